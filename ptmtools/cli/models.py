@@ -84,15 +84,17 @@ def _images(found: Inspection) -> str:
 
 
 def _say_space(voice: Voice, found: Inspection) -> None:
-    scene, best, other = found.scene, found.best, found.runner_up
+    scene = found.scene
     space = scene.space
     width, height, depth = (scene.points.max(axis=0) - scene.points.min(axis=0)).tolist()
     _row(voice, "size", f"{width:.3g} x {depth:.3g} m, {height:.3g} m high")
     guessed = "guessed" if space.unit_guessed else "given"
     _row(voice, "unit", f"{space.metres:g} m ({guessed})")
     _row(voice, "up axis", f"{space.up} ({'guessed' if space.up_guessed else 'given'})")
-    _row(voice, "looks like", _guess(best))
-    _row(voice, "or like", _guess(other))
+    _row(voice, "looks like", _guess(found.best))
+    for place, other in enumerate(found.others):
+        if place == 0 or other.rival:
+            _row(voice, "or like", _guess(other))
 
 
 def _guess(guess: Guess) -> str:
@@ -132,7 +134,7 @@ def _record(found: Inspection, around: Enclosure) -> dict[str, Any]:
         "images": [asdict(image) for image in found.images],
         "space": vars(scene.space),
         "size": (scene.points.max(axis=0) - scene.points.min(axis=0)).tolist(),
-        "looks": [asdict(found.best), asdict(found.runner_up)],
+        "looks": [asdict(guess) for guess in (found.best, *found.others)],
         "enclosure": asdict(around) | {"closed": around.closed},
         "storeys": [vars(storey) for storey in scene.storeys],
         "notes": [vars(note) for note in scene.notes],

@@ -176,6 +176,8 @@ def _say_stage(voice: Voice, as_json: bool, stage: StageReport) -> None:
             voice.say(f"{'':<22}because {reason}")
     for warning in stage.warnings:
         voice.say(f"warning: {warning}")
+    for note in filter(_is_runner_up, stage.further):
+        voice.say(f"note: {note}")
 
 
 def print_report(voice: Voice, report: BuildReport, as_json: bool) -> None:
@@ -185,7 +187,7 @@ def print_report(voice: Voice, report: BuildReport, as_json: bool) -> None:
         return
     memory = f", at most {size(report.peak_memory)} of memory" if report.peak_memory else ""
     voice.say(f"{'all':<9}{report.seconds:>8.1f} s{memory}")
-    further = [note for stage in report.stages for note in stage.further]
+    further = [n for stage in report.stages for n in stage.further if not _is_runner_up(n)]
     for note in further if voice.verbose else ():
         voice.say(f"note: {note}")
     if further and not voice.verbose:
@@ -211,6 +213,13 @@ def print_report(voice: Voice, report: BuildReport, as_json: bool) -> None:
         width = max(map(len, commands))
         for command, purpose in commands.items():
             voice.say(f"  {command:<{width}}  {purpose}")
+
+
+def _is_runner_up(note: str) -> bool:
+    """Whether a note is shown beside its stage although it is no warning."""
+    from ptmtools.scene.notes import RUNNER_UP
+
+    return note.endswith(f"[{RUNNER_UP}]")
 
 
 def print_visitor(voice: Voice, visitor: Visitor) -> None:

@@ -15,7 +15,7 @@ from ptmtools.scene.gltf.document import document_json, outcome_of
 from ptmtools.scene.ingestion import ingest
 from ptmtools.scene.model import Scene, SourceImage
 from ptmtools.scene.options import IngestOptions
-from ptmtools.scene.up_axis import Named, Reading, Up, looks, readings
+from ptmtools.scene.up_axis import USUAL_UP, Named, Reading, Up, looks, readings
 from ptmtools.texture.images.opening import opened
 from ptmtools.texture.model import Limits
 
@@ -55,13 +55,15 @@ class ImageFacts:
 
 @dataclass(frozen=True)
 class Guess:
-    """A reading of the model (`readings`): what it would be, why, and how unusual that is."""
+    """A reading of the model (`readings`): what it would be, why, how unusual that is, and whether
+    it costs at most `RUNNER_UP` times as much as the best one."""
 
     unit: str
     up: Up
     size: str
     reasons: tuple[str, ...]
     cost: float
+    rival: bool
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,9 @@ class Inspection:
     extensions: of glTF, by name, with what becomes of each.
     objects: by name, with the triangles of all objects of that name, those with most first.
     images: that faces use, in the order of the file.
-    best, runner_up: the likeliest reading of its looks, and the next that has another unit or axis.
+    best: the likeliest reading of its looks.
+    others: the likeliest one with the other axis up, and the likeliest one with the same axis up
+        and another unit; the likelier first.
     scene: all of it as it would be built.
     """
 
@@ -85,7 +89,7 @@ class Inspection:
     objects: dict[str, int]
     images: tuple[ImageFacts, ...]
     best: Guess
-    runner_up: Guess
+    others: tuple[Guess, ...]
     scene: Scene
 
 
@@ -104,7 +108,7 @@ def inspect(
     count = Counter[str]()
     for index, triangles in enumerate(np.bincount(scene.triangle_object).tolist()):
         count[scene.objects[index]] += triangles
-    best, runner_up = _guesses(scene)
+    best, *others = _guesses(scene, USUAL_UP.get(suffix))
     return Inspection(
         format=" ".join(part for part in (_FORMATS.get(suffix, suffix), version) if part),
         generator=str(tree.get("asset", {}).get("generator", "")),
@@ -113,7 +117,7 @@ def inspect(
         objects=dict(count.most_common()),
         images=tuple(_facts(image, options) for image in scene.images),
         best=best,
-        runner_up=runner_up,
+        others=tuple(others),
         scene=scene,
     )
 
@@ -131,8 +135,9 @@ def _facts(image: SourceImage, options: IngestOptions) -> ImageFacts:
     return ImageFacts(image.name, found.format or "", *found.size, len(data))
 
 
-def _guesses(scene: Scene) -> tuple[Guess, Guess]:
-    """The likeliest reading by the looks of the model, in its own unit and axes, and the next."""
+def _guesses(scene: Scene, usual: Up | None) -> list[Guess]:
+    """The likeliest reading by the looks of the model, in its own unit and axes, then the likeliest
+    ones of the other axis and of another unit."""
     space = scene.space
     points = scene.points / space.metres
     if space.up == "z":  # the way back from `space.turned`
@@ -141,10 +146,20 @@ def _guesses(scene: Scene) -> tuple[Guess, Guess]:
         (scene.objects, scene.triangle_object),
         ([material.name for material in scene.materials], scene.triangle_material),
     )
-    best, runner_up = readings(looks(points, scene.triangles, named))[:2]
-    return _guess(best, runner_up), _guess(runner_up, best)
+    ranked = readings(looks(points, scene.triangles, named), usual=usual)
+    best = ranked[0]
+    axis = next(reading for reading in ranked if reading.up != best.up)
+    unit = next(reading for reading in ranked[1:] if reading.up == best.up)
+    others = [reading for reading in ranked if reading in (axis, unit)]
+    return [_guess(best, others[0]), *(_guess(other, best) for other in others)]
 
 
 def _guess(reading: Reading, other: Reading) -> Guess:
-    reasons = tuple(reading.reasons(other))
-    return Guess(reading.unit, reading.up, reading.size, reasons, round(reading.cost, 3))
+    return Guess(
+        unit=reading.unit,
+        up=reading.up,
+        size=reading.size,
+        reasons=tuple(reading.reasons(other)),
+        cost=round(reading.cost, 3),
+        rival=reading.rivals(other),
+    )

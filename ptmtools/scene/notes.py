@@ -28,6 +28,8 @@ WARNINGS = (
 )
 
 
+#: The runner-up of the up axis: no warning, and shown without ``-v`` all the same.
+RUNNER_UP = "PTM-N238"
 #: Of no meaning where a model is looked at from outside, as statues and the buildings of a campus
 #: are: there a face that is turned away from all rooms is as it should be.
 OF_ROOMS = frozenset({"PTM-N235"})

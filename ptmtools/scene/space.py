@@ -22,8 +22,10 @@ from ptmtools.scene.source import Findings
 from ptmtools.scene.up_axis import (
     CLOSE_AXIS,
     CLOSE_UNIT,
+    CONVENTION,
     DOUBT_AXIS,
     UNITS,
+    USUAL_UP,
     Named,
     Reading,
     Up,
@@ -85,10 +87,13 @@ def settle(
     metres, up = said.metres or by_format.metres, said.up or by_format.up
     if said.metres is None or said.up is None:
         seen = looks(points, triangles, named)
-        judged = said.up or _judge_axis(readings(seen, metres), by_format.up, findings)
+        usual = None if by_format.up else USUAL_UP.get(model.suffix.lower())
+        ranked = readings(seen, metres, usual)
+        judged = said.up or _judge_axis(ranked, by_format.up, findings)
         up = up or judged
         if said.metres is None:
-            upright = [reading for reading in readings(seen) if reading.up == judged]
+            ranked = readings(seen, usual=usual)
+            upright = [reading for reading in ranked if reading.up == judged]
             metres = _judge_unit(upright, by_format.metres, findings)
     assert metres
     assert up
@@ -117,7 +122,8 @@ def _judge_axis(ranked: list[Reading], by_format: Up | None, findings: Findings)
     """The axis that is up by the looks of the model, and a note on it."""
     best = ranked[0]
     rival = next(reading for reading in ranked if reading.up != best.up)
-    ahead = rival.cost - best.cost
+    # A convention decides, but leaves the model as uncertain as it looks.
+    ahead = rival.cost - best.cost - rival.costs[CONVENTION]
     for_best, for_rival = _because(best, rival), _because(rival, best)
     if by_format:
         # What is flat has no rooms that could lie on their side.
@@ -148,6 +154,13 @@ def _judge_axis(ranked: list[Reading], by_format: Up | None, findings: Findings)
         findings.say(
             "PTM-N202", f"up axis guessed: {best.up}, {best.size}{for_best}; give --up to override"
         )
+        if rival.rivals(best):
+            unit = f" in {rival.unit}" if rival.unit != best.unit else ""
+            findings.say(
+                "PTM-N238",
+                f"the runner-up is {rival.up} up{unit}: {rival.size}{for_rival}; give "
+                f"--up {rival.up} to take it",
+            )
     return best.up
 
 

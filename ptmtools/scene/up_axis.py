@@ -9,7 +9,9 @@ without floors, 19 × 11.4 × 3 m, is then laid on its side: its walls are all t
 is. That walls go in two directions tells it from a building with floors and no walls on two sides.
 How alike free heights are says little by itself (25 % of the height upright and 59 % lying in the
 gallery); that they are lower than rooms are wide says more than the same of the whole building: it
-holds in towers.
+holds in towers. Comparing the free height that most space has, instead of the median by space: in
+an atrium with arcades whose outer walls are hollow from the ground to the roof, the hollow is the
+commonest height, 13.6 m, and outweighs the arcades.
 
 What a model looks like with one or the other of its axes up: the signs by which `space` judges.
 
@@ -96,6 +98,7 @@ class Look:
     built: the width of what has rooms, without the ground around it; all of it if nothing has.
     room: the free height that most space has; 0 if nothing lies over anything.
     alike: how much of the height rooms of this height take up, on average.
+    median: half of the space has at most this free height; 0 if nothing lies over anything.
     level: area of level faces, as a share of all.
     upright: area of level and of upright faces, as a share of all.
     crossed: how far walls go in two directions: 0 if all are parallel, 1 if as many are square to
@@ -109,6 +112,7 @@ class Look:
     built: float
     room: float
     alike: float
+    median: float
     level: float
     upright: float
     crossed: float
@@ -133,7 +137,7 @@ def looks(points: Floats, triangles: NDArray[np.integer], named: Named) -> dict[
         slope = np.abs(normal[:, axis])
         lies, stands = slope > _LEVEL, slope < _UPRIGHT
         wall = area * stands
-        room, alike = _free_height(crossed[axis], float(side[axis]) / scale)
+        room, alike, median = _free_height(crossed[axis], float(side[axis]) / scale)
         width = float(side[[u, v]].max())
         as_called = float(area @ ((level & lies) | (upright & stands)))
         doors = [np.ptp(local[triangles[each], axis]) for each in named.doors]
@@ -143,6 +147,7 @@ def looks(points: Floats, triangles: NDArray[np.integer], named: Named) -> dict[
             built=_built(lines, crossed[axis], axis, room) * scale or width,
             room=room * scale,
             alike=alike,
+            median=median * scale,
             level=float(area @ lies) / total,
             upright=float(area @ (lies | stands)) / total,
             crossed=_least_of_greatest(
@@ -188,25 +193,33 @@ def _built(lines: SampleLines, crossed: Crossings, axis: int, room: float) -> fl
     return max(float(np.ptp(row[i])) if len(i) else 0.0 for row, i in zip((u, v), at, strict=True))
 
 
-def _free_height(crossed: Crossings, height: float) -> tuple[float, float]:
-    """The free height that most space has, and how much of the height of the model it takes up, on
-    average over the lines that cross it twice."""
+def _free_height(crossed: Crossings, height: float) -> tuple[float, float, float]:
+    """The free height that most space has; how much of the height of the model it takes up, on
+    average over the lines that cross it twice; and the median of all free heights, by space."""
     before, gaps = crossed.gaps()
     if not len(gaps) or not height > 0:
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     lines = len(np.unique(crossed.line[before]))
     gaps = np.sort(gaps)
     reach = np.concatenate([[0.0], np.cumsum(gaps)])
     end = np.searchsorted(gaps, gaps * (1 + _SAME), "right")
     space = reach[end] - reach[:-1]
     most = int(space.argmax())
-    return float(space[most] / (end[most] - most)), float(space[most] / (lines * height))
+    median = gaps[np.searchsorted(reach[1:], reach[-1] / 2)]
+    room, share = space[most] / (end[most] - most), space[most] / (lines * height)
+    return float(room), float(share), float(median)
 
 
 #: Metres in one unit, in the order of preference where two are equally plausible.
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 #: What a unit costs beforehand.
 PRIOR = {"m": 0.0, "cm": 0.1, "mm": 0.1, "in": 0.5, "ft": 0.5}
+#: The up axis by the convention of a format that does not record one, and the cost of the other
+#: axis. OBJ: Y. Real OBJ files with Z up cost at least 1.5 more with Y up before this.
+USUAL_UP: dict[str, Up] = {".obj": "y"}
+CONVENTION, UNUSUAL_UP = "a usual up axis", 0.75
+#: A runner-up is printed if it costs at most this many times as much as the best reading.
+RUNNER_UP = 3.0
 #: Heights of buildings in metres: below the first nobody can stand; above the second it has
 #: several storeys, which is less usual and not impossible.
 HEIGHTS = (2.0, 15.0)
@@ -265,6 +278,10 @@ class Reading:
         rooms = f", free height mostly {look.room * metres:.3g} m" if look.room else ""
         return f"{width:.3g} m wide and {height:.3g} m high{rooms}"
 
+    def rivals(self, other: Reading) -> bool:
+        """Whether it is cheap enough, compared with the best, to be printed as the runner-up."""
+        return self.cost <= RUNNER_UP * other.cost
+
     def reasons(self, other: Reading) -> list[str]:
         """What speaks for it rather than for the other, the weightiest first."""
         gain = {words: other.costs[words] - cost for words, cost in self.costs.items()}
@@ -272,13 +289,16 @@ class Reading:
         return sorted(telling, key=lambda words: -gain[words])
 
 
-def readings(looks: Mapping[Up, Look], metres: float | None = None) -> list[Reading]:
+def readings(
+    looks: Mapping[Up, Look], metres: float | None = None, usual: Up | None = None
+) -> list[Reading]:
     """The readings of a model that looks like this with each axis up, the likeliest first, in every
-    unit or in the one that is known."""
+    unit or in the one that is known. ``usual`` is the up axis by convention (`USUAL_UP`)."""
     names = {each: name for name, each in UNITS.items()}
     units = UNITS if metres is None else {names.get(metres, ""): metres}
+    axis = {up: {CONVENTION: UNUSUAL_UP * (usual not in (None, up))} for up in looks}
     found = [
-        Reading(up, each, unit, look, _costs(look, looks[_OTHER[up]], unit, each))
+        Reading(up, each, unit, look, _costs(look, looks[_OTHER[up]], unit, each) | axis[up])
         for up, look in looks.items()
         for unit, each in units.items()
     ]
@@ -292,7 +312,7 @@ _OTHER: dict[Up, Up] = {"y": "z", "z": "y"}
 def _costs(look: Look, other: Look, unit: str, metres: float) -> dict[str, float]:
     level = look.level + other.level
     # Where nothing lies over anything, there are no rooms to compare.
-    rooms = _higher(look.room, other.room) if look.room and other.room else 0.5
+    rooms = _higher(look.median, other.median) if look.room and other.room else 0.5
     return {
         "more level faces": 1 - look.level / level if level else 0.5,
         "wider than high": 0.75 * _higher(look.height, other.height),

@@ -106,3 +106,14 @@ def test_a_house_of_walls_stands_up(ptm: Ptm, tmp_path: Path) -> None:
     path.write_text(obj_text(house(floor=False, roof=False)))
     out = ptm("cells", path).out
     assert "z up (unit and up axis guessed); 19.2 × 11.6 m, 3 m high" in out
+
+
+def test_the_runner_up_of_the_up_axis_is_shown_with_its_stage(ptm: Ptm, tmp_path: Path) -> None:
+    """Of OBJ with Z up, which is not its convention; not of two rooms with Y up."""
+    path = tmp_path / "house.obj"
+    path.write_text(obj_text(house()))
+    lines = ptm("cells", path).out.splitlines()
+    assert lines[1].startswith("note: the runner-up is y up: 19.2 m wide and 11.6 m high, ")
+    assert lines[1].endswith("; give --up y to take it [PTM-N238]")
+    assert sum("PTM-N238" in line for line in ptm("cells", path, "-v").out.splitlines()) == 1
+    assert "PTM-N238" not in ptm("cells", MODEL).out

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from ptmtools.arrays import Floats, Ints
@@ -236,3 +238,123 @@ def obj_text(triangles: Floats) -> str:
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
     lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
     return "\n".join(lines) + "\n"
+
+
+def atrium() -> Floats:
+    """Two storeys of arcades around a courtyard without a roof, 37.2 × 22.9 m and 15.6 m high.
+
+    As in Sponza: round columns carry the arches, a vault spans each aisle, and between the back
+    wall of the aisles and the outer wall the building is hollow from the ground to the roof. Walls
+    are sheets.
+    """
+    wide, deep, high, base = 37.21, 22.87, 14.3, -1.26
+    low, end = (5.9, 7.3), (31.3, 15.57)  # corners of the courtyard
+    back = 3.2  # from the arches to the wall behind them
+    parts = [
+        _ring((0, 0), (wide, deep), base, high),
+        _ring((low[0] - back, low[1] - back), (end[0] + back, end[1] + back), 0, high - 1.4),
+        sheet((0, 0, 0), (wide, 0, 0), (wide, deep, 0), (0, deep, 0)),
+        sheet((0, 0, base), (0, deep, base), (wide, deep, base), (wide, 0, base)),
+    ]
+    storeys = ((0.0, 2.6, 4.7, 5.2), (5.2, 7.4, 9.0, 11.6))  # floor, springing, crown, top
+    for along, across in ((0, low[1]), (0, end[1]), (1, low[0]), (1, end[0])):
+        span = low[along], end[along]
+        behind = across - back if across == low[1 - along] else across + back
+        for floor, springing, crown, top in storeys:
+            parts.append(_arcade(along, span, across, (floor, springing, crown, top)))
+            parts.append(_vault(along, span, (across, behind), springing, crown))
+        parts.append(_strip(along, span, (across, behind), 5.2, 5.2))
+    # The roof falls towards the courtyard.
+    rim = [(low[0], low[1]), (end[0], low[1]), (end[0], end[1]), (low[0], end[1])]
+    outer = [(0.0, 0.0), (wide, 0.0), (wide, deep), (0.0, deep)]
+    for k in range(4):
+        a, b, c, d = rim[k - 1], rim[k], outer[k], outer[k - 1]
+        parts.append(sheet((*a, 11.6), (*b, 11.6), (*c, high), (*d, high)))
+    return np.concatenate(parts)
+
+
+def _ring(a: tuple[float, float], b: tuple[float, float], low: float, high: float) -> Floats:
+    """Four walls of no thickness."""
+    rim = [a, (b[0], a[1]), b, (a[0], b[1])]
+    return np.concatenate(
+        [
+            sheet((*rim[k - 1], low), (*rim[k], low), (*rim[k], high), (*rim[k - 1], high))
+            for k in range(4)
+        ]
+    )
+
+
+def _strip(
+    along: int, span: tuple[float, float], across: tuple[float, float], z0: float, z1: float
+) -> Floats:
+    """A sheet along an axis, at one height on one of its sides, at another on the other."""
+    corner = [(span[0], across[0], z0), (span[1], across[0], z0)]
+    corner += [(span[1], across[1], z1), (span[0], across[1], z1)]
+    return sheet(*((s, c, z) if along == 0 else (c, s, z) for s, c, z in corner))
+
+
+def _arcade(
+    along: int,
+    span: tuple[float, float],
+    across: float,
+    levels: tuple[float, float, float, float],
+) -> Floats:
+    """Columns, and a wall 60 cm thick upon their arches; across: where its middle lies."""
+    floor, springing, crown, top = levels
+    bays = max(2, round((span[1] - span[0]) / 4.2))
+    bay = (span[1] - span[0]) / bays
+    half = bay / 2 - 0.45
+    rise = min(half, crown - springing)
+    parts = []
+
+    def at(s: float, c: float, z: float) -> Point:
+        return (s, c, z) if along == 0 else (c, s, z)
+
+    for k in range(bays):
+        middle = span[0] + (k + 0.5) * bay
+        angle = np.linspace(np.pi, 0, 13)
+        arch = [(middle + half * np.cos(v), springing + rise * np.sin(v)) for v in angle]
+        edge = [(middle - bay / 2, springing), *arch, (middle + bay / 2, springing)]
+        for (s0, z0), (s1, z1) in pairwise(edge):
+            near, far = across - 0.3, across + 0.3
+            for c in (near, far):
+                if s1 > s0:
+                    parts.append(
+                        sheet(at(s0, c, z0), at(s1, c, z1), at(s1, c, top), at(s0, c, top))
+                    )
+            parts.append(
+                sheet(at(s0, near, z0), at(s1, near, z1), at(s1, far, z1), at(s0, far, z0))
+            )
+    turn = np.linspace(0, 2 * np.pi, 13)
+    for s in np.linspace(*span, bays + 1).tolist():
+        rim = [(s + 0.4 * np.cos(v), across + 0.4 * np.sin(v)) for v in turn]
+        parts += [
+            sheet(at(*a, floor), at(*b, floor), at(*b, springing), at(*a, springing))
+            for a, b in pairwise(rim)
+        ]
+    return np.concatenate(parts)
+
+
+def _vault(
+    along: int,
+    span: tuple[float, float],
+    across: tuple[float, float],
+    springing: float,
+    crown: float,
+) -> Floats:
+    """A barrel over an aisle between two lines."""
+    middle, half = (across[0] + across[1]) / 2, abs(across[1] - across[0]) / 2
+    rim = [
+        (middle + half * np.cos(v), springing + (crown - springing) * np.sin(v))
+        for v in np.linspace(0, np.pi, 13)
+    ]
+
+    def at(s: float, c: float, z: float) -> Point:
+        return (s, c, z) if along == 0 else (c, s, z)
+
+    return np.concatenate(
+        [
+            sheet(at(span[0], *a), at(span[1], *a), at(span[1], *b), at(span[0], *b))
+            for a, b in pairwise(rim)
+        ]
+    )

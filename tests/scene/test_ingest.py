@@ -32,7 +32,7 @@ def rgba(alpha: int, where: tuple[slice, slice] = (slice(None), slice(None))) ->
 
 def said(scene: Scene) -> list[tuple[str, str]]:
     """Codes and places of the notes, but for the guesses that every model brings."""
-    guesses = ("PTM-N201", "PTM-N202", "PTM-N232")
+    guesses = ("PTM-N201", "PTM-N202", "PTM-N232", "PTM-N238")
     return [(note.code, note.place) for note in scene.notes if note.code not in guesses]
 
 

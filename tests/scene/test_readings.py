@@ -16,6 +16,7 @@ from ptmtools.scene.up_axis import (
     CLOSE_AXIS,
     CLOSE_UNIT,
     UNITS,
+    UNUSUAL_UP,
     Look,
     Named,
     Reading,
@@ -25,6 +26,7 @@ from ptmtools.scene.up_axis import (
 )
 
 from .made import (
+    atrium,
     box,
     corridor,
     divided,
@@ -83,9 +85,10 @@ UNSURE = {
 FAR = np.array([512_345.0, 5_400_123.0, 250.0])
 
 
-def read(triangles: Floats, named: Named | None = None) -> list[Reading]:
+def read(triangles: Floats, usual: Up | None = None) -> list[Reading]:
     points, faces = welded(triangles)
-    return readings(looks(points, faces, named or Named(*np.zeros((2, len(faces)), dtype=bool))))
+    named = Named(*np.zeros((2, len(faces)), dtype=bool))
+    return readings(looks(points, faces, named), usual=usual)
 
 
 def axis_ahead(ranked: list[Reading]) -> float:
@@ -106,6 +109,32 @@ def test_what_is_up(name: str, up: Up) -> None:
     assert (ranked[0].up, ranked[0].unit) == (up, "m")
     assert axis_ahead(ranked) >= CLOSE_AXIS
     assert unit_ahead(ranked) >= CLOSE_UNIT
+
+
+@pytest.mark.parametrize("name", SURE)
+def test_a_convention_is_not_stronger_than_what_is_seen(name: str) -> None:
+    """OBJ files have Y up by convention, and many have Z up."""
+    ranked = read(SURE[name], "y")
+    assert ranked[0].up == "z" or axis_ahead(read(SURE[name])) < UNUSUAL_UP
+
+
+@pytest.mark.parametrize("name", UNSURE)
+def test_a_convention_decides_where_nothing_is_seen(name: str) -> None:
+    up = read(y_up(UNSURE[name]), "y")[0].up
+    assert up == "y"
+
+
+def test_a_courtyard_with_arcades_does_not_turn_over() -> None:
+    """An atrium like Sponza, in centimetres with Y up: there the space between the back walls of
+    the arcades and the outer walls is 13.6 m high, and the court has no roof."""
+    ranked = read(y_up(atrium()) * 100, "y")
+    best = ranked[0]
+    assert np.allclose(np.ptp(y_up(atrium()) * 100, axis=(0, 1)), [3721, 1556, 2287], atol=1)
+    assert (best.up, best.unit) == ("y", "cm")
+    assert axis_ahead(ranked) >= CLOSE_AXIS
+    assert "a usual up axis" in best.reasons(next(r for r in ranked if r.up == "z"))
+    assert read(y_up(atrium()) * 100)[0].up == "y"
+    assert read(atrium() * 100)[0].up == "z"
 
 
 def test_the_width_that_counts_is_that_of_rooms() -> None:
@@ -191,7 +220,7 @@ def test_words_in_names() -> None:
     assert [leaf.tolist() for leaf in named.doors] == [[5]]
 
 
-PLAIN = Look(20, 6, 20, 3, 0.5, 0.5, 1.0, 0.5, 1.0, 0.0)
+PLAIN = Look(20, 6, 20, 3, 0.5, 3, 0.5, 1.0, 0.5, 1.0, 0.0)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from ptmtools.scene.source import Findings
 from ptmtools.scene.space import UNITS, Said, parse_unit, settle, turned
 from ptmtools.scene.up_axis import Named
 
-from .made import box, corridor, house, site_plan, tower, welded, y_up
+from .made import atrium, box, corridor, house, site_plan, tower, welded, y_up
 
 
 @pytest.mark.parametrize(
@@ -55,21 +55,39 @@ def told(triangles: Floats, said: Said = Said(), by_format: Said = Said()) -> tu
 def test_guesses_are_noted() -> None:
     space, notes = told(house() / 0.0254)
     assert (space.metres, space.up, space.unit_guessed, space.up_guessed) == (0.0254, "z", 1, 1)
-    assert list(notes) == ["PTM-N202", "PTM-N201"]
+    assert list(notes) == ["PTM-N202", "PTM-N238", "PTM-N201"]
     assert notes["PTM-N202"].startswith(
         "up axis guessed: z, 19.2 m wide and 3.5 m high, free height"
     )
     assert "rooms wider than high" in notes["PTM-N202"]
     assert notes["PTM-N201"].startswith("unit guessed: in (it would be 19.2 m wide")
+    assert notes["PTM-N238"].startswith("the runner-up is y up in cm: 7.56 m wide and 4.57 m high")
+    assert notes["PTM-N238"].endswith("give --up y to take it")
+
+
+def test_a_runner_up_far_behind_is_not_noted() -> None:
+    """Two storeys of rooms, Y up as an OBJ file should have it."""
+    _, notes = told(y_up(house(storeys=2)))
+    assert list(notes) == ["PTM-N202", "PTM-N201"]
+    _, notes = told(house(storeys=2))
+    assert list(notes) == ["PTM-N202", "PTM-N238", "PTM-N201"]
+
+
+def test_an_uncertain_courtyard_is_noted_although_a_convention_decides() -> None:
+    space, notes = told(y_up(atrium()) * 100)
+    assert (space.up, space.metres) == ("y", 0.01)
+    assert "y is taken, 37.2 m wide and 15.6 m high" in notes["PTM-N232"]
+    assert "z is nearly as likely, 37.2 m wide and 22.9 m high" in notes["PTM-N232"]
 
 
 def test_what_is_uncertain_is_noted_with_the_runner_up() -> None:
     space, notes = told(box((0, 0, 0), (300, 300, 300)))
     assert space.metres == 0.01
     assert list(notes) == ["PTM-N232", "PTM-N201"]
+    assert space.up == "y"
     assert notes["PTM-N232"].endswith("give --up y or --up z")
     _, notes = told(house() / 0.3048)
-    assert list(notes) == ["PTM-N202", "PTM-N233"]
+    assert list(notes) == ["PTM-N202", "PTM-N238", "PTM-N233"]
     assert "m is taken" in notes["PTM-N233"]
     assert "ft is nearly as likely (19.2 m wide" in notes["PTM-N233"]
     assert notes["PTM-N233"].endswith("give --unit m or --unit ft")
@@ -82,7 +100,7 @@ def test_what_is_given_is_not_judged() -> None:
     space, notes = told(y_up(house()), Said(up="y"))
     assert (space.up, space.up_guessed, list(notes)) == ("y", False, ["PTM-N201"])
     space, notes = told(house(), Said(metres=1.0))
-    assert (space.up, space.unit_guessed, list(notes)) == ("z", False, ["PTM-N202"])
+    assert (space.up, space.unit_guessed, list(notes)) == ("z", False, ["PTM-N202", "PTM-N238"])
 
 
 def test_a_format_is_believed_and_doubted() -> None:

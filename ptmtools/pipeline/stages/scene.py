@@ -45,8 +45,8 @@ def _summary(n: Mapping[str, Any]) -> str:
 SCENE: Stage[Scene] = Stage(
     name="scene",
     about="Read a model.",
-    recipe=6,
-    changed="colours of vertices, alpha cutoffs, masks and mirrored textures are kept",
+    recipe=7,
+    changed="the up axis of an OBJ file is guessed by its convention, too",
     options=IngestOptions,
     artifact=Lazy("ptmtools.scene.model:Scene"),
     counts=_counts,
