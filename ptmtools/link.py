@@ -106,5 +106,5 @@ def _refused(problem: str, place: str | None) -> InputError:
         "PTM-I710",
         f"no trace of a network: {problem}",
         place=place,
-        remedy="see docs/design/walkthrough.md#traces",
+        remedy="see docs/formats/walk.md#traces",
     )
