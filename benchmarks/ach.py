@@ -45,10 +45,10 @@ from ptmtools.coverage.item_buffer import VIEWS
 from ptmtools.coverage.options import PRESETS, AchOptions
 from ptmtools.coverage.sampling import CellHints, Sampler
 from ptmtools.errors import MissingComponentError
-from ptmtools.executors import open_executor
 from ptmtools.lab.tradeoff.experiment import run
 from ptmtools.lab.tradeoff.report import as_csv, picture
 from ptmtools.lab.tradeoff.stages import CoverageTrade
+from ptmtools.parallel import open_executor
 from ptmtools.scene import ingest
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs

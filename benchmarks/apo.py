@@ -21,11 +21,11 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "sample_data")]
 
-from ptmtools.executors import open_executor  # noqa: E402
 from ptmtools.neighbours.apo.files import streamed  # noqa: E402
 from ptmtools.neighbours.apo.making import Made, make_apo  # noqa: E402
 from ptmtools.neighbours.apo.model import ApoOptions  # noqa: E402
 from ptmtools.neighbours.apo.warm_up import warm_up  # noqa: E402
+from ptmtools.parallel import open_executor  # noqa: E402
 from ptmtools.scene import IngestOptions, ingest  # noqa: E402
 
 #: Model, triangles, faces, seconds, MB, frames a second.

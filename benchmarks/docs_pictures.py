@@ -36,10 +36,10 @@ from render import LOOKS, View, load, render  # noqa: E402
 
 from ptmtools import texture  # noqa: E402
 from ptmtools.cli.main import main as command  # noqa: E402
-from ptmtools.executors import open_executor  # noqa: E402
 from ptmtools.neighbours.apo.making import make_apo, smooth, welded  # noqa: E402
 from ptmtools.neighbours.apo.model import ApoOptions  # noqa: E402
 from ptmtools.neighbours.apo.picture import RenderOptions, render as draw_octree  # noqa: E402
+from ptmtools.parallel import open_executor  # noqa: E402
 from ptmtools.scene.model import Material, Scene  # noqa: E402
 from ptmtools.scene.orientation import tolerance_of  # noqa: E402
 from ptmtools.texture import read_image  # noqa: E402

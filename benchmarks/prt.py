@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.executors import open_executor
+from ptmtools.parallel import open_executor
 from ptmtools.portal_flow.double_double import SequenceTest
 from ptmtools.portal_flow.flow import PortalFlow, Portals, geometry, leaf_matrix, portal_flow
 from ptmtools.tolerance import Tolerance

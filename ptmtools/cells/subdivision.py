@@ -50,8 +50,7 @@ from ptmtools.cells.rooms import grouped
 from ptmtools.cells.sight import seen_from_places
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
-from ptmtools.executors.model import Executor
-from ptmtools.executors.serial import Serial
+from ptmtools.parallel import Executor
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.scene.orientation import main_axes
@@ -129,7 +128,7 @@ def subdivide(
     wide = replace(wide, points=wide.points @ axes)
     tight = _thickened(*bounds(corners if len(corners) else scene.corners), tolerance)
     notes = of_detail(scene, building.structure.detail)
-    executor = executor or Serial()
+    executor = executor or Executor()
     clipped = executor.submit(divide_inside, building, tight, long=len(scene.triangles) >= LARGE)
     try:
         space = divide(building, wide, progress)

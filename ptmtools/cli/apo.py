@@ -97,10 +97,9 @@ def apo(
 def _make(
     voice: Voice, model: str, folder: str, values: dict[str, Any], workers: int, force: bool
 ) -> None:
-    from ptmtools.executors import open_executor
-    from ptmtools.executors.model import processors
     from ptmtools.neighbours.apo.files import FORM, files_of
     from ptmtools.neighbours.apo.making import make_apo
+    from ptmtools.parallel import open_executor, processors
     from ptmtools.scene import ingest
     from ptmtools.scene.notes import outside, warnings
 

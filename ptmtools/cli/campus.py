@@ -42,8 +42,8 @@ def campus(
     if not model or not folder:
         raise click.UsageError("a name is empty")
     options, reading = take(CampusOptions, values), take(IngestOptions, values)
-    from ptmtools.executors.local import open_executor
     from ptmtools.neighbours.campus.building import make_campus
+    from ptmtools.parallel import open_executor
     from ptmtools.scene.notes import line, outside, warnings
 
     with voice.progress() as progress, open_executor(workers) as executor:

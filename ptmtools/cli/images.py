@@ -22,7 +22,7 @@ from ptmtools.cli.batch import (
 )
 from ptmtools.cli.parameters import Numbers, options_of, take
 from ptmtools.errors import InputError, OutputError, naming
-from ptmtools.executors.model import processors
+from ptmtools.parallel import processors
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Description, EncodeOptions
 from ptmtools.texture.profiles import PROFILES

@@ -22,7 +22,7 @@ _SHOWN = 5
 def info_model(voice: Voice, target: str, options: IngestOptions, as_json: bool) -> None:
     """Reads a model and prints what it is. Raises what `ptmtools.scene.ingest` raises."""
     from ptmtools.cells.entrances import enclosure
-    from ptmtools.executors.model import processors
+    from ptmtools.parallel import processors
     from ptmtools.scene.inspection import inspect
 
     with voice.progress() as progress:

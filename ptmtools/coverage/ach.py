@@ -24,8 +24,7 @@ from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
 from ptmtools.coverage.sampling import RULE_OF_THREE, CellHints, Sampler, estimate
 from ptmtools.errors import InputError, MissingComponentError
-from ptmtools.executors.model import Executor
-from ptmtools.executors.serial import Serial
+from ptmtools.parallel import Executor
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
@@ -74,7 +73,7 @@ def compute_ach(
     pvs: Pvs,
     options: AchOptions = AchOptions(),  # noqa: B008 - a frozen value
     progress: Progress = silent,
-    executor: Executor = Serial(),  # noqa: B008 - has no state
+    executor: Executor = Executor(),  # noqa: B008 - has no state
 ) -> Ach:
     """The coverage hints of every cell, aligned with ``pvs`` (paper §5).
 
@@ -91,7 +90,7 @@ def compute_ach(
     rays = points * len(VIEWS) * options.side**2
     count = cells.cell_count
     worth = rays * count >= 2 * WORTH_A_PROCESS
-    doer = executor if backend.in_processes and executor.workers > 1 and worth else Serial()
+    doer = executor if backend.in_processes and executor.workers > 1 and worth else Executor()
     chunk = int(max(1, min(TASK // rays, count // (4 * doer.workers))))
     found: list[CellHints] = []
     sampler = Sampler(scene, cells, pvs, options, backend)

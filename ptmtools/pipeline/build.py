@@ -20,7 +20,7 @@ from typing import Any, Literal
 
 from ptmtools.ahead import Task, compile_ahead
 from ptmtools.lazy import Lazy
-from ptmtools.pipeline.background import Workers
+from ptmtools.parallel import Workers
 from ptmtools.pipeline.command import naming_command
 from ptmtools.pipeline.report import BuildReport, StageReport, peak_memory
 from ptmtools.pipeline.run import Artifacts, Run, reasons, work_of

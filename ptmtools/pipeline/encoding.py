@@ -1,14 +1,30 @@
-"""One image as a task: the bytes of a `.ptm`, what its levels show, and of its fallback image."""
+"""Encodes one image as a task: a `.ptm`, the `Detail` of its levels, a fallback image.
+
+`encoded_image` takes and returns bytes. `encoded_there` is for processes, of this machine or
+others, that see the disk of the database: only names and digests travel. (The bytes of images
+and textures would keep the process that builds so busy that it serves eight workers and no more,
+docs/design/scaling.md.) A worker writes to a folder with a new name in every run, so one that an
+interrupted run has left behind writes nowhere.
+"""
 
 from __future__ import annotations
 
 import io
 import json
-from dataclasses import asdict, replace
+import secrets
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ptmtools.errors import naming
+from ptmtools.errors import WorkerError, naming
+from ptmtools.files import write_bytes
+from ptmtools.parallel import Executor
 from ptmtools.pipeline.options import TextureOptions
+from ptmtools.store.layout import IMAGES, STAGING, sha256
+from ptmtools.store.transaction import Transaction
 
 if TYPE_CHECKING:
     from ptmtools.texture.detail import Detail
@@ -46,6 +62,86 @@ def encoded_image(options: TextureOptions, image: tuple[str, bytes, int]) -> lis
     else:
         png = png_bytes(texels)
     return [data, detail, png]
+
+
+@dataclass(frozen=True)
+class SharedDisk:
+    """Shared by the tasks: the options, and two absolute paths, of the database and of the folder
+    for results."""
+
+    options: TextureOptions
+    database: str
+    out: str
+
+
+@dataclass(frozen=True)
+class ImageTask:
+    """An image of the database, the stem of the files that its task writes, and the number of its
+    finest levels to leave out."""
+
+    name: str
+    sha256: str
+    made: str
+    unresolved: int = 0
+
+
+@contextmanager
+def shared_disk(
+    transaction: Transaction, database: Path, options: TextureOptions, executor: Executor
+) -> Iterator[SharedDisk | None]:
+    """The disk, if all workers are other processes that see it; None if bytes must travel.
+
+    Raises WorkerError PTM-W005 if only some workers see it.
+    """
+    if not executor.remote:
+        yield None
+        return
+    out = transaction.subfolder(f"out-{secrets.token_hex(8)}")
+    disk = SharedDisk(options, str(database.resolve()), str(out.resolve()))
+    try:
+        seen = list(executor.each(_sees, disk, range(4 * executor.workers), releases_lock=True))
+        if any(seen) and not all(seen):
+            raise _half_seen(disk)
+        yield disk if all(seen) else None
+    finally:
+        shutil.rmtree(out, ignore_errors=True)
+
+
+def encoded_there(disk: SharedDisk, image: ImageTask) -> list[tuple[str, str]]:
+    """Writes the results of `encoded_image` to the shared disk: (file, SHA-256) of each.
+
+    Raises what that raises; WorkerError PTM-W005 where the disk cannot be seen.
+    """
+    results = encoded_image(disk.options, (image.name, _image(disk, image), image.unresolved))
+    files = []
+    for number, data in enumerate(results):
+        file = Path(disk.out, f"{image.made}-{number}")
+        write_bytes(file, data, force=True)
+        files.append((str(file), sha256(data)))
+    return files
+
+
+def _image(disk: SharedDisk, image: ImageTask) -> bytes:
+    """Its bytes, from `IMAGES` or, until the scene is committed, from the staging folder."""
+    for folder in ("", f"{STAGING}/scene", ""):
+        with suppress(OSError):
+            data = Path(disk.database, folder, IMAGES, image.sha256).read_bytes()
+            if sha256(data) == image.sha256:
+                return data
+    raise _half_seen(disk)
+
+
+def _sees(disk: SharedDisk, _: int) -> bool:
+    return Path(disk.out).is_dir()
+
+
+def _half_seen(disk: SharedDisk) -> WorkerError:
+    return WorkerError(
+        "PTM-W005",
+        "some workers see the disk of the database and others do not",
+        file=disk.database,
+        remedy="mount it in the same place on all machines, or put it where only this one sees it",
+    )
 
 
 def read_detail(data: bytes) -> Detail:

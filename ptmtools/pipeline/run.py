@@ -25,7 +25,7 @@ from ptmtools.store.writer import DatabaseWriter
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from ptmtools.pipeline.background import Workers
+    from ptmtools.parallel import Workers
 
 
 #: Files that are named one by one.

@@ -20,14 +20,12 @@ from threading import Event
 from typing import TYPE_CHECKING, Any
 
 from ptmtools.errors import naming
-from ptmtools.executors.model import Executor
 from ptmtools.files import open_regular
-from ptmtools.pipeline.background import BackgroundLoop
-from ptmtools.pipeline.encoding import encoded_image
+from ptmtools.parallel import BackgroundLoop, Executor
+from ptmtools.pipeline.encoding import ImageTask, encoded_image, encoded_there, shared_disk
 from ptmtools.pipeline.options import TextureOptions
 from ptmtools.pipeline.reading import image_digests, images_of
 from ptmtools.pipeline.run import Artifacts, Job, Run
-from ptmtools.pipeline.shared_disk import ImageTask, encoded_there, shared_disk
 from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages.textures import TEXTURES
 from ptmtools.pipeline.trimming import notes_on_trim, unresolved, unresolved_counts

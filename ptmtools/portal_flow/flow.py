@@ -45,8 +45,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bits, Bools, Floats, Ints
 from ptmtools.errors import InputError, LimitError
-from ptmtools.executors.model import Executor
-from ptmtools.executors.serial import Serial
+from ptmtools.parallel import Executor
 from ptmtools.portal_flow.double_double import Searched, SequenceTest, searched
 from ptmtools.portal_flow.storage import Geometry, Scratch
 from ptmtools.progress import Progress, silent
@@ -112,7 +111,7 @@ def portal_flow(
     portals: Portals,
     budget: int,
     progress: Progress = silent,
-    executor: Executor = Serial(),  # noqa: B008 - has no state
+    executor: Executor = Executor(),  # noqa: B008 - has no state
 ) -> PortalFlow:
     """Conservative visibility from portal to portal (Teller & Séquin; paper §3).
 
@@ -137,22 +136,24 @@ def portal_flow(
     searching = Searching(g, known, budget)
     sizes = BITS_OF_BYTE[searching.known.view(np.uint8)].sum(axis=1)
     order = np.argsort(sizes, kind="stable")
-    with executor.sharing(searching, releases_lock=True) as shared:
-        for first in range(0, count, BATCH):
-            batch = order[first : first + BATCH]
-            found = list(shared.each(search_from, batch.tolist(), chunk=together))
-            for p, (_, figures) in zip(batch, found, strict=True):
-                cut[p], *counts[:, p] = figures
-            each = max(1, int(counts[0, batch].mean()))
-            together = max(1, min(BATCH // 2, TASK // each))  # the next ones take about as long
-            shared.change(settle, (batch, np.stack([seen for seen, _ in found])))
-            progress(min(first + BATCH, count), count, "portals")
+    for first in range(0, count, BATCH):
+        batch = order[first : first + BATCH]
+        tasks = batch.tolist()
+        found = list(
+            executor.each(search_from, searching, tasks, releases_lock=True, chunk=together)
+        )
+        for p, (_, figures) in zip(batch, found, strict=True):
+            cut[p], *counts[:, p] = figures
+        each = max(1, int(counts[0, batch].mean()))
+        together = max(1, min(BATCH // 2, TASK // each))  # the next ones take about as long
+        settle(searching, batch, np.stack([seen for seen, _ in found]))
+        progress(min(first + BATCH, count), count, "portals")
     return PortalFlow(searching.known, cut[0::2] | cut[1::2], *(counts[:, 0::2] + counts[:, 1::2]))
 
 
 def upper_bound(
     portals: Portals,
-    executor: Executor = Serial(),  # noqa: B008 - has no state
+    executor: Executor = Executor(),  # noqa: B008 - has no state
 ) -> PortalFlow:
     """What `portal_flow` begins with: its sets before any search. Raises what it raises."""
     check(portals)
@@ -324,11 +325,10 @@ def search_from(shared: Searching, source: int) -> tuple[Bits, Searched]:
         return seen, searched(*given, seen)
 
 
-def settle(shared: Searching, done: tuple[Ints, Bits]) -> None:
-    """As a change: the (B, W) rows that a batch of (B,) directed portals has found."""
+def settle(shared: Searching, batch: Ints, seen: Bits) -> None:
+    """Enters the (B, W) rows ``seen`` that the searches of (B,) directed portals have found."""
     from ptmtools.portal_flow.line_kernels import drop_unreturned
 
-    batch, seen = done
     dropped = shared.known[batch] & ~seen
     shared.known[batch] = seen
     for p, row in zip(batch, dropped, strict=True):

@@ -25,8 +25,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.model import Cells
 from ptmtools.cells.sight import LONGEST, from_places, portals_of
-from ptmtools.executors.model import Executor
-from ptmtools.executors.serial import Serial
+from ptmtools.parallel import Executor
 from ptmtools.portal_flow.flow import PortalFlow, Portals, check, geometry, leaf_matrix, portal_flow
 from ptmtools.portal_flow.storage import Geometry
 from ptmtools.progress import Progress, silent
@@ -44,7 +43,7 @@ Shooting = tuple[Geometry, int, int, int]
 def sampled_leaves(
     portals: Portals,
     lines: int,
-    executor: Executor = Serial(),  # noqa: B008 - has no state
+    executor: Executor = Executor(),  # noqa: B008 - has no state
     seed: int = 0,
 ) -> Bools:
     """(L, L) which leaf sees which on one of ``lines`` random lines through each portal.
@@ -148,7 +147,7 @@ def compute_pvs(
     cells: Cells,
     options: PvsOptions = PvsOptions(),  # noqa: B008 - a frozen value
     progress: Progress = silent,
-    executor: Executor = Serial(),  # noqa: B008 - has no state
+    executor: Executor = Executor(),  # noqa: B008 - has no state
 ) -> Pvs:
     """Cell-to-cell visibility, symmetric (paper §3; Teller & Séquin).
 

@@ -16,8 +16,8 @@ from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
 from ptmtools.coverage.placement import TRIES
 from ptmtools.errors import InputError, MissingComponentError
-from ptmtools.executors import Local
 from ptmtools.lazy import Lazy
+from ptmtools.parallel import Local
 from ptmtools.visibility.model import Pvs
 
 #: Eight points, at the middles of equal parts.

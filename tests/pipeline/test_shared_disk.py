@@ -8,17 +8,18 @@ from typing import Any
 
 import pytest
 
+from ptmtools import parallel
 from ptmtools.errors import OutputError, WorkerError
-from ptmtools.executors import Serial
-from ptmtools.pipeline import TextureOptions, background, build_scene
-from ptmtools.pipeline.shared_disk import ImageTask, _sees, encoded_there, shared_disk
+from ptmtools.parallel import Executor
+from ptmtools.pipeline import TextureOptions, build_scene
+from ptmtools.pipeline.encoding import ImageTask, _sees, encoded_there, shared_disk
 from ptmtools.store.layout import sha256
 from ptmtools.store.writer import DatabaseWriter
 
 TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data" / "two_rooms"
 
 
-class Remote(Serial):
+class Remote(Executor):
     """One machine that sees all disks; it remembers what it was asked."""
 
     remote = True
@@ -44,8 +45,8 @@ class Blind(Remote):
         return super().each(function, shared, tasks, **settings)
 
 
-def built(folder: Path, monkeypatch: pytest.MonkeyPatch, executor: Serial) -> dict[str, bytes]:
-    monkeypatch.setattr(background, "open_executor", lambda *_: executor)
+def built(folder: Path, monkeypatch: pytest.MonkeyPatch, executor: Executor) -> dict[str, bytes]:
+    monkeypatch.setattr(parallel, "open_executor", lambda *_: executor)
     build_scene(TWO_ROOMS / "two_rooms.obj", folder, scheduler="somewhere")
     return {
         file.relative_to(folder).as_posix(): file.read_bytes()
@@ -55,7 +56,7 @@ def built(folder: Path, monkeypatch: pytest.MonkeyPatch, executor: Serial) -> di
 
 
 def test_names_or_bytes_make_the_same_database(tmp_path, monkeypatch) -> None:
-    near, far, blind = Serial(), Remote(), Blind(half=False)
+    near, far, blind = Executor(), Remote(), Blind(half=False)
     expected = built(tmp_path / "near", monkeypatch, near)
     assert built(tmp_path / "far", monkeypatch, far) == expected
     assert built(tmp_path / "blind", monkeypatch, blind) == expected
@@ -108,5 +109,5 @@ def test_a_forgotten_worker_writes_to_nowhere(tmp_path, transaction) -> None:
 
 
 def test_who_shares_memory_needs_no_shared_disk(tmp_path, transaction) -> None:
-    with shared_disk(transaction, tmp_path, TextureOptions(), Serial()) as disk:
+    with shared_disk(transaction, tmp_path, TextureOptions(), Executor()) as disk:
         assert disk is None

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from PIL import Image, PngImagePlugin
 
-from ptmtools.executors import Serial
-from ptmtools.pipeline import TextureOptions, background, build_scene, run_stage
-from ptmtools.pipeline.background import Workers
+from ptmtools import parallel
+from ptmtools.parallel import Executor, Workers
+from ptmtools.pipeline import TextureOptions, build_scene, run_stage
 from ptmtools.pipeline.encoding import bare_png
 from ptmtools.pipeline.run import Run
 from ptmtools.pipeline.stages import CELLS, TEXTURES
@@ -58,7 +58,7 @@ def test_what_is_left_when_it_is_stopped_is_done_later(tmp_path: Path) -> None:
         job = TexturesJob(run, TEXTURES, TextureOptions())
         job.begin()
         images = job.left
-        job.encode(Serial(), stop)
+        job.encode(Executor(), stop)
         assert 0 < job.left < images
         job.do()
         assert job.left == 0
@@ -70,7 +70,7 @@ def test_many_textures_are_encoded_beside_the_cells(tmp_path, monkeypatch) -> No
     """The same bytes from one worker, from workers beside, and where some are left for later."""
     found = {}
     for count, least in ((1, 8), (2, 1), (2, 10**9)):
-        monkeypatch.setattr(background, "WORTH_A_PROCESS", least)
+        monkeypatch.setattr(parallel, "WORTH_A_PROCESS", least)
         db = tmp_path / f"{count} {least}"
         build_scene(TWO_ROOMS, db, workers=count)
         found[db] = {f.relative_to(db): f.read_bytes() for f in db.rglob("*") if f.is_file()}

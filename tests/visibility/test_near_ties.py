@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from ptmtools.cells.sight import portals_of
-from ptmtools.executors import Local
+from ptmtools.parallel import Local
 from ptmtools.portal_flow import (
     double_double,
     double_double as near_ties,

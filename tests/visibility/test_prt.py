@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ptmtools.executors import Local
+from ptmtools.parallel import Local
 from ptmtools.portal_flow import double_double as near_ties
 from ptmtools.portal_flow.flow import leaf_matrix, portal_flow
 from ptmtools.visibility import PvsOptions

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 from ptmtools.cells.model import Cells
 from ptmtools.cli.main import main
 from ptmtools.errors import InputError
-from ptmtools.executors import Local
+from ptmtools.parallel import Local
 from ptmtools.portal_flow.flow import Portals, portal_flow
 from ptmtools.visibility import Pvs, PvsOptions, check_conservative, compute_pvs
 

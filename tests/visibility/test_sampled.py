@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ptmtools.cells.sight import portals_of
-from ptmtools.executors import Local
+from ptmtools.parallel import Local
 from ptmtools.portal_flow.flow import Portals, leaf_matrix, portal_flow
 from ptmtools.visibility.pvs import sampled_leaves
 from tests.visibility.test_pvs import ROW, ZIGZAG

@@ -13,10 +13,10 @@ _SIDE = 12
 
 def warm_up() -> None:
     """Calls every kernel once."""
-    from ptmtools.executors import Serial
     from ptmtools.neighbours.apo.making import make_apo
     from ptmtools.neighbours.apo.model import ApoOptions
     from ptmtools.neighbours.apo.traversal import look_up
+    from ptmtools.parallel import Executor
     from ptmtools.scene.model import Material, Scene
     from ptmtools.scene.orientation import tolerance_of
 
@@ -34,7 +34,7 @@ def warm_up() -> None:
         (Material("stone"),),
         tolerance_of(points, triangles),
     )
-    made = make_apo(scene, ApoOptions(faces=count // 4, depth=3), Serial())
+    made = make_apo(scene, ApoOptions(faces=count // 4, depth=3), Executor())
     look_up(made.octree, np.full((1, 3), 0.5))
     simplify(Mesh(points, triangles, none, uv), SimplifyOptions(count // 4))
 

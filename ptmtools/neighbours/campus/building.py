@@ -15,8 +15,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.executors.model import Executor
-from ptmtools.executors.serial import Serial
 from ptmtools.lazy import component
 from ptmtools.neighbours.campus.making import ObjectMade, Work, make_object
 from ptmtools.neighbours.campus.model import ALPHA, FORM, INDEX, Campus, CampusMaterial, Names
@@ -25,6 +23,7 @@ from ptmtools.neighbours.campus.occlusion import Surroundings
 from ptmtools.neighbours.campus.options import CampusOptions
 from ptmtools.neighbours.campus.second_set import model_light, model_masks
 from ptmtools.neighbours.campus.textures import BaseImage, Mask, texture_files
+from ptmtools.parallel import Executor
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.ingestion import ingest
 from ptmtools.scene.model import Material, Scene
@@ -77,7 +76,7 @@ def make_campus(
     OutputError: PTM-O001, O002, O003, O820, O821 of the folder.
     MissingComponentError: PTM-M830 lightmaps are to be baked, and xatlas is not installed.
     """
-    executor, path = executor or Serial(), Path(model)
+    executor, path = executor or Executor(), Path(model)
     FORM.check(folder, force=force)
     if options.lightmaps != "none":
         component("xatlas", "PTM-M830", "lightmaps need xatlas", "campus")

@@ -20,7 +20,6 @@ from ptmtools import schemas
 from ptmtools.cli.main import main
 from ptmtools.diagnostics import ValidationReport
 from ptmtools.errors import InputError, PtmError
-from ptmtools.executors import Serial
 from ptmtools.neighbours.apo.checking import CODES, check_folder, describe
 from ptmtools.neighbours.apo.files import (
     COLORS,
@@ -38,6 +37,7 @@ from ptmtools.neighbours.apo.files import (
 from ptmtools.neighbours.apo.making import make_apo
 from ptmtools.neighbours.apo.model import ApoOptions
 from ptmtools.neighbours.apo.octree import fault_of
+from ptmtools.parallel import Executor
 from ptmtools.texture.model import Limits
 from tests.neighbours.apo.building import nodes, octree_of
 from tests.neighbours.apo.meshes import ply, scene_of, sphere
@@ -50,7 +50,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     points, triangles = sphere(4, 0.05)
     color = (points[triangles] * 100 + 128).astype(np.uint8)
     options = ApoOptions(faces=200, depth=6, error=0.2, color=True)
-    made = make_apo(scene_of(points, triangles, color), options, Serial())
+    made = make_apo(scene_of(points, triangles, color), options, Executor())
     folder = tmp_path_factory.mktemp("apo") / "ball.apo"
     FORM.write(folder, files_of(made))
     return folder
@@ -286,7 +286,7 @@ def test_from_a_mesh_to_a_picture(
 
 
 def test_a_mesh_whose_error_is_not_known(written: Path, tmp_path: Path) -> None:
-    made = make_apo(scene_of(*sphere(3)), ApoOptions(faces=100, depth=4), Serial())
+    made = make_apo(scene_of(*sphere(3)), ApoOptions(faces=100, depth=4), Executor())
     FORM.write(tmp_path / "a.apo", files_of(replace(made, deviation=float("nan"))))
     assert check(tmp_path / "a.apo").ok
     assert "unknown" in describe(tmp_path / "a.apo")[0][0]

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from ptmtools.errors import InputError, LimitError
-from ptmtools.executors import Serial, open_executor
 from ptmtools.neighbours.apo import blocks
 from ptmtools.neighbours.apo.blocks import Surface
 from ptmtools.neighbours.apo.making import Made, make_apo, welded
@@ -18,13 +17,14 @@ from ptmtools.neighbours.apo.normals import corner_normals
 from ptmtools.neighbours.apo.octree import fault_of
 from ptmtools.neighbours.apo.sampling import REACH, Source, areas, nearest
 from ptmtools.neighbours.apo.traversal import look_up
+from ptmtools.parallel import Executor, open_executor
 from tests.neighbours.apo.meshes import scene_of, sphere, square
 
 OPTIONS = ApoOptions(faces=500, depth=9, error=0.1)
 
 
 def made(points: np.ndarray, triangles: np.ndarray, options: ApoOptions = OPTIONS) -> Made:
-    found = make_apo(scene_of(points, triangles), options, Serial())
+    found = make_apo(scene_of(points, triangles), options, Executor())
     assert fault_of(found.octree) is None
     return found
 
@@ -117,7 +117,7 @@ def test_the_number_of_workers_changes_nothing(ball: Made, monkeypatch: pytest.M
     assert np.array_equal(ball.octree.texels, other.octree.texels)
     assert np.array_equal(ball.mesh.points, other.mesh.points)
     monkeypatch.setattr(blocks, "MOST", 3000)  # some fifteen blocks instead of one, of small cells
-    cut = make_apo(scene, OPTIONS, Serial())
+    cut = make_apo(scene, OPTIONS, Executor())
     assert np.array_equal(ball.octree.start, cut.octree.start)
     assert np.abs(ball.octree.texels.astype(int) - cut.octree.texels).max() <= 1
 
@@ -136,12 +136,12 @@ def test_colours_of_corners_are_kept() -> None:
     points, triangles = sphere(5)
     red = np.where(points[triangles][:, :, :1] > 0, [255, 0, 0], [0, 0, 255]).astype(np.uint8)
     scene = scene_of(points, triangles, red)
-    found = make_apo(scene, replace(OPTIONS, color=True), Serial())
+    found = make_apo(scene, replace(OPTIONS, color=True), Executor())
     assert found.octree.colors is not None
     q = (np.array([[0.9, 0.1, 0.1], [-0.9, 0.1, -0.1]]) - found.octree.low) / found.octree.side
     address = look_up(found.octree, q).address
     assert found.octree.colors[address].tolist() == [[255, 0, 0, 255], [0, 0, 255, 255]]
-    plain = make_apo(scene, OPTIONS, Serial())
+    plain = make_apo(scene, OPTIONS, Executor())
     assert plain.octree.colors is None
     assert len(plain.octree.texels) < len(found.octree.texels)  # the edge of the colours
 
@@ -274,7 +274,7 @@ def test_the_warm_up_calls_every_kernel(monkeypatch: pytest.MonkeyPatch) -> None
         return call(self, *arguments)
 
     monkeypatch.setattr(compiled._Kernel, "__call__", record)
-    found = make_apo(scene_of(*sphere(5, 0.03)), OPTIONS, Serial())
+    found = make_apo(scene_of(*sphere(5, 0.03)), OPTIONS, Executor())
     look_up(found.octree, np.full((1, 3), 0.5))
     needed = set(names)
     names.clear()

@@ -10,11 +10,11 @@ import pytest
 
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError, LimitError
-from ptmtools.executors import Serial, open_executor
 from ptmtools.neighbours.apo.octree import fault_of
 from ptmtools.neighbours.apo.options import ReplaceOptions
 from ptmtools.neighbours.apo.replacing import Replaced, Replacement, replaced
 from ptmtools.neighbours.apo.traversal import look_up
+from ptmtools.parallel import Executor, open_executor
 from ptmtools.scene import ingest
 from ptmtools.scene.model import Scene
 from tests.neighbours.apo.statues import STATUES, statue, wrapped, write_rooms
@@ -37,7 +37,7 @@ def rooms(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 @pytest.fixture(scope="module")
 def made(rooms: Scene) -> Replaced:
-    return replaced(rooms, OPTIONS, Serial())
+    return replaced(rooms, OPTIONS, Executor())
 
 
 def of_object(scene: Scene, name: str) -> np.ndarray:
@@ -104,7 +104,7 @@ def test_what_is_painted_stays_where_it_was(rooms: Scene, made: Replaced) -> Non
 
 def test_the_normals_are_those_of_the_statue(rooms: Scene) -> None:
     rng = np.random.default_rng(2)
-    made = replaced(rooms, replace(OPTIONS, apo_error=0.03, apo_density=60), Serial())
+    made = replaced(rooms, replace(OPTIONS, apo_error=0.03, apo_density=60), Executor())
     for each in made.octrees:
         assert fault_of(each.octree) is None
         own = of_object(rooms, each.name)
@@ -134,7 +134,7 @@ def test_borders_of_sides_and_of_colours_stay(rooms: Scene) -> None:
     colors = np.full((len(rooms.triangles), 3, 3), 255, np.uint8)
     colors[own[middle[:, 0] > x]] = [255, 0, 0]
     both = replace(rooms, two_sided=two_sided, colors=colors)
-    scene = replaced(both, replace(OPTIONS, apo=("statue_02",)), Serial()).scene
+    scene = replaced(both, replace(OPTIONS, apo=("statue_02",)), Executor()).scene
     assert scene.colors is not None
     own = of_object(scene, "statue_02")
     assert len(own) < 1200
@@ -148,14 +148,14 @@ def test_borders_of_sides_and_of_colours_stay(rooms: Scene) -> None:
 
 
 def test_light_objects_and_unknown_names(rooms: Scene) -> None:
-    found = replaced(rooms, ReplaceOptions(apo=("*", "bust"), apo_faces=5120), Serial())
+    found = replaced(rooms, ReplaceOptions(apo=("*", "bust"), apo_faces=5120), Executor())
     assert found.scene is rooms
     assert (found.replacement, found.octrees) == (None, ())
     unknown, light = found.notes
     assert unknown == "--apo: no object is called 'bust'"
     assert light.startswith("15 objects of --apo have no more triangles than --apo-faces 5,120")
     assert all(isinstance(note, Warned) for note in found.notes)
-    some = replaced(rooms, replace(OPTIONS, apo=("*",)), Serial())
+    some = replaced(rooms, replace(OPTIONS, apo=("*",)), Executor())
     assert [isinstance(note, Warned) for note in some.notes] == [False]
     assert len(some.octrees) == 2
 
@@ -167,14 +167,14 @@ def test_what_cannot_be_lighter_stays(rooms: Scene) -> None:
     material[own] = len(rooms.materials) + np.arange(len(own))
     materials = (*rooms.materials, *[rooms.materials[0]] * len(own))
     patched = replace(rooms, triangle_material=material, materials=materials)
-    found = replaced(patched, replace(OPTIONS, apo=("statue_01",)), Serial())
+    found = replaced(patched, replace(OPTIONS, apo=("statue_01",)), Executor())
     assert found.scene is patched
     assert "statue_01 stays as modelled: it cannot have fewer triangles" in found.notes
 
 
 def test_objects_of_one_name_are_two(rooms: Scene) -> None:
     names = tuple("statue" if name in STATUES else name for name in rooms.objects)
-    found = replaced(replace(rooms, objects=names), replace(OPTIONS, apo=("statue",)), Serial())
+    found = replaced(replace(rooms, objects=names), replace(OPTIONS, apo=("statue",)), Executor())
     assert [each.name for each in found.octrees] == ["statue", "statue"]
     assert found.octrees[0].object != found.octrees[1].object
     for each in found.octrees:
@@ -184,7 +184,7 @@ def test_objects_of_one_name_are_two(rooms: Scene) -> None:
 
 
 def test_nothing_is_asked_for(rooms: Scene) -> None:
-    found = replaced(rooms, ReplaceOptions(), Serial())
+    found = replaced(rooms, ReplaceOptions(), Executor())
     assert found == Replaced(rooms, None, (), ())
 
 
@@ -208,7 +208,7 @@ def test_holes_that_are_filled_go_the_way_through_a_file(rooms: Scene) -> None:
     kept = np.setdiff1d(np.arange(len(rooms.triangles)), lost)
     names = ("triangles", "uv", "triangle_object", "triangle_material", "two_sided")
     holed = replace(rooms, **{name: getattr(rooms, name)[kept] for name in names})
-    made = replaced(holed, OPTIONS, Serial())
+    made = replaced(holed, OPTIONS, Executor())
     assert made.replacement
     assert any("holes are filled" in note for note in made.notes)
     assert (np.diff(made.replacement.source) == 0).any()
@@ -244,7 +244,7 @@ def test_a_replacement_that_is_none(rooms: Scene, made: Replaced, name: str, cha
 def test_too_many_texels_are_refused(rooms: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("ptmtools.neighbours.apo.octree.ADDRESS_BITS", 8)
     with pytest.raises(LimitError, match=r"statue_01: .*--apo-error.*--apo-depth.*PTM-L840"):
-        replaced(rooms, OPTIONS, Serial())
+        replaced(rooms, OPTIONS, Executor())
 
 
 @pytest.mark.parametrize(
@@ -262,7 +262,7 @@ def test_the_model_is_that_of_the_sample_and_statues(rooms: Scene, tmp_path: Pat
 
 def test_an_object_that_is_far_off_once_simplified_is_told(rooms: Scene) -> None:
     name = rooms.objects[-1]
-    told = replaced(rooms, ReplaceOptions(apo=(name,), apo_faces=12), Serial()).notes
+    told = replaced(rooms, ReplaceOptions(apo=(name,), apo_faces=12), Executor()).notes
     assert any(isinstance(note, Warned) and "is off by about" in note for note in told)
-    fine = replaced(rooms, ReplaceOptions(apo=(name,), apo_faces=1000), Serial()).notes
+    fine = replaced(rooms, ReplaceOptions(apo=(name,), apo_faces=1000), Executor()).notes
     assert not any("is off by about" in note for note in fine)

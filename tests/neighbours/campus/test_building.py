@@ -15,9 +15,9 @@ from ptmtools import schemas
 from ptmtools.cli.main import main
 from ptmtools.diagnostics import ValidationReport
 from ptmtools.errors import InputError, MissingComponentError, OutputError
-from ptmtools.executors import open_executor
 from ptmtools.neighbours.campus import Campus, CampusOptions, distances, make_campus, read_campus
 from ptmtools.neighbours.campus.meshes import read_mesh
+from ptmtools.parallel import open_executor
 from ptmtools.pipeline.validation import kind_of, validate
 from ptmtools.scene import IngestOptions
 from tests.conftest import files_below

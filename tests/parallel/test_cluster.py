@@ -8,14 +8,15 @@ import signal
 import sys
 from pathlib import Path
 
-import executor_tasks as tasks
 import numpy as np
+import parallel_tasks as tasks
 import pytest
 
+from ptmtools import cluster as module
 from ptmtools.cli.main import main
+from ptmtools.cluster import software
 from ptmtools.errors import MissingComponentError, WorkerError
-from ptmtools.executors import cluster as module, open_executor
-from ptmtools.executors.software import software
+from ptmtools.parallel import open_executor
 
 
 def test_without_dask(monkeypatch):
@@ -48,7 +49,7 @@ def test_workers_with_other_software(scheduler, cluster, monkeypatch):
 
 
 def test_dying_workers(require, monkeypatch):
-    """One worker, then both: others do the tasks again, with all that has changed."""
+    """One worker, then both: others repeat the tasks, over the shared value."""
     from distributed import LocalCluster
 
     monkeypatch.setattr(module, "PATIENCE", 0.5)
@@ -59,19 +60,15 @@ def test_dying_workers(require, monkeypatch):
         monkeypatch.undo()
         machines.scale(2)
         machines.wait_for_workers(2)
-        array = np.zeros(5000)
-        with (
-            open_executor(scheduler=machines.scheduler_address) as executor,
-            executor.sharing(array) as shared,
-        ):
-            processes = set(shared.each(tasks.process, range(20)))
+        array = np.arange(5000.0)
+        with open_executor(scheduler=machines.scheduler_address) as executor:
+            processes = set(executor.each(tasks.process, None, range(20)))
             for victims in (1, 2):
-                shared.change(tasks.add, (7, 1.0))
-                found = shared.each(tasks.at, [7] * 40)
-                assert next(found) == victims
+                found = executor.each(tasks.at, array, [7] * 40)
+                assert next(found) == 7
                 for process in list(processes)[:victims]:
                     os.kill(process, signal.SIGKILL)
-                assert list(found) == [victims] * 39
+                assert list(found) == [7] * 39
                 processes = set(executor.each(tasks.process, None, range(20)))
             with pytest.raises(WorkerError, match="PTM-W004"):
                 list(executor.each(tasks.die, 1, [0, 1]))

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from ptmtools.executors import Executor, Local, Serial, open_executor
+from ptmtools.parallel import Executor, Local, open_executor
 
-# Where worker processes find `executor_tasks`: they are given this path.
+# Where worker processes find `parallel_tasks`: they are given this path.
 sys.path.append(str(Path(__file__).parent / "tasks"))
 
 KINDS = ("serial", "local", "cluster")
@@ -52,4 +52,4 @@ def cluster(scheduler: str) -> Iterator[Executor]:
 @pytest.fixture(params=KINDS)
 def executor(request) -> Executor:
     """Each kind in turn."""
-    return Serial() if request.param == "serial" else request.getfixturevalue(request.param)
+    return Executor() if request.param == "serial" else request.getfixturevalue(request.param)

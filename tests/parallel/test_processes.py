@@ -6,16 +6,17 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
 
-import executor_tasks as tasks
+import parallel_tasks as tasks
 import pytest
 
 from ptmtools.errors import InputError, OutputError, WorkerError
-from ptmtools.executors import BackgroundTask, Local, Serial, open_executor
+from ptmtools.parallel import Executor, Local, in_background, open_executor
 
 HERE = Path(__file__).parent / "tasks"
 
@@ -24,8 +25,8 @@ SCRIPT = """
 import sys
 from pathlib import Path
 sys.path.append(sys.argv[1])
-import executor_tasks as tasks
-from ptmtools.executors import Local
+import parallel_tasks as tasks
+from ptmtools.parallel import Local
 
 {guard}
     with Local(3) as local:
@@ -116,12 +117,10 @@ def test_a_script_without_a_guard_is_told_what_it_needs(tmp_path):
 
 
 def test_a_full_disk_is_told(local, monkeypatch):
-    import ptmtools.executors.processes as processes
-
     def full(*_args, **_settings):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(processes.tempfile, "TemporaryFile", full)
+    monkeypatch.setattr(tempfile, "TemporaryFile", full)
     with pytest.raises(OutputError, match="PTM-O003"):
         list(local.each(tasks.die, 9, range(3)))
 
@@ -134,35 +133,31 @@ def test_without_threads_even_one_worker_is_another_process():
 
 
 @pytest.mark.parametrize("releases_lock", [False, True])
-def test_nothing_is_begun_once_it_is_closed(releases_lock):
+@pytest.mark.parametrize("threads", [False, True])
+def test_nothing_is_begun_once_it_is_closed(releases_lock, threads):
     """By a thread that comes late, say: it would be waited for, or left behind."""
-    local = Local(2)
-    with local.sharing(None) as shared:
-        local.close()
-        with pytest.raises(RuntimeError, match="after shutdown"):
-            list(shared.each(tasks.process, range(3)))
+    local = Local(2, threads=threads)
+    local.close()
     with pytest.raises(RuntimeError, match="after shutdown"):
         list(local.each(tasks.process, None, range(3), releases_lock=releases_lock))
 
 
 def test_one_task_in_the_background():
     ended = threading.Event()
-    task = BackgroundTask(tasks.slower_at_first, 0.02, 4)
-    task.add_done_callback(lambda _: ended.set())
+    task = in_background(tasks.slower_at_first, 0.02, 4, ended.set)
     assert task.result() == 16
     until(ended.is_set)
     with pytest.raises(InputError, match="PTM-I999"):
-        BackgroundTask(tasks.refuse, 5, 5).result()
+        in_background(tasks.refuse, 5, 5).result()
     with pytest.raises(WorkerError, match="PTM-W004"):
-        BackgroundTask(tasks.die, 7, 7).result()
+        in_background(tasks.die, 7, 7).result()
 
 
 @pytest.mark.parametrize("begun", [False, True])
 def test_an_unwanted_task_is_ended(tmp_path, begun):
-    """In the middle, or before its process was even started."""
+    """During the task, or before its process has even started."""
     ended = threading.Event()
-    task = BackgroundTask(tasks.note_and_sleep, tmp_path, 1e6)
-    task.add_done_callback(lambda _: ended.set())
+    task = in_background(tasks.note_and_sleep, tmp_path, 1e6, ended.set)
     if begun:
         until(lambda: any(tmp_path.iterdir()))
     task.cancel()
@@ -172,15 +167,21 @@ def test_an_unwanted_task_is_ended(tmp_path, begun):
         task.result()
 
 
+def test_a_worker_that_dies_while_it_sends_a_result_is_an_error(local):
+    with pytest.raises(WorkerError, match="PTM-W004"):
+        list(local.each(tasks.die_while_sending, None, range(3)))
+    assert list(local.each(tasks.die, 3, range(3))) == [0, 1, 2]
+
+
 def test_what_is_only_asked_for_is_not_done_before(tmp_path):
-    pending = Serial().submit(tasks.note_and_sleep, tmp_path, 0.0)
+    pending = Executor().submit(tasks.note_and_sleep, tmp_path, 0.0)
     assert not list(tmp_path.iterdir())
     pending.result()
     assert list(tmp_path.iterdir())
 
 
 def test_which_executor():
-    assert isinstance(open_executor(1), Serial)
+    assert isinstance(open_executor(1), Executor)
     with open_executor(3) as three, open_executor() as all_:
         assert three.workers == 3
         assert all_.workers == len(os.sched_getaffinity(0))

@@ -1,16 +1,16 @@
-"""What stages rely on, whoever does their tasks."""
+"""The contract of all executors."""
 
 from __future__ import annotations
 
 import itertools
 import os
 
-import executor_tasks as tasks
 import numpy as np
+import parallel_tasks as tasks
 import pytest
 
 from ptmtools.errors import InputError
-from ptmtools.executors.model import AHEAD
+from ptmtools.parallel import AHEAD
 
 #: Whether the function may run in threads.
 IN_THREADS = pytest.mark.parametrize("releases_lock", [False, True])
@@ -80,19 +80,6 @@ def test_what_is_shared_is_sent_once_to_a_worker_and_is_one_object_there(executo
     assert len(met) <= executor.workers
     assert (os.getpid() in met) != apart
     assert len(list(tmp_path.iterdir())) == (len(met) if apart else 0)
-
-
-@IN_THREADS
-def test_changes_reach_every_copy_before_the_next_task(executor, releases_lock):
-    array = np.zeros(5000)
-    with executor.sharing(array, releases_lock=releases_lock) as shared:
-        shared.change(tasks.add, (0, 1.0))
-        assert list(shared.each(tasks.at, [0] * 6)) == [1.0] * 6
-        for k in range(1, 5):
-            shared.change(tasks.add, (0, 1.0))
-            shared.change(tasks.add, (k, 0.5))
-            assert list(shared.each(tasks.at, [0, k] * 6, chunk=2)) == [1.0 + k, 0.5] * 6
-    assert array[:6].tolist() == [5, 0.5, 0.5, 0.5, 0.5, 0]
 
 
 def test_copies_can_be_written_and_are_copies(executor):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 import time
 import uuid
 from pathlib import Path
@@ -22,11 +23,6 @@ def slower_at_first(delay: float, i: int) -> int:
 
 def at(array: np.ndarray, i: int) -> float:
     return float(array[i])
-
-
-def add(array: np.ndarray, change: tuple[int, float]) -> None:
-    i, more = change
-    array[i] += more
 
 
 def spoil(array: np.ndarray, _: int) -> int:
@@ -88,6 +84,18 @@ def die(where: int, i: int) -> int:
     if i == where:
         os.kill(os.getpid(), signal.SIGKILL)
     return i
+
+
+class _Fuse:
+    """Kills its process a moment after it was pickled."""
+
+    def __reduce__(self) -> Any:
+        threading.Timer(0.01, lambda: os.kill(os.getpid(), signal.SIGKILL)).start()
+        return int, ()
+
+
+def die_while_sending(_: Any, i: int) -> Any:
+    return bytes(200_000_000), _Fuse()
 
 
 def note_and_sleep(folder: Path, seconds: float) -> None:
