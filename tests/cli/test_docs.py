@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib
+import importlib.util
 import re
 import sys
 from pathlib import Path
@@ -173,3 +174,20 @@ def test_messages_are_those_of_the_program() -> None:
             runs = re.findall(r"[a-z]+(?: [a-z]+){5,}", note)
             unknown += [(page.name, run) for run in runs if run not in said]
     assert unknown == []
+
+
+def test_names_that_examples_import_exist() -> None:
+    missing = []
+    for page in PAGES:
+        for block in re.findall(r"^```python\n(.*?)^```", page.read_text("utf-8"), re.M | re.S):
+            for node in ast.walk(ast.parse(block)):
+                if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("ptmtools"):
+                    module = importlib.import_module(str(node.module))
+                    for name in (alias.name for alias in node.names):
+                        if not (hasattr(module, name) or _is_module(f"{node.module}.{name}")):
+                            missing.append((page.name, f"{node.module}.{name}"))
+    assert missing == []
+
+
+def _is_module(name: str) -> bool:
+    return importlib.util.find_spec(name) is not None
