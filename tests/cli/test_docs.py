@@ -29,6 +29,8 @@ FENCED = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^()\s]+)\)")
 #: A page or a picture that a file of the code names.
 NAMED_PAGE = re.compile(r"\b(docs/[\w/-]+\.(?:md|png|jpg))(#[\w-]+)?")
+#: A file or a folder of the project.
+NAMED_FILE = re.compile(r"(?<![\w/.])((?:ptmtools|web|tests|benchmarks|sample_data)/[\w./-]*[\w/])")
 SOURCES = {".py", ".js", ".mjs", ".c", ".h", ".json", ".md"}
 #: Code in a line, and a line of code.
 CODE = re.compile(r"`([^`\n]+)`|^ {4,}(\S.*)$", re.MULTILINE)
@@ -110,6 +112,12 @@ def test_pages_that_the_code_names_exist() -> None:
             if not page.is_file() or (anchor and anchor[1:] not in anchors(page)):
                 missing.append((str(file.relative_to(ROOT)), name + anchor))
     assert missing == []
+
+
+def test_files_that_the_pages_name_exist() -> None:
+    pages = [*DOCS, ROOT / "README.md"]
+    named = {(p.name, n) for p in pages for n in NAMED_FILE.findall(p.read_text("utf-8"))}
+    assert sorted((page, name) for page, name in named if not (ROOT / name).exists()) == []
 
 
 def options_of_scripts() -> set[str]:
