@@ -190,7 +190,7 @@ def test_names_that_examples_import_exist() -> None:
         for block in re.findall(r"^```python\n(.*?)^```", page.read_text("utf-8"), re.M | re.S):
             if "from ptmtools" not in block:  # a row of a table
                 continue
-            for node in ast.walk(ast.parse(block)):
+            for node in ast.parse(block).body:
                 if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("ptmtools"):
                     module = importlib.import_module(str(node.module))
                     for name in (alias.name for alias in node.names):
