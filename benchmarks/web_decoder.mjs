@@ -1,16 +1,16 @@
-// Times the decoders of web/ptm: for each file the milliseconds in which an engine decodes all its
-// levels, the least of several rounds, as one line of JSON.
+// Times the decoder of web/ptm: for each file the milliseconds in which it decodes all its levels,
+// the least of several rounds, as one line of JSON.
 //
-//   node web_decoder.mjs js|wasm ROUNDS FILE.ptm …
+//   node web_decoder.mjs ROUNDS FILE.ptm …
 
 import { readFileSync } from "node:fs";
 
-import { makeEngine } from "../tests/web/engines.mjs";
 import { readHeader } from "../web/ptm/src/container.js";
+import { DECODER_URL, loadEngine } from "../web/ptm/src/engine.js";
 import { LevelDecoder } from "../web/ptm/src/level-decoder.js";
 
-const [, , name, rounds, ...paths] = process.argv;
-const engine = await makeEngine(name);
+const [, , rounds, ...paths] = process.argv;
+const engine = await loadEngine(readFileSync(DECODER_URL));
 const files = paths.map((path) => new Uint8Array(readFileSync(path)));
 const least = files.map(() => Infinity);
 let first = 0;

@@ -1,8 +1,8 @@
 """How fast the browser's decoder is, beside Python's: `python benchmarks/web_decoder.py [NAME…]`
 
 Names are those of the sets of `benchmarks/codec/images.py`. All levels of every image are decoded
-on one thread: by Python and numba, and in node by plain JavaScript and by WebAssembly, in turn,
-several times over; of each the least time counts. MB are those of the finest level. ``--browser``
+on one thread: by Python and numba, and in node by WebAssembly, in turn, several times over; of each
+the least time counts. MB are those of the finest level. ``--browser``
 does the same in a worker of headless Chromium, beside `createImageBitmap` of the same images as PNG
 (which may decode on a thread of its own). Last come the sizes of what a page downloads.
 """
@@ -30,9 +30,8 @@ from PIL import Image  # noqa: E402
 from ptmtools.texture import decode_levels, encode, read_image  # noqa: E402
 
 PACKAGE = ROOT / "web" / "ptm"
-#: What a page downloads where there is WebAssembly with SIMD; a worker has modules of its own.
+#: What a page downloads; a worker has modules of its own.
 GLUE = sorted((PACKAGE / "src").glob("*.js"))
-ENGINES = ("js", "wasm")
 #: In one process, so that what compiles while it runs has done so.
 ROUNDS = 10
 
@@ -80,16 +79,16 @@ def by_python(data: bytes) -> float:
     return time.perf_counter() - begin
 
 
-def by_node(engine: str, files: list[Path], rounds: int) -> list[float]:
+def by_node(files: list[Path], rounds: int) -> list[float]:
     """Seconds of each file, the least of several rounds in one process."""
     script = ROOT / "benchmarks" / "web_decoder.mjs"
-    command = ["node", str(script), engine, str(rounds), *map(str, files)]
+    command = ["node", str(script), str(rounds), *map(str, files)]
     done = subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True)
     return [milliseconds / 1000 for milliseconds in json.loads(done.stdout)["least"]]
 
 
 def in_browser(timed: list[Timed], folder: Path, rounds: int) -> None:
-    """Notes the times of the two engines and of `createImageBitmap` in one page."""
+    """Notes the times of the decoder and of `createImageBitmap` in one page."""
     from browsers import web
 
     files = [file.name for one in timed for file in one.files]
@@ -116,12 +115,10 @@ def print_sizes() -> None:
         lines = (line for line in io.StringIO(file.read_text()))
         return "".join(x for x in lines if not x.lstrip().startswith(("//", "*", "/*"))).encode()
 
-    module = PACKAGE / "decoder.wasm"
+    module = PACKAGE / "src" / "decoder.wasm"
     uncommented = sum(len(gzip.compress(bare(file), 9, mtime=0)) for file in GLUE)
-    plain = sorted((PACKAGE / "src" / "js").glob("*.js"))
     print(f"\nmodule: {module.stat().st_size:,} bytes, gzipped {gzipped(module):,}")
     print(f"glue, {len(GLUE)} files: gzipped {gzipped(*GLUE):,}, without comments {uncommented:,}")
-    print(f"the plain engine, where there is no SIMD: gzipped {gzipped(*plain):,} more")
 
 
 def main() -> None:
@@ -138,8 +135,7 @@ def main() -> None:
         for _ in range(given.rounds):
             for one in timed:
                 one.note("Python", [by_python(file.read_bytes()) for file in one.files])
-                for engine in ENGINES:
-                    one.note(engine, by_node(engine, one.files, ROUNDS))
+                one.note("wasm", by_node(one.files, ROUNDS))
         if given.browser:
             in_browser(timed, folder, ROUNDS * given.rounds)
     decoders = list(timed[0].least)

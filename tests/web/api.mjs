@@ -6,7 +6,7 @@ import { readFileSync } from "node:fs";
 import { DecoderWorkers, loadEngine, openPtm, serve } from "../../web/ptm/src/index.js";
 
 const file = new Uint8Array(readFileSync(process.argv[2]));
-const wasm = readFileSync(new URL("../../web/ptm/decoder.wasm", import.meta.url));
+const wasm = readFileSync(new URL("../../web/ptm/src/decoder.wasm", import.meta.url));
 const told = {};
 
 const digest = (image) => createHash("sha256").update(image.data).digest("hex");
@@ -29,14 +29,17 @@ async function digests(ptm, options) {
 }
 
 const engine = await loadEngine(wasm);
-told.engines = [engine.name, (await loadEngine(new Uint8Array(8))).name];
+told.refusals = [await settled(loadEngine(new Uint8Array(8)))];
+const { validate } = WebAssembly;
+WebAssembly.validate = () => false;
+told.refusals.push(await settled(loadEngine(wasm)));
+WebAssembly.validate = validate;
 
 const whole = ranges(file);
 const ptm = await openPtm(whole.read);
 told.rangesOf = ptm.levels.map((_, n) => Object.values(ptm.rangeOf(n)));
 told.levels = await digests(ptm, { engine });
 told.asked = [...whole.asked];
-told.plain = await digests(ptm, { engine: (await import("../../web/ptm/src/js/engine.js")).plainEngine });
 told.one = digest(await ptm.image(3, { engine, format: "native" }));
 told.noLevel = await settled(ptm.image(99, { engine }));
 
@@ -58,7 +61,6 @@ const create = () => {
 const workers = new DecoderWorkers({ count: 2, create, wasm: await WebAssembly.compile(wasm) });
 const both = await Promise.all([digests(ptm, { workers }), digests(cutPtm, { workers })]);
 told.workers = both;
-told.names = workers.lanes.map((lane) => lane.engine);
 
 // Bytes stay whose they were; what is refused can be given again; what is aborted is not lost.
 const group = (n) => file.slice(ptm.levels[n].offset, ptm.levels[n].offset + ptm.levels[n].length);
@@ -74,17 +76,15 @@ const going = settled(remote.refine(group(1), { signal: stop.signal }));
 stop.abort();
 told.aborted = await going;
 told.again = digest(await remote.refine(group(1)));
-// Several levels in one go, until one is refused; then from there on.
-const swift = workers.decoder(ptm.header, { format: "native" });
-const refused = await swift.refineAll([group(0), group(1), bad]).catch((error) => error);
-told.refused = [refused.code, refused.decoded, swift.level];
-const rest = ptm.levels.slice(2).map((_, n) => group(n + 2));
-told.rest = (await swift.refineAll(rest)).map(digest);
-// A module that cannot be had is looked for by the worker.
-const failing = new DecoderWorkers({ count: 1, create, wasm: Promise.reject(new Error("none")) });
-const alone = failing.decoder(ptm.header, { format: "native" });
-told.alone = [digest(await alone.refine(group(0))), failing.lanes[0].engine !== ""];
-failing.close();
+// Several levels in one go, all or until one is damaged; and of a file that is not the expected one.
+const ends = ptm.levels.map(({ offset, length }) => offset + length);
+const options = { ends, levels: 4, format: "native" };
+told.several = (await workers.decodeFirst(file.subarray(0, ends[3]), options)).map(digest);
+const spoiled = file.slice();
+spoiled[ends[2] - 1] ^= 1;
+const refused = await workers.decodeFirst(spoiled, options).catch((error) => error);
+const other = await workers.decodeFirst(file, { ...options, ends: ends.slice(1) }).catch((error) => error);
+told.refused = [refused.code, refused.decoded, other.code, other.decoded];
 // One of two has failed: the other has all the work.
 const halved = new DecoderWorkers({ count: 2, create, wasm });
 halved.lanes[0].fail(new Error("did not start"));

@@ -1,18 +1,18 @@
 // Decodes many files and says what each held: one line of JSON for each, in order.
 //
-//   node decode.mjs CASES [js|wasm] [native|rgba] [MEMORY]
+//   node decode.mjs CASES [native|rgba] [MEMORY]
 //
 // CASES: for each file its length in four bytes and its bytes.
 
 import { createHash } from "node:crypto";
 import { readFileSync } from "node:fs";
 
-import { makeEngine } from "./engines.mjs";
 import { readHeader } from "../../web/ptm/src/container.js";
+import { DECODER_URL, loadEngine } from "../../web/ptm/src/engine.js";
 import { LevelDecoder } from "../../web/ptm/src/level-decoder.js";
 
-const [, , path, engineName = "js", format = "native", memory] = process.argv;
-const engine = await makeEngine(engineName);
+const [, , path, format = "native", memory] = process.argv;
+const engine = await loadEngine(readFileSync(DECODER_URL));
 const cases = readFileSync(path);
 for (let at = 0; at < cases.length; ) {
   const length = cases.readUInt32LE(at);

@@ -1,9 +1,11 @@
 // Huge levels before a decoder: prints the codes of what is refused, and the bytes that it took.
 
-import { makeEngine } from "./engines.mjs";
+import { readFileSync } from "node:fs";
+
+import { DECODER_URL, loadEngine } from "../../web/ptm/src/engine.js";
 import { LevelDecoder } from "../../web/ptm/src/level-decoder.js";
 
-const engine = await makeEngine(process.argv[2]);
+const engine = await loadEngine(readFileSync(DECODER_URL));
 const before = process.memoryUsage().arrayBuffers;
 for (const tile of [0, 512]) {
   const counts = tile ? { across: 128, down: 128 } : { across: 1, down: 1 };

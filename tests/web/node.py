@@ -56,12 +56,12 @@ def run(*arguments: str | Path, seconds: float = 300) -> str:
 
 
 def decode_all(
-    folder: Path, files: Sequence[bytes], engine: str, *options: str, seconds: float = 300
+    folder: Path, files: Sequence[bytes], *options: str, seconds: float = 300
 ) -> list[Decoded]:
-    """What an engine makes of files, in one process; ``options`` are those of ``decode.mjs``."""
-    cases = folder / f"cases-{engine}"
+    """What the decoder makes of files, in one process; ``options`` are those of ``decode.mjs``."""
+    cases = folder / "cases"
     cases.write_bytes(b"".join(struct.pack("<I", len(file)) + file for file in files))
-    lines = run(HERE / "decode.mjs", cases, engine, *options, seconds=seconds).splitlines()
+    lines = run(HERE / "decode.mjs", cases, *options, seconds=seconds).splitlines()
     assert len(lines) == len(files)
     told = map(json.loads, lines)
     return [Decoded(tuple(one["levels"]), one["error"]) for one in told]

@@ -1,4 +1,4 @@
-"""The decoder in a real browser: in its workers, from ranges, with either engine."""
+"""The decoder in a real browser: in its workers, from ranges."""
 
 from __future__ import annotations
 
@@ -23,21 +23,26 @@ from browsers import web  # noqa: E402
 #: Slices stand for ranges, which the page's server does not know.
 PAGE = """
 <script type="module">
-import { DecoderWorkers, loadEngine, openPtm } from "/ptm/src/index.js";
+import { DecoderWorkers, openPtm } from "/ptm/src/index.js";
 const file = new Uint8Array(await (await fetch("/files/image.ptm")).arrayBuffer());
 const ptm = await openPtm(async (offset, length) => file.slice(offset, offset + length));
 const byte = (b) => b.toString(16).padStart(2, "0");
 const hex = (bytes) => [...new Uint8Array(bytes)].map(byte).join("");
-const told = { here: (await loadEngine()).name };
-for (const wasm of [undefined, new Uint8Array(0)]) {
-  const workers = new DecoderWorkers({ count: 2, wasm });
-  const levels = [];
-  for await (const { data } of ptm.decode({ workers })) {
-    levels.push(hex(await crypto.subtle.digest("SHA-256", data)));
-  }
-  told[workers.lanes[0].engine] = levels;
-  workers.close();
+const told = { levels: [] };
+const workers = new DecoderWorkers({ count: 2 });
+for await (const { data } of ptm.decode({ workers })) {
+  told.levels.push(hex(await crypto.subtle.digest("SHA-256", data)));
 }
+workers.close();
+// A worker fetches the module itself where the page cannot.
+const wasm = Promise.reject(new Error("none"));
+const alone = new DecoderWorkers({ count: 1, wasm });
+told.alone = (await ptm.image(0, { workers: alone })).width;
+const useless = new DecoderWorkers({ count: 2, wasm: new Uint8Array(8) });
+told.error = await ptm.image(0, { workers: useless }).catch(({ name }) => name);
+useless.decoder(ptm.header);
+await new Promise((resolve) => setTimeout(resolve, 500));
+told.failed = useless.failed;
 post("/done", JSON.stringify(told));
 </script>
 """
@@ -60,4 +65,4 @@ def test_workers_decode_what_python_does(browser: Any, tmp_path: Path) -> None:
     for level in decode_levels(file):
         opaque = np.dstack([level, np.full(level.shape[:2], 255, np.uint8)])
         levels.append(hashlib.sha256(opaque.tobytes()).hexdigest())
-    assert told == {"here": "wasm", "wasm": levels, "js": levels}
+    assert told == {"levels": levels, "alone": 1, "error": "Error", "failed": True}

@@ -40,11 +40,6 @@ def _node(require: Callable[[str, str], None]) -> None:
         require("node", remedy)
 
 
-@pytest.fixture(params=["js", "wasm"])
-def engine(request: pytest.FixtureRequest) -> str:
-    return str(request.param)
-
-
 def known(file: bytes) -> bool:
     """Whether the file is of a profile and kind that a browser reads."""
     header = read_header(file)
@@ -89,9 +84,9 @@ def synthetic() -> dict[str, bytes]:
     return files
 
 
-def test_frozen_files(tmp_path: Path, engine: str) -> None:
+def test_frozen_files(tmp_path: Path) -> None:
     files = [file.read_bytes() for file in sorted(VECTORS.glob("*.ptm"))]
-    for file, found in zip(files, decode_all(tmp_path, files, engine), strict=True):
+    for file, found in zip(files, decode_all(tmp_path, files), strict=True):
         if known(file):
             assert found == by_python(file)
         else:
@@ -99,9 +94,9 @@ def test_frozen_files(tmp_path: Path, engine: str) -> None:
     assert sum(map(known, files)) == 23
 
 
-def test_synthetic_files(tmp_path: Path, engine: str) -> None:
+def test_synthetic_files(tmp_path: Path) -> None:
     files = synthetic()
-    found = decode_all(tmp_path, list(files.values()), engine)
+    found = decode_all(tmp_path, list(files.values()))
     wrong = [
         name
         for (name, file), one in zip(files.items(), found, strict=True)
@@ -111,11 +106,11 @@ def test_synthetic_files(tmp_path: Path, engine: str) -> None:
     assert len(files) > 300
 
 
-def test_ready_for_upload(tmp_path: Path, engine: str) -> None:
+def test_ready_for_upload(tmp_path: Path) -> None:
     """As RGBA grey is in all three, and what has no alpha is opaque."""
     images = [image("photo", 21, 18, components) for components in range(1, 5)]
     files = [encode(one) for one in images]
-    found = decode_all(tmp_path, files, engine, "rgba")
+    found = decode_all(tmp_path, files, "rgba")
     for file, one in zip(files, found, strict=True):
         wanted = []
         for level in decode_levels(file):
@@ -129,12 +124,12 @@ def test_ready_for_upload(tmp_path: Path, engine: str) -> None:
 @pytest.mark.parametrize(
     "name", ["fast-rgb-palette", "fast-greyalpha-27x30", "fast-rgb-error-2", "raw-rgb-tiles"]
 )
-def test_cut_at_every_byte(tmp_path: Path, engine: str, name: str) -> None:
+def test_cut_at_every_byte(tmp_path: Path, name: str) -> None:
     """Whatever is whole comes out, and nothing else."""
     file = (VECTORS / f"{name}.ptm").read_bytes()
     header, exact = read_header(file), by_python(file)
     cuts = [file[:size] for size in range(len(file))]
-    for cut, found in zip(cuts, decode_all(tmp_path, cuts, engine), strict=True):
+    for cut, found in zip(cuts, decode_all(tmp_path, cuts), strict=True):
         if len(cut) < header.description[0]:
             assert found == by_python(cut)
         else:
@@ -145,7 +140,7 @@ def test_cut_at_every_byte(tmp_path: Path, engine: str, name: str) -> None:
 @pytest.mark.parametrize(
     "name", ["fast-rgb-ranks", "fast-grey-33x31", "fast-rgba-24x21", "fast-rgb-error-2"]
 )
-def test_every_byte_flipped(tmp_path: Path, engine: str, name: str) -> None:
+def test_every_byte_flipped(tmp_path: Path, name: str) -> None:
     """One bit of each byte: no checksum lets it pass."""
     file = (VECTORS / f"{name}.ptm").read_bytes()
     flips = []
@@ -154,13 +149,13 @@ def test_every_byte_flipped(tmp_path: Path, engine: str, name: str) -> None:
         flipped[at] ^= 1 << (at % 8)
         flips.append(bytes(flipped))
     exact = by_python(file)
-    for at, found in enumerate(decode_all(tmp_path, flips, engine)):
+    for at, found in enumerate(decode_all(tmp_path, flips)):
         assert found.error is not None, at
         assert found == by_python(flips[at]) or found.error == UNKNOWN
         assert found.levels == exact.levels[: len(found.levels)]
 
 
-def test_flips_behind_right_checksums(tmp_path: Path, engine: str) -> None:
+def test_flips_behind_right_checksums(tmp_path: Path) -> None:
     """Refused, or decoded to what Python makes of it."""
     flips = []
     for name in ("fast-rgb-ranks", "fast-rgb-palette", "fast-rgb-error-2", "fast-rgb-tiles"):
@@ -171,13 +166,13 @@ def test_flips_behind_right_checksums(tmp_path: Path, engine: str) -> None:
             flipped[at] ^= 1 << (at % 8)
             flips.append(sealed(bytes(flipped), file))
     passed = 0
-    for flipped, found in zip(flips, decode_all(tmp_path, flips, engine), strict=True):
+    for flipped, found in zip(flips, decode_all(tmp_path, flips), strict=True):
         assert found == by_python(flipped)
         passed += found.error is None
     assert 0 < passed < len(flips)
 
 
-def test_the_fuzzers_files(tmp_path: Path, engine: str) -> None:
+def test_the_fuzzers_files(tmp_path: Path) -> None:
     """The same levels as Python's, and the same code of what is refused."""
     target, rng = Ptm(tmp_path, tmp_path), random.Random("browser")
     files = [target.make(rng).data for _ in range(1000)]
@@ -186,7 +181,7 @@ def test_the_fuzzers_files(tmp_path: Path, engine: str) -> None:
         file = rng.choice(own)
         changed = damaged(rng, file, rng.choice(own), rng.choice(((), (), FIELDS)))
         files.append(sealed(changed, file) if rng.random() < 0.9 else changed)
-    decoded = decode_all(tmp_path, files, engine, "native", str(LIMITS.decoded_bytes))
+    decoded = decode_all(tmp_path, files, "native", str(LIMITS.decoded_bytes))
     outcomes: Counter[str | None] = Counter()
     for file, found in zip(files, decoded, strict=True):
         wanted = by_python(file, LIMITS)
@@ -212,7 +207,7 @@ def hostile_head(**fields: int) -> bytes:
     return bytes(file[:68])
 
 
-def test_huge_sizes_are_refused_before_memory_is_taken(tmp_path: Path, engine: str) -> None:
+def test_huge_sizes_are_refused_before_memory_is_taken(tmp_path: Path) -> None:
     huge = [
         hostile_head(width=65536, height=1, components=4, length=2 * 65536 * 4),
         hostile_head(width=65537),
@@ -227,31 +222,31 @@ def test_huge_sizes_are_refused_before_memory_is_taken(tmp_path: Path, engine: s
         hostile_head(components=5),
         hostile_head(components=0),
     ]
-    found = decode_all(tmp_path, huge, engine)
+    found = decode_all(tmp_path, huge)
     assert found == [by_python(file) for file in huge]
     assert {one.error for one in found} == {None, "PTM-L101", "PTM-I105"}
 
 
-def test_memory_stays_within_the_limit(tmp_path: Path, engine: str) -> None:
+def test_memory_stays_within_the_limit(tmp_path: Path) -> None:
     """The largest level that the format allows, of which not one byte is there, takes none."""
     script = Path(__file__).with_name("limits.mjs")
-    told = run(script, engine).split()
+    told = run(script).split()
     assert told[:2] == ["PTM-L103", "PTM-L103"]
     assert int(told[2]) < 1 << 24
 
 
-def test_a_large_tile_leaves_nothing_behind(tmp_path: Path, engine: str) -> None:
-    """Of 34 MB: the engine in WebAssembly gives its memory up and begins anew."""
+def test_a_large_tile_leaves_nothing_behind(tmp_path: Path) -> None:
+    """Of 34 MB: the decoder gives its memory up and begins anew."""
     large = encode(np.full((2600, 2600, 1), 200, np.uint8), EncodeOptions(tile=0))
     small = encode(image("photo", 60, 61, 3))
-    found = decode_all(tmp_path, [small, large, small], engine)
+    found = decode_all(tmp_path, [small, large, small])
     assert found == [by_python(file) for file in (small, large, small)]
 
 
-def test_a_limit_is_a_limit(tmp_path: Path, engine: str) -> None:
+def test_a_limit_is_a_limit(tmp_path: Path) -> None:
     file = encode(image("photo", 300, 400, 3))
-    whole = decode_all(tmp_path, [file], engine)[0]
-    small = decode_all(tmp_path, [file], engine, "native", str(1 << 22))[0]
+    whole = decode_all(tmp_path, [file])[0]
+    small = decode_all(tmp_path, [file], "native", str(1 << 22))[0]
     assert whole.error is None
     assert small.error == "PTM-L103"
     assert small.levels == whole.levels[: len(small.levels)]

@@ -1,5 +1,5 @@
-"""Compiles ``c/*.c`` to ``decoder.wasm``, which is committed: with the pinned zig the same bytes
-come out on any machine.
+"""Compiles ``c/*.c`` to ``src/decoder.wasm``, which is committed: with the pinned zig the same
+bytes come out on any machine.
 
     python web/ptm/build.py             writes it
     python web/ptm/build.py OTHER.wasm  writes that
@@ -15,7 +15,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-MODULE = HERE / "decoder.wasm"
+MODULE = HERE / "src" / "decoder.wasm"
 #: The compiler, a wheel on PyPI; the extra `dev` pins it too.
 ZIG = "0.15.2"
 SOURCES = ("decoder.c", "rans.c", "haar.c", "haar_planes.c", "repeats.c", "texel.c")

@@ -8,17 +8,8 @@ import { rawTexels, storedTexels, toNative, toRgba, unknownCoder } from "./texel
 import { tileSpan } from "./tiling.js";
 
 /** @typedef {import("./container.js").Header} Header */
+/** @typedef {import("./engine.js").Engine} Engine */
 /** @typedef {import("./texels.js").Shape} Shape */
-
-/**
- * What decodes one tile of `fast`: given its bytes (behind those that name its coder) and the same
- * part of the level below, its texels. They may be overwritten by the next call.
- * @typedef {object} Engine
- * @property {string} name
- * @property {(data: Uint8Array, below: Uint32Array, shape: Shape) => Uint32Array} haar
- * @property {(data: Uint8Array, below: Uint32Array, shape: Shape) => Uint32Array} repeats
- * @property {(data: Uint8Array, below: Uint32Array, shape: Shape, error: number) => Uint32Array} texel
- */
 
 /**
  * @typedef {object} Image

@@ -1,9 +1,9 @@
 // A file that is read range by range: as much of it as the levels that are wanted.
 
 import { readHeader } from "./container.js";
+import { loadEngine } from "./engine.js";
 import { PtmError } from "./errors.js";
 import { LevelDecoder } from "./level-decoder.js";
-import { loadEngine } from "./load-engine.js";
 
 /** @typedef {import("./level-decoder.js").Image} Image */
 
@@ -23,7 +23,7 @@ import { loadEngine } from "./load-engine.js";
  * @typedef {import("./level-decoder.js").DecoderOptions & {
  *   to?: number,
  *   signal?: AbortSignal,
- *   engine?: import("./level-decoder.js").Engine,
+ *   engine?: import("./engine.js").Engine,
  *   workers?: import("./workers.js").DecoderWorkers,
  * }} DecodeOptions
  *   `to`: the finest level that is wanted; it is an error then if it is not whole in the file.

@@ -1,25 +1,28 @@
 // The worker's side: decoders by number, each told what to do next.
 
+import { readHeader } from "./container.js";
+import { loadEngine } from "./engine.js";
 import { PtmError } from "./errors.js";
 import { LevelDecoder } from "./level-decoder.js";
-import { loadEngine } from "./load-engine.js";
 
 /**
- * What a worker is told: where the module is, first of all; then of a decoder that it begins, that it
- * refines, that it ends.
- * @typedef {{wasm?: import("./load-engine.js").ModuleSource}
+ * A message to a worker: first where the module is; then a file whose first levels are wanted; or a
+ * decoder that begins, that refines, that ends.
+ * @typedef {{wasm?: import("./engine.js").ModuleSource}
+ *   | {bytes: Uint8Array, ends: number[], levels: number,
+ *      options: import("./level-decoder.js").DecoderOptions}
  *   | {decoder: number, header: import("./container.js").Header,
  *      options: import("./level-decoder.js").DecoderOptions}
- *   | {decoder: number, groups: Uint8Array[]}
+ *   | {decoder: number, bytes: Uint8Array}
  *   | {decoder: number}} Order
  */
 
 /**
- * What it answers when it has refined: the levels that were decoded, and what is wrong with the next.
+ * The answer to bytes: the levels that were decoded, and what is wrong with the next.
  * @typedef {object} Answer
  * @property {import("./level-decoder.js").Image[]} images
- * @property {string} engine its name, "" if there was none
  * @property {{code: string | null, message: string} | null} fault
+ * @property {boolean} [useless] whether the worker has no engine and will never decode anything
  */
 
 /**
@@ -36,32 +39,35 @@ import { loadEngine } from "./load-engine.js";
 export function serve(port) {
   /** @type {Map<number, LevelDecoder>} */
   const decoders = new Map();
-  /** @type {Promise<import("./level-decoder.js").Engine> | undefined} */
+  /** @type {Promise<import("./engine.js").Engine> | undefined} */
   let loading;
   // One order after the other: the first ones wait for the engine.
   let before = Promise.resolve();
 
   /** @param {Order} order */
   async function obey(order) {
-    if (!("decoder" in order)) {
+    if ("wasm" in order) {
       loading = loadEngine(order.wasm);
+      loading.catch(() => {}); // the next order reports it
       return;
     }
-    const engine = await (loading ??= loadEngine());
+    const engine = await (loading ??= loadEngine()).catch((error) => {
+      throw Object.assign(error, { useless: true });
+    });
     if ("header" in order) {
       decoders.set(order.decoder, new LevelDecoder(order.header, engine, order.options));
-    } else if ("groups" in order) {
-      const decoder = /** @type {LevelDecoder} */ (decoders.get(order.decoder));
+    } else if ("bytes" in order) {
+      /** @type {import("./level-decoder.js").Image[]} */
       const images = [];
       let fault = null;
       try {
-        for (const group of order.groups) images.push(decoder.refine(group));
+        if ("ends" in order) for (const image of firstLevels(order, engine)) images.push(image);
+        else images.push(/** @type {LevelDecoder} */ (decoders.get(order.decoder)).refine(order.bytes));
       } catch (error) {
         fault = faultOf(error);
       }
-      const answer = { images, engine: engine.name, fault };
-      port.postMessage(answer, images.map(({ data }) => data.buffer));
-    } else {
+      port.postMessage({ images, fault }, images.map(({ data }) => data.buffer));
+    } else if ("decoder" in order) {
       decoders.delete(order.decoder);
     }
   }
@@ -69,10 +75,27 @@ export function serve(port) {
   port.onmessage = ({ data: order }) => {
     before = before.then(() =>
       obey(order).catch((error) => {
-        port.postMessage({ images: [], engine: "", fault: faultOf(error) }, []);
+        port.postMessage({ images: [], fault: faultOf(error), useless: error.useless }, []);
       }),
     );
   };
+}
+
+/**
+ * The first levels of a file. Throws what `readHeader` and `refine` throw; PTM-I105 if its levels do not
+ * end where they should.
+ * @param {{bytes: Uint8Array, ends: number[], levels: number,
+ *   options: import("./level-decoder.js").DecoderOptions}} order
+ * @param {import("./engine.js").Engine} engine
+ */
+function* firstLevels({ bytes, ends, levels, options }, engine) {
+  const header = readHeader(bytes);
+  const own = header.levels.map(({ offset, length }) => offset + length);
+  if (own.join() !== ends.join()) throw new PtmError("PTM-I105", "its levels end elsewhere");
+  const decoder = new LevelDecoder(header, engine, options);
+  for (const { offset, length } of header.levels.slice(0, levels)) {
+    yield decoder.refine(bytes.subarray(offset, offset + length));
+  }
 }
 
 /** @param {any} error */

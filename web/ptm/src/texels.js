@@ -5,8 +5,8 @@
 import { damaged } from "./errors.js";
 import { Reader } from "./reader.js";
 
-/** What stands above three components. */
-export const OPAQUE = 0xff << 24;
+/** Alpha above three components. */
+const OPAQUE = 0xff << 24;
 const GREY = 0x010101;
 
 /**

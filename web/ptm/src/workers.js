@@ -5,7 +5,7 @@ import { PtmError } from "./errors.js";
 /** @typedef {import("./container.js").Header} Header */
 /** @typedef {import("./level-decoder.js").Image} Image */
 /** @typedef {import("./level-decoder.js").DecoderOptions} DecoderOptions */
-/** @typedef {import("./load-engine.js").ModuleSource} ModuleSource */
+/** @typedef {import("./engine.js").ModuleSource} ModuleSource */
 
 /**
  * @typedef {object} WorkersOptions
@@ -15,15 +15,12 @@ import { PtmError } from "./errors.js";
  * @property {() => import("./serve.js").Port} [create] how a worker is made, if otherwise
  */
 
-/** Groups of bytes on their way through a worker. */
+/** Bytes on their way through a worker. */
 class Task {
-  /**
-   * @param {number} decoder
-   * @param {Uint8Array[]} groups
-   */
-  constructor(decoder, groups) {
-    this.decoder = decoder;
-    this.groups = groups;
+  /** @param {{bytes: Uint8Array, decoder: number} | {bytes: Uint8Array, ends: number[], levels: number,
+   *   options: DecoderOptions}} order */
+  constructor(order) {
+    this.order = order;
     /** @type {(images: Image[]) => void} */
     this.resolve = () => {};
     /** @type {(error: unknown) => void} */
@@ -59,8 +56,6 @@ class Lane {
     this.decoders = 0;
     /** @type {Error | undefined} */
     this.failure = undefined;
-    /** Name of the engine, once it has worked. */
-    this.engine = "";
     port.onmessage = ({ data }) => this.#answered(data);
     port.onerror = (event) => this.fail(new Error(`a worker failed: ${event.message ?? event}`));
   }
@@ -103,20 +98,19 @@ class Lane {
     if (this.#task) return;
     this.#task = this.#waiting.shift();
     if (!this.#task) return;
-    const { decoder } = this.#task;
-    const groups = this.#task.groups.map((group) => group.slice());
-    this.tell({ decoder, groups }, groups.map(({ buffer }) => buffer));
+    const { order } = this.#task, bytes = order.bytes.slice();
+    this.tell({ ...order, bytes }, [bytes.buffer]);
   }
 
   /** @param {import("./serve.js").Answer} answer */
-  #answered({ images, engine, fault }) {
+  #answered({ images, fault, useless }) {
     const task = this.#task;
     this.#task = undefined;
-    this.engine = engine || this.engine;
     if (fault) {
       const { code, message } = fault;
       const error = code ? new PtmError(code, message.slice(code.length + 2)) : new Error(message);
       task?.reject(Object.assign(error, { decoded: images.length }));
+      if (useless) this.fail(error);
     } else {
       task?.resolve(images);
     }
@@ -154,7 +148,7 @@ class RemoteDecoder {
     this.#asked = true;
     let task = this.#task;
     if (!task) {
-      task = this.#task = new Task(this.number, [data]);
+      task = this.#task = new Task({ decoder: this.number, bytes: data });
       this.lane.add(task);
     }
     try {
@@ -164,28 +158,6 @@ class RemoteDecoder {
       return image;
     } catch (error) {
       if (!signal?.aborted || this.lane.callOff(task)) this.#task = undefined;
-      throw error;
-    } finally {
-      this.#asked = false;
-    }
-  }
-
-  /**
-   * The next levels from their groups, in one go: threads that are busy are waited for only once.
-   * What is thrown tells how many were `decoded` before.
-   * @param {Uint8Array[]} groups
-   */
-  async refineAll(groups) {
-    if (this.#asked || this.#task) throw new Error("a level is being decoded already");
-    this.#asked = true;
-    try {
-      const task = new Task(this.number, groups);
-      this.lane.add(task);
-      const images = await task.images;
-      this.level += images.length;
-      return images;
-    } catch (error) {
-      this.level += /** @type {{decoded?: number}} */ (error).decoded ?? 0;
       throw error;
     } finally {
       this.#asked = false;
@@ -224,14 +196,34 @@ export class DecoderWorkers {
    * @param {DecoderOptions} [options]
    */
   decoder(header, options = {}) {
-    const able = this.lanes.filter(({ failure }) => !failure);
-    const lane = (able.length ? able : this.lanes).reduce(
-      (one, other) => (other.decoders < one.decoders ? other : one),
-    );
+    const lane = this.#lane();
     lane.decoders++;
     const number = this.#decoders++;
     lane.tell({ decoder: number, header, options });
     return new RemoteDecoder(lane, number);
+  }
+
+  /**
+   * The first levels of a file in one go, so that a busy main thread is waited for once. The bytes are
+   * copied. Throws PtmError as `LevelDecoder.refine` and `readHeader`, with the number of levels that
+   * were `decoded`; PTM-I105 if the file's levels do not end at `ends`.
+   * @param {Uint8Array} bytes of the file from its begin on
+   * @param {{ends: number[], levels: number} & DecoderOptions} options where each level ends in the
+   *   file, and how many are wanted
+   */
+  async decodeFirst(bytes, { ends, levels, ...options }) {
+    const lane = this.#lane(), task = new Task({ bytes, ends, levels, options });
+    lane.decoders++;
+    lane.add(task);
+    return task.images.finally(() => lane.decoders--);
+  }
+
+  /** The worker that has the fewest decoders, of those that have not failed. */
+  #lane() {
+    const able = this.lanes.filter(({ failure }) => !failure);
+    return (able.length ? able : this.lanes).reduce(
+      (one, other) => (other.decoders < one.decoders ? other : one),
+    );
   }
 
   /** Ends all workers at once; what is under way is rejected. */
