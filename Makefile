@@ -9,6 +9,7 @@
 # make bench-walk    what clients show to a walker: all policies, links and scenes (an hour)
 # make bench-web     how soon a view is there, by the walk page and by what people do otherwise
 # make fuzz    100,000 damaged and hostile files for every reader (half an hour)
+# make page    bundle the page of web/page into the package, with esbuild
 # make sample  only the sample museum
 # make setup   only the virtual environment
 # make docs-tables     print the exact tables of benchmarks/RESULTS.md into it (ten minutes)
@@ -30,7 +31,7 @@ JOBS ?= 2
 PYTEST_ARGS ?=
 export PTM_SHARED ?= $(abspath ../shared)
 
-.PHONY: help setup demo walk test lint bench bench-codec bench-pvs bench-ach bench-walk bench-web fuzz sample docs-tables docs-timings docs-pictures clean
+.PHONY: help setup demo walk test lint bench bench-codec bench-pvs bench-ach bench-walk bench-web fuzz page sample docs-tables docs-timings docs-pictures clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -155,6 +156,10 @@ docs-timings: build/museum/.made $(VENV)/.installed-dev
 docs-pictures: build/museum/.made
 	$(BIN)/ptm build-scene build/museum/museum.obj -o build/museum.db
 	$(BIN)/python benchmarks/docs_pictures.py build/museum.db
+
+page: $(VENV)/.installed-dev
+	@.ci/test-components
+	$(BIN)/python web/page/build.py
 
 clean:
 	rm -rf build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -114,7 +114,7 @@ def walk(database: Path) -> Image.Image:
     from playwright.sync_api import sync_playwright
 
     from ptmtools.server.running import serving
-    from ptmtools.viewer.site import site_of
+    from ptmtools.site.content import site_of
 
     program = shutil.which("chromium")
     with serving(site_of(database).entries) as url, sync_playwright() as playwright:

@@ -30,7 +30,7 @@ from benchmarks.web_rivals.images import MEDIA, in_form
 from benchmarks.web_rivals.models import whole_glb
 from benchmarks.web_rivals.packages import ESBUILD, KTX2, THREE
 from ptmtools.scene.model import Scene
-from ptmtools.viewer.entry import Entry
+from ptmtools.site.content import Entry
 
 PAGES = Path(__file__).with_name("pages")
 #: Files of more bytes are textures for the most part, which gzip does not make smaller.
@@ -87,7 +87,7 @@ def rival(name: str, scene: Scene, viewpoint: Mapping[str, Any]) -> Entrant:
 
 def walk_page(database: Path) -> Entrant:
     """The page that `ptm publish` makes of a database. What it asks for depends on the link."""
-    from ptmtools.viewer.site import site_of
+    from ptmtools.site.content import site_of
 
     return Entrant(WALK, site_of(database).entries, "window.ptm?.state().complete", steady=False)
 

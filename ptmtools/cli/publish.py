@@ -11,9 +11,8 @@ from ptmtools.cli.common import as_json, database, voiced
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
 from ptmtools.quantities import count, size
-from ptmtools.viewer.publishing import PublishOptions, publish as write
-from ptmtools.viewer.site import SiteOptions, site_of
-from ptmtools.viewer.weight import COARSE, weight_of
+from ptmtools.site.content import SiteOptions, site_of
+from ptmtools.site.publishing import COARSE, PublishOptions, publish as write, weight_of
 
 
 @click.command("publish")

@@ -28,7 +28,7 @@ from ptmtools.server.ranges import (
 from ptmtools.server.stored import Copies, Stored, stored
 from ptmtools.server.throttle import Throttle
 from ptmtools.server.visits import Visits
-from ptmtools.viewer.entry import Entry
+from ptmtools.site.content import Entry
 
 FOREVER = "public, max-age=31536000, immutable"
 #: May be kept, and is asked about before each use.

@@ -12,7 +12,7 @@ from pathlib import Path
 from urllib.parse import unquote, unquote_to_bytes
 
 from ptmtools.files import leads_inside
-from ptmtools.viewer.entry import Entry
+from ptmtools.site.content import Entry
 
 #: The file of a decoded name, or None; raises BlockingIOError for what will be there later.
 Lookup = Callable[[str], Entry | None]

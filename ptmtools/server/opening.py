@@ -11,8 +11,8 @@ from ptmtools.errors import DatabaseError, PtmError
 from ptmtools.pipeline.command import naming_command, open_database
 from ptmtools.pipeline.stages.emit import EMIT
 from ptmtools.server.lookup import INDEX, Lookup, among, below
+from ptmtools.site.content import Entry
 from ptmtools.store.layout import MANIFEST, SERVED
-from ptmtools.viewer.entry import Entry
 
 
 def files_of(folder: str | PathLike[str]) -> Lookup:
@@ -68,7 +68,7 @@ class _Database:
         return state.st_mtime_ns, state.st_ino
 
     def _site(self) -> Lookup:
-        from ptmtools.viewer.site import SiteOptions, site_of
+        from ptmtools.site.content import SiteOptions, site_of
 
         with naming_command(self._path):
             try:

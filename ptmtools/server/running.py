@@ -15,7 +15,7 @@ from ptmtools.lazy import component
 from ptmtools.server.lookup import Lookup, among
 from ptmtools.server.throttle import Throttle
 from ptmtools.server.visits import Visits
-from ptmtools.viewer.entry import Entry
+from ptmtools.site.content import Entry
 
 if TYPE_CHECKING:
     from starlette.types import ASGIApp

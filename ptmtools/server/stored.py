@@ -16,7 +16,7 @@ from anyio.to_thread import run_sync
 
 from ptmtools.files import open_regular
 from ptmtools.output.emission import compressed
-from ptmtools.viewer.entry import Entry, state_of
+from ptmtools.site.content import Entry, state_of
 
 #: Bytes that are read, or handed on, at a time.
 PIECE = 1 << 18

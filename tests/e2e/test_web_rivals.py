@@ -19,7 +19,7 @@ from ptmtools.glb import BINARY, glb_chunks
 from ptmtools.output.served import read_served
 from ptmtools.scene.model import Scene, SourceImage
 from ptmtools.server.throttle import Throttle
-from ptmtools.viewer.entry import Entry
+from ptmtools.site.content import Entry
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "e2e"), str(ROOT / "benchmarks")]

@@ -14,7 +14,7 @@ import pytest
 from ptmtools.server.lookup import Lookup, among, below
 from ptmtools.server.running import serving
 from ptmtools.server.visits import Visits
-from ptmtools.viewer.entry import Entry
+from ptmtools.site.content import Entry
 
 PAGE = b"<!DOCTYPE html><p>hello</p>" * 20
 TEXTS = b'{"cells": [1, 2, 3]}' * 500

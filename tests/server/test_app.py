@@ -19,7 +19,7 @@ from ptmtools.server.paced import Paced
 from ptmtools.server.running import running, serving
 from ptmtools.server.throttle import Throttle
 from ptmtools.server.visits import Visits
-from ptmtools.viewer.entry import Entry
+from ptmtools.site.content import Entry
 from tests.server.conftest import NOISE, PAGE, TEXTS, Client, client_of
 
 FILES = ["/data/a%20%C3%BC-0123456789.ptm", "/data/file.ptm", "/noise.ptm"]

@@ -24,9 +24,8 @@ from ptmtools.server import opening
 from ptmtools.server.lookup import Lookup
 from ptmtools.server.running import url_of
 from ptmtools.server.stored import stored
+from ptmtools.site.content import Entry, SiteOptions
 from ptmtools.store.manifest import SCHEMA, Manifest, StageRecord
-from ptmtools.viewer.entry import Entry
-from ptmtools.viewer.site import SiteOptions
 from tests.server.conftest import NOISE, PAGE, client_of
 
 TWO_ROOMS = Path(__file__).parents[2] / "sample_data/two_rooms/two_rooms.obj"
@@ -237,7 +236,7 @@ def site_of(path: Path, options: SiteOptions) -> Site:
 def test_a_site_goes_before_the_files_of_its_database(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("ptmtools.viewer.site.site_of", site_of)
+    monkeypatch.setattr("ptmtools.site.content.site_of", site_of)
     made = database(tmp_path / "db", {"emit": RECORD})
     (made / "www").mkdir()
     (made / "www/index.html").write_bytes(b"not this")

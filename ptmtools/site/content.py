@@ -1,0 +1,458 @@
+"""The files of a site: what a browser needs to walk through a database.
+
+Every file but the page has a hash of its contents in its name, so that caches may keep it for ever
+and a site that changes is never half old. The index is that of the hints, with names and sizes of
+each file instead of templates: a client plans with what a record and the geometry of a cell cost.
+The page itself is built by ``web/page/build.py`` and committed in ``page/``.
+
+The geometry stays GLB. (Tried, benchmarks/RESULTS.md: differences of vertices in planes of
+bytes save 22 to 44 % of it, but 0.02 to 0.04 s until the first room at 512 kbit/s; a GLB without
+the names and URIs that the page does not read, 5 %.)
+"""
+
+from __future__ import annotations
+
+import html
+import io
+import json
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+from urllib.parse import quote, unquote
+
+from ptmtools.errors import DatabaseError, InputError, LimitError, naming
+from ptmtools.files import open_regular
+from ptmtools.output.emission import compressed
+from ptmtools.output.served import FORM, Served, read_served
+from ptmtools.pipeline.command import naming_command, open_database
+from ptmtools.pipeline.stages.emit import EMIT
+from ptmtools.progress import Progress, silent
+from ptmtools.store.folder import DatabaseFolder, damaged, unreadable
+from ptmtools.store.layout import SERVED, sha256
+from ptmtools.store.manifest import BUILD
+
+FORMAT = "ptmtools site"
+INDEX, DATA = "index.html", "data"
+#: Hex digits of a SHA-256 that make a name unique.
+DIGITS = 10
+#: The page as ``web/page/build.py`` leaves it, and the media type of each file.
+PAGE = Path(__file__).parent / "page"
+HTML, JAVASCRIPT = "text/html; charset=utf-8", "text/javascript; charset=utf-8"
+PROGRAM = {
+    "viewer.js": JAVASCRIPT,
+    "later.js": JAVASCRIPT,
+    "worker.js": JAVASCRIPT,
+    "decoder.wasm": "application/wasm",
+}
+JSON, JPEG = "application/json", "image/jpeg"
+GLB, PTM = "model/gltf-binary", "application/octet-stream"
+#: Textures that the page decodes.
+PROFILES, KIND, VERSION = ("fast", "raw"), "uint8", 2
+#: Fields of a database's index that a site's index lacks.
+_LEFT_OUT = ("record", "geometry", "textureSets", "statistics", "firstLook", "octrees")
+_VRML_MEDIA = {".wrl": "model/vrml", ".png": "image/png"}
+#: First bytes of pictures: pattern, media type, suffix.
+_MAGIC = (
+    (rb"\xff\xd8\xff", JPEG, ".jpg"),
+    (rb"\x89PNG\r\n\x1a\n", "image/png", ".png"),
+    (rb"RIFF....WEBP", "image/webp", ".webp"),
+)
+#: Fields of a texture that the hints of earlier releases lack.
+_NEEDED = {"gpuTexelBytes", "differences", "color"}
+_STRANGE = re.compile(r"[^A-Za-z0-9_-]+")
+_FIELD = re.compile(r"\{\{(\w+)\}\}")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A file of a site.
+
+    Attributes
+    ----------
+    name: its URL relative to the site, percent-encoded as in links.
+    source: the file, or the bytes themselves.
+    media: its media type.
+    forever: whether the name changes with the content, so that caches may keep it for ever.
+    compressed: whether clients that accept gzip get it compressed; others may ask for ranges.
+    state: of a file, `state_of` at the time when its contents were checked.
+    """
+
+    name: str
+    source: Path | bytes
+    media: str
+    forever: bool = False
+    compressed: bool = False
+    state: tuple[int, int, int] | None = None
+
+    def read(self) -> bytes:
+        """All bytes."""
+        return self.source if isinstance(self.source, bytes) else self.source.read_bytes()
+
+
+def state_of(stat: os.stat_result) -> tuple[int, int, int]:
+    """Inode, time in ns, bytes: they change when a file is written again."""
+    return stat.st_ino, stat.st_mtime_ns, stat.st_size
+
+
+@dataclass(frozen=True)
+class SiteOptions:
+    """Options of a site.
+
+    Attributes
+    ----------
+    title: the title of the page; by default the name of the database.
+    poster: a picture to show until the building is there, JPEG, PNG or WebP, in place of one that
+        is drawn.
+    pictures: draw a poster and pictures of the viewpoints.
+    clients: who it is for: this page only, or VRML browsers too, with their files and the images
+        that these show.
+    """
+
+    title: str = ""
+    poster: str = ""
+    pictures: bool = True
+    clients: Literal["page", "vrml"] = field(default="page", metadata={"option": "for"})
+
+
+@dataclass(frozen=True)
+class Site:
+    """A site.
+
+    Attributes
+    ----------
+    entries: its files, by name.
+    index: the document that the page reads first.
+    notes: remarks for the user, one line each.
+    """
+
+    entries: Mapping[str, Entry]
+    index: Mapping[str, Any]
+    notes: tuple[str, ...] = ()
+
+
+def site_of(
+    database: str | os.PathLike[str],
+    options: SiteOptions | None = None,
+    progress: Progress = silent,
+) -> Site:
+    """The site of a finished database.
+
+    Raises
+    ------
+    DatabaseError: PTM-D001 to D003 there is no database, or one of another version; PTM-D901 its
+        hints are of an earlier release; PTM-D004 it is not finished; PTM-D005, D006 a file is
+        missing or damaged; PTM-D606 there is no geometry in glTF.
+    InputError: PTM-I900 the installed page is incomplete; and what `web_texture` raises.
+    LimitError: as `web_texture`.
+    """
+    options = options or SiteOptions()
+    with naming_command(database):
+        folder = open_database(database)
+        folder.record(EMIT.name)
+        return _Builder(folder, read_served(folder.path), options, progress).site()
+
+
+class _Builder:
+    """Collects the files of a site."""
+
+    def __init__(
+        self, folder: DatabaseFolder, served: Served, options: SiteOptions, progress: Progress
+    ) -> None:
+        self._folder, self._served, self._options = folder, served, options
+        self._progress = progress
+        self._digests = folder.manifest.outputs()
+        self._entries: dict[str, Entry] = {}
+        self._notes: list[str] = []
+
+    def site(self) -> Site:
+        """The whole site."""
+        index = dict(self._served.index)
+        for name in _LEFT_OUT:
+            index.pop(name, None)
+        index["format"] = FORMAT
+        index["cells"] = list(self._cells())
+        index["textures"] = list(self._textures())
+        index["viewpoints"], poster = self._pictures()
+        if self._options.clients == "vrml":
+            self._vrml()
+        text = json.dumps(index, ensure_ascii=False, separators=(",", ":")).encode()
+        name = self._add("index", ".json", JSON, text, compressed=True)
+        self._page(index, f"{DATA}/{name}", poster)
+        return Site(self._entries, index, tuple(self._notes))
+
+    def _page(self, index: Mapping[str, Any], url: str, poster: str | None) -> None:
+        program = program_files()
+        self._entries |= {entry.name: entry for entry in program.values()}
+        first = index["cells"][index["viewpoints"][0]["cell"]]
+        settings = {
+            "index": url,
+            "worker": program["worker.js"].name,
+            "wasm": program["decoder.wasm"].name,
+            "poster": poster,
+            "title": self._options.title or title_of(self._folder.path),
+        }
+        preload = [url, *(f"{DATA}/{first[kind]}" for kind in ("record", "geometry"))]
+        preload.append(program["decoder.wasm"].name)
+        self._entries[INDEX] = page(settings, program["viewer.js"].name, preload)
+
+    def _cells(self) -> Iterator[dict[str, Any]]:
+        index = self._served.index
+        templates = {"record": index["record"], "geometry": index["geometry"][FORM]}
+        media = {"record": (".json", JSON), "geometry": (".glb", GLB)}
+        for number, cell in enumerate(index["cells"]):
+            self._progress(number, len(index["cells"]), "cells")
+            row = dict(cell)
+            for kind, template in templates.items():
+                file, digest = self._place(template.replace("{name}", cell["name"]))
+                data = self._folder.read(file.relative_to(self._folder.path).as_posix(), digest)
+                row[kind] = self._add(
+                    cell["name"], *media[kind], file, digest=digest, compressed=True
+                )
+                row[f"{kind}Bytes"] = min(len(data), len(compressed(data)))
+            yield row
+
+    def _textures(self) -> Iterator[Mapping[str, Any]]:
+        rows = self._served.index["textures"]
+        for number, row in enumerate(rows):
+            self._progress(number, len(rows), "textures")
+            if _NEEDED - row.keys():
+                raise DatabaseError(
+                    "PTM-D901",
+                    "was built by an earlier release: its hints lack what the page needs",
+                    file=self._folder.path,
+                    remedy=f"run {BUILD}",
+                )
+            file, digest = self._place(row["file"])
+            texture = web_texture(file, row)
+            if texture.note:
+                self._notes.append(texture.note)
+            source = file if texture.data is None else texture.data
+            name = self._add(file.stem, ".ptm", PTM, source, digest=digest)
+            yield {**texture.row, "file": name, "fallback": None, "fallbackLevel": None}
+
+    def _pictures(self) -> tuple[list[dict[str, Any]], str | None]:
+        """The viewpoints, and the URL of the poster."""
+        rows = [dict(row) for row in self._served.index["viewpoints"]]
+        poster = None
+        if self._options.poster:
+            media, suffix, data = _picture_file(self._options.poster)
+            poster = self._add("poster", suffix, media, data)
+        if self._options.pictures:
+            for drawn, small in self._drawn():
+                poster = poster or self._add("poster", ".jpg", JPEG, drawn)
+                for number, (row, data) in enumerate(zip(rows, small, strict=False)):
+                    row["thumbnail"] = self._add(f"vp-{number:03}", ".jpg", JPEG, data)
+        return rows, poster and f"{DATA}/{poster}"
+
+    def _drawn(self) -> Iterator[tuple[bytes, list[bytes]]]:
+        """The poster and the small pictures; nothing where Embree is missing."""
+        from ptmtools.site.pictures import pictures
+
+        self._progress(0, 1, "pictures")
+        try:
+            yield pictures(self._served)
+        except ImportError:
+            self._notes.append(
+                "no poster or thumbnails: embreex, which renders them, is not installed"
+            )
+        except LimitError:
+            raise
+        except InputError as fault:
+            raise damaged(Path(fault.file or self._folder.path), fault.message) from None
+
+    def _vrml(self) -> None:
+        """The files of VRML, under the names that they have in the database."""
+        if "vrml" not in self._served.index["geometry"]:
+            raise DatabaseError(
+                "PTM-D900",
+                "has no VRML files",
+                file=self._folder.path,
+                remedy="write them with `ptm emit DB --format vrml,gltf`",
+            )
+        for name in sorted(self._digests):
+            media = _VRML_MEDIA.get(Path(name).suffix)
+            if media and name.startswith(f"{SERVED}/"):
+                own = quote(name.removeprefix(f"{SERVED}/"))
+                self._entries[own] = Entry(
+                    own, self._folder.path / name, media, compressed=own.endswith(".wrl")
+                )
+
+    def _place(self, url: str) -> tuple[Path, str]:
+        """The file that a URL of the index names, and its recorded hash."""
+        name = f"{SERVED}/{os.path.normpath(unquote(url))}"
+        file = self._folder.path / name
+        if name not in self._digests:
+            raise damaged(file, "the manifest does not list it")
+        return file, self._digests[name]
+
+    def _add(
+        self,
+        stem: str,
+        suffix: str,
+        media: str,
+        source: Path | bytes,
+        *,
+        compressed: bool = False,
+        digest: str = "",
+    ) -> str:
+        """Adds a file of the data; returns its URL relative to the index."""
+        digest = sha256(source) if isinstance(source, bytes) else digest
+        name = f"{_STRANGE.sub('_', stem)[:64]}-{digest[:DIGITS]}{suffix}"
+        state = state_of(source.stat()) if isinstance(source, Path) else None
+        entry = Entry(f"{DATA}/{name}", source, media, True, compressed, state)
+        self._entries[entry.name] = entry
+        return name
+
+
+def _picture_file(file: str) -> tuple[str, str, bytes]:
+    """Media type, suffix and bytes of a picture; raises InputError PTM-I901 if it is none."""
+    try:
+        with open_regular(file) as stream:
+            data = stream.read()
+    except OSError as fault:
+        what = f"cannot be read ({fault.strerror or fault})"
+        raise InputError("PTM-I901", what, file=file) from None
+    for begin, media, suffix in _MAGIC:
+        if re.match(begin, data, re.DOTALL):
+            return media, suffix, data
+    remedy = "give a JPEG, PNG or WebP"
+    raise InputError("PTM-I901", "is no picture that browsers show", file=file, remedy=remedy)
+
+
+def program_files() -> dict[str, Entry]:
+    """The scripts and the decoder, by their names in `PAGE`, in a folder named by their contents.
+
+    Raises InputError: PTM-I900 one is missing.
+    """
+    data = {name: _built(name) for name in PROGRAM}
+    digest = sha256(b"".join(data[name] for name in sorted(data)))[:DIGITS]
+    return {
+        name: Entry(f"viewer-{digest}/{name}", data[name], media, True, compressed=True)
+        for name, media in PROGRAM.items()
+    }
+
+
+def _built(name: str) -> bytes:
+    try:
+        return (PAGE / name).read_bytes()
+    except OSError as fault:
+        raise InputError(
+            "PTM-I900",
+            f"a file of the page cannot be read ({fault.strerror or fault})",
+            file=PAGE / name,
+            remedy="install ptmtools again",
+        ) from None
+
+
+def page(settings: Mapping[str, Any], script: str, preload: Sequence[str]) -> Entry:
+    """The page, filled in.
+
+    Parameters
+    ----------
+    settings: the JSON that its script reads (docs/guide/publish.md).
+    script: URL of its script. preload: URLs of what it fetches first.
+
+    Raises InputError: PTM-I900 the template is missing.
+    """
+    # Workers take the module out of the cache.
+    links = [f'<link rel="modulepreload" href="{settings["worker"]}">']
+    links += [f'<link rel="preload" as="fetch" href="{url}" crossorigin>' for url in preload]
+    text = json.dumps(settings, ensure_ascii=False, separators=(",", ":"))
+    fields = {
+        "title": html.escape(settings["title"]),
+        # Nothing in it ends the element that holds it.
+        "site": text.replace("<", "\\u003c"),
+        "preload": "\n".join(links),
+        "poster": html.escape(str(settings.get("poster") or "")),
+        "script": script,
+    }
+    template = _built(INDEX).decode()
+    filled = _FIELD.sub(lambda match: fields[match[1]], template)
+    return Entry(INDEX, filled.encode(), HTML, compressed=True)
+
+
+@dataclass(frozen=True)
+class Texture:
+    """A texture of a site.
+
+    Attributes
+    ----------
+    row: its row of the index, but for the name of the file.
+    data: its bytes if it was encoded anew; None if the file is sent as it is.
+    note: a remark for the user.
+    """
+
+    row: Mapping[str, Any]
+    data: bytes | None = None
+    note: str = ""
+
+
+def web_texture(file: Path, row: Mapping[str, Any]) -> Texture:
+    """A texture of an index, in a form that browsers read. One of another profile, version or kind
+    of sample is encoded again with the same levels: integers lose their low bits, floats count from
+    0 to 1, as wherever such a texture is shown.
+
+    Raises
+    ------
+    DatabaseError: PTM-D005, D006 the file is missing or damaged, or not what the index says.
+    LimitError: those of `ptmtools.texture.open` and `PtmReader.level`.
+    """
+    from ptmtools.texture.container import HEAD_MAX, read_header
+
+    try:
+        with open_regular(file) as stream, naming(file):
+            header = read_header(stream.read(HEAD_MAX))
+            size = os.fstat(stream.fileno()).st_size
+    except OSError as fault:
+        raise unreadable(file, fault) from None
+    except InputError as fault:
+        raise damaged(file, fault.message) from None
+    if size != header.file_size or [level.end for level in header.levels] != row["ends"]:
+        raise damaged(file, "is not the texture that the index has")
+    if header.profile in PROFILES and header.kind == KIND and header.version == VERSION:
+        return Texture(row)
+    return _encoded_again(file, row)
+
+
+def _encoded_again(file: Path, row: Mapping[str, Any]) -> Texture:
+    from ptmtools.texture import EncodeOptions, encode_to, open as open_ptm, read_header
+    from ptmtools.texture.model import gpu_texel_bytes
+    from ptmtools.texture.samples import in_eight_bits
+
+    try:
+        with open_ptm(file) as ptm:
+            before = f"{ptm.header.profile}, {ptm.header.kind}"
+            texels = in_eight_bits(ptm.level(len(ptm.header.levels) - 1))
+    except InputError as fault:
+        raise damaged(file, fault.message) from None
+    buffer = io.BytesIO()
+    options = EncodeOptions(min_level=-len(row["ends"]))
+    detail = encode_to(buffer, texels, options)
+    data = buffer.getvalue()
+    components = int(row["components"])
+    changed = {
+        "texelBytes": components,
+        "gpuTexelBytes": gpu_texel_bytes(components, components),
+        "ends": [level.end for level in read_header(data).levels],
+        "differences": list(detail.differences),
+        "color": list(detail.color),
+    }
+    note = f"{file.name} was {before}, which browsers do not read: encoded again as fast, 8 bits"
+    return Texture({**row, **changed}, data, note)
+
+
+def title_of(database: Path) -> str:
+    """The name of a database as a title: `old_town-hall.db` is "Old town hall"."""
+    words = re.sub(r"[\s_-]+", " ", database.resolve().stem).strip()
+    return words[:1].upper() + words[1:]
+
+
+def link_bytes(entry: Entry) -> int:
+    """Bytes of a file on the link without headers; of its gzip copy where that is sent."""
+    if isinstance(entry.source, Path) and not entry.compressed:
+        return entry.source.stat().st_size
+    data = entry.read()
+    return min(len(data), len(compressed(data))) if entry.compressed else len(data)

@@ -1,0 +1,311 @@
+"""Writes a site to a folder, for any static host, and counts what its visitors download.
+
+A visitor during publication gets the old site or the new one: the files of the new page are written
+first, then the page; files of the old page alone are removed last. A list in the folder names our
+files; nothing else is changed or removed. The list is written before the first file and after the
+last, so that publishing again completes an interrupted run.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+from urllib.parse import unquote
+
+from ptmtools.errors import OutputError
+from ptmtools.files import (
+    leads_inside,
+    open_regular,
+    real_file,
+    real_folder,
+    refuse_existing,
+    write_bytes,
+    write_with,
+    writing,
+)
+from ptmtools.output.emission import compressed
+from ptmtools.progress import Progress, silent
+from ptmtools.site.content import DATA, DIGITS, INDEX, Entry, Site, link_bytes
+from ptmtools.store.folder import damaged, unreadable
+from ptmtools.store.layout import sha256
+
+#: Texels of the longer side up to which the textures of a room count in `Weight`.
+COARSE = 64
+#: The list of our files, and its format.
+LIST, FORMAT, SCHEMA = ".ptm-site.json", "ptmtools site files", 1
+HEADERS = "_headers"
+_PIECE = 1 << 20
+
+
+@dataclass(frozen=True)
+class PublishOptions:
+    """How a site is written.
+
+    Attributes
+    ----------
+    gzip: also write gzip copies of what is worth compressing, for servers that send those
+        (nginx: gzip_static).
+    keep: leave what earlier versions of the site needed, for visitors who are in them.
+    """
+
+    gzip: bool = False
+    keep: bool = False
+
+
+@dataclass(frozen=True)
+class Published:
+    """What became of a folder: names of files that were written, that were there already, and that
+    were removed."""
+
+    written: tuple[str, ...]
+    unchanged: tuple[str, ...]
+    removed: tuple[str, ...]
+
+
+def publish(
+    site: Site,
+    folder: str | os.PathLike[str],
+    options: PublishOptions | None = None,
+    *,
+    force: bool = False,
+    progress: Progress = silent,
+) -> Published:
+    """Writes a site to a folder, or brings that up to date.
+
+    ``force`` allows a folder that is not a site, and replaces files of the same names in it.
+
+    Raises
+    ------
+    OutputError: PTM-O001 a file is in the way; PTM-O900 the folder is not empty and no site;
+        PTM-O002, O003, O005 it cannot be written.
+    DatabaseError: PTM-D005, D006 a file of the database is missing or damaged.
+    """
+    root = Path(folder)
+    before = _checked(root, force)
+    options = options or PublishOptions()
+    files = dict(_files(site, options))
+    # In the end the page: what it names is there.
+    names = [*sorted(files.keys() - {INDEX}), INDEX]
+    for name in names:
+        if name not in before and not force:
+            with writing(root):
+                refuse_existing(root / name, "move it away, or give --force to replace it")
+    with writing(root):
+        root.mkdir(parents=True, exist_ok=True)
+    now = {name: _digest(files[name]) for name in names}
+    _write_list(root, before | now)
+    written = []
+    for number, name in enumerate(names):
+        progress(number, len(names), "files")
+        if _held(root, name) != now[name]:
+            _write(root, name, files[name], now[name])
+            written.append(name)
+    old = {name: digest for name, digest in before.items() if name not in now}
+    removed = () if options.keep else tuple(_remove(root, old))
+    _write_list(root, now | (old if options.keep else {}))
+    unchanged = tuple(name for name in names if name not in written)
+    return Published(tuple(written), unchanged, removed)
+
+
+def _checked(root: Path, force: bool) -> dict[str, str]:
+    """The list of a folder, name → SHA-256; empty for a new one, or one that was forced."""
+    if root.exists() and not root.is_dir():
+        raise OutputError(
+            "PTM-O001", "exists and is not a folder", file=root, remedy="name another with -o"
+        )
+    with writing(root):
+        if not root.exists() or not any(root.iterdir()):
+            return {}
+    found = _read_list(root)
+    if found is None and not force:
+        raise OutputError(
+            "PTM-O900",
+            "the folder is not empty and not a site that `ptm publish` wrote",
+            file=root,
+            remedy="name another folder with -o, or give --force to write into it",
+        )
+    return found or {}
+
+
+def _read_list(root: Path) -> dict[str, str] | None:
+    """What a folder's list names that may be ours; None if there is no such list."""
+    try:
+        with open_regular(root / LIST) as stream:
+            document: Any = json.loads(stream.read())
+        if (document["format"], document["schema"]) != (FORMAT, SCHEMA):
+            return None
+        rows: Mapping[str, Any] = document["files"]
+        return {
+            name: digest
+            for name, digest in rows.items()
+            if isinstance(digest, str) and leads_inside(name)
+        }
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+def _write_list(root: Path, files: Mapping[str, str]) -> None:
+    document = {"format": FORMAT, "schema": SCHEMA, "files": dict(sorted(files.items()))}
+    data = (json.dumps(document, indent=0, ensure_ascii=False) + "\n").encode()
+    if _held(root, LIST) != sha256(data):
+        write_bytes(root / LIST, data, force=True)
+
+
+def _files(site: Site, options: PublishOptions) -> Iterator[tuple[str, Entry]]:
+    """The files of a site by their names in the folder."""
+    for name, entry in site.entries.items():
+        yield unquote(name), entry
+        if options.gzip and entry.compressed:
+            data = entry.read()
+            packed = compressed(data)
+            if len(packed) < len(data):
+                yield f"{unquote(name)}.gz", Entry(f"{name}.gz", packed, "application/gzip")
+    yield HEADERS, Entry(HEADERS, _headers(site.entries.values()), "text/plain")
+
+
+def _headers(entries: Iterable[Entry]) -> bytes:
+    """How Netlify and Cloudflare Pages are told of types and caching: by folder and suffix."""
+    folders = sorted({f"/{e.name.partition('/')[0]}/*" for e in entries if e.forever})
+    forever = "\n  Cache-Control: public, max-age=31536000, immutable\n"
+    parts = [f"{folder}{forever}" for folder in folders]
+    parts += [f"{page}\n  Cache-Control: no-cache\n" for page in ("/", f"/{INDEX}")]
+    parts.append("/data/*.glb\n  Content-Type: model/gltf-binary\n")
+    return "".join(parts).encode()
+
+
+def _digest(entry: Entry) -> str:
+    """The SHA-256 of an entry, which is the one that its name tells."""
+    if isinstance(entry.source, bytes):
+        return sha256(entry.source)
+    with _reading(entry.source):
+        digest = _file_digest(entry.source)
+    if entry.forever and f"-{digest[:DIGITS]}." not in entry.name:
+        raise damaged(entry.source, "its SHA-256 is not the recorded one")
+    return digest
+
+
+@contextmanager
+def _reading(file: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as fault:
+        raise unreadable(file, fault) from fault
+
+
+def _file_digest(file: Path) -> str:
+    digest = hashlib.sha256()
+    with open_regular(file) as stream:
+        for piece in iter(lambda: stream.read(_PIECE), b""):
+            digest.update(piece)
+    return digest.hexdigest()
+
+
+def _held(root: Path, name: str) -> str | None:
+    """The SHA-256 of a file of the folder, None if there is none."""
+    file = real_file(root, name)
+    if file is None:
+        return None
+    with writing(file):
+        return _file_digest(file)
+
+
+def _write(root: Path, name: str, entry: Entry, digest: str) -> None:
+    """Writes a file whole, or not at all."""
+    target = real_folder(root, name.rpartition("/")[0]) / name.rpartition("/")[2]
+    source = entry.source
+    if isinstance(source, bytes):
+        write_bytes(target, source, force=True)
+        return
+
+    def copy(file: IO[bytes]) -> None:
+        found = hashlib.sha256()
+        with _reading(source), open_regular(source) as stream:
+            for piece in iter(lambda: stream.read(_PIECE), b""):
+                found.update(piece)
+                file.write(piece)
+        if found.hexdigest() != digest:
+            raise damaged(source, "it changed while it was copied")
+
+    write_with(target, copy, force=True)
+
+
+def _remove(root: Path, files: Mapping[str, str]) -> Iterator[str]:
+    """Removes what is still as it was written, and folders that are empty then."""
+    for name, digest in files.items():
+        if _held(root, name) == digest:
+            with writing(root / name):
+                (root / name).unlink()
+            yield name
+            with suppress(OSError):
+                (root / name).parent.rmdir()
+
+
+@dataclass(frozen=True)
+class Weight:
+    """Bytes that a visitor of a site downloads, without the headers of HTTP; files that servers
+    compress count compressed.
+
+    Attributes
+    ----------
+    page: the page, the viewer, a worker and the decoder, which come before the building.
+    first_room: the page, the poster, the index, and the room of the first viewpoint.
+    mean_room, worst_room: record and geometry of a room, and of the textures in it the levels up to
+        `COARSE` texels. Of all cells in which one can stand; worst_cell is the heaviest.
+    whole: all that a walk can need; the VRML files do not count.
+    """
+
+    page: int
+    first_room: int
+    mean_room: int
+    worst_room: int
+    worst_cell: int
+    whole: int
+
+
+def weight_of(site: Site) -> Weight:
+    """The bytes of a site."""
+    index = site.index
+    rooms = {
+        number: _room(site.entries, index, row)
+        for number, row in enumerate(index["cells"])
+        if row.get("standing", True)
+    }
+    bytes_of = {name: link_bytes(entry) for name, entry in site.entries.items() if _walked(name)}
+    begins = (f"{DATA}/index-", f"{DATA}/poster-")
+    page = sum(size for name, size in bytes_of.items() if not name.startswith(f"{DATA}/"))
+    before = sum(size for name, size in bytes_of.items() if name.startswith(begins))
+    first = _room(site.entries, index, index["cells"][index["viewpoints"][0]["cell"]])
+    worst = max(rooms, key=rooms.__getitem__)
+    return Weight(
+        page=page,
+        first_room=page + before + first,
+        mean_room=round(sum(rooms.values()) / len(rooms)),
+        worst_room=rooms[worst],
+        worst_cell=worst,
+        whole=sum(bytes_of.values()),
+    )
+
+
+def _walked(name: str) -> bool:
+    """Whether every walk may need a file."""
+    later = name.endswith("/later.js")
+    return name == INDEX or (name.startswith(("viewer-", f"{DATA}/")) and not later)
+
+
+def _room(entries: Mapping[str, Entry], index: Mapping[str, Any], row: Mapping[str, Any]) -> int:
+    record = json.loads(entries[f"{DATA}/{row['record']}"].read())
+    coarse = sum(_coarse(index["textures"][texture]) for texture in record["textures"][0])
+    return int(row["recordBytes"]) + int(row["geometryBytes"]) + coarse
+
+
+def _coarse(texture: Mapping[str, Any]) -> int:
+    """Bytes of the levels of a texture up to `COARSE` texels; of the coarsest at least."""
+    side, ends = max(texture["width"], texture["height"]), texture["ends"]
+    coarse = [end for n, end in enumerate(ends) if side >> (len(ends) - 1 - n) <= COARSE]
+    return int(coarse[-1] if coarse else ends[0])

@@ -1,0 +1,169 @@
+"""A visitor of a site: the page in Chromium, and what the server was asked for."""
+
+from __future__ import annotations
+
+import io
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from ptmtools.server.running import serving
+from ptmtools.server.throttle import Throttle
+from ptmtools.server.visits import Visits
+from ptmtools.site.content import Entry
+
+#: Said by SwiftShader now and then, even of a page that reads a cleared buffer once.
+OF_RENDERER = "GPU stall due to ReadPixels"
+#: Counts, by the calls themselves, what textures take: `window.counted`.
+COUNTING = """
+(() => {
+  const prototype = WebGL2RenderingContext.prototype, sizes = new Map();
+  const texel = { 0x8229: 1, 0x822B: 2, 0x8058: 4 };
+  const counted = (window.counted = { bytes: 0, peak: 0, stripe: 0, others: [] });
+  const bound = (gl) => gl.getParameter(gl.TEXTURE_BINDING_2D);
+  const wrap = (name, before) => {
+    const call = prototype[name];
+    prototype[name] = function (...given) {
+      before(this, ...given);
+      return call.apply(this, given);
+    };
+  };
+  wrap("texStorage2D", (gl, target, levels, format, width, height) => {
+    let bytes = 0;
+    for (let k = 0; k < levels; k++) {
+      bytes += Math.max(1, width >> k) * Math.max(1, height >> k) * texel[format];
+    }
+    sizes.set(bound(gl), bytes);
+    counted.bytes += bytes;
+    counted.peak = Math.max(counted.peak, counted.bytes);
+  });
+  wrap("deleteTexture", (gl, texture) => {
+    counted.bytes -= sizes.get(texture) ?? 0;
+    sizes.delete(texture);
+  });
+  wrap("texSubImage2D", (gl, ...given) => {
+    counted.stripe = Math.max(counted.stripe, given[8].byteLength);
+  });
+  for (const name of ["texImage2D", "texImage3D", "texStorage3D", "generateMipmap"]) {
+    wrap(name, () => counted.others.push(name));
+  }
+})();
+"""
+
+
+@dataclass
+class Visitor:
+    """A page that is open.
+
+    Attributes
+    ----------
+    page: playwright's.
+    url: of the site.
+    visits: what the server was asked for.
+    messages: what the console said.
+    """
+
+    page: Any
+    url: str
+    visits: Visits
+    messages: list[str] = field(default_factory=list)
+
+    def hear(self, message: str) -> None:
+        """What the console says, but for what the software renderer says of itself."""
+        if OF_RENDERER not in message:
+            self.messages.append(message)
+
+    def state(self) -> dict[str, Any]:
+        """`window.ptm.state()`."""
+        found: dict[str, Any] = self.page.evaluate("window.ptm?.state() ?? {}")
+        return found
+
+    def until(self, condition: str, seconds: float = 120) -> dict[str, Any]:
+        """Waits for a condition, an expression of ``s``, the state; TimeoutError if it never is."""
+        late = time.monotonic() + seconds
+        while True:
+            state = "window.ptm?.state() ?? {}"
+            holds = self.page.evaluate(f"((s) => Boolean({condition}))({state})")
+            if holds:
+                return self.state()
+            if time.monotonic() > late:
+                raise TimeoutError(f"never {condition}: {self.state()}; {self.messages}")
+            time.sleep(0.1)
+
+    def complete(self) -> dict[str, Any]:
+        """Waits until nothing is missing for the present view."""
+        # What was asked for a moment ago is not complete because of the moment before.
+        self.page.evaluate(
+            "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+        )
+        return self.until("s.complete")
+
+    def go(self, viewpoint: int) -> dict[str, Any]:
+        """To a viewpoint; the state once everything is there."""
+        self.page.evaluate("(place) => window.ptm.goTo(place)", viewpoint)
+        return self.complete()
+
+    def lose_context(self) -> None:
+        """The graphics context goes, as when a driver is restarted."""
+        self.page.evaluate(
+            "window.lost = window.ptm.walk.gl.getExtension('WEBGL_lose_context');"
+            "window.lost.loseContext()"
+        )
+        self.until("s.residentBytes === 0")
+
+    def restore_context(self) -> None:
+        """It comes back; textures are on their way."""
+        self.page.evaluate("window.lost.restoreContext()")
+        self.until("s.residentBytes > 0")
+
+    def picture(self) -> NDArray[np.uint8]:
+        """(height, width, 3) of the canvas alone, as it is drawn next."""
+        png = self.page.locator("canvas").first.screenshot(
+            style="body > *:not(canvas) { visibility: hidden !important }"
+        )
+        with Image.open(io.BytesIO(png)) as image:
+            return np.asarray(image.convert("RGB"))
+
+
+@contextmanager
+def visiting(
+    browser: Any,
+    entries: Mapping[str, Entry],
+    *,
+    query: str = "",
+    width: int = 640,
+    height: int = 480,
+    throttle: Throttle | None = None,
+    prepare: Any = None,
+    **context: Any,
+) -> Iterator[Visitor]:
+    """Opens a site with an empty cache.
+
+    Parameters
+    ----------
+    query: behind the URL. width, height: of the window.
+    prepare: called with the page before it is opened.
+    context: options of playwright's context.
+    """
+    visits = Visits()
+    options = {"viewport": {"width": width, "height": height}, **context}
+    with serving(entries, throttle=throttle, visits=visits) as url:
+        fresh = browser.new_context(**options)
+        page = fresh.new_page()
+        visitor = Visitor(page, url, visits)
+        page.on("console", lambda said: visitor.hear(f"{said.type}: {said.text}"))
+        page.on("pageerror", lambda fault: visitor.messages.append(f"error: {fault}"))
+        page.add_init_script(COUNTING)
+        if prepare:
+            prepare(page)
+        page.goto(url + query)
+        try:
+            yield visitor
+        finally:
+            fresh.close()

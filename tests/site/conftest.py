@@ -1,0 +1,73 @@
+"""Sites in a real browser: headless Chromium, driven by playwright, with WebGL2 by software."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ptmtools.cli.main import main
+from ptmtools.site.content import Site, SiteOptions, site_of
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+sys.path[:0] = [str(HERE), str(ROOT / "benchmarks")]
+from browser import Visitor, visiting  # noqa: E402
+
+from tests.lab.conftest import Ptm, ptm, two_rooms  # noqa: E402
+
+__all__ = ["Ptm", "ptm", "two_rooms"]
+
+Visiting = Callable[..., AbstractContextManager[Visitor]]
+
+
+@pytest.fixture
+def visit(chromium: Any) -> Visiting:
+    """``with visit(site, query="?memory=4") as visitor:`` see `browser.visiting`."""
+
+    def of(site: Site, **options: Any) -> AbstractContextManager[Visitor]:
+        return visiting(chromium, site.entries, **options)
+
+    return of
+
+
+def build(model: Path, database: Path) -> Path:
+    """A database with cells as glTF alone."""
+    options = ["--format", "gltf", "--no-fallback", "-j", "1"]
+    assert main(["-q", "build-scene", str(model), "-o", str(database), *options]) == 0
+    return database
+
+
+@pytest.fixture(scope="session")
+def museum_db(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A museum of four rooms and stairs, with twelve small textures."""
+    folder = tmp_path_factory.mktemp("museum")
+    script = ROOT / "sample_data" / "make_museum.py"
+    words = ["-o", folder / "model", "--rooms", 4, "--textures", 12, "--size", 256]
+    command = [sys.executable, script, *words]
+    subprocess.run([str(word) for word in command], check=True, capture_output=True, timeout=300)
+    return build(folder / "model" / "museum.obj", folder / "museum.db")
+
+
+@pytest.fixture(scope="session")
+def hospital_db(tmp_path_factory: pytest.TempPathFactory, shared: Path) -> Path:
+    """A floor of a hospital."""
+    folder = tmp_path_factory.mktemp("hospital")
+    return build(shared / "scenes" / "hospital" / "hospital.obj", folder / "hospital.db")
+
+
+@pytest.fixture(scope="session")
+def museum(museum_db: Path) -> Site:
+    """The site of the museum."""
+    return site_of(museum_db, SiteOptions(pictures=False))
+
+
+@pytest.fixture(scope="session")
+def hospital(hospital_db: Path) -> Site:
+    """The site of the hospital."""
+    return site_of(hospital_db, SiteOptions(pictures=False))

@@ -1,0 +1,222 @@
+"""The viewer's client decides as the simulated one does."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings, strategies as st
+
+from ptmtools.arrays import Floats
+from ptmtools.lab.allocation import allocate, next_fetch
+from ptmtools.lab.catalogue import catalogue_of
+from ptmtools.lab.client import PRIOR, Estimate
+from ptmtools.lab.network import Conditions, Link, Request
+from ptmtools.lab.policies.paper_kernels import refresh, share_out
+from ptmtools.lab.world import World
+from tests.lab.conftest import two_rooms, walk_file, world
+from tests.lab.worlds import SEEDS, any_world, catalogue, raw, standing
+from tests.site.watching import HERE, Witness, called, documents, same, tables, write
+from tests.web.node import missing, run
+
+__all__ = ["two_rooms", "walk_file", "world"]
+
+EACH = pytest.mark.parametrize("policy", ["best", "paper"])
+#: Cases that one process answers.
+CASES = 200
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _node(require: Callable[[str, str], None]) -> None:
+    if remedy := missing():
+        require("node", remedy)
+
+
+def tall(random: np.random.Generator) -> tuple[Floats, Any, Any]:
+    """Worth and cost (T, K) and last columns (T,): often alike, and some worth nothing."""
+    textures, levels = int(random.integers(1, 9)), int(random.integers(1, 7))
+    worth = random.integers(0, 4, (textures, levels + 1)).astype(np.float64)
+    if random.random() < 0.5:
+        worth *= random.random(worth.shape)
+    cost = np.cumsum(random.integers(1, 9, worth.shape), axis=1)
+    cost -= cost[:, :1]
+    return worth, cost, random.integers(0, levels + 1, textures)
+
+
+def test_what_is_chosen(tmp_path: Path) -> None:
+    calls, expected = [], []
+    for seed in range(CASES):
+        random = np.random.default_rng(seed)
+        worth, cost, last = tall(random)
+        budget, column = int(random.integers(0, int(cost[:, -1].sum()) + 3)), last.copy()
+        used = allocate(worth, cost, last, budget, column, False)
+        expected.append([used, column.tolist()])
+        told = {"worth": worth.tolist(), "cost": cost.tolist(), "last": last.tolist()}
+        calls.append(("allocate", {**told, "budget": budget}))
+    assert called(tmp_path, calls) == expected
+
+
+def test_what_is_fetched_next(tmp_path: Path) -> None:
+    calls, expected = [], []
+    for seed in range(CASES):
+        random = np.random.default_rng(seed)
+        worth, ends, last = tall(random)
+        asked, busy = random.integers(0, ends[:, -1] + 1), random.random(len(last)) < 0.3
+        free = np.where(busy, ends[:, -1], asked)
+        expected.append(list(next_fetch(worth, ends, free, last, 5)))
+        told = {"worth": worth, "ends": ends, "asked": asked, "last": last, "busy": busy}
+        calls.append(("next", {k: v.tolist() for k, v in told.items()} | {"overhead": 5}))
+    assert called(tmp_path, calls) == expected
+    assert {texture for _, texture, _ in expected} >= {-1, 0, 1, 2}
+
+
+def test_how_the_paper_shares_out(tmp_path: Path) -> None:
+    """Rounds in which the budget falls and grows."""
+    calls, expected = [], []
+    for seed in range(CASES):
+        random = np.random.default_rng(seed)
+        _, memory, levels = tall(random)
+        memory = np.where(np.arange(memory.shape[1]) <= levels[:, None], memory, 0)
+        memory = np.maximum.accumulate(memory, axis=1)
+        have, column = random.integers(0, levels + 1), np.zeros(len(levels), np.int64)
+        cells = [random.integers(0, len(levels), random.integers(0, 5)) for _ in range(4)]
+        weight = -np.sort(-random.random(len(cells)))
+        first = np.cumsum([0, *map(len, cells)])
+        texture = np.concatenate(cells).astype(np.int64)
+        shown, idle = np.ones(len(texture), dtype=bool), np.zeros(len(levels), dtype=bool)
+        budgets = random.integers(0, int(memory[:, -1].sum()) + 2, 5).tolist()
+        rounds = []
+        for budget in budgets:
+            share = np.zeros(len(levels))
+            share_out(
+                np.arange(len(cells)), weight, first, texture, shown, memory, levels, column,
+                float(budget), share,
+            )  # fmt: skip
+            asks = refresh(share, memory, levels, have, idle, budget, column)
+            rounds.append([share.tolist(), asks.tolist(), column.tolist()])
+        expected.append(rounds)
+        rows = zip(weight.tolist(), cells, strict=True)
+        told = {
+            "memory": memory.tolist(),
+            "levels": levels.tolist(),
+            "have": have.tolist(),
+            "budget": budgets,
+            "rounds": len(budgets),
+            "column": [0] * len(levels),
+            "cells": [{"weight": w, "textures": some.tolist()} for w, some in rows],
+        }
+        calls.append(("share", told))
+    assert same(called(tmp_path, calls), expected)
+
+
+@settings(max_examples=50)
+@given(SEEDS, st.sampled_from(["h1", "h2"]))
+@example(570, "h1")
+def test_what_is_believed_of_a_link(
+    tmp_path_factory: pytest.TempPathFactory, seed: int, protocol: str
+) -> None:
+    """As Python's, of the same arrivals, though a browser knows of more moments."""
+    random = np.random.default_rng(seed)
+    latency = float(random.uniform(0.01, 0.3))
+    link = Link(Conditions(float(random.uniform(2e4, 2e7)), latency, protocol=protocol))
+    estimate, calls, expected = Estimate(link, *PRIOR), [], []
+    asked: list[Request] = []
+    begun: set[int] = set()
+    carried = 0.0
+
+    def note(name: str, *values: float) -> None:
+        calls.append([name, *values])
+        expected.append(None)
+
+    def wait(until: float) -> Request | None:
+        """Moments at which responses begin are told when they are over, as the link tells them."""
+        nonlocal carried
+        finished = link.advance(until)
+        estimate.observe(finished)
+        new = [(r.first_byte, n) for n, r in enumerate(asked) if r.first_byte is not None]
+        for first_byte, n in sorted(new):
+            if n not in begun:
+                begun.add(n)
+                note("sent", n, asked[n].sent)
+                note("firstByte", n, first_byte)
+        note("bytes", link.now, link.carried - carried)
+        carried = link.carried
+        if finished:
+            note("finished", asked.index(finished), link.now)
+        expected[-1] = [estimate.bandwidth, estimate.latency, estimate.duration(5000)]
+        return finished
+
+    for _ in range(12):
+        for _ in range(int(random.integers(0, 4))):
+            asked.append(link.request(int(random.integers(1, 40_000)), float(random.random())))
+        until = link.now + float(random.uniform(0.05, 2))
+        while wait(until):
+            pass
+    folder = tmp_path_factory.mktemp("estimate")
+    told = called(folder, [("estimate", {"calls": calls, "size": 5000})])[0]
+    known = [(a, b) for a, b in zip(told, expected, strict=True) if b]
+    for found, wanted in known:
+        assert found == pytest.approx(wanted)
+
+
+def test_the_catalogue_of_an_index(tmp_path: Path, world: World) -> None:
+    served = world.served
+    expected = tables(catalogue_of(served, world.pyramids.differences, world.pyramids.mean))
+    sizes = {"recordBytes": served.record_bytes, "geometryBytes": served.geometry_bytes}
+    index = json.loads(json.dumps(served.index))
+    for c, cell in enumerate(index["cells"]):
+        cell |= {name: int(size[c]) for name, size in sizes.items()}
+    found, guessed = called(tmp_path, [("catalogue", {"index": i}) for i in (index, served.index)])
+    flat = {k: np.ravel(v).tolist() if isinstance(v, list) else v for k, v in expected.items()}
+    assert found == flat
+    assert guessed["recordBytes"] == [1000] * world.catalogue.cell_count
+
+
+@EACH
+@settings(max_examples=25)
+@given(SEEDS)
+def test_walks(tmp_path_factory: pytest.TempPathFactory, policy: str, seed: int) -> None:
+    """What it holds, has, lacks and asks for, at each look and each arrival."""
+    random = np.random.default_rng(seed)
+    witness = Witness(any_world(seed, 40), policy, int(random.integers(0, 3000)))
+    bandwidth = float(random.choice([2e3, 2e4, 2e5, 1e7]))
+    witness.walk(Conditions(bandwidth, float(random.choice([0.0, 0.05, 0.3]))))
+    assert same(witness.in_javascript(tmp_path_factory.mktemp("walk")), witness.answers)
+
+
+@EACH
+@pytest.mark.parametrize("bandwidth", [56e3, 512e3, 4e6])
+def test_a_walk_through_a_database(
+    tmp_path: Path, world: World, policy: str, bandwidth: float
+) -> None:
+    witness = Witness(world, policy, world.catalogue.whole // 4)
+    witness.walk(Conditions(bandwidth))
+    answers = witness.in_javascript(tmp_path)
+    assert same(answers, witness.answers)
+    looks = [a for a, e in zip(answers, witness.events, strict=True) if e["act"] == "look"]
+    assert any(any(column) for column, _ in looks)
+    if policy == "best":
+        assert bandwidth > 1e5 or max(lacking for _, lacking in looks) > 1
+        assert bandwidth < 1e6 or min(lacking for _, lacking in looks) == 0
+
+
+@EACH
+@pytest.mark.parametrize("seed", range(1, 7))
+def test_a_link_that_fails(tmp_path: Path, policy: str, seed: int) -> None:
+    """No range twice or on top of another, nothing sooner again than was said, never more than is
+    there or the budget holds; and in the end all is there."""
+    random = np.random.default_rng(seed)
+    shapes = sorted((int(random.integers(5)), t) for t in range(8))
+    world = standing(catalogue([raw(128)] * 8, shapes, cells=5, random=random), 1.0)
+    file = tmp_path / "life.json"
+    write(file, {**documents(world), "policy": policy, "seed": seed})
+    told = json.loads(run(HERE / "life.mjs", file))
+    assert told["failures"] > 0
+    assert [told[name] for name in ("overlaps", "beyond", "above", "early")] == [0] * 4
+    assert told["forgotten"]
+    assert told["again"] > 0
+    assert told["missing"] == 0

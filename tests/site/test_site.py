@@ -1,0 +1,313 @@
+"""A site holds what its page names, under names that change with the contents."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from ptmtools import schemas
+from ptmtools.errors import DatabaseError, InputError
+from ptmtools.output.emission import compressed
+from ptmtools.site import pictures as drawing
+from ptmtools.site.content import (
+    DATA,
+    PROGRAM,
+    Site,
+    SiteOptions,
+    link_bytes,
+    site_of,
+    title_of,
+    web_texture,
+)
+from ptmtools.site.publishing import weight_of
+from ptmtools.texture import EncodeOptions, decode, decode_levels, encode, read_header
+
+PLAIN = SiteOptions(pictures=False)
+#: Bytes of the page itself, compressed.
+LARGEST_PAGE = 48_000
+
+
+@pytest.fixture(scope="module")
+def site(two_rooms: Path) -> Site:
+    return site_of(two_rooms)
+
+
+@pytest.fixture
+def changed(two_rooms: Path, tmp_path: Path) -> Path:
+    """A copy of the database, to be damaged."""
+    shutil.copytree(two_rooms, tmp_path / "db")
+    return tmp_path / "db"
+
+
+@contextmanager
+def refused(code: str) -> Iterator[None]:
+    with pytest.raises((DatabaseError, InputError)) as raised:
+        yield
+    assert raised.value.code == code
+
+
+def told(site: Site) -> Any:
+    """What the page tells its script."""
+    page = site.entries["index.html"].read().decode()
+    found = re.search(r'<script type="application/json" id="site">(.*?)</script>', page, re.DOTALL)
+    assert found
+    return json.loads(found[1])
+
+
+def test_names_are_hashes(site: Site, two_rooms: Path) -> None:
+    for name, entry in site.entries.items():
+        assert entry.name == name
+        assert entry.forever is (name != "index.html")
+        if name.startswith(DATA):
+            digest = hashlib.sha256(entry.read()).hexdigest()
+            assert re.fullmatch(rf"data/[\w-]+-{digest[:10]}\.\w+", name)
+    program = {name for name in site.entries if name.startswith("viewer-")}
+    assert len({name.split("/")[0] for name in program}) == 1
+    assert {name.split("/")[1] for name in program} == set(PROGRAM)
+    again = site_of(two_rooms)
+    assert {n: e.read() for n, e in again.entries.items()} == {
+        n: e.read() for n, e in site.entries.items()
+    }
+
+
+def test_the_index(site: Site, two_rooms: Path) -> None:
+    """What the index names is there, of the size that it tells; the rest is that of the hints."""
+    config = told(site)
+    data = site.entries[config["index"]].read()
+    index = schemas.read(data, schemas.SITE)
+    assert index == site.index
+    hints = json.loads((two_rooms / "www" / "hints.json").read_bytes())
+    for field in ("record", "geometry", "statistics"):
+        assert field not in index
+        hints.pop(field)
+    for cell, was in zip(index["cells"], hints.pop("cells"), strict=True):
+        record = site.entries[f"data/{cell.pop('record')}"]
+        geometry = site.entries[f"data/{cell.pop('geometry')}"]
+        assert record.read() == (two_rooms / f"www/hints/{cell['name']}.json").read_bytes()
+        assert geometry.read() == (two_rooms / f"www/gltf/{cell['name']}.glb").read_bytes()
+        assert cell.pop("recordBytes") == len(compressed(record.read()))
+        assert cell.pop("geometryBytes") == len(compressed(geometry.read()))
+        assert record.compressed
+        assert geometry.compressed
+        assert cell == was
+    for row, was in zip(index["textures"], hints.pop("textures"), strict=True):
+        texture = site.entries[f"data/{row['file']}"]
+        assert texture.read() == (two_rooms / "www" / was["file"]).read_bytes()
+        assert not texture.compressed
+        assert (row["fallback"], row["fallbackLevel"]) == (None, None)
+        same = was.keys() - {"file", "fallback", "fallbackLevel"}
+        assert {name: row[name] for name in same} == {name: was[name] for name in same}
+    for row in index["viewpoints"]:
+        row.pop("thumbnail")
+    hints["format"] = index["format"]
+    assert {name: index[name] for name in hints} == hints
+
+
+def test_the_page(site: Site, two_rooms: Path) -> None:
+    config = told(site)
+    page = site.entries["index.html"].read().decode()
+    assert "{{" not in page
+    for kind in ("index", "worker", "wasm", "poster"):
+        assert config[kind] in site.entries
+    linked = re.findall(r'<link rel="preload" as="fetch" href="([^"]+)" crossorigin>', page)
+    first = site.index["cells"][site.index["viewpoints"][0]["cell"]]
+    assert linked == [
+        config["index"], f"data/{first['record']}", f"data/{first['geometry']}", config["wasm"]
+    ]  # fmt: skip
+    assert set(re.findall(r'src="(viewer-[^"]+)"', page)) <= site.entries.keys()
+    odd = site_of(two_rooms, SiteOptions("</script><b>&", pictures=False))
+    text = odd.entries["index.html"].read().decode()
+    assert "<title>&lt;/script&gt;&lt;b&gt;&amp;</title>" in text
+    assert told(odd)["title"] == "</script><b>&"
+    assert title_of(Path("a/old_town-hall.db")) == "Old town hall"
+
+
+def test_pictures(site: Site) -> None:
+    poster = site.entries[told(site)["poster"]].read()
+    assert len(poster) <= drawing.POSTER_BYTES
+    image = Image.open(io.BytesIO(poster))
+    assert (image.format, image.size) == ("JPEG", drawing.POSTER)
+    # Not a blank one.
+    assert np.asarray(image.convert("L")).std() > 5
+    for row in site.index["viewpoints"]:
+        small = site.entries[f"data/{row['thumbnail']}"].read()
+        assert len(small) <= drawing.SMALL_BYTES
+        assert Image.open(io.BytesIO(small)).size == drawing.SMALL
+
+
+def test_the_poster_shows_the_first_viewpoint(two_rooms: Path, site: Site) -> None:
+    """It is what the compiled renderer of the simulation draws there, but for the light."""
+    from ptmtools.output.served import read_served
+    from ptmtools.rendering.kernels import shade
+    from ptmtools.rendering.pyramids import read_pyramids
+    from ptmtools.rendering.rays import Camera, Caster
+    from ptmtools.rendering.records import own_levels, triangles_of
+
+    served = read_served(two_rooms)
+    viewpoint = served.index["viewpoints"][0]
+    camera = Camera(160, 90, viewpoint["fieldOfView"], 16 / 9)
+    eye, direction = (np.array(viewpoint[name]) for name in ("position", "direction"))
+    sight = Caster(served.surfaces).look(camera, eye, direction)
+    sight = sight._replace(pixel=2 * np.tan(camera.field_of_view / 2) / 90)
+    pyramids, shown = read_pyramids(served), np.empty((160 * 90, 3))
+    triangles = triangles_of(served.surfaces)
+    there = np.ones(served.cell_count, dtype=np.bool_)
+    shade(sight, triangles, own_levels(pyramids), there, pyramids.levels, shown)
+    poster = Image.open(io.BytesIO(site.entries[told(site)["poster"]].read())).resize((160, 90))
+    textured = (sight.triangle >= 0) & (triangles.texture[sight.triangle] >= 0)
+    assert textured.mean() > 0.2
+    off = np.abs(np.asarray(poster, dtype=float).reshape(-1, 3) - shown)[textured]
+    assert np.median(off) < 12
+    assert off.mean() < 20
+
+
+def test_pictures_of_others(two_rooms: Path, tmp_path: Path, monkeypatch: Any) -> None:
+    file = tmp_path / "own.png"
+    Image.new("RGB", (8, 8)).save(file)
+    own = site_of(two_rooms, SiteOptions(poster=str(file), pictures=False))
+    assert own.entries[told(own)["poster"]].read() == file.read_bytes()
+    assert own.entries[told(own)["poster"]].media == "image/png"
+    assert "thumbnail" not in own.index["viewpoints"][0]
+    for name in ("model/two_rooms.obj", "gone.png"):
+        with refused("PTM-I901"):
+            site_of(two_rooms, SiteOptions(poster=str(two_rooms.parent / name), pictures=False))
+
+    def without(served: object) -> None:
+        raise ImportError("embreex")
+
+    monkeypatch.setattr(drawing, "pictures", without)
+    bare = site_of(two_rooms)
+    assert told(bare)["poster"] is None
+    assert any("embreex" in note for note in bare.notes)
+
+
+def test_databases_that_have_no_site(changed: Path) -> None:
+    with refused("PTM-D001"):
+        site_of(changed / "gone")
+    glb = next((changed / "www" / "gltf").iterdir())
+    before = glb.read_bytes()
+    glb.write_bytes(before[:-4] + b"\0\0\0\0")
+    with refused("PTM-D006"):
+        site_of(changed, PLAIN)
+    glb.unlink()
+    with refused("PTM-D005"):
+        site_of(changed, PLAIN)
+    glb.write_bytes(before)
+    texture = next((changed / "www" / "textures").glob("*.ptm"))
+    data = texture.read_bytes()
+    for damage, code in ((data[:-1], "PTM-D006"), (b"x" * 99, "PTM-D006"), (None, "PTM-D005")):
+        texture.unlink() if damage is None else texture.write_bytes(damage)
+        with refused(code):
+            site_of(changed, PLAIN)
+    texture.write_bytes(data)
+    manifest = json.loads((changed / "manifest.json").read_text())
+    stage = manifest["stages"].pop("emit")
+    (changed / "manifest.json").write_text(json.dumps(manifest))
+    with refused("PTM-D004"):
+        site_of(changed, PLAIN)
+    manifest["stages"]["emit"] = stage
+    (changed / "manifest.json").write_text(json.dumps({**manifest, "schema": 1}))
+    with refused("PTM-D003"):
+        site_of(changed, PLAIN)
+
+
+def test_without_gltf(changed: Path, ptm: Any) -> None:
+    assert ptm("emit", changed, "--format", "vrml").status == 0
+    with refused("PTM-D606"):
+        site_of(changed, PLAIN)
+    assert ptm("emit", changed, "--format", "gltf").status == 0
+    assert site_of(changed, PLAIN)
+    with refused("PTM-D900"):
+        site_of(changed, SiteOptions(pictures=False, clients="vrml"))
+
+
+def test_for_vrml(two_rooms: Path, site: Site) -> None:
+    both = site_of(two_rooms, SiteOptions(pictures=False, clients="vrml"))
+    more = both.entries.keys() - site.entries.keys()
+    assert {"root.wrl", "cells/c0000.wrl"} <= more
+    assert any(name.endswith(".png") for name in more)
+    assert not any(both.entries[name].forever for name in more if not name.startswith(DATA))
+    assert weight_of(both).whole < sum(map(link_bytes, both.entries.values()))
+
+
+@pytest.mark.parametrize(
+    ("kind", "profile"),
+    [("uint8", "small"), ("uint8", "raw"), ("uint16", "fast"), ("float32", "fast")],
+)
+def test_textures_that_browsers_do_not_read(tmp_path: Path, kind: str, profile: str) -> None:
+    rng = np.random.default_rng(3)
+    image = rng.integers(0, 256, (40, 56, 3)).astype(kind)
+    if kind == "uint16":
+        image = image * 257
+    if kind == "float32":
+        image = image / 255 * 1.5 - 0.2
+    image = image.astype(kind)
+    file = tmp_path / "a.ptm"
+    file.write_bytes(encode(image, EncodeOptions(profile, min_side=4)))
+    header = read_header(file.read_bytes())
+    row = {
+        "ends": [level.end for level in header.levels], "components": 3, "width": 56, "height": 40,
+        "texelBytes": header.texel_bytes, "gpuTexelBytes": 4, "color": [0, 0, 0], "differences": [],
+    }  # fmt: skip
+    found = web_texture(file, row)
+    if profile == "raw":
+        assert (found.row, found.data, found.note) == (row, None, "")
+        return
+    assert found.data
+    assert "a.ptm" in found.note
+    new = read_header(found.data)
+    assert (new.profile, new.kind, new.version) == ("fast", "uint8", 2)
+    assert [level.end for level in new.levels] == found.row["ends"]
+    assert [(o.width, o.height) for o in new.levels] == [(o.width, o.height) for o in header.levels]
+    assert (found.row["texelBytes"], found.row["gpuTexelBytes"]) == (3, 4)
+    scale = {"uint8": 1.0, "uint16": 1 / 257, "float32": 255.0}[kind]
+    wanted = np.clip(image.astype(float) * scale, 0, 255)
+    assert np.abs(decode(found.data) - wanted).max() <= 1
+    coarsest = next(iter(decode_levels(found.data))).reshape(-1, 3).mean(axis=0)
+    assert np.abs(coarsest - found.row["color"]).max() <= 0.5
+
+
+def test_weight(site: Site) -> None:
+    """Sums of what is on the disk."""
+    weight = weight_of(site)
+    sizes = {name: link_bytes(entry) for name, entry in site.entries.items()}
+    program = [n for n in sizes if not n.startswith("data/") and not n.endswith("/later.js")]
+    assert weight.page == sum(sizes[name] for name in program)
+    assert weight.whole == sum(v for n, v in sizes.items() if not n.endswith("/later.js"))
+    row = site.index["cells"][site.index["viewpoints"][0]["cell"]]
+    record = json.loads(site.entries[f"data/{row['record']}"].read())
+    room = sizes[f"data/{row['record']}"] + sizes[f"data/{row['geometry']}"]
+    for texture in record["textures"][0]:
+        header = read_header(site.entries[f"data/{site.index['textures'][texture]['file']}"].read())
+        room += max(o.end for o in header.levels if max(o.width, o.height) <= 64)
+    config = told(site)
+    assert (
+        weight.first_room == weight.page + sizes[config["index"]] + sizes[config["poster"]] + room
+    )
+    assert weight.mean_room <= weight.worst_room
+    assert weight.page < LARGEST_PAGE
+
+
+def test_hints_of_an_earlier_release(changed: Path) -> None:
+    """The manifest lists them as they are, without what came later."""
+    hints, manifest = changed / "www" / "hints.json", changed / "manifest.json"
+    document = json.loads(hints.read_text())
+    for row in document["textures"]:
+        del row["color"]
+    before = hashlib.sha256(hints.read_bytes()).hexdigest()
+    hints.write_text(json.dumps(document))
+    after = hashlib.sha256(hints.read_bytes()).hexdigest()
+    manifest.write_text(manifest.read_text().replace(before, after))
+    with refused("PTM-D901"):
+        site_of(changed)

@@ -1,0 +1,190 @@
+// The walk as the interface has it, and tests and the curious, who find it at `window.ptm`.
+
+import { clock } from "./net/fetcher.js";
+import { POLICIES } from "./policy/policies.js";
+import { Recorder } from "./recorder.js";
+import { footprintOf } from "./space/footprint.js";
+import { stateOf } from "./state.js";
+import { poseOf } from "./ui/address.js";
+import { Solids } from "./walk/solids.js";
+import { Walker } from "./walk/walker.js";
+import { Walkthrough } from "./walkthrough.js";
+
+/** Bytes of texture memory unless the visitor says otherwise: of desks, and of phones. */
+const BUDGET = 256 << 20, SMALL_BUDGET = 64 << 20;
+/** MiB that a visitor may say at most. */
+const MOST = 4096;
+/** Seconds of a frame for what one may bump into. */
+const SOLID_TIME = 0.004;
+/** The longest step of a walk, s: who comes back to a hidden tab has not walked. */
+const LONGEST = 0.1;
+
+/** @typedef {import("./walk/walker.js").Pose} Pose */
+/** @typedef {import("./ui/all.js").Events} Events */
+
+export class App {
+  /** @type {Map<string, ((detail: any) => void)[]>} */
+  #listeners = new Map();
+
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {WebGL2RenderingContext} gl
+   * @param {import("./data/site.js").Site} site
+   * @param {import("./data/site.js").SiteConfig} config
+   * @param {import("../ptm/src/workers.js").DecoderWorkers} workers
+   */
+  constructor(canvas, gl, site, config, workers) {
+    const query = new URLSearchParams(location.search);
+    const small = matchMedia("(pointer: coarse)").matches;
+    const megabytes = Number(query.get("memory"));
+    const policy = query.get("policy") ?? "best";
+    this.canvas = canvas;
+    this.config = config;
+    this.index = site.index;
+    const options = {
+      workers,
+      policy: Object.hasOwn(POLICIES, policy) ? policy : "best",
+      budget: megabytes > 0 ? Math.min(megabytes, MOST) * 2 ** 20 : small ? SMALL_BUDGET : BUDGET,
+    };
+    const walk = (this.walk = new Walkthrough(canvas, gl, site, options, this.emit));
+    const { connection } = /** @type {{connection?: {saveData?: boolean}}} */ (navigator);
+    walk.saving = connection?.saveData === true;
+    walk.memory.fades = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+    this.solids = new Solids();
+    /** @param {number[]} eye */
+    const locate = (eye) => walk.locator.locate(eye, walk.cell);
+    const avatar = site.index.avatarSize;
+    this.walker = new Walker({ solids: this.solids, locate, avatar });
+    this.goTo(0);
+    const linked = poseOf(location.hash);
+    // Whoever listens does so after this.
+    if (linked) queueMicrotask(() => this.follow(linked));
+  }
+
+  /** Goes where a link leads, if there is anything. @param {Pose} pose */
+  follow(pose) {
+    const { low, high, C } = this.walk.catalogue;
+    for (let c = 0; c < C; c++) {
+      if (pose.eye.every((x, k) => low[3 * c + k] <= x && x <= high[3 * c + k])) {
+        return this.goTo(pose);
+      }
+    }
+    this.emit("notice", { message: "The link leads to a place outside of the building." });
+  }
+
+  /**
+   * @template {keyof Events} K
+   * @param {K} name
+   * @param {(detail: Events[K]) => void} listener
+   */
+  on(name, listener) {
+    this.#listeners.set(name, [...(this.#listeners.get(name) ?? []), listener]);
+  }
+
+  /**
+   * @template {keyof Events} K
+   * @param {K} name
+   * @param {Events[K]} detail
+   */
+  emit = (name, detail) => {
+    for (const listener of this.#listeners.get(name) ?? []) listener(detail);
+  };
+
+  /** What went wrong, in order. */
+  get errors() {
+    return this.walk.faults;
+  }
+
+  /** The numbers of the overlay. */
+  state() {
+    return { ...stateOf(this.walk), pose: this.walker.pose };
+  }
+
+  /** @param {number | Pose} place a viewpoint, or a pose */
+  goTo(place) {
+    const { walk, walker, index } = this;
+    if (typeof place === "number") {
+      const { position, direction: [x, y, z], cell } = index.viewpoints[place];
+      walk.enter(cell);
+      walker.place({ eye: [...position], yaw: Math.atan2(-x, -z), pitch: Math.asin(y) });
+    } else {
+      walker.place(place);
+    }
+    walk.touch();
+  }
+
+  /** @param {number} bytes of texture memory */
+  setBudget(bytes) {
+    this.walk.budget = bytes;
+  }
+
+  /** @param {number} seconds that a level may take while one moves: §6.2's δt */
+  setPatience(seconds) {
+    this.walk.client.patience.moving = seconds;
+  }
+
+  /** @param {string} name of a policy */
+  setPolicy(name) {
+    this.walk.choose(name);
+  }
+
+  /** @param {boolean} on whether texture memory stays as it is */
+  freeze(on) {
+    this.walk.freeze(on);
+  }
+
+  /** @param {boolean} on whether the right half shows what every level would */
+  compare(on) {
+    this.walk.compare(on);
+  }
+
+  /** @param {boolean} on whether nothing is fetched but what is on the screen */
+  setDataSaver(on) {
+    this.walk.saving = on;
+  }
+
+  /** Records the walk from now on. */
+  record() {
+    this.walk.recorder = new Recorder(this.walk);
+  }
+
+  /** What was recorded, as `ptm simulate --walk` reads it; null if nothing was. */
+  get recording() {
+    return this.walk.recorder?.document ?? null;
+  }
+
+  /** What a map shows: the cells, where the visitor is, and what can be seen from there. */
+  plan() {
+    const { walk, index } = this;
+    const cells = index.cells.map(({ box }, cell) => {
+      const leaves = walk.stream.records.get(cell)?.leaves;
+      const outline = leaves && footprintOf(leaves.flatMap(({ points }) => points));
+      return { cell, low: box.slice(0, 3), high: box.slice(3), outline };
+    });
+    return { cells, here: walk.cell, visible: walk.visible };
+  }
+
+  /**
+   * A frame: the step of the walker, the picture, and what follows from both.
+   * @param {number} dt s
+   * @param {import("./walk/walker.js").Wishes} wishes
+   */
+  frame(dt, wishes) {
+    this.#solidify();
+    this.walker.step(Math.min(dt, LONGEST), wishes);
+    this.walk.frame(this.walker.pose);
+  }
+
+  /** What one may bump into: the cell and its neighbours, as long as there is time. */
+  #solidify() {
+    const until = clock() + SOLID_TIME, late = () => clock() > until;
+    const { walk, solids } = this, { records, shapes } = walk.stream;
+    const record = records.get(walk.cell);
+    solids.keep(new Set([...walk.visible, ...(record?.adjacent ?? [])]));
+    for (const cell of record ? [walk.cell, ...record.adjacent] : []) {
+      const its = records.get(cell), geometry = shapes.get(cell);
+      if (!its || !geometry || solids.has(cell)) continue;
+      if (!solids.add(cell, geometry, its, late) || late()) return;
+    }
+  }
+}

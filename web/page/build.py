@@ -1,0 +1,57 @@
+"""Builds the page that ptmtools ships, in ``ptmtools/site/page``: the modules of the page and of
+the worker, bundled and minified by esbuild, the template with its style, and the decoder.
+
+    python web/page/build.py            writes it
+    python web/page/build.py FOLDER     writes it elsewhere
+
+The result is committed, so that `ptm publish` and `ptm serve` need no node. Bundles, since forty
+modules would be forty requests, each found only in the one before it.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+sys.path.insert(0, str(ROOT))
+
+from benchmarks.web_rivals.packages import ESBUILD  # noqa: E402
+
+PTM = ROOT / "web" / "ptm" / "src"
+OUTPUT = ROOT / "ptmtools" / "site" / "page"
+_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+_LINE_END = re.compile(r"\s*\n\s*")
+
+
+def minified(source: Path) -> bytes:
+    """A module with all that it imports, or a style sheet. CalledProcessError if esbuild fails."""
+    options = ["--bundle", "--minify", "--format=esm", "--target=es2022", "--charset=utf8"]
+    options.append("--external:./later.js")
+    command = [ESBUILD.folder / "bin/esbuild", source.name, *options, "--log-level=warning"]
+    return subprocess.run(command, cwd=source.parent, stdout=subprocess.PIPE, check=True).stdout
+
+
+def build(folder: Path) -> None:
+    """Writes the page to a folder. SystemExit without esbuild."""
+    ESBUILD.require()
+    template = _COMMENT.sub("", (HERE / "index.html").read_text(encoding="utf-8"))
+    style = minified(HERE / "style.css").decode().strip()
+    html = _LINE_END.sub("\n", template).replace("{{style}}", style)
+    files = {
+        "index.html": html.encode(),
+        "viewer.js": minified(HERE / "main.js"),
+        "later.js": minified(HERE / "later.js"),
+        "worker.js": minified(PTM / "worker.js"),
+        "decoder.wasm": (PTM / "decoder.wasm").read_bytes(),
+    }
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, data in files.items():
+        (folder / name).write_bytes(data)
+
+
+if __name__ == "__main__":
+    build(Path(sys.argv[1]) if len(sys.argv) > 1 else OUTPUT)

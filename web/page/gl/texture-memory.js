@@ -1,0 +1,263 @@
+// What of each texture is on the GPU: never more bytes than the budget, those of a texture that is
+// replaced counted twice while it is; uploads in stripes, as long as a frame has time.
+//
+// Levels are decoded again for each replacement, a third more work than the finest alone. (Copying on
+// the GPU those that both have works as well. It takes a decoder that is kept open for each texture,
+// with four bytes for each of its texels, and a second way of shrinking.)
+
+import { Storage } from "./storage.js";
+
+/** @typedef {import("../../ptm/src/level-decoder.js").Image} Image */
+
+/**
+ * @typedef {object} Row
+ * @property {{width: number, height: number}[]} sizes of its levels, coarsest first
+ * @property {number} channels of a texel on the GPU
+ *
+ * The first levels of a texture, so many, decoded.
+ * @typedef {(texture: number, levels: number) => Promise<Image[]>} Decode
+ */
+
+/** Textures that are decoded at a time, and that are on their way at most. */
+const DECODING = 3, UNDER_WAY = 6;
+
+/** What is to be in place of a texture's storage. */
+class Replacement {
+  /** @type {Image[] | null} */
+  images = null;
+  /** @type {Storage | null} */
+  storage = null;
+  /** The level that is uploaded, and the next row of it. */
+  level = 0;
+  row = 0;
+
+  /**
+   * @param {number} texture
+   * @param {number} to columns
+   */
+  constructor(texture, to) {
+    this.texture = texture;
+    this.to = to;
+  }
+}
+
+export class TextureMemory {
+  /** @type {(Storage | null)[]} */
+  #storages;
+  /** @type {Map<number, Replacement>} */
+  #underWay = new Map();
+  /** @type {Int32Array} */
+  #want = new Int32Array(0);
+  /** @type {Float64Array} */
+  #priority = new Float64Array(0);
+  #lost;
+
+  /**
+   * @param {WebGL2RenderingContext} gl
+   * @param {Row[]} rows
+   * @param {Decode} decode
+   */
+  constructor(gl, rows, decode) {
+    this.gl = gl;
+    this.rows = rows;
+    this.decode = decode;
+    this.#storages = rows.map(() => null);
+    /** Columns on the GPU: so many levels of each texture. */
+    this.held = new Int32Array(rows.length);
+    /** Columns that went with the context, and were not chosen anew. */
+    this.#lost = new Int32Array(rows.length);
+    this.budget = Infinity;
+    this.bytes = 0;
+    /** The most that was ever held. */
+    this.peak = 0;
+    this.fades = true;
+  }
+
+  /** @param {number} texture */
+  of(texture) {
+    return this.#storages[texture];
+  }
+
+  /**
+   * Begins what leads to other columns, the greatest priority first; what is to shrink before what is
+   * to grow. What is not wanted at all goes at once.
+   * @param {Int32Array} want columns
+   * @param {Float64Array} priority
+   */
+  settle(want, priority) {
+    this.#want = want;
+    this.#lost.fill(0);
+    this.#priority = priority;
+    for (let t = 0; t < want.length; t++) if (want[t] === 0 && this.held[t]) this.#clear(t);
+    // There may be no room to shrink in.
+    const shrinking = [...want.keys()].filter((t) => this.held[t] > want[t]);
+    shrinking.sort((a, b) => priority[a] - priority[b]);
+    const moving = [...this.#underWay.values()].some(({ storage }) => storage);
+    const least = Math.min(...shrinking.map((t) => this.#size(t, want[t])));
+    for (const t of shrinking) {
+      if (this.bytes <= this.budget && (moving || this.bytes + least <= this.budget)) break;
+      this.#clear(t);
+    }
+    this.#next();
+  }
+
+  /** What is there, or was before the context was lost, stays and comes back; nothing else does. */
+  hold() {
+    this.#want = this.held.map((held, t) => Math.max(held, Math.min(this.#want[t] ?? 0, this.#lost[t])));
+  }
+
+  /** What was wanted before the context was lost comes back. */
+  resume() {
+    this.#next();
+  }
+
+  /**
+   * The texture of the greatest worth, of those that may be.
+   * @param {(texture: number) => boolean} may
+   * @param {(texture: number) => number} worth
+   */
+  #best(may, worth) {
+    let best = -1;
+    for (let t = 0; t < this.rows.length; t++) {
+      if (may(t) && (best < 0 || worth(t) > worth(best))) best = t;
+    }
+    return best;
+  }
+
+  /** Decodes what is worth most, as long as decoders are free. */
+  #next() {
+    const { held } = this, want = this.#want, priority = this.#priority;
+    for (;;) {
+      const under = [...this.#underWay.values()];
+      if (under.filter(({ images }) => !images).length >= DECODING) return;
+      // What shrinks makes room for those that wait.
+      const all = under.length < UNDER_WAY;
+      const next = this.#best(
+        (t) => want[t] > 0 && (want[t] < held[t] || (all && want[t] > held[t])) && !this.#underWay.has(t),
+        (t) => priority[t] + +(want[t] < held[t]),
+      );
+      if (next < 0) return;
+      const replacement = new Replacement(next, want[next]);
+      this.#underWay.set(next, replacement);
+      this.decode(next, want[next]).then(
+        (images) => {
+          replacement.images = images;
+          this.#next();
+        },
+        () => this.#drop(replacement),
+      );
+    }
+  }
+
+  /** @param {Replacement} replacement */
+  #drop(replacement) {
+    if (this.#underWay.get(replacement.texture) !== replacement) return;
+    if (replacement.storage) this.#remove(replacement.storage);
+    this.#underWay.delete(replacement.texture);
+  }
+
+  /** @param {number} texture */
+  #clear(texture) {
+    const storage = this.#storages[texture];
+    if (storage) this.#remove(storage);
+    this.#storages[texture] = null;
+    this.held[texture] = 0;
+  }
+
+  /**
+   * Uploads stripes until there is none left, or the time has come; true if anything was done.
+   * @param {number} now s
+   * @param {() => boolean} late
+   */
+  pump(now, late) {
+    let done = false;
+    for (const replacement of [...this.#underWay.values()]) {
+      while (!late() && this.#step(replacement, now)) done = true;
+      if (late()) break;
+    }
+    if (done) this.#next();
+    return done;
+  }
+
+  /**
+   * One stripe of a texture; false if there is nothing more to do, or no room.
+   * @param {Replacement} replacement
+   * @param {number} now
+   */
+  #step(replacement, now) {
+    const { texture, to, images } = replacement, held = this.held[texture];
+    if (!images || this.#underWay.get(texture) !== replacement) return false;
+    const want = this.#want[texture];
+    // Not wanted any more; more than is wanted; or less than is there and wanted.
+    if (want === 0 || to > want || (to <= held && want >= held)) {
+      this.#drop(replacement);
+      return false;
+    }
+    replacement.storage ??= this.#make(texture, to);
+    const { storage } = replacement;
+    if (!storage) return false;
+    replacement.row = storage.upload(replacement.level, images[replacement.level].data, replacement.row);
+    if (replacement.row >= images[replacement.level].height) {
+      replacement.row = 0;
+      replacement.level++;
+    }
+    if (replacement.level < to) return true;
+    this.#underWay.delete(texture);
+    this.#clear(texture);
+    this.#storages[texture] = storage;
+    this.held[texture] = to;
+    if (this.fades && held > 0 && to > held) storage.fadeIn(to - held, now);
+    return true;
+  }
+
+  /**
+   * Storage for so many levels, or null if there is no room. What grows leaves room for what is to
+   * shrink, without which there would be none in the end.
+   * @param {number} texture
+   * @param {number} levels
+   */
+  #make(texture, levels) {
+    const { sizes, channels } = this.rows[texture], bytes = this.#size(texture, levels);
+    const left = levels < this.held[texture] ? 0 : this.#shrinking();
+    if (this.bytes + bytes + left > this.budget) return null;
+    this.bytes += bytes;
+    this.peak = Math.max(this.peak, this.bytes);
+    return new Storage(this.gl, sizes.slice(0, levels), channels);
+  }
+
+  /** Bytes of so many levels. @param {number} texture @param {number} levels */
+  #size(texture, levels) {
+    const { sizes, channels } = this.rows[texture];
+    return sizes.slice(0, levels).reduce((sum, size) => sum + size.width * size.height * channels, 0);
+  }
+
+  /** The most that a texture which is to shrink will take, until it has. */
+  #shrinking() {
+    return this.#want.reduce(
+      (most, levels, t) => (levels < this.held[t] ? Math.max(most, this.#size(t, levels)) : most),
+      0,
+    );
+  }
+
+  /** @param {Storage} storage */
+  #remove(storage) {
+    this.bytes -= storage.bytes;
+    storage.delete();
+  }
+
+  /** Gives all of it back, also what is on its way. */
+  delete() {
+    this.#want = new Int32Array(this.rows.length);
+    for (const replacement of [...this.#underWay.values()]) this.#drop(replacement);
+    for (let t = 0; t < this.rows.length; t++) this.#clear(t);
+  }
+
+  /** All is gone with the context: it comes back by `resume`. */
+  lose() {
+    this.#lost = this.held.map((held, t) => Math.max(held, this.#lost[t]));
+    this.#storages.fill(null);
+    this.#underWay.clear();
+    this.held.fill(0);
+    this.bytes = 0;
+  }
+}

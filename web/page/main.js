@@ -1,0 +1,76 @@
+// The page's beginning: reads the index, makes the walk, and lets the interface at it.
+
+import { DecoderWorkers, hasSimd } from "../ptm/src/index.js";
+import { App } from "./app.js";
+import { readConfig, Site } from "./data/site.js";
+import { PageError } from "./net/errors.js";
+import { clock, Fetcher } from "./net/fetcher.js";
+import { attachUi } from "./ui/all.js";
+import { showError } from "./ui/errors.js";
+
+/** The site that the page is of. @param {import("./data/site.js").SiteConfig} config */
+async function siteOf(config) {
+  const address = new URL(config.index, location.href).href;
+  return new Fetcher(() => {}).whole(
+    address,
+    (body) => new Site(JSON.parse(new TextDecoder().decode(body)), address),
+  );
+}
+
+/** Decoders, which start while the index is on its way. @param {import("./data/site.js").SiteConfig} config */
+function workersOf(config) {
+  const worker = new URL(config.worker, location.href);
+  const wasm = new URL(config.wasm, location.href).href;
+  const compiled = async () =>
+    WebAssembly.compile(await new Fetcher(() => {}).whole(wasm, (body) => body));
+  const create = () => new Worker(worker, { type: "module" });
+  return new DecoderWorkers({ wasm: compiled(), create });
+}
+
+/** Smooth edges cost too much without a graphics card. @param {HTMLCanvasElement} canvas */
+function contextOf(canvas) {
+  const options = { antialias: true, failIfMajorPerformanceCaveat: true };
+  const plain = { antialias: false };
+  const gl = canvas.getContext("webgl2", options) ?? canvas.getContext("webgl2", plain);
+  return /** @type {WebGL2RenderingContext | null} */ (gl);
+}
+
+async function main() {
+  const canvas = /** @type {HTMLCanvasElement} */ (document.querySelector("canvas"));
+  const config = readConfig();
+  try {
+    if (!hasSimd()) {
+      throw new PageError("PTM-V102", "This browser cannot run WebAssembly with SIMD.");
+    }
+    const workers = workersOf(config), site = siteOf(config);
+    const gl = contextOf(canvas);
+    if (!gl) throw new PageError("PTM-V101", "This browser cannot draw with WebGL 2.");
+    const app = new App(canvas, gl, await site, config, workers);
+    Object.assign(window, { ptm: app });
+    const controls = attachUi(app);
+    let before = clock();
+    const frame = () => {
+      const now = clock();
+      try {
+        app.frame(now - before, controls.wishes());
+      } catch (fault) {
+        app.freeze(true);
+        end(fault);
+        throw fault;
+      }
+      before = now;
+      requestAnimationFrame(frame);
+    };
+    requestAnimationFrame(frame);
+  } catch (fault) {
+    end(fault);
+  }
+}
+
+/** @param {unknown} fault */
+function end(fault) {
+  const known = fault instanceof PageError;
+  showError(document, known ? fault : new PageError("PTM-V107", String(fault)));
+}
+
+main();

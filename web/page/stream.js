@@ -1,0 +1,194 @@
+// Carries out what the client asks for: requests go out, and what comes is given to whom it concerns.
+
+import { PtmError } from "../ptm/src/index.js";
+import { readGlb } from "./data/glb.js";
+import { readRecord } from "./data/record.js";
+import { PageError } from "./net/errors.js";
+import { clock } from "./net/fetcher.js";
+import { TextureFile } from "./net/texture-file.js";
+
+/** @typedef {import("./policy/downloads.js").Request} Request */
+/** @typedef {import("./data/site.js").CellRecord} CellRecord */
+/** @typedef {import("./data/glb.js").Shape} Shape */
+
+/** Seconds until a file that could not be had is asked for again. */
+const REST = 10;
+const CONNECTIONS = 6;
+
+export class Stream {
+  /** @type {Map<number, CellRecord>} */
+  records = new Map();
+  /** @type {Map<number, Shape[]>} */
+  shapes = new Map();
+  /** Whether anything has arrived that was not looked at yet. */
+  news = false;
+  /** @type {Request[]} */
+  #queue = [];
+  /** @type {Set<Request>} */
+  #sent = new Set();
+  /** The level at which a texture was found to be damaged. @type {Map<number, number>} */
+  #suspect = new Map();
+  #cannotDecode = false;
+
+  /**
+   * @param {object} parts
+   * @param {import("./data/site.js").Site} parts.site
+   * @param {import("./policy/client.js").Client} parts.client
+   * @param {import("./space/locating.js").Locator} parts.locator
+   * @param {import("./policy/estimate.js").Estimate} parts.estimate
+   * @param {import("./net/fetcher.js").Fetcher} parts.fetcher
+   * @param {import("../ptm/src/workers.js").DecoderWorkers} parts.workers
+   * @param {() => boolean} parts.rests whether nothing more is asked for
+   * @param {(error: PageError, kind: string, number: number) => void} parts.report what it is about
+   */
+  constructor({ site, client, locator, estimate, fetcher, workers, rests, report }) {
+    this.site = site;
+    this.client = client;
+    this.locator = locator;
+    this.estimate = estimate;
+    this.fetcher = fetcher;
+    this.workers = workers;
+    this.rests = rests;
+    this.report = report;
+    this.files = site.index.textures.map((row) => new TextureFile(row, workers));
+  }
+
+  /** Asks for what is worth most, as long as the link would run dry. */
+  pump() {
+    while (!this.rests()) {
+      const request = this.client.next(this.estimate);
+      if (!request) return;
+      this.ask(request);
+    }
+  }
+
+  /**
+   * As many requests are on the way as browsers have connections to a host, the most urgent ones.
+   * @param {Request} request
+   */
+  ask(request) {
+    this.#queue.push(request);
+    this.#send();
+  }
+
+  #send() {
+    // Those that wait to be made again take no connection.
+    const busy = () => [...this.#sent].filter(({ waits }) => !waits).length;
+    while (busy() < CONNECTIONS && this.#queue.length) {
+      const { priority } = this.#queue.reduce((a, b) => (b.priority > a.priority ? b : a));
+      const first = this.#queue.findIndex((request) => request.priority === priority);
+      const [request] = this.#queue.splice(first, 1);
+      this.#sent.add(request);
+      this.#fetch(request).finally(() => {
+        this.#sent.delete(request);
+        this.#send();
+        this.pump();
+      });
+    }
+  }
+
+  /** @param {Request} request */
+  async #fetch(request) {
+    const { kind, number } = request, { client } = this;
+    try {
+      if (kind === "texture") await this.#texture(request);
+      else await this.#cell(kind, request);
+      this.news = true;
+    } catch (fault) {
+      const known = fault instanceof PageError;
+      const error = known ? fault : new PageError("PTM-V107", String(fault));
+      const forGood = error.code === "PTM-V103" || error.code === "PTM-V105";
+      client.failed(request, forGood ? Infinity : clock() + REST);
+      this.report(error, kind, number);
+    }
+  }
+
+  /**
+   * @param {"record" | "geometry"} kind
+   * @param {Request} request
+   */
+  async #cell(kind, request) {
+    const { client } = this, cell = request.number, url = this.site.cell(kind, cell);
+    if (kind === "record") {
+      const { cells, textures } = this.site.index;
+      const read = (/** @type {Uint8Array} */ body) =>
+        readRecord(body, cell, cells.length, textures.length);
+      const record = await this.fetcher.whole(url, read, request);
+      this.locator.learn(cell, record);
+      this.records.set(cell, record);
+      client.arrived(request);
+      client.learnRecord(cell, record);
+    } else {
+      const textures = this.site.index.textures.length;
+      const read = (/** @type {Uint8Array<ArrayBuffer>} */ body) => readShapes(body, cell, textures);
+      const shapes = await this.fetcher.whole(url, read, request);
+      this.shapes.set(cell, shapes);
+      client.arrived(request);
+      client.learnGeometry(cell, shapes);
+    }
+  }
+
+  /** @param {Request} request */
+  async #texture(request) {
+    const { number, begin, end } = request, file = this.files[number];
+    const size = file.row.ends[file.row.ends.length - 1];
+    const url = this.site.texture(number), cache = this.#suspect.has(number) ? "no-store" : "default";
+    const part = await this.fetcher.range(url, begin, end, size, request, cache);
+    // What was here before it may have been found to be damaged.
+    if (part.begin <= file.length) file.append(part.begin, part.body);
+    this.client.arrived(request, file.length);
+  }
+
+  /**
+   * The first levels, so many, of a texture whose bytes are here. A level that is damaged is asked for
+   * once more; if that is damaged as well, what is below it remains.
+   * @param {number} texture
+   * @param {number} levels
+   */
+  async decode(texture, levels) {
+    const file = this.files[texture];
+    // What was damaged is on its way once more.
+    if (levels > this.client.have[texture]) throw new Error("not here");
+    try {
+      const images = await file.decode(levels);
+      if (levels > (this.#suspect.get(texture) ?? levels)) this.#suspect.delete(texture);
+      return images;
+    } catch (fault) {
+      // A worker without a decoder knows nothing of the file.
+      if (!(fault instanceof PtmError) || fault.code === "PTM-M103") {
+        if (!this.#cannotDecode && this.workers.failed) {
+          this.report(new PageError("PTM-V106", `Textures cannot be decoded: ${fault}`), "decoder", 0);
+        }
+        this.#cannotDecode ||= this.workers.failed;
+        throw fault;
+      }
+      // Somebody else has found it out.
+      if (levels > this.client.have[texture]) throw fault;
+      const { level = 0 } = /** @type {{level?: number}} */ (fault);
+      const kept = level > 0 ? file.row.ends[level - 1] : 0;
+      if (fault.code.startsWith("PTM-L")) {
+        this.client.lose(texture, kept, Infinity);
+        const message = `${file.row.file} is not shown with all of its levels: ${fault.message}`;
+        this.report(new PageError("PTM-V106", message), "texture", texture);
+        throw fault;
+      }
+      file.cut(kept);
+      this.client.lose(texture, kept, this.#suspect.get(texture) === level ? Infinity : 0);
+      this.#suspect.set(texture, level);
+      const message = `${file.row.file} is damaged: ${fault.message}`;
+      this.report(new PageError("PTM-V105", message), "texture", texture);
+      throw fault;
+    }
+  }
+}
+
+/**
+ * @param {Uint8Array<ArrayBuffer>} body
+ * @param {number} cell
+ * @param {number} textures that there are
+ */
+function readShapes(body, cell, textures) {
+  const read = readGlb(body.buffer, textures);
+  if (read.cell !== cell) throw new Error("is of another cell");
+  return read.shapes;
+}

@@ -1,0 +1,69 @@
+// What went wrong, in words, and what to do about it.
+
+import { find, make } from "./elements.js";
+
+const TELL = "Tell the owner of this site: publishing it again should repair it.";
+const BROWSER = "Use a current Chrome, Edge or Firefox, or Safari 16.4 or newer";
+/** What to do, by the code of the error. @type {Record<string, string>} */
+const REMEDIES = {
+  "PTM-V101": `${BROWSER}, with hardware acceleration on.`,
+  "PTM-V102": `${BROWSER}.`,
+  "PTM-V103": TELL,
+  "PTM-V104": "Check your connection and reload the page.",
+  "PTM-V106": "Update the browser, or allow this page to use web workers and more memory.",
+  "PTM-V105": TELL,
+};
+const OTHERWISE = "Reload the page. If that does not help, tell the owner of this site.";
+/** How long a notice stays, ms. */
+const STAYS = 8000;
+
+/** What an error is in the way of. */
+const BEHIND = ["nav", "#panels", "#view"];
+
+/** Shows an error, in the way of everything. @param {Document} root
+ * @param {{code: string, message: string}} error */
+export function showError(root, { code, message }) {
+  const panel = find(root, "#error"), again = find(root, "#again");
+  find(root, "#error-text").textContent = message;
+  find(root, "#error-remedy").textContent = REMEDIES[code] ?? OTHERWISE;
+  find(root, "#error-code").textContent = code;
+  find(root, "#loading").hidden = true;
+  panel.hidden = false;
+  for (const name of BEHIND) find(root, name).inert = true;
+  again.onclick = () => location.reload();
+  again.focus();
+}
+
+/** The walk has begun after all. @param {Document} root */
+function hideError(root) {
+  const panel = find(root, "#error");
+  if (panel.hidden) return;
+  panel.hidden = true;
+  for (const name of BEHIND) find(root, name).inert = false;
+  find(root, "#view").focus();
+}
+
+/** Says something in passing. @param {Document} root @param {...(string | Node)} message */
+export function showNotice(root, ...message) {
+  const line = make("p", {}, ...message);
+  find(root, "#notices").append(line);
+  // Not from under whoever is in it.
+  const leave = () => {
+    if (line.contains(root.activeElement)) setTimeout(leave, STAYS);
+    else line.remove();
+  };
+  setTimeout(leave, STAYS);
+}
+
+/** Each notice is given once. @param {Document} root @param {import("./all.js").App} app */
+export function attachErrors(root, app) {
+  /** @type {Set<string>} */
+  const said = new Set();
+  app.on("error", (error) => showError(root, error));
+  app.on("first-picture", () => hideError(root));
+  app.on("notice", ({ message }) => {
+    if (said.has(message)) return;
+    said.add(message);
+    showNotice(root, message);
+  });
+}

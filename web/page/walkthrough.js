@@ -1,0 +1,387 @@
+// The walk: each frame where the visitor is, what is drawn, what goes into texture memory and what is
+// asked for next (docs/formats/client.md).
+
+import { beginningOf } from "./beginning.js";
+import { Comparison } from "./compare.js";
+import { fitting, levelsOf } from "./data/site.js";
+import { cameraOf } from "./gl/camera.js";
+import { ItemBuffer } from "./gl/item-buffer.js";
+import { Renderer } from "./gl/renderer.js";
+import { Reserve } from "./gl/reserve.js";
+import { Sharpness } from "./gl/sharpness.js";
+import { TextureMemory } from "./gl/texture-memory.js";
+import { clock, Fetcher } from "./net/fetcher.js";
+import { watchLink } from "./net/timings.js";
+import { catalogueOf } from "./policy/catalogue.js";
+import { Client } from "./policy/client.js";
+import { Estimate } from "./policy/estimate.js";
+import { POLICIES } from "./policy/policies.js";
+import { sightOf } from "./policy/sight.js";
+import { distance, frustumOf, meetsBox } from "./space/frustum.js";
+import { Locator } from "./space/locating.js";
+import { Stream } from "./stream.js";
+import { Stillness } from "./walk/stillness.js";
+
+/** Seconds between item buffers, and between looks of the client. */
+const ITEM_EVERY = 0.1, LOOK_EVERY = 0.2;
+/** Seconds between pictures of who stands, and until one does. */
+const PAINT_EVERY = 0.05, RESTING = 0.4;
+/** Seconds of a frame for uploads, and for geometry that comes into view. */
+const UPLOAD_TIME = 0.004, GEOMETRY_TIME = 0.004;
+/** The widest that a view is upright on a narrow screen, radians. */
+const TALLEST = 1.4;
+/** @typedef {import("./gl/camera.js").Pose} Pose */
+/** @typedef {import("./gl/renderer.js").Drawn} Drawn */
+
+export class Walkthrough {
+  /** @type {Drawn[]} */
+  drawn = [];
+  cell = -1;
+  /** What went wrong, in order. @type {{code: string, message: string}[]} */
+  faults = [];
+  /** Whether there was a picture of the room. */
+  begun = false;
+  /** Whether texture memory stays as it is, and nothing is asked for. */
+  frozen = false;
+  /** Whether nothing is fetched but what is on the screen. */
+  saving = false;
+  /** Whether both halves are to be seen, and what that takes. */
+  comparing = false;
+  /** @type {Comparison | null} */
+  comparison = null;
+  /** @type {import("./recorder.js").Recorder | null} */
+  recorder = null;
+  /** When what is drawn has last changed, and was drawn, s. */
+  #changed = 0;
+  #painted = -1;
+  #looked = -1;
+  #before = 0;
+  #itemDrawn = -1;
+  /** @type {import("./policy/sight.js").Sight | null} */
+  #sight = null;
+  #sightDrawn = -1;
+  /** @type {number[]} */
+  #frames = [];
+
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {WebGL2RenderingContext} gl
+   * @param {import("./data/site.js").Site} site
+   * @param {object} options
+   * @param {import("../ptm/src/workers.js").DecoderWorkers} options.workers
+   * @param {string} options.policy
+   * @param {number} options.budget bytes of texture memory
+   * @param {import("./app.js").App["emit"]} emit
+   */
+  constructor(canvas, gl, site, options, emit) {
+    const index = fitting(site.index, gl.getParameter(gl.MAX_TEXTURE_SIZE));
+    this.index = index;
+    this.canvas = canvas;
+    this.gl = gl;
+    this.site = site;
+    this.emit = emit;
+    this.budget = options.budget;
+    this.policy = options.policy;
+    this.catalogue = catalogueOf(index);
+    this.reserve = new Reserve(this.catalogue);
+    this.sharpness = new Sharpness(canvas);
+    this.stillness = new Stillness();
+    this.estimate = new Estimate();
+    this.fetcher = new Fetcher((message) => emit("notice", { message }));
+    watchLink(this.estimate, this.fetcher);
+    this.locator = new Locator(this.catalogue);
+    this.client = new Client(this.catalogue, {
+      budget: options.budget,
+      policy: POLICIES[options.policy],
+    });
+    this.stream = new Stream({
+      site,
+      client: this.client,
+      locator: this.locator,
+      estimate: this.estimate,
+      fetcher: this.fetcher,
+      workers: options.workers,
+      rests: () => this.#rests,
+      report: (error, kind, number) => this.#report(error, kind, number),
+    });
+    this.rows = index.textures.map(levelsOf);
+    this.memory = new TextureMemory(gl, this.rows, (t, levels) => this.stream.decode(t, levels));
+    this.means = index.textures.map(({ color }) => color);
+    const low = [0, 1, 2].map((k) => Math.min(...index.cells.map(({ box }) => box[k])));
+    const high = [0, 1, 2].map((k) => Math.max(...index.cells.map(({ box }) => box[k + 3])));
+    // What lies outside of the cells is drawn, too.
+    this.far = 10 + 3 * Math.hypot(...high.map((x, k) => x - low[k]));
+    this.angle = index.viewpoints[0]?.fieldOfView ?? Math.PI / 3;
+    this.#make();
+    canvas.addEventListener("webglcontextlost", (event) => {
+      event.preventDefault();
+      this.memory.lose();
+      this.comparison?.memory.lose();
+    });
+    canvas.addEventListener("webglcontextrestored", () => {
+      this.#make();
+      this.memory.resume();
+      this.comparison = this.comparing ? new Comparison(this) : null;
+    });
+  }
+
+  /**
+   * Without the first room, or a decoder, there is no walk; whatever else is missing, it goes on.
+   * @param {import("./net/errors.js").PageError} error
+   * @param {string} kind of what is missing
+   * @param {number} number
+   */
+  #report(error, kind, number) {
+    this.faults.push({ code: error.code, message: error.message });
+    const room = kind !== "texture" && number === this.cell;
+    const fatal = !this.begun && (room || kind === "decoder");
+    this.emit(fatal ? "error" : "notice", error);
+  }
+
+  #make() {
+    this.renderer = new Renderer(this.gl, this.memory, this.means);
+    this.items = new ItemBuffer(this.gl);
+    this.touch();
+  }
+
+  /** Something that is drawn has changed. */
+  touch() {
+    this.#changed = clock();
+  }
+
+  /** Cells that can be seen from where the visitor is, itself first. */
+  get visible() {
+    const { known, cell } = this.client;
+    return (known[this.cell] ?? known[cell])?.visible ?? (this.cell < 0 ? [] : [this.cell]);
+  }
+
+  /** Vertical field of view, radians: `angle` is the smaller one. */
+  get tall() {
+    const aspect = this.aspect;
+    if (aspect >= 1) return this.angle;
+    return Math.min(TALLEST, 2 * Math.atan(Math.tan(this.angle / 2) / aspect));
+  }
+
+  get aspect() {
+    return this.canvas.width / this.canvas.height;
+  }
+
+  /** @param {Pose} pose */
+  locate(pose) {
+    const found = this.locator.locate(pose.eye, this.cell);
+    if (found >= 0) return this.enter(found);
+    // Among cells that are not known yet, the one that one is said to be in.
+    const maybe = this.locator.candidates(pose.eye, this.cell);
+    if (maybe.length && !maybe.includes(this.cell)) this.enter(maybe[0]);
+  }
+
+  /** @param {number} cell that the visitor is in */
+  enter(cell) {
+    if (cell === this.cell) return;
+    this.cell = cell;
+    this.#looked = -1;
+    this.emit("cell", cell);
+  }
+
+  /**
+   * A frame.
+   * @param {Pose} pose
+   */
+  frame(pose) {
+    const now = clock(), { gl } = this;
+    if (gl.isContextLost()) return;
+    this.locate(pose);
+    const { stillness } = this;
+    if (stillness.takes(pose, now)) this.touch();
+    if (this.sharpness.settle(now - this.#before, now - stillness.moved < RESTING)) this.touch();
+    this.#before = now;
+    const frustum = frustumOf(pose, this.tall, this.aspect);
+    this.#bring(now + GEOMETRY_TIME);
+    this.#cull(frustum);
+    const until = clock() + UPLOAD_TIME, late = () => clock() > until;
+    if (this.memory.pump(now, late) || this.comparison?.memory.pump(now, late)) this.touch();
+    this.#read();
+    if (this.stream.news || now - this.#looked >= LOOK_EVERY) this.#look(now, frustum, stillness.lasts(now));
+    const camera = cameraOf(pose, this.tall, this.aspect, this.far);
+    const waits = stillness.moved < this.#painted && now - this.#painted < PAINT_EVERY;
+    if (this.#changed > this.#painted && !waits) this.#paint(camera, now);
+    if (this.#changed > this.#itemDrawn && now - this.#itemDrawn >= ITEM_EVERY) {
+      this.#drawItems(camera, now);
+    }
+    if (!this.begun) {
+      const { progress, over } = beginningOf(this);
+      this.emit("progress", progress);
+      this.begun = over;
+      if (over) this.emit("first-picture", undefined);
+    }
+    this.recorder?.frame(now, frustum, this.#sightDrawn);
+    this.stream.pump();
+  }
+
+  /** Whether nothing more is asked for: what is on the screen may be enough, or the rest of the link
+   * be for the comparison. */
+  get #rests() {
+    const enough = this.saving || document.hidden || this.comparing;
+    return this.frozen || (enough && this.client.missing(true) === 0);
+  }
+
+  /**
+   * @param {import("./gl/camera.js").Camera} camera
+   * @param {number} now
+   */
+  #paint(camera, now) {
+    const { gl, canvas: { width, height }, comparison } = this;
+    this.#painted = now;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.viewport(0, 0, width, height);
+    if (this.renderer?.draw(camera, this.drawn, now)) this.touch();
+    if (comparison) {
+      const half = width >> 1;
+      gl.enable(gl.SCISSOR_TEST);
+      gl.scissor(half, 0, width - half, height);
+      comparison.renderer.draw(camera, this.drawn, now);
+      gl.disable(gl.SCISSOR_TEST);
+    }
+    this.#frames = [...this.#frames.filter((at) => at > now - 1), now];
+  }
+
+  /** @param {boolean} on whether texture memory stays as it is, and nothing is asked for */
+  freeze(on) {
+    this.frozen = on;
+    if (on) this.memory.hold();
+  }
+
+  /** @param {boolean} on whether the right half shows what every level would */
+  compare(on) {
+    this.comparing = on;
+    if (this.gl.isContextLost()) return;
+    this.comparison?.delete();
+    this.comparison = on ? new Comparison(this) : null;
+    this.touch();
+  }
+
+  /** @param {string} policy by name */
+  choose(policy) {
+    if (!Object.hasOwn(POLICIES, policy)) return;
+    this.policy = policy;
+    this.client.policy = POLICIES[policy];
+  }
+
+  /** What the view wants of each texture, or null before anything was seen. */
+  get present() {
+    return this.#sight?.present ?? null;
+  }
+
+  /**
+   * Puts on the GPU the geometry of what can be seen, as long as there is time, and takes off what
+   * cannot.
+   * @param {number} until s
+   */
+  #bring(until) {
+    const { renderer, visible } = this;
+    if (!renderer) return;
+    renderer.keep(new Set(visible));
+    const late = () => clock() > until;
+    for (const cell of visible) {
+      const shapes = this.stream.shapes.get(cell);
+      if (!shapes || renderer.cells.has(cell)) continue;
+      if (!renderer.add(cell, shapes, late)) break;
+      this.touch();
+      if (late()) break;
+    }
+  }
+
+  /** @param {import("./space/frustum.js").Frustum} frustum */
+  #cull(frustum) {
+    this.drawn = [];
+    for (const [cell, buffers] of this.renderer?.cells ?? []) {
+      const batches = buffers.batches.filter(({ low, high }) => meetsBox(frustum, low, high));
+      if (batches.length) this.drawn.push({ cell, buffers, batches });
+    }
+    const { low, high } = this.catalogue;
+    const far = new Map(
+      this.drawn.map(({ cell }) => [cell, distance(frustum.eye, low, high, 3 * cell)]),
+    );
+    this.drawn.sort((a, b) => (far.get(a.cell) ?? 0) - (far.get(b.cell) ?? 0));
+  }
+
+  /**
+   * @param {import("./gl/camera.js").Camera} camera
+   * @param {number} now
+   */
+  #drawItems(camera, now) {
+    if (!this.items || this.items.busy) return;
+    this.#itemDrawn = now;
+    const { cells, textures } = this.index;
+    this.items.draw({
+      camera,
+      aspect: this.aspect,
+      lines: this.sharpness.lines,
+      now,
+      drawn: this.drawn,
+      missing: this.visible
+        .filter((cell) => !this.stream.shapes.has(cell))
+        .map((cell) => ({ cell, box: cells[cell].box })),
+      sizeOf: (t) => [textures[t].width, textures[t].height],
+    });
+  }
+
+  #read() {
+    const reading = this.items?.poll();
+    if (!reading) return;
+    this.#sight = sightOf(reading, this.catalogue);
+    this.#sightDrawn = reading.drawn;
+    this.client.sees(this.#sight.present, this.#sight.hidden);
+  }
+
+  /**
+   * @param {number} now
+   * @param {import("./space/frustum.js").Frustum} frustum
+   * @param {boolean} still
+   */
+  #look(now, frustum, still) {
+    this.#looked = now;
+    this.stream.news = false;
+    const { client, memory, reserve, comparison } = this;
+    client.downloads.now = now;
+    if (comparison) comparison.settle();
+    if (this.frozen) return;
+    reserve.enter(this.cell, this.budget);
+    client.budget = this.budget - reserve.bytes;
+    client.look({ now, cell: this.cell, frustum, still });
+    while (reserve.grow(client.column) && client.fit(this.budget - reserve.bytes));
+    memory.budget = this.budget;
+    memory.settle(client.column, this.#priority());
+  }
+
+  /** How much of the view each texture is, for the order of uploads. */
+  #priority() {
+    const { T, K } = this.catalogue, share = new Float64Array(T);
+    for (let t = 0; this.#sight && t < T; t++) share[t] = this.#sight.present[t * K + 1];
+    return share;
+  }
+
+  /** Pictures in the second before the last one. */
+  get fps() {
+    return this.#frames.length;
+  }
+
+  /** Seconds since the item buffer that is gone by was drawn; null before there is one. */
+  get bufferAge() {
+    return this.#sightDrawn < 0 ? null : clock() - this.#sightDrawn;
+  }
+
+  /** Whether nothing that this view could use is missing within the budget. */
+  get complete() {
+    const { client, memory, present, catalogue: { T, K } } = this;
+    if (!present || this.#sightDrawn < this.#changed || this.#looked < this.#changed) return false;
+    if (client.cell !== this.cell || client.missing() > 0 || !this.sharpness.full) return false;
+    for (let t = 0; t < T; t++) {
+      const held = memory.held[t];
+      for (let column = client.column[t]; column > held; column--) {
+        if (present[t * K + column] > 0) return false;
+      }
+    }
+    return true;
+  }
+}
