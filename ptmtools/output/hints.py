@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
+from ptmtools.output.convexity import portal_polygons, slack_of
 from ptmtools.output.emitters import chosen_emitters
 from ptmtools.output.first_look import FirstLooks
 from ptmtools.output.model import OctreeRecord, TextureRecord, Viewpoint
@@ -234,11 +235,13 @@ def _portals(cells: Cells) -> list[list[dict[str, Any]]]:
     rows: list[list[dict[str, Any]]] = [[] for _ in range(cells.cell_count)]
     area = coordinates(cells.portal_area, "portals") if cells.portal_count else []
     ends = cells.portal_cell
-    for k in range(cells.portal_count):
+    polygons = portal_polygons(
+        cells.portal_point, cells.portal_start, cells.portal_plane[:, :3], slack_of(cells)
+    )
+    for k, polygon in enumerate(polygons):
         behind, ahead = ends[k].tolist()
         if behind == ahead or min(behind, ahead) < 0:
             continue
-        polygon = coordinates(cells.portal(k), "portals")
         for cell, neighbour, loop in ((behind, ahead, polygon[::-1]), (ahead, behind, polygon)):
             rows[cell].append({"neighbour": neighbour, "area": area[k], "polygon": loop})
     return rows

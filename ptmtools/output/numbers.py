@@ -62,11 +62,12 @@ def decimal(value: float) -> str:
     return row_texts(single([[value]], "a number"))[0]
 
 
-def row_texts(values: NDArray[np.float32] | NDArray[np.integer]) -> list[str]:
-    """Each row of an (n, k) array of finite numbers as text, with spaces in between."""
+def row_texts(values: NDArray[np.floating] | NDArray[np.integer]) -> list[str]:
+    """Each row of an (n, k) array of finite numbers as text, with spaces in between: the shortest
+    decimals that read back to the same number of the array's type."""
     if not len(values):
         return []
-    text = _json(values) if values.dtype == np.float32 else _plain(values)
+    text = _json(values) if values.dtype.kind == "f" else _plain(values)
     return text[2:-2].replace("],[", ";").replace(",", " ").split(";")
 
 

@@ -41,6 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.output.content import Content
+from ptmtools.output.convexity import hull_rows, slack_of
 from ptmtools.output.hull import convex_hull
 from ptmtools.output.model import TextureRecord
 from ptmtools.output.names import ROOT, VRML_FILES, DefNames, cell_file, cell_name, path_of
@@ -172,6 +173,7 @@ class CellWriter:
             for leaves in content.leaves
         ]
         self._hulls = [convex_hull(np.concatenate(leaves)) for leaves in self._leaves]
+        self._slack = slack_of(cells)
 
     def cell(self, cell: int) -> tuple[str, NDArray[np.float32]]:
         """The file of one cell, and the (2, 3) least and greatest corner of all that it holds."""
@@ -181,7 +183,7 @@ class CellWriter:
         leaves = self._leaves[cell]
         lists = {
             "cellName": quoted(cell_name(cell)),
-            "hullPoint": _points(hull),
+            "hullPoint": field(hull_rows(hull, triangles, self._slack)),
             "hullIndex": loops(triangles, 16),
             "adjacentUrl": self._cells(self._adjacent[cell]),
             "visibleUrl": self._cells(self._pvs.cell[seen]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from fractions import Fraction
 
 import numpy as np
@@ -113,6 +114,14 @@ def test_millions_read_back(seed: int) -> None:
 def single_or_inf(text: str) -> np.float32:
     with np.errstate(over="ignore"):
         return np.float32(float(text))
+
+
+@given(FLOATS)
+def test_float64_reads_back_as_either_type(value: float) -> None:
+    (text,) = row_texts(np.array([[np.float32(value)]], np.float64) + 0.0)
+    assert float(text) == np.float32(value)
+    assert np.float32(text) == np.float32(value)
+    assert re.fullmatch(r"-?(0|[1-9]\d*)(\.\d+|e-?\d+)?", text)
 
 
 @given(FLOATS)
