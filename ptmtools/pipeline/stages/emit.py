@@ -35,9 +35,8 @@ EMIT: Stage[None] = Stage(
     changed="the hints say what each level of a texture adds, its mean colour, and what a texel "
     "takes on a GPU, and how fine each is needed in each cell; --first-look writes a bundle of "
     "coarse levels for each cell; "
-    "viewpoints look where pictures are; hulls with slivers and portals with short edges are
-    convex "
-    "in float32 and in float64",
+    "viewpoints look where pictures are; hulls with slivers and portals with short edges are "
+    "convex in float32 and in float64",
     options=EmitOptions,
     reads=(APO, CELLS, PVS, ACH, TEXTURES),
     files=(APO,),
