@@ -1,12 +1,13 @@
-"""The knobs of the subdivision."""
+"""Options of the subdivision, and the size of the visitor."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Literal, NamedTuple, get_args
+from dataclasses import dataclass
+from typing import ClassVar, Literal, NamedTuple, get_args
 
 from ptmtools.errors import InputError
+from ptmtools.options import option
 
 CellKind = Literal["leaf", "room"]
 Reach = Literal["all", "main"]
@@ -21,7 +22,7 @@ def _positions(viewpoints: Sequence[tuple[float, ...]]) -> tuple[Position, ...]:
 
 
 class Walker(NamedTuple):
-    """The body of whoever walks: an upright cylinder from ``step`` to ``height`` above the floor,
+    """The body of a visitor: an upright cylinder from ``step`` to ``height`` above the floor, in
     metres."""
 
     radius: float
@@ -30,78 +31,112 @@ class Walker(NamedTuple):
 
     @property
     def middle(self) -> float:
-        """How high above the floor the body's middle is."""
+        """Height of the body's middle above the floor, metres."""
         return (self.step + self.height) / 2
 
     @property
     def reach(self) -> float:
-        """How high above the floor eyes are at most: somebody may be taller, 2.2 m to the 1.7."""
+        """Greatest height of eyes above the floor, metres: 2.2 for a height of 1.7, since visitors
+        may be taller."""
         return self.height * (2.2 / 1.7)
 
 
-#: Whoever walks unless another is asked for.
+#: The default visitor.
 WALKER = Walker(0.25, 0.5, 1.7)
-#: Nobody is wider or taller, metres: in a model in another unit neither.
+#: Upper bound of a visitor's size, metres, also for models in other units.
 GIANT = 1e9
 
 
 @dataclass(frozen=True)
 class SubdivideOptions:
-    """What may split, and how far. The metadata of a field name its option and older spellings.
+    """Options of `ptmtools.cells.subdivide`.
 
-    Attributes
-    ----------
-    wall_area: walls of at least this area, in m², divide the building into leaves, its convex
-        pieces. A smaller value gives more and tighter cells, and slower visibility.
-    wall_thickness: parallel walls closer together than this, in metres, are the two faces of one
-        wall; jambs, lintels and sills between them divide the building whatever their area.
-        Whatever stands off a wall by less than 0.12 of this, or by less than 1/1000 of the
-        building's extent, is part of the wall.
-    max_leaves: stop at this many leaves. The best splits come first.
-    structural: objects or materials (names, with * and ?) that divide the building whatever their
-        area. May be given several times.
-    detail: objects or materials (names, with * and ?) that never divide the building and never hide
-        anything, such as furniture; --structural takes precedence. May be given several times.
-    detail_by_shape: take for detail, too, what is small, dense and round, such as sofas, statues
-        and plants: it can neither divide nor hide anything.
-    cells: what a cell, the unit that clients load and draw, consists of: a single "leaf", or a
-        "room", all leaves between its doors; but see --gain.
-    gain: keep the leaves of a room as separate cells if that saves viewers at least this share of
-        what they download; 0 keeps all of them apart, 1 makes every room one cell.
-    walker: radius, highest step and height, in metres, of whoever walks. Where such a body fits
-        is not left out, even if it cannot be reached; see --reach.
-    standing: where visitors are: at "places", on floors where the body of --walker fits, their eyes
-        up to 1.3 times its height; or "anywhere" in the cells, as cameras that fly are.
-    viewpoints: a starting point inside the building: metres, Y up, and the yaw in degrees,
-        counter-clockwise from -Z. By default one is chosen. May be given several times.
-    reach: what becomes of space that cannot be reached from the start, behind closed doors or in
-        another building: "all" keeps what has a place in it, "main" drops everything.
-    doors: "open" lets everybody see through the leaves of doors between rooms, though they are
-        drawn; "hidden" does not draw them either; to "closed" ones they are walls. Entrances, with
-        nothing but the outside beyond, stay shut.
-    door: objects or materials (names, with * and ?) that are door leaves, whatever their shape;
-        --structural takes precedence. Others are recognised by name and shape. May be given
-        several times.
-    strict: stop the build if more than a tenth of where one could stand is left out.
+    Raises InputError PTM-I300 for values out of range.
     """
 
-    wall_area: float = 2.0
-    wall_thickness: float = 0.5
-    max_leaves: int = field(default=10_000, metadata={"was": ("max-cells",)})
-    structural: tuple[str, ...] = ()
-    detail: tuple[str, ...] = ()
-    detail_by_shape: bool = True
-    cells: CellKind = "room"
-    gain: float = 0.1
-    walker: tuple[float, float, float] = WALKER
-    reach: Reach = "all"
-    standing: Standing = "places"
-    doors: DoorState = "open"
-    door: tuple[str, ...] = ()
-    viewpoints: tuple[Position, ...] = field(
-        default=(), metadata={"option": "viewpoint", "numbers": (3, 4), "parse": _positions}
+    heading: ClassVar[str] = "Cells"
+
+    wall_area: float = option(
+        2.0,
+        "Smallest wall that divides the building into leaves (its convex parts). Smaller values "
+        "give more and tighter cells, and slower visibility.",
+        metavar="M2",
     )
-    strict: bool = False
+    wall_thickness: float = option(
+        0.5,
+        "Largest distance of the two faces of one wall. Jambs, lintels and sills between them "
+        "divide the building, whatever their area.",
+        metavar="METRES",
+    )
+    max_leaves: int = option(
+        10_000, "Largest number of leaves. The best splits come first.", was=("max-cells",)
+    )
+    structural: tuple[str, ...] = option(
+        (),
+        "Objects or materials (names, with * and ?) that divide the building, whatever their area. "
+        "Repeatable.",
+        metavar="NAME",
+    )
+    detail: tuple[str, ...] = option(
+        (),
+        "Objects or materials (names, with * and ?) that neither divide the building nor hide "
+        "anything, such as furniture. --structural takes precedence. Repeatable.",
+        metavar="NAME",
+        basic=True,
+    )
+    detail_by_shape: bool = option(
+        True, "Treat small, dense, round objects as detail: sofas, statues, plants."
+    )
+    cells: CellKind = option(
+        "room",
+        "Unit that clients load and draw: a convex leaf, or a room, which is all leaves between "
+        "its doors; see --gain.",
+    )
+    gain: float = option(
+        0.1,
+        "Divide a room into its leaves where that saves clients at least this share of their "
+        "download; 0 divides every room, 1 none.",
+        metavar="SHARE",
+    )
+    walker: tuple[float, float, float] = option(
+        WALKER,
+        "Size of the visitor: radius, highest step and height, in metres. Space where such a body "
+        "fits is walkable.",
+        metavar="RADIUS,STEP,HEIGHT",
+    )
+    reach: Reach = option(
+        "all",
+        "Space that the starting point does not reach, such as rooms behind closed doors: all "
+        "keeps it where it is walkable, main drops it.",
+    )
+    standing: Standing = option(
+        "places",
+        "Positions of eyes: above walkable floor, up to 1.3 times the height of --walker (places), "
+        "or in the whole cell, as of a flying camera (anywhere).",
+    )
+    doors: DoorState = option(
+        "open",
+        "Doors between rooms: open ones are drawn and hide nothing, hidden ones are not drawn, "
+        "closed ones are walls. Entrances stay shut.",
+        basic=True,
+    )
+    door: tuple[str, ...] = option(
+        (),
+        "Objects or materials (names, with * and ?) that are door leaves, beside those recognised "
+        "by name and shape. --structural takes precedence. Repeatable.",
+        metavar="NAME",
+    )
+    viewpoints: tuple[Position, ...] = option(
+        (),
+        "Starting point inside the building: position in metres, Y up, and yaw in degrees, "
+        "counter-clockwise from -Z. Default: chosen automatically. Repeatable.",
+        name="viewpoint",
+        metavar="X,Y,Z[,YAW]",
+        numbers=(3, 4),
+        parse=_positions,
+        basic=True,
+    )
+    strict: bool = option(False, "Fail if more than a tenth of the walkable floor is left out.")
 
     def __post_init__(self) -> None:
         area, thickness, gain = self.wall_area, self.wall_thickness, self.gain
@@ -124,7 +159,7 @@ class SubdivideOptions:
                 len(self.walker) == 3
                 and all(0 < length <= GIANT for length in self.walker)
                 and self.walker[1] < self.walker[2],
-                f"nobody's radius, step and height are {self.walker} metres",
+                f"radius, step and height of {self.walker} metres are out of range",
                 "try 0.25,0.5,1.7",
             ),
             (self.cells in get_args(CellKind), f"unknown cells {self.cells!r}", "leaf or room"),

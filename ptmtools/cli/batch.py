@@ -1,7 +1,8 @@
-"""Several files by one command: which ones are meant, and what happens when one is bad."""
+"""Commands that take several files: expansion of names, names of results, failures of one file."""
 
 from __future__ import annotations
 
+import errno
 import glob
 import os
 import stat
@@ -14,16 +15,22 @@ from typing import IO, TYPE_CHECKING, Any
 
 import click
 
-from ptmtools.cli.common import as_json, forced, limited, voiced, workers
-from ptmtools.cli.failures import report
-from ptmtools.cli.output import Voice, abandon_stdout
+from ptmtools.cli.console import Console, abandon_stdout, report
+from ptmtools.cli.parameters import (
+    force_option,
+    jobs_option,
+    json_option,
+    limit_option,
+    option,
+    with_console,
+)
 from ptmtools.errors import InputError, OutputError, PtmError, naming
 from ptmtools.files import output_error, refuse_existing, write_with, writing
 
 if TYPE_CHECKING:
     from ptmtools.texture.model import Limits
 
-#: What is said of a file, as in JSON.
+#: The report on a file, as in JSON.
 Report = dict[str, Any]
 
 #: As a file name: standard input or output.
@@ -31,12 +38,12 @@ STANDARD = "-"
 
 
 def expanded(names: Iterable[str], suffixes: Sequence[str]) -> list[str]:
-    """The files that are meant: a pattern that no file is called, as a shell would expand it
-    (``**`` is any folder); a folder as the files of ``suffixes`` in it. What is not there stays.
+    """The files of patterns, which are expanded as by a shell (``**`` is any folder) unless a file
+    has that very name; of folders, their files with one of the ``suffixes``; other names unchanged.
 
-    Raises InputError PTM-I128 for a folder that has none.
+    Raises InputError PTM-I128 for a folder without such files.
     """
-    found: list[str] = []
+    files: list[str] = []
     for name in names:
         if os.path.isdir(name):
             inside = sorted(
@@ -51,30 +58,30 @@ def expanded(names: Iterable[str], suffixes: Sequence[str]) -> list[str]:
                     file=name,
                     remedy=f"their names end with {', '.join(suffixes)}",
                 )
-            found += inside
+            files += inside
         elif _several(name):
-            found += sorted(glob.glob(name, recursive=True)) or [name]
+            files += sorted(glob.glob(name, recursive=True)) or [name]
         else:
-            found.append(name)
-    return found
+            files.append(name)
+    return files
 
 
 def many_files(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Adds the options of a command that makes a file of each file, and hands in the `Batch`."""
+    """Adds the options of a command that converts files one by one, and passes the `Batch`."""
 
-    @click.option(
+    @option(
         "--skip-existing",
         is_flag=True,
-        help="Skip files whose result exists already, for example after an interrupted run.",
+        help="Skip files whose result exists, for example after an interrupted run.",
     )
-    @limited
-    @workers
-    @forced
-    @as_json
-    @voiced
+    @limit_option
+    @jobs_option
+    @force_option()
+    @json_option
+    @with_console
     @wraps(function)
     def command(
-        voice: Voice,
+        console: Console,
         force: bool,
         skip_existing: bool,
         workers: int,
@@ -84,7 +91,7 @@ def many_files(function: Callable[..., Any]) -> Callable[..., Any]:
     ) -> Any:
         if force and skip_existing:
             raise click.UsageError("give either --force or --skip-existing, not both")
-        return function(Batch(voice, force, skip_existing, workers, limits, as_json), **values)
+        return function(Batch(console, force, skip_existing, workers, limits, as_json), **values)
 
     return command
 
@@ -96,9 +103,9 @@ class Job:
     Attributes
     ----------
     source: its name; - is standard input.
-    target: where the result goes; None is standard output.
-    folder: one to make first, if it is not there.
-    fault: why nothing can be done with it.
+    target: the file for the result; None is standard output.
+    folder: a folder to create first.
+    fault: the reason why the file is skipped.
     """
 
     source: str
@@ -112,7 +119,7 @@ class Job:
         return self.target is None and self.fault is None
 
     def put(self, write: Callable[[IO[bytes]], object], force: bool) -> None:
-        """What ``write`` puts into the file it is given, which can seek, goes where it belongs."""
+        """Stores the result that ``write`` writes into a seekable file."""
         if self.target is None:
             to_standard_output(write)
             return
@@ -130,11 +137,11 @@ def jobs_for(
     suffix: str,
     suffixes: Sequence[str],
 ) -> list[Job]:
-    """What is to be done, each of the files that `expanded` finds once.
+    """One job for each file of `expanded`.
 
-    ``output`` is a folder if it is one already or ends with a slash, or if those ``given`` by the
-    user are several, a folder or a pattern; of the last two, a single file may still go to a name
-    with one of ``suffixes``. Different sources whose results would lie in one place are one job, a
+    ``output`` is a folder if it exists as one or ends with a slash, or if the user has ``given``
+    several files, a folder or a pattern; a single file of the last two may still go to a name with
+    one of ``suffixes``. Sources whose results would have the same name become one job with a
     fault.
 
     Raises click.UsageError; InputError PTM-I128.
@@ -144,9 +151,9 @@ def jobs_for(
         raise click.BadParameter("the name is empty", None, None, "-o")
     if STANDARD in sources and len(sources) > 1:
         raise click.UsageError("standard input (-) must be the only file")
-    found = _once(sources)
-    named = [name for name in found if name]
-    nameless = [Job(name, fault=no_name()) for name in found if not name]
+    unique = _once(sources)
+    named = [name for name in unique if name]
+    nameless = [Job(name, fault=no_name()) for name in unique if not name]
     if output == STANDARD or (output is None and any(map(_streams, named))):
         if len(named) > 1:
             raise click.UsageError("only one file can go to standard output")
@@ -174,7 +181,7 @@ def jobs_for(
 
 
 def _several(name: str) -> bool:
-    """Whether a name that the user gave stands for any number of files."""
+    """Whether a name is a folder or a pattern."""
     return os.path.isdir(name) or (glob.has_magic(name) and not os.path.lexists(name))
 
 
@@ -188,17 +195,17 @@ def no_name() -> InputError:
 
 
 def _once(sources: Iterable[str]) -> list[str]:
-    """Without those that name a file of the same folder again. Links are files of their own."""
-    found: dict[str, str] = {}
+    """The names without repetitions of a file. Links are files of their own."""
+    files: dict[str, str] = {}
     for name in sources:
         folder, file = os.path.split(name)
         key = os.path.join(os.path.realpath(folder), file) if file else name
-        found.setdefault(os.path.normcase(key), name)
-    return list(found.values())
+        files.setdefault(os.path.normcase(key), name)
+    return list(files.values())
 
 
 def _streams(name: str) -> bool:
-    """Whether it is standard input, or a pipe that has a name; nothing can lie beside those."""
+    """Whether a name is standard input or a named pipe."""
     if name == STANDARD or os.path.dirname(name) in ("/dev", "/dev/fd"):
         return True
     try:
@@ -213,7 +220,7 @@ def _beside(name: str, folder: Path | None, suffix: str) -> Path:
 
 
 def _apart(targets: dict[str, Path], folder: Path | None) -> list[Job]:
-    """A job for each target that one source has."""
+    """A job for each target; with a fault if several sources have it."""
     places: dict[str, list[str]] = {}
     for name, target in targets.items():
         places.setdefault(os.path.normcase(os.path.realpath(target)), []).append(name)
@@ -235,9 +242,9 @@ def _apart(targets: dict[str, Path], folder: Path | None) -> list[Job]:
 
 @dataclass(frozen=True)
 class Batch:
-    """How a command treats its files: as its options say."""
+    """The options with which a command converts its files."""
 
-    voice: Voice
+    console: Console
     force: bool
     skip_existing: bool
     workers: int
@@ -245,7 +252,7 @@ class Batch:
     as_json: bool
 
     def skips(self, target: Path | None) -> bool:
-        """Whether the result is there and stays. Raises OutputError PTM-O001 if it must not be."""
+        """Whether to keep an existing result; raises OutputError PTM-O001 without an option."""
         if target is None or self.force:
             return False
         if not self.skip_existing:
@@ -258,17 +265,17 @@ class Batch:
         work: Callable[[Job, int], Report],
         lines: Callable[[Report], Iterable[str]],
     ) -> tuple[int, list[Report]]:
-        """``work(job, threads)`` for every job, several at a time; the first failure's exit status,
-        and the reports of those done, in the order of the jobs.
+        """Runs ``work(job, threads)`` for every job, several at a time; returns the exit status of
+        the first failure, and the reports of the other jobs, in order.
 
-        What ``lines`` makes of a report is printed, or with ``as_json`` all of them at the end; in
-        both cases a warning in it goes to stderr. A job that fails is reported and the others go
-        on. One job has all the threads to itself; of several, each has one.
+        Prints the ``lines`` of each report, or with ``as_json`` all reports at the end; warnings go
+        to stderr. The other jobs continue after a failure. A single job has all the threads; each
+        of several has one.
         """
         from ptmtools.texture.parallel import ordered
 
-        voice, workers = self.voice, self.workers or os.cpu_count() or 1
-        voice.to_stderr = any(job.to_stdout for job in jobs)
+        console, workers = self.console, self.workers or os.cpu_count() or 1
+        console.to_stderr = any(job.to_stdout for job in jobs)
         at_once = min(workers, len(jobs))
 
         def guarded(job: Job) -> Report | Exception:
@@ -281,33 +288,33 @@ class Batch:
 
         status = 0
         reports: list[Report] = []
-        with voice.progress() as progress:
+        with console.progress() as progress:
             for done, result in enumerate(ordered(guarded, jobs, at_once)):
                 progress(done, len(jobs), "files")
                 if isinstance(result, Exception):
-                    with voice.above_progress():
-                        failed = report(result, voice.verbose)
+                    with console.above_progress():
+                        failed = report(result, console.verbose)
                     status = status or failed
                     continue
                 reports.append(result)
                 if result.get("warning"):
-                    voice.warn(f"{result['file']}: {result['warning']}")
+                    console.warn(f"{result['file']}: {result['warning']}")
                 for line in lines(result) if not self.as_json else ():
-                    voice.say(line)
+                    console.print(line)
         if self.as_json:
-            voice.emit_json(reports)
+            console.json(reports)
         return status, reports
 
 
 def standard_input() -> bytes:
-    """All of it."""
+    """The bytes of standard input."""
     return sys.stdin.buffer.read()
 
 
 def to_standard_output(write: Callable[[IO[bytes]], object]) -> None:
-    """What ``write`` puts into the file it is given, which can seek, goes to stdout.
+    """Copies to stdout what ``write`` writes into a seekable file.
 
-    Raises OutputError PTM-O002, PTM-O003; BrokenPipeError if nobody reads it.
+    Raises OutputError PTM-O002, PTM-O003; BrokenPipeError if the reader has ended.
     """
     import shutil
     import tempfile
@@ -326,3 +333,17 @@ def to_standard_output(write: Callable[[IO[bytes]], object]) -> None:
             fault = output_error("standard output", error)
             fault.remedy = "the output is incomplete"
             raise fault from error
+
+
+def check_writable(file: str, *, force: bool) -> None:
+    """Raises the `OutputError` of writing the file, before a long computation of its content:
+    PTM-O001 it exists, PTM-O002 its folder is missing or read-only."""
+    if not force:
+        refuse_existing(file)
+    path = Path(file).absolute()
+    if path.exists() and not path.is_file():
+        raise OutputError("PTM-O002", "is not a file", file=file, remedy="name a file instead")
+    with writing(file):
+        os.stat(path.parent / ".")  # fails if the parent is a file
+        if not os.access(path.parent, os.W_OK | os.X_OK):
+            raise OSError(errno.EACCES, os.strerror(errno.EACCES))

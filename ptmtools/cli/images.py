@@ -1,4 +1,4 @@
-"""The commands for images and their `.ptm` files."""
+"""`ptm encode` and `ptm decode`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ptmtools.cli.batch import (
     many_files,
     standard_input,
 )
-from ptmtools.cli.parameters import Numbers, options_of, take
+from ptmtools.cli.parameters import Command, Numbers, option, options_of, take
 from ptmtools.errors import InputError, OutputError, naming
 from ptmtools.parallel import processors
 from ptmtools.quantities import count, size
@@ -28,20 +28,19 @@ from ptmtools.texture.model import Description, EncodeOptions
 from ptmtools.texture.profiles import PROFILES
 
 
-@click.command("encode")
+@click.command("encode", cls=Command)
 @click.argument("images", metavar="IMAGE...", nargs=-1, required=True, type=click.Path())
-@click.option(
+@option(
     "-o",
     "--output",
     type=click.Path(),
-    help="The .ptm file to write; - for stdout; for several images a folder, which is created if "
-    "it does not exist. A name that ends with / is a folder. By default each .ptm is written next "
-    "to its image.",
+    help="File to write; - for stdout. For several images, or with a final /, a folder. Default: "
+    "beside each image.",
 )
 @options_of(EncodeOptions)
-@click.option(
+@option(
     "--orient / --no-orient",
-    help="Rotate the texels upright by the image's EXIF orientation, instead of recording it.",
+    help="Rotate the texels by the EXIF orientation of the image, instead of recording it.",
 )
 @many_files
 def encode(
@@ -49,8 +48,8 @@ def encode(
 ) -> int:
     """Encode images as progressive textures (.ptm).
 
-    An IMAGE may be a file, a pattern such as 'scans/*.tif', a folder (all images in it), or - for
-    stdin. If an image cannot be read, that is reported and the others are encoded.
+    IMAGE is a file, a pattern such as 'scans/*.tif', a folder (all images in it), or - for stdin.
+    After an image that cannot be read, the command continues with the others.
     """
     from ptmtools.texture.container import HEAD_MAX, read_header
     from ptmtools.texture.encoder import check_options, encode_to, level_above
@@ -117,19 +116,17 @@ def encode(
 
     status, reports = batch.each(jobs, work, lines)
     if not batch.as_json and (hint := _hint_on_lossy(reports, options)):
-        batch.voice.say(hint)
+        batch.console.print(hint)
     return status
 
 
 def _note_on_sides(report: Report, max_side: int) -> str | None:
-    """What ``--max-side`` made of an image whose sides do not halve to it."""
+    """A note on the size of the finest level, if the sides do not halve to ``--max-side``."""
     width, height = report["finest"]
     if not max_side or max(width, height) == max_side:
         return None
     if max(width, height) > max_side:
-        return (
-            f"no level is within --max-side {max_side}; the coarsest, {width} x {height}, is kept"
-        )
+        return f"all levels exceed --max-side {max_side}; the coarsest, {width} x {height}, is kept"
     if not (above := report["left_out"]):
         return None
     return (
@@ -140,7 +137,7 @@ def _note_on_sides(report: Report, max_side: int) -> str | None:
 
 
 def _hint_on_lossy(reports: list[Report], options: EncodeOptions) -> str | None:
-    """What helps where lossless files have become larger than the lossy images they come from."""
+    """Advice for lossless files that are larger than their lossy sources."""
     grown = [
         report
         for report in reports
@@ -152,10 +149,9 @@ def _hint_on_lossy(reports: list[Report], options: EncodeOptions) -> str | None:
         return None
     kinds = " and ".join(sorted({report["lossy"] for report in grown}))
     return (
-        f"hint: {kinds} files are small because they discard detail; a lossless .ptm keeps every "
-        "texel of them, noise included. For pictures, --max-error 4 about halves the .ptm: no "
-        "sample is off by more than 4 (of 255), which is hard to see. Stay at 0 where texels are "
-        "data, such as normals, masks or heights."
+        f"hint: {kinds} files discard detail; a lossless .ptm keeps every decoded texel, noise "
+        "included. For pictures, --max-error 4 about halves the .ptm: errors of up to 4 (of 255) "
+        "are hard to see. Keep 0 where texels are data, such as normals, masks or heights."
     )
 
 
@@ -164,27 +160,25 @@ def _share(part: int, whole: int) -> str:
     return f"{part / whole:.1%} of" if part < 2 * whole else f"{part / whole:.1f} times"
 
 
-@click.command("decode")
+@click.command("decode", cls=Command)
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path())
-@click.option(
+@option(
     "--level",
     type=int,
-    help="Which level to decode; 0 is the coarsest. By default the finest that is complete in "
-    "the file.",
+    help="Level to decode; 0 is the coarsest. Default: the finest complete one.",
 )
-@click.option(
+@option(
     "--window",
     type=Numbers([4], int),
     metavar="X,Y,W,H",
-    help="Decode only this part of the level: W x H texels, starting at column X and row Y.",
+    help="Decode only W x H texels of the level, from column X and row Y on.",
 )
-@click.option(
+@option(
     "-o",
     "--output",
     type=click.Path(),
-    help="The image to write (.png, .npy, .tif, .hdr or .exr); - for stdout; for several files a "
-    "folder, which is created if it does not exist. A name that ends with / is a folder. By "
-    "default each image is written next to its file: a .png, or an .npy for floats.",
+    help="Image to write (.png, .npy, .tif, .hdr, .exr); - for stdout. For several files, or with "
+    "a final /, a folder. Default: a .png beside each file, or an .npy for floats.",
 )
 @many_files
 def decode(
@@ -196,16 +190,16 @@ def decode(
 ) -> int:
     """Decode .ptm files to images.
 
-    A FILE may be a .ptm, or the beginning of one that is still downloading; a pattern such as
-    'textures/*.ptm'; a folder (all .ptm files in it); or - for stdin. If a file cannot be
-    decoded, that is reported and the others are decoded.
+    FILE is a .ptm, or the beginning of one; a pattern such as 'textures/*.ptm'; a folder (all .ptm
+    files in it); or - for stdin. After a file that cannot be decoded, the command continues with
+    the others.
     """
     from ptmtools.texture.images import WRITTEN, write_to
     from ptmtools.texture.images.files import writer
     from ptmtools.texture.reader import open
 
     jobs = jobs_for(files, (".ptm",), output, "", tuple(WRITTEN))
-    # One name is an image's; what goes into a folder, or beside its file, gets a suffix.
+    # A single output has the suffix that the user gave; others get one.
     named = output is not None and any(job.target and not job.folder for job in jobs)
     if named:
         with naming(output):
@@ -227,7 +221,6 @@ def decode(
             }
             if report["skipped"]:
                 return report
-            # The sizes of files and of stdin are known, and so is what is whole.
             number = max(0, ptm.whole - 1) if level is None else level
             texels = ptm.window(number, *window) if window else ptm.level(number)
             description, warning = Description(), None
@@ -263,7 +256,7 @@ def decode(
 
 
 def _refuse_image_suffix(output: str) -> None:
-    """Raise OutputError PTM-O101 if what is written would pass for an image of another format."""
+    """Raises OutputError PTM-O101 if the name of a .ptm has the suffix of an image format."""
     from ptmtools.texture.images import SUFFIXES, WRITTEN
     from ptmtools.texture.images.files import LOSSY
 

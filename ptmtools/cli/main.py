@@ -1,8 +1,8 @@
-"""The `ptm` command: which commands there are, and what becomes of a failure.
+"""The command `ptm`: its table of commands, and the exit status of a failure.
 
-Each command lives in a module that is imported when it is called, so that ``ptm --version`` and
-``ptm --help`` need nothing but Click. Whatever goes wrong ends in one line on stderr,
-``ptm: … [CODE]``, and in the exit status that `ptmtools.errors` documents.
+The module of a command is imported when the command is called, so that ``ptm --version`` and
+``ptm --help`` need nothing but Click. A failure prints one line on stderr, ``ptm: … [CODE]``, and
+ends with an exit status of `ptmtools.errors`.
 """
 
 from __future__ import annotations
@@ -11,76 +11,109 @@ import importlib
 import sys
 import warnings
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from ptmtools.cli.failures import BROKEN_PIPE, report
-from ptmtools.cli.output import Voice, abandon_stdout
+from ptmtools.cli.console import BROKEN_PIPE, Console, abandon_stdout, report
 from ptmtools.progress import listen
 from ptmtools.version import __version__
 
 if TYPE_CHECKING:
     from ptmtools.pipeline.stage import Stage
 
-#: Command → (module, the command in it or a function that makes it, what `ptm --help` says);
-#: besides, each stage has one.
-COMMANDS = {
-    "build-scene": ("stages", "build_scene", "Build or update a database from a model."),
-    "status": ("status", "status", "Show which stages of a database are up to date."),
-    "validate": ("reports", "validate", "Check a database or a .ptm file."),
-    "info": ("information", "info", "Show what is in a model, a database or a .ptm file."),
-    "plot": ("reports", "plot", "Draw the floor plan of a database."),
-    "tradeoff": ("tradeoff", "tradeoff", "Measure what settings cost, and what they are worth."),
-    "path": ("path", "path", "Make a walk through every room of a database."),
-    "simulate": ("simulate", "simulate", "Walk through a database as clients would see it."),
-    "serve": ("serve", "serve", "Serve a database to browsers on this machine."),
-    "publish": ("publish", "publish", "Write a walk for browsers, a folder for any web server."),
-    "encode": ("images", "encode", "Encode images as .ptm files."),
-    "decode": ("images", "decode", "Decode .ptm files to images."),
-    "apo": ("apo", "apo", "Make a light mesh and an octree texture of a heavy mesh."),
-    "interlace": ("interlacing", "interlace", "Split an image into files that sharpen it."),
-    "deinterlace": ("interlacing", "deinterlace", "Join the files of an interlaced image."),
-    "campus": ("campus", "campus", "Write a model as objects with levels of detail."),
-    "walk-campus": ("walk_campus", "walk_campus", "Walk through a campus as clients would see it."),
-    "warm-up": ("warm_up", "warm_up", "Compile for this machine, before the first run."),
-    "compare": ("comparing", "compare", "Compare .ptm with other image formats: size and speed."),
+
+@dataclass(frozen=True)
+class Entry:
+    """A command: its line in ``ptm --help``, and ``module:function``, which is the `click.Command`
+    or makes it."""
+
+    about: str
+    place: str
+    hidden: bool = False
+
+    def load(self) -> click.Command:
+        """The command; imports its module."""
+        module, _, name = self.place.partition(":")
+        command = getattr(importlib.import_module(f"ptmtools.cli.{module}"), name)
+        return command if isinstance(command, click.Command) else command()
+
+
+#: Heading → name → command. Besides, each stage has a command.
+GROUPS: dict[str, dict[str, Entry]] = {
+    "Build and check": {
+        "build-scene": Entry("Build or update a database from a model.", "build:build_scene"),
+        "info": Entry("Describe a model, a database or a .ptm file.", "info:info"),
+        "validate": Entry("Check a database or a .ptm file.", "check:validate"),
+        "status": Entry("Show which stages of a database are up to date.", "build:status"),
+        "plot": Entry("Draw the floor plan of a database.", "check:plot"),
+        "render": Entry("Draw a view of a database or an octree texture.", "render:render"),
+        "warm-up": Entry("Compile before the first run.", "build:warm_up", hidden=True),
+    },
+    "Publish": {
+        "serve": Entry("Serve a database to browsers on this machine.", "publish:serve"),
+        "publish": Entry("Write a database as a web site.", "publish:publish"),
+    },
+    "Images": {
+        "encode": Entry("Encode images as .ptm files.", "images:encode"),
+        "decode": Entry("Decode .ptm files to images.", "images:decode"),
+        "compare": Entry("Compare .ptm with other image formats.", "image_formats:compare"),
+        "interlace": Entry("Split an image into files that sharpen it.", "image_formats:interlace"),
+        "deinterlace": Entry("Join the files of an interlaced image.", "image_formats:deinterlace"),
+    },
+    "Other representations": {
+        "apo": Entry(
+            "Convert a mesh to a light mesh and an octree texture.", "representations:apo"
+        ),
+        "campus": Entry(
+            "Convert a model to objects with levels of detail.", "representations:campus"
+        ),
+    },
+    "Laboratory": {
+        "path": Entry("Make a walk through every room of a database.", "lab:path_command"),
+        "simulate": Entry("Simulate clients that walk through a database.", "lab:simulate"),
+        "walk-campus": Entry("Simulate a walk through a campus.", "lab:walk_campus"),
+        "tradeoff": Entry("Measure cost and benefit of settings.", "tradeoff:tradeoff"),
+    },
 }
+COMMANDS = {name: entry for group in GROUPS.values() for name, entry in group.items()}
 
 
 class Commands(click.Group):
-    """A group whose commands are imported when they are needed."""
+    """A group whose commands are imported when they are called."""
 
     def invoke(self, ctx: click.Context) -> object:
         try:
             return super().invoke(ctx)
-        except BrokenPipeError:  # Click itself would make an internal error of it
+        except BrokenPipeError:  # Click would make it an internal error
             ctx.exit(BROKEN_PIPE)
-        except KeyboardInterrupt as fault:  # Click itself would print an empty line first
+        except KeyboardInterrupt as fault:  # Click would print an empty line first
             raise click.Abort from fault
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return [*COMMANDS, *_stages()]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name in COMMANDS:
-            module, function, _ = COMMANDS[cmd_name]
-            found = getattr(importlib.import_module(f"ptmtools.cli.{module}"), function)
-            command = found if isinstance(found, click.Command) else found()
-            assert isinstance(command, click.Command)
-            return command
+        if entry := COMMANDS.get(cmd_name):
+            return entry.load()
         stage = _stages().get(cmd_name)
         if stage is None:
             return None
-        from ptmtools.cli.stages import stage_command
+        from ptmtools.cli.build import stage_command
 
         return stage_command(stage)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, COMMANDS[name][2]) for name in COMMANDS])
-        with formatter.section("Single stages of build-scene"):
-            formatter.write_dl([(name, stage.about) for name, stage in _stages().items()])
+        tables = {
+            heading: [(name, entry.about) for name, entry in group.items() if not entry.hidden]
+            for heading, group in GROUPS.items()
+        }
+        tables["Single stages of build-scene"] = [(n, s.about) for n, s in _stages().items()]
+        width = max(len(name) for rows in tables.values() for name, _ in rows)
+        for heading, rows in tables.items():
+            with formatter.section(heading):
+                formatter.write_dl([(name.ljust(width), about) for name, about in rows])
 
 
 def _stages() -> dict[str, Stage[Any]]:
@@ -102,22 +135,22 @@ def _stages() -> dict[str, Stage[Any]]:
 @click.pass_context
 def ptm(ctx: click.Context, quiet: bool, verbose: bool) -> None:
     """Turn an architectural model into a database that clients can stream."""
-    voice = ctx.ensure_object(Voice)
-    voice.quiet, voice.verbose = quiet, verbose
+    console = ctx.ensure_object(Console)
+    console.quiet, console.verbose = quiet, verbose
     if not quiet and sys.stderr.isatty():
-        listen(voice.warn)
+        listen(console.warn)
 
 
 def main(arguments: Sequence[str]) -> int:
     """Runs one command; returns its exit status. Never raises."""
-    voice = Voice()
-    warnings.filterwarnings("ignore", module=r"PIL\.")  # what is serious becomes an error of ours
+    console = Console()
+    warnings.filterwarnings("ignore", module=r"PIL\.")  # serious ones become errors of ptmtools
     try:
-        status = ptm.main(list(arguments), "ptm", standalone_mode=False, obj=voice)
+        status = ptm.main(list(arguments), "ptm", standalone_mode=False, obj=console)
         sys.stdout.flush()
         return status if isinstance(status, int) else 0
     except BaseException as fault:
-        status = report(fault, voice.verbose)
+        status = report(fault, console.verbose)
         try:
             sys.stdout.flush()
         except OSError:

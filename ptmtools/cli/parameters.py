@@ -1,56 +1,132 @@
-"""Command-line options made from the fields of an options dataclass; `ptmtools.pipeline.stage` is
-the way back.
+"""Options of commands: those generated from options classes, and those that commands share.
 
-The dataclass stays the one home of names, defaults and their explanation: a field `wall_area:
-float = 2.0` with the line ``wall_area: the least area …`` under "Attributes" of the docstring
-becomes ``--wall-area FLOAT`` with that default and that help, with a capital
-letter. The metadata of a field may say more:
-
-* ``option``: its name on the command line, where that is not the field's own;
-* ``was``: former names, which work for one release, with a note;
-* ``deprecated``: why it does nothing any more; it is hidden, and giving it draws a note;
-* ``note``: a function of what was given that returns what there is to say of it, or None;
-* ``choices``: a table of what may be given, by name, each with an ``about``; with ``several``,
-  several names may be given, separated by commas;
-* ``numbers``: how many numbers one value consists of, where that varies, such as (3, 4);
-* ``parse``, ``print``: from what the command line gives to the field's value, and back.
-
-Fields of several classes that have the same option share it.
+A field that `ptmtools.options.option` declares becomes an option of the command line. `Command`
+prints the options under headings; a command with advanced options, which are those that are not
+``basic``, prints them for ``--help-all``.
 """
 
 from __future__ import annotations
 
-import inspect
+import math
+import os
 import re
 import typing
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import Field, fields
-from functools import wraps
+from functools import partial, wraps
+from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
 import click
 from click.core import ParameterSource
 
-from ptmtools.pipeline.stage import default_of, option_name
+from ptmtools.cli.console import Console
+from ptmtools.options import Option as Declared, default_of, degrees_text, option_name, option_of
 
 T = TypeVar("T")
-Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+Function = Callable[..., Any]
+Decorator = Callable[[Function], Function]
+
+#: The heading of options that belong to no options class; it comes last.
+GENERAL = "General"
+_ALL = "ptmtools.cli.help_all"
+_ADDRESS = re.compile(r"\w+://.+:\d+")
+_METAVARS = {"integer": "N", "integer range": "N", "float": "X", "float range": "X"}
+
+
+class Option(click.Option):
+    """An option with a heading."""
+
+    def __init__(
+        self,
+        *arguments: Any,
+        heading: str = GENERAL,
+        basic: bool = True,
+        shown_default: str | None = None,
+        **settings: Any,
+    ) -> None:
+        super().__init__(*arguments, **settings)
+        self.heading, self.basic = heading, basic
+        self._shown_default = shown_default
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        """(names and placeholder, help and default)."""
+        if self.hidden:
+            return None
+        names = ", ".join(self.opts)
+        if self.default is True and self.secondary_opts:
+            names += f" / {self.secondary_opts[0]}"
+        takes_value = not self.is_flag
+        default = self._shown_default
+        if default is None and takes_value and not callable(self.default):
+            default = _shown(self.default)
+        text = (self.help or "") + (f"  [default: {default}]" if default else "")
+        return f"{names} {self._placeholder()}" if takes_value else names, text
+
+    def _placeholder(self) -> str:
+        if isinstance(self.type, click.Choice):
+            return f"[{'|'.join(map(str, self.type.choices))}]"
+        return self.metavar or _METAVARS.get(self.type.name, self.type.name.upper())
+
+
+#: ``click.option`` for an `Option`.
+option = partial(click.option, cls=Option)
+
+
+class Command(click.Command):
+    """A command whose options are listed under headings."""
+
+    def __init__(self, *arguments: Any, **settings: Any) -> None:
+        super().__init__(*arguments, **settings)
+        if any(not getattr(each, "basic", True) for each in self.params):
+            every = Option(
+                ["--help-all"],
+                is_flag=True,
+                is_eager=True,
+                expose_value=False,
+                callback=_print_all_help,
+                help="Show all options and exit.",
+            )
+            self.params.append(every)
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Writes the options under their headings."""
+        sections: dict[str, list[tuple[str, str]]] = {}
+        omitted = 0
+        for each in self.get_params(ctx):
+            record = each.get_help_record(ctx) if isinstance(each, click.Option) else None
+            if record is None:
+                continue
+            if ctx.meta.get(_ALL) or getattr(each, "basic", True):
+                sections.setdefault(getattr(each, "heading", GENERAL), []).append(record)
+            else:
+                omitted += 1
+        sections[GENERAL] = sections.pop(GENERAL, [])
+        width = min(30, max(len(names) for rows in sections.values() for names, _ in rows))
+        for heading, rows in sections.items():
+            with formatter.section(heading):
+                formatter.write_dl([(names.ljust(width), text) for names, text in rows])
+        if omitted:
+            formatter.write_paragraph()
+            formatter.write_text(f"--help-all shows {omitted} more options.")
+
+
+def _print_all_help(context: click.Context, parameter: click.Parameter, asked: bool) -> None:
+    if asked:
+        context.meta[_ALL] = True
+        click.echo(context.get_help())
+        context.exit()
 
 
 class Numbers(click.ParamType):  # type: ignore[type-arg]  # generic only in newer Clicks
-    """``X,Y,Z``: so many numbers, separated by commas; ``kind`` is float or int."""
+    """Numbers separated by commas, as many as one of the counts; ``kind`` is float or int."""
 
     name = "numbers"
 
     def __init__(self, counts: Sequence[int], kind: type[float] = float) -> None:
         self.counts = tuple(counts)
         self.kind = kind
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
-        if self.counts == (3, 4):
-            return "X,Y,Z[,YAW]"
-        return "X,Y,Z" if self.counts == (3,) else ",".join("N" * self.counts[0])
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
@@ -69,16 +145,13 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]  # generic only in new
 
 
 class Named(click.ParamType):  # type: ignore[type-arg]  # generic only in newer Clicks
-    """A name in a table of declarations, or ``several`` with commas in between."""
+    """A name in a table of declarations, or with ``several`` some names separated by commas."""
 
     name = "name"
 
     def __init__(self, table: Mapping[str, Any], *, several: bool = False) -> None:
         self.table = table
         self.several = several
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
-        return "NAME[,NAME]" if self.several else f"[{'|'.join(self.table)}]"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         for name in str(value).split(",") if self.several else [value]:
@@ -88,48 +161,61 @@ class Named(click.ParamType):  # type: ignore[type-arg]  # generic only in newer
 
     @property
     def explained(self) -> str:
-        """What each name stands for."""
+        """The names, each with its description."""
         return ", ".join(f"{name} ({declared.about})" for name, declared in self.table.items())
 
 
-def descriptions(cls: type) -> dict[str, str]:
-    """What the docstring of a dataclass, and of its bases, says of its fields: name → text."""
-    if cls is object:
-        return {}
-    found = {name: text for base in cls.__bases__ for name, text in descriptions(base).items()}
-    doc = inspect.cleandoc(cls.__doc__ or "")
-    _, _, body = doc.partition("Attributes\n----------\n")
-    names: list[str] = []
-    for line in re.split(r"\n\w+\n-+\n", body)[0].splitlines():
-        if head := re.match(r"(\w+(?:, \w+)*): (.*)", line):
-            names = head[1].split(", ")
-            found.update(dict.fromkeys(names, head[2]))
-        elif line.startswith(" ") and names:
-            for name in names:
-                found[name] += " " + line.strip()
-        else:
-            names = []
-    return {name: re.sub(r"``?([^`]*)``?", r"\1", text) for name, text in found.items()}
+class Degrees(click.ParamType):  # type: ignore[type-arg]  # generic only in newer Clicks
+    """An angle in degrees, converted to radians; a default is in radians.
+
+    Fields of view were in radians once. Numbers below pi, too small for degrees, are still read as
+    such, with a note.
+    """
+
+    name = "degrees"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        if isinstance(value, float):
+            return value
+        try:
+            angle = float(value)
+        except ValueError:
+            self.fail(f"{value!r} is not a number of degrees", param, ctx)
+        if not 0 < angle < math.pi:
+            return math.radians(angle)
+        name = param.opts[0] if param else "the angle"
+        click.echo(
+            f"ptm: note: {name} is in degrees now; {value} is read as radians, which are "
+            f"{degrees_text(angle)} degrees",
+            err=True,
+        )
+        return angle
 
 
-def options_of(*classes: type) -> Decorator:
-    """A decorator that adds the options of all fields of ``classes``."""
-    found: dict[str, Decorator] = {}
+def options_of(*classes: type, layered: bool = False, hidden: bool = False) -> Decorator:
+    """A decorator that adds the options of all fields of ``classes``, under the ``heading`` of each
+    class; with ``layered``, ``--help`` lists the basic ones only, with ``hidden``, none. Fields of
+    several classes that have the same option share it."""
+    options: dict[str, Decorator] = {}
     former: dict[str, str] = {}
     deprecated: dict[str, tuple[Any, str]] = {}
     for cls in classes:
-        hints, texts = typing.get_type_hints(cls), descriptions(cls)
+        hints, heading = typing.get_type_hints(cls), getattr(cls, "heading", "Options")
         for field in fields(cls):
-            name = option_name(field)
-            if name not in found:
-                found[name] = _option(field, hints[field.name], texts.get(field.name))
-                if reason := field.metadata.get("deprecated"):
-                    deprecated[name] = default_of(field), reason
-                for old in field.metadata.get("was", ()):
-                    found[old] = _option(field, hints[field.name], None, former=old)
-                    former[old] = name
+            name, about = option_name(field), option_of(field)
+            if name in options:
+                continue
+            settings = {"heading": heading, "basic": about.basic or not layered, "hidden": hidden}
+            options[name] = _option(field, hints[field.name], **settings)
+            if about.deprecated:
+                deprecated[name] = default_of(field), about.deprecated
+            for old in about.was:
+                options[old] = _option(field, hints[field.name], former=old)
+                former[old] = name
 
-    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
+    def decorate(function: Function) -> Function:
         @wraps(function)
         def renamed(*arguments: Any, **values: Any) -> Any:
             for old, new in former.items():
@@ -143,72 +229,175 @@ def options_of(*classes: type) -> Decorator:
             for name, (default, reason) in deprecated.items():
                 if values[_variable(name)] != default:
                     word = f"no-{name}" if default is True else name
-                    click.echo(f"ptm: note: --{word} does nothing any more: {reason}", err=True)
+                    click.echo(f"ptm: note: --{word} has no effect any more: {reason}", err=True)
             return function(*arguments, **values)
 
-        command: Callable[..., Any] = renamed
-        for option in reversed(found.values()):
-            command = option(command)
+        command: Function = renamed
+        for each in reversed(options.values()):
+            command = each(command)
         return command
 
     return decorate
 
 
-def take(cls: type[T], values: dict[str, Any]) -> T:
+def take(cls: type[T], values: Mapping[str, Any]) -> T:
     """An instance of ``cls`` from the parsed values; a field whose option the command does not have
     keeps its default."""
-    found = {}
+    given = {}
     for field in fields(cls):  # type: ignore[arg-type]
         name = _variable(option_name(field))
         if name in values:
-            parse = field.metadata.get("parse", lambda value: value)
-            found[field.name] = parse(values[name])
-    return cls(**found)
+            parse = option_of(field).parse or (lambda value: value)
+            given[field.name] = parse(values[name])
+    return cls(**given)
 
 
 def _variable(option: str) -> str:
-    """The name under which a command is handed an option."""
+    """The keyword argument of a command for an option."""
     return option.replace("-", "_")
 
 
-def _option(field: Field[Any], hint: Any, text: str | None, former: str = "") -> Decorator:
+def _option(field: Field[Any], hint: Any, *, former: str = "", **settings: Any) -> Decorator:
     """The option of a field; with ``former`` the hidden one of that name, without a default."""
     default = None if former else default_of(field)
-    name = former or option_name(field)
-    settings: dict[str, Any] = {
+    about, name = option_of(field), former or option_name(field)
+    settings |= {
         "default": default,
-        "help": text and text[:1].upper() + text[1:],
-        "hidden": bool(former or field.metadata.get("deprecated")),
+        "help": f"Now --{option_name(field)}." if former else about.help,
+        "metavar": about.metavar or None,
     }
-    if former:
-        settings["help"] = f"Now --{option_name(field)}."
+    if former or about.deprecated:
+        settings["hidden"] = True
     if get_origin(hint) in (Union, UnionType):  # X | None
         hint = next(part for part in get_args(hint) if part is not NoneType)
-    if default not in (None, (), ""):
-        settings["show_default"] = True
-    flag = f"--{name}"
     if hint is bool:
-        # A switch that is on by default is named by what turns it off.
-        flag = f"{flag}/--no-{name}"
-    elif (table := field.metadata.get("choices")) is not None:
-        settings["type"] = named = Named(table, several=field.metadata.get("several", False))
-        settings["help"] = settings["help"] and f"{settings['help']}: {named.explained}."
-    elif get_origin(hint) is Literal:
-        settings["type"] = click.Choice([str(choice) for choice in get_args(hint)])
-    elif counts := field.metadata.get("numbers"):
-        settings["type"], settings["multiple"] = Numbers(counts), True
-    elif get_origin(hint) is tuple:
-        settings["type"], settings["multiple"] = _element(hint)
-    else:
-        settings["type"] = hint
-    return click.option(flag, _variable(name), **settings)
+        return option(f"--{name}/--no-{name}", _variable(name), **settings)
+    settings |= _typed(about, hint)
+    if about.degrees and default is not None:
+        settings["shown_default"] = f"{math.degrees(default):.4g}"
+    return option(f"--{name}", _variable(name), **settings)
 
 
-def _element(hint: Any) -> tuple[Any, bool]:
-    """(type of one value, whether it may be given several times) of a tuple's annotation."""
+def _typed(about: Declared, hint: Any) -> dict[str, Any]:
+    """The settings of an option that follow from its declaration and the type of the field."""
+    if about.choices is not None:
+        named = Named(about.choices, several=about.several)
+        metavar = "NAME[,NAME]" if about.several else f"[{'|'.join(about.choices)}]"
+        return {"type": named, "help": f"{about.help}: {named.explained}.", "metavar": metavar}
+    if about.degrees:
+        return {"type": Degrees()}
+    if about.numbers:
+        return {"type": Numbers(about.numbers), "multiple": get_args(hint)[0] is not float}
+    if get_origin(hint) is Literal:
+        return {"type": click.Choice([str(choice) for choice in get_args(hint)])}
+    if get_origin(hint) is not tuple:
+        return {"type": hint}
     parts = get_args(hint)
     if parts[-1] is not Ellipsis:
-        return Numbers([len(parts)]), False
+        return {"type": Numbers([len(parts)])}
     if get_origin(parts[0]) is tuple:
-        return Numbers([len(get_args(parts[0]))]), True
-    return parts[0], True
+        return {"type": Numbers([len(get_args(parts[0]))]), "multiple": True}
+    return {"type": parts[0], "multiple": True}
+
+
+def _shown(value: Any) -> str:
+    """A default as the user would give it; "" for none."""
+    if value is None or value == () or type(value).__name__ == "Sentinel":
+        return ""
+    if isinstance(value, (tuple, list)):
+        return ",".join(map(_shown, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def with_console(function: Function) -> Function:
+    """Adds ``-q`` and ``-v``, and passes the `Console` as the first argument."""
+
+    @option("-q", "--quiet", is_flag=True, help="Print errors only.")
+    @option("-v", "--verbose", is_flag=True, help="Print more, and tracebacks of errors.")
+    @click.pass_obj
+    @wraps(function)
+    def command(console: Console, /, quiet: bool, verbose: bool, **values: Any) -> Any:
+        console.quiet |= quiet
+        console.verbose |= verbose
+        return function(console, **values)
+
+    return command
+
+
+#: ``--json``, as ``as_json``.
+json_option = option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
+
+database_argument = click.argument("db", type=click.Path())
+
+
+def force_option(text: str = "Replace existing files.") -> Decorator:
+    """``--force``."""
+    return option("--force", is_flag=True, help=text)
+
+
+#: ``-j``, as ``workers``; 0 is one for each processor.
+jobs_option = option(
+    "-j",
+    "--jobs",
+    "workers",
+    type=click.IntRange(0, 1024),
+    default=0,
+    help="Number of workers; 0 for one per processor. It does not change the result.",
+)
+
+
+def cluster_options(function: Function) -> Function:
+    """Adds ``-j`` and ``--scheduler``, the arguments of `open_executor`."""
+    return option(
+        "--scheduler",
+        metavar="ADDRESS",
+        callback=_address,
+        help="Run the tasks on the cluster of this Dask scheduler, such as tcp://10.0.0.1:8786; -j "
+        "then limits the tasks that run at a time.",
+    )(jobs_option(function))
+
+
+def _address(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
+    if value is not None and not _ADDRESS.fullmatch(value):
+        raise click.BadParameter(f"{value!r} is not an address such as tcp://10.0.0.1:8786")
+    return value
+
+
+def limit_option(function: Function) -> Function:
+    """Adds ``--limit``, as the `Limits` ``limits``."""
+
+    @option(
+        "--limit",
+        type=click.IntRange(1, 1 << 20),
+        default=1024,
+        metavar="MIB",
+        help="Largest decoded size of an image.",
+    )
+    @wraps(function)
+    def command(*arguments: Any, limit: int, **values: Any) -> Any:
+        from ptmtools.texture.model import Limits
+
+        return function(*arguments, limits=Limits(decoded_bytes=limit << 20), **values)
+
+    return command
+
+
+def new_database_option(function: Function) -> Function:
+    """Adds ``-o DB`` to a command with a model; by default the database lies beside the model."""
+
+    @option(
+        "-o",
+        "--output",
+        "db",
+        type=click.Path(),
+        metavar="DB",
+        help="Database to write, a folder. Default: museum.db beside museum.obj.",
+    )
+    @wraps(function)
+    def command(*arguments: Any, model: str, db: str | None, **values: Any) -> Any:
+        if not model or db == "":
+            raise click.UsageError("a name is empty")
+        place = os.fspath(Path(model).with_suffix(".db")) if db is None else db
+        return function(*arguments, model=model, db=place, **values)
+
+    return command

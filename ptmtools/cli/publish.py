@@ -1,60 +1,144 @@
-"""`ptm publish`: a database as a folder for any static host."""
+"""`ptm serve` and `ptm publish`: a database in a browser."""
 
 from __future__ import annotations
 
+import re
+import sys
+import threading
+import webbrowser
 from dataclasses import asdict
+from ipaddress import ip_address
 from typing import Any
 
 import click
 
-from ptmtools.cli.common import as_json, database, voiced
-from ptmtools.cli.output import Voice
-from ptmtools.cli.parameters import options_of, take
+from ptmtools.cli.console import Console
+from ptmtools.cli.parameters import (
+    Command,
+    database_argument,
+    force_option,
+    json_option,
+    option,
+    options_of,
+    take,
+    with_console,
+)
 from ptmtools.quantities import count, size
+from ptmtools.server.opening import files_of
+from ptmtools.server.options import ServeOptions
+from ptmtools.server.running import require, serving
 from ptmtools.site.content import SiteOptions, site_of
 from ptmtools.site.publishing import COARSE, PublishOptions, publish as write, weight_of
 
+_ORIGIN = re.compile(r"\*|https?://[^\s/?#@]+")
 
-@click.command("publish")
-@database
-@click.option(
-    "-o", "--output", "folder", type=click.Path(), required=True, help="The site, a folder."
+
+def _origin(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
+    if value is not None and not _ORIGIN.fullmatch(value):
+        raise click.BadParameter(
+            f"{value!r} is not an origin such as https://example.org; put DB before --cors"
+        )
+    return value
+
+
+@click.command("serve", cls=Command)
+@database_argument
+@options_of(ServeOptions)
+@option("--open", "opened", is_flag=True, help="Open the page in the default browser.")
+@option(
+    "--cors",
+    "origin",
+    is_flag=False,
+    flag_value="*",
+    metavar="[ORIGIN]",
+    callback=_origin,
+    help="Let pages of this origin, such as https://example.org, read the files; without ORIGIN, "
+    "pages of any origin.",
 )
+@with_console
+def serve(console: Console, db: str, opened: bool, origin: str | None, **values: Any) -> None:
+    """Serve DB to browsers on this machine until Ctrl-C, and print the URL of its page.
+
+    DB is a database, or a folder that `ptm publish` wrote. --bandwidth and --latency simulate a
+    slow connection.
+    """
+    options = take(ServeOptions, values)
+    require()
+    files = files_of(db)
+    try:
+        with serving(
+            files,
+            host=options.host,
+            port=options.port,
+            throttle=options.throttle,
+            origin=origin,
+        ) as url:
+            console.print(url)
+            if not console.quiet and sys.stderr.isatty():
+                click.echo("Press Ctrl-C to stop", err=True)
+            if not _is_local(options.host):
+                console.warn(
+                    f"warning: listening on {options.host}: every machine that can reach this "
+                    "address can read the files"
+                )
+            if opened and not _open_in_browser(url):
+                console.warn("note: no browser could be started; open the URL yourself")
+            threading.Event().wait()
+    except KeyboardInterrupt:
+        pass  # the usual end
+
+
+def _is_local(host: str) -> bool:
+    """Whether only this machine can reach the address."""
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _open_in_browser(url: str) -> bool:
+    """Whether a browser has opened the URL."""
+    try:
+        return webbrowser.open(url)
+    except (OSError, webbrowser.Error):
+        return False
+
+
+@click.command("publish", cls=Command)
+@database_argument
+@option("-o", "--output", "folder", type=click.Path(), required=True, help="Site to write.")
 @options_of(SiteOptions, PublishOptions)
-@click.option(
-    "--force",
-    is_flag=True,
-    help="Write into a folder that is not a site, and replace files of the same names in it.",
-)
-@as_json
-@voiced
-def publish(voice: Voice, db: str, folder: str, force: bool, as_json: bool, **values: Any) -> None:
-    """Write what a browser needs to walk through DB to a folder that any web server can serve.
+@force_option("Write into a folder that is not a site, and replace files of the same names in it.")
+@json_option
+@with_console
+def publish(
+    console: Console, db: str, folder: str, force: bool, as_json: bool, **values: Any
+) -> None:
+    """Write DB as a web site for browsers, a folder that any web server can serve.
 
-    Publishing again changes only what has changed.
+    A second run rewrites only the files that have changed.
     """
     site_options, options = take(SiteOptions, values), take(PublishOptions, values)
-    with voice.progress() as progress:
+    with console.progress() as progress:
         site = site_of(db, site_options, progress)
         done = write(site, folder, options, force=force, progress=progress)
     weight = weight_of(site)
     if as_json:
         changed = {name: list(names) for name, names in asdict(done).items()}
-        voice.emit_json({**changed, "notes": list(site.notes), "bytes": asdict(weight)})
+        console.json({**changed, "notes": list(site.notes), "bytes": asdict(weight)})
         return
     for note in site.notes:
-        voice.warn(note)
+        console.warn(note)
     removed = f", {count(len(done.removed), 'file')} removed" if done.removed else ""
-    voice.say(
+    console.print(
         f"{folder}: {count(len(done.written), 'file')} written, "
         f"{len(done.unchanged):,} unchanged{removed}"
     )
-    voice.say(f"a visitor downloads {size(weight.page)} for the page itself,")
-    voice.say(
-        f"{size(weight.first_room)} in total until the first room is shown (textures of up to "
-        f"{COARSE} texels a side),"
+    console.print(
+        f"download: page {size(weight.page)}; with the first room {size(weight.first_room)} "
+        f"(textures up to {COARSE} texels a side)"
     )
-    voice.say(
-        f"then {size(weight.mean_room)} for another room on average, at most "
-        f"{size(weight.worst_room)} (cell {weight.worst_cell}), and {size(weight.whole)} in all"
+    console.print(
+        f"each further room {size(weight.mean_room)} on average, at most "
+        f"{size(weight.worst_room)} (cell {weight.worst_cell}); everything {size(weight.whole)}"
     )

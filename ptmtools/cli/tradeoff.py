@@ -1,4 +1,4 @@
-"""The command that measures what the settings of the stages cost, and how accurate they are."""
+"""`ptm tradeoff`: the cost of settings, and their effect on accuracy and on a walk."""
 
 from __future__ import annotations
 
@@ -8,9 +8,18 @@ from typing import Any
 
 import click
 
-from ptmtools.cli.common import as_json, database, forced, voiced, writable
-from ptmtools.cli.output import Voice
-from ptmtools.cli.parameters import options_of, take
+from ptmtools.cli.batch import check_writable
+from ptmtools.cli.console import Console
+from ptmtools.cli.parameters import (
+    Command,
+    database_argument,
+    force_option,
+    json_option,
+    option,
+    options_of,
+    take,
+    with_console,
+)
 from ptmtools.coverage.options import MAX_SAMPLES
 from ptmtools.files import write_bytes
 from ptmtools.lab.path.making import path_through
@@ -24,73 +33,76 @@ from ptmtools.lab.walk import Walk, read_walk
 from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.command import open_database
 
-#: Sample points of the reference: at least so many that settings with fewer remain.
+#: Fewest sample points of the reference, so that settings with fewer remain.
 LEAST_POINTS = 64
-#: What is tried on a walk, beside the experiments of the stages.
+#: The experiment on a walk, beside those of the stages.
 WALK = "walk"
-#: How long the walk is that is made where none is given, s; in a hurry.
+#: Duration of the default walk, and with ``--quick``, s.
 DURATION, QUICK = 60.0, 30.0
 
 
-@click.command("tradeoff")
-@database
-@click.option(
+@click.command("tradeoff", cls=Command)
+@database_argument
+@option(
     "--stage",
     "stages",
     type=click.Choice([WALK, *EXPERIMENTS]),
     multiple=True,
-    help="Try only this: all that changes what somebody sees who walks through the building "
-    f"({WALK}), or a stage by itself. May be given several times. By default all are tried.",
+    help=f"Run only this experiment: the effect of settings on a walk ({WALK}), or the accuracy of "
+    "one stage. Repeatable. Default: all.",
 )
-@click.option(
+@option(
     "--walk",
     "walk_file",
     type=click.Path(),
     metavar="FILE",
-    help="The walk, as `ptm path` writes it. By default one of "
-    f"{DURATION:.0f} s is made, with --quick of {QUICK:.0f} s.",
+    help=f"Walk that `ptm path` wrote. Default: a new one of {DURATION:.0f} s, with --quick of "
+    f"{QUICK:.0f} s.",
 )
 @options_of(WalkOptions)
-@click.option(
+@option(
     "--knob",
     "knobs",
     type=click.Choice([knob.option.removeprefix("--") for knob in KNOBS]),
     multiple=True,
-    help="Try only this option on the walk, with values that take long too. May be given several "
-    "times. By default all are tried.",
+    help="Try only this option on the walk, also with its slow values. Repeatable. Default: all.",
 )
-@click.option("--quick", is_flag=True, help="Try one value of each option, on a shorter walk.")
-@click.option(
+@option("--quick", is_flag=True, help="Try one value of each option, on a shorter walk.")
+@option(
     "--error",
     "wanted",
     type=click.FloatRange(0, min_open=True),
-    help="Also name the cheapest setting of each stage whose error is at most this.",
+    help="Also name the cheapest setting of each stage within this error.",
 )
-@click.option(
+@option(
     "--cells-tried",
     type=click.IntRange(1),
     default=16,
-    show_default=True,
-    help="Try coverage hints in this many cells, as a sample of all.",
+    help="Cells in which coverage hints are tested, a sample of all.",
 )
-@click.option(
+@option(
     "--reference",
     type=click.IntRange(LEAST_POINTS, MAX_SAMPLES),
     default=MAX_SAMPLES,
-    show_default=True,
     metavar="POINTS",
-    help="Compare coverage hints with those of this many other sample points in each cell; only "
-    "settings with fewer points are tried.",
+    help="Sample points per cell of the reference for coverage hints. Only settings with fewer "
+    "points are tried.",
 )
-@click.option("--csv", "csv_file", type=click.Path(), help="Also write every trial as CSV.")
-@click.option(
-    "--plot", "plot_file", type=click.Path(), help="Also plot error against cost, as a PNG."
+@option(
+    "--csv", "csv_file", type=click.Path(), metavar="FILE", help="Also write all trials as CSV."
 )
-@forced
-@as_json
-@voiced
+@option(
+    "--plot",
+    "plot_file",
+    type=click.Path(),
+    metavar="FILE",
+    help="Also plot error against cost, as a PNG.",
+)
+@force_option()
+@json_option
+@with_console
 def tradeoff(
-    voice: Voice,
+    console: Console,
     db: str,
     stages: tuple[str, ...],
     walk_file: str | None,
@@ -105,35 +117,34 @@ def tradeoff(
     as_json: bool,
     **values: Any,
 ) -> None:
-    """Measure what settings of each stage cost, and what they are worth, on the scene of DB.
+    """Measure the cost and the benefit of settings on the scene of DB, which is not changed.
 
-    First what somebody sees who walks through the building: in sentences, and as a table. Then, of
-    each stage, how accurate its result is; a star marks a setting if no cheaper one is more
-    accurate. DB is not changed.
+    The first part is the effect on a walk through the building, in sentences and as a table. The
+    second part is the accuracy of each stage; a star marks settings that no cheaper one surpasses.
     """
     options = take(WalkOptions, values)
     stages = stages or (WALK, *EXPERIMENTS)
     if WALK not in stages and (walk_file or knobs):
         given = "--walk" if walk_file else "--knob"
-        raise click.UsageError(f"{given} is for --stage {WALK}, which is not asked for")
+        raise click.UsageError(f"{given} needs --stage {WALK}")
     walk = read_walk(walk_file) if walk_file else None
     for file in (csv_file, plot_file):
         if file:
-            writable(file, force)
+            check_writable(file, force=force)
     if plot_file:
         require()
     artifacts = Artifacts(open_database(db))
     subject = Subject(artifacts, cells_tried, reference)
     walked: list[WalkTrade] = []
     trades = []
-    with voice.progress() as progress:
+    with console.progress() as progress:
         for stage in stages:
             progress(0, 1, f"preparing {stage}")
             if stage == WALK:
                 walked.append(
                     try_settings(
-                        Path(db), artifacts, walk or _made(artifacts, quick), options, knobs,
-                        quick=quick, progress=progress, tell=voice.warn,
+                        Path(db), artifacts, walk or _new_walk(artifacts, quick), options, knobs,
+                        quick=quick, progress=progress, tell=console.warn,
                     )
                 )  # fmt: skip
             else:
@@ -145,30 +156,30 @@ def tradeoff(
     if plot_file:
         write_bytes(plot_file, picture(every), force=force)
     if as_json:
-        found = [_walk_document(walk) for walk in walked]
-        voice.emit_json([*found, *(_document(trade, wanted) for trade in trades)])
+        first = [_walk_document(walk) for walk in walked]
+        console.json([*first, *(_document(trade, wanted) for trade in trades)])
         return
     blocks = [sentences.settings_table(walk, wanted) for walk in walked]
     for lines in [*blocks, *(table(trade, wanted) for trade in trades)]:
         for line in lines:
-            voice.say(line)
-        voice.say("")
+            console.print(line)
+        console.print("")
 
 
-def _made(artifacts: Artifacts, quick: bool) -> Walk:
-    """A walk through a database."""
+def _new_walk(artifacts: Artifacts, quick: bool) -> Walk:
+    """A walk of the default duration."""
     options = PathOptions(duration=QUICK if quick else DURATION)
     return path_through(artifacts, options).walk
 
 
 def _walk_document(trade: WalkTrade) -> dict[str, Any]:
-    """As JSON has it: with what is said of it."""
+    """The trials on a walk as JSON, with their sentences."""
     return {"stage": WALK, "sentences": sentences.said(trade), **asdict(trade)}
 
 
 def _document(trade: Trade, wanted: float | None) -> dict[str, Any]:
-    """As JSON has it; with a wanted error, ``cheapest`` is the setting's name, or None."""
+    """The trials of a stage as JSON; with a wanted error, ``cheapest`` is a setting or null."""
     if wanted is None:
         return asdict(trade)
-    found = trade.cheapest(wanted)
-    return {**asdict(trade), "cheapest": found.setting.name if found else None}
+    best = trade.cheapest(wanted)
+    return {**asdict(trade), "cheapest": best.setting.name if best else None}

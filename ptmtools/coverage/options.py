@@ -1,12 +1,13 @@
-"""The knobs of the coverage hints."""
+"""Options of the coverage hints."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Literal, get_args
+from dataclasses import dataclass
+from typing import ClassVar, Literal, get_args
 
 from ptmtools.coverage.backends import AUTO, CHOICES
 from ptmtools.errors import InputError
+from ptmtools.options import option
 
 Preset = Literal["paper", "fast", "default", "high"]
 Placement = Literal["sobol", "kd", "uniform"]
@@ -16,7 +17,7 @@ Weighting = Literal["pixel", "solid-angle"]
 MAX_FACE = 2048
 #: Sample points a cell: the counts of all of them are held at once.
 MAX_SAMPLES = 2**14
-#: Of each preset: sample points a cell, pixels a side of a view, and how the points are placed.
+#: Preset → (sample points per cell, pixels per side of a view, placement of the points).
 PRESETS: dict[Preset, tuple[int, int, Placement]] = {
     "paper": (8, 256, "uniform"),
     "fast": (32, 4, "sobol"),
@@ -27,45 +28,55 @@ PRESETS: dict[Preset, tuple[int, int, Placement]] = {
 
 @dataclass(frozen=True)
 class AchOptions:
-    """How coverage is sampled.
+    """Options of `compute_ach`."""
 
-    Attributes
-    ----------
-    preset: defaults for --samples, --face and --placement: "fast", "default", "high", or "paper",
-        which is what Marvie & Bouatouch (2003) used: 8 points with views of 256 x 256 pixels, slow
-        and less accurate than "fast".
-    samples: sample points in each cell; with --tolerance, the most that may be used.
-    face: side of each sample point's six square views, in pixels. More points help far more than
-        larger views.
-    placement: how sample points are spread over a cell: "sobol", evenly (a scrambled Sobol
-        sequence); "kd", in the middles of equal parts, best for fewer than 16; or "uniform", at
-        random.
-    tolerance: add sample points in each cell until its hints are within this of the truth (total
-        variation, with about 95 % confidence), or until --samples is reached.
-    weighting: "pixel" counts every pixel of a view equally; "solid-angle" weights each by how much
-        of the sphere it covers, which is less near the edges and corners.
-    backend: what draws the views
-    gpu: number of the graphics device to draw with. By default the first.
-    clearance: smallest distance of a sample point from any surface, in metres. By default a quarter
-        of the thickness of the thinnest cell that the subdivision allows.
-    seed: random seed: another number gives other sample points.
-    per_texture: also measure how much of the view each texture of each visible cell covers.
-    """
+    heading: ClassVar[str] = "Coverage hints"
 
-    preset: Preset = "default"
-    samples: int | None = None
-    face: int | None = None
-    placement: Placement | None = None
-    tolerance: float | None = None
-    weighting: Weighting = "pixel"
-    backend: str = field(default=AUTO, metadata={"choices": CHOICES})
-    gpu: int | None = None
-    clearance: float | None = None
-    seed: int = 0
-    per_texture: bool = False
+    preset: Preset = option(
+        "default",
+        "Defaults of --samples, --face and --placement. paper is the setting of Marvie & Bouatouch "
+        "(2003), 8 points with views of 256 x 256 pixels: slower and less accurate than fast.",
+        basic=True,
+    )
+    samples: int | None = option(
+        None, "Sample points of each cell; with --tolerance, the upper limit. Default: by --preset."
+    )
+    face: int | None = option(
+        None,
+        "Side of the six square views of a sample point. More points help far more than larger "
+        "views. Default: by --preset.",
+        metavar="PIXELS",
+    )
+    placement: Placement | None = option(
+        None,
+        "Distribution of the sample points in a cell: sobol, evenly spread; kd, in the middles of "
+        "equal parts, best for fewer than 16 points; uniform, at random. Default: by --preset.",
+    )
+    tolerance: float | None = option(
+        None,
+        "Add sample points to each cell until its hints are within this total variation of the "
+        "exact ones, with about 95 % confidence, or --samples is reached.",
+    )
+    weighting: Weighting = option(
+        "pixel",
+        "Weight of a pixel: the same for all, or its solid angle, which is smaller near the edges "
+        "of a view.",
+    )
+    backend: str = option(AUTO, "Renderer of the views", choices=CHOICES)
+    gpu: int | None = option(None, "Number of the graphics device. Default: the first.")
+    clearance: float | None = option(
+        None,
+        "Smallest distance of a sample point from any surface. Default: a quarter of the smallest "
+        "cell thickness.",
+        metavar="METRES",
+    )
+    seed: int = option(0, "Seed of the random sample points.")
+    per_texture: bool = option(
+        False, "Also measure the share of the view that each texture of a visible cell covers."
+    )
 
     def __post_init__(self) -> None:
-        """Raises `InputError` PTM-I500 for a value that makes no sense."""
+        """Raises `InputError` PTM-I500 for a value out of range."""
         for name, choice, known in (
             ("preset", self.preset, PRESETS),
             ("backend", self.backend, CHOICES),
@@ -73,7 +84,7 @@ class AchOptions:
             ("placement", self.placement or "sobol", get_args(Placement)),
         ):
             if choice not in known:
-                raise _refused(f"no {name} '{choice}'", f"one of {', '.join(known)}")
+                raise _refused(f"unknown {name} '{choice}'", f"one of {', '.join(known)}")
         for name, value, low, high in (
             ("samples", self.points, 1, MAX_SAMPLES),
             ("face", self.side, 1, MAX_FACE),
@@ -84,7 +95,7 @@ class AchOptions:
                 raise _refused(f"{name} is {value}", f"give a number from {low} to {high}")
         if self.clearance is not None and not 0 < self.clearance < float("inf"):
             raise _refused(
-                f"a clearance of {self.clearance} m makes no sense", "give a distance above 0"
+                f"a clearance of {self.clearance} m is out of range", "give a distance above 0"
             )
         if self.tolerance is not None:
             self._check_tolerance(self.tolerance)
@@ -111,7 +122,7 @@ class AchOptions:
 
         if not 0 < tolerance < 1:
             raise _refused(
-                f"a tolerance of {tolerance} makes no sense",
+                f"a tolerance of {tolerance} is out of range",
                 "give a total variation above 0 and below 1, such as 0.01",
             )
         if self.points < GROUPS:  # of which each needs one

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Literal
+from typing import ClassVar, Literal
 
 from ptmtools.errors import InputError
 from ptmtools.lab.campus.simulation import CAMPUS_POLICIES, CampusPolicy, walk_beside
@@ -17,6 +17,7 @@ from ptmtools.lab.policies import POLICIES, Declared
 from ptmtools.lab.simulation import Run, simulate
 from ptmtools.lab.world import World
 from ptmtools.link import Trace
+from ptmtools.options import option
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress, silent
 from ptmtools.quantities import MemorySize, parse_bandwidth, parse_duration, parse_memory
@@ -24,36 +25,48 @@ from ptmtools.quantities import MemorySize, parse_bandwidth, parse_duration, par
 
 @dataclass(frozen=True)
 class SimulateOptions:
-    """
-    Attributes
-    ----------
-    policy: clients that walk, with commas in between
-    bandwidth: of the link, bit/s, such as 56k, 4M (powers of ten) or inf, with commas in between.
-    latency: from a request to the first byte of its response, such as 100ms or 0.1.
-    overhead: bytes of headers a request.
-    protocol: h1, six connections that share the link, or h2, one with priorities.
-    memory: for textures, such as 4MiB, 10% of what all textures take, or inf, with commas in
-        between.
-    paper_bytes: count three bytes a texel of RGB, as the paper does; graphics processors take four.
-    one_range: ask for one range of a file at a time, as browsers must.
-    lit: light what is shown, so that relief is seen: clients of octree textures need it.
+    """Options of `play`.
 
-    Raises InputError: PTM-I701 a policy shows relief, and nothing is lit, or is of a campus, and
-    all is; PTM-I711 a link that cannot be; PTM-I712 a word that is no such quantity.
+    Raises InputError: PTM-I701 a policy shows relief without ``lit``, or a campus with it; PTM-I711
+    an impossible link; PTM-I712 an unreadable quantity.
     """
 
-    policy: str = field(
-        default="paper,ach,best,oracle",
-        metadata={"choices": {**POLICIES, **CAMPUS_POLICIES}, "several": True},
+    heading: ClassVar[str] = "Clients and link"
+
+    policy: str = option(
+        "paper,ach,best,oracle",
+        "Policies of the clients",
+        choices={**POLICIES, **CAMPUS_POLICIES},
+        several=True,
     )
-    bandwidth: str = "512k,4M"
-    latency: str = "100ms"
-    overhead: int = 300
-    protocol: Literal["h1", "h2"] = "h1"
-    memory: str = "4MiB,10%"
-    paper_bytes: bool = False
-    one_range: bool = False
-    lit: bool = False
+    bandwidth: str = option(
+        "512k,4M",
+        "Bandwidth of the link in bit/s: 56k, 4M (powers of ten) or inf, one or several with "
+        "commas.",
+        metavar="RATE[,RATE]",
+    )
+    latency: str = option(
+        "100ms",
+        "Time from a request to the first byte of its response: 100ms or 0.1.",
+        metavar="TIME",
+    )
+    overhead: int = option(300, "Size of the headers of a request.", metavar="BYTES")
+    protocol: Literal["h1", "h2"] = option(
+        "h1", "Six connections that share the link (h1), or one connection with priorities (h2)."
+    )
+    memory: str = option(
+        "4MiB,10%",
+        "Texture memory: 4MiB, 10% of that of all textures, or inf; one or several with commas.",
+        metavar="SIZE[,SIZE]",
+    )
+    paper_bytes: bool = option(
+        False,
+        "Count three bytes per RGB texel, as the paper does, not four as graphics processors do.",
+    )
+    one_range: bool = option(False, "Request one range of a file at a time, as browsers do.")
+    lit: bool = option(
+        False, "Light the pictures, so that relief is visible; policies of octree textures need it."
+    )
 
     def __post_init__(self) -> None:
         self.links()

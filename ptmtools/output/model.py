@@ -14,16 +14,17 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from ptmtools import schemas
 from ptmtools.errors import InputError
+from ptmtools.options import degrees_text, option
 from ptmtools.output.emitters import EMITTERS, chosen_emitters
-from ptmtools.scene.model import Scene
 
 if TYPE_CHECKING:
     from ptmtools.cells.options import Walker
     from ptmtools.output.emission import Visit
+    from ptmtools.scene.model import Scene
     from ptmtools.texture.detail import Detail
     from ptmtools.texture.model import Level
 
@@ -143,47 +144,67 @@ def _numbers(viewpoints: Sequence[GivenViewpoint]) -> list[tuple[float, ...]]:
 
 @dataclass(frozen=True)
 class EmitOptions:
-    """
-    Attributes
-    ----------
-    title: title of the world, which browsers show in their title bar.
-    fallback: refer to the PNG of each texture as well, for clients that cannot read `.ptm`;
-        otherwise only to the `.ptm`.
-    viewpoints: where to begin. By default the model's cameras, or if there are none, the place with
-        most to see in the largest rooms. Without YAW one looks where most is to be seen. May be
-        given several times.
-    viewpoint_count: give viewpoints to at most this many further rooms, the largest first. They are
-        listed in the order of a walk through them.
-    avatar_size: the visitor: distance kept from walls, eye height above the floor, and highest step
-        climbed, all in metres. By default those of the --walker of the cells, with the eyes at
-        0.94 of its height.
-    field_of_view: field of view of viewpoints that are not cameras of the model, in radians.
-    first_look: for each cell also write the levels of up to this many texels a side of all textures
-        that can be seen from it, in one file; 0 does not.
-    need: for each cell write how fine each texture is needed, measured from so many sample points;
-        0 does not.
-    gzip: also write a gzip copy of each VRML and JSON file, such as root.wrl.gz, for servers that
-        send precompressed files.
-    format: what to write, one or more names separated by commas
-    """
+    """Options of `emit`. Raises InputError PTM-I603 for values out of range."""
 
-    title: str = "ptmtools database"
-    fallback: bool = True
-    viewpoints: tuple[GivenViewpoint, ...] = field(
-        default=(),
-        metadata={"option": "viewpoint", "numbers": (3, 4), "parse": _given, "print": _numbers},
+    heading: ClassVar[str] = "Served files"
+
+    title: str = option("ptmtools database", "Title of the world, which browsers show.", basic=True)
+    fallback: bool = option(
+        True, "Also refer to the PNG of each texture, for clients that cannot read .ptm."
     )
-    viewpoint_count: int = 32
-    avatar_size: Vector | None = field(
-        default=None, metadata={"default_before": (6, (0.25, 1.6, 0.75))}
+    viewpoints: tuple[GivenViewpoint, ...] = option(
+        (),
+        "Starting point inside the building: position in metres, Y up, and yaw in degrees, "
+        "counter-clockwise from -Z; without YAW, towards the best view. Default: the model's "
+        "cameras, or the best views in the largest rooms. Repeatable.",
+        name="viewpoint",
+        metavar="X,Y,Z[,YAW]",
+        numbers=(3, 4),
+        parse=_given,
+        print=_numbers,
     )
-    field_of_view: float = 1.1
-    first_look: int = 0
-    need: int = field(default=16, metadata={"default_before": (8, 0)})
-    gzip: bool = False
-    format: str = field(
-        default="vrml,gltf",
-        metadata={"choices": EMITTERS, "several": True, "default_before": (5, "vrml")},
+    viewpoint_count: int = option(
+        32,
+        "Largest number of further rooms that get a viewpoint, the largest rooms first. They are "
+        "listed in the order of a walk.",
+    )
+    avatar_size: Vector | None = option(
+        None,
+        "Size of the visitor in VRML browsers: distance from walls, eye height and highest step, "
+        "in metres. Default: that of --walker, with the eyes at 0.94 of its height.",
+        metavar="RADIUS,EYE,STEP",
+        default_before=(6, (0.25, 1.6, 0.75)),
+    )
+    field_of_view: float = option(
+        1.1,
+        "Field of view of viewpoints that are not cameras of the model.",
+        metavar="DEGREES",
+        degrees=True,
+    )
+    first_look: int = option(
+        0,
+        "Also write, for each cell, one file with the levels of up to this side of all textures "
+        "visible from it; 0 for none.",
+        metavar="TEXELS",
+    )
+    need: int = option(
+        16,
+        "Sample points of each cell for the resolution that each texture needs there; 0 leaves it "
+        "out.",
+        default_before=(8, 0),
+    )
+    gzip: bool = option(
+        False,
+        "Also write a gzip copy of each VRML and JSON file, for servers that send precompressed "
+        "files.",
+    )
+    format: str = option(
+        "vrml,gltf",
+        "Formats to write",
+        choices=EMITTERS,
+        several=True,
+        default_before=(5, "vrml"),
+        basic=True,
     )
 
     def __post_init__(self) -> None:
@@ -198,7 +219,9 @@ class EmitOptions:
         except ValueError as fault:
             wrong = f"--format: {fault}"
         if not 0 < self.field_of_view < math.pi:
-            wrong = f"a field of view of {self.field_of_view:g} is not between 0 and pi radians"
+            wrong = (
+                f"a field of view of {degrees_text(self.field_of_view)}° is not between 0 and 180"
+            )
         elif not all(0 <= size < math.inf for size in self.avatar_size or ()):
             wrong = "the sizes of --avatar-size must be 0 or more"
         elif self.viewpoint_count < 0:
@@ -245,22 +268,21 @@ class EmitReport:
 
 @dataclass(frozen=True)
 class PlotOptions:
-    """
-    Attributes
-    ----------
-    cell: shade every cell that can be seen from the cell with this number, by its average share of
-        the view.
-    height: how far above each storey's floor the building is cut, in metres.
-    storey_gap: floors farther apart than this belong to different storeys, in metres.
-    width: width of the picture, in inches.
-    dpi: resolution, in dots per inch.
-    """
+    """Options of `plot_plan`."""
 
-    cell: int | None = None
-    height: float = 1.2
-    storey_gap: float = 1.5
-    width: float = 12.0
-    dpi: int = 110
+    heading: ClassVar[str] = "Plan"
+
+    cell: int | None = option(
+        None, "Shade the cells visible from this one by their average share of the view."
+    )
+    height: float = option(
+        1.2, "Height of the horizontal cut above the floor of each storey.", metavar="METRES"
+    )
+    storey_gap: float = option(
+        1.5, "Smallest vertical distance of the floors of two storeys.", metavar="METRES"
+    )
+    width: float = option(12.0, "Width of the picture.", metavar="INCHES")
+    dpi: int = option(110, "Resolution, in dots per inch.")
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ptmtools.errors import DatabaseError
 from ptmtools.files import open_regular
-from ptmtools.pipeline.stage import words
+from ptmtools.options import arguments
 from ptmtools.pipeline.stages import STAGES
 from ptmtools.store.folder import DatabaseFolder, read_manifest
 from ptmtools.store.layout import MANIFEST
@@ -25,7 +25,7 @@ def build_command(db: str | PathLike[str]) -> str:
     for name, stage in STAGES.items():
         with suppress(KeyError, ValueError):
             options.append(stage.recorded(stages[name]))
-    parts = ["ptm", "build-scene", model or "MODEL", "-o", str(db), *words(options)]
+    parts = ["ptm", "build-scene", model or "MODEL", "-o", str(db), *arguments(options)]
     return shlex.join(parts)
 
 

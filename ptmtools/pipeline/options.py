@@ -1,43 +1,44 @@
-"""The options of the textures stage; those of the others are with the rooms that do them."""
+"""Options of the textures stage; those of the other stages are in the packages that do them."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from ptmtools.errors import InputError
+from ptmtools.options import option
 from ptmtools.texture.model import EncodeOptions
 
 
 @dataclass(frozen=True)
 class TextureOptions(EncodeOptions):
-    """How the images of a scene are encoded.
+    """Options of the textures stage."""
 
-    Attributes
-    ----------
-    fallback: also write a PNG of each texture, for clients that cannot read `.ptm`.
-    fallback_size: the PNG holds the finest level whose longer side is at most this many texels, or
-        the coarsest if there is none; 0 is the finest. Browsers that cannot read `.ptm` load the
-        PNGs of all textures.
-    trim: leave out the levels that no visitor's screen resolves, wherever one can stand and
-        whatever one looks at; judged by the distance of eyes from what they may see, and on the
-        safe side. Somebody with a larger screen or who flies to a ceiling sees it blurred.
-    trim_height: how many pixels high the screen is that --trim goes by; it is 16:9.
-    trim_fov: the angle from top to bottom of a picture that --trim goes by, in degrees.
-    trim_distance: how near to a surface an eye comes that --trim goes by, in metres, at the least.
-    limit: refuse an image that takes more memory than this once decoded, in MiB.
-    """
-
-    fallback: bool = True
-    fallback_size: int = 0
-    trim: bool = False
-    trim_height: int = 1080
-    trim_fov: float = 60.0
-    trim_distance: float = 0.25
-    limit: int = field(default=1024, compare=False)
+    fallback: bool = option(
+        True, "Also write a PNG of each texture, for clients that cannot read .ptm."
+    )
+    fallback_size: int = option(
+        0,
+        "Largest side of the PNGs, which hold the finest level within it; 0 for the finest level.",
+        metavar="TEXELS",
+    )
+    trim: bool = option(
+        False,
+        "Leave out levels that no screen of --trim-height resolves from any place where a visitor "
+        "can stand. Larger screens and flying cameras see them blurred.",
+        basic=True,
+    )
+    trim_height: int = option(
+        1080, "Height of the screen that --trim assumes; it is 16:9.", metavar="PIXELS"
+    )
+    trim_fov: float = option(60.0, "Vertical field of view that --trim assumes.", metavar="DEGREES")
+    trim_distance: float = option(
+        0.25, "Smallest distance of an eye from a surface that --trim assumes.", metavar="METRES"
+    )
+    limit: int = option(1024, "Largest decoded size of an image.", metavar="MIB", compare=False)
 
     def __post_init__(self) -> None:
-        """Raises InputError PTM-I111 for what no image can be encoded with."""
+        """Raises InputError PTM-I111 for values out of range."""
         from ptmtools.texture.encoder import check_options
 
         check_options(self)

@@ -2,8 +2,7 @@
 
 Each stands in a file of its own in `stages/`, and in the table there. Build, plan, status, info,
 validate, tradeoff and the command line loop over that table.
-
-Options of stages as words of the command line; `ptmtools.cli.parameters` is the way there."""
+"""
 
 from __future__ import annotations
 
@@ -11,12 +10,13 @@ import json
 import typing
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from dataclasses import MISSING, Field, asdict, dataclass, field, fields, is_dataclass
+from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from types import UnionType
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar, Union, get_args, get_origin
 
 from ptmtools.errors import PtmError
 from ptmtools.lazy import Lazy
+from ptmtools.options import option_of
 from ptmtools.store.layout import arrays_of
 
 if TYPE_CHECKING:
@@ -146,11 +146,11 @@ class Stage(Generic[A]):
         given: dict[str, Any] = {}
         try:
             for each in fields(self.options):
-                former = (name.replace("-", "_") for name in each.metadata.get("was", ()))
+                former = (name.replace("-", "_") for name in option_of(each).was)
                 for name in (each.name, *former):
                     if name in parameters and each.compare:
                         value = _restored(hints[each.name], parameters[name])
-                        recipe, former = each.metadata.get("default_before", (0, None))
+                        recipe, former = option_of(each).default_before or (0, None)
                         if record.recipe >= recipe or value != former:
                             given[each.name] = value
                         break
@@ -194,45 +194,3 @@ def _restored(hint: Any, value: Any) -> Any:
     ):
         return value
     raise TypeError(f"{value!r} is not {hint}")
-
-
-def words(options: Iterable[Any]) -> list[str]:
-    """The command-line words that give these instances of options classes; defaults are left out.
-    Where several share an option the last one counts."""
-    found: dict[str, list[str]] = {}
-    for each in options:
-        for option in fields(each):
-            value, name = getattr(each, option.name), option_name(option)
-            if value == default_of(option) or "deprecated" in option.metadata:
-                continue
-            value = option.metadata.get("print", lambda value: value)(value)
-            if isinstance(value, bool):
-                found[name] = [f"--{name}" if value else f"--no-{name}"]
-            else:
-                many = isinstance(value, (list, tuple)) and _repeated(type(each), field)
-                each_value = value if many else [value]
-                found[name] = [w for one in each_value for w in (f"--{name}", _text(one))]
-    return [word for given in found.values() for word in given]
-
-
-def _repeated(cls: type, field: Field[Any]) -> bool:
-    """Whether the option of a field may be given several times."""
-    hint = typing.get_type_hints(cls)[field.name]
-    return get_origin(hint) is tuple and get_args(hint)[-1] is Ellipsis
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, (list, tuple)):
-        return ",".join(map(_text, value))
-    return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
-
-
-def option_name(field: Field[Any]) -> str:
-    """The option of a field, without its dashes."""
-    name: str = field.metadata.get("option", field.name.replace("_", "-"))
-    return name
-
-
-def default_of(field: Field[Any]) -> Any:
-    """What a field is unless it is given."""
-    return field.default if field.default_factory is MISSING else field.default_factory()

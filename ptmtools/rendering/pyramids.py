@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -20,8 +21,10 @@ from ptmtools.texture.samples import in_eight_bits
 _LIMITS = Limits(decoded_bytes=1 << 33)
 
 
-def read_pyramids(served: Served, progress: Progress = silent) -> Pyramids:
-    """Decodes all textures.
+def read_pyramids(
+    served: Served, progress: Progress = silent, only: Collection[int] | None = None
+) -> Pyramids:
+    """Decodes all textures, or ``only`` those of these numbers; the others have no levels.
 
     Raises
     ------
@@ -29,7 +32,7 @@ def read_pyramids(served: Served, progress: Progress = silent) -> Pyramids:
     LimitError: those of `ptmtools.texture.open` and `PtmReader.levels`.
     """
     try:
-        return _pyramids(served, progress)
+        return _pyramids(served, progress, only)
     except LimitError:
         raise
     except InputError as fault:
@@ -39,7 +42,7 @@ def read_pyramids(served: Served, progress: Progress = silent) -> Pyramids:
         ) from None
 
 
-def _pyramids(served: Served, progress: Progress) -> Pyramids:
+def _pyramids(served: Served, progress: Progress, only: Collection[int] | None = None) -> Pyramids:
     rows = served.index["textures"]
     deepest = max((len(row["ends"]) for row in rows), default=1)
     start, levels = np.zeros((len(rows), deepest), np.int64), np.zeros(len(rows), np.int64)
@@ -48,6 +51,8 @@ def _pyramids(served: Served, progress: Progress) -> Pyramids:
     parts: list[NDArray[np.uint8]] = []
     at = 0
     for t in range(len(rows)):
+        if only is not None and t not in only:
+            continue
         progress(t, len(rows), "decoding textures")
         below = None
         file = served.texture_file(t)

@@ -1,14 +1,14 @@
-"""The knobs of ingest."""
+"""Options of ingest, and the file formats that it reads."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 from ptmtools.errors import InputError
+from ptmtools.options import option
 
-#: Of the files that are read: by readers of our own, through trimesh, pymeshlab,
-#: IfcOpenShell and usd-core.
+#: Suffixes of model files, by reader: ptmtools, trimesh, pymeshlab, IfcOpenShell, usd-core.
 OWN = (".obj", ".glb", ".gltf")
 TRIMESH = (".ply", ".stl", ".off")
 MESHLAB = (".3ds", ".3mf", ".ctm", ".dae", ".wrl", ".x3d")
@@ -19,30 +19,40 @@ SUFFIXES = (*OWN, *TRIMESH, *MESHLAB, *IFC, *USD)
 
 @dataclass(frozen=True)
 class IngestOptions:
-    """How a model is read.
+    """Options of `ptmtools.scene.ingest`.
 
-    Attributes
-    ----------
-    unit: the model's unit: m, cm, mm, in, ft, or its length in metres. By default it is guessed
-        from the size of the model and of its rooms.
-    up: the model's up axis, "y" or "z". By default it is what the format says (glTF: y), or guessed
-        from the rooms, walls and floors.
-    two_sided: draw every face from both sides, whatever the model says.
-    strict: stop the build at missing files, unknown materials, unreadable images and dropped faces,
-        and if more than a tenth of where one could stand is left out.
-    allow_outside: also read files outside the model's folder that the model refers to.
-    limit: refuse an image that takes more memory than this once decoded, in MiB.
-    max_triangles: refuse a model with more triangles than this.
+    Raises InputError: PTM-I250 an unknown unit, PTM-I251 an unknown up axis, PTM-I257 a limit
+    below 1.
     """
 
-    unit: str | float | None = None
-    up: Literal["y", "z"] | None = None
-    two_sided: bool = False
-    strict: bool = False
-    allow_outside: bool = False
+    heading: ClassVar[str] = "Model"
+
+    unit: str | float | None = option(
+        None,
+        "Unit of the model: m, cm, mm, in, ft, or its length in metres. Default: guessed from "
+        "the size of the model and its rooms.",
+        metavar="UNIT",
+        basic=True,
+    )
+    up: Literal["y", "z"] | None = option(
+        None,
+        "Up axis of the model. Default: the axis that the format prescribes (glTF: y), or else "
+        "guessed from floors and walls.",
+        basic=True,
+    )
+    two_sided: bool = option(False, "Draw both sides of every face.")
+    strict: bool = option(
+        False,
+        "Fail on missing files, unknown materials, unreadable images and dropped faces, and if "
+        "more than a tenth of the walkable floor is left out.",
+        basic=True,
+    )
+    allow_outside: bool = option(False, "Also read files outside the model's folder.")
     # Limits end a build or change nothing in it, so they do not decide whether a stage is current.
-    limit: int = field(default=1024, compare=False)
-    max_triangles: int = field(default=20_000_000, compare=False)
+    limit: int = option(1024, "Largest decoded size of an image.", metavar="MIB", compare=False)
+    max_triangles: int = option(
+        20_000_000, "Largest number of triangles of the model.", compare=False
+    )
 
     def __post_init__(self) -> None:
         if self.up not in (None, "y", "z"):

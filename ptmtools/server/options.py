@@ -1,31 +1,38 @@
-"""What may be chosen of `ptm serve`."""
+"""Options of `ptm serve`."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
+from ptmtools.options import option
 from ptmtools.quantities import parse_bandwidth, parse_duration
 from ptmtools.server.throttle import Throttle
 
 
 @dataclass(frozen=True)
 class ServeOptions:
-    """
-    Attributes
-    ----------
-    port: the port to listen on; 0 picks a free one.
-    host: the address to listen on; 0.0.0.0 is all that this machine has, for other machines too.
-    bandwidth: limit the bandwidth, bit/s over all connections together, such as 56k, 4M (powers of
-        ten) or inf.
-    latency: delay before the first byte of each response, such as 100ms or 0.1.
+    """Options of `ptm serve`.
 
-    Raises InputError: PTM-I711 a link that cannot be; PTM-I712 a word that is no such quantity.
+    Raises InputError: PTM-I711 an impossible link; PTM-I712 an unreadable quantity.
     """
 
-    port: int = 0
-    host: str = "127.0.0.1"
-    bandwidth: str = "inf"
-    latency: str = "0"
+    heading: ClassVar[str] = "Server"
+
+    port: int = option(0, "Port to listen on; 0 for any free one.")
+    host: str = option(
+        "127.0.0.1",
+        "Address to listen on; 0.0.0.0 for all addresses of this machine.",
+        metavar="ADDRESS",
+    )
+    bandwidth: str = option(
+        "inf",
+        "Bandwidth of all connections together, in bit/s: 56k, 4M (powers of ten) or inf.",
+        metavar="RATE",
+    )
+    latency: str = option(
+        "0", "Delay before the first byte of each response: 100ms or 0.1.", metavar="TIME"
+    )
 
     def __post_init__(self) -> None:
         self.throttle  # noqa: B018 - raises for what cannot be read

@@ -18,13 +18,14 @@ import json
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 from urllib.parse import quote, unquote
 
 from ptmtools.errors import DatabaseError, InputError, LimitError, naming
 from ptmtools.files import open_regular
+from ptmtools.options import option
 from ptmtools.output.emission import compressed
 from ptmtools.output.served import FORM, Served, read_served
 from ptmtools.pipeline.command import naming_command, open_database
@@ -99,22 +100,22 @@ def state_of(stat: os.stat_result) -> tuple[int, int, int]:
 
 @dataclass(frozen=True)
 class SiteOptions:
-    """Options of a site.
+    """Options of `site_of`."""
 
-    Attributes
-    ----------
-    title: the title of the page; by default the name of the database.
-    poster: a picture to show until the building is there, JPEG, PNG or WebP, in place of one that
-        is drawn.
-    pictures: draw a poster and pictures of the viewpoints.
-    clients: who it is for: this page only, or VRML browsers too, with their files and the images
-        that these show.
-    """
+    heading: ClassVar[str] = "Site"
 
-    title: str = ""
-    poster: str = ""
-    pictures: bool = True
-    clients: Literal["page", "vrml"] = field(default="page", metadata={"option": "for"})
+    title: str = option("", "Title of the page. Default: the name of the database.")
+    poster: str = option(
+        "",
+        "Picture (JPEG, PNG or WebP) to show while the building loads. Default: drawn.",
+        metavar="FILE",
+    )
+    pictures: bool = option(True, "Draw a poster and pictures of the viewpoints.")
+    clients: Literal["page", "vrml"] = option(
+        "page",
+        "Clients of the site: its own page, or also VRML browsers, with their files and images.",
+        name="for",
+    )
 
 
 @dataclass(frozen=True)

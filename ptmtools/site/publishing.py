@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, ClassVar
 from urllib.parse import unquote
 
 from ptmtools.errors import OutputError
@@ -29,6 +29,7 @@ from ptmtools.files import (
     write_with,
     writing,
 )
+from ptmtools.options import option
 from ptmtools.output.emission import compressed
 from ptmtools.progress import Progress, silent
 from ptmtools.site.content import DATA, DIGITS, INDEX, Entry, Site, link_bytes
@@ -45,17 +46,16 @@ _PIECE = 1 << 20
 
 @dataclass(frozen=True)
 class PublishOptions:
-    """How a site is written.
+    """Options of `publish`."""
 
-    Attributes
-    ----------
-    gzip: also write gzip copies of what is worth compressing, for servers that send those
-        (nginx: gzip_static).
-    keep: leave what earlier versions of the site needed, for visitors who are in them.
-    """
+    heading: ClassVar[str] = "Site"
 
-    gzip: bool = False
-    keep: bool = False
+    gzip: bool = option(
+        False, "Also write gzip copies, for servers that send those (nginx: gzip_static)."
+    )
+    keep: bool = option(
+        False, "Keep the files of earlier versions of the site, for visitors who are using them."
+    )
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import ClassVar
 
+from ptmtools.options import option
 from ptmtools.texture.profiles import PROFILES
 from ptmtools.texture.pyramid import Box
 from ptmtools.texture.samples import KINDS
@@ -19,34 +21,45 @@ TILE_SIDES = (16, 1 << 15)
 
 @dataclass(frozen=True)
 class EncodeOptions:
-    """How an image is encoded.
+    """Options of `ptmtools.texture.encode`."""
 
-    Attributes
-    ----------
-    profile: how the levels are coded
-    max_error: how far any sample of any level may be from its exact value; 0 is lossless. Larger
-        values make smaller files (4 of 255 is hard to see and about halves most of them). For
-        integer images only.
-    tile: side of the tiles in texels (pixels of a texture). A level with a side of more than twice
-        that is cut into tiles that are coded one by one, which allows parallel work, bounded memory
-        and random access. 0 turns tiles off.
-    min_side: leave out levels whose shorter side is below this, in texels; clients that need them
-        can compute them.
-    max_side: leave out levels whose longer side is above this, in texels; 0 keeps all. Sides halve
-        from level to level, so the finest level kept may be much smaller.
-    min_level: the coarsest level to keep: 0 is the coarsest of all, -1 the finest, -2 the next
-        coarser one. An image without that level keeps the nearest one that it has.
-    max_level: the finest level to keep, counted in the same way. The levels kept are numbered from
-        0 again; the file still records the size of the original.
-    """
+    heading: ClassVar[str] = "Textures"
 
-    profile: str = field(default="fast", metadata={"choices": PROFILES})
-    max_error: int = 0
-    tile: int = 512
-    min_side: int = 1
-    max_side: int = 0
-    min_level: int = 0
-    max_level: int = -1
+    profile: str = option("fast", "Coding of the levels", choices=PROFILES)
+    max_error: int = option(
+        0,
+        "Largest error of any sample of any level; 0 is lossless. An error of 4 (of 255) is hard "
+        "to see and about halves most files. Integer images only.",
+        basic=True,
+    )
+    tile: int = option(
+        512,
+        "Side of the tiles into which large levels are cut, for parallel work, bounded memory and "
+        "random access; 0 for no tiles.",
+        metavar="TEXELS",
+    )
+    min_side: int = option(
+        1,
+        "Leave out levels whose shorter side is below this. Clients can compute them.",
+        metavar="TEXELS",
+    )
+    max_side: int = option(
+        0,
+        "Leave out levels whose longer side is above this; 0 keeps all. Sides halve from level to "
+        "level, so the finest level kept may be much smaller.",
+        metavar="TEXELS",
+        basic=True,
+    )
+    min_level: int = option(
+        0,
+        "Coarsest level to keep: 0 is the coarsest of all, -1 the finest, -2 the next coarser one. "
+        "Images without that level keep the nearest one.",
+    )
+    max_level: int = option(
+        -1,
+        "Finest level to keep, counted likewise. The levels kept are numbered from 0; the file "
+        "records the original size.",
+    )
 
 
 @dataclass(frozen=True)

@@ -1,42 +1,43 @@
-"""The options of the visibility stage."""
+"""Options of the visibility stage."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 from ptmtools.errors import InputError
+from ptmtools.options import option
 
 
 @dataclass(frozen=True)
 class PvsOptions:
-    """Settings of `compute_pvs`.
+    """Options of `compute_pvs`. Raises InputError PTM-I402 for values out of range."""
 
-    Attributes
-    ----------
-    method: how the potentially visible set (PVS: the cells that may be visible) of each cell is
-        found. full: follow every sequence of portals (openings between cells), within the budget;
-        fast: look only at the first two portals, which gives larger sets; sampled: try random
-        lines, which misses visible cells and is for comparison only.
-    budget: how many operations (tests and clips of portals) the search from one side of a portal
-        may take. When they are spent, everything still undecided counts as visible, so a lower
-        budget makes sets larger, never wrong.
-    lines: random lines through each portal, with --pvs sampled.
-    exact: deprecated, does nothing: lines of sight too thin for floating point are always decided
-        in higher precision.
-    """
+    heading: ClassVar[str] = "Visibility"
 
-    method: Literal["full", "fast", "sampled"] = field(default="full", metadata={"option": "pvs"})
-    budget: int = field(default=200_000, metadata={"option": "pvs-budget"})
-    lines: int = field(default=1000, metadata={"option": "pvs-lines"})
-    exact: bool = field(
-        default=True,
+    method: Literal["full", "fast", "sampled"] = option(
+        "full",
+        "Method that finds the potentially visible set (PVS) of each cell: full follows every "
+        "sequence of portals within the budget; fast tests the first two portals, for larger sets; "
+        "sampled shoots random lines and misses visible cells, for comparison only.",
+        name="pvs",
+    )
+    budget: int = option(
+        200_000,
+        "Most operations (tests and clips of portals) of the search from one side of a portal. "
+        "Undecided cells then count as visible: sets become larger, never wrong.",
+        name="pvs-budget",
+    )
+    lines: int = option(
+        1000, "Random lines through each portal, with --pvs sampled.", name="pvs-lines"
+    )
+    exact: bool = option(
+        True,
+        "No effect: lines of sight too thin for floating point are always decided exactly.",
+        name="pvs-exact",
         compare=False,
-        metadata={
-            "option": "pvs-exact",
-            "deprecated": "lines of sight too thin for floating point are always decided in higher "
-            "precision",
-        },
+        deprecated="lines of sight too thin for floating point are always decided in higher "
+        "precision",
     )
 
     def __post_init__(self) -> None:

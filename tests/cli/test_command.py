@@ -3,66 +3,43 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 import subprocess
 import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
 import click
 import pytest
 from click.testing import CliRunner
 
 import ptmtools
+from ptmtools.cli.console import Console
 from ptmtools.cli.main import main, ptm
-from ptmtools.cli.output import Voice
-from ptmtools.cli.parameters import descriptions, options_of, take
+from ptmtools.cli.parameters import Command, options_of, take
+from ptmtools.options import arguments, option
 from ptmtools.quantities import count, size
 
 
 @dataclass(frozen=True)
 class Base:
-    """A base.
+    heading: ClassVar[str] = "Shape"
 
-    Attributes
-    ----------
-    depth: how deep,
-        in metres.
-    """
-
-    depth: float = 1.5
+    depth: float = option(1.5, "Depth of it.", metavar="METRES")
 
 
 @dataclass(frozen=True)
 class Options(Base):
-    """Options.
-
-    Attributes
-    ----------
-    kind: of `thing`.
-    names, places: several.
-    quick: or not.
-
-    Raises
-    ------
-    nothing: at all.
-    """
-
-    kind: Literal["a", "b"] = "a"
-    names: tuple[str, ...] = ()
+    kind: Literal["a", "b"] = option("a", "Kind of it.", basic=True)
+    names: tuple[str, ...] = option((), "Names.", was=("titles",))
     places: tuple[tuple[float, float, float], ...] = ()
-    quick: bool = False
-    seed: int | None = field(default=None)
-
-
-def test_help_is_what_the_docstring_says() -> None:
-    assert descriptions(Options) == {
-        "depth": "how deep, in metres.",
-        "kind": "of thing.",
-        "names": "several.",
-        "places": "several.",
-        "quick": "or not.",
-    }
+    eye: tuple[float, ...] | None = option(None, "Eye.", numbers=(3, 4))
+    angle: float = option(1.0472, "Angle of it.", metavar="DEGREES", degrees=True)
+    quick: bool = option(False, "Hurry.")
+    tidy: bool = option(True, "Clean up.")
+    seed: int | None = None
 
 
 @pytest.mark.parametrize(
@@ -71,7 +48,13 @@ def test_help_is_what_the_docstring_says() -> None:
         ([], Options()),
         (["--kind", "b", "--depth", "2", "--quick"], Options(2.0, "b", quick=True)),
         (["--names", "x", "--names", "y", "--seed", "7"], Options(names=("x", "y"), seed=7)),
+        (["--titles", "x", "--no-tidy"], Options(names=("x",), tidy=False)),
         (["--places", "1,2,-3.5"], Options(places=((1.0, 2.0, -3.5),))),
+        (["--eye", "1,2,3,90"], Options(eye=(1.0, 2.0, 3.0, 90.0))),
+        (["--angle", "90"], Options(angle=math.pi / 2)),
+        (["--titles", "x", "--names", "y"], None),
+        (["--eye", "1,2"], None),
+        (["--angle", "wide"], None),
         (["--kind", "c"], None),
         (["--places", "1,2"], None),
         (["--places", "1,2,x"], None),
@@ -89,6 +72,56 @@ def test_options_come_from_the_class(arguments: list[str], wanted: Options | Non
     assert (result.exit_code, found) == ((0, [wanted]) if wanted else (2, []))
 
 
+def test_arguments_give_the_same_options_again() -> None:
+    given = Options(2.0, "b", ("x", "y"), ((1, 2, 3),), (1, 2, 3, 90), 1.1, True, False, 7)
+    taken = []
+
+    @click.command()
+    @options_of(Options)
+    def command(**values: object) -> None:
+        taken.append(take(Options, values))
+
+    assert arguments([Options()]) == []
+    words = arguments([given])
+    assert CliRunner().invoke(command, words).exit_code == 0
+    assert taken == [given]
+    for degrees in (1, 33.3, 60, 63, 179):
+        angle = math.radians(degrees)
+        assert arguments([Options(angle=angle)]) == ["--angle", f"{degrees:g}"]
+
+
+def test_radians_are_still_read_with_a_note() -> None:
+    @click.command()
+    @options_of(Options)
+    def command(**values: object) -> None:
+        click.echo(take(Options, values).angle)
+
+    result = CliRunner().invoke(command, ["--angle", "1.1"])
+    assert result.stdout == "1.1\n"
+    assert "--angle is in degrees now; 1.1 is read as radians" in result.stderr
+
+
+def test_help_has_headings_and_levels() -> None:
+    @click.command(cls=Command, context_settings={"terminal_width": 90})
+    @options_of(Options, layered=True)
+    def command(**values: object) -> None: ...
+
+    short = CliRunner().invoke(command, ["--help"]).output
+    assert [line for line in short.splitlines() if line.endswith(":")] == ["Shape:", "General:"]
+    assert "--kind [a|b]  Kind of it.  [default: a]" in re.sub("  +", "  ", short)
+    assert "--depth" not in short
+    assert "--help-all shows 8 more options." in short
+    whole = re.sub("  +", "  ", CliRunner().invoke(command, ["--help-all"]).output)
+    for line in (
+        "--depth METRES  Depth of it.  [default: 1.5]",
+        "--angle DEGREES  Angle of it.  [default: 60]",
+        "--quick  Hurry.",
+        "--tidy / --no-tidy  Clean up.",
+    ):
+        assert line in whole
+    assert "--titles" not in whole
+
+
 @pytest.mark.parametrize("name", ptm.list_commands(click.Context(ptm)))
 def test_every_option_of_every_command_is_explained(name: str) -> None:
     command = ptm.get_command(click.Context(ptm), name)
@@ -99,7 +132,7 @@ def test_every_option_of_every_command_is_explained(name: str) -> None:
     assert [o.name for o in options if not o.help] == []
     names = [name for o in options for name in (*o.opts, *o.secondary_opts)]
     assert len(names) == len(set(names))
-    assert CliRunner().invoke(ptm, [name, "--help"], obj=Voice()).exit_code == 0
+    assert CliRunner().invoke(ptm, [name, "--help"], obj=Console()).exit_code == 0
 
 
 def test_version_and_help_load_nothing_heavy() -> None:

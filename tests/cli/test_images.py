@@ -195,7 +195,7 @@ def test_sizes_are_printed_beside_those_of_the_input(
     stored, given = os.path.getsize("new/l.ptm"), os.path.getsize("l.jpg")
     assert first.endswith(f", {stored / given:.1f} times l.jpg ({given / 1000:.1f} kB)")
     assert f"% of a.png ({os.path.getsize('a.png') / 1000:.1f} kB)" in second
-    assert hint.startswith("hint: JPEG files are small because")
+    assert hint.startswith("hint: JPEG files discard detail")
     assert "--max-error 4" in hint
     assert main(["encode", "a.png", "n.webp", "-o", "new", "--force"]) == 0
     assert main(["encode", "l.jpg", "-o", "new", "--force", "--max-error", "1"]) == 0
@@ -223,7 +223,7 @@ def test_sizes_are_printed_beside_those_of_the_input(
         (17, None),
         (34, None),
         (99, None),
-        (1, "no level is within --max-side 1; the coarsest, 2 x 1, is kept"),
+        (1, "all levels exceed --max-side 1; the coarsest, 2 x 1, is kept"),
     ],
 )
 def test_the_side_that_was_chosen(

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from ptmtools.cli.console import Console, printable
 from ptmtools.cli.main import main
-from ptmtools.cli.output import Voice, printable
 from ptmtools.pipeline.stages import STAGES
 
 
@@ -27,8 +27,8 @@ def test_names_are_shown_harmlessly(
     text: str, shown: str, capsysbinary: pytest.CaptureFixture[bytes]
 ) -> None:
     assert printable(text) == shown
-    Voice().say(text)
-    Voice().warn(text)
+    Console().print(text)
+    Console().warn(text)
     printed = capsysbinary.readouterr()
     assert printed.out.decode() == shown + "\n"
     assert printed.err.decode() == f"ptm: {shown}\n"
@@ -36,7 +36,7 @@ def test_names_are_shown_harmlessly(
 
 def test_json_of_what_is_no_text(capsysbinary: pytest.CaptureFixture[bytes]) -> None:
     document = {"name": "\ud800\x1b ☃"}
-    Voice().emit_json(document)
+    Console().json(document)
     out = capsysbinary.readouterr().out
     assert json.loads(out) == document
     assert "☃".encode() in out

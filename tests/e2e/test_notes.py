@@ -34,14 +34,14 @@ def test_warnings_come_with_their_stage_and_notes_are_counted(ptm: Ptm, lying: P
     assert lines[0].startswith("scene ")
     assert lines[1].startswith("warning: the format has y up, but the model seems to lie on its")
     assert lines[2].startswith("cells ")
-    assert lines[-1].endswith(" further notes; -v lists them")
+    assert lines[-1].endswith(" more notes; -v lists them")
     assert "note: " not in done.out
 
     again = ptm("cells", lying, "-v").out.splitlines()
     assert again[0].startswith("scene     unchanged")
     assert again[1] == lines[1]
     notes = [line for line in again if line.startswith("note: ")]
-    assert f"{len(notes)} further notes; -v lists them" == lines[-1]
+    assert f"{len(notes)} more notes; -v lists them" == lines[-1]
     for verbose in ([], ["-v"]):
         told = ptm("info", lying.with_suffix(".db"), *verbose).out
         assert told.count(lines[1].removeprefix("warning: ")) == 1

@@ -40,7 +40,7 @@ def test_a_walk_that_is_too_short_for_all_rooms(
     assert main(["path", str(db), "-o", str(tmp_path / "walk.json"), "--duration", "1"]) == 0
     said = capsys.readouterr().out
     assert "1 of 2 rooms" in said
-    assert "1 room more with a longer --duration\n" in said
+    assert "a longer --duration visits 1 more room\n" in said
 
 
 def test_options_and_json(db: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -108,7 +108,7 @@ def test_rooms_that_cannot_be_reached(
     assert main(["path", str(db), "-o", str(tmp_path / "w.json")]) == 0
     first, second = capsys.readouterr().out.splitlines()
     assert "1 of 2 rooms" in first
-    assert second.startswith("no way on foot, at the height of eyes, to 1 room: cell ")
+    assert second.startswith("not reachable on foot, at eye height: 1 room, cell ")
 
 
 def test_a_walk_in_the_plan(db: Path, tmp_path: Path) -> None:

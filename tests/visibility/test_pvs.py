@@ -248,4 +248,4 @@ def test_the_deprecated_option_is_accepted_with_a_note(tmp_path, capsys):
     assert PvsOptions(exact=False) == PvsOptions()
     for option, noted in (("--no-pvs-exact", True), ("--pvs-exact", False)):
         main(["pvs", str(tmp_path), option])
-        assert ("--no-pvs-exact does nothing any more" in capsys.readouterr().err) is noted
+        assert ("--no-pvs-exact has no effect any more" in capsys.readouterr().err) is noted

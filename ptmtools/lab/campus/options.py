@@ -1,14 +1,15 @@
-"""What a walk through a campus depends on, beside the campus and the walk."""
+"""Options of a walk through a campus."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 from ptmtools.errors import InputError
 from ptmtools.lab.network import Conditions
 from ptmtools.link import Trace
 from ptmtools.neighbours.campus.model import PRESETS, Quality
+from ptmtools.options import option
 from ptmtools.quantities import MemorySize, parse_bandwidth, parse_duration, parse_memory
 
 #: High detail for so many of the nearest objects (the paper's IV).
@@ -21,7 +22,7 @@ MOVE = 2.0
 
 @dataclass(frozen=True)
 class Choice:
-    """A preset, and what is said of it where it is chosen."""
+    """A preset and its description in ``--help``."""
 
     quality: Quality
 
@@ -38,40 +39,44 @@ QUALITIES = {quality.name.lower().replace(" ", "-"): Choice(quality) for quality
 
 @dataclass(frozen=True)
 class CampusWalkOptions:
-    """How somebody walks through a campus.
+    """Options of a walk through a campus.
 
-    Attributes
-    ----------
-    preset: sides of textures and of lightmaps, texels, with commas in between
-    bandwidth: of the link, bit/s, such as 512k, 4M (powers of ten) or inf.
-    latency: from a request to the first byte of its response, such as 100ms or 0.1.
-    overhead: bytes of headers a request.
-    protocol: h1, connections that share the link, or h2, one with priorities.
-    memory: for meshes, textures and lightmaps, such as 64MiB, or inf.
-    nearest: so many objects are shown in high detail.
-    threads: so many objects are loaded at a time.
-    move: objects are sorted again when the viewpoint has moved so far, metres.
-    lightmaps: load them, if the campus has some.
-    stored: count meshes and index as they lie, and not as a server sends them, by gzip.
-
-    Raises InputError: PTM-I711 a link that cannot be; PTM-I712 a word that is no such quantity;
-    PTM-I713 another option that is out of range.
+    Raises InputError: PTM-I711 an impossible link; PTM-I712 an unreadable quantity; PTM-I713
+    another value out of range.
     """
 
-    preset: str = field(
-        default="low,medium,high,ultra,ultra-cached",
-        metadata={"choices": QUALITIES, "several": True},
+    heading: ClassVar[str] = "Client and link"
+
+    preset: str = option(
+        "low,medium,high,ultra,ultra-cached",
+        "Sides of textures and of lightmaps, in texels",
+        choices=QUALITIES,
+        several=True,
     )
-    bandwidth: str = "4M"
-    latency: str = "100ms"
-    overhead: int = 300
-    protocol: Literal["h1", "h2"] = "h1"
-    memory: str = "inf"
-    nearest: int = NEAREST
-    threads: int = THREADS
-    move: float = MOVE
-    lightmaps: bool = True
-    stored: bool = False
+    bandwidth: str = option(
+        "4M",
+        "Bandwidth of the link in bit/s: 56k, 4M (powers of ten) or inf.",
+        metavar="RATE",
+    )
+    latency: str = option(
+        "100ms",
+        "Time from a request to the first byte of its response: 100ms or 0.1.",
+        metavar="TIME",
+    )
+    overhead: int = option(300, "Size of the headers of a request.", metavar="BYTES")
+    protocol: Literal["h1", "h2"] = option(
+        "h1", "Connections that share the link (h1), or one connection with priorities (h2)."
+    )
+    memory: str = option(
+        "inf", "Memory for meshes, textures and lightmaps: 64MiB or inf.", metavar="SIZE"
+    )
+    nearest: int = option(NEAREST, "Number of nearest objects shown in high detail.")
+    threads: int = option(THREADS, "Number of objects loaded at a time.")
+    move: float = option(
+        MOVE, "Distance after which the client sorts the objects again.", metavar="METRES"
+    )
+    lightmaps: bool = option(True, "Load the lightmaps of the campus.")
+    stored: bool = option(False, "Count meshes and index as stored, not as compressed by a server.")
 
     def __post_init__(self) -> None:
         self.link()

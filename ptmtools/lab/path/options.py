@@ -1,44 +1,50 @@
-"""What may be asked of a walk."""
+"""Options of a walk through a database."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 from ptmtools.cells.options import Walker
 from ptmtools.errors import InputError
+from ptmtools.options import degrees_text, option
 from ptmtools.output.model import EmitOptions
 
-#: Nobody walks longer, seconds.
+#: Longest walk, seconds.
 DAY = 86_400.0
 
 
 @dataclass(frozen=True)
 class PathOptions:
-    """
-    Attributes
-    ----------
-    seed: another seed is another walk: 1 begins at the first viewpoint, 2 at the next, and so on;
-        each looks at other pictures first, and glances elsewhere.
-    duration: seconds. A shorter walk ends before it has been everywhere, a longer one goes round
-        again and looks at other pictures. By default as long as every room takes.
-    speed: of walking, in m/s.
-    rate: samples a second.
-    stop: how long to stand before a picture, in seconds, on average.
-    eye: height of the eyes above the floor, in metres. By default 0.94 of the height of the
-        --walker of the cells, as in the hints.
-    field_of_view: vertical, in radians.
-    aspect: width of the picture by its height.
-    """
+    """Options of `path_through`. Raises InputError PTM-I810 for values out of range."""
 
-    seed: int = 1
-    duration: float | None = None
-    speed: float = 1.4
-    rate: float = 10.0
-    stop: float = 5.0
-    eye: float | None = None
-    field_of_view: float = 1.0472
-    aspect: float = 1.7778
+    heading: ClassVar[str] = "Walk"
+
+    seed: int = option(
+        1,
+        "Seed of the walk: 1 begins at the first viewpoint, 2 at the next, and so on; each looks "
+        "at the pictures in another order.",
+    )
+    duration: float | None = option(
+        None,
+        "Length of the walk; a longer one than needed goes round again. Default: the time that all "
+        "rooms take.",
+        metavar="SECONDS",
+    )
+    speed: float = option(1.4, "Walking speed.", metavar="M/S")
+    rate: float = option(10.0, "Samples per second.")
+    stop: float = option(5.0, "Average stop before a picture.", metavar="SECONDS")
+    eye: float | None = option(
+        None,
+        "Height of the eyes above the floor. Default: 0.94 of the height of --walker, as in the "
+        "hints.",
+        metavar="METRES",
+    )
+    field_of_view: float = option(
+        1.0472, "Vertical field of view.", metavar="DEGREES", degrees=True
+    )
+    aspect: float = option(1.7778, "Width of the picture divided by its height.")
 
     def __post_init__(self) -> None:
         wrong = None
@@ -53,16 +59,18 @@ class PathOptions:
         elif not 0 <= self.stop <= DAY:
             wrong = f"--stop {self.stop:g} is not between 0 and {DAY:g} seconds"
         elif not 0 < self.field_of_view < math.pi:
-            wrong = f"a field of view of {self.field_of_view:g} is not between 0 and pi radians"
+            wrong = (
+                f"a field of view of {degrees_text(self.field_of_view)}° is not between 0 and 180"
+            )
         elif not 0 < self.aspect < math.inf:
             wrong = f"an aspect of {self.aspect:g} is not above 0"
         if wrong:
             raise _out_of_range(wrong)
 
     def eye_height(self, walker: Walker) -> float:
-        """Metres above the floor, of whoever walks in the cells.
+        """Height of the eyes above the floor, metres, for the visitor of the cells.
 
-        Raises InputError PTM-I810: his eyes cannot be there.
+        Raises InputError PTM-I810 if it is not above a step, or too high for the visitor.
         """
         eye = EmitOptions().avatar(walker)[1] if self.eye is None else self.eye
         if not walker.step < eye <= walker.reach:

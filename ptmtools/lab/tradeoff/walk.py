@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +33,7 @@ from ptmtools.lab.tradeoff.knobs import (
 )
 from ptmtools.lab.walk import Walk
 from ptmtools.lab.world import World, prepare
+from ptmtools.options import option
 from ptmtools.output.served import Served, Surfaces, read_served
 from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.build import WARM_UP
@@ -50,10 +51,14 @@ _OF_DATABASES = {name: policy for name, policy in POLICIES.items() if policy.for
 
 @dataclass(frozen=True)
 class WalkOptions(SimulateOptions):
-    """Who walks, over what; everything else as in `SimulateOptions`."""
+    """`SimulateOptions` with other defaults."""
 
-    policy: str = field(default="best", metadata={"choices": _OF_DATABASES, "several": True})
-    memory: str = "10%"
+    policy: str = option("best", "Policies of the clients", choices=_OF_DATABASES, several=True)
+    memory: str = option(
+        "10%",
+        "Texture memory: 4MiB, 10% of that of all textures, or inf; one or several with commas.",
+        metavar="SIZE[,SIZE]",
+    )
 
 
 @dataclass(frozen=True)

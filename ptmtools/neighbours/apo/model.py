@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.neighbours.apo.options import RANGES, check_range
+from ptmtools.options import option
 
 #: Bits of the address of a child, and so the most texels.
 ADDRESS_BITS = 24
@@ -17,28 +18,27 @@ ADDRESS_BITS = 24
 
 @dataclass(frozen=True)
 class ApoOptions:
-    """
-    Attributes
-    ----------
-    faces: of the simplified mesh, at most.
-    error: leaves are divided while the normals in them deviate more than this from their mean: the
-        root mean square of the length of the difference, 0 to 2.
-    depth: greatest depth of leaves; a leaf of depth 13 is 1/8192 of the cube wide.
-    density: samples for each triangle of the source, on average.
-    method: what simplifies; meshlab is pymeshlab, as the paper's tool.
-    color: also keep the colours of vertices or of the texture, which the paper leaves for later.
-    color_error: the same for colours, as a share of the full range.
+    """Options of `make_apo`. Raises InputError PTM-I840 for values out of range."""
 
-    Raises InputError PTM-I840 for what is out of range.
-    """
+    heading: ClassVar[str] = "Octree texture"
 
-    faces: int = 10_000
-    error: float = 0.05
-    depth: int = 13
-    density: float = 8.0
-    method: Literal["quadric", "meshlab"] = "quadric"
-    color: bool = False
-    color_error: float = 0.05
+    faces: int = option(10_000, "Most faces of the simplified mesh.")
+    error: float = option(
+        0.05,
+        "Divide leaves of the octree while the normals in them deviate more than this from their "
+        "mean: root mean square, 0 to 2.",
+    )
+    depth: int = option(
+        13, "Greatest depth of the octree. Leaves of depth 13 are 1/8192 of its cube wide."
+    )
+    density: float = option(8.0, "Samples per triangle of the mesh, on average.")
+    method: Literal["quadric", "meshlab"] = option(
+        "quadric", "Simplification: that of ptmtools, or pymeshlab's, the tool of the paper."
+    )
+    color: bool = option(False, "Also keep the colours of vertices or of the texture.")
+    color_error: float = option(
+        0.05, "The same as --error for colours, as a share of the full range."
+    )
 
     def __post_init__(self) -> None:
         for name in RANGES:

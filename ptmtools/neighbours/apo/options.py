@@ -1,15 +1,17 @@
-"""What is asked for when objects of a building are replaced; see
+"""Options for the replacement of objects by octree textures; see
 `ptmtools.neighbours.apo.replacing`."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from ptmtools.errors import InputError
+from ptmtools.options import option
 
 #: The greatest depth: Morton codes of three times as many bits stay within 63.
 DEEPEST = 20
-#: Of each option the least and the most.
+#: Option → (least, most).
 RANGES: dict[str, tuple[float, float]] = {
     "faces": (4, 10_000_000),
     "error": (0.0, 2.0),
@@ -33,27 +35,31 @@ def check_range(name: str, value: float, prefix: str = "") -> None:
 
 @dataclass(frozen=True)
 class ReplaceOptions:
-    """Which objects are replaced by a simplified mesh and an octree texture, and how fine.
+    """Objects to replace by a simplified mesh and an octree texture, and their accuracy.
 
-    Attributes
-    ----------
-    apo: replace these objects (names, with * and ?), such as scanned statues, by a mesh of few
-        triangles, and write an octree of their normals for clients that can draw one. May be given
-        several times.
-    apo_faces: of each simplified mesh, at most. Objects with no more triangles stay as they are.
-    apo_error: leaves of an octree are divided while the normals in them deviate more than this from
-        their mean: the root mean square of the length of the difference, 0 to 2.
-    apo_depth: greatest depth of the leaves; one of depth 11 is 1/2048 of the object wide.
-    apo_density: samples for each triangle of an object, on average.
-
-    Raises InputError PTM-I840 for what is out of range, or of no object.
+    Raises InputError PTM-I840 for values out of range, or without an object.
     """
 
-    apo: tuple[str, ...] = ()
-    apo_faces: int = 2_000
-    apo_error: float = 0.05
-    apo_depth: int = 11
-    apo_density: float = 8.0
+    heading: ClassVar[str] = "Octree textures"
+
+    apo: tuple[str, ...] = option(
+        (),
+        "Replace these objects (names, with * and ?), such as scanned statues, by a light mesh, "
+        "and write an octree of their normals. Repeatable.",
+        metavar="NAME",
+    )
+    apo_faces: int = option(
+        2_000, "Most faces of a simplified mesh. Objects with fewer triangles stay unchanged."
+    )
+    apo_error: float = option(
+        0.05,
+        "Divide leaves of the octree while the normals in them deviate more than this from their "
+        "mean: root mean square, 0 to 2.",
+    )
+    apo_depth: int = option(
+        11, "Greatest depth of the octree. Leaves of depth 11 are 1/2048 of the object wide."
+    )
+    apo_density: float = option(8.0, "Samples per triangle of an object, on average.")
 
     def __post_init__(self) -> None:
         for name in ("faces", "error", "depth", "density"):
@@ -62,5 +68,5 @@ class ReplaceOptions:
                 raise InputError(
                     "PTM-I840",
                     f"--apo-{name} does nothing without --apo",
-                    remedy="name the objects that it is for with --apo",
+                    remedy="name the objects with --apo",
                 )

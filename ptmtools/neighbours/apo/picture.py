@@ -9,7 +9,7 @@ How pictures of octree textures are lit, and what a picture is made of."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.neighbours.apo.model import Octree
+from ptmtools.options import option
 
 #: Vertical, degrees.
 FIELD_OF_VIEW = 35.0
@@ -179,28 +180,33 @@ WIDEST = 4096
 
 @dataclass(frozen=True)
 class RenderOptions:
-    """
-    Attributes
-    ----------
-    levels: of the octree that are there, from the root on; 0 shows the mesh's own normals.
-    azimuth: where the view is taken from, degrees around the Y axis: 0 is +Z, 90 is +X.
-    elevation: and degrees above the horizon.
-    distance: from the middle of the mesh, in diameters of it; 0 takes the least that shows all.
-    field_of_view: vertical, degrees.
-    width, height: pixels.
-    what: the mesh as lit from the upper left, or the normals as they are stored.
-    backend: what draws: gl is OpenGL, embree rays, auto what is there.
-    """
+    """Options of `render`. Raises InputError PTM-I860 for values out of range."""
 
-    levels: int | None = None
-    azimuth: float = 25.0
-    elevation: float = 15.0
-    distance: float = 0.0
-    field_of_view: float = FIELD_OF_VIEW
-    width: int = 1024
-    height: int = 1024
-    what: Literal["shaded", "normals"] = "shaded"
-    backend: Literal["auto", "gl", "embree"] = "auto"
+    heading: ClassVar[str] = "Picture of an octree texture"
+
+    levels: int | None = option(
+        None, "Levels of the octree to draw, from the root on; 0 draws the normals of the mesh."
+    )
+    azimuth: float = option(
+        25.0,
+        "Direction of the view around the Y axis: 0 is from +Z, 90 from +X.",
+        metavar="DEGREES",
+    )
+    elevation: float = option(15.0, "Direction of the view above the horizon.", metavar="DEGREES")
+    distance: float = option(
+        0.0,
+        "Distance from the centre of the mesh, in diameters; 0 for the smallest that shows all of "
+        "it.",
+    )
+    field_of_view: float = option(FIELD_OF_VIEW, "Vertical field of view.", metavar="DEGREES")
+    width: int = option(1024, "Width of the picture.", metavar="PIXELS")
+    height: int = option(1024, "Height of the picture.", metavar="PIXELS")
+    what: Literal["shaded", "normals"] = option(
+        "shaded", "Draw the mesh lit from the upper left, or its normals as colours."
+    )
+    backend: Literal["auto", "gl", "embree"] = option(
+        "auto", "Renderer: OpenGL, rays on the processor, or whichever can run here."
+    )
 
     def __post_init__(self) -> None:
         _check(self)

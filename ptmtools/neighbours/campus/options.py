@@ -1,11 +1,12 @@
-"""The knobs of `ptm campus`."""
+"""Options of `ptm campus`."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 from ptmtools.errors import InputError
+from ptmtools.options import option
 
 #: Most levels of detail, and most rays for a point of a lightmap.
 MAX_LODS, MAX_SAMPLES = 8, 4096
@@ -13,34 +14,40 @@ MAX_LODS, MAX_SAMPLES = 8, 4096
 
 @dataclass(frozen=True)
 class CampusOptions:
-    """How a model becomes a campus.
+    """Options of `make_campus`. Raises InputError PTM-I830 for values out of range."""
 
-    Attributes
-    ----------
-    lods: meshes of each object, from the coarsest to the finest. The finest is the model's own.
-    ratio: faces of a mesh, as a share of those of the next finer one.
-    faces: no mesh is simplified to fewer faces than this.
-    error: the greatest error of a step of a simplification, as a share of the diagonal of the
-        object's box; more faces are left where it would be exceeded.
-    small: objects smaller than this, the diagonal of their box in metres, are joined with their
-        small neighbours; 0 joins none.
-    lightmaps: where they come from: bake computes how much of the sky each point sees, model takes
-        those of a glTF model, none leaves them out.
-    samples: rays for each point of a baked lightmap.
-    reach: what is farther away than this, in metres, takes no light; inf is plain ambient
-        occlusion.
-    quality: of the JPEG files, 1 to 95.
-    """
+    heading: ClassVar[str] = "Campus"
 
-    lods: int = 2
-    ratio: float = 0.1
-    faces: int = 100
-    error: float = 0.01
-    small: float = 10.0
-    lightmaps: Literal["bake", "model", "none"] = "bake"
-    samples: int = 64
-    reach: float = 20.0
-    quality: int = 85
+    lods: int = option(
+        2, "Meshes of each object, from the coarsest to the finest, which is that of the model."
+    )
+    ratio: float = option(
+        0.1, "Faces of a mesh as a share of those of the next finer one.", metavar="SHARE"
+    )
+    faces: int = option(100, "Smallest number of faces of a simplified mesh.")
+    error: float = option(
+        0.01,
+        "Greatest error of a step of the simplification, as a share of the diagonal of the "
+        "object's box.",
+        metavar="SHARE",
+    )
+    small: float = option(
+        10.0,
+        "Join objects with a box diagonal below this with small neighbours; 0 joins none.",
+        metavar="METRES",
+    )
+    lightmaps: Literal["bake", "model", "none"] = option(
+        "bake",
+        "Lightmaps: computed from the share of the sky that each point sees, taken from a glTF "
+        "model, or none.",
+    )
+    samples: int = option(64, "Rays for each point of a baked lightmap.")
+    reach: float = option(
+        20.0,
+        "Distance beyond which surfaces cast no shadow; inf is plain ambient occlusion.",
+        metavar="METRES",
+    )
+    quality: int = option(85, "Quality of the JPEG files, 1 to 95.")
 
     def __post_init__(self) -> None:
         no_end = self.reach == float("inf")

@@ -9,10 +9,11 @@ smaller than twice the minimum is one.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
 
 from ptmtools.neighbours.interlace.containers import CONTAINERS
+from ptmtools.options import option
 
 #: The index of a folder, and what it says of itself.
 INDEX, FORMAT, SCHEMA = "interlace.json", "ptmtools interlaced image", 1
@@ -23,18 +24,13 @@ Size = tuple[int, int]
 
 @dataclass(frozen=True)
 class InterlaceOptions:
-    """How an image is interlaced.
+    """Options of `interlace`."""
 
-    Attributes
-    ----------
-    min: no side is halved below this, texels (pixels of a texture).
-    format: of the files
-    quality: of JPEG files, 1 to 100.
-    """
+    heading: ClassVar[str] = "Interlaced image"
 
-    min: int = 128
-    format: str = field(default="png", metadata={"choices": CONTAINERS})
-    quality: int = 90
+    min: int = option(128, "Smallest side of the first file.", metavar="TEXELS")
+    format: str = option("png", "Format of the files", choices=CONTAINERS)
+    quality: int = option(90, "Quality of JPEG files, 1 to 100.")
 
 
 @dataclass(frozen=True)

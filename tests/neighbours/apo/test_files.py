@@ -273,12 +273,12 @@ def test_from_a_mesh_to_a_picture(
     assert run("info", target) == 0
     assert "octree texture" in capsys.readouterr().out
     small = ["--width", 64, "--height", 48, "--backend", "embree"]
-    assert run("apo", target, "--render", view, "--levels", 3, *small) == 0
-    assert "by 3 of 5 levels" in capsys.readouterr().out
+    assert run("render", target, "-o", view, "--levels", 3, *small) == 0
+    assert "3 of 5 levels" in capsys.readouterr().out
     from PIL import Image
 
     assert Image.open(view).size == (64, 48)
-    assert run("apo", target, "--render", view, *small) == 4  # it is there already
+    assert run("render", target, "-o", view, *small) == 4  # it exists
     assert run("apo", model, "-o", target, *options) == 4
     before = {file.name: file.read_bytes() for file in target.iterdir()}
     assert run("apo", model, "-o", target, *options, "-j", 1, "--force") == 0
@@ -299,8 +299,17 @@ def test_a_picture_and_the_record(
 ) -> None:
     view = tmp_path / "view.png"
     small = ["--width", 8, "--height", 8, "--backend", "embree"]
-    assert run("apo", written, "--render", view, "--json", *small) == 0
-    assert json.loads(capsys.readouterr().out)["picture"]["file"] == str(view)
+    assert run("render", written, "-o", view, "--json", *small) == 0
+    said = capsys.readouterr()
+    assert (json.loads(said.out)["file"], said.err) == (str(view), "")
+    drawn = view.read_bytes()
+    assert run("apo", written, "--render", view, "--json", "--force", *small) == 0
+    said = capsys.readouterr()
+    assert json.loads(said.out)["picture"]["file"] == str(view)
+    assert said.err == "ptm: note: --render of `ptm apo` is now `ptm render DIR -o VIEW.png`\n"
+    assert view.read_bytes() == drawn
+    assert run("apo", written, "--render", view, "--force", "--faces", 9) == 2
+    assert run("apo", tmp_path, "--render", view, "--force") == 3
 
 
 def test_the_folder_lies_beside_the_mesh_unless_it_is_named(model: Path, tmp_path: Path) -> None:
@@ -325,8 +334,6 @@ def bad_inputs(model: Path, folder: Path, tmp_path: Path) -> list[tuple[list[Any
     (own / "thesis.doc").write_text("mine")
     mixed = Path(shutil.copytree(folder, tmp_path / "mixed.apo"))
     (mixed / "thesis.doc").write_text("mine")
-    no_index = tmp_path / "no_index"
-    no_index.mkdir()
     view = tmp_path / "view.png"
 
     def damaged(name: str, change: Callable[[Path], object]) -> Path:
@@ -352,19 +359,19 @@ def bad_inputs(model: Path, folder: Path, tmp_path: Path) -> list[tuple[list[Any
         (["apo", model, "-o", mixed, "--force"], "PTM-O821"),
         (["apo", model, "-o", model], "PTM-O820"),
         (["apo", model, "-o", tmp_path / "no" / "where"], "PTM-O002"),
-        (["apo", folder, "--render", view, "--levels", "99"], "PTM-I8"),
-        (["apo", folder, "--render", view, "--width", "0"], "PTM-I860"),
-        (["apo", folder, "--render", tmp_path / "no" / "view.png"], "PTM-O002"),
-        (["apo", no_index, "--render", view], "PTM-I"),
-        (["apo", damaged("a", PLANTED["PTM-D851"][0]), "--render", view], "PTM-I842"),
-        (["apo", damaged("b", PLANTED["PTM-D851"][1]), "--render", view], "PTM-I843"),
-        (["apo", damaged("c", PLANTED["PTM-D852"][0]), "--render", view], "PTM-I845"),
-        (["apo", damaged("d", PLANTED["PTM-D850"][0]), "--render", view], "PTM-I844"),
-        (["apo", damaged("e", lambda f: flip(f / MESH, 30)), "--render", view], "PTM-I846"),
+        (["render", folder, "-o", view, "--levels", "99"], "PTM-I8"),
+        (["render", folder, "-o", view, "--width", "0"], "PTM-I860"),
+        (["render", folder, "-o", tmp_path / "no" / "view.png"], "PTM-O002"),
+        (["render", damaged("a", PLANTED["PTM-D851"][0]), "-o", view], "PTM-I842"),
+        (["render", damaged("b", PLANTED["PTM-D851"][1]), "-o", view], "PTM-I843"),
+        (["render", damaged("c", PLANTED["PTM-D852"][0]), "-o", view], "PTM-I845"),
+        (["render", damaged("d", PLANTED["PTM-D850"][0]), "-o", view], "PTM-I844"),
+        (["render", damaged("e", lambda f: flip(f / MESH, 30)), "-o", view], "PTM-I846"),
         (["apo", ""], "PTM-"),
         (["apo", "."], "PTM-"),
-        (["apo", folder, "--render", tmp_path / "view.jpg"], "PTM-O"),
-        (["apo", folder, "--render", view, "--faces", "9"], ""),
+        (["render", folder, "-o", tmp_path / "view.jpg"], "PTM-O"),
+        (["render", folder, "-o", view, "--faces", "9"], ""),
+        (["render", folder, "-o", view, "--eye", "0,0,0"], "PTM-U001"),
     ]
 
 

@@ -28,7 +28,7 @@ def test_there_and_back(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = capsys.readouterr().out
     assert out.startswith("wall: 128 x 64, 5 files, ")
     assert "of wall.png" in out
-    assert "the first, 32 x 16, has" in out
+    assert "first file 32 x 16, " in out
     assert len(out.splitlines()) == 1
     assert sorted(files_below(here / "wall")) == [*(f"{n}.png" for n in range(1, 6))] + [
         "interlace.json"

@@ -1,4 +1,4 @@
-"""The commands that check what was written, and that draw a database."""
+"""`ptm validate` and `ptm plot`."""
 
 from __future__ import annotations
 
@@ -11,9 +11,19 @@ from typing import Any
 import click
 
 from ptmtools.cli.batch import no_name
-from ptmtools.cli.common import as_json, database, forced, limited, voiced, workers
-from ptmtools.cli.output import Voice
-from ptmtools.cli.parameters import options_of, take
+from ptmtools.cli.console import Console
+from ptmtools.cli.parameters import (
+    Command,
+    database_argument,
+    force_option,
+    jobs_option,
+    json_option,
+    limit_option,
+    option,
+    options_of,
+    take,
+    with_console,
+)
 from ptmtools.diagnostics import ValidationReport
 from ptmtools.errors import CheckError
 from ptmtools.output import PlotOptions
@@ -26,10 +36,8 @@ from ptmtools.quantities import count, size
 from ptmtools.texture.model import Limits
 from ptmtools.visibility import SegmentReport
 
-#: So many findings are shown without ``-v``; if there are more, of each file the worst.
+#: Findings that are printed without ``-v``; of more, the worst of each file.
 SHOWN = 20
-
-target = click.argument("target", metavar="FILE|DB", type=click.Path())
 
 
 def _print_codes(context: click.Context, option: click.Option, asked: bool) -> None:
@@ -37,37 +45,37 @@ def _print_codes(context: click.Context, option: click.Option, asked: bool) -> N
         from ptmtools.output.validation.findings import CODES
 
         tables = (CODES, *(kind.codes.load() for kind in FOLDERS.values()))
-        every = {code: found for table in tables for code, found in table.items()}
+        every = {code: entry for table in tables for code, entry in table.items()}
         for code, (severity, meaning) in sorted(every.items()):
             click.echo(f"{code}  {severity:<7}  {meaning}")
         context.exit()
 
 
-@click.command("validate")
-@target
-@click.option(
+@click.command("validate", cls=Command)
+@click.argument("target", metavar="FILE|DB", type=click.Path())
+@option(
     "--segments",
     type=click.IntRange(0),
     default=0,
     metavar="N",
-    help="Also try N random lines between points in cells: if nothing is in the way, each of the "
-    "two cells must be in the other's visible set.",
+    help="Also test N random lines between points in cells: where nothing blocks the line, each of "
+    "the two cells must be in the visible set of the other.",
 )
-@click.option("--strict / --no-strict", help="Fail on warnings too.")
-@click.option(
+@option("--strict/--no-strict", help="Fail on warnings too.")
+@option(
     "--codes",
     is_flag=True,
     is_eager=True,
     expose_value=False,
     callback=_print_codes,
-    help="List the codes of all findings with their meaning, and exit.",
+    help="List the codes of all findings and exit.",
 )
-@limited
-@workers
-@as_json
-@voiced
+@limit_option
+@jobs_option
+@json_option
+@with_console
 def validate(
-    voice: Voice,
+    console: Console,
     target: str,
     segments: int,
     strict: bool,
@@ -75,25 +83,25 @@ def validate(
     workers: int,
     as_json: bool,
 ) -> None:
-    """Check a database, another folder that ptm has written, or a .ptm file.
+    """Check a database, another folder written by ptm, or a .ptm file.
 
-    Prints the worst finding of each file first, and ends with the command that repairs them. The
-    exit status is 8 if there is an error.
+    Prints the worst finding of each file first, and the command that repairs them at the end. The
+    exit status is 8 if there are errors.
     """
     if not target:
         raise no_name()
-    with voice.progress() as progress:
+    with console.progress() as progress:
         report = check(target, progress, limits=limits, workers=workers)
         shot = shoot_segments(target, segments, progress) if segments else None
     failed = report.error_count + (report.warning_count if strict else 0)
     failed += len(shot.missed) if shot else 0
     if as_json:
-        voice.emit_json(_document(target, report, shot, failed == 0))
+        console.json(_document(target, report, shot, failed == 0))
     else:
-        _print_findings(voice, target, report, shot)
+        _print_findings(console, target, report, shot)
         if shot and shot.tried < segments:
-            voice.warn(
-                f"{segments:,} segments were asked for, but few begin where eyes can be and end in "
+            console.warn(
+                f"only {shot.tried:,} of {segments:,} segments begin at a possible eye and end in "
                 "a cell"
             )
     if failed:
@@ -106,15 +114,19 @@ def validate(
         )
 
 
-@click.command("plot")
-@database
-@click.option("-o", "--output", type=click.Path(), required=True, help="The picture, a PNG.")
+@click.command("plot", cls=Command)
+@database_argument
+@option("-o", "--output", type=click.Path(), required=True, help="Picture to write, a PNG.")
 @options_of(PlotOptions)
-@click.option("--walk", type=click.Path(), help="Also draw the way of this walk; see `ptm path`.")
-@forced
-@voiced
-def plot(voice: Voice, db: str, output: str, walk: str | None, force: bool, **values: Any) -> None:
-    """Draw the floor plan of DB, storey by storey: cells, portals, and with --cell what it sees."""
+@option(
+    "--walk", type=click.Path(), metavar="FILE", help="Also draw this walk, which `ptm path` wrote."
+)
+@force_option()
+@with_console
+def plot(
+    console: Console, db: str, output: str, walk: str | None, force: bool, **values: Any
+) -> None:
+    """Draw the floor plan of DB, storey by storey: cells, portals, and what --cell sees."""
     from ptmtools.lab.walk import read_walk
     from ptmtools.output import plot_plan
 
@@ -131,13 +143,13 @@ def plot(voice: Voice, db: str, output: str, walk: str | None, force: bool, **va
         way=(walked.eye, walked.direction) if walked else None,
         force=force,
     )
-    voice.say(f"{output}: the floor plan of {db}, {count(len(report.floors), 'storey')}")
+    console.print(f"{output}: the floor plan of {db}, {count(len(report.floors), 'storey')}")
 
 
 def _document(
     target: str, report: ValidationReport, shot: SegmentReport | None, ok: bool
 ) -> dict[str, Any]:
-    """The report as JSON has it; its schema is published."""
+    """The report as JSON, which `validation.schema.json` describes."""
     return {
         "format": "ptmtools validation",
         "schema": 1,
@@ -157,18 +169,18 @@ def _document(
 
 
 def _print_findings(
-    voice: Voice, target: str, report: ValidationReport, shot: SegmentReport | None
+    console: Console, target: str, report: ValidationReport, shot: SegmentReport | None
 ) -> None:
-    """All findings, of each file the worst first; of many findings that of each file alone, and how
-    many more it has."""
+    """Prints the findings, the worst of each file first; of many findings, the worst of each file
+    and the number of the others."""
     lines = [str(issue) for issue in report.issues]
-    if len(lines) > SHOWN and not voice.verbose:
-        files = [list(found) for _, found in groupby(report.issues, lambda issue: issue.file)]
-        files.sort(key=lambda found: found[0].severity != "error")
-        more = [sum(issue.count for issue in found) - 1 for found in files]
+    if len(lines) > SHOWN and not console.verbose:
+        files = [list(issues) for _, issues in groupby(report.issues, lambda issue: issue.file)]
+        files.sort(key=lambda issues: issues[0].severity != "error")
+        more = [sum(issue.count for issue in issues) - 1 for issues in files]
         lines = [
-            f"{found[0]}{f' and {n:,} more' if n else ''}"
-            for found, n in zip(files[:SHOWN], more, strict=False)
+            f"{issues[0]}{f' and {n:,} more' if n else ''}"
+            for issues, n in zip(files[:SHOWN], more, strict=False)
         ]
         if rest := len(files) - len(lines):
             lines.append(f"findings in {count(rest, 'more file')}")
@@ -176,8 +188,8 @@ def _print_findings(
     for pair in shot.missed if shot else ():
         a, b = pair.cells
         lines.append(
-            f"{target}: error: cells {a} and {b} see each other, but are not in each other's "
-            "visible sets"
+            f"{target}: error: a free line connects cells {a} and {b}, which are not in each "
+            "other's visible sets"
         )
     if shot:
         lines.append(
@@ -187,15 +199,15 @@ def _print_findings(
         )
     lines += [f"note: {note}" for note in report.notes]
     for line in lines:
-        voice.say(line)
-    voice.say(
+        console.print(line)
+    console.print(
         f"{target}: {count(report.files, 'file')}, {size(report.bytes)}; "
         f"{count(report.error_count, 'error')}, {count(report.warning_count, 'warning')}"
     )
 
 
 def _repair(target: str, report: ValidationReport) -> str | None:
-    """The command that makes good what was found, if one does."""
+    """The command that repairs the findings, if there is one."""
     codes = {issue.code for issue in report.issues}
     if not codes - NOT_BUILT:
         return None
@@ -206,6 +218,6 @@ def _repair(target: str, report: ValidationReport) -> str | None:
         return f"{kind.again} -o {shlex.quote(target)} --force"
     if "PTM-D650" in codes:
         return f"{build_command(target)} --rebuild --force"
-    # A file that is as it was written is made again only when that is asked for.
+    # A build does not notice a file that is as it was written.
     seen = codes - NOT_BUILT <= SEEN_BY_BUILD
     return build_command(target) + ("" if seen else " --rebuild")

@@ -1,0 +1,342 @@
+"""Commands that build a database: `ptm build-scene`, one for each stage, `status` and `warm-up`."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from itertools import zip_longest
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ptmtools.cli.console import Console
+from ptmtools.cli.parameters import (
+    Command,
+    cluster_options,
+    database_argument,
+    force_option,
+    jobs_option,
+    json_option,
+    new_database_option,
+    option,
+    options_of,
+    take,
+    with_console,
+)
+from ptmtools.lazy import Lazy
+from ptmtools.output.emitters import GLTF
+from ptmtools.pipeline.build import Visitor, build_scene as build, run_stage
+from ptmtools.pipeline.command import build_command, open_database
+from ptmtools.pipeline.report import BuildReport, StageReport
+from ptmtools.pipeline.run import NEVER_RUN, Artifacts
+from ptmtools.pipeline.stage import Stage
+from ptmtools.pipeline.stages import CELLS, EMIT, PVS, STAGES
+from ptmtools.quantities import count, size
+from ptmtools.store.layout import SERVED
+
+if TYPE_CHECKING:
+    from ptmtools.pipeline.build import StagePlan
+
+
+@dataclass(frozen=True)
+class ReportKind:
+    """The report of ``ptm STAGE DB --report``.
+
+    Attributes
+    ----------
+    help: the text of ``--help``.
+    reads: the stages whose artifacts the report describes.
+    report: computes it, a dataclass, from those artifacts.
+    lines: formats it as lines of text.
+    """
+
+    help: str
+    reads: tuple[Stage[Any], ...]
+    report: Lazy[Callable[..., Any]]
+    lines: Lazy[Callable[..., Iterable[str]]]
+
+
+REPORTS = {
+    PVS: ReportKind(
+        "Print the sizes of the sets, the most expensive portals, and openings through which "
+        "suspiciously much is visible.",
+        (CELLS, PVS),
+        Lazy("ptmtools.visibility.report:report"),
+        Lazy("ptmtools.visibility.report:report_lines"),
+    )
+}
+#: Textures that are listed without ``-v``.
+SHOWN_TEXTURES = 5
+
+_PLANNED = {"current": "unchanged", "run": "would run", "maybe": "may run"}
+
+
+def build_scene() -> click.Command:
+    """The command that runs all stages, with the options of all."""
+    return click.command("build-scene", cls=Command)(_from_model(None))
+
+
+def stage_command(stage: Stage[Any]) -> click.Command:
+    """The command of a stage."""
+    command = _from_model(stage) if stage.from_model else _of_database(stage)
+    return click.command(stage.name, cls=Command, help=stage.about)(command)
+
+
+def _from_model(last: Stage[Any] | None) -> Callable[..., None]:
+    """The function of a command that reads a model and runs all stages, or those up to ``last``."""
+    stages = list(STAGES.values())
+    stages = stages[: stages.index(last) + 1] if last else stages
+
+    @click.argument("model", type=click.Path())
+    @new_database_option
+    @options_of(*(stage.options for stage in stages), layered=last is None)
+    @(jobs_option if last else cluster_options)
+    @force_option(
+        "Replace the database of another model, or write into a folder that is not a database."
+    )
+    @option("--rebuild", is_flag=True, help="Run all stages, also those that are up to date.")
+    @option("--dry-run", is_flag=True, help="Show which stages would run, and why; write nothing.")
+    @json_option
+    @with_console
+    def command(
+        console: Console,
+        model: str,
+        db: str,
+        as_json: bool,
+        dry_run: bool,
+        rebuild: bool,
+        workers: int,
+        force: bool,
+        scheduler: str | None = None,
+        **values: Any,
+    ) -> None:
+        """Build a database from MODEL, or bring it up to date.
+
+        MODEL is an OBJ, glTF or GLB file, or of a format that trimesh, pymeshlab, IfcOpenShell or
+        usd-core reads. The database is a folder. A second run repeats only the stages whose input
+        or options have changed.
+        """
+        options: list[Any] = [take(stage.options, values) for stage in stages]
+        if dry_run:
+            from ptmtools.pipeline.build import plan_build
+
+            plans = plan_build(model, db, *options, force=force)
+            print_plan(console, plans[: len(stages)], as_json)
+            return
+        with console.progress() as progress:
+            report = build(
+                model,
+                db,
+                *options,
+                until=last,
+                workers=workers,
+                scheduler=scheduler,
+                force=force,
+                rebuild=rebuild,
+                progress=progress,
+                tell=partial(_print_stage, console, as_json),
+            )
+        print_report(console, report, as_json)
+
+    return command
+
+
+def _of_database(stage: Stage[Any]) -> Callable[..., None]:
+    """The function of a command that runs one stage of a database."""
+
+    @database_argument
+    @options_of(stage.options)
+    @cluster_options
+    @json_option
+    @with_console
+    def command(
+        console: Console,
+        db: str,
+        as_json: bool,
+        workers: int,
+        scheduler: str | None,
+        wanted: bool = False,
+        **values: Any,
+    ) -> None:
+        with console.progress() as progress:
+            report = run_stage(
+                db,
+                take(stage.options, values),
+                workers=workers,
+                scheduler=scheduler,
+                progress=progress,
+                tell=partial(_print_stage, console, as_json),
+            )
+        if not wanted:
+            print_report(console, report, as_json)
+            return
+        kind, artifacts = REPORTS[stage], Artifacts(open_database(db))
+        details = kind.report.load()(*(artifacts[read] for read in kind.reads))
+        if as_json:
+            console.json(asdict(details))
+            return
+        print_report(console, report, as_json)
+        for line in kind.lines.load()(details, verbose=console.verbose):
+            console.print(line)
+
+    if stage in REPORTS:
+        return option("--report", "wanted", is_flag=True, help=REPORTS[stage].help)(command)
+    return command
+
+
+@click.command("status", cls=Command)
+@database_argument
+@json_option
+@with_console
+def status(console: Console, db: str, as_json: bool) -> None:
+    """Show which stages of DB are done, stale or damaged, and which process is writing it."""
+    from ptmtools.pipeline.status import database_status
+
+    state = database_status(db)
+    if as_json:
+        console.json({"schema": 1, **asdict(state)})
+        return
+    model = f"database of {state.model}" if state.model else "no stage has finished yet"
+    console.print(f"{db}: {model}")
+    for stage in state.stages:
+        summary = STAGES[stage.stage].summarize(stage.counts) if stage.counts else ""
+        files = f"{count(stage.files, 'file')}, {size(stage.bytes)}" if stage.files else ""
+        line = f"{stage.stage:<9}{stage.state:>8}   {files:<22} {stage.why or summary}"
+        console.print(line.rstrip())
+    if state.writer:
+        console.print(f"locked by {state.writer}, which is writing it")
+    if state.interrupted:
+        kept = f"; the next one keeps {count(state.waiting, 'finished texture')}"
+        console.print(f"a run was interrupted{kept if state.waiting else ''}")
+    if not state.finished and not state.writer:
+        console.print(f"not finished: run `{build_command(db)}`")
+
+
+@click.command("warm-up", cls=Command)
+@with_console
+def warm_up(console: Console) -> None:
+    """Compile the code that the first build, encoding or octree texture would compile.
+
+    This takes a minute, once per release and user. A first build compiles beside its work; use this
+    command for images of containers.
+    """
+    from ptmtools.ahead import compile_now
+    from ptmtools.pipeline.build import WARM_UP
+
+    start = time.perf_counter()
+    octrees: Lazy[Callable[[], object]] = Lazy("ptmtools.neighbours.apo.warm_up:warm_up")
+    compiled = [compile_now(task) for task in (WARM_UP, octrees)]
+    seconds = time.perf_counter() - start
+    console.print(f"compiled in {seconds:.1f} s" if any(compiled) else "nothing to compile")
+
+
+def print_plan(console: Console, plans: Sequence[StagePlan], as_json: bool) -> None:
+    """Prints what a build would do."""
+    if as_json:
+        console.json({"schema": 1, "stages": [asdict(plan) for plan in plans]})
+        return
+    for plan in plans:
+        reasons = list(plan.reasons)
+        if plan.textures and plan.plan == "run":
+            shown = plan.textures if console.verbose else plan.textures[:SHOWN_TEXTURES]
+            more = len(plan.textures) - len(shown)
+            names = ", ".join(shown) + (f" and {more:,} more" if more else "")
+            reasons.append(f"encode {count(len(plan.textures), 'texture')}: {names}")
+        first = reasons[0] if reasons else ""
+        console.print(f"{plan.stage:<9}{_PLANNED[plan.plan]:>10}   {first}".rstrip())
+        for line in reasons[1:]:
+            console.print(f"{'':<22}{line}")
+
+
+def _print_stage(console: Console, as_json: bool, stage: StageReport) -> None:
+    """Prints the report of a stage as soon as it has finished."""
+    if as_json:
+        return
+    done = f"{stage.seconds:7.1f} s" if stage.ran else "unchanged"
+    summary = STAGES[stage.stage].summarize(stage.counts)
+    console.print(f"{stage.stage:<9}{done:>10}   {summary}{_tasks(stage)}")
+    if console.verbose or stage.reasons != NEVER_RUN:
+        for reason in stage.reasons:
+            console.print(f"{'':<22}because {reason}")
+    for warning in stage.warnings:
+        console.print(f"warning: {warning}")
+    for note in filter(_is_runner_up, stage.further):
+        console.print(f"note: {note}")
+
+
+def print_report(console: Console, report: BuildReport, as_json: bool) -> None:
+    """Prints the totals of a run, its notes and the next steps; see also `_print_stage`."""
+    if as_json:
+        console.json(asdict(report))
+        return
+    memory = f", peak memory {size(report.peak_memory)}" if report.peak_memory else ""
+    console.print(f"{'all':<9}{report.seconds:>8.1f} s{memory}")
+    further = [n for stage in report.stages for n in stage.further if not _is_runner_up(n)]
+    for note in further if console.verbose else ():
+        console.print(f"note: {note}")
+    if further and not console.verbose:
+        console.print(f"{count(len(further), 'more note')}; -v lists them")
+    if report.visitor:
+        print_visitor(console, report.visitor)
+    if any(stage.stage == EMIT.name for stage in report.stages):
+        _print_next_steps(console, report.database)
+
+
+def _print_next_steps(console: Console, database: str) -> None:
+    ptm, db = _invoked(), shlex.quote(database)
+    console.print("")
+    console.print(f"Database: {db}. Next steps:")
+    if all((Path(database) / SERVED / own).exists() for own in GLTF.owns):
+        first = f"{ptm} serve {db} --open", "walk through it in a browser"
+    else:
+        first = f"{ptm} emit {db} --format vrml,gltf", "also write the files of `ptm serve`"
+    steps = (
+        first,
+        (f"{ptm} plot {db} -o plan.png", "draw its floor plan"),
+        (f"{ptm} validate {db}", "check every file"),
+    )
+    width = max(len(command) for command, _ in steps)
+    for command, purpose in steps:
+        console.print(f"  {command:<{width}}  {purpose}")
+
+
+def _is_runner_up(note: str) -> bool:
+    """Whether a note is printed with its stage although it is not a warning."""
+    from ptmtools.scene.notes import RUNNER_UP
+
+    return note.endswith(f"[{RUNNER_UP}]")
+
+
+def print_visitor(console: Console, visitor: Visitor) -> None:
+    """Prints what a visitor of the database downloads."""
+    for head, line in zip_longest(["visitor"], visitor.lines(), fillvalue=""):
+        console.print(f"{head:<9} {line}".rstrip())
+
+
+def _tasks(stage: StageReport) -> str:
+    """The counts of new and reused tasks of a stage, if some were reused."""
+    if not stage.ran or stage.tasks is None:
+        return ""
+    total, kept, resumed = stage.tasks
+    if not kept and not resumed:
+        return ""
+    taken = f", {resumed:,} by the interrupted run" if resumed else ""
+    return f"; {total - kept - resumed:,} encoded, {kept:,} unchanged{taken}"
+
+
+def _invoked() -> str:
+    """The word by which the user called this command: ``ptm``, or a path if it is not on PATH."""
+    called = sys.argv[0]
+    on_path = shutil.which("ptm")
+    if Path(called).name != "ptm" or (
+        on_path and os.path.realpath(on_path) == os.path.realpath(called)
+    ):
+        return "ptm"
+    return shlex.quote(called)

@@ -1,0 +1,338 @@
+"""`ptm info`: describes a model, a database, another folder of `ptm`, or a `.ptm` file."""
+
+from __future__ import annotations
+
+import io
+import shlex
+from collections import Counter
+from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ptmtools.cli.batch import STANDARD, no_name, standard_input
+from ptmtools.cli.console import Console
+from ptmtools.cli.parameters import Command, json_option, options_of, take, with_console
+from ptmtools.errors import InputError, naming
+from ptmtools.pipeline.validation import FolderKind, kind_of
+from ptmtools.quantities import count, size
+from ptmtools.scene.options import SUFFIXES, IngestOptions
+from ptmtools.texture.model import Description, PtmHeader, gpu_texel_bytes
+
+if TYPE_CHECKING:
+    from ptmtools.cells.entrances import Enclosure
+    from ptmtools.scene.inspection import Guess, Inspection
+
+#: Shown for a stage whose record has another recipe.
+_OLD = "made by another release of ptmtools"
+#: Objects, images and doors that are listed without ``-v``.
+_SHOWN = 5
+
+
+@click.command("info", cls=Command)
+@click.argument("target", metavar="MODEL|FILE|DB", type=click.Path())
+@options_of(IngestOptions)
+@json_option
+@with_console
+def info(console: Console, target: str, as_json: bool, **values: Any) -> None:
+    """Describe a model before a build, a database, or the levels of a .ptm file (- for stdin).
+
+    The options apply to models, which are read as by build-scene. Only the head of a .ptm is read.
+    """
+    if not target:
+        raise no_name()
+    if target != STANDARD and Path(target).is_dir():
+        if kind := kind_of(Path(target)):
+            _info_folder(console, Path(target), kind, as_json)
+        else:
+            _info_database(console, target, as_json)
+    elif Path(target).suffix.lower() in SUFFIXES:
+        _info_model(console, target, take(IngestOptions, values), as_json)
+    else:
+        _info_ptm(console, target, as_json)
+
+
+def _info_folder(console: Console, folder: Path, kind: FolderKind, as_json: bool) -> None:
+    lines, record = kind.describe.load()(folder)
+    if as_json:
+        console.json(record)
+        return
+    console.print(f"{folder}: {kind.about}")
+    for line in lines:
+        console.print(line)
+
+
+def _info_database(console: Console, target: str, as_json: bool) -> None:
+    from ptmtools.cli.build import print_visitor
+    from ptmtools.options import arguments
+    from ptmtools.pipeline.build import Visitor
+    from ptmtools.pipeline.command import build_command, open_database
+    from ptmtools.pipeline.stages import STAGES
+
+    db = open_database(target)
+    stages = db.manifest.stages
+    visitor = Visitor.of(db.manifest)
+    old = [n for n, s in STAGES.items() if n in stages and stages[n].recipe != s.recipe]
+    if old:
+        console.warn(f"{target}: {', '.join(old)}: {_OLD}; run `{build_command(target)}`")
+    if as_json:
+        console.json(
+            {
+                "model": db.manifest.model,
+                "stages": {
+                    name: {
+                        "recipe": record.recipe,
+                        "parameters": record.parameters,
+                        "counts": record.counts,
+                        "notes": record.notes,
+                        "warnings": record.warnings,
+                        "files": len(record.outputs),
+                    }
+                    for name, record in stages.items()
+                },
+                "outdated": old,
+                "visitor": visitor and asdict(visitor),
+            }
+        )
+        return
+    console.print(f"{target}: database of {db.manifest.model}")
+    for name, stage in STAGES.items():
+        if name not in stages:
+            continue
+        record = stages[name]
+        console.print(f"{name:<9} {_OLD if name in old else stage.summarize(record.counts)}")
+        with suppress(ValueError):
+            if words := arguments([stage.recorded(record)]):
+                console.print(f"{'':<9}   options: {shlex.join(words)}")
+        for warning in record.warnings:
+            console.print(f"{'':<9}   warning: {warning}")
+        if console.verbose:
+            for key, value in record.parameters.items():
+                console.print(f"{'':<9}   {key} = {value}")
+            for note in [note for note in record.notes if note not in record.warnings]:
+                console.print(f"{'':<9}   note: {note}")
+    if visitor:
+        print_visitor(console, visitor)
+
+
+def _info_ptm(console: Console, target: str, as_json: bool) -> None:
+    from ptmtools.texture.container import HEAD_MAX, read_header, whole_levels
+    from ptmtools.texture.sources import open_file
+
+    with (
+        io.BytesIO(standard_input()) if target == STANDARD else open_file(target) as file,
+        naming(target),
+    ):
+        header = read_header(file.read(HEAD_MAX))
+        file_bytes = file.seek(0, io.SEEK_END)
+        offset, length, crc32 = header.description
+        file.seek(offset)
+        description = _description(file.read(length), crc32)
+    whole = whole_levels(header, file_bytes)
+    levels = _levels(header)
+    if as_json:
+        console.json(
+            {
+                **asdict(header),
+                "description": None if description is None else _described(description),
+                "levels": levels,
+                "file_bytes": file_bytes,
+                "whole_levels": whole,
+            }
+        )
+        return
+    exact = "lossless" if not header.max_error else f"errors up to {header.max_error}"
+    trimmed = f", {count(header.trimmed, 'finer level')} left out" if header.trimmed else ""
+    console.print(
+        f"{target}: {header.width} x {header.height}, {count(header.components, 'component')} of "
+        f"{header.kind}, profile {header.profile}, {exact}{trimmed}, {size(file_bytes)}"
+    )
+    if description is None:
+        console.print("the description is damaged or incomplete")
+    elif fields := _described(description):
+        console.print("; ".join(f"{name} {value}" for name, value in fields.items()))
+    console.print(
+        "level       size       tiles         bytes   share  bits/texel      up to here"
+        "   in GPU memory  RGB as RGBA"
+    )
+    for n, level in enumerate(levels):
+        extent = f"{level['width']} x {level['height']}"
+        across, down = level["tiles"]
+        tiles = f"{across} x {down}" if across * down > 1 else "1"
+        cut = "" if n < whole else "   cut off"
+        console.print(
+            f"{n:>5}  {extent:>14} {tiles:>8} {level['length']:>13,} {level['share']:>7.2%} "
+            f"{level['bits_per_texel']:>11.2f} {level['end']:>15,} {level['gpu_bytes']:>15,} "
+            f"{level['gpu_bytes_padded']:>12,}{cut}"
+        )
+
+
+def _levels(header: PtmHeader) -> list[dict[str, Any]]:
+    """The records of the levels; `end` and `gpu_…` count all bytes up to and including a level."""
+    per_texel = gpu_texel_bytes(header.texel_bytes, header.components)
+    records, texels = [], 0
+    for level in header.levels:
+        here = level.width * level.height
+        texels += here
+        records.append(
+            {
+                **asdict(level),
+                "end": level.end,
+                "share": level.length / header.file_size,
+                "bits_per_texel": 8 * level.length / here,
+                "texel_bytes": header.texel_bytes * here,
+                "gpu_bytes_padded": per_texel * texels,
+            }
+        )
+    return records
+
+
+def _description(data: bytes, crc32: int) -> Description | None:
+    import zlib
+
+    from ptmtools.texture.container import parse_description
+
+    try:
+        return parse_description(data) if zlib.crc32(data) == crc32 else None
+    except InputError:
+        return None
+
+
+def _described(description: Description) -> dict[str, Any]:
+    """The fields of a description that are set."""
+    fields: dict[str, Any] = {}
+    if description.icc is not None:
+        fields["icc_bytes"] = len(description.icc)
+    if description.srgb is not None:
+        fields["srgb_intent"] = description.srgb
+    if description.gamma is not None:
+        fields["gamma"] = description.gamma / 100_000
+    if description.chromaticities is not None:
+        fields["chromaticities"] = [value / 100_000 for value in description.chromaticities]
+    if description.orientation != 1:
+        fields["orientation"] = description.orientation
+    return fields
+
+
+def _info_model(console: Console, target: str, options: IngestOptions, as_json: bool) -> None:
+    """Raises what `ptmtools.scene.ingest` raises."""
+    from ptmtools.cells.entrances import enclosure
+    from ptmtools.parallel import processors
+    from ptmtools.scene.inspection import inspect
+
+    with console.progress() as progress:
+        model = inspect(Path(target), options, progress, workers=processors())
+    around = enclosure(model.scene)
+    if as_json:
+        console.json(_record(model, around))
+        return
+    scene, many = model.scene, console.verbose
+    by = f", written by {model.generator}" if model.generator else ""
+    console.print(f"{target}: {model.format}, {size(model.bytes)}{by}")
+    for name, outcome in model.extensions.items():
+        _row(console, "extension", f"{name}: {outcome}")
+    _row(console, "triangles", f"{len(scene.triangles):,} in {count(len(scene.objects), 'object')}")
+    named = [f"{name} {triangles:,}" for name, triangles in model.objects.items()]
+    _row(console, "", f"largest: {_some(named, many)}")
+    _row(console, "materials", _materials(model))
+    _row(console, "images", _images(model))
+    sizes = [f"{i.name} {i.width} x {i.height}" for i in model.images]
+    if sizes:
+        _row(console, "", _some(sizes, many))
+    _print_space(console, model)
+    _row(console, "closed", _closed(around))
+    doors = f"{len(around.doors)} recognised"
+    _row(console, "doors", f"{doors}: {_some(list(around.doors), many)}" if around.doors else doors)
+    if scene.storeys:
+        named = [f"{storey.name} at {storey.height:.3g} m" for storey in scene.storeys]
+        _row(console, "storeys", _some(named, many))
+    _print_notes(console, scene.notes)
+
+
+def _row(console: Console, name: str, text: str) -> None:
+    console.print(f"{name:<10} {text}")
+
+
+def _some(names: list[str], many: bool) -> str:
+    shown = names if many else names[:_SHOWN]
+    more = f" and {len(names) - len(shown):,} more" if len(names) > len(shown) else ""
+    return ", ".join(shown) + more
+
+
+def _materials(model: Inspection) -> str:
+    materials = model.scene.materials
+    plain = sum(material.image < 0 for material in materials)
+    through = sum(material.transparent for material in materials)
+    parts = [f"{plain:,} without an image"] if plain else []
+    parts += [f"{through:,} transparent"] if through else []
+    return f"{len(materials):,}" + (f", of which {', '.join(parts)}" if parts else "")
+
+
+def _images(model: Inspection) -> str:
+    kinds = Counter(image.format for image in model.images)
+    if not kinds:
+        return "none"
+    texels = sum(image.width * image.height for image in model.images)
+    files = ", ".join(f"{number:,} {kind}" for kind, number in kinds.most_common())
+    total = sum(image.bytes for image in model.images)
+    return f"{files}; {size(total)}, {texels / 1e6:,.1f} million texels"
+
+
+def _print_space(console: Console, model: Inspection) -> None:
+    scene = model.scene
+    space = scene.space
+    width, height, depth = (scene.points.max(axis=0) - scene.points.min(axis=0)).tolist()
+    _row(console, "size", f"{width:.3g} x {depth:.3g} m, {height:.3g} m high")
+    guessed = "guessed" if space.unit_guessed else "given"
+    _row(console, "unit", f"{space.metres:g} m ({guessed})")
+    _row(console, "up axis", f"{space.up} ({'guessed' if space.up_guessed else 'given'})")
+    _row(console, "looks like", _guess(model.best))
+    for place, other in enumerate(model.others):
+        if place == 0 or other.rival:
+            _row(console, "or like", _guess(other))
+
+
+def _guess(guess: Guess) -> str:
+    why = f" ({', '.join(guess.reasons)})" if guess.reasons else ""
+    return f"{guess.unit}, {guess.up} up: {guess.size}{why}"
+
+
+def _closed(around: Enclosure) -> str:
+    if not around.rooms:
+        return "unknown: no place has a roof above and walls around it"
+    if around.closed:
+        return "looks closed: no sight line from its rooms leaves it"
+    roof = "" if around.roofed > 0.99 else f"; {1 - around.roofed:.0%} of the floor has no ceiling"
+    return f"looks open: {around.leaving:.1%} of the sight lines from its rooms leave it{roof}"
+
+
+def _print_notes(console: Console, notes: Any) -> None:
+    from ptmtools.scene.notes import line, warnings
+
+    for warning in warnings(notes):
+        _row(console, "warning", warning)
+    if console.verbose:
+        for note in notes:
+            _row(console, "note", line(note))
+
+
+def _record(model: Inspection, around: Enclosure) -> dict[str, Any]:
+    scene = model.scene
+    return {
+        "format": model.format,
+        "generator": model.generator,
+        "bytes": model.bytes,
+        "extensions": model.extensions,
+        "triangles": len(scene.triangles),
+        "objects": model.objects,
+        "materials": [vars(material) for material in scene.materials],
+        "images": [asdict(image) for image in model.images],
+        "space": vars(scene.space),
+        "size": (scene.points.max(axis=0) - scene.points.min(axis=0)).tolist(),
+        "looks": [asdict(guess) for guess in (model.best, *model.others)],
+        "enclosure": asdict(around) | {"closed": around.closed},
+        "storeys": [vars(storey) for storey in scene.storeys],
+        "notes": [vars(note) for note in scene.notes],
+    }

@@ -1,0 +1,384 @@
+"""Commands of the laboratory: `ptm path`, `simulate` and `walk-campus`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ptmtools.cli.batch import check_writable
+from ptmtools.cli.console import Console
+from ptmtools.cli.parameters import (
+    Command,
+    database_argument,
+    force_option,
+    json_option,
+    option,
+    options_of,
+    take,
+    with_console,
+)
+from ptmtools.errors import InputError, OutputError, naming
+from ptmtools.files import refuse_existing, write_bytes, writing
+from ptmtools.lab import figures
+from ptmtools.lab.campus.options import CampusWalkOptions
+from ptmtools.lab.campus.world import prepare_campus
+from ptmtools.lab.comparing import SimulateOptions, counted, play, require_hints
+from ptmtools.lab.measures import require as require_flip
+from ptmtools.lab.path.making import Path as WalkPath, path_through
+from ptmtools.lab.path.options import PathOptions
+from ptmtools.lab.report import as_csv, document, table
+from ptmtools.lab.walk import Walk, read_walk, walk_text
+from ptmtools.lab.world import prepare, read_forms, relief_of
+from ptmtools.link import read_trace
+from ptmtools.output.names import HINTS
+from ptmtools.output.served import read_served
+from ptmtools.pipeline import Artifacts
+from ptmtools.pipeline.command import open_database
+from ptmtools.quantities import count
+from ptmtools.rendering.pyramids import read_pyramids
+from ptmtools.rendering.render import lit
+
+#: Rooms that are listed without ``-v``.
+SHOWN = 12
+#: Duration of the default walk of ``ptm simulate``, s.
+DURATION = 150.0
+#: ``--trace``, as ``trace_file``.
+trace_option = option(
+    "--trace",
+    "trace_file",
+    type=click.Path(),
+    metavar="FILE",
+    help="Changes of the link over time, JSON or CSV.",
+)
+
+
+@click.command("path", cls=Command)
+@database_argument
+@option("-o", "--output", type=click.Path(), required=True, help="Walk to write, a JSON file.")
+@options_of(PathOptions)
+@force_option()
+@json_option
+@with_console
+def path_command(
+    console: Console, db: str, output: str, force: bool, as_json: bool, **values: Any
+) -> None:
+    """Make a walk through every room of DB: on floors and through doors, with stops at pictures.
+
+    The walk begins at a viewpoint. The same seed makes the same walk.
+    """
+    options = take(PathOptions, values)
+    check_writable(output, force=force)
+    artifacts = Artifacts(open_database(db))
+    with naming(db):
+        path = path_through(artifacts, options)
+    write_bytes(output, walk_text(path.walk).encode(), force=force)
+    if as_json:
+        console.json(_path_document(path))
+        return
+    console.print(
+        f"{output}: {len(path.visited):,} of {count(path.rooms, 'room')}, "
+        f"{path.walk.length:.0f} m in {path.walk.duration:.0f} s, {count(path.stops, 'stop')}"
+    )
+    left = path.rooms - len(path.visited) - len(path.unreachable)
+    if left and options.duration is not None:
+        console.print(f"a longer --duration visits {count(left, 'more room')}")
+    if not path.walk.length:
+        console.print("the walk stays in one place: no other is reachable")
+    if path.unreachable:
+        shown = path.unreachable if console.verbose else path.unreachable[:SHOWN]
+        more = ", …; -v lists all" if len(shown) < len(path.unreachable) else ""
+        console.print(
+            f"not reachable on foot, at eye height: {count(len(path.unreachable), 'room')}, cell "
+            f"{', '.join(map(str, shown))}{more}"
+        )
+
+
+def _path_document(made: WalkPath) -> dict[str, Any]:
+    return {
+        "rooms": made.rooms,
+        "visited": list(made.visited),
+        "unreachable": list(made.unreachable),
+        "stops": made.stops,
+        "length": round(made.walk.length, 3),
+        "duration": made.walk.duration,
+        "samples": len(made.walk.time),
+    }
+
+
+@click.command("walk-campus", cls=Command)
+@click.argument("campus", type=click.Path())
+@option(
+    "--walk",
+    "walk_file",
+    type=click.Path(),
+    required=True,
+    metavar="FILE",
+    help="Walk that `ptm path` wrote.",
+)
+@option(
+    "--db",
+    type=click.Path(),
+    help="Database of the same model, whose full picture is the reference instead of that of the "
+    "campus.",
+)
+@options_of(CampusWalkOptions)
+@option(
+    "--every",
+    type=click.IntRange(0),
+    default=5,
+    help="Measure the picture of every Nth frame, of five per second; 0 for none.",
+)
+@option(
+    "--only",
+    default="*",
+    metavar="NAMES",
+    help="Keep only these objects (names, with * and ?).",
+)
+@trace_option
+@json_option
+@with_console
+def walk_campus(
+    console: Console,
+    campus: str,
+    walk_file: str,
+    db: str | None,
+    every: int,
+    only: str,
+    trace_file: str | None,
+    as_json: bool,
+    **values: Any,
+) -> None:
+    """Simulate a walk through CAMPUS, which `ptm campus` wrote, with each preset: downloads, late
+    objects, and the error of the picture.
+
+    The output is Markdown: a row for each measure, and the MB received per half minute.
+    """
+    options = take(CampusWalkOptions, values)
+    from ptmtools.lab.campus.simulation import simulate_campus
+    from ptmtools.visibility.report import report
+
+    walk = read_walk(walk_file)
+    trace = read_trace(trace_file) if trace_file else None
+    served = read_served(db) if db else None
+    with console.progress() as progress:
+        world = prepare_campus(campus, walk, served, every=every, only=only, progress=progress)
+    runs = [simulate_campus(world, quality, options, trace) for quality in options.qualities]
+    if as_json:
+        console.json(report.document(campus, runs))
+        return
+    console.print(
+        f"{walk.length:.0f} m in {walk.duration:.0f} s, {world.stock.objects:,} objects, "
+        f"{options.bandwidth}bit/s, {options.latency}\n"
+    )
+    for line in (*report.table(runs), "", *report.received(runs)):
+        console.print(line)
+
+
+@click.command("simulate", cls=Command)
+@database_argument
+@option(
+    "--walk",
+    "walk_files",
+    type=click.Path(),
+    multiple=True,
+    metavar="FILE",
+    help=f"Walk that `ptm path` wrote. Repeatable. Default: a new one of {DURATION:.0f} s.",
+)
+@option(
+    "--seed",
+    "seeds",
+    type=click.IntRange(0),
+    multiple=True,
+    help="Seed of the new walk without --walk; 1 by default. Repeatable.",
+)
+@options_of(SimulateOptions)
+@option(
+    "--against",
+    type=click.Path(),
+    metavar="DB",
+    help="Another database of the same model, such as one without --max-error, whose full picture "
+    "is the reference instead of that of DB.",
+)
+@option(
+    "--campus",
+    type=click.Path(),
+    metavar="DIR",
+    help="Campus of the same model, which `ptm campus` wrote, for the policies campus-….",
+)
+@trace_option
+@option(
+    "--flip",
+    is_flag=True,
+    help="Also measure FLIP, the perceived difference, of 12 frames of each run; takes seconds per "
+    "run.",
+)
+@option(
+    "--csv", "csv_file", type=click.Path(), metavar="FILE", help="Also write all frames as CSV."
+)
+@option(
+    "--plot",
+    "plot_file",
+    type=click.Path(),
+    metavar="FILE",
+    help="Also plot --measure over time, as a PNG.",
+)
+@option(
+    "--measure",
+    type=click.Choice(list(figures.MEASURES)),
+    default="e",
+    help="Measure to plot.",
+)
+@option(
+    "--frames",
+    "frames_folder",
+    type=click.Path(),
+    metavar="DIR",
+    help="Also draw frames of the first policy, bandwidth, memory and walk, as PNGs.",
+)
+@option(
+    "--every",
+    type=click.FloatRange(0, min_open=True),
+    default=10.0,
+    metavar="SECONDS",
+    help="Interval of the frames of --frames.",
+)
+@option(
+    "--strip",
+    "strip_file",
+    type=click.Path(),
+    metavar="FILE",
+    help="Also draw the pictures at the start of the walk after 10, 35 and 80 s, and the full "
+    "picture, as one PNG, likewise of the first run.",
+)
+@force_option()
+@json_option
+@with_console
+def simulate(
+    console: Console,
+    db: str,
+    walk_files: tuple[str, ...],
+    seeds: tuple[int, ...],
+    against: str | None,
+    campus: str | None,
+    trace_file: str | None,
+    flip: bool,
+    csv_file: str | None,
+    plot_file: str | None,
+    measure: str,
+    frames_folder: str | None,
+    every: float,
+    strip_file: str | None,
+    force: bool,
+    as_json: bool,
+    **values: Any,
+) -> None:
+    """Simulate clients that walk through DB over a modelled link, and measure their pictures.
+
+    Every policy walks over every link with every amount of memory. DB is not changed.
+    """
+    options = take(SimulateOptions, values)
+    if walk_files and seeds:
+        raise click.UsageError("give either --walk or --seed")
+    files = [file for file in (csv_file, plot_file, strip_file) if file]
+    for file in files:
+        check_writable(file, force=force)
+    if len({Path(file).resolve() for file in files}) < len(files):
+        raise click.UsageError("two pictures or tables have the same file name")
+    frames_to = Path(frames_folder) if frames_folder else None
+    if frames_to:
+        _check_folder(frames_to, force)
+    if plot_file:
+        figures.require()
+    if flip:
+        require_flip()
+    _check_campus(options, campus, drawn=bool(frames_to or strip_file))
+    trace = read_trace(trace_file) if trace_file else None
+    walks = {file: read_walk(file) for file in walk_files} or _new_walks(db, seeds)
+    served, other = read_served(db), read_served(against) if against else None
+    if options.lit:
+        served, other = lit(served), lit(other) if other else None
+    require_hints(served, options.policies)
+    with console.progress() as progress:
+        pyramids = read_pyramids(served, progress)
+        relief = relief_of(served, pyramids, other, lit=options.lit, progress=progress)
+        shown = relief.reference.pyramids if relief and relief.reference else pyramids
+        campuses = {
+            name: prepare_campus(campus, walk, other or served, shown, progress=progress)
+            for name, walk in walks.items()
+            if campus
+        }
+        forms = read_forms(served, pyramids, (p.form for p in options.policies), progress)
+        worlds = {
+            name: counted(
+                prepare(served, walk, pyramids, progress=progress, forms=forms, relief=relief),
+                options,
+            )
+            for name, walk in walks.items()
+        }
+        played = play(worlds, options, trace, progress, flip=flip, campuses=campuses)
+    if csv_file:
+        write_bytes(csv_file, as_csv(played).encode(), force=force)
+    if plot_file:
+        write_bytes(plot_file, figures.picture(played, measure), force=force)
+    first = worlds[played[0].walk]
+    if frames_to:
+        with writing(frames_to):
+            frames_to.mkdir(parents=True, exist_ok=True)
+        for name, data in figures.frames(first, played[0].run, every):
+            write_bytes(frames_to / name, data, force=force)
+    if strip_file:
+        write_bytes(strip_file, figures.strip(first, played[0]), force=force)
+    if as_json:
+        console.json(document(db, played, worlds, lit=options.lit, against=against))
+        return
+    for line in table(played, worlds, lit=options.lit, against=against, campuses=campuses):
+        console.print(line)
+
+
+def _check_campus(options: SimulateOptions, campus: str | None, *, drawn: bool) -> None:
+    """Raises UsageError if policies of a campus and ``--campus`` do not go together, or if there is
+    no client of a database whose frames can be drawn."""
+    asked = [policy.name for policy in options.campus_policies]
+    if asked and not campus:
+        raise click.UsageError(
+            f"policy {asked[0]} needs --campus, a folder that `ptm campus` wrote"
+        )
+    if campus and not asked:
+        raise click.UsageError(
+            "--campus is for policies such as campus-medium; add one to --policy"
+        )
+    if drawn and not options.policies:
+        raise click.UsageError("--frames and --strip draw clients of DB; add such a policy")
+
+
+def _check_folder(folder: Path, force: bool) -> None:
+    """Raises the `OutputError` of writing files into the folder: PTM-O001 it is not empty, PTM-O002
+    it, or a folder above it, is a file."""
+    nearest = next(p for p in (folder, *folder.absolute().parents) if p.exists())
+    if not nearest.is_dir():
+        raise OutputError(
+            "PTM-O002",
+            f"cannot be created: {nearest.name} is not a folder",
+            file=folder,
+            remedy="name another folder",
+        )
+    if not force and nearest == folder and any(folder.iterdir()):
+        refuse_existing(folder, "use --force to replace frames in it, or name another folder")
+
+
+def _new_walks(db: str, seeds: tuple[int, ...]) -> dict[str, Walk]:
+    """New walks through a database, by name."""
+    if (Path(db) / HINTS).exists():
+        raise InputError(
+            "PTM-I702",
+            "is a served folder, which does not record the walkable floor",
+            file=db,
+            remedy="give a walk with --walk FILE, or the database that the folder belongs to",
+        )
+    artifacts = Artifacts(open_database(db))
+    return {
+        f"seed {seed}": path_through(artifacts, PathOptions(seed=seed, duration=DURATION)).walk
+        for seed in dict.fromkeys(seeds or (PathOptions.seed,))
+    }

@@ -1,0 +1,186 @@
+"""Other representations of a model: `ptm apo` and `ptm campus`."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+import click
+from click.core import ParameterSource
+
+from ptmtools.cli.batch import no_name
+from ptmtools.cli.console import Console
+from ptmtools.cli.parameters import (
+    Command,
+    force_option,
+    jobs_option,
+    json_option,
+    option,
+    options_of,
+    take,
+    with_console,
+)
+from ptmtools.cli.render import check_picture, draw_octree, octree_line
+from ptmtools.neighbours.apo.model import ApoOptions
+from ptmtools.neighbours.apo.picture import RenderOptions
+from ptmtools.neighbours.campus.options import CampusOptions
+from ptmtools.neighbours.campus.reading import record, summary
+from ptmtools.quantities import count, size
+from ptmtools.scene.options import IngestOptions
+
+
+@click.command("apo", cls=Command)
+@click.argument("mesh", metavar="MESH", type=click.Path())
+@option(
+    "-o",
+    "--output",
+    "folder",
+    type=click.Path(),
+    metavar="DIR",
+    help="Folder to write. Default: bust.apo beside bust.ply.",
+)
+@options_of(ApoOptions, IngestOptions)
+@option("--render", "view", type=click.Path(), hidden=True, help="Now `ptm render`.")
+@options_of(RenderOptions, hidden=True)
+@force_option("Replace a folder that ptm apo wrote.")
+@jobs_option
+@json_option
+@with_console
+def apo(
+    console: Console,
+    mesh: str,
+    folder: str | None,
+    view: str | None,
+    force: bool,
+    workers: int,
+    as_json: bool,
+    **values: Any,
+) -> None:
+    """Convert a mesh of many triangles to a light mesh and an octree texture of its normals.
+
+    The octree streams level by level (docs/formats/apo.md). `ptm render DIR -o view.png` draws it.
+    """
+    from ptmtools.neighbours.apo.files import INDEX, read_index
+    from ptmtools.scene.ingestion import check_file
+
+    if not mesh or "" in (folder, view):
+        raise no_name()
+    exists = folder is None and view is not None and (Path(mesh) / INDEX).is_file()
+    if view is not None:
+        console.warn("note: --render of `ptm apo` is now `ptm render DIR -o VIEW.png`")
+        check_picture(view, force=force)
+    if exists:
+        _refuse_conversion()
+    else:
+        check_file(Path(mesh))
+    options = take(RenderOptions, values)
+    target = mesh if exists else folder or os.fspath(Path(mesh).with_suffix(".apo"))
+    if not exists:
+        _convert(console, mesh, target, values, workers, force)
+    index = read_index(target)
+    picture = draw_octree(target, view, options, force=force) if view is not None else None
+    if as_json:
+        console.json({**index.document, **({"picture": picture} if picture else {})})
+        return
+    if picture:
+        console.print(octree_line(target, picture))
+    if not exists:
+        source, mesh_file = index.document["source"], index.mesh
+        whole = sum(stream.ends[-1] for stream in (index.normals, index.colors) if stream)
+        console.print(
+            f"{target}: {source['triangles']:,} triangles → {mesh_file['faces']:,} faces, "
+            f"{size(mesh_file['bytes'])}; octree of {count(index.levels, 'level')}, "
+            f"{int(index.start[-1]):,} texels, {size(whole)}"
+        )
+
+
+def _convert(
+    console: Console, model: str, folder: str, values: dict[str, Any], workers: int, force: bool
+) -> None:
+    """Writes the folder of a mesh."""
+    from ptmtools.neighbours.apo.files import FORM, files_of
+    from ptmtools.neighbours.apo.making import make_apo
+    from ptmtools.parallel import open_executor, processors
+    from ptmtools.scene import ingest
+    from ptmtools.scene.notes import outside, warnings
+
+    options, read = take(ApoOptions, values), take(IngestOptions, values)
+    FORM.check(folder, force=force)
+    with console.progress() as progress, open_executor(workers) as executor:
+        scene = ingest(model, read, progress, workers=workers or processors())
+        if scene.space.up_guessed or scene.space.unit_guessed:
+            # The estimate assumes a building; a statue stays unchanged.
+            read = replace(read, up=read.up or "y", unit=read.unit or "m")
+            scene = ingest(model, read, progress, workers=workers or processors())
+        octree = make_apo(scene, options, executor, progress)
+    FORM.write(folder, files_of(octree), force=force)
+    for warning in [*warnings(outside(scene.notes)), *octree.notes]:
+        console.warn(warning)
+
+
+def _refuse_conversion() -> None:
+    """Raises UsageError for options of the conversion, which a folder has behind it."""
+    context = click.get_current_context()
+    for each in (*fields(ApoOptions), *fields(IngestOptions)):
+        name = each.name
+        if context.get_parameter_source(name) == ParameterSource.COMMANDLINE:
+            raise click.UsageError(
+                f"--{name.replace('_', '-')} is for the conversion of a mesh, not for a folder"
+            )
+
+
+@click.command("campus", cls=Command)
+@click.argument("model", type=click.Path())
+@option(
+    "-o", "--output", "folder", type=click.Path(), required=True, help="Campus to write, a folder."
+)
+@options_of(CampusOptions, IngestOptions)
+@force_option("Replace a folder that ptm campus wrote.")
+@jobs_option
+@json_option
+@with_console
+def campus(
+    console: Console,
+    model: str,
+    folder: str,
+    force: bool,
+    workers: int,
+    as_json: bool,
+    **values: Any,
+) -> None:
+    """Convert MODEL to a campus: each object in several levels of detail with its own lightmap,
+    textures by size and channel, and the files of each quality preset.
+
+    A client loads the coarsest meshes first, and refines the nearest objects.
+    """
+    if not model or not folder:
+        raise click.UsageError("a name is empty")
+    options, reading = take(CampusOptions, values), take(IngestOptions, values)
+    from ptmtools.neighbours.campus.building import make_campus
+    from ptmtools.parallel import open_executor
+    from ptmtools.scene.notes import line, outside, warnings
+
+    with console.progress() as progress, open_executor(workers) as executor:
+        result = make_campus(
+            model, folder, options, reading, executor, force=force, progress=progress
+        )
+    scene_notes = outside(result.scene.notes)
+    if as_json:
+        seconds = {name: round(value, 3) for name, value in result.seconds.items()}
+        notes = [line(note) for note in scene_notes]
+        console.json(
+            {**record(result.campus), "seconds": seconds, "notes": [*notes, *result.notes]}
+        )
+        return
+    for warning in warnings(scene_notes):
+        console.warn(warning)
+    for note in result.notes:
+        console.warn(f"note: {note}")
+    if console.verbose:
+        for each in scene_notes:
+            console.warn(f"note: {line(each)}")
+    console.print(f"{folder}: {count(len(result.campus.files()) + 1, 'file')}")
+    for text in summary(result.campus):
+        console.print(text)

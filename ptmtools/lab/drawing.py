@@ -1,0 +1,197 @@
+"""Draws a view of a served database from the finest levels of its textures.
+
+Embree finds the surface of each ray, and the kernels of the simulator sample the textures. A lit
+picture has the lamp of `ptmtools.rendering.render` and the relief of octree textures; in
+others, surfaces without texture are shaded by the angle to the viewer, as on the page.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Floats
+from ptmtools.errors import InputError
+from ptmtools.options import option
+from ptmtools.output.served import Served
+from ptmtools.progress import Progress, silent
+from ptmtools.rendering.rays import Camera, Caster
+from ptmtools.rendering.records import Sight, Triangles, own_levels, triangles_of
+
+#: Largest side of a picture, pixels.
+WIDEST = 4096
+#: Field of view where no viewpoint gives one, degrees.
+FIELD_OF_VIEW = 60.0
+#: Rays per pixel each way, for pictures of at most so many pixels; larger ones have one ray.
+_SAMPLES, _MANY_PIXELS = 2, 1 << 22
+#: Colour of the sky, 0 to 255, and the least light on surfaces without texture, as on the page.
+_SKY, _AMBIENT = (0.16 * 255, 0.17 * 255, 0.19 * 255), 0.25
+
+
+@dataclass(frozen=True)
+class ViewOptions:
+    """Options of `draw_view`. Raises InputError PTM-I860 for values out of range."""
+
+    heading: ClassVar[str] = "View"
+
+    viewpoint: int | None = option(
+        None, "Number of the viewpoint in the database; 0, the first, by default."
+    )
+    eye: tuple[float, ...] | None = option(
+        None,
+        "Position of the eye instead, in metres, Y up, and yaw in degrees, counter-clockwise from "
+        "-Z.",
+        metavar="X,Y,Z[,YAW]",
+        numbers=(3, 4),
+    )
+    look: tuple[float, float, float] | None = option(
+        None, "Point to look at, in metres.", metavar="X,Y,Z"
+    )
+    field_of_view: float | None = option(
+        None,
+        f"Vertical field of view. Default: that of the viewpoint, or {FIELD_OF_VIEW:g}.",
+        metavar="DEGREES",
+    )
+    width: int = option(1280, "Width of the picture.", metavar="PIXELS")
+    height: int = option(720, "Height of the picture.", metavar="PIXELS")
+    max_side: int = option(
+        0, "Use texture levels of at most this side; 0 for the finest.", metavar="TEXELS"
+    )
+    lit: bool = option(
+        False, "Light the picture by a lamp, and draw the relief of octree textures."
+    )
+
+    def __post_init__(self) -> None:
+        for name, low, high in (
+            ("width", 1, WIDEST),
+            ("height", 1, WIDEST),
+            ("max_side", 0, 1 << 16),
+            ("field_of_view", 1, 170),
+        ):
+            value = getattr(self, name)
+            if value is not None and not low <= value <= high:
+                raise _refused(
+                    f"--{name.replace('_', '-')} {value:g} is not between {low} and {high}"
+                )
+        if self.eye and self.viewpoint is not None:
+            raise _refused("--viewpoint and --eye exclude each other", "give one of them")
+        for name, place in (("eye", self.eye), ("look", self.look)):
+            if place and not all(map(math.isfinite, place)):
+                raise _refused(f"--{name} is not finite")
+        if self.eye and self.look and len(self.eye) > 3:
+            raise _refused("--look and a yaw of --eye exclude each other", "give one of them")
+
+
+@dataclass(frozen=True)
+class Eye:
+    """A place to look from: position (3,) in metres, unit direction (3,), vertical field of view in
+    radians."""
+
+    position: Floats
+    direction: Floats
+    field_of_view: float
+
+
+def eye_of(served: Served, options: ViewOptions) -> Eye:
+    """The eye that the options name. Raises InputError PTM-I860 if there is no such viewpoint."""
+    angle = FIELD_OF_VIEW
+    if options.eye:
+        position = np.array(options.eye[:3], dtype=np.float64)
+        yaw = math.radians(options.eye[3] if len(options.eye) > 3 else 0.0)
+        direction = np.array([-math.sin(yaw), 0.0, -math.cos(yaw)])
+    else:
+        rows, number = served.index["viewpoints"], options.viewpoint or 0
+        if not 0 <= number < len(rows):
+            raise InputError(
+                "PTM-I860",
+                f"has no viewpoint {number}",
+                file=served.folder,
+                remedy=f"give 0 to {len(rows) - 1}, or --eye" if rows else "give --eye",
+            )
+        row = rows[number]
+        position = np.array(row["position"], dtype=np.float64)
+        direction = np.array(row["direction"], dtype=np.float64)
+        angle = _vertical(math.degrees(row["fieldOfView"]), options)
+    if options.look:
+        direction = np.array(options.look, dtype=np.float64) - position
+    length = float(np.linalg.norm(direction))
+    if length == 0:
+        raise _refused("--look is the position of the eye")
+    return Eye(position, direction / length, math.radians(options.field_of_view or angle))
+
+
+def draw_view(
+    served: Served, options: ViewOptions, progress: Progress = silent
+) -> NDArray[np.uint8]:
+    """A picture (height, width, 3), sRGB. Only textures that it shows are decoded.
+
+    Raises
+    ------
+    InputError: PTM-I860 there is no such viewpoint.
+    DatabaseError, LimitError: those of `read_pyramids` and `read_octrees`.
+    """
+    from ptmtools.lab.relief.octrees import read_octrees
+    from ptmtools.rendering.kernels import shade
+    from ptmtools.rendering.pyramids import read_pyramids
+    from ptmtools.rendering.render import lamps, lit
+
+    eye = eye_of(served, options)
+    if options.lit:
+        served = lit(served)
+    surfaces = served.surfaces
+    samples = _SAMPLES if options.width * options.height <= _MANY_PIXELS else 1
+    camera = Camera(
+        options.width * samples,
+        options.height * samples,
+        eye.field_of_view,
+        options.width / options.height,
+        options.height,
+    )
+    triangles = triangles_of(surfaces)
+    sight = Caster(surfaces).look(camera, eye.position, eye.direction)
+    hit = sight.triangle[sight.triangle >= 0]
+    pyramids = read_pyramids(served, progress, only=set(surfaces.texture[hit].tolist()))
+    column = pyramids.levels
+    if options.max_side:
+        within = (pyramids.size.max(axis=2) <= options.max_side) & (pyramids.size[:, :, 0] > 0)
+        column = np.minimum(np.maximum(within.sum(axis=1), 1), column)
+    shown = np.empty((len(sight.ray), 3))
+    there = np.ones(served.cell_count, dtype=np.bool_)
+    shade(sight, triangles, own_levels(pyramids), there, column, shown)
+    if options.lit:
+        from ptmtools.lab.relief.kernels import relieve
+
+        octrees = read_octrees(served)
+        relieve(sight, triangles, lamps(surfaces.corner), octrees, there, octrees.levels, shown)
+    else:
+        _shade_plain(sight, triangles, shown)
+    shown[sight.triangle < 0] = _SKY
+    each = (options.height, samples, options.width, samples, 3)
+    colors = shown.reshape(each).mean(axis=(1, 3))
+    return np.rint(np.clip(colors, 0, 255)).astype(np.uint8)
+
+
+def _vertical(degrees: float, options: ViewOptions) -> float:
+    """The vertical field of view of a picture whose smaller one is ``degrees``."""
+    if options.width >= options.height:
+        return degrees
+    half = math.tan(math.radians(degrees) / 2) * options.height / options.width
+    return 2 * math.degrees(math.atan(half))
+
+
+def _shade_plain(sight: Sight, triangles: Triangles, shown: Floats) -> None:
+    """Multiplies the colours of surfaces without texture by their angle to the viewer."""
+    plain = np.flatnonzero(sight.triangle >= 0)
+    plain = plain[triangles.texture[sight.triangle[plain]] < 0]
+    normal, ray = triangles.normal[sight.triangle[plain]], sight.ray[plain]
+    length = np.linalg.norm(normal, axis=1) * np.linalg.norm(ray, axis=1)
+    facing = np.abs(np.einsum("ij,ij->i", normal, ray)) / np.maximum(length, 1e-300)
+    shown[plain] *= (_AMBIENT + (1 - _AMBIENT) * facing)[:, None]
+
+
+def _refused(problem: str, remedy: str | None = None) -> InputError:
+    return InputError("PTM-I860", problem, remedy=remedy)
