@@ -95,7 +95,7 @@ def test_cells_without_usable_points_give_json_and_rates(tmp_path, capsys) -> No
 
 def test_what_is_no_number_is_null_in_json(capsys) -> None:
     document = {"a": [math.nan, {"b": np.float64("inf")}], "c": (-math.inf, 1.5, True, None, "NaN")}
-    Console().emit_json(document)
+    Console().json(document)
     document = json.loads(capsys.readouterr().out, parse_constant=no_constant)
     assert document == {"a": [None, {"b": None}], "c": [None, 1.5, True, None, "NaN"]}
 
