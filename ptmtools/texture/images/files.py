@@ -238,16 +238,17 @@ def writer(suffix: str) -> Writer:
             f"the suffix {suffix!r} {why}",
             remedy=f"use one of {', '.join(WRITTEN)}",
         )
-    write: Writer = getattr(import_module(f"ptmtools.texture.images.{found}"), f"save_{found}")
+    module, name = found
+    write: Writer = getattr(import_module(f"ptmtools.texture.images.{module}"), name)
     return write
 
 
-#: The module, and its function ``save_…``, that writes files of each suffix.
+#: Suffix → the module, and its function that writes such files.
 WRITTEN = {
-    ".png": "png",
-    ".npy": "npy",
-    ".tif": "tiff",
-    ".tiff": "tiff",
-    ".hdr": "radiance",
-    ".exr": "openexr",
+    ".png": ("png", "save_png"),
+    ".npy": ("floats", "save_npy"),
+    ".tif": ("deep", "save_tiff"),
+    ".tiff": ("deep", "save_tiff"),
+    ".hdr": ("floats", "save_radiance"),
+    ".exr": ("floats", "save_openexr"),
 }
