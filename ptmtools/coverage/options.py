@@ -26,6 +26,10 @@ PRESETS: dict[Preset, tuple[int, int, Placement]] = {
 }
 
 
+#: Groups of sample points that the standard error is taken from.
+GROUPS = 8
+
+
 @dataclass(frozen=True)
 class AchOptions:
     """Options of `compute_ach`."""
@@ -118,8 +122,6 @@ class AchOptions:
         return PRESETS[self.preset][2] if self.placement is None else self.placement
 
     def _check_tolerance(self, tolerance: float) -> None:
-        from ptmtools.coverage.sampling import GROUPS
-
         if not 0 < tolerance < 1:
             raise _refused(
                 f"a tolerance of {tolerance} is out of range",

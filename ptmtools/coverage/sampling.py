@@ -25,7 +25,7 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.backends import Backend
 from ptmtools.coverage.item_buffer import Surfaces
-from ptmtools.coverage.options import AchOptions
+from ptmtools.coverage.options import GROUPS, AchOptions
 from ptmtools.coverage.placement import Volume
 from ptmtools.coverage.sample_points import PointFinder, PointSequence, SamplePoints
 from ptmtools.coverage.solids import Obstacles
@@ -33,8 +33,6 @@ from ptmtools.coverage.tally import PixelCounter, Tally
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
 
-#: Groups of sample points that the standard error is taken from.
-GROUPS = 8
 #: Student's t for GROUPS - 1 degrees of freedom, two-sided 95 %. One-sided would be 1.895, but
 #: distances lean to one side: where two cells share the view, that bound held in 91 % of the cases.
 STUDENT_T = 2.365

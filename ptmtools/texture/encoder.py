@@ -20,6 +20,7 @@ from typing import IO
 import numpy as np
 
 from ptmtools.errors import InputError, LimitError, OutputError
+from ptmtools.texture.coder import Coder, Tile
 from ptmtools.texture.container import (
     DESCRIPTION_MAX,
     EXACT,
@@ -32,7 +33,7 @@ from ptmtools.texture.container import (
 from ptmtools.texture.detail import Detail, detail_of, difference_between
 from ptmtools.texture.model import TILE_SIDES, Description, EncodeOptions, PtmHeader
 from ptmtools.texture.parallel import ordered
-from ptmtools.texture.profiles import PROFILES, Coder, Tile
+from ptmtools.texture.profiles import PROFILES
 from ptmtools.texture.pyramid import (
     Box,
     build_pyramid,

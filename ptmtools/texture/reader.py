@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, LimitError, naming
+from ptmtools.texture.coder import Tile
 from ptmtools.texture.coders.group import damaged
 from ptmtools.texture.container import (
     EXACT,
@@ -28,7 +29,7 @@ from ptmtools.texture.container import (
 )
 from ptmtools.texture.model import Description, Level, Limits, PtmHeader
 from ptmtools.texture.parallel import ordered
-from ptmtools.texture.profiles import PROFILES, Tile
+from ptmtools.texture.profiles import PROFILES
 from ptmtools.texture.pyramid import Box, covering, tiles_under
 from ptmtools.texture.sources import Ranges, Source, ranges_of
 

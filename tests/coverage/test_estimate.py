@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ptmtools.coverage.ach import compute_ach
-from ptmtools.coverage.options import AchOptions
-from ptmtools.coverage.sampling import GROUPS, estimate, grouped, ninety_fifth, shares, spread
+from ptmtools.coverage.options import GROUPS, AchOptions
+from ptmtools.coverage.sampling import estimate, grouped, ninety_fifth, shares, spread
 from ptmtools.visibility.model import Pvs
 
 COUNTS = st.integers(1, 6).flatmap(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ptmtools.errors import InputError
-from ptmtools.texture.coders import mixing as tables
+from ptmtools.texture.coders import mixing_tables as tables
 from ptmtools.texture.coders.mixing import _split, decode_mixing, encode_mixing
 from ptmtools.texture.profiles import small
 from ptmtools.texture.pyramid import build_pyramid, mean_below

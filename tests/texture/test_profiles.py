@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from ptmtools.cli.main import main
 from ptmtools.errors import InputError
 from ptmtools.texture import EncodeOptions, check, decode, encode, load_image, write_image
+from ptmtools.texture.coder import Tile
 from ptmtools.texture.coders.group import Reader
-from ptmtools.texture.profiles import PROFILES, Profile, Tile
+from ptmtools.texture.profiles import PROFILES, Profile
 
 TOY = Profile("toy", 200, "for tests", module=__name__)
 TEXELS = np.random.default_rng(3).integers(0, 256, (40, 70, 3), np.uint8)

@@ -12,8 +12,8 @@ import numpy as np
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.neighbours.apo.model import Octree
-from ptmtools.neighbours.apo.picture import Drawn, Look, View
 from ptmtools.neighbours.apo.traversal import look_up, stop_depth
+from ptmtools.neighbours.apo.view import Drawn, Look, View
 
 #: Rays that are cast at a time.
 _RAYS = 1 << 18

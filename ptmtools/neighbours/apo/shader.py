@@ -17,8 +17,8 @@ import numpy as np
 from ptmtools.arrays import Floats, Ints, Singles
 from ptmtools.coverage.backends.opengl import create_context
 from ptmtools.neighbours.apo.model import Octree
-from ptmtools.neighbours.apo.picture import AMBIENT, FILL, KEY, Drawn, Look, View
 from ptmtools.neighbours.apo.traversal import NEVER, WIDTH, rows_of
+from ptmtools.neighbours.apo.view import AMBIENT, FILL, KEY, Drawn, Look, View
 
 #: A farthest depth, where nothing has any.
 TINY = 2.0**-100

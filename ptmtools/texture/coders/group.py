@@ -1,20 +1,15 @@
-"""What every decoder reads its bytes with, and the error for bytes that no encoder writes.
+"""The bytes of a group, as all coders read and write them.
 
-The components of a texel, in the order in which all coders code them: as *planes*.
-
-Green, red, blue, alpha; grey and alpha. Red refers to green, blue to both, the others to none.
-
-A coarsest level of any size, coded as the pyramid of its own: levels in one string of bytes.
-
-Each level has its length in four bytes before it.
-
-Weights by least squares, solved without rounding, so that every machine finds the same.
-
-Deflated groups of files of version 1; they are read and no longer written.
-
-What is deflated is either the group of `raw` or, for each 2×2 block, p - I, q - I and r - I modulo
-256 and the remainder of the sum. Deflate made the bytes of a file depend on the zlib that wrote
-it; `repeats` has taken its place."""
+- `Reader` bounds every read; `damaged` is the error for bytes that no encoder writes.
+- The components of a texel are coded as *planes*: green, red, blue, alpha; grey and alpha. Red
+  refers to green, blue to both, the others to none.
+- A coarsest level of any size is coded as the pyramid of its own: levels in one string of bytes,
+  each with its length in four bytes before it.
+- `fitted` solves weighted least squares without rounding, so that every machine gets the same.
+- Deflated groups of files of version 1 are read and no longer written: the group of `raw` or, for
+  each 2×2 block, p - I, q - I and r - I modulo 256 and the remainder of the sum. Deflate made the
+  bytes of a file depend on the zlib that wrote it; `repeats` has taken its place.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +24,7 @@ from ptmtools.errors import InputError
 from ptmtools.texture.pyramid import level_sizes
 
 if TYPE_CHECKING:
-    from ptmtools.texture.profiles import Samples, Shape, Tile
+    from ptmtools.texture.coder import Samples, Shape, Tile
 
 
 def damaged(what: str) -> InputError:
@@ -221,3 +216,19 @@ def decode_differences(
     p[:], q[:], r[:] = (blocks[:, :, i] + below for i in range(3))
     s[:] = 4 * below + blocks[:, :, 3] - p - q - r
     return level
+
+
+#: Bits of a table and its size: the frequencies of a table in use sum to this.
+TABLE_BITS = 11
+
+
+TABLE_SIZE = 1 << TABLE_BITS
+
+
+#: Symbols of this number escape to a 16-bit value, but for tables without escape.
+ESCAPE = 255
+
+
+#: What a pass over a group returns: TRUNCATED where its stream ended early, IMPOSSIBLE where no
+#: encoder writes it.
+OK, TRUNCATED, IMPOSSIBLE = 0, 1, 2

@@ -1,19 +1,15 @@
-"""Symbols as bytes and back: escapes, then the words of four rANS states.
+"""Static entropy coding: symbols as bytes and back, and the frequency tables of their contexts.
 
-Layout: number of escapes (4 bytes); the escapes (2 bytes each); the words (2 bytes each) to the
-end, of which the first eight are the states. All little endian.
-
-What compiled loops and those that call them agree on.
-
-Symbol frequencies of the static coders: built in or sent, always in integers.
+Layout of a stream: number of escapes (4 bytes); the escapes (2 bytes each); the words of four rANS
+states (2 bytes each) to the end, of which the first eight are the states. All little endian.
 
 Each table of a group is either one of a family of two-sided geometric distributions, named by its
 number, or the frequencies counted. Small groups live on the first kind, large ones on the second;
-the encoder takes whichever is shorter, table by table. All of it is written as numbers of groups of
+the encoder takes whichever is shorter, table by table. Tables are written as numbers of groups of
 three bits, so that the tables of a nearly empty group take a few bytes.
 
-Deflating the frequencies was rejected: the bytes of a file would depend on the zlib that wrote
-it."""
+Deflating the frequencies was rejected: the bytes of a file would depend on the zlib that wrote it.
+"""
 
 from __future__ import annotations
 
@@ -25,16 +21,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.group import Reader, damaged
-
-#: Bits of a table and its size: the frequencies of a table in use sum to this.
-TABLE_BITS = 11
-TABLE_SIZE = 1 << TABLE_BITS
-#: Symbols of this number escape to a 16-bit value, but for tables without escape.
-ESCAPE = 255
-#: What a pass over a group returns: TRUNCATED where its stream ended early, IMPOSSIBLE where no
-#: encoder writes it.
-OK, TRUNCATED, IMPOSSIBLE = 0, 1, 2
+from ptmtools.texture.coders.group import (
+    ESCAPE,
+    OK,
+    TABLE_BITS,
+    TABLE_SIZE,
+    TRUNCATED,
+    Reader,
+    damaged,
+)
 
 
 class Sink(NamedTuple):

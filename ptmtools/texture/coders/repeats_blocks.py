@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ptmtools.compiled import plain_kernel as kernel
-from ptmtools.texture.coders.rans import ESCAPE
+from ptmtools.texture.coders.group import ESCAPE
 from ptmtools.texture.coders.rans_kernels import decode_single
 
 #: First table of each sort of symbol: is the block the first guess; which guess it is; which guess

@@ -25,15 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.texture.coders import rans as tables, texel_layout as layout
-from ptmtools.texture.coders.group import Reader, damaged, plane_order, references
-from ptmtools.texture.coders.rans import (
-    OK,
-    Sink,
-    check_end,
-    empty_sink,
-    encode_symbols,
-    read_stream,
-)
+from ptmtools.texture.coders.group import OK, Reader, damaged, plane_order, references
+from ptmtools.texture.coders.rans import Sink, check_end, empty_sink, encode_symbols, read_stream
 from ptmtools.texture.coders.texel_layout import (
     Numbering,
     fit_weights,
@@ -45,8 +38,8 @@ from ptmtools.texture.profiles.raw import sample_bytes
 from ptmtools.texture.samples import SampleKind, from_ordered, kind_of, to_ordered
 
 if TYPE_CHECKING:
+    from ptmtools.texture.coder import Samples, Shape
     from ptmtools.texture.coders.texel_kernels import Source
-    from ptmtools.texture.profiles import Samples, Shape
 
 #: Forms of a group.
 RAW, PLAIN, CODED, CODED_WITH_WEIGHTS = 0, 1, 2, 3

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ptmtools.compiled import kernel
-from ptmtools.texture.coders.rans import ESCAPE, IMPOSSIBLE, OK, TRUNCATED
+from ptmtools.texture.coders.group import ESCAPE, IMPOSSIBLE, OK, TRUNCATED
 from ptmtools.texture.coders.rans_kernels import STATE_LOW, decode_single, start_states
 
 #: How the fourth texel follows from the others: not at all, as integers, as floats of 16, 32 bits.

@@ -28,14 +28,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.texture.coder import Tile
 from ptmtools.texture.coders import haar, repeats
 from ptmtools.texture.coders.group import Reader, damaged, pack_levels, shapes_to, unpack_levels
-from ptmtools.texture.profiles import Tile, raw
+from ptmtools.texture.profiles import raw
 from ptmtools.texture.profiles.raw import group_length
 from ptmtools.texture.pyramid import build_pyramid
 
 if TYPE_CHECKING:
-    from ptmtools.texture.profiles import Samples, Shape
+    from ptmtools.texture.coder import Samples, Shape
 
 #: Coders 1 to 3 are those of files of version 1.
 STORED, HAAR_1, DEFLATED_1, DIFFERENCES_1, HAAR, REPEATS, PYRAMID = range(7)

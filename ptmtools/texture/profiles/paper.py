@@ -18,8 +18,9 @@ import numpy as np
 
 from ptmtools.errors import InputError
 from ptmtools.lazy import component
+from ptmtools.texture.coder import Tile
 from ptmtools.texture.coders.group import Reader, damaged
-from ptmtools.texture.profiles import Tile, raw
+from ptmtools.texture.profiles import raw
 from ptmtools.texture.profiles.raw import (
     corners,
     pack_pairs,
@@ -30,7 +31,7 @@ from ptmtools.texture.profiles.raw import (
 )
 
 if TYPE_CHECKING:
-    from ptmtools.texture.profiles import Samples, Shape
+    from ptmtools.texture.coder import Samples, Shape
 
 #: Forms of a group: as in `raw`, where JPEG is longer or there are no blocks; with JPEGs.
 RAW, JPEG = 0, 1

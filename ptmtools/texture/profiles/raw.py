@@ -26,12 +26,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.texture.coder import Tile
 from ptmtools.texture.coders.group import Reader, damaged
-from ptmtools.texture.profiles import Tile
 from ptmtools.texture.samples import from_ordered, kind_of, round_to, to_ordered
 
 if TYPE_CHECKING:
-    from ptmtools.texture.profiles import Samples, Shape
+    from ptmtools.texture.coder import Samples, Shape
 
 #: Correction codes 0, 1, 2 stand for 0, -1, +1 units in the last place; this one for an escape.
 ESCAPE = 3

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ptmtools.texture.coder import Tile
 from ptmtools.texture.coders.group import Reader, damaged, pack_levels, shapes_to, unpack_levels
-from ptmtools.texture.profiles import Tile
 from ptmtools.texture.pyramid import build_pyramid
 
 if TYPE_CHECKING:
-    from ptmtools.texture.profiles import Samples, Shape
+    from ptmtools.texture.coder import Samples, Shape
 
 #: The first byte of a group.
 MIXED, STORED, TEXEL, EVEN = range(4)

@@ -9,16 +9,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from ptmtools.errors import InputError, MissingComponentError
-from ptmtools.neighbours.apo.picture import (
-    Rendering,
-    RenderOptions,
-    View,
-    render,
-    render_view,
-    view_of,
-)
+from ptmtools.neighbours.apo.picture import Rendering, RenderOptions, render, render_view
 from ptmtools.neighbours.apo.shader import OctreeShader
 from ptmtools.neighbours.apo.traversal import look_up, stop_depth, unpacked
+from ptmtools.neighbours.apo.view import View, view_of
 from tests.neighbours.apo.building import Node, ball, nodes, octree_of
 from tests.neighbours.apo.test_normals import sphere
 

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders import haar as layout
+from ptmtools.texture.coders import haar_layout as layout
 from ptmtools.texture.coders.group import Reader, plane_order, references
 from tests.texture.oracles.rans import Symbols, read_tables
 

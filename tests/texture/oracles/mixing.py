@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders import mixing as tables
+from ptmtools.texture.coders import mixing_tables as tables
 from ptmtools.texture.coders.group import plane_order
 from tests.texture.oracles.haar import edge
 

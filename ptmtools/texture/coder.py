@@ -1,0 +1,71 @@
+"""The contract between the files of a `.ptm` and the coders of its tiles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Samples = NDArray[Any]
+    Shape = tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class Tile:
+    """One tile, coded or decoded.
+
+    Attributes
+    ----------
+    data: its bytes (empty after decoding).
+    texels: (h, w, c), as a decoder has them. They are those of the image unless an error was
+        allowed.
+    memory: what an adaptive profile has learned from this tile and those before it; else None.
+    """
+
+    data: bytes
+    texels: Samples
+    memory: Any = None
+
+
+class Coder(Protocol):
+    """The four functions of a profile's module, which code and decode tiles.
+
+    All levels are C-contiguous (h, w, c) of uint8, uint16, float16 or float32. ``below`` is
+    (h >> 1, w >> 1, c), the level below as a decoder has it: the mean of ``level`` unless
+    ``max_error`` allows an error. Decoding raises InputError (PTM-I112) where the bytes contradict
+    the sizes or themselves; it never reads or writes outside its arrays.
+
+    A level is one tile or several; a tile is coded as if there was nothing around it. ``memory``
+    is what the tile of the level below left, None at first; the tiles of a level of several all
+    get what the last single tile left, and what they leave is dropped. It is never changed.
+    """
+
+    def encode_base(self, level: Samples) -> bytes:
+        """The coarsest level, which has nothing below it; without error."""
+
+    def decode_base(self, data: bytes | memoryview, shape: Shape, dtype: np.dtype[Any]) -> Samples:
+        """The inverse of `encode_base`."""
+
+    def encode_tile(
+        self,
+        level: Samples,
+        below: Samples,
+        max_error: int = 0,
+        memory: Any = None,
+        threads: int = 1,
+    ) -> Tile:
+        """What refines ``below`` to ``level``, or to within ``max_error`` of it."""
+
+    def decode_tile(
+        self,
+        data: bytes | memoryview,
+        below: Samples,
+        shape: Shape,
+        max_error: int = 0,
+        memory: Any = None,
+        threads: int = 1,
+    ) -> Tile:
+        """The inverse of `encode_tile`."""
