@@ -226,7 +226,12 @@ await post("/done", JSON.stringify({ line: line(), colors }));
 def test_the_example_walks(three: Any, gltf_museum: Path, tmp_path: Path) -> None:
     """As it is shipped, beside the packages as npm installs them."""
     folders = three.folders()
-    names = {"three": "three", "ptm-decoder": "decoder", "three-ptm": "adapter"}
+    names = {
+        "three": "three",
+        "ptm-client": "client",
+        "ptm-decoder": "decoder",
+        "three-ptm": "adapter",
+    }
     for name, folder in names.items():
         (tmp_path / name).symlink_to(folders[folder])
     served = {"node_modules": tmp_path, "www": gltf_museum / "www"}

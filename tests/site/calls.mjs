@@ -9,7 +9,7 @@ import { refresh, shareOut } from "../../web/page/policy/sharing.js";
 import {
   directionOf, distance, frustumOf, meetsBox, meetsHull,
 } from "../../web/page/space/frustum.js";
-import { Locator } from "../../web/page/space/locating.js";
+import { Locator } from "../../web/client/src/locating.js";
 import { crossing } from "../../web/page/space/portals.js";
 
 const reals = (rows) => Float64Array.from(rows.flat());
@@ -64,7 +64,7 @@ const functions = {
     };
   },
   locate({ index, records, known, eyes, from }) {
-    const locator = new Locator(catalogueOf(index));
+    const locator = new Locator(index.cells.map(({ box }) => box));
     for (const cell of known) locator.learn(cell, records[cell]);
     let cell = from;
     return eyes.map((eye) => {

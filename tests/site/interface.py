@@ -57,7 +57,8 @@ def _answer(route: Any) -> None:
     elif path.endswith(".png"):
         route.fulfill(body=PNG, content_type="image/png")
     else:
-        file = PAGE / path.removeprefix("/page/") if "/page/" in path else HERE / path[1:]
+        web = path.startswith(("/page/", "/client/"))
+        file = PAGE.parent / path[1:] if web else HERE / path[1:]
         route.fulfill(body=file.read_text(), content_type="text/javascript")
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 VERSION = "5.9.3"
 ROOT = Path(__file__).resolve().parents[2]
 #: Folders with a tsconfig.json.
-PACKAGES = ("web/ptm", "web/three-ptm", "web/page")
+PACKAGES = ("web/ptm", "web/client", "web/three-ptm", "web/page")
 PREFIX = "build/browsers/typescript"
 INSTALL = (
     "npm install --no-save --no-package-lock --ignore-scripts --no-audit --no-fund "

@@ -34,7 +34,7 @@ export class Stream {
    * @param {object} parts
    * @param {import("./data/site.js").Site} parts.site
    * @param {import("./policy/client.js").Client} parts.client
-   * @param {import("./space/locating.js").Locator} parts.locator
+   * @param {import("../client/src/locating.js").Locator} parts.locator
    * @param {import("./policy/estimate.js").Estimate} parts.estimate
    * @param {import("./net/fetcher.js").Fetcher} parts.fetcher
    * @param {import("../ptm/src/workers.js").DecoderWorkers} parts.workers

@@ -1,6 +1,7 @@
 // The walk: each frame where the visitor is, what is drawn, what goes into texture memory and what is
 // asked for next (docs/formats/client.md).
 
+import { Locator } from "../client/src/locating.js";
 import { beginningOf } from "./beginning.js";
 import { Comparison } from "./compare.js";
 import { fitting, levelsOf } from "./data/site.js";
@@ -18,7 +19,6 @@ import { Estimate } from "./policy/estimate.js";
 import { POLICIES } from "./policy/policies.js";
 import { sightOf } from "./policy/sight.js";
 import { distance, frustumOf, meetsBox } from "./space/frustum.js";
-import { Locator } from "./space/locating.js";
 import { Stream } from "./stream.js";
 import { Stillness } from "./walk/stillness.js";
 
@@ -89,7 +89,7 @@ export class Walkthrough {
     this.estimate = new Estimate();
     this.fetcher = new Fetcher((message) => emit("notice", { message }));
     watchLink(this.estimate, this.fetcher);
-    this.locator = new Locator(this.catalogue);
+    this.locator = new Locator(index.cells.map(({ box }) => box));
     this.client = new Client(this.catalogue, {
       budget: options.budget,
       policy: POLICIES[options.policy],

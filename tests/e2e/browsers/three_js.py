@@ -32,6 +32,7 @@ HEAD = (
 <script type="importmap">
 { "imports": { "three": "/three/build/three.module.js",
                "three/addons/": "/three/examples/jsm/",
+               "ptm-client": "/client/src/index.js",
                "ptm-decoder": "/decoder/src/index.js",
                "three-ptm": "/adapter/src/index.js" } }
 </script>
@@ -171,7 +172,8 @@ def folders() -> dict[str, Path]:
     three = package()
     if three is None:
         raise FileNotFoundError(missing())
-    return {"three": three, "decoder": ROOT / "web" / "ptm", "adapter": ADAPTER}
+    web_packages = {"client": ROOT / "web" / "client", "decoder": ROOT / "web" / "ptm"}
+    return {"three": three, "adapter": ADAPTER, **web_packages}
 
 
 def run(

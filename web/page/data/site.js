@@ -1,4 +1,6 @@
-// What the page is told of its site, and where the files are that the index names.
+// The settings of the page, the index, and the URLs of the files that the index names.
+
+import { levelSizes } from "../../client/src/levels.js";
 
 /**
  * @typedef {object} SiteConfig
@@ -124,10 +126,6 @@ export function fitting(index, side) {
  * The sizes of a texture's levels, coarsest first, and the bytes of a texel on the GPU.
  * @param {TextureRow} row
  */
-export function levelsOf({ width, height, ends, gpuTexelBytes }) {
-  const sizes = ends.map((_, n) => {
-    const halved = ends.length - 1 - n;
-    return { width: width >> halved, height: height >> halved };
-  });
-  return { sizes, channels: gpuTexelBytes };
+export function levelsOf(row) {
+  return { sizes: levelSizes(row), channels: row.gpuTexelBytes };
 }

@@ -1,7 +1,7 @@
 // The beginning of a `.ptm` that is here, and its levels, decoded in a worker.
 
 import { PtmError } from "../../ptm/src/index.js";
-import { levelsOf } from "../data/site.js";
+import { levelSizes } from "../../client/src/levels.js";
 
 /** @typedef {import("../../ptm/src/level-decoder.js").Image} Image */
 /** @typedef {import("../../ptm/src/workers.js").DecoderWorkers} DecoderWorkers */
@@ -51,7 +51,7 @@ export class TextureFile {
    * @returns {Promise<Image[]>}
    */
   async decode(levels) {
-    const { ends, components } = this.row, { sizes } = levelsOf(this.row);
+    const { ends, components } = this.row, sizes = levelSizes(this.row);
     const format = components < 3 ? "native" : "rgba", channels = components < 3 ? components : 4;
     try {
       const bytes = this.#bytes.subarray(0, ends[levels - 1]);

@@ -1,6 +1,6 @@
 // What a camera takes in: boxes and hulls that reach into its frustum.
 
-import { cross } from "./vectors.js";
+import { cross } from "../../client/src/vectors.js";
 
 /** @typedef {ArrayLike<number>} Numbers */
 

@@ -1,6 +1,6 @@
 // Ways through portals.
 
-import { cross, dot, facing, minus } from "./vectors.js";
+import { cross, dot, facing, minus } from "../../client/src/vectors.js";
 
 /** @typedef {ArrayLike<number>} Vector */
 /** @typedef {{neighbour: number, polygon: number[][]}} Portal */

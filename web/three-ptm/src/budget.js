@@ -22,17 +22,6 @@ export function pyramidBytes(sizes, level) {
 }
 
 /**
- * Sizes of the levels of a texture of the index, coarsest first.
- * @param {{width: number, height: number, ends: number[]}} row
- */
-export function levelSizes({ width, height, ends }) {
-  return ends.map((_, n) => {
-    const halved = ends.length - 1 - n;
-    return { width: width >> halved, height: height >> halved };
-  });
-}
-
-/**
  * The level that each texture may have: the finest that fits into its part of the memory, at least
  * the coarsest. What a texture leaves of its part goes to the others. Room is kept for one of them
  * to be there twice while its storage is exchanged.

@@ -2,10 +2,10 @@
 // (docs/formats/hints.md).
 
 import { Group } from "three";
+import { Locator, levelSizes } from "ptm-client";
 import { DecoderWorkers } from "ptm-decoder";
-import { levelSizes, shareOut } from "./budget.js";
+import { shareOut } from "./budget.js";
 import { CellLoader, disposeCell } from "./cell-loader.js";
-import { holds, near, planesOf } from "./locating.js";
 import { PtmTexture } from "./ptm-texture.js";
 import { RangeFile } from "./range-file.js";
 
@@ -26,10 +26,11 @@ import { RangeFile } from "./range-file.js";
 /**
  * @typedef {object} CellRecord
  * @property {number[]} visible
+ * @property {number[]} adjacent
  * @property {number[]} ach
  * @property {number} floor
  * @property {number[][]} textures
- * @property {import("./locating.js").Leaf[]} leaves
+ * @property {{points: number[][], faces: number[][]}[]} leaves
  */
 
 /**
@@ -54,7 +55,8 @@ export class Walk {
   #options;
   #ownWorkers;
   #loader = new CellLoader((...which) => this.#texture(...which));
-  /** @type {Map<number, Promise<CellRecord & {planes: import("three").Plane[][]}>>} */
+  #locator;
+  /** @type {Map<number, Promise<CellRecord>>} */
   #records = new Map();
   /** @type {Map<number, {control: AbortController, done: Promise<void>}>} */
   #cells = new Map();
@@ -86,6 +88,7 @@ export class Walk {
     if (index.schema !== 2) throw new Error(`hints of schema ${index.schema}, not 2`);
     this.index = index;
     this.budget = options.budget ?? 2 ** 28;
+    this.#locator = new Locator(index.cells.map(({ box }) => box));
     this.#renderer = renderer;
     this.#url = new URL(url, globalThis.document?.baseURI);
     this.#options = options;
@@ -118,19 +121,18 @@ export class Walk {
   }
 
   /**
-   * The cell that holds a point, or -1: it is behind all planes of one of the cell's leaves. Boxes
-   * tell which records are worth a look, that of the cell the viewer was in first.
+   * The cell that holds a point, or -1. Fetches the records of cells whose box holds it until one is
+   * the cell.
    * @param {Vector3} point
-   * @param {number} [slack] metres
    */
-  async locate(point, slack = 1e-3) {
-    const { cells } = this.index;
-    for (const cell of [Math.max(this.cell, 0), ...cells.keys()]) {
-      if (!near(cells[cell].box, point, slack)) continue;
-      const { planes } = await this.#record(cell);
-      if (planes.some((leaf) => holds(leaf, point, slack))) return cell;
+  async locate(point) {
+    const eye = point.toArray();
+    for (;;) {
+      const cell = this.#locator.locate(eye, this.cell);
+      const [unknown] = this.#locator.candidates(eye, this.cell);
+      if (cell >= 0 || unknown === undefined) return cell;
+      await this.#record(unknown);
     }
-    return -1;
   }
 
   /**
@@ -176,7 +178,8 @@ export class Walk {
     const read = async () => {
       /** @type {CellRecord} */
       const record = await json(this.#address(cell, "record"));
-      return { ...record, planes: record.leaves.map(planesOf) };
+      this.#locator.learn(cell, record);
+      return record;
     };
     const found = this.#records.get(cell) ?? read();
     this.#records.set(cell, found);

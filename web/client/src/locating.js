@@ -1,4 +1,4 @@
-// In which cell an eye is: the one of whose leaves it is behind all planes.
+// The cell that a point is in: the point is behind all planes of one of its leaves.
 
 import { dot, facing } from "./vectors.js";
 
@@ -23,16 +23,16 @@ function planesOf({ points, faces }) {
   });
 }
 
-/** The leaves of the cells whose record is there. */
+/** Locates points among the cells whose records it has learned. */
 export class Locator {
   #boxes;
   /** @type {({leaves: number[][][], adjacent: number[]} | undefined)[]} by cell */
   #cells;
 
-  /** @param {{C: number, low: Vector, high: Vector}} catalogue */
-  constructor(catalogue) {
-    this.#boxes = catalogue;
-    this.#cells = new Array(catalogue.C).fill(undefined);
+  /** @param {Vector[]} boxes of each cell: x, y, z of the low corner, then of the high one, metres */
+  constructor(boxes) {
+    this.#boxes = boxes;
+    this.#cells = new Array(boxes.length).fill(undefined);
   }
 
   /** @param {number} cell @param {CellRecord} record */
@@ -41,8 +41,8 @@ export class Locator {
   }
 
   /**
-   * The cell that the eye is in, of those whose record is there: the one before if it still is, else
-   * one of those next to it, else any; −1 for none.
+   * The cell that the eye is in, among those whose record is known: the one before if possible, else one
+   * next to it, else any; −1 for none.
    * @param {Vector} eye
    * @param {number} from the cell before, or −1
    */
@@ -52,7 +52,7 @@ export class Locator {
   }
 
   /**
-   * Cells that the eye may be in and whose record is not there, those next to the one before first.
+   * Cells without a known record whose box holds the eye, those next to the one before first.
    * @param {Vector} eye
    * @param {number} from
    */
@@ -66,18 +66,15 @@ export class Locator {
    * @param {number} from
    */
   #near(eye, from) {
-    const { C, low, high } = this.#boxes, adjacent = this.#cells[from]?.adjacent ?? [];
-    /** @type {number[]} */
-    const near = [];
-    /** @type {number[]} */
-    const far = [];
-    for (let c = 0; c < C; c++) {
-      let inside = true;
+    const adjacent = this.#cells[from]?.adjacent ?? [];
+    /** @type {number[][]} */
+    const [near, far] = [[], []];
+    this.#boxes.forEach((box, cell) => {
       for (let i = 0; i < 3; i++) {
-        inside &&= low[3 * c + i] - SLACK <= eye[i] && eye[i] <= high[3 * c + i] + SLACK;
+        if (eye[i] < box[i] - SLACK || eye[i] > box[i + 3] + SLACK) return;
       }
-      if (inside) (adjacent.includes(c) ? near : far).push(c);
-    }
+      (adjacent.includes(cell) ? near : far).push(cell);
+    });
     return [...near, ...far];
   }
 

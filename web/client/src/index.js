@@ -1,0 +1,5 @@
+// What the package offers: see README.md.
+
+export { levelSizes } from "./levels.js";
+export { Locator } from "./locating.js";
+export { cross, dot, facing, minus } from "./vectors.js";
