@@ -1,4 +1,4 @@
-"""What the budget of the portal flow and the decision of near ties cost and bring.
+"""Cost and gain of the portal flow's budget and of the decision of near ties.
 
     python benchmarks/budget.py MODEL... [--wall-area 2] [--budgets 0 2000 20000 200000 1000000]
 

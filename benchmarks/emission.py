@@ -1,4 +1,4 @@
-"""How fast a database is emitted, and how long its files are beside those of others.
+"""Speed of emission, and sizes of the files beside those of other writers.
 
     python benchmarks/emission.py [MODEL…]
 
@@ -41,9 +41,9 @@ from ptmtools.output.vrml import field
 from ptmtools.scene import Scene, ingest
 from ptmtools.visibility import Pvs, compute_pvs
 
-#: Each thing is timed so many times, and the best counts.
+#: Repetitions; the best time counts.
 TIMES = 3
-#: The large scene has at least so many triangles.
+#: Least number of triangles of the large scene.
 MANY = 400_000
 
 

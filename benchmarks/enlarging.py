@@ -32,7 +32,7 @@ _LINES = 1 << 18
 
 
 def enlarged(scene: Scene, kind: str, triangles: int, library: str) -> list[bytes]:
-    """The OBJ, in parts, of a scene with about so many triangles; ``library`` is its MTL."""
+    """The OBJ, in parts, of a scene with about ``triangles`` triangles; ``library`` is its MTL."""
     corners, uv, owner = scene.corners, scene.uv, scene.triangle_object
     names, material = list(scene.objects), scene.triangle_material
     if kind == "walls":

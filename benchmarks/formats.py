@@ -35,7 +35,7 @@ print(seconds, most, len(scene.triangles))
 
 
 def floor(triangles: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points, texture coordinates and (n, 3) triangles, about so many."""
+    """Points, texture coordinates and (n, 3) triangles of a wavy floor."""
     side = max(2, round((triangles / 2) ** 0.5)) + 1
     x, z = np.meshgrid(np.linspace(0, 50, side), np.linspace(0, 50, side), indexing="ij")
     y = 0.2 * np.sin(x) * np.cos(0.7 * z)
@@ -51,8 +51,8 @@ def floor(triangles: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def glb(views: list[tuple[bytes, dict[str, Any]]], tree: dict[str, Any]) -> bytes:
     """A GLB of buffer views, each with what it says besides."""
     blob, rows = b"", []
-    for data, told in views:
-        rows.append({"buffer": 0, "byteOffset": len(blob), "byteLength": len(data)} | told)
+    for data, fields in views:
+        rows.append({"buffer": 0, "byteOffset": len(blob), "byteLength": len(data)} | fields)
         blob += data + bytes(-len(data) % 4)
     tree = {"asset": {"version": "2.0"}, "bufferViews": rows} | tree
     tree["buffers"] = [{"byteLength": len(blob)}, *tree.get("buffers", [])]
@@ -103,18 +103,18 @@ def meshopt(points: np.ndarray, coords: np.ndarray, faces: np.ndarray) -> bytes:
             rows = np.ascontiguousarray(each).view(np.uint8).reshape(len(each), -1)
             data = library.encode_vertex_buffer_level(rows, 2, 0)
             mode, (count, stride) = "ATTRIBUTES", rows.shape
-        told = {"mode": mode, "count": count, "byteStride": stride, "byteLength": len(data)}
-        views.append((data, told))
+        fields = {"mode": mode, "count": count, "byteStride": stride, "byteLength": len(data)}
+        views.append((data, fields))
         whole += count * stride
     at, packed = 0, []
-    for data, told in views:
-        extension = {name: told | {"buffer": 0, "byteOffset": at}}
+    for data, fields in views:
+        extension = {name: fields | {"buffer": 0, "byteOffset": at}}
         packed.append(
             (
                 data,
                 {
                     "buffer": 1,
-                    "byteLength": told["count"] * told["byteStride"],
+                    "byteLength": fields["count"] * fields["byteStride"],
                     "extensions": extension,
                 },
             )
@@ -138,8 +138,8 @@ def draco(points: np.ndarray, coords: np.ndarray, faces: np.ndarray) -> bytes:
     for accessor in tree["accessors"][:2]:
         accessor["count"] = len(decoded.points)
     assert count <= len(decoded.points)
-    told = {"bufferView": 0, "attributes": {"POSITION": ids[0], "TEXCOORD_0": ids[3]}}
-    tree["meshes"][0]["primitives"][0]["extensions"] = {name: told}
+    fields = {"bufferView": 0, "attributes": {"POSITION": ids[0], "TEXCOORD_0": ids[3]}}
+    tree["meshes"][0]["primitives"][0]["extensions"] = {name: fields}
     return glb([(data, {})], tree | {"extensionsRequired": [name], "extensionsUsed": [name]})
 
 

@@ -1,4 +1,4 @@
-"""How time and memory grow with the model: ``python benchmarks/growth.py [rooms|walls|furniture]``
+"""Growth of time and memory with the model: ``python benchmarks/growth.py [rooms|walls|furniture]``
 
 rooms         sample museums of 12, 50, 200 and 800 rooms (`sample_data/make_museum.py`)
 walls         the museum of 12 rooms, its walls subdivided into 200,000 to 5 million triangles
@@ -56,7 +56,7 @@ from ptmtools.visibility import Pvs, compute_pvs
 
 ROOT = Path(__file__).resolve().parent.parent
 SMALL = ROOT / "sample_data/two_rooms/two_rooms.obj"
-#: The kinds of growth: what is counted, so many of it, and what figures are held against.
+#: Kinds of growth: the counted quantity, its values, and the quantity that exponents refer to.
 KINDS = {
     "rooms": ("rooms", (12, 50, 200, 800), "leaves"),
     "walls": ("triangles", (200_000, 1_000_000, 5_000_000), "triangles"),
@@ -146,7 +146,7 @@ def one_stage(stage: str, work: Work) -> None:
 
 
 def make_model(kind: str, size: int, folder: Path) -> None:
-    """A museum of so many rooms, or of `FEW_ROOMS` with so many triangles of a ``kind``."""
+    """Makes a museum of ``size`` rooms, or of `FEW_ROOMS` rooms with ``size`` triangles."""
     model = folder / "model/museum.obj"
     if model.is_file():
         return

@@ -81,7 +81,7 @@ def middle(image: Texels, side: int) -> Texels:
 
 
 def box(image: Texels, rows: int, columns: int) -> Texels:
-    """Means of blocks of so many rows and columns, rounded to the nearest."""
+    """Means of blocks of ``rows`` × ``columns`` texels, rounded to the nearest."""
     height, width, components = image.shape
     blocks = image.reshape(height // rows, rows, width // columns, columns, components)
     total = blocks.sum(axis=(1, 3), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""How like a browser's picture is to our own, outside edges.
+"""Compares a browser's picture with our own outside edges.
 
 Along an edge two renderers may differ by a whole pixel: one takes the pixel for this surface, one
 for that, a third mixes them (X_ITE smooths edges, view3dscene does not). Such pixels say nothing
@@ -9,7 +9,7 @@ also behind glass. A pixel is masked if there is an edge within it or within one
 neighbours. Texture is no edge: what a browser makes of that is modelled (render.py), not excused.
 
 Sky is left out of the PSNR too, since to show nothing where nothing is would raise it; how much of
-the sky shows something else is told apart.
+the sky shows something else is counted separately.
 
 (Tried: a threshold of 40 levels on the colour's step to the next pixel as well. It masks up to 4 %
 more of a picture and changes no PSNR by more than 1 dB.)

@@ -1,4 +1,4 @@
-"""How much memory a piece of work takes, beyond what its process held before."""
+"""Measures the peak memory of a function beyond the memory of its process before the call."""
 
 from __future__ import annotations
 
@@ -12,15 +12,17 @@ T = TypeVar("T")
 
 
 def with_peak(work: Callable[[], T]) -> tuple[T, int]:
-    """What ``work`` returns, and the most bytes resident meanwhile less those before; where the
-    system cannot forget an earlier peak, the most that the process ever held."""
+    """Returns the result of ``work`` and its peak of resident bytes above those before the call.
+
+    Where the system cannot reset the peak, the second value is the peak of the whole process.
+    """
     before = _before()
-    found = work()
-    return found, max(peak_memory() if before is None else _status("VmHWM") - before, 0)
+    result = work()
+    return result, max(peak_memory() if before is None else _status("VmHWM") - before, 0)
 
 
 def _before() -> int | None:
-    """Bytes resident; the peak so far is forgotten. None where the system cannot."""
+    """Resets the peak and returns the resident bytes; None where the system cannot reset it."""
     try:
         Path("/proc/self/clear_refs").write_text("5")
         return _status("VmRSS")

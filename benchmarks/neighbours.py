@@ -1,4 +1,4 @@
-"""Which system shows the better picture for the same bytes: ``python benchmarks/neighbours.py``
+"""Compares systems by their pictures after the same bytes: ``python benchmarks/neighbours.py``
 
 The viewer's client and others that take `.ptm`s, and the clients of the neighbouring systems, on
 the same walks: the sample museum (`make sample`), and a hall of large photographs, all different
@@ -10,12 +10,12 @@ e             mean over pixels and frames of the root mean square error over R, 
               against the picture of all `.ptm`s with all of their levels
 / best        e over that of `best`
 p95           what e does not exceed in 95 % of the frames
-50 %, …, s    until who stands where the walk begins has so much of the picture, at most a minute
-e at 100 kB   of who stands before a picture, at `PLACES` places of the walk, once so many bytes
-              have been received, over a link of 512 kbit/s with all memory, and over that of
-              `best`; in the end, and the bytes by then, after a minute
-all there     e over the walk with all files there: what scaling to powers of two and other mip
-              levels make of the same texels
+50 %, …, s    until a visitor at the start has that share of the picture, at most a minute
+e at 100 kB   of a visitor who stands before a picture, at `PLACES` places of the walk, after that
+              many bytes over a link of 512 kbit/s with all memory, and over that of `best`; then
+              at the end, after a minute, and the bytes by then
+complete      e over the walk with all files present: the effect of scaling to powers of two and of
+              other mip levels
 """
 
 from __future__ import annotations
@@ -130,18 +130,18 @@ def tables(world: World, options: SimulateOptions) -> Iterator[str]:
 
 
 def stock_table(world: World) -> Iterator[str]:
-    """What the textures take in each form, and the error with all of it there."""
-    yield "| form | textures | their texture memory | all there |"
+    """Sizes of the textures in each form, and the error with all files present."""
+    yield "| form | textures | their texture memory | complete |"
     yield "|---|--:|--:|--:|"
     for form in (PTM, *world.beside):
         own = world.in_form(form)
         stock = own.catalogue
         fetched, held = size(int(stock.ends[:, -1].sum())), size(stock.whole)
-        yield f"| {FORMS[form].about} | {fetched} | {held} | {all_there(own):.2f} |"
+        yield f"| {FORMS[form].about} | {fetched} | {held} | {complete(own):.2f} |"
 
 
-def all_there(world: World) -> float:
-    """e over the walk with everything there."""
+def complete(world: World) -> float:
+    """e over the walk with all files present."""
     views, last = world.views, np.append(world.catalogue.levels, 0)
     rows = views.error[np.arange(len(views.texture)), last[views.texture] + 1]
     of = np.repeat(np.arange(views.frames), np.diff(views.start))
@@ -168,7 +168,7 @@ def bytes_table(world: World, policies: Sequence[Declared]) -> Iterator[str]:
     """e by bytes received, means over places."""
     places = standing_places(world)
     if not places:
-        yield "Nobody comes to stand in this walk."
+        yield "Nobody stands still in this walk."
         return
     heads = " | ".join(f"e at {size(mark)}" for mark in MARKS)
     yield f"| system | {heads} | at the end | received |"

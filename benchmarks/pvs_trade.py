@@ -461,7 +461,7 @@ def main(arguments: list[str] | None = None) -> int:
         output.parent.mkdir(parents=True, exist_ok=True)
         models = [m for m in given.models or AREAS if m.is_file()]
         if not models:
-            parser.exit(message="no model at hand\n")
+            parser.exit(message="none of the models exists\n")
         rows = []
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)

@@ -1,4 +1,4 @@
-"""What rounding does to cells: a model whose meshes Draco has compressed, each on its own grid.
+"""Cells of a model whose meshes Draco has quantised, each on its own grid.
 
     python benchmarks/rounded.py [MODEL] [--bits 14 12 11]
 

@@ -1,4 +1,4 @@
-"""What simplification costs, and how near it comes: `python benchmarks/simplification.py`
+"""Cost and error of simplification: `python benchmarks/simplification.py`
 
 Made statues (a sphere blown up from a cube, with seeded waves and folds; ``--shape squashed`` to
 make it flat and long, ``column`` for the sample column, which has thousands of handles, ``holed``
@@ -72,7 +72,7 @@ def littered(points: Floats, faces: Any, rng: np.random.Generator) -> tuple[Floa
 
 
 def statue(faces: int, shape: str, painted: bool = False, seed: int = 1) -> Mesh:
-    """About so many faces: waves from a third of the size to a hundredth, and folds."""
+    """About ``faces`` faces: waves from a third of the size to a hundredth, and folds."""
     if shape == "column":
         return column(faces)
     n = ceil(sqrt(faces / 12))

@@ -1,4 +1,4 @@
-"""How long the simulator takes: ``python benchmarks/walk_speed.py [SCENE…]``
+"""Times the simulator: ``python benchmarks/walk_speed.py [SCENE…]``
 
 A walk of five minutes through the sample museum and through the museum of 40 rooms (`scenes.py`):
 processor seconds of preparing it, and of what in that; then of a run of each policy at 512
@@ -9,7 +9,7 @@ decoding      textures, all levels
 rays          the first surface that each pixel shows
 sampling      textures at each pixel, at all levels
 rest          of the preparation
-all told      the preparation and a run of the slowest policy
+total         the preparation and a run of the slowest policy
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ PARTS = {
 
 def main() -> None:
     scenes = sys.argv[1:] or ["museum", "rooms"]
-    print("| scene | frames | " + " | ".join([*PARTS, "rest", "preparation", "all told"]) + " |")
+    print("| scene | frames | " + " | ".join([*PARTS, "rest", "preparation", "total"]) + " |")
     print("|---" + "|--:" * (len(PARTS) + 4) + "|")
     runs: dict[str, list[float]] = {name: [] for name in OURS}
     for scene in scenes:

@@ -1,4 +1,4 @@
-"""What clients show to a walker: ``python benchmarks/walk_table.py``
+"""Compares the clients of the simulator: ``python benchmarks/walk_table.py``
 
 Every policy of the simulator, on four links and with three amounts of texture memory, on three
 walks of 150 seconds through each of four scenes (`scenes.py`): `h1`, 100 ms to the first byte, 300
@@ -13,8 +13,8 @@ waste         share of the bytes received that was never on the screen
 / oracle      e over that of `oracle` on the same walk under the same conditions, on average
 ± walks       standard deviation of that ratio over the walks through a scene, root mean square
 p95 / ach     p95 on average over that of `ach`, which is 0 on some walks
-90 %, s       until who stands where the walk begins has 90 % of the picture, at most a minute
-s             processor seconds that a run takes; so many does the preparation of a walk
+90 %, s       until a visitor who stands at the start has 90 % of the picture, at most a minute
+s             processor seconds of a run; a table of its own has those of preparing a walk
 
 The last table is beside the figures of the research prototype, which had geometry and hints for
 nothing, and other walks: e over the prototype's, over the scenes and conditions that it had.
@@ -205,8 +205,8 @@ class Case:
 
 
 def made(cases: list[Case], file: Path, jobs: int) -> list[Row]:
-    """The rows of all cases, in their order; those that the file lacks are run, a world in each of
-    so many processes, and added to it, one by one."""
+    """Returns the rows of all cases, in order. Missing ones are run, one world in each of ``jobs``
+    processes, and appended to the file one by one."""
     have = _kept(file)
     worlds: dict[tuple[str, int], list[Case]] = {}
     for case in cases:

@@ -1,4 +1,4 @@
-"""How fast the browser's decoder is, beside Python's: `python benchmarks/web_decoder.py [NAME…]`
+"""Speed of the browser's decoder beside Python's: `python benchmarks/web_decoder.py [NAME…]`
 
 Names are those of the sets of `benchmarks/codec/images.py`. All levels of every image are decoded
 on one thread: by Python and numba, and in node by WebAssembly, in turn, several times over; of each

@@ -114,7 +114,7 @@ def rivals(image: Samples) -> dict[str, int]:
 
 
 def open_exr(image: Samples) -> dict[str, int]:
-    """OpenEXR, if it is at hand."""
+    """OpenEXR (ZIP), if the module is installed."""
     try:
         import OpenEXR
     except ImportError:

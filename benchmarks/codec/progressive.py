@@ -8,7 +8,7 @@ summed over images of both sets of textures, over the bytes of Pillow's PNG of t
 - `.ptm`: the end of the level's group.
 - PNG mip chain, WebP mip chain: a file for each level, coarsest first.
 - Adam7: passes 1, 3, 5 and 7 complete a half, with an aliased picture: texels picked, not averaged.
-  Each pass is counted as Pillow compresses it alone, without its head, as no encoder at hand
+  Each pass is counted as Pillow compresses it alone, without its head, as no available encoder
   interlaces; coarser levels than an eighth do not exist.
 - JPEG 2000: the end of the last packet of the resolution, in resolution-major order; as many
   resolutions as the format's default, six.

@@ -1,10 +1,10 @@
-"""How long first runs take, which compile, and later ones, which do not; from the shell.
+"""Times first runs, which compile, and later ones from the shell.
 
     python benchmarks/codec/startup.py [--runs 3] [--only encode]
 
 First: `ptm encode` of a 1024² image and `ptm build-scene -j 2` of the sample museum, each with an
 empty folder as the place for machine code (as on a fresh installation), and once more. Then, always
-with machine code at hand: what Python itself, numpy and numba take to start, and the commands on a
+with compiled loops: the start of Python itself, numpy and numba, and the commands on a
 256² image. Prints Markdown tables: the least, the median and the most of the runs, in seconds of
 wall and processor time, children included.
 """
@@ -103,7 +103,7 @@ def print_first_runs(only: list[str], runs: int, folder: str) -> None:
 
 
 def print_warm_runs(runs: int, folder: str) -> None:
-    """The table of commands on a small image, with machine code at hand."""
+    """The table of commands on a small image, with compiled loops."""
     print(f"\n{HEAD}")
     image = f"{folder}/small.png"
     Image.fromarray(photo_like(256)).save(image)

@@ -139,7 +139,7 @@ def _zip_fields(data: bytes) -> list[tuple[int, int]]:
 
 
 def _rezipped(rng: Random, arrays: Mapping[str, Any]) -> bytes:
-    """An archive as others write it, or nobody does."""
+    """An archive of another writer, or of none."""
     out = io.BytesIO()
     kind = rng.choice((zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_LZMA))
     with zipfile.ZipFile(out, "w", kind) as archive:
@@ -261,7 +261,7 @@ class ManifestText:
 
 
 class Interrupted:
-    """What a run left that was killed, or that somebody put there in its place."""
+    """Leftovers of a killed run, or files put in their place."""
 
     limit = 1 << 26
 

@@ -17,7 +17,7 @@ from benchmarks.fuzz.child import Tally, work
 SLOW, HANGS = 5.0, 60.0
 #: Setting a target up takes this long at most.
 SETUP = 600.0
-#: After so many findings of one kind of input the rest of it is left.
+#: A kind of input ends after this many findings.
 ENOUGH = 200
 
 

@@ -1,4 +1,4 @@
-"""How soon a view is there, by the walk page and by what people do otherwise.
+"""Time until a view is complete, for the walk page and for usual alternatives.
 
     python -m benchmarks.web_rivals [DB] [--bandwidth 4M,16M] [--latency 100ms] [--only ptm,glb-png]
     python -m benchmarks.web_rivals [DB] --memory

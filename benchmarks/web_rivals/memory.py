@@ -1,4 +1,4 @@
-"""How a view looks at its best in so much texture memory, whatever the link.
+"""Best picture of a view within a budget of texture memory, independent of the link.
 
 Lossless texels take four bytes on a graphics card; blocks hold them in one byte (UASTC, as BC7 or
 ASTC) or half a byte (ETC1S, as ETC1 or BC1), and so one level more, or one and a half. Which levels

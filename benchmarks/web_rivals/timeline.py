@@ -1,4 +1,4 @@
-"""What a page shows when, and what has been sent by then, over a link with an empty cache."""
+"""Records pictures of a page and the bytes sent, over a link and with an empty cache."""
 
 from __future__ import annotations
 
