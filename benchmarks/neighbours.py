@@ -36,13 +36,13 @@ from ptmtools.arrays import Floats
 from ptmtools.lab.comparing import Played, SimulateOptions, play
 from ptmtools.lab.forms import FORMS, PTM
 from ptmtools.lab.measures import STANDS
-from ptmtools.lab.network import Conditions
 from ptmtools.lab.policies import POLICIES, Declared
 from ptmtools.lab.policies.whole_files import GpuiiClient
 from ptmtools.lab.report import link_text
 from ptmtools.lab.simulation import simulate
 from ptmtools.lab.walk import read_walk
 from ptmtools.lab.world import World, prepare, read_forms
+from ptmtools.link import Conditions
 from ptmtools.output.served import read_served
 from ptmtools.quantities import size
 from ptmtools.rendering.pyramids import read_pyramids

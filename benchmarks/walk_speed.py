@@ -23,11 +23,11 @@ from scenes import database_of, make_scene, walk_file
 
 from ptmtools.lab.comparing import budget_of
 from ptmtools.lab.forms import PTM
-from ptmtools.lab.network import Conditions
 from ptmtools.lab.policies import POLICIES
 from ptmtools.lab.simulation import simulate
 from ptmtools.lab.walk import Walk, read_walk
 from ptmtools.lab.world import RATE, World, prepare
+from ptmtools.link import Conditions
 from ptmtools.output.served import read_served
 from ptmtools.quantities import parse_memory
 

@@ -42,11 +42,11 @@ from scenes import FOLDER, ROOT, SCENES, WALKS, database_of, make_scenes, walk_f
 from ptmtools.lab.comparing import budget_of
 from ptmtools.lab.forms import PTM
 from ptmtools.lab.measures import STANDS, measure
-from ptmtools.lab.network import Conditions
 from ptmtools.lab.policies import POLICIES
 from ptmtools.lab.simulation import simulate
 from ptmtools.lab.walk import read_walk
 from ptmtools.lab.world import World, prepare
+from ptmtools.link import Conditions
 from ptmtools.output.served import Served, read_served
 from ptmtools.quantities import parse_bandwidth, parse_memory
 from ptmtools.rendering.pyramids import read_pyramids

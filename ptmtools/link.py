@@ -1,4 +1,4 @@
-"""How a link behaves over time: bandwidth, latency and loss, recorded or made up.
+"""Conditions of a network link, and their change over time: bandwidth, latency and loss.
 
 A trace is a row of steps in which nothing changes; behind the last one the first begins again. It
 is read from JSON (`ptmtools/schemas/trace.schema.json`) or from CSV, whose first line names the
@@ -8,6 +8,7 @@ columns: ``seconds``, and those of ``bandwidth``, ``latency`` and ``loss`` that 
 from __future__ import annotations
 
 import csv
+import math
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
@@ -108,3 +109,50 @@ def _refused(problem: str, place: str | None) -> InputError:
         place=place,
         remedy="see docs/formats/walk.md#traces",
     )
+
+
+PROTOCOLS = ("h1", "h2")
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """The state of a link.
+
+    Attributes
+    ----------
+    bandwidth: bit/s, or None if it has no limit.
+    latency: s from a request to the first byte of its response.
+    overhead: bytes of headers a request.
+    protocol: one of `PROTOCOLS`.
+    connections: at most, on ``h1``.
+    trace: how the link changes over time: at each moment the lesser bandwidth of the two holds, and
+        the sum of the latencies.
+    seed: of the random losses.
+
+    Raises InputError PTM-I711 for an invalid value.
+    """
+
+    bandwidth: float | None = None
+    latency: float = 0.1
+    overhead: int = 300
+    protocol: str = "h1"
+    connections: int = 6
+    trace: Trace | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        wrong = ""
+        if self.bandwidth is not None and not 0 < self.bandwidth < math.inf:
+            wrong = f"a bandwidth of {self.bandwidth:g} bit/s"
+        elif not 0 <= self.latency < math.inf:
+            wrong = f"a latency of {self.latency:g} s"
+        elif self.overhead < 0:
+            wrong = f"an overhead of {self.overhead} bytes"
+        elif self.protocol not in PROTOCOLS:
+            wrong = f"the protocol {self.protocol!r}, which is none of {', '.join(PROTOCOLS)}"
+        elif self.connections < 1:
+            wrong = f"{self.connections} connections"
+        if wrong:
+            raise InputError(
+                "PTM-I711", f"no link has {wrong}", remedy="leave it out for its default"
+            )

@@ -29,12 +29,12 @@ from benchmarks.web_rivals.images import in_form
 from benchmarks.web_rivals.packages import KTX2
 from ptmtools.lab.allocation import allocate
 from ptmtools.lab.measures import flip
+from ptmtools.lab.renderer import Renderer
 from ptmtools.lab.walk import Walk
 from ptmtools.lab.world import World, prepare
 from ptmtools.output.served import Served
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.records import Pyramids
-from ptmtools.rendering.render import Renderer
 from ptmtools.scene.model import Scene
 
 WIDTH, HEIGHT, _SAMPLES = 320, 240, 3

@@ -37,8 +37,8 @@ from ptmtools.output.served import read_served
 from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.command import open_database
 from ptmtools.quantities import count
+from ptmtools.rendering.light import lit
 from ptmtools.rendering.pyramids import read_pyramids
-from ptmtools.rendering.render import lit
 
 #: Rooms that are listed without ``-v``.
 SHOWN = 12

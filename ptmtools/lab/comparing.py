@@ -12,11 +12,10 @@ from ptmtools.lab.campus.simulation import CAMPUS_POLICIES, CampusPolicy, walk_b
 from ptmtools.lab.campus.world import CampusWorld
 from ptmtools.lab.forms import FORMS, PTM
 from ptmtools.lab.measures import STANDS, Flip, Measures, measure
-from ptmtools.lab.network import Conditions
 from ptmtools.lab.policies import POLICIES, Declared
 from ptmtools.lab.simulation import Run, simulate
 from ptmtools.lab.world import World
-from ptmtools.link import Trace
+from ptmtools.link import Conditions, Trace
 from ptmtools.options import option
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress, silent

@@ -1,7 +1,7 @@
 """Draws a view of a served database from the finest levels of its textures.
 
 Embree finds the surface of each ray, and the kernels of the simulator sample the textures. A lit
-picture has the lamp of `ptmtools.rendering.render` and the relief of octree textures; in
+picture has the lamp of `ptmtools.rendering.light` and the relief of octree textures; in
 others, surfaces without texture are shaded by the angle to the viewer, as on the page.
 """
 
@@ -136,8 +136,8 @@ def draw_view(
     """
     from ptmtools.lab.relief.octrees import read_octrees
     from ptmtools.rendering.kernels import shade
+    from ptmtools.rendering.light import lamps, lit
     from ptmtools.rendering.pyramids import read_pyramids
-    from ptmtools.rendering.render import lamps, lit
 
     eye = eye_of(served, options)
     if options.lit:

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats
 from ptmtools.lab.comparing import Played
 from ptmtools.lab.policies import POLICIES
+from ptmtools.lab.renderer import Renderer
 from ptmtools.lab.report import link_text
 from ptmtools.lab.simulation import Run, simulate
 from ptmtools.lab.world import World
 from ptmtools.lazy import component
-from ptmtools.rendering.render import Renderer, as_bytes
+from ptmtools.rendering.light import as_bytes
 
 #: What may be drawn: how the axis is called, and the values of a run.
 MEASURES: dict[str, tuple[str, Callable[[Run], Floats]]] = {

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.lab.renderer import Renderer
 from ptmtools.lab.simulation import Run
 from ptmtools.lab.world import World
 from ptmtools.lazy import component
 from ptmtools.rendering.records import Sight
-from ptmtools.rendering.render import Renderer
 
 #: Of the way from nothing to the full picture.
 SHARES = (0.5, 0.9, 0.99)

@@ -33,8 +33,7 @@ from dataclasses import dataclass
 from operator import attrgetter
 from random import Random
 
-from ptmtools.errors import InputError
-from ptmtools.link import Step, Trace
+from ptmtools.link import Conditions, Step
 
 
 @dataclass(eq=False, slots=True)
@@ -100,55 +99,10 @@ class Request:
         return -self.priority, self.number
 
 
-PROTOCOLS = ("h1", "h2")
 #: So much of a latency is what the server sends on its way.
 _UNDER_WAY = 0.5
 _left, _rank = attrgetter("left"), attrgetter("rank")
 _starts, _stops = attrgetter("starts"), attrgetter("stops")
-
-
-@dataclass(frozen=True)
-class Conditions:
-    """What a link is like.
-
-    Attributes
-    ----------
-    bandwidth: bit/s, or None if it has no limit.
-    latency: s from a request to the first byte of its response.
-    overhead: bytes of headers a request.
-    protocol: one of `PROTOCOLS`.
-    connections: so many at most, on ``h1``.
-    trace: how the link changes over time: at each moment the lesser bandwidth of the two holds, and
-        the sum of the latencies.
-    seed: of the draws of what is lost.
-
-    Raises InputError PTM-I711 for a value that makes no sense.
-    """
-
-    bandwidth: float | None = None
-    latency: float = 0.1
-    overhead: int = 300
-    protocol: str = "h1"
-    connections: int = 6
-    trace: Trace | None = None
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        wrong = ""
-        if self.bandwidth is not None and not 0 < self.bandwidth < math.inf:
-            wrong = f"a bandwidth of {self.bandwidth:g} bit/s"
-        elif not 0 <= self.latency < math.inf:
-            wrong = f"a latency of {self.latency:g} s"
-        elif self.overhead < 0:
-            wrong = f"an overhead of {self.overhead} bytes"
-        elif self.protocol not in PROTOCOLS:
-            wrong = f"the protocol {self.protocol!r}, which is none of {', '.join(PROTOCOLS)}"
-        elif self.connections < 1:
-            wrong = f"{self.connections} connections"
-        if wrong:
-            raise InputError(
-                "PTM-I711", f"no link has {wrong}", remedy="leave it out for its default"
-            )
 
 
 class Link:

@@ -16,8 +16,8 @@ import numpy as np
 from ptmtools.lab.campus.world import CampusWorld
 from ptmtools.lab.comparing import Played
 from ptmtools.lab.measures import FRAMES, PER_DEGREE, PIXELS, SHARES
-from ptmtools.lab.network import Conditions
 from ptmtools.lab.world import World
+from ptmtools.link import Conditions
 from ptmtools.quantities import count, size
 
 FORMAT, SCHEMA = "ptmtools simulation", 1

@@ -15,9 +15,10 @@ import numpy as np
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.lab.allocation import picture
 from ptmtools.lab.client import DOCUMENTS, Client, Kind
-from ptmtools.lab.network import Conditions, Link, Request
+from ptmtools.lab.network import Link, Request
 from ptmtools.lab.policies import Declared
 from ptmtools.lab.world import World
+from ptmtools.link import Conditions
 
 #: Seconds from one look of a client in a browser to the next, unless something has arrived.
 LOOK_SECONDS = 0.2

@@ -251,7 +251,7 @@ def prepare(
     world = replace(world, beside=beside)
     if relief is None:
         return world
-    from ptmtools.lab.relief.octrees import with_octrees, without_octrees
+    from ptmtools.lab.relief.stock import with_octrees, without_octrees
 
     octrees = relief.octrees
     world = world.changed(lambda w: replace(w, catalogue=without_octrees(w.catalogue, octrees)))

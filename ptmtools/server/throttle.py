@@ -19,7 +19,7 @@ import math
 import time
 from dataclasses import dataclass
 
-from ptmtools.lab.network import Conditions
+from ptmtools.link import Conditions
 
 #: Seconds of the link that a round of pieces takes, one piece of each flow.
 PIECE = 0.01

@@ -8,8 +8,9 @@ import numpy as np
 from hypothesis import given, strategies as st
 
 from ptmtools.lab.client import Files, Kind, Range
-from ptmtools.lab.network import Conditions, Link
+from ptmtools.lab.network import Link
 from ptmtools.lab.policies.whole_files import LruClient
+from ptmtools.link import Conditions
 from tests.lab.worlds import catalogue, raw, standing
 
 ACTS = st.lists(

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ptmtools.lab.client import Estimate
-from ptmtools.lab.network import Conditions, Link
-from ptmtools.link import Step, Trace
+from ptmtools.lab.network import Link
+from ptmtools.link import Conditions, Step, Trace
 from tests.lab.links import PROTOCOL
 
 SIZES = st.lists(st.integers(1000, 100_000), min_size=1, max_size=20)

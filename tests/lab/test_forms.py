@@ -16,18 +16,18 @@ from ptmtools.errors import DatabaseError, InputError
 from ptmtools.lab.comparing import SimulateOptions, budget_of, counted, play
 from ptmtools.lab.forms import PTM, mip_levels, mip_sizes
 from ptmtools.lab.measures import Flip
-from ptmtools.lab.network import Conditions
 from ptmtools.lab.policies import POLICIES
+from ptmtools.lab.renderer import Renderer
 from ptmtools.lab.report import table
 from ptmtools.lab.simulation import simulate
 from ptmtools.lab.tables import look, look_at_forms
 from ptmtools.lab.world import World, read_forms
+from ptmtools.link import Conditions
 from ptmtools.neighbours.interlace import deinterlace, read_manifest
 from ptmtools.output.served import read_served
 from ptmtools.rendering.kernels import GREY
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.records import Shows, own_levels
-from ptmtools.rendering.render import Renderer
 from ptmtools.texture import decode
 from tests.lab.conftest import Ptm
 from tests.lab.test_view import (

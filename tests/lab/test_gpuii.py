@@ -10,11 +10,12 @@ from hypothesis import given, settings, strategies as st
 
 from ptmtools.lab.catalogue import Catalogue, Shapes
 from ptmtools.lab.client import Client, Kind, Range
-from ptmtools.lab.network import Conditions, Link, Request
+from ptmtools.lab.network import Link, Request
 from ptmtools.lab.policies import POLICIES
 from ptmtools.lab.policies.whole_files import RING, GpuiiClient
 from ptmtools.lab.simulation import Run, simulate
 from ptmtools.lab.world import World
+from ptmtools.link import Conditions
 from tests.lab.worlds import (
     CAMERA,
     SEEDS,

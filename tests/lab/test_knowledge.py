@@ -12,11 +12,12 @@ from hypothesis import Phase, given, settings, strategies as st
 from ptmtools.arrays import Bools
 from ptmtools.lab.catalogue import Catalogue
 from ptmtools.lab.client import Client, Kind
-from ptmtools.lab.network import Conditions, Link, Request
+from ptmtools.lab.network import Link, Request
 from ptmtools.lab.policies import POLICIES, Knows
 from ptmtools.lab.simulation import Run, simulate
 from ptmtools.lab.tables import Views
 from ptmtools.lab.world import World
+from ptmtools.link import Conditions
 from tests.lab.worlds import SEEDS, any_world, for_policy, leaf
 
 PHASES = (Phase.explicit, Phase.reuse, Phase.generate)

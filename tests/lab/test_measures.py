@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from ptmtools.lab.measures import measure
-from ptmtools.lab.network import Conditions
 from ptmtools.lab.simulation import Run
+from ptmtools.link import Conditions
 
 
 def run_of(error: list[float], still: list[bool]) -> Run:

@@ -11,12 +11,13 @@ import pytest
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.lab.client import Client, Kind, Range
-from ptmtools.lab.network import Conditions, Link, Request
+from ptmtools.lab.network import Link, Request
 from ptmtools.lab.policies import POLICIES
 from ptmtools.lab.policies.paper import PaperClient, Patience
 from ptmtools.lab.policies.paper_kernels import refresh, share_out
 from ptmtools.lab.simulation import Run, simulate
 from ptmtools.lab.world import World
+from ptmtools.link import Conditions
 from tests.lab.worlds import ROOM, Texture, catalogue, raw, standing, strolling, world
 
 MIB = 1 << 20

@@ -15,11 +15,11 @@ from ptmtools.errors import MissingComponentError
 from ptmtools.lab import measures as flips
 from ptmtools.lab.comparing import SimulateOptions, play
 from ptmtools.lab.figures import frames, strip
+from ptmtools.lab.renderer import Renderer
 from ptmtools.lab.world import World
 from ptmtools.output.served import Surfaces
 from ptmtools.rendering.rays import Camera
 from ptmtools.rendering.records import Pyramids
-from ptmtools.rendering.render import Renderer
 
 #: Corners of a texture, clockwise from the upper left.
 CORNERS = np.array([[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 0]], dtype=np.uint8)

@@ -19,19 +19,22 @@ from ptmtools.cli.main import main
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.lab.client import Client, Kind, Range
 from ptmtools.lab.comparing import SimulateOptions, budget_of, play, require_hints
-from ptmtools.lab.network import Conditions, Link, Request
+from ptmtools.lab.network import Link, Request
 from ptmtools.lab.policies import POLICIES, Declared
 from ptmtools.lab.policies.apo import ApoClient
 from ptmtools.lab.relief.kernels import descend, lamp, stop_of
-from ptmtools.lab.relief.octrees import Octrees, no_octrees, read_octrees, without_octrees
+from ptmtools.lab.relief.octrees import Octrees, no_octrees, read_octrees
+from ptmtools.lab.relief.stock import without_octrees
+from ptmtools.lab.renderer import Renderer
 from ptmtools.lab.simulation import Run, simulate
 from ptmtools.lab.walk import read_walk
 from ptmtools.lab.world import World, prepare, relief_of
+from ptmtools.link import Conditions
 from ptmtools.neighbours.apo.traversal import look_up, stop_depth
 from ptmtools.output.served import Served, read_served
+from ptmtools.rendering.light import AMBIENT, lamps, lit
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.rays import Camera
-from ptmtools.rendering.render import AMBIENT, Renderer, lamps, lit
 from tests.lab.conftest import Ptm
 from tests.lab.worlds import SEEDS, catalogue, raw
 from tests.neighbours.apo.building import Node, nodes, octree_of

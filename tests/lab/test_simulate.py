@@ -13,12 +13,12 @@ import pytest
 from ptmtools import schemas
 from ptmtools.lab.comparing import SimulateOptions, play
 from ptmtools.lab.forms import PTM
-from ptmtools.lab.network import Conditions
 from ptmtools.lab.policies import POLICIES, Declared
 from ptmtools.lab.report import COLUMNS, table
 from ptmtools.lab.simulation import simulate
 from ptmtools.lab.walk import Walk, walk_text
 from ptmtools.lab.world import World
+from ptmtools.link import Conditions
 from tests.lab.conftest import Ptm
 
 ALL = [p for p in POLICIES.values() if p.needs is None and p.form == PTM]

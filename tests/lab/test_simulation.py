@@ -13,11 +13,12 @@ from hypothesis import Phase, given, settings, strategies as st
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.lab.client import Client, Kind, Range
-from ptmtools.lab.network import Conditions, Link, Request
+from ptmtools.lab.network import Link, Request
 from ptmtools.lab.policies import POLICIES
 from ptmtools.lab.policies.whole_files import LruClient
 from ptmtools.lab.simulation import Run, simulate
 from ptmtools.lab.world import World
+from ptmtools.link import Conditions
 from tests.lab.links import CONDITIONS
 from tests.lab.worlds import SEEDS, any_world, catalogue, for_policy, raw, standing
 

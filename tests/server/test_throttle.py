@@ -11,7 +11,8 @@ from random import Random
 import pytest
 
 from ptmtools.errors import InputError
-from ptmtools.lab.network import Conditions, Link as FluidLink
+from ptmtools.lab.network import Link as FluidLink
+from ptmtools.link import Conditions
 from ptmtools.server.throttle import LATE, PIECE, Link, Throttle
 
 BANDWIDTHS = [56e3, 512e3, 4e6, 16e6]

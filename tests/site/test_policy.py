@@ -15,9 +15,10 @@ from ptmtools.arrays import Floats
 from ptmtools.lab.allocation import allocate, next_fetch
 from ptmtools.lab.catalogue import catalogue_of
 from ptmtools.lab.client import PRIOR, Estimate
-from ptmtools.lab.network import Conditions, Link, Request
+from ptmtools.lab.network import Link, Request
 from ptmtools.lab.policies.paper_kernels import refresh, share_out
 from ptmtools.lab.world import World
+from ptmtools.link import Conditions
 from tests.lab.conftest import two_rooms, walk_file, world
 from tests.lab.worlds import SEEDS, any_world, catalogue, raw, standing
 from tests.site.watching import HERE, Witness, called, documents, same, tables, write

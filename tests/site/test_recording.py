@@ -11,11 +11,11 @@ from urllib.parse import unquote
 import pytest
 
 from ptmtools.cli.main import main
-from ptmtools.lab.network import Conditions
 from ptmtools.lab.policies import POLICIES
 from ptmtools.lab.simulation import simulate
 from ptmtools.lab.walk import read_walk
 from ptmtools.lab.world import prepare
+from ptmtools.link import Conditions
 from ptmtools.output.served import read_served
 from ptmtools.server.throttle import Throttle
 from ptmtools.site.content import Site

@@ -15,11 +15,12 @@ import numpy as np
 from ptmtools.lab.allocation import allocate
 from ptmtools.lab.catalogue import Catalogue
 from ptmtools.lab.client import Client, Kind
-from ptmtools.lab.network import Conditions, Link, Request
+from ptmtools.lab.network import Link, Request
 from ptmtools.lab.policies import POLICIES
 from ptmtools.lab.policies.engine import HELD_ON, EngineClient
 from ptmtools.lab.simulation import simulate
 from ptmtools.lab.world import World
+from ptmtools.link import Conditions
 from tests.web.node import run
 
 HERE = Path(__file__).resolve().parent

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from ptmtools.errors import InputError
-from ptmtools.lab.network import Conditions
-from ptmtools.link import Trace
+from ptmtools.link import Conditions, Trace
 from ptmtools.neighbours.campus.model import PRESETS, Quality
 from ptmtools.options import option
 from ptmtools.quantities import MemorySize, parse_bandwidth, parse_duration, parse_memory

@@ -24,11 +24,11 @@ from ptmtools.lab.campus.options import QUALITIES, CampusWalkOptions
 from ptmtools.lab.campus.stock import Stock
 from ptmtools.lab.campus.world import COARSE, FINE, NOTHING, CampusWorld, prepare_campus
 from ptmtools.lab.measures import STANDS, Measures, measure, seconds_to
-from ptmtools.lab.network import Conditions, Link
+from ptmtools.lab.network import Link
 from ptmtools.lab.simulation import Run
 from ptmtools.lab.walk import Walk
 from ptmtools.lab.world import World
-from ptmtools.link import Trace
+from ptmtools.link import Conditions, Trace
 from ptmtools.neighbours.campus.model import SIZES, Quality
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress, silent

@@ -10,8 +10,8 @@ from ptmtools.compiled import kernel, plain_kernel
 from ptmtools.lab.relief.octrees import Octrees
 from ptmtools.neighbours.apo.traversal import child_of
 from ptmtools.rendering.kernels import GREY, Sums, blend, distance, texel_under
+from ptmtools.rendering.light import AMBIENT, LAMP
 from ptmtools.rendering.records import Pyramids, Sight, Triangles
-from ptmtools.rendering.render import AMBIENT, LAMP
 
 #: The greatest coordinate in a cube.
 _LAST = float(np.nextafter(1.0, 0.0))
@@ -22,7 +22,7 @@ _X, _Y, _Z = LAMP
 
 @plain_kernel
 def lamp(x: float, y: float, z: float) -> float:
-    """As `ptmtools.rendering.render.lamps`, of a normal of any length."""
+    """As `ptmtools.rendering.light.lamps`, of a normal of any length."""
     length = np.sqrt(x * x + y * y + z * z)
     along = (x * _X + y * _Y + z * _Z) / length if length > 0.0 else 0.0
     return AMBIENT + (1.0 - AMBIENT) * ((1.0 + along) / 2.0) ** 2

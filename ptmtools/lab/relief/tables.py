@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.lab.relief.octrees import Octrees
 from ptmtools.output.served import Surfaces
+from ptmtools.rendering.light import lamps
 from ptmtools.rendering.rays import Caster
 from ptmtools.rendering.records import Pyramids, Sight, Triangles, own_levels, triangles_of
-from ptmtools.rendering.render import lamps
 
 #: Depths that differ by a smaller share are those of the same surface.
 APART = 1e-3

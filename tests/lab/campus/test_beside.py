@@ -14,9 +14,9 @@ from ptmtools.errors import InputError
 from ptmtools.lab.campus import CampusWalkOptions, prepare_campus, simulate_campus
 from ptmtools.lab.campus.simulation import CAMPUS_POLICIES, walk_beside
 from ptmtools.lab.campus.world import CampusWorld
-from ptmtools.lab.network import Conditions
 from ptmtools.lab.walk import read_walk
 from ptmtools.lab.world import World
+from ptmtools.link import Conditions
 from ptmtools.neighbours.campus import CampusOptions, make_campus
 from ptmtools.output.served import read_served
 from ptmtools.scene import IngestOptions

@@ -1,50 +1,23 @@
-"""Pictures of frames, with exactly the levels that a client has, or with all.
+"""Pictures of frames of a walk, with the levels that a client has, or with all.
 
 As for the tables, levels are chosen as for the screen of the walk, of 1080 lines unless it was
-recorded: a smaller picture is that one made smaller. At 960 × 540 with two samples each way its
+recorded: a smaller picture is the same one made smaller. At 960 × 540 with two samples each way its
 samples are the pixels of the screen.
-
-The light of lit pictures: one lamp far away, and some light from everywhere.
-
-The lamp wraps around (half Lambert, squared), so that relief shows on all sides of a statue. It
-multiplies colours as sRGB encodes them, as the rest of the simulator does."""
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, normals
-from ptmtools.output.served import Served
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.rendering.light import lamps
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.rendering.records import Shows, Sight, own_levels, triangles_of
 
 if TYPE_CHECKING:
     from ptmtools.lab.world import World
-
-
-#: Share of the light that comes from everywhere, and a unit vector towards the lamp.
-AMBIENT = 0.3
-LAMP = tuple(float(v) for v in np.array([0.5, 0.7, 0.6]) / np.linalg.norm([0.5, 0.7, 0.6]))
-
-
-def lamps(corner: Floats) -> Floats:
-    """(n,) how much light falls on triangles (n, 3, 3), which are flat: `AMBIENT` to 1."""
-    normal = normals(corner)
-    length = np.linalg.norm(normal, axis=1)
-    along = np.divide(normal @ LAMP, length, out=np.zeros(len(corner)), where=length > 0)
-    found: Floats = AMBIENT + (1 - AMBIENT) * ((1 + along) / 2) ** 2
-    return found
-
-
-def lit(served: Served) -> Served:
-    """The same under the lamp."""
-    surfaces = served.surfaces
-    color = surfaces.color * lamps(surfaces.corner)[:, None]
-    return replace(served, surfaces=replace(surfaces, color=color))
 
 
 class Renderer:
@@ -107,8 +80,3 @@ class Renderer:
         each = (self.height, self.samples, self.width, self.samples, 3)
         found: Floats = shown.reshape(each).mean(axis=(1, 3))
         return found
-
-
-def as_bytes(colors: Floats) -> NDArray[np.uint8]:
-    """Colours as 8 bits hold them."""
-    return np.rint(np.clip(colors, 0, 255)).astype(np.uint8)
