@@ -184,6 +184,14 @@ class ImageStore:
         found = self._sound(texture)
         return None if found is None else found.alpha
 
+    def holes(self, texture: Texture) -> tuple[str, NDArray[np.bool_]] | None:
+        """The digest of an image, and (H, W), rows from the top, which of its texels are not
+        opaque; None if all are, or (and a miss is recorded) if it cannot be decoded."""
+        found = self._sound(texture)
+        if found is None or (holes := found.holes) is None:
+            return None
+        return found.sha256, holes
+
     def _sound(self, texture: Texture, channel: str | None = None) -> _Examined | None:
         """What `_examine` finds, once; None (and a miss is recorded) if that is a fault."""
         key = texture.read, channel

@@ -27,7 +27,7 @@ from ptmtools.scene.options import IngestOptions
 from ptmtools.scene.orientation import tolerance_of
 from ptmtools.scene.source import MAX_VERTICES, Findings, Source, SourceMaterial
 from ptmtools.scene.space import Said, parse_unit, settle, to_world, turned
-from ptmtools.scene.texels import uses_holes
+from ptmtools.scene.texels import uses_holes, without_alpha
 from ptmtools.scene.up_axis import Named
 from ptmtools.scene.wrapping import MOST, near_origin, told, unmirrored
 from ptmtools.tolerance import PLANE_SHARE
@@ -120,6 +120,7 @@ def ingest(
     source, uv = unmirrored(source, used_material, faces, uv, store, findings)
     textures = [source.materials[index].texture for index in used_material.tolist()]
     store.examine((texture for texture in textures if texture is not None), workers, progress)
+    source = without_alpha(source, used_material, faces, uv, store)
     colors = None if source.colors is None else source.colors[kept.source]
     if colors is not None and (colors == 255).all():
         colors = None
@@ -288,7 +289,7 @@ def _material(
         decoded = store.add(texture)
         if decoded is not None:
             image, holes = decoded
-            if holes is not None and not transparent:
+            if holes is not None and not (transparent or given.ignores_alpha):
                 wraps = told(texture.wrap_s), told(texture.wrap_t)
                 transparent = uses_holes(holes, uv, *wraps)
     if given.opacity == 0:

@@ -57,7 +57,7 @@ class Material:
     image: index into `Scene.images`, or -1.
     wrap_s, wrap_t: what the image does beyond [0, 1].
     transparent: never occludes: `opacity` < 1, alpha blending or testing, or a used texel with
-        alpha < 255.
+        alpha < 255 unless the mode of the material ignores alpha.
     cutoff: texels with less alpha than this, in [0, 1], are not drawn, and all others are opaque;
         None where they are blended.
     """

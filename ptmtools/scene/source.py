@@ -108,6 +108,7 @@ class SourceMaterial:
     color: tint in [0, 1], sRGB; None where the model says nothing.
     opacity: in [0, 1].
     see_through: the material itself says that it is blended, tested or transmitting.
+    ignores_alpha: the alpha of its texture has no effect, by the mode of the material (glTF, USD).
     cutoff: texels of less alpha are not drawn and all others are opaque (alpha testing); None where
         they are blended.
     two_sided: whether its faces have a back.
@@ -119,6 +120,7 @@ class SourceMaterial:
     color: tuple[float, float, float] | None = None
     opacity: float = 1.0
     see_through: bool = False
+    ignores_alpha: bool = False
     cutoff: float | None = None
     two_sided: bool = True
     texture: Texture | None = None

@@ -8,14 +8,24 @@ spreads it over, two texels wide; those of a row are one run, in which the table
 texel by texel. A thousand large triangles beside the holes of an image of 4096², files of 50 KB,
 take a quarter of an hour. Rasterising with Pillow: its polygons miss texels at slivers and corners,
 and that errs to the wrong side.)
+
+Materials whose mode ignores alpha get an image without alpha, but only where their faces use
+texels that are not opaque: an atlas that opaque and blended materials share stays one image.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats, Ints
+from ptmtools.scene.images import ImageStore, integers
 from ptmtools.scene.model import Wrap
+from ptmtools.scene.source import Source, Texture
+from ptmtools.scene.wrapping import told
 
 #: A triangle repeating the image more often than this, counted in images, is taken to use all.
 _MANY_TILES = 16
@@ -155,3 +165,54 @@ def _touches(
         return count
 
     return bool((before(end[reached]) > before(first[reached])).any())
+
+
+@dataclass(frozen=True)
+class OpaqueBytes:
+    """The bytes of a PNG of an image without its alpha.
+
+    ``limit`` as of `ImageStore`. Raises what reading raises, and InputError or LimitError for what
+    cannot be decoded or has no 8 or 16 bits.
+    """
+
+    read: Callable[[], bytes]
+    limit: int
+
+    def __call__(self) -> bytes:
+        from ptmtools.texture.images.png import png_bytes
+
+        texels, description = integers(self.read(), self.limit)
+        colors = texels.shape[2] - (texels.shape[2] in (2, 4))
+        return png_bytes(texels[..., :colors], description)
+
+
+def without_alpha(
+    source: Source, used: Ints, faces: Sequence[Ints], uv: Floats, store: ImageStore
+) -> Source:
+    """The same with images without alpha where materials ignore it and would show it.
+
+    ``faces`` are the rows of ``uv``, (T, 3, 2), of each material that is ``used``, by number. VRML,
+    whose textures show their alpha always, needs such an image; a material that blends the same
+    image keeps it as it is. Where faces use opaque texels only, the image stays one.
+    Raises LimitError PTM-L104, PTM-L106.
+    """
+    materials = list(source.materials)
+    ignoring: list[tuple[int, Texture, str]] = []
+    shown: set[str] = set()
+    for index, rows in zip(used.tolist(), faces, strict=True):
+        given = materials[index]
+        sound = store.holes(given.texture) if given.ignores_alpha and given.texture else None
+        if sound is None or given.texture is None:
+            continue
+        sha256, holes = sound
+        ignoring.append((index, given.texture, sha256))
+        wraps = told(given.texture.wrap_s), told(given.texture.wrap_t)
+        if sha256 not in shown and uses_holes(holes, uv[rows], *wraps):
+            shown.add(sha256)
+    for index, texture, sha256 in ignoring:
+        if sha256 in shown:
+            made = replace(texture, read=OpaqueBytes(texture.read, store.limit))
+            store.made_into_another(texture)
+            if store.has_alpha(made) is not None:
+                materials[index] = replace(materials[index], texture=made)
+    return replace(source, materials=tuple(materials))

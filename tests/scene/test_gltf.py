@@ -113,6 +113,65 @@ def test_what_never_occludes(put: Put, more: dict[str, Any], transparent: bool) 
     assert [m.transparent for m in scene.materials] == [transparent]
 
 
+def with_modes(doc: Gltf, pixels: np.ndarray, *modes: str, coords: Any = None) -> Gltf:
+    """Quads side by side that show one image, each in another mode."""
+    base = with_image(doc, png(pixels))
+    for place, mode in enumerate(modes):
+        doc.tree.setdefault("materials", []).append({**base, "alphaMode": mode, "name": mode})
+        quad = doc.quad(material=place)
+        if coords is not None:
+            quad["attributes"]["TEXCOORD_0"] = doc.add(np.array(coords, np.float32))
+        doc.place(quad, translation=[0, 0, 5 * place])
+    return doc
+
+
+def pixels_of(scene: Scene, material: int) -> np.ndarray:
+    with Image.open(io.BytesIO(scene.images[scene.materials[material].image].load())) as image:
+        return np.asarray(image)
+
+
+@pytest.mark.parametrize("bands", [2, 4])
+def test_an_opaque_material_ignores_the_alpha_of_its_texture(put: Put, bands: int) -> None:
+    """glTF 2.0, section 3.9.6. Clients that know no modes see it opaque, too."""
+    pixels = noise(1, bands=bands)
+    scene = ingest(put("a.glb", with_modes(Gltf(), pixels, "OPAQUE").glb()))
+    assert not scene.materials[0].transparent
+    assert scene.opaque.all()
+    assert np.array_equal(pixels_of(scene, 0), pixels[..., :-1].squeeze())
+    assert [image.name for image in scene.images] == ["Brick_1.png"]
+
+
+def test_an_image_of_opaque_and_of_blended_materials_becomes_two(put: Put) -> None:
+    pixels = noise(1, bands=4)
+    doc = with_modes(Gltf(), pixels, "OPAQUE", "BLEND", "OPAQUE", "MASK")
+    scene = ingest(put("a.glb", doc.glb()))
+    assert [m.transparent for m in scene.materials] == [False, True, False, True]
+    assert [m.image for m in scene.materials] == [0, 1, 0, 1]
+    assert np.array_equal(pixels_of(scene, 0), pixels[..., :3])
+    assert np.array_equal(pixels_of(scene, 1), pixels)
+
+
+def test_an_image_stays_one_where_opaque_materials_use_opaque_texels(put: Put) -> None:
+    """As of an atlas; its bytes are kept."""
+    pixels = noise(1, bands=4)
+    pixels[4:, :, 3] = 255  # the lower half
+    coords = [(0, 0.9), (1, 0.9), (1, 0.7), (0, 0.7)]
+    doc = with_modes(Gltf(), pixels, "OPAQUE", "BLEND", coords=coords)
+    scene = ingest(put("a.glb", doc.glb()))
+    assert [m.transparent for m in scene.materials] == [False, True]
+    assert [m.image for m in scene.materials] == [0, 0]
+    assert scene.images[0].load() == png(pixels)
+
+
+def test_what_transmits_light_ignores_alpha_too(put: Put) -> None:
+    doc = with_modes(Gltf(), noise(1, bands=4), "OPAQUE")
+    glass = {"KHR_materials_transmission": {"transmissionFactor": 1}}
+    doc.tree["materials"][0]["extensions"] = glass
+    scene = ingest(put("a.glb", doc.glb()))
+    assert scene.materials[0].transparent
+    assert pixels_of(scene, 0).shape[2] == 3
+
+
 @pytest.mark.parametrize(
     ("sampler", "wraps", "noted"),
     [

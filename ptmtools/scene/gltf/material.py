@@ -2,7 +2,8 @@
 
 Of the metallic-roughness model only the base colour is kept. Its factor is linear light, and the
 tint of the emitted files is not, so the factor is converted to sRGB; the product of tint and
-texel then differs from the linear product for partial tints, and the conversion is noted.
+texel then differs from the linear product for partial tints, and the conversion is noted. The alpha
+of texels counts in the modes MASK and BLEND only (section 3.9.6).
 """
 
 from __future__ import annotations
@@ -126,6 +127,7 @@ class MaterialReader:
                 color=(red, green, blue),
                 opacity=opacity,
                 see_through=see_through,
+                ignores_alpha=mode not in ("MASK", "BLEND"),
                 # Of a texel, where all are multiplied with the factor's alpha.
                 cutoff=max(cutoff / a, 0.0) if tested and opacity and a > 0 else None,
                 two_sided=bool(entry.get("doubleSided", False)),

@@ -46,7 +46,7 @@ class Surface:
     Attributes
     ----------
     color: sRGB; of an image white, and None where the material says nothing that is read.
-    opacity, see_through, cutoff: see `ptmtools.scene.source.SourceMaterial`.
+    opacity, see_through, ignores_alpha, cutoff: see `ptmtools.scene.source.SourceMaterial`.
     image: as the stage names it.
     coords: the primvar with the image's coordinates, "" if there is none.
     matrix: (2, 3) by which they are transformed.
@@ -57,6 +57,7 @@ class Surface:
     color: Color | None = None
     opacity: float = 1.0
     see_through: bool = False
+    ignores_alpha: bool = False
     cutoff: float | None = None
     image: NamedImage | None = None
     coords: str = ""
@@ -121,8 +122,19 @@ class MaterialReader:
         coords, matrix = self._coords(source, name, place)
         turned = tuple((float(a), float(b), float(c)) for a, b, c in matrix.tolist())
         white = (1.0, 1.0, 1.0)
-        cutoff = _threshold(shader) if from_image == (_path_of(file), "a") else 0.0
-        return Surface(name, white, opacity, see_through, cutoff or None, image, coords, turned)
+        own_alpha = from_image == (_path_of(file), "a")
+        cutoff = _threshold(shader) if own_alpha else 0.0
+        return Surface(
+            name,
+            white,
+            opacity,
+            see_through,
+            ignores_alpha=not own_alpha,
+            cutoff=cutoff or None,
+            image=image,
+            coords=coords,
+            matrix=turned,
+        )
 
     def _opacity(self, shader: Any, name: str, place: str) -> tuple[float, bool, Any]:
         """The opacity; whether it is not the same everywhere, other than by an image; and of an
@@ -336,6 +348,7 @@ class Painter:
                 color=color,
                 opacity=opacity,
                 see_through=see_through,
+                ignores_alpha=surface.ignores_alpha,
                 cutoff=surface.cutoff,
                 two_sided=two_sided,
             ),

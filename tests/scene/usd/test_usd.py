@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import os
 import sys
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from ptmtools.errors import InputError, LimitError, MissingComponentError, PtmError
 from ptmtools.scene import IngestOptions, ingest
@@ -952,18 +954,27 @@ def test_opacity_by_an_image(
 
 
 def test_holes_in_an_image(put: Put, tmp_path: Path) -> None:
+    """They count where the opacity of the material is the image's alpha, and not otherwise."""
     texels = np.full((8, 8, 4), 255, np.uint8)
     texels[:4, :, 3] = 0  # the upper half
     put("brick.png", png(texels))
-    for name, st, transparent in (
-        ("upper", made.CORNERS, True),
-        ("lower", [(0, 0.2), (1, 0.2), (1, 0.3), (0, 0.3)], False),
+    for name, st, connected, transparent in (
+        ("upper", made.CORNERS, True, True),
+        ("lower", [(0, 0.2), (1, 0.2), (1, 0.3), (0, 0.3)], True, False),
+        ("opaque", made.CORNERS, False, False),
     ):
         on = made.stage(tmp_path / f"{name}.usda")
         made.textured(on, st=st)
+        if connected:
+            alpha = UsdShade.Shader.Get(on, "/World/paint/image")
+            UsdShade.Shader.Get(on, "/World/paint/surface").CreateInput(
+                "opacity", Sdf.ValueTypeNames.Float
+            ).ConnectToSource(alpha.CreateOutput("a", Sdf.ValueTypeNames.Float))
         on.GetRootLayer().Save()
         scene = ingest(tmp_path / f"{name}.usda")
         assert scene.materials[0].transparent is transparent
+        with Image.open(io.BytesIO(scene.images[0].load())) as image:
+            assert image.mode == ("RGBA" if connected else "RGB")
 
 
 # -- Displayed colours ----------------------------------------------------------------------------
