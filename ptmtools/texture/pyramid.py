@@ -4,6 +4,9 @@ Level n-1 is max(1, side >> 1) wide and high, as in OpenGL and WebGPU, so that a
 be uploaded as it is. An odd last row or column belongs to no 2×2 block and does not reach the
 level below.
 
+Levels stop where the shorter side is 1. (Rejected: to go on halving the longer side, which saves
+at most half a kilobyte at 4096 × 16, and needs blocks of two texels in every coder.)
+
 Integers: the floor of the mean. Floats: the sum of the four as float64, in the order
 (p + q) + (r + s), times ¼, rounded once to the stored type. No sum of finite samples overflows in
 float64 and none underflows: the largest is below 2^130 and every float32 is a whole multiple of

@@ -175,3 +175,21 @@ def test_foreign_byte_order_and_other_types_are_no_kind() -> None:
     for dtype in (">u2", ">f4", "i2", "f8", "u4", "?"):
         with pytest.raises(KeyError):
             kind_of(np.dtype(dtype))
+
+
+@pytest.mark.parametrize(
+    ("size", "coarsest", "levels"),
+    [
+        ((1, 1), (1, 1), 1),
+        ((4096, 1), (4096, 1), 1),
+        ((1, 7), (1, 7), 1),
+        ((4096, 16), (256, 1), 5),
+    ],
+)
+def test_levels_of_strips_stop_at_a_shorter_side_of_1(
+    size: tuple[int, int], coarsest: tuple[int, int], levels: int
+) -> None:
+    sizes = level_sizes(*size)
+    assert (sizes[0], len(sizes)) == (coarsest, levels)
+    built = build_pyramid(np.zeros((size[1], size[0], 1), np.uint8))
+    assert [level.shape[1::-1] for level in built] == sizes
