@@ -113,8 +113,8 @@ def walk(database: Path) -> Image.Image:
     """The page at a viewpoint, once everything is there."""
     from playwright.sync_api import sync_playwright
 
-    from ptmtools.server.running import serving
     from ptmtools.site.content import site_of
+    from ptmtools.site.serving import serving
 
     program = shutil.which("chromium")
     with serving(site_of(database).entries) as url, sync_playwright() as playwright:

@@ -39,7 +39,7 @@ from benchmarks.web_rivals.tables import memory_table, times_table  # noqa: E402
 from benchmarks.web_rivals.timeline import Timeline, chromium, watch  # noqa: E402
 from ptmtools.output.served import read_served  # noqa: E402
 from ptmtools.quantities import parse_bandwidth, parse_duration  # noqa: E402
-from ptmtools.server.throttle import Throttle  # noqa: E402
+from ptmtools.site.throttle import Throttle  # noqa: E402
 
 #: Of the second table, bytes; the last holds everything.
 BUDGETS = tuple(kib << 10 for kib in (256, 512, 1024, 2048, 4096, 8192, 16384, 1 << 30))

@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 from benchmarks.web_rivals.entrants import Entrant
 from benchmarks.web_rivals.packages import ROOT
 from ptmtools.lab.measures import flip
-from ptmtools.server.running import serving
-from ptmtools.server.throttle import Throttle
-from ptmtools.server.visits import Visits
+from ptmtools.site.serving import serving
+from ptmtools.site.throttle import Throttle, Visits
 
 sys.path[:0] = [str(ROOT / "tests" / "e2e")]
 from browsers import web  # noqa: E402

@@ -24,11 +24,10 @@ from ptmtools.cli.parameters import (
     with_console,
 )
 from ptmtools.quantities import count, size
-from ptmtools.server.opening import files_of
-from ptmtools.server.options import ServeOptions
-from ptmtools.server.running import require, serving
 from ptmtools.site.content import SiteOptions, site_of
+from ptmtools.site.lookup import files_of
 from ptmtools.site.publishing import COARSE, PublishOptions, publish as write, weight_of
+from ptmtools.site.serving import ServeOptions, require, serving
 
 _ORIGIN = re.compile(r"\*|https?://[^\s/?#@]+")
 

@@ -18,8 +18,8 @@ from PIL import Image
 from ptmtools.glb import BINARY, glb_chunks
 from ptmtools.output.served import read_served
 from ptmtools.scene.model import Scene, SourceImage
-from ptmtools.server.throttle import Throttle
 from ptmtools.site.content import Entry
+from ptmtools.site.throttle import Throttle
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "e2e"), str(ROOT / "benchmarks")]

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ptmtools.server.running import serving
-from ptmtools.server.throttle import Throttle
-from ptmtools.server.visits import Visits
 from ptmtools.site.content import Entry
+from ptmtools.site.serving import serving
+from ptmtools.site.throttle import Throttle, Visits
 
 #: Said by SwiftShader now and then, even of a page that reads a cleared buffer once.
 OF_RENDERER = "GPU stall due to ReadPixels"

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ptmtools.server.throttle import Throttle
 from ptmtools.site.content import Site
+from ptmtools.site.throttle import Throttle
 
 DOCS = Path(__file__).parents[2] / "docs/guide/publish.md"
 TEXTURES = re.compile(r"\.ptm$")

@@ -17,8 +17,8 @@ from ptmtools.lab.walk import read_walk
 from ptmtools.lab.world import prepare
 from ptmtools.link import Conditions
 from ptmtools.output.served import read_served
-from ptmtools.server.throttle import Throttle
 from ptmtools.site.content import Site
+from ptmtools.site.throttle import Throttle
 
 LINK = Throttle(2e6, 0.05)
 #: Recording begins as soon as there is something to record.

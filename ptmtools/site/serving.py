@@ -1,27 +1,67 @@
-"""A server that runs in a thread of its own, until who started it is done."""
+"""`ptm serve`: a database, or a folder that `ptm publish` wrote, over HTTP to browsers on this
+machine.
+
+A server for looking and for measuring, not for the public: static hosts do that
+(docs/guide/publish.md). It adds a simulated slow link and a list of requests
+(`ptmtools.site.throttle`).
+"""
 
 from __future__ import annotations
 
 import errno
-import os
 import socket
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
 from ptmtools.errors import InputError
 from ptmtools.lazy import component
-from ptmtools.server.lookup import Lookup, among
-from ptmtools.server.throttle import Throttle
-from ptmtools.server.visits import Visits
+from ptmtools.options import option
+from ptmtools.quantities import parse_bandwidth, parse_duration
 from ptmtools.site.content import Entry
+from ptmtools.site.lookup import Lookup, among
+from ptmtools.site.throttle import Throttle, Visits
 
 if TYPE_CHECKING:
     from starlette.types import ASGIApp
 
-#: Seconds for which an idle connection is kept. Browsers that wander for a while find it open.
+#: Seconds for which an idle connection is kept: browsers that pause find it open.
 _KEPT = 75
+
+
+@dataclass(frozen=True)
+class ServeOptions:
+    """Options of `ptm serve`.
+
+    Raises InputError: PTM-I711 an impossible link; PTM-I712 an unreadable quantity.
+    """
+
+    heading: ClassVar[str] = "Server"
+
+    port: int = option(0, "Port to listen on; 0 for any free one.")
+    host: str = option(
+        "127.0.0.1",
+        "Address to listen on; 0.0.0.0 for all addresses of this machine.",
+        metavar="ADDRESS",
+    )
+    bandwidth: str = option(
+        "inf",
+        "Bandwidth of all connections together, in bit/s: 56k, 4M (powers of ten) or inf.",
+        metavar="RATE",
+    )
+    latency: str = option(
+        "0", "Delay before the first byte of each response: 100ms or 0.1.", metavar="TIME"
+    )
+
+    def __post_init__(self) -> None:
+        self.throttle  # noqa: B018 - raises for what cannot be read
+
+    @property
+    def throttle(self) -> Throttle:
+        """The link."""
+        return Throttle(parse_bandwidth(self.bandwidth), parse_duration(self.latency))
 
 
 @contextmanager
@@ -34,18 +74,17 @@ def serving(
     visits: Visits | None = None,
     origin: str | None = None,
 ) -> Iterator[str]:
-    """Serves files meanwhile; yields the URL, which ends in a slash.
+    """Serves files in a thread inside the ``with``; yields the URL, which ends in a slash.
 
     Parameters
     ----------
-    files: by their names, or what finds them.
-    host, port: as `running` has them.
-    throttle, visits, origin: as `ptmtools.server.app.app_of` has them.
+    files: by their names, or a function that finds them.
+    host, port: see `running`. throttle, visits, origin: see `ptmtools.site.responses.app_of`.
 
     Raises as `require` and `running` do.
     """
     require()
-    from ptmtools.server.app import app_of
+    from ptmtools.site.responses import app_of
 
     lookup = among(files) if isinstance(files, Mapping) else files
     app = app_of(lookup, throttle=throttle, visits=visits, origin=origin)
@@ -55,15 +94,15 @@ def serving(
 
 @contextmanager
 def running(app: ASGIApp, *, host: str = "127.0.0.1", port: int = 0) -> Iterator[str]:
-    """Runs an ASGI application meanwhile; yields its URL. Responses that are under way at the end
-    are cut.
+    """Runs an ASGI application in a thread inside the ``with``; yields its URL. At the end,
+    responses under way are cut.
 
     Parameters
     ----------
-    host, port: to listen on; port 0 is any that is free.
+    host, port: to listen on; port 0 for any free one.
 
-    Raises InputError: PTM-I920 the port is taken; PTM-I921 there is no such address, or it may not
-    be used.
+    Raises InputError: PTM-I920 the port is taken; PTM-I921 the address does not exist or is not
+    permitted.
     """
     import uvicorn
 
@@ -99,7 +138,7 @@ def require() -> None:
 
 
 def url_of(listener: socket.socket) -> str:
-    """Where a browser on this machine finds what listens there."""
+    """The URL of a socket for browsers on this machine."""
     host, port = listener.getsockname()[:2]
     host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
     return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
@@ -107,26 +146,11 @@ def url_of(listener: socket.socket) -> str:
 
 def _listening(host: str, port: int) -> socket.socket:
     """A socket that listens; raises InputError PTM-I920, I921."""
-    place = f"{host}:{port}"
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
-        if not 0 <= port < 1 << 16:  # of which the system would take the lower bits
-            raise OverflowError("there is no such port")
-        family, kind, protocol, _, address = socket.getaddrinfo(
-            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
-        )[0]
-        listener = socket.socket(family, kind, protocol)
+        return socket.create_server((host, port), family=family)
     except (OSError, OverflowError, UnicodeError) as fault:
-        raise _refused(place, fault) from None
-    try:
-        # A port that a server has just left is free; on Windows this would share a taken one.
-        if os.name == "posix":
-            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind(address)
-        listener.listen()
-    except (OSError, OverflowError) as fault:
-        listener.close()
-        raise _refused(place, fault) from None
-    return listener
+        raise _refused(f"{host}:{port}", fault) from None
 
 
 def _refused(place: str, fault: Exception) -> InputError:
@@ -135,7 +159,7 @@ def _refused(place: str, fault: Exception) -> InputError:
             "PTM-I920",
             "the port is taken by another program",
             file=place,
-            remedy="give another one with --port, or none for any that is free",
+            remedy="give another one with --port, or none for any free one",
         )
     reason = getattr(fault, "strerror", None) or fault
     return InputError(

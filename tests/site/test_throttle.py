@@ -13,7 +13,7 @@ import pytest
 from ptmtools.errors import InputError
 from ptmtools.lab.network import Link as FluidLink
 from ptmtools.link import Conditions
-from ptmtools.server.throttle import LATE, PIECE, Link, Throttle
+from ptmtools.site.throttle import LATE, PIECE, Link, Throttle
 
 BANDWIDTHS = [56e3, 512e3, 4e6, 16e6]
 #: Seconds by which timers are late at most, as those of a busy machine are.

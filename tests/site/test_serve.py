@@ -20,13 +20,13 @@ from urllib.parse import urlsplit
 import pytest
 
 from ptmtools.cli.main import main
-from ptmtools.server import opening
-from ptmtools.server.lookup import Lookup
-from ptmtools.server.running import url_of
-from ptmtools.server.stored import stored
+from ptmtools.site import lookup
 from ptmtools.site.content import Entry, SiteOptions
+from ptmtools.site.lookup import Lookup
+from ptmtools.site.responses import Content
+from ptmtools.site.serving import url_of
 from ptmtools.store.manifest import SCHEMA, Manifest, StageRecord
-from tests.server.conftest import NOISE, PAGE, client_of
+from tests.site.client import NOISE, PAGE, client_of
 
 TWO_ROOMS = Path(__file__).parents[2] / "sample_data/two_rooms/two_rooms.obj"
 
@@ -236,12 +236,12 @@ def site_of(path: Path, options: SiteOptions) -> Site:
 def test_a_site_goes_before_the_files_of_its_database(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("ptmtools.site.content.site_of", site_of)
+    monkeypatch.setattr("ptmtools.site.lookup.site_of", site_of)
     made = database(tmp_path / "db", {"emit": RECORD})
     (made / "www").mkdir()
     (made / "www/index.html").write_bytes(b"not this")
     (made / "www/root.wrl").write_bytes(b"#VRML V2.0 utf8\n")
-    find = opening.files_of(made)
+    find = lookup.files_of(made)
     for name, content in (("index.html", PAGE), ("root.wrl", b"#VRML V2.0 utf8\n")):
         entry = find(name)
         assert entry
@@ -254,14 +254,14 @@ def test_a_database_that_is_built_again(tmp_path: Path) -> None:
     made = tmp_path / "two_rooms.db"
     build = ["-q", "build-scene", str(TWO_ROOMS), "-o", str(made), "-j", "1"]
     assert main(build) == 0
-    find = opening.files_of(made)
+    find = lookup.files_of(made)
     before = data_of(find)
     assert main([*build, "--max-level", "-2"]) == 0
     for name in textures_in(before):
         entry = find(name)
         assert entry
         with pytest.raises((BlockingIOError, FileNotFoundError)):
-            stored(entry)
+            Content.of(entry)
     after = data_of(find)
     assert textures_in(after).isdisjoint(textures_in(before))
     shutil.rmtree(made)

@@ -1,0 +1,141 @@
+"""Finds the file that a URL names, and nothing outside what is served.
+
+Names are compared after percent-decoding, once, component by component. A name that decodes to a
+slash, a backslash, a colon, a NUL or a dotted step matches no file.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable, Mapping
+from os import PathLike
+from pathlib import Path
+from threading import Lock
+from urllib.parse import unquote, unquote_to_bytes
+
+from ptmtools.errors import DatabaseError, PtmError
+from ptmtools.files import leads_inside
+from ptmtools.site.content import HTML, INDEX, JAVASCRIPT, Entry, SiteOptions, site_of
+from ptmtools.store.layout import MANIFEST, SERVED
+
+#: The file of a decoded name, or None; raises BlockingIOError for one that will exist later.
+Lookup = Callable[[str], Entry | None]
+
+#: Suffix → (media type, whether it is worth compressing).
+_MEDIA = {
+    ".html": (HTML, True),
+    ".js": (JAVASCRIPT, True),
+    ".css": ("text/css; charset=utf-8", True),
+    ".json": ("application/json", True),
+    ".svg": ("image/svg+xml", True),
+    ".txt": ("text/plain; charset=utf-8", True),
+    ".wasm": ("application/wasm", True),
+    ".glb": ("model/gltf-binary", True),
+    ".wrl": ("model/vrml", True),
+    ".png": ("image/png", False),
+    ".jpg": ("image/jpeg", False),
+    ".webp": ("image/webp", False),
+}
+_OTHER = ("application/octet-stream", False)
+#: The hash that `ptm publish` puts into names that change with the content.
+_HASH = re.compile(r"-[0-9a-f]{10}(?=[./])")
+
+
+def name_of(path: bytes) -> str | None:
+    """The decoded name in the raw path of a request; None if no file can have it."""
+    if not path.startswith(b"/"):
+        return None
+    try:
+        steps = [unquote_to_bytes(step).decode() for step in path[1:].split(b"/")]
+    except UnicodeDecodeError:
+        return None
+    name = "/".join(steps)
+    if not name:
+        return INDEX
+    return name if name.count("/") + 1 == len(steps) and leads_inside(name) else None
+
+
+def among(entries: Mapping[str, Entry]) -> Lookup:
+    """The entries of a site, by their names."""
+    return {unquote(name): entry for name, entry in entries.items()}.get
+
+
+def below(folder: Path, *, hashed: bool = False) -> Lookup:
+    """The regular files below a folder; links are followed as long as they stay there.
+
+    With ``hashed``, names with a hash as `ptm publish` writes it may be kept for ever.
+    """
+    root = folder.resolve()
+
+    def find(name: str) -> Entry | None:
+        try:
+            file = (root / name).resolve(strict=True)
+            if not (file.is_relative_to(root) and file.is_file()):
+                return None
+        except (OSError, RuntimeError, ValueError):  # no such file, circular links, a NUL
+            return None
+        media, compressed = _MEDIA.get(file.suffix.lower(), _OTHER)
+        return Entry(name, file, media, hashed and bool(_HASH.search(name)), compressed)
+
+    return find
+
+
+def files_of(folder: str | PathLike[str]) -> Lookup:
+    """The files of a database: those of its site, without pictures, then those in its `www`; or
+    those of a folder that `ptm publish` wrote.
+
+    Raises
+    ------
+    DatabaseError: PTM-D001 it is neither; PTM-D002, D003 a damaged database, or one of another
+        schema; PTM-D004 one that is not finished; and what `site_of` raises.
+    """
+    path = Path(folder)
+    if (path / INDEX).is_file() and not (path / MANIFEST).exists():
+        return below(path, hashed=True)
+    return _Database(path)
+
+
+class _Database:
+    """The files of a database. It may be built again meanwhile: the next request for the page then
+    gets a new site."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._lock = Lock()
+        stamp = self._stamp()
+        #: The site, and the state of the database that it describes.
+        self._site = self._new_site(), stamp
+        self._others = below(path / SERVED)
+
+    def __call__(self, name: str) -> Entry | None:
+        if name == INDEX:
+            self._renew()
+        return self._site[0](name) or self._others(name)
+
+    def _renew(self) -> None:
+        with self._lock:
+            stamp = self._stamp()
+            if self._site[1] == stamp:
+                return
+            try:
+                self._site = self._new_site(), stamp
+            except (PtmError, OSError) as fault:
+                print(f"ptm: {fault}", file=sys.stderr)
+                raise BlockingIOError("the database is being built, or damaged") from None
+
+    def _stamp(self) -> tuple[int, int]:
+        """Time and inode of the manifest, which change when a stage is finished."""
+        try:
+            state = (self._path / MANIFEST).stat()
+        except OSError:
+            return 0, 0
+        return state.st_mtime_ns, state.st_ino
+
+    def _new_site(self) -> Lookup:
+        try:
+            return among(site_of(self._path, SiteOptions(pictures=False)).entries)
+        except DatabaseError as fault:
+            if fault.code == "PTM-D001" and self._path.exists():
+                fault.message = "neither a database nor a folder that `ptm publish` wrote"
+            raise
