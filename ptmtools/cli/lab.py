@@ -28,10 +28,12 @@ from ptmtools.lab.comparing import SimulateOptions, counted, play, require_hints
 from ptmtools.lab.measures import require as require_flip
 from ptmtools.lab.path.making import Path as WalkPath, path_through
 from ptmtools.lab.path.options import PathOptions
+from ptmtools.lab.policies.paper import PaperOptions
 from ptmtools.lab.report import as_csv, document, table
 from ptmtools.lab.walk import Walk, read_walk, walk_text
 from ptmtools.lab.world import prepare, read_forms, relief_of
 from ptmtools.link import read_trace
+from ptmtools.options import arguments
 from ptmtools.output.names import HINTS
 from ptmtools.output.served import read_served
 from ptmtools.pipeline import Artifacts
@@ -193,7 +195,7 @@ def walk_campus(
     multiple=True,
     help="Seed of the new walk without --walk; 1 by default. Repeatable.",
 )
-@options_of(SimulateOptions)
+@options_of(SimulateOptions, PaperOptions)
 @option(
     "--against",
     type=click.Path(),
@@ -278,7 +280,10 @@ def simulate(
 
     Every policy walks over every link with every amount of memory. DB is not changed.
     """
-    options = take(SimulateOptions, values)
+    options, paper = take(SimulateOptions, values), take(PaperOptions, values)
+    with_paper = any(policy.options for policy in options.policies)
+    if paper != PaperOptions() and not with_paper:
+        raise click.UsageError(f"{arguments([paper])[0]} needs --policy paper")
     if walk_files and seeds:
         raise click.UsageError("give either --walk or --seed")
     files = [file for file in (csv_file, plot_file, strip_file) if file]
@@ -317,7 +322,9 @@ def simulate(
             )
             for name, walk in walks.items()
         }
-        played = play(worlds, options, trace, progress, flip=flip, campuses=campuses)
+        played = play(
+            worlds, options, trace, progress, flip=flip, campuses=campuses, policy_options=[paper]
+        )
     if csv_file:
         write_bytes(csv_file, as_csv(played).encode(), force=force)
     if plot_file:
@@ -329,10 +336,13 @@ def simulate(
         for name, data in figures.frames(first, played[0].run, every):
             write_bytes(frames_to / name, data, force=force)
     if strip_file:
-        write_bytes(strip_file, figures.strip(first, played[0]), force=force)
+        write_bytes(strip_file, figures.strip(first, played[0], [paper]), force=force)
     if as_json:
-        console.json(document(db, played, worlds, lit=options.lit, against=against))
+        own = paper if with_paper else None
+        console.json(document(db, played, worlds, lit=options.lit, against=against, paper=own))
         return
+    if given := arguments([paper]):
+        console.print(f"policy paper with {' '.join(given)}")
     for line in table(played, worlds, lit=options.lit, against=against, campuses=campuses):
         console.print(line)
 

@@ -170,6 +170,7 @@ def play(
     *,
     flip: bool = False,
     campuses: Mapping[str, CampusWorld] = MappingProxyType({}),
+    policy_options: Sequence[object] = (),
 ) -> list[Played]:
     """All runs: by link, memory, policy, walk; those of a campus after the others.
 
@@ -177,6 +178,7 @@ def play(
     ----------
     flip: also measure that, of clients of the database.
     campuses: each walk through a campus, where a policy is of one.
+    policy_options: options of single policies, such as `PaperOptions`.
 
     Raises
     ------
@@ -185,7 +187,8 @@ def play(
         PTM-I712.
     MissingComponentError: PTM-M702 with ``flip``, without flip-evaluator.
     """
-    policies: list[Declared | CampusPolicy] = [*options.policies, *options.campus_policies]
+    own = [policy.configured(policy_options) for policy in options.policies]
+    policies: list[Declared | CampusPolicy] = [*own, *options.campus_policies]
     cases = [
         (link, memory, policy, name)
         for link in options.links(trace)

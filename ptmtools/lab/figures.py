@@ -98,13 +98,14 @@ def frames(world: World, run: Run, every: float) -> Iterator[tuple[str, bytes]]:
         yield f"{world.time[f]:07.1f}.png", png(as_bytes(colors))
 
 
-def strip(world: World, played: Played) -> bytes:
+def strip(world: World, played: Played, policy_options: Sequence[object] = ()) -> bytes:
     """A PNG: what the client of a run shows after `INSTANTS` to who stands where the walk begins,
     and the full picture."""
     of = played.run
-    world = world.in_form(POLICIES[of.policy].form)
+    policy = POLICIES[of.policy].configured(policy_options)
+    world = world.in_form(policy.form)
     stays = world.standing(INSTANTS[-1])
-    run = simulate(stays, POLICIES[of.policy], of.conditions, of.budget)
+    run = simulate(stays, policy, of.conditions, of.budget)
     renderer = Renderer(world, _STRIP_LINES, samples=3)
     sight = renderer.look(stays.eye[0], stays.direction[0])
     found = []

@@ -16,6 +16,7 @@ import numpy as np
 from ptmtools.lab.campus.world import CampusWorld
 from ptmtools.lab.comparing import Played
 from ptmtools.lab.measures import FRAMES, PER_DEGREE, PIXELS, SHARES
+from ptmtools.lab.policies.paper import PaperOptions
 from ptmtools.lab.world import World
 from ptmtools.link import Conditions
 from ptmtools.quantities import count, size
@@ -148,6 +149,7 @@ def document(
     *,
     lit: bool = False,
     against: str | None = None,
+    paper: PaperOptions | None = None,
 ) -> Any:
     """All runs as JSON has them; the schema is published. Numbers have `_DIGITS` digits."""
     some = next(iter(worlds.values()))
@@ -170,6 +172,16 @@ def document(
             for name, world in worlds.items()
         ],
         "runs": [_run_document(p) for p in played],
+        **({"paper": _paper_document(paper)} if paper else {}),
+    }
+
+
+def _paper_document(options: PaperOptions) -> dict[str, Any]:
+    return {
+        "deltaT": options.delta_t,
+        "deltaTStatic": options.delta_t_static,
+        "staticMemory": options.static_memory or None,
+        "staticAfter": options.static_after,
     }
 
 

@@ -133,7 +133,7 @@ def simulate(world: World, policy: Declared, conditions: Conditions, budget: int
         switches=int(np.count_nonzero(steps)),
         requests=link.requests - passing.page,
         stalls=int((~there[np.arange(frames), world.cell]).sum()),
-        overruns=int((memory > budget).sum()),
+        overruns=int((memory > policy.limits(world, budget)).sum()),
     )
 
 

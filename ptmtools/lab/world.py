@@ -94,6 +94,12 @@ class World:
         """How many there are."""
         return len(self.time)
 
+    def still_after(self, seconds: float) -> Bools:
+        """(F,) the frames in which the viewpoint has not moved for so many seconds."""
+        if seconds == STILL_SECONDS:
+            return self.still
+        return _still(self.time, self.eye, self.direction, seconds)
+
     def in_form(self, form: str) -> World:
         """The same for clients that take textures in a form.
 
@@ -335,11 +341,11 @@ def _drawn(time: Floats, age: Floats) -> Ints:
     return frames
 
 
-def _still(time: Floats, eye: Floats, direction: Floats) -> Bools:
-    found = np.zeros(len(time), dtype=bool)
-    begin = np.searchsorted(time, time - STILL_SECONDS - 1e-9)
-    for f in np.flatnonzero(time >= STILL_SECONDS).tolist():
+def _still(time: Floats, eye: Floats, direction: Floats, seconds: float = STILL_SECONDS) -> Bools:
+    still = np.zeros(len(time), dtype=bool)
+    begin = np.searchsorted(time, time - seconds - 1e-9)
+    for f in np.flatnonzero(time >= seconds).tolist():
         last = slice(int(begin[f]), f + 1)
         moved = np.abs(eye[last] - eye[f]).max()
-        found[f] = moved < _STILL_METRES and (direction[last] @ direction[f]).min() > _STILL_COSINE
-    return found
+        still[f] = moved < _STILL_METRES and (direction[last] @ direction[f]).min() > _STILL_COSINE
+    return still

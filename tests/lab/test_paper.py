@@ -13,7 +13,7 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.lab.client import Client, Kind, Range
 from ptmtools.lab.network import Link, Request
 from ptmtools.lab.policies import POLICIES
-from ptmtools.lab.policies.paper import PaperClient, Patience
+from ptmtools.lab.policies.paper import PaperClient, PaperOptions
 from ptmtools.lab.policies.paper_kernels import refresh, share_out
 from ptmtools.lab.simulation import Run, simulate
 from ptmtools.lab.world import World
@@ -45,15 +45,18 @@ class Watched(PaperClient):
         super().ask(kind, number, end, priority)
 
 
-def played(made: World, conditions: Conditions, *budgets: int) -> tuple[Run, Watched]:
+def played(
+    made: World, conditions: Conditions, budget: int, options: PaperOptions | None = None
+) -> tuple[Run, Watched]:
     """A run of the paper's client, and the client."""
     clients: list[Client] = []
 
     def make(made: World, link: Link, budget: int) -> Client:
-        clients.append(Watched(made, link, *budgets))
+        clients.append(Watched(made, link, budget, options or PaperOptions()))
         return clients[0]
 
-    run = simulate(made, replace(PAPER, client=make), conditions, budgets[0])
+    policy = replace(PAPER.configured([options or PaperOptions()]), client=make)
+    run = simulate(made, policy, conditions, budget)
     return run, cast("Watched", clients[0])
 
 
@@ -116,12 +119,30 @@ def test_a_greater_budget_while_standing() -> None:
     parts = [strolling(stock, 3), standing(stock, 4), strolling(stock, 1)]
     poses = [(w.eye, w.direction) for w in parts]
     made = world(stock, *(np.concatenate(part) for part in zip(*poses, strict=True)))
-    run, _ = played(made, bare(None), 4 * MIB, 16 * MIB)
+    run, _ = played(made, bare(None), 4 * MIB, PaperOptions(static_memory="16MiB"))
     stands = np.flatnonzero(run.still)
     assert run.column[stands[0] - 1].tolist() == [10, 10]
     assert run.column[stands[-1]].tolist() == [11, 11]
     assert run.column[stands[-1] + 1].tolist() == [10, 10]
     assert (run.memory[~run.still] <= 4 * MIB).all()
+    assert run.overruns == 0
+    same, _ = played(made, bare(None), 4 * MIB, PaperOptions(static_memory="inf"))
+    np.testing.assert_array_equal(same.column, run.column)
+
+
+def test_how_long_a_viewpoint_is_still() -> None:
+    """From when on its parameters are those of a static one."""
+    stock = catalogue([LARGE] * 2, [(0, 0), (0, 1)])
+    parts = [strolling(stock, 3), standing(stock, 8)]
+    poses = [(w.eye, w.direction) for w in parts]
+    made = world(stock, *(np.concatenate(part) for part in zip(*poses, strict=True)))
+    finest = {}
+    for seconds in (1.0, 4.0):
+        options = PaperOptions(static_memory="16MiB", static_after=seconds)
+        run, _ = played(made, bare(None), 4 * MIB, options)
+        whole = np.flatnonzero((run.column == 11).all(axis=1))
+        finest[seconds] = run.time[whole[0]]
+    assert finest[4.0] - finest[1.0] == pytest.approx(3.0)
 
 
 def test_a_level_at_a_time() -> None:
@@ -142,9 +163,7 @@ def test_a_level_at_a_time() -> None:
 @pytest.mark.parametrize("seconds", [0.01, 0.2, 3.0, 10.0])
 def test_patience(seconds: float) -> None:
     stock = catalogue([LARGE], [(0, 0)])
-    patient = replace(
-        PAPER, client=lambda *place: PaperClient(*place, patience=Patience(seconds, seconds))
-    )
+    patient = PAPER.configured([PaperOptions(seconds, seconds)])
     levels = sum(8 * size / 512e3 <= seconds for size in LARGE.groups)
     for made in (strolling(stock, 60), standing(stock, 60)):
         assert simulate(made, patient, bare(512e3), 4 * MIB).quality[-1] == levels / 11

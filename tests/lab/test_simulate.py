@@ -163,7 +163,7 @@ def test_nothing_is_overwritten(ptm: Ptm, two_rooms: Path, walk_file: Path, tmp_
     assert "[PTM-O001]" in ptm(*words, "--frames", tmp_path).err
     for folder in (file, file / "frames"):
         refused = ptm("simulate", "nowhere", "--frames", folder).err
-        assert "frames.csv is no folder" in refused
+        assert "frames.csv is not a folder" in refused
     assert file.read_text() == "mine"
     assert ptm(*words, "--csv", file, "--force").status == 0
     assert file.read_text().startswith("policy,")
@@ -198,3 +198,26 @@ def test_without_limits_all_ends_well(world: World, policy: Declared) -> None:
     assert run.error[0] > 1
     assert run.error[-1] == 0
     assert run.missing[-1] == 0
+
+
+def test_the_parameters_of_the_paper(two_rooms: Path, walk_file: Path, ptm: Ptm) -> None:
+    words = ["simulate", two_rooms, "--walk", walk_file, "--policy", "paper", "--bandwidth", "1M"]
+    plain = json.loads(ptm(*words, "--memory", "20%", "--json").out)
+    assert plain["paper"] == {
+        "deltaT": 0.5,
+        "deltaTStatic": 20,
+        "staticMemory": None,
+        "staticAfter": 1,
+    }
+    given = ["--delta-t", "0", "--delta-t-static", "0", "--static-memory", "inf"]
+    own = schemas.read(
+        ptm(*words, "--memory", "20%", *given, "--json").out.encode(), schemas.SIMULATION
+    )
+    assert own["paper"]["staticMemory"] == "inf"
+    (first,), (second,) = plain["runs"], own["runs"]
+    assert first["uploadedBytes"] > second["uploadedBytes"] == 0
+    assert second["overruns"] == 0
+    assert ptm(*words, *given).out.startswith("policy paper with --delta-t 0 --delta-t-static 0 ")
+    assert "[PTM-U001]" in ptm(*words, "--policy", "best", "--delta-t", "1").err
+    assert "[PTM-I715]" in ptm(*words, "--static-after", "-1").err
+    assert "[PTM-I712]" in ptm(*words, "--static-memory", "much").err

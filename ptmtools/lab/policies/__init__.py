@@ -5,11 +5,14 @@ To add one: a module with a `Client`, or a policy of the `engine`, and a line he
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import partial
 
+import numpy as np
+
+from ptmtools.arrays import Ints
 from ptmtools.lab.client import Client
 from ptmtools.lab.forms import PTM
 from ptmtools.lab.network import Link
@@ -17,7 +20,7 @@ from ptmtools.lab.policies import shares as around, shares as coverage
 from ptmtools.lab.policies.apo import ApoClient
 from ptmtools.lab.policies.engine import EngineClient, Policy
 from ptmtools.lab.policies.oracle import Oracle
-from ptmtools.lab.policies.paper import PaperClient
+from ptmtools.lab.policies.paper import PaperClient, PaperOptions
 from ptmtools.lab.policies.shares import BEST, Screen
 from ptmtools.lab.policies.whole_files import GpuiiClient, LruClient
 from ptmtools.lab.world import World
@@ -41,6 +44,7 @@ class Declared:
     name, about: for `--policy`.
     knows: what it needs.
     client: makes a client of it, in a world, on a link, with a budget.
+    options: its own options, if it has some; see `configured`.
     needs: a field that the records of cells must have, and how to get it; None: as they always are.
     form: in which it takes textures, a name in `ptmtools.lab.forms.FORMS`.
     """
@@ -51,6 +55,19 @@ class Declared:
     client: Callable[[World, Link, int], Client]
     needs: tuple[str, str] | None = None
     form: str = PTM
+    options: PaperOptions | None = None
+
+    def configured(self, options: Sequence[object]) -> Declared:
+        """The policy with that of the ``options`` that is of the class of its own."""
+        for each in options:
+            if isinstance(each, PaperOptions) and self.options:
+                return replace(self, options=each, client=partial(self.client, options=each))
+        return self
+
+    def limits(self, world: World, budget: int) -> Ints:
+        """(F,) bytes of texture memory that a client with a budget may use in each frame."""
+        whole = np.full(world.frames, budget, np.int64)
+        return self.options.limits(world, budget) if self.options else whole
 
 
 def _engine(
@@ -67,7 +84,13 @@ def _same(policy: Policy, *, statistics: bool = False) -> Callable[[World, Link,
 
 
 _LIST = (
-    Declared("paper", "Marvie & Bouatouch, §6.1 and §6.2, as written", Knows.CAMERA, PaperClient),
+    Declared(
+        "paper",
+        "Marvie & Bouatouch, §6.1 and §6.2, as written",
+        Knows.CAMERA,
+        PaperClient,
+        options=PaperOptions(),
+    ),
     Declared("lru", "files in the order met, and a cache", Knows.CAMERA, LruClient),
     Declared(
         "gpuii",

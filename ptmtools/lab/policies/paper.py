@@ -11,7 +11,8 @@ In every frame it rendered (30 a second here; pictures are looked at five times 
    pyramid up to a level: the level alone would break the budget.
 3. Each texture adds or removes one level, or asks for one, if it may be had within δt: the latency,
    and its bytes by the bandwidth of recent downloads.
-4. Where the viewpoint is still for `STILL_SECONDS`, the greater budget and δt hold.
+4. Where the viewpoint has been static for t_static, M_static and δt_static replace the budget and
+   δt (`PaperOptions`).
 
 A client that enters a cell drops what its visible set does not use. The next cell, behind the first
 portal that the way of the last half second leads through within two seconds, is fetched ahead.
@@ -25,15 +26,20 @@ that turns around, or walks on, would hold more than its budget.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.errors import InputError
 from ptmtools.lab.client import Client, Kind, Range
 from ptmtools.lab.network import Link
 from ptmtools.lab.policies.paper_kernels import refresh, share_out
-from ptmtools.lab.world import World
+from ptmtools.lab.world import STILL_SECONDS, World
+from ptmtools.options import option
+from ptmtools.quantities import MemorySize, parse_memory
 
 #: Frames a second that it renders.
 FRAMES = 30
@@ -44,28 +50,65 @@ LEVEL, NEXT, VISIBLE, CURRENT = 1.0, 2.0, 3.0, 4.0
 
 
 @dataclass(frozen=True)
-class Patience:
-    """How long a level may take, s, while the viewpoint moves and while it is still."""
+class PaperOptions:
+    """The parameters of §6.2 that the user sets.
 
-    moving: float = 0.5
-    still: float = 20.0
+    Raises InputError: PTM-I712 an unreadable amount of memory; PTM-I715 another value out of range.
+    """
+
+    heading: ClassVar[str] = "Policy paper"
+
+    delta_t: float = option(
+        0.5, "Longest download of a level, while the viewpoint moves.", metavar="SECONDS"
+    )
+    delta_t_static: float = option(
+        20.0, "Longest download of a level, while the viewpoint is static.", metavar="SECONDS"
+    )
+    static_memory: str = option(
+        "",
+        "Texture memory while the viewpoint is static: 16MiB, 40% or inf. Default: that of "
+        "--memory.",
+        metavar="SIZE",
+    )
+    static_after: float = option(
+        STILL_SECONDS, "Time without movement until the viewpoint is static.", metavar="SECONDS"
+    )
+
+    def __post_init__(self) -> None:
+        self.memory  # noqa: B018 - raises for an unreadable amount
+        for name in ("delta_t", "delta_t_static", "static_after"):
+            if not 0 <= getattr(self, name) < math.inf:
+                raise InputError(
+                    "PTM-I715",
+                    f"--{name.replace('_', '-')} {getattr(self, name):g} is out of range",
+                    remedy="give 0 or more, finite",
+                )
+
+    @property
+    def memory(self) -> MemorySize | None:
+        """Texture memory of a static viewpoint; None for that of a moving one."""
+        return parse_memory(self.static_memory) if self.static_memory else None
+
+    def limits(self, world: World, budget: int) -> Ints:
+        """(F,) bytes of texture memory in each frame; ``budget`` is that of a moving viewpoint."""
+        static = budget
+        if self.memory:
+            held, whole = self.memory.of(world.catalogue.whole), world.catalogue.whole
+            static = whole if held is None else held
+        return np.where(world.still_after(self.static_after), static, budget)
 
 
 class PaperClient(Client):
-    """See the module; ``still_budget``, bytes, is that of a viewpoint that is still."""
+    """The client of the module."""
 
     def __init__(
-        self,
-        world: World,
-        link: Link,
-        budget: int,
-        still_budget: int | None = None,
-        patience: Patience = Patience(),
+        self, world: World, link: Link, budget: int, options: PaperOptions = PaperOptions()
     ) -> None:
         super().__init__(world, link, budget)
         self.ticks = max(1, round(FRAMES / world.rate))
-        self._still_budget = budget if still_budget is None else still_budget
-        self._patience = patience
+        self._options = options
+        self._static = world.still_after(options.static_after)
+        self._limits = options.limits(world, budget)
         stock = world.catalogue
         self._pending = np.zeros(stock.texture_count, dtype=bool)
         self._used = np.zeros(stock.texture_count, dtype=bool)
@@ -90,8 +133,8 @@ class PaperClient(Client):
         """A frame is rendered: steps 1 to 3, and requests for levels."""
         if self.cell < 0:
             return
-        stock, still = self.world.catalogue, bool(self.world.still[self.frame])
-        budget = self._still_budget if still else self.budget
+        stock, static = self.world.catalogue, bool(self._static[self.frame])
+        budget = int(self._limits[self.frame])
         shapes = stock.shapes
         share = np.zeros(stock.texture_count)
         share_out(
@@ -100,7 +143,7 @@ class PaperClient(Client):
         )  # fmt: skip
         have = self.have
         asks = refresh(share, stock.memory, stock.levels, have, self._pending, budget, self.column)
-        most = self._patience.still if still else self._patience.moving
+        most = self._options.delta_t_static if static else self._options.delta_t
         for t in asks.tolist():
             end = int(stock.ends[t, have[t] + 1])
             size = end - int(self.textures.asked[t])
