@@ -21,11 +21,11 @@ def cross(a: Floats, b: Floats) -> Floats:
     fifths of its time on the axes that it allows for."""
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
     bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
-    found = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    found[..., 0] = ay * bz - az * by
-    found[..., 1] = az * bx - ax * bz
-    found[..., 2] = ax * by - ay * bx
-    return found
+    result = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    result[..., 0] = ay * bz - az * by
+    result[..., 1] = az * bx - ax * bz
+    result[..., 2] = ax * by - ay * bx
+    return result
 
 
 def normals(corners: Floats) -> Floats:

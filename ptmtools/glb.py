@@ -57,17 +57,17 @@ def glb_chunks(data: bytes) -> list[tuple[bytes, int, bytes]]:
         raise ValueError(f"version {version}", "byte 4")
     if length > len(data):
         raise ValueError(f"cut short, {length} bytes expected", f"byte {len(data)}")
-    found: list[tuple[bytes, int, bytes]] = []
+    result: list[tuple[bytes, int, bytes]] = []
     at = _HEADER.size
     while (begin := at + _CHUNK.size) <= length:
         size, kind = _CHUNK.unpack_from(data, at)
         if begin + size > length:
             raise ValueError("a chunk ends beyond the file", f"byte {at}")
         at = begin + size
-        found.append((kind, begin, data[begin:at]))
-    if [kind for kind, *_ in found[:1]] != [JSON]:
+        result.append((kind, begin, data[begin:at]))
+    if [kind for kind, *_ in result[:1]] != [JSON]:
         raise ValueError("the first chunk is not JSON", f"byte {_HEADER.size}")
-    return found
+    return result
 
 
 def elements(

@@ -193,9 +193,9 @@ class _LeftOut(int):
     """A number of levels that can be called as the method that its name hides."""
 
     def __new__(cls, levels: int, method: Callable[..., Image.Image]) -> _LeftOut:
-        found = super().__new__(cls, levels)
-        found.method = method
-        return found
+        result = super().__new__(cls, levels)
+        result.method = method
+        return result
 
     method: Callable[..., Image.Image]
 

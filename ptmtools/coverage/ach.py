@@ -92,38 +92,38 @@ def compute_ach(
     worth = rays * count >= 2 * WORTH_A_PROCESS
     doer = executor if backend.in_processes and executor.workers > 1 and worth else Executor()
     chunk = int(max(1, min(TASK // rays, count // (4 * doer.workers))))
-    found: list[CellHints] = []
+    rows: list[CellHints] = []
     sampler = Sampler(scene, cells, pvs, options, backend)
     try:
         if doer is executor:
             sampler.renderer.close()  # each process opens one of its own
         for hints in doer.each(Sampler.of_cell, sampler, range(count), chunk=chunk):
-            found.append(hints)
-            progress(len(found), count, "coverage")
+            rows.append(hints)
+            progress(len(rows), count, "coverage")
     finally:
         sampler.renderer.close()
-    return _gathered(found, sampler)
+    return _gathered(rows, sampler)
 
 
-def _gathered(found: list[CellHints], sampler: Sampler) -> Ach:
+def _gathered(cells: list[CellHints], sampler: Sampler) -> Ach:
     none = np.zeros((len(VIEWS), 0), dtype=np.int64)
     nothing = estimate(none[:0], none, none[0], 1)  # has the types of what is joined
-    rows = [nothing, *(hints.row for hints in found)]
+    rows = [nothing, *(hints.row for hints in cells)]
     entries = {
         name: np.concatenate([getattr(row, name) for row in rows])
         for name in ("value", "pixels", "error", "p95", "seen", "views")
     }
-    total = np.array([float(hints.row.pixels.sum()) for hints in found])
-    samples = np.array([hints.samples for hints in found], dtype=np.int32)
-    textures = found if sampler.options.per_texture else []
+    total = np.array([float(hints.row.pixels.sum()) for hints in cells])
+    samples = np.array([hints.samples for hints in cells], dtype=np.int32)
+    textures = cells if sampler.options.per_texture else []
     size = np.concatenate([np.zeros(0, np.int64), *(hints.texture_count for hints in textures)])
     return Ach(
         start=sampler.pvs.start.copy(),
         **entries,
-        missed=np.array([hints.missed for hints in found], dtype=np.float64),
+        missed=np.array([hints.missed for hints in cells], dtype=np.float64),
         samples=samples,
-        rejected=np.array([hints.rejected for hints in found], dtype=np.int32),
-        uncertain=np.array([hints.row.uncertain for hints in found], dtype=np.float64),
+        rejected=np.array([hints.rejected for hints in cells], dtype=np.int32),
+        uncertain=np.array([hints.row.uncertain for hints in cells], dtype=np.float64),
         unseen_below=np.minimum(1.0, RULE_OF_THREE / np.maximum(samples, 1)),
         floor=np.divide(0.5, total, out=np.zeros_like(total), where=total > 0),
         texture_start=np.cumsum(np.append(0, size)) if textures else size,

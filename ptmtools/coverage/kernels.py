@@ -13,7 +13,7 @@ from ptmtools.compiled import plain_kernel
 
 @plain_kernel
 def clearances(
-    points: Floats, corners: Floats, first: Ints, end: Ints, enough: float, found: Floats
+    points: Floats, corners: Floats, first: Ints, end: Ints, enough: float, distances: Floats
 ) -> None:
     """Lowers ``found`` (n,) to the distance of each of the (n, 3) points from the nearest of the
     (m, 3, 3) triangles, each held against the points from its ``first`` to its ``end`` (m,)."""
@@ -23,7 +23,7 @@ def clearances(
         low_z, high_z = min(a[2], b[2], c[2]) - enough, max(a[2], b[2], c[2]) + enough
         for i in range(first[t], end[t]):
             if low_y <= points[i, 1] <= high_y and low_z <= points[i, 2] <= high_z:
-                found[i] = min(found[i], distance(points[i], corners[t]))
+                distances[i] = min(distances[i], distance(points[i], corners[t]))
 
 
 @plain_kernel

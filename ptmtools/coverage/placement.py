@@ -59,7 +59,7 @@ _POLYNOMIALS = (
 
 def _directions() -> NDArray[np.uint32]:
     """(DIMENSIONS, DIGITS) direction numbers, scaled by 2^32."""
-    found = [[1 << (DIGITS - 1 - k) for k in range(DIGITS)]]
+    directions = [[1 << (DIGITS - 1 - k) for k in range(DIGITS)]]
     for degree, middle, first in _POLYNOMIALS:
         m = [v << (DIGITS - 1 - k) for k, v in enumerate(first)]
         for k in range(degree, DIGITS):
@@ -68,8 +68,8 @@ def _directions() -> NDArray[np.uint32]:
                 if middle >> (degree - 1 - i) & 1:
                     v ^= m[k - i]
             m.append(v)
-        found.append(m)
-    return np.array(found, dtype=np.uint32)
+        directions.append(m)
+    return np.array(directions, dtype=np.uint32)
 
 
 _DIRECTIONS = _directions()
@@ -87,9 +87,9 @@ def sobol(first: int, count: int, seed: int) -> Floats:
     for k in range(max(1, int(first + count).bit_length())):
         bit = (index >> np.uint64(k) & np.uint64(1)).astype(bool)
         point[bit] ^= _DIRECTIONS[:, k]
-    found = (_scrambled(point, seed) + 0.5) * 2.0**-DIGITS
-    found.setflags(write=False)
-    return np.asarray(found)
+    points = (_scrambled(point, seed) + 0.5) * 2.0**-DIGITS
+    points.setflags(write=False)
+    return np.asarray(points)
 
 
 def uniform(first: int, count: int, seed: int) -> Floats:

@@ -106,14 +106,14 @@ def compute_need(
     sampler = Sampler(scene, cells, pvs, options, BACKENDS["embree"])
     try:
         wanting = _Wanting(scene, cells, sizes, sampler)
-        found = []
+        shares = []
         for cell in range(cells.cell_count):
             progress(cell, cells.cell_count, "need")
-            found.append(wanting.shares(sampler.points_of(cell)))
+            shares.append(wanting.shares(sampler.points_of(cell)))
         progress(cells.cell_count, cells.cell_count, "need")
     finally:
         sampler.renderer.close()
-    return _gathered(found)
+    return _gathered(shares)
 
 
 class _Wanting:
@@ -178,10 +178,10 @@ def levels_of_detail(ray: Floats, normal: Floats, gradient: Floats) -> Floats:
     return np.asarray(np.where(np.isnan(detail), np.inf, detail))
 
 
-def _gathered(found: list[Floats]) -> Need:
+def _gathered(parts: list[Floats]) -> Need:
     """Of each cell (I, L) shares that want just that level."""
     counts, images, firsts, lengths, shares = [0], [], [], [0], [np.zeros(0)]
-    for wanted in found:
+    for wanted in parts:
         finer = np.cumsum(wanted[:, ::-1], axis=1)[:, ::-1]
         met = np.flatnonzero(wanted.any(axis=1))
         for image in met.tolist():

@@ -61,9 +61,9 @@ class PointFinder:
         good = (free >= self.clearance) & outside
         if not good.any():
             for i in np.lexsort((free, outside))[-1:]:
-                found = (bool(outside[i]), float(free[i]), points[i])
-                if self._best is None or found[:2] > self._best[:2]:
-                    self._best = found
+                candidate = (bool(outside[i]), float(free[i]), points[i])
+                if self._best is None or candidate[:2] > self._best[:2]:
+                    self._best = candidate
         return np.asarray(good)
 
     def of_parts(self, count: int, seed: int) -> SamplePoints:
@@ -77,8 +77,8 @@ class PointFinder:
             good = np.flatnonzero(first if first[0] else self.usable(part))
             self.rejected += int(good[0]) if len(good) else len(part)
             chosen += [np.append(part[i], shift[number]) for i in good[:1]]
-        found = np.array(chosen).reshape(-1, 5)
-        return self.at(found[:, :3], found[:, 3:])
+        rows = np.array(chosen).reshape(-1, 5)
+        return self.at(rows[:, :3], rows[:, 3:])
 
     def at(self, points: Floats, unit: Floats) -> SamplePoints:
         """Sample points at usable positions, shifted by two coordinates in (0, 1) each."""

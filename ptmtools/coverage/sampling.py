@@ -64,10 +64,10 @@ def shares(counts: Ints) -> Floats:
     within 1.2e-16 of 1.
     """
     total = counts.sum(axis=-1, keepdims=True)
-    found = counts / np.maximum(total, 1)
-    if found.shape[-1]:
-        found[..., 0] += total[..., 0] == 0
-    return np.asarray(found)
+    share = counts / np.maximum(total, 1)
+    if share.shape[-1]:
+        share[..., 0] += total[..., 0] == 0
+    return np.asarray(share)
 
 
 def estimate(at_points: Ints, in_views: Ints, group: Ints, unit: int) -> Row:
@@ -185,14 +185,14 @@ class Sampler:
         def count(points: SamplePoints) -> Tally:
             return self._counter.count(points, wanted)
 
-        found = self._tallied(finder, count, begin)
-        if found is None and not finder.volume.everywhere:  # hardly anywhere in it eyes can be
+        tallied = self._tallied(finder, count, begin)
+        if tallied is None and not finder.volume.everywhere:  # hardly anywhere in it eyes can be
             finder = replace(finder, volume=finder.volume.anywhere())
-            found = self._tallied(finder, count, begin)
-        if found is None:
+            tallied = self._tallied(finder, count, begin)
+        if tallied is None:
             points = finder.least_bad()
-            found = count(points), np.zeros(len(points), dtype=np.int64)
-        tally, group = found
+            tallied = count(points), np.zeros(len(points), dtype=np.int64)
+        tally, group = tallied
         owned = shares(tally.in_views.sum(axis=0))
         met = np.flatnonzero(owned)
         entry = np.searchsorted(begin, met, "right") - 1
@@ -251,7 +251,7 @@ class Sampler:
         options = self.options
         seeds = ((options.seed << 3) + g + (1 << 35) for g in range(GROUPS))
         sequences = [PointSequence(finder, options.placed, seed) for seed in seeds]
-        found: list[Tally] = []
+        tallies: list[Tally] = []
         group = np.zeros(0, dtype=np.int64)
         before = np.inf
         more = max(1, min(FIRST, options.points // GROUPS))
@@ -259,13 +259,13 @@ class Sampler:
             parts = [sequence.take(more) for sequence in sequences]
             added = np.repeat(np.arange(GROUPS), [len(part) for part in parts])
             points = SamplePoints.join(parts)
-            if not len(added) and not found:
+            if not len(added) and not tallies:
                 return None
-            found = [Tally.join([*found, count(points)])]
+            tallies = [Tally.join([*tallies, count(points)])]
             group = np.concatenate([group, added])
-            by_cell = found[0].grouped(begin).at_points
+            by_cell = tallies[0].grouped(begin).at_points
             now = spread(by_cell, group)[1]
             bound, before = max(now, before * FALL), now
             more = min(len(group) // GROUPS, (options.points - len(group)) // GROUPS)
             if bound <= tolerance or more < 1 or not len(added):
-                return found[0], group
+                return tallies[0], group

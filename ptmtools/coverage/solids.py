@@ -97,7 +97,7 @@ def solids(scene: Scene, cells: Cells) -> list[Solid]:
     bounds = closed & (2 * in_boundary <= area)
     order = np.argsort(group, kind="stable")
     order = order[bounds[group[order]]]
-    found = []
+    result = []
     for members in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
         if not len(members):
             continue
@@ -105,8 +105,8 @@ def solids(scene: Scene, cells: Cells) -> list[Solid]:
         box = np.array([corners.min(axis=(0, 1)), corners.max(axis=(0, 1))])
         inwards = balanced[group[members[0]]] and signed_volume(corners - box.mean(axis=0)) < 0
         if not inwards:
-            found.append(Solid(corners, box))
-    return found
+            result.append(Solid(corners, box))
+    return result
 
 
 def edges(corner: Ints) -> tuple[Ints, Bools]:
@@ -164,9 +164,9 @@ class Obstacles:
     def of(scene: Scene, cells: Cells) -> Obstacles:
         """Those of a subdivided scene."""
         corners = scene.corners
-        found = tuple(solids(scene, cells))
-        boxes = np.array([solid.box for solid in found]).reshape(-1, 2, 3)
-        return Obstacles(corners, Nearby(corners, 0.0), found, boxes)
+        bodies = tuple(solids(scene, cells))
+        boxes = np.array([solid.box for solid in bodies]).reshape(-1, 2, 3)
+        return Obstacles(corners, Nearby(corners, 0.0), bodies, boxes)
 
     def in_solid(self, points: Floats) -> Bools:
         """(n,) whether each of the (n, 3) points is inside a solid."""
@@ -186,15 +186,15 @@ class Obstacles:
         ``enough``."""
         from ptmtools.coverage.kernels import clearances
 
-        found = np.full(len(points), enough)
+        result = np.full(len(points), enough)
         if len(points):
             low, high = points.min(axis=0) - enough, points.max(axis=0) + enough
             near = self.corners[self.nearby.meeting(low, high)]
             order, first, end = by_x(points, near, enough)
             ascending = np.full(len(points), enough)
             clearances(points[order], near, first, end, enough, ascending)
-            found[order] = ascending
-        return found
+            result[order] = ascending
+        return result
 
 
 def by_x(points: Floats, corners: Floats, margin: float) -> tuple[Ints, Ints, Ints]:

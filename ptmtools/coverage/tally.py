@@ -68,9 +68,9 @@ class Owners:
         where the cell has nothing with that one; -1 where the cell is -1."""
         every = self.cell.astype(np.int64) * self.images + self.image + 1
         key = cell.astype(np.int64) * self.images + image + 1
-        found = np.minimum(np.searchsorted(every, key), len(every) - 1)
+        place = np.minimum(np.searchsorted(every, key), len(every) - 1)
         bare = self.first[cell]
-        return np.where(cell < 0, -1, np.where(every[found] == key, found, bare)).astype(np.int64)
+        return np.where(cell < 0, -1, np.where(every[place] == key, place, bare)).astype(np.int64)
 
 
 @dataclass(frozen=True)

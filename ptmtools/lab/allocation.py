@@ -178,7 +178,7 @@ def holes(
     missing: cells whose placeholders are drawn.
     """
     for i in range(len(owner)):
-        nearest, found = np.inf, -1
+        nearest, nearest_cell = np.inf, -1
         if owner[i] >= 0 and there[owner[i]]:
             nearest = depth[i]
         for m in range(len(missing)):
@@ -193,9 +193,9 @@ def holes(
                 a, b = a / ray[i, k], b / ray[i, k]
                 begin, end = max(begin, min(a, b)), min(end, max(a, b))
             if begin <= end < nearest:
-                nearest, found = end, cell
-        if found >= 0:
-            share[found] += 1.0 / len(owner)
+                nearest, nearest_cell = end, cell
+        if nearest_cell >= 0:
+            share[nearest_cell] += 1.0 / len(owner)
 
 
 @plain_kernel

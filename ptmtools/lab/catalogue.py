@@ -222,10 +222,10 @@ class Catalogue:
     def with_memory(self, memory: Ints) -> Catalogue:
         """The same with other texture memory (t, k) of the first textures."""
         rows, wide = memory.shape
-        found = self.memory.copy()
-        found[:rows, :wide] = memory
-        found[:rows, wide:] = memory[:, -1:]
-        return replace(self, memory=found)
+        table = self.memory.copy()
+        table[:rows, :wide] = memory
+        table[:rows, wide:] = memory[:, -1:]
+        return replace(self, memory=table)
 
     def beside(self, more: Columns, differences: Floats, shapes: Shapes | None = None) -> Catalogue:
         """The same with more textures behind these, and shapes that show them; ``differences``
@@ -285,8 +285,8 @@ def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalog
 def _stored(last: Ints, wide: int) -> Bools:
     """(T, K) which columns there are, the first aside."""
     column = np.arange(wide)
-    found: Bools = (column > 0) & (column <= last[:, None])
-    return found
+    result: Bools = (column > 0) & (column <= last[:, None])
+    return result
 
 
 def _shapes(served: Served) -> Shapes:

@@ -130,15 +130,15 @@ class Files:
     @property
     def whole(self) -> Bools:
         """(n,) which are there from beginning to end."""
-        found: Bools = self.there >= self.size
-        return found
+        result: Bools = self.there >= self.size
+        return result
 
     def ask(self, number: int, end: int) -> Range:
         """The range that leads to ``end``; it counts as asked for."""
-        found = Range(self.kind, number, int(self.asked[number]), end)
+        result = Range(self.kind, number, int(self.asked[number]), end)
         self.asked[number] = end
         self._waiting.setdefault(number, deque()).append([end, 0])
-        return found
+        return result
 
     def arrived(self, part: Range) -> None:
         """A range is there; others before it may not be."""

@@ -203,21 +203,21 @@ def play(
     }
     standing = {of: world.standing(STANDS) for of, world in taken.items()}
     looks = {of: Flip(world) for of, world in taken.items()} if flip else {}
-    found = []
+    result = []
     for done, (link, memory, policy, name) in enumerate(cases):
         progress(done, len(cases), "simulating")
         if isinstance(policy, CampusPolicy):
             held = memory.of(worlds[name].catalogue.whole)
             both = walk_beside(campuses[name], worlds[name], policy, link, held)
-            found.append(Played(name, memory.text, *both))
+            result.append(Played(name, memory.text, *both))
             continue
         of = name, policy.form
         world, budget = taken[of], budget_of(worlds[name], memory, policy.form)
         run = simulate(world, policy, link, budget)
         stood = simulate(standing[of], policy, link, budget)
         seen = float(looks[of].each(run).mean()) if flip else None
-        found.append(Played(name, memory.text, run, measure(run, world, stood), seen))
-    return found
+        result.append(Played(name, memory.text, run, measure(run, world, stood), seen))
+    return result
 
 
 def _parts(text: str) -> list[str]:

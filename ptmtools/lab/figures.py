@@ -108,15 +108,15 @@ def strip(world: World, played: Played, policy_options: Sequence[object] = ()) -
     run = simulate(stays, policy, of.conditions, of.budget)
     renderer = Renderer(world, _STRIP_LINES, samples=3)
     sight = renderer.look(stays.eye[0], stays.direction[0])
-    found = []
+    frames = []
     for instant in INSTANTS:
         f = int(np.searchsorted(stays.time, instant - 0.5 / stays.rate))
         colors = renderer.colors(sight, run.there[f], run.column[f])
         label = f"{instant:g} s, {run.fetched[f] / 1e6:.2f} MB, e {run.error[f]:.2f}"
-        found.append((label, as_bytes(colors)))
-    found.append(("full", as_bytes(renderer.full(sight))))
+        frames.append((label, as_bytes(colors)))
+    frames.append(("full", as_bytes(renderer.full(sight))))
     title = f"{of.policy}, {link_text(of.conditions)}, texture memory {played.memory}"
-    return png(_side_by_side(found, title))
+    return png(_side_by_side(frames, title))
 
 
 def png(picture: NDArray[np.uint8]) -> bytes:

@@ -179,8 +179,8 @@ def flip(reference: Floats, test: Floats) -> float:
     import flip_evaluator
 
     shown = [np.clip(picture / 255, 0, 1).astype(np.float32) for picture in (reference, test)]
-    found, _, _ = flip_evaluator.evaluate(
+    difference, _, _ = flip_evaluator.evaluate(
         *shown, "LDR", applyMagma=False, parameters={"ppd": PER_DEGREE}
     )
     # Its own mean is summed up by several threads, in any order.
-    return float(np.mean(found, dtype=np.float64))
+    return float(np.mean(difference, dtype=np.float64))

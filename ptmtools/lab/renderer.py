@@ -78,5 +78,5 @@ class Renderer:
     def _picture(self, shown: Floats) -> Floats:
         """(height, width, 3) of (n, 3) samples."""
         each = (self.height, self.samples, self.width, self.samples, 3)
-        found: Floats = shown.reshape(each).mean(axis=(1, 3))
-        return found
+        result: Floats = shown.reshape(each).mean(axis=(1, 3))
+        return result

@@ -187,7 +187,7 @@ def _paper_document(options: PaperOptions) -> dict[str, Any]:
 
 def _run_document(played: Played) -> dict[str, Any]:
     run, m = played.run, played.measures
-    found = {
+    figures = {
         "policy": run.policy,
         "bandwidth": run.conditions.bandwidth,
         "latency": run.conditions.latency,
@@ -212,8 +212,8 @@ def _run_document(played: Played) -> dict[str, Any]:
         "details": {name: asdict(getattr(m, name)) for name in ("rmse", "missing", "quality")},
     }
     if played.flip is not None:
-        found["flip"] = played.flip
-    rounded: dict[str, Any] = _rounded(found)
+        figures["flip"] = played.flip
+    rounded: dict[str, Any] = _rounded(figures)
     return rounded
 
 

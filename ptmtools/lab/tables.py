@@ -115,8 +115,8 @@ def look_at_forms(
             tally.add(plain)
         owner[k], depth[k] = _item_buffer(sight, triangles, seen)
     progress(len(eye), len(eye), "looking along the walk")
-    found = [tally.views(owner, depth) for tally in tallies]
-    return [with_rows(views, beside.rows) for views in found] if beside else found
+    views_of = [tally.views(owner, depth) for tally in tallies]
+    return [with_rows(views, beside.rows) for views in views_of] if beside else views_of
 
 
 class _Tally:
@@ -142,22 +142,22 @@ class _Tally:
         pixels = len(seen)
         self._pixels = (pixels, pixels, pixels, max(int(seen.sum()), 1))
         #: Of no frame, and of each: its pairs, and its rows of each table.
-        self._found = [np.zeros(0, np.int64)]
+        self._nonzero = [np.zeros(0, np.int64)]
         self._rows = [[np.zeros((0, n), np.float32)] for n in columns]
 
     def add(self, sight: Sight) -> None:
         """Makes the rows of the next frame."""
         self._add(sight, *self._what, self._sums, self._room)
-        found = np.flatnonzero(self._sums.need[:, 0])
-        self._found.append(found)
+        nonzero = np.flatnonzero(self._sums.need[:, 0])
+        self._nonzero.append(nonzero)
         for rows, table, pixels in zip(self._rows, self._sums[1:], self._pixels, strict=True):
-            rows.append((table[found] / pixels).astype(np.float32))
-            table[found] = 0.0
+            rows.append((table[nonzero] / pixels).astype(np.float32))
+            table[nonzero] = 0.0
 
     def views(self, owner: NDArray[np.int32], depth: Singles) -> Views:
         """Those of all frames, with their item buffers."""
-        start = np.cumsum([len(found) for found in self._found])
-        cell, texture = self._pairs[np.concatenate(self._found)].T
+        start = np.cumsum([len(pairs) for pairs in self._nonzero])
+        cell, texture = self._pairs[np.concatenate(self._nonzero)].T
         error, square, need, sight = map(np.concatenate, self._rows)
         return Views(start, cell, texture, error, square, need, sight, owner, depth)
 

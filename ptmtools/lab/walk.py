@@ -136,13 +136,13 @@ def browser_of(told: Mapping[str, Any], time: Floats) -> Browser:
 
 def _apart(spans: Floats) -> Floats:
     """(m, 2) spans of time, those that meet joined into one."""
-    found: list[list[float]] = []
+    intervals: list[list[float]] = []
     for begin, end in sorted(spans.tolist()):
-        if found and begin <= found[-1][1]:
-            found[-1][1] = max(found[-1][1], end)
+        if intervals and begin <= intervals[-1][1]:
+            intervals[-1][1] = max(intervals[-1][1], end)
         elif begin < end:
-            found.append([begin, end])
-    return np.array(found).reshape(-1, 2)
+            intervals.append([begin, end])
+    return np.array(intervals).reshape(-1, 2)
 
 
 FORMAT, SCHEMA = "ptmtools walk", 1

@@ -132,10 +132,10 @@ def searched(
         if not any(passes[sequence] for sequence in new):
             return Searched(False, work, ties, len(passes), sum(passes.values()))
         opened = np.sort(np.array([_mark(way) for way, open_ in passes.items() if open_]))
-        more, cut, found, used = kernels.flow(g, s, known, source, budget, opened, False, seen)
-        work, ties = work + more, max(ties, found)
+        more, cut, near, used = kernels.flow(g, s, known, source, budget, opened, False, seen)
+        work, ties = work + more, max(ties, near)
         rejected = set(noted := _sequences(s.near_tie[:used]))
-        overflown = len(noted) < found
+        overflown = len(noted) < near
     seen |= most
     return Searched(True, work, ties, len(passes), sum(passes.values()))
 
@@ -149,13 +149,13 @@ def _mark(sequence: tuple[int, ...]) -> np.uint64:
 def _sequences(words: Ints) -> list[tuple[int, ...]]:
     """The sequences in `Scratch.near_tie`, each after its length."""
     row = words.tolist()
-    found = []
+    result = []
     at = 0
     while at < len(row):
         following = at + 1 + row[at]
-        found.append(tuple(row[at + 1 : following]))
+        result.append(tuple(row[at + 1 : following]))
         at = following
-    return found
+    return result
 
 
 def _deciding(known: Bits, doubtful: Bits, rejected: set[tuple[int, ...]]) -> list[tuple[int, ...]]:

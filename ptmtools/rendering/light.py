@@ -29,8 +29,8 @@ def lamps(corner: Floats) -> Floats:
     normal = normals(corner)
     length = np.linalg.norm(normal, axis=1)
     along = np.divide(normal @ LAMP, length, out=np.zeros(len(corner)), where=length > 0)
-    found: Floats = AMBIENT + (1 - AMBIENT) * ((1 + along) / 2) ** 2
-    return found
+    result: Floats = AMBIENT + (1 - AMBIENT) * ((1 + along) / 2) ** 2
+    return result
 
 
 def lit(served: Served) -> Served:

@@ -45,8 +45,8 @@ class Camera:
         """(height * width,) which pixels a client's own item buffer has: every other one each way,
         from the second on."""
         odd = [np.arange(side) % 2 == 1 for side in (self.height, self.width)]
-        found: Bools = np.outer(*odd).ravel()
-        return found
+        result: Bools = np.outer(*odd).ravel()
+        return result
 
     @property
     def pixel(self) -> float:
@@ -109,9 +109,9 @@ class Caster:
 
     def first(self, eye: Floats, along: Floats) -> Ints:
         """(n,) the triangle that each of (n, 3) rays from a point (3,) shows, or -1."""
-        found = np.full(len(along), -1, np.int64)
+        result = np.full(len(along), -1, np.int64)
         if self._tree is None:
-            return found
+            return result
         waiting = np.arange(len(along))
         start = np.repeat((eye - self._middle)[None], len(along), axis=0)
         for _ in range(_LAYERS):
@@ -122,7 +122,7 @@ class Caster:
             turn = np.einsum("ij,ij->i", self._normal[triangle], along[waiting])
             passed = self._one_sided[triangle] & (turn > 0)
             behind = turn[~passed] > 0
-            found[waiting[~passed]] = self._seen[triangle[~passed], behind.astype(np.int64)]
+            result[waiting[~passed]] = self._seen[triangle[~passed], behind.astype(np.int64)]
             waiting, triangle, turn = waiting[passed], triangle[passed], turn[passed]
             if not len(waiting):
                 break
@@ -130,7 +130,7 @@ class Caster:
             far = np.einsum("ij,ij->i", to, self._normal[triangle]) / turn
             length = np.linalg.norm(along[waiting], axis=1)
             start[waiting] += along[waiting] * (np.maximum(far, 0) + self._step / length)[:, None]
-        return found
+        return result
 
 
 #: Nothing nearer than this is in front of the camera, metres.

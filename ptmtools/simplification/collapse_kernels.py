@@ -62,18 +62,18 @@ BETTER = ROUNDING_SHARE
 @kernel
 def cost_into(state: State, a: int, b: int, count: int, x: float, y: float, z: float) -> float:
     """What it costs to move vertex a into b, (x, y, z) away."""
-    found = value_at(state.quadric, a, x, y, z) + state.quadric[b, 9]
+    cost = value_at(state.quadric, a, x, y, z) + state.quadric[b, 9]
     if state.attribute.shape[1] == 0:
-        return float(found)
+        return float(cost)
     for i in range(count):
         known = False
         for j in range(i):
             known |= state.shared[j, 0] == state.shared[i, 0]
         if not known:
             here, there = state.shared[i, 0], state.shared[i, 1]
-            found += wedge_value_at(state.texture, state.attribute, here, there, x, y, z)
-            found += state.texture[there, 9]
-    return float(found)
+            cost += wedge_value_at(state.texture, state.attribute, here, there, x, y, z)
+            cost += state.texture[there, 9]
+    return float(cost)
 
 
 @kernel

@@ -77,11 +77,11 @@ def is_linked(state: State, u: int, v: int, count: int) -> bool:
 @kernel
 def faces_at(state: State, v: int) -> int:
     """How many faces a vertex has."""
-    found, corner = 0, state.head[v]
+    result, corner = 0, state.head[v]
     while corner >= 0:
-        found += state.triangle[corner // 3, 0] >= 0
+        result += state.triangle[corner // 3, 0] >= 0
         corner = state.beyond[corner]
-    return found
+    return result
 
 
 @kernel
@@ -157,10 +157,10 @@ def has_counterparts(state: State, u: int, v: int, count: int) -> bool:
                 return False
     corner = state.head[u]
     while corner >= 0:
-        found = wedge[corner // 3, corner % 3]
+        other = wedge[corner // 3, corner % 3]
         known = False
         for i in range(count):
-            known |= shared[i, 0] == found
+            known |= shared[i, 0] == other
         if not known:
             return False
         corner = state.beyond[corner]

@@ -135,11 +135,11 @@ def shifted(quadric: Floats, d: Floats) -> Floats:
 
 def attribute_value(quadric: Floats, d: Floats, s: Floats) -> float:
     """Of one wedge's row, for displacements of the vertex and of its attributes."""
-    found = value(quadric, d)
+    result = value(quadric, d)
     for k, step in enumerate(s):
         g, r, w = np.split(quadric[10 + PER_ATTRIBUTE * k :][:PER_ATTRIBUTE], [3, 4])
-        found += float(step * step * w[0] - 2 * step * (g @ d + r[0]))
-    return found
+        result += float(step * step * w[0] - 2 * step * (g @ d + r[0]))
+    return result
 
 
 def attribute_shifted(quadric: Floats, d: Floats, s: Floats) -> Floats:
@@ -180,13 +180,13 @@ def wedge_value_at(
     quadric: Floats, attribute: Floats, row: int, at: int, x: float, y: float, z: float
 ) -> float:
     """The value of a wedge's row for a displacement, and the attributes of another wedge."""
-    found = value_at(quadric, row, x, y, z)
+    value = value_at(quadric, row, x, y, z)
     for k in range(attribute.shape[1]):
         i = 10 + PER_ATTRIBUTE * k
         s = attribute[at, k] - attribute[row, k]
         g = quadric[row, i] * x + quadric[row, i + 1] * y + quadric[row, i + 2] * z
-        found += s * s * quadric[row, i + 4] - 2.0 * s * (g + quadric[row, i + 3])
-    return float(found)
+        value += s * s * quadric[row, i + 4] - 2.0 * s * (g + quadric[row, i + 3])
+    return float(value)
 
 
 @kernel

@@ -83,10 +83,10 @@ def by_meshlab(mesh: Mesh, surface: Surface, faces: int) -> Simplified:
     numbers = np.arange(len(surface.triangle), dtype=np.float64)
     meshes.add_mesh(pymeshlab.Mesh(surface.point, surface.triangle, f_scalar_array=numbers))
     meshes.meshing_decimation_quadric_edge_collapse(targetfacenum=faces)
-    found = meshes.current_mesh()
-    source = surface.source[np.rint(found.face_scalar_array()).astype(np.int64)]
-    points = np.asarray(found.vertex_matrix(), np.float64) * surface.scale + surface.centre
-    triangles = np.ascontiguousarray(found.face_matrix(), dtype=np.int32)
+    reduced = meshes.current_mesh()
+    source = surface.source[np.rint(reduced.face_scalar_array()).astype(np.int64)]
+    points = np.asarray(reduced.vertex_matrix(), np.float64) * surface.scale + surface.centre
+    triangles = np.ascontiguousarray(reduced.face_matrix(), dtype=np.int32)
     return Simplified(
         Mesh(points, triangles), source, float("nan"), too_many(len(triangles), faces)
     )
@@ -126,10 +126,10 @@ def simplify(
     mended = None if options.keep_parts else filled(mesh, surface, options.faces)
     if mended is None:
         return _simplified(mesh, surface, options, progress)
-    found = _simplified(mended.mesh, surface_of(mended.mesh), options, progress)
+    simplified = _simplified(mended.mesh, surface_of(mended.mesh), options, progress)
     note = f"{mended.holes:,} small holes are filled: they would hold many of the faces"
-    source = mended.like[found.source].astype(np.int32)
-    return replace(found, source=source, notes=(note, *found.notes))
+    source = mended.like[simplified.source].astype(np.int32)
+    return replace(simplified, source=source, notes=(note, *simplified.notes))
 
 
 def _simplified(
@@ -142,19 +142,19 @@ def _simplified(
     if held > HELD * options.faces:
         state.number[TOPOLOGY] = CLOSE if options.keep_parts else DROP
     _collapse(state, options.faces, progress)
-    found = _result(mesh, surface, state, options)
+    result = _result(mesh, surface, state, options)
     if state.number[TOPOLOGY] == KEEP:
-        return found
+        return result
     # That of which no face stands for any is gone.
     part = np.empty(len(mesh.triangles), np.int64)
     part[surface.source] = parts_of(
         edges_of(surface.triangle, len(surface.point)), len(surface.source)
     )
-    left = len(np.unique(part[found.source]))
+    left = len(np.unique(part[result.source]))
     if left == there.parts:
-        return found
+        return result
     gone = f"{there.parts - left:,} of {there.parts:,} parts are gone"
-    return replace(found, notes=(f"{gone}: they would hold many of the faces", *found.notes))
+    return replace(result, notes=(f"{gone}: they would hold many of the faces", *result.notes))
 
 
 def _square(error: float) -> float:

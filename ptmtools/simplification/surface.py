@@ -142,8 +142,8 @@ def _layered(triangle: Ints, given: Ints) -> tuple[Ints, Ints]:
     begin = np.flatnonzero(fresh)
     layer = np.empty(len(order), np.int64)
     layer[order] = np.arange(len(order)) - begin[np.cumsum(fresh) - 1]
-    place, found = np.unique(layer[:, None] * len(given) + triangle, return_inverse=True)
-    return found.reshape(-1, 3), given[place % len(given)]
+    place, index = np.unique(layer[:, None] * len(given) + triangle, return_inverse=True)
+    return index.reshape(-1, 3), given[place % len(given)]
 
 
 @dataclass(frozen=True)

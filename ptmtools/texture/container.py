@@ -253,11 +253,11 @@ def pack_description(description: Description) -> bytes:
 def parse_description(data: bytes) -> Description:
     """The inverse of `pack_description`. Raises InputError PTM-I113 for impossible values."""
     values = list(_values(data))
-    found = dict(values)
-    if len(found) < len(values):
+    tags = dict(values)
+    if len(tags) < len(values):
         raise _impossible("a tag is repeated")
-    srgb, gamma = found.get(b"SRGB"), found.get(b"GAMA")
-    points, orientation = found.get(b"CHRM"), found.get(b"ORIE", b"\1")
+    srgb, gamma = tags.get(b"SRGB"), tags.get(b"GAMA")
+    points, orientation = tags.get(b"CHRM"), tags.get(b"ORIE", b"\1")
     if (
         (srgb is not None and (len(srgb) != 1 or srgb[0] > 3))
         or (gamma is not None and len(gamma) != 4)
@@ -267,7 +267,7 @@ def parse_description(data: bytes) -> Description:
     ):
         raise _impossible("one of its values is out of range")
     return Description(
-        icc=found.get(b"ICCP"),
+        icc=tags.get(b"ICCP"),
         srgb=None if srgb is None else srgb[0],
         gamma=None if gamma is None else int.from_bytes(gamma, "little"),
         chromaticities=None if points is None else _CHROMATICITIES.unpack(points),

@@ -75,14 +75,14 @@ def ranges_of(source: Source) -> Ranges:
 
 def _called(read: RangeReader, offset: int, length: int) -> bytes:
     """What the caller's function gives, over a network for instance."""
-    found: object = read(offset, length)
-    if not isinstance(found, bytes | bytearray | memoryview):
+    data: object = read(offset, length)
+    if not isinstance(data, bytes | bytearray | memoryview):
         raise InputError(
             "PTM-I122",
-            f"the function that reads ranges returned {type(found).__name__} instead of bytes",
+            f"the function that reads ranges returned {type(data).__name__} instead of bytes",
         )
     # More than was asked for is no harm: some servers send all there is.
-    return bytes(found)[:length]
+    return bytes(data)[:length]
 
 
 def _ranges_of_file(

@@ -116,13 +116,13 @@ def find_leaks(cells: Cells, flow: PortalFlow, matrix: Bools) -> NDArray[np.int3
     ----------
     flow: of the portals of ``cells``. matrix: (C, C) who sees whom.
     """
-    found = []
+    leaks = []
     if cells.portal_count:
         sees = matrix.sum(axis=1)
         bound = SUSPICIOUS * float(np.median(sees))
         order = np.lexsort((np.arange(len(sees)), -sees))[:MOST]
-        found = [_leak(cells, flow, int(c), int(sees[c])) for c in order if sees[c] > bound]
-    return np.array([leak for leak in found if leak], np.int32).reshape(-1, 4)
+        leaks = [_leak(cells, flow, int(c), int(sees[c])) for c in order if sees[c] > bound]
+    return np.array([leak for leak in leaks if leak], np.int32).reshape(-1, 4)
 
 
 def _leak(cells: Cells, flow: PortalFlow, cell: int, sees: int) -> tuple[int, ...]:
@@ -133,14 +133,14 @@ def _leak(cells: Cells, flow: PortalFlow, cell: int, sees: int) -> tuple[int, ..
         return ()
     seen = np.bitwise_or.reduce(flow.sees[out], axis=0)
     reached = np.union1d(flow.portals_in(seen), out)
-    found = []
+    candidates = []
     for q in reached[enters[reached] != leaves[reached]].tolist():
         behind = enters[flow.portals_in(flow.sees[q] & seen)]
         behind = np.append(behind, enters[q])
         through = len(np.unique(behind[behind >= 0]))
         if through >= SHARE * sees:
-            found.append((float(cells.portal_area[q >> 1]), q >> 1, through))
-    return (cell, sees, *min(found)[1:]) if found else ()
+            candidates.append((float(cells.portal_area[q >> 1]), q >> 1, through))
+    return (cell, sees, *min(candidates)[1:]) if candidates else ()
 
 
 def compute_pvs(

@@ -122,7 +122,7 @@ def check_conservative(
     blockers = Blockers(structural, cells.root_box)
     jitter = JITTER * cells.tolerance.hairline
     tried = unoccluded = hairlines = drawn = batch = 0
-    found: dict[tuple[int, int], MissedPair] = {}
+    pairs: dict[tuple[int, int], MissedPair] = {}
     while tried < segments and drawn < PATIENCE * segments:
         rng = np.random.default_rng([seed, batch])
         size = min(BATCH, segments - tried)
@@ -147,10 +147,10 @@ def check_conservative(
         for m in missed[share >= 0.5]:
             ends = (int(a[m]), _place(start[m])), (int(b[m]), _place(end[m]))
             (one, here), (other, there) = sorted(ends)
-            pair = found.get((one, other)) or MissedPair((one, other), here, there, 0)
-            found[one, other] = replace(pair, segments=pair.segments + 1)
+            pair = pairs.get((one, other)) or MissedPair((one, other), here, there, 0)
+            pairs[one, other] = replace(pair, segments=pair.segments + 1)
         progress(tried, segments, "segments")
-    missing = tuple(found[pair] for pair in sorted(found))
+    missing = tuple(pairs[pair] for pair in sorted(pairs))
     return SegmentReport(tried, unoccluded, missing, hairlines)
 
 
@@ -167,10 +167,10 @@ class _Eyes:
     def at(self, points: Floats, leaf: NDArray[np.int32]) -> Bools:
         """(n,) whether one can be at the (n, 3) points, in (n,) leaves or -1."""
         inside = leaf >= 0
-        found = inside & self._whole[leaf]
+        standing = inside & self._whole[leaf]
         if not self._eyes.everywhere:
-            found[inside] |= self._eyes.contains(points[inside])
-        return np.asarray(found)
+            standing[inside] |= self._eyes.contains(points[inside])
+        return np.asarray(standing)
 
     def first(self, start: Floats, end: Floats) -> tuple[Floats, Floats]:
         """Of segments between (n, 3) points those that begin where an eye can be and end in a leaf;

@@ -52,16 +52,16 @@ class EmbreeRenderer:
 
     def show(self, points: SamplePoints, needed: Bools | None = None) -> NDArray[np.int32]:
         """See `Renderer.show`."""
-        found, _ = self._layers(*self._rays(points))
-        return found.reshape(-1, len(points), len(VIEWS), self._face**2)
+        layers, _ = self._layers(*self._rays(points))
+        return layers.reshape(-1, len(points), len(VIEWS), self._face**2)
 
     def trace(self, points: SamplePoints, pixels: Ints) -> tuple[NDArray[np.int32], Floats]:
         """See `Renderer.trace`."""
         origin, along = (rays[pixels] for rays in self._rays(points))
-        found, depth = self._layers(origin, along)
+        layers, depth = self._layers(origin, along)
         point = pixels // (len(VIEWS) * self._face**2)
         exact = self._surfaces.normalised(points.position)[point]
-        return found, self._surfaces.world(exact + depth[..., None] * along)
+        return layers, self._surfaces.world(exact + depth[..., None] * along)
 
     def _rays(self, points: SamplePoints) -> tuple[Singles, Singles]:
         from ptmtools.coverage.kernels import cast_rays
@@ -75,14 +75,14 @@ class EmbreeRenderer:
     def _layers(self, origin: Singles, along: Singles) -> tuple[NDArray[np.int32], Floats]:
         """(L, n) opaque and transparent triangles that the (n, 3) rays hit, or -1; (L, n) depths,
         0 where there is none."""
-        found, depths = [], []
+        triangles, depths = [], []
         limit = None
         for tree in self._trees:
             triangle, depth = tree.hits(origin, along, limit)
-            found.append(triangle)
+            triangles.append(triangle)
             depths.append(np.where(triangle >= 0, depth.astype(np.float64), 0.0))
             limit = np.where(triangle >= 0, depth / np.float32(BEFORE), np.float32(np.inf))
-        return np.stack(found), np.stack(depths)
+        return np.stack(triangles), np.stack(depths)
 
     def close(self) -> None:
         """Drops the trees."""
@@ -112,5 +112,5 @@ class _Tree:
         or -1; and their (n,) depths."""
         if self._tree is None:
             return np.full(len(origin), -1, np.int32), np.zeros(len(origin), np.float32)
-        found = self._tree.run(origin, along, dists=limit, output=True)
-        return self._which[found["primID"]], found["tfar"]
+        hits = self._tree.run(origin, along, dists=limit, output=True)
+        return self._which[hits["primID"]], hits["tfar"]

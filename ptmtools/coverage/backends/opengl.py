@@ -193,8 +193,8 @@ class OpenGLRenderer:
                 self._program["base"].value = int(first[v]) + 1
                 drawing.render(vertices=3 * int(count[v]), first=3 * int(first[v]))
         target.viewport = (0, 0, *size)
-        found = np.frombuffer(target.read(size, components=1, dtype="u4"), dtype=np.uint32)
-        split = found.reshape(rows, face, tiles, face)
+        pixels = np.frombuffer(target.read(size, components=1, dtype="u4"), dtype=np.uint32)
+        split = pixels.reshape(rows, face, tiles, face)
         each = split.transpose(0, 2, 1, 3).reshape(rows * tiles, face**2)
         return np.asarray(each[: len(VIEWS) * len(points)], dtype=np.int64)
 

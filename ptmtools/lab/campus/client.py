@@ -152,7 +152,7 @@ class CampusClient:
         self, objects: Iterable[int], files: list[tuple[int, ...]], left: int | None
     ) -> tuple[int | None, deque[int]]:
         """What is left of a budget, None without one, and which objects found room in it."""
-        found: deque[int] = deque()
+        chosen: deque[int] = deque()
         for number in objects:
             new = [f for f in files[number] if not self._room[f]]
             takes = int(self.stock.most[new].sum())
@@ -161,8 +161,8 @@ class CampusClient:
                     continue
                 left -= takes
             self._room[new] = True
-            found.append(number)
-        return left, found
+            chosen.append(number)
+        return left, chosen
 
     def _job(self) -> deque[int] | None:
         """The files of the nearest object that lacks some that nobody has asked for; low detail of

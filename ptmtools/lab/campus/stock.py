@@ -304,13 +304,13 @@ def read_textures(folder: Path, stock: Stock, size: int) -> Pyramids:
 def mip_levels(image: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
     """A square (s, s, 3), s a power of two, and its mip levels, the coarsest first: each texel is
     the rounded mean of four."""
-    found = [image]
+    levels = [image]
     while len(image) > 1:
         held = image.astype(np.uint16)
         total = held[::2, ::2] + held[1::2, ::2] + held[::2, 1::2] + held[1::2, 1::2]
         image = ((total + 2) >> 2).astype(np.uint8)
-        found.append(image)
-    return found[::-1]
+        levels.append(image)
+    return levels[::-1]
 
 
 def _image(folder: Path, name: str, size: int) -> NDArray[np.uint8]:

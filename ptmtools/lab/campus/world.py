@@ -119,12 +119,12 @@ def look(
         owner = _owners((fine.triangle, finest), (coarse.triangle, coarsest))
         for (kind, _, drawn), seen in zip(kinds, (coarse, fine), strict=True):
             add_shown(owner, seen, drawn, Sizes(*sizes), exact, place, sums, work)
-            found = np.flatnonzero(sums.any(axis=1))
-            number, texture = np.divmod(found, wide)
+            nonzero = np.flatnonzero(sums.any(axis=1))
+            number, texture = np.divmod(nonzero, wide)
             texture[texture == wide - 1] = -1
-            rows.append(np.stack([number, texture, np.full(len(found), kind)], axis=1))
-            errors.append((sums[found] / pixels).astype(np.float32))
-            sums[found] = 0.0
+            rows.append(np.stack([number, texture, np.full(len(nonzero), kind)], axis=1))
+            errors.append((sums[nonzero] / pixels).astype(np.float32))
+            sums[nonzero] = 0.0
         start.append(start[-1] + len(rows[-1]) + len(rows[-2]))
         nobody = exact[owner < 0]
         least[f] = np.sqrt((nobody**2).mean(axis=1)).sum() / pixels
@@ -138,11 +138,11 @@ def look(
 
 def _owners(*seen: tuple[Ints, Surfaces]) -> Ints:
     """(n,) the object of the first of the meshes that shows something."""
-    found = np.full(len(seen[0][0]), -1, np.int64)
+    result = np.full(len(seen[0][0]), -1, np.int64)
     for triangle, surfaces in seen:
-        open_ = (found < 0) & (triangle >= 0)
-        found[open_] = surfaces.cell[triangle[open_]]
-    return found
+        open_ = (result < 0) & (triangle >= 0)
+        result[open_] = surfaces.cell[triangle[open_]]
+    return result
 
 
 @dataclass(frozen=True)
@@ -236,8 +236,8 @@ def prepare_campus(
     view, tables = np.full(len(time), -1, np.int64), None
     if every:
         pose = np.concatenate([eye, direction], axis=1)[::every]
-        seen, found = np.unique(pose, axis=0, return_inverse=True)
-        view[::every] = found.reshape(-1)
+        seen, inverse = np.unique(pose, axis=0, return_inverse=True)
+        view[::every] = inverse.reshape(-1)
         finest, coarsest = (read_surfaces(folder, stock, level) for level in (-1, 0))
         small, middle, large = (read_textures(folder, stock, size) for size in SIZES)
         full = Full(finest, large)

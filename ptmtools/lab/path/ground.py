@@ -114,8 +114,8 @@ class Obstacles:
 
     def crossed(self, start: Floats, end: Floats) -> Bools:
         """(n,) whether something is between (n, 3) points and (n, 3) others, metres."""
-        found: Bools = self.first(start, end - start, 1.0)[0] >= 0
-        return found
+        result: Bools = self.first(start, end - start, 1.0)[0] >= 0
+        return result
 
     def first(self, points: Floats, along: Floats, reach: float = np.inf) -> tuple[Ints, Floats]:
         """What rays from (n, 3) points along (n, 3) vectors meet first within a ``reach``: (n,) the
@@ -174,12 +174,12 @@ def _below(cells: Cells, missed: Bools, eye_height: float) -> Bools:
     """(n,) which triangles of floor some eye is above in a leaf of the (C,) cells marked."""
     corner = cells.eye_floor + [0, eye_height, 0]
     low, high = corner.min(axis=1), corner.max(axis=1)
-    found = np.zeros(len(corner), dtype=np.bool_)
+    result = np.zeros(len(corner), dtype=np.bool_)
     leaves = np.flatnonzero(cells.leaf_standing & (cells.leaf_cell >= 0))
     for leaf in leaves[missed[cells.leaf_cell[leaves]]]:
         point = cells.leaf_points(leaf)
-        found |= ((low <= point.max(axis=0)) & (high >= point.min(axis=0))).all(axis=1)
-    return found
+        result |= ((low <= point.max(axis=0)) & (high >= point.min(axis=0))).all(axis=1)
+    return result
 
 
 def _surfaces(

@@ -19,13 +19,13 @@ def nearest_goal(start: Ints, target: Ints, cost: Floats, source: int, goal: Boo
     before = np.full(count, -1, dtype=np.int64)
     least[source] = 0.0
     heap = [(0.0, source)]
-    found = -1
+    nearest = -1
     while len(heap):
         paid, place = heappop(heap)
         if paid > least[place]:
             continue
         if goal[place]:
-            found = place
+            nearest = place
             break
         for step in range(start[place], start[place + 1]):
             to, sum_ = target[step], paid + cost[step]
@@ -33,12 +33,12 @@ def nearest_goal(start: Ints, target: Ints, cost: Floats, source: int, goal: Boo
                 least[to] = sum_
                 before[to] = place
                 heappush(heap, (sum_, to))
-    length, place = 0, found
+    length, place = 0, nearest
     while place >= 0:
         length += 1
         place = before[place]
     way = np.empty(length, dtype=np.int64)
-    place = found
+    place = nearest
     while place >= 0:
         length -= 1
         way[length] = place

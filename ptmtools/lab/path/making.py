@@ -40,14 +40,14 @@ _NEAR = 1.0
 def beginning(ground: Ground, viewpoints: Viewpoints, seed: int) -> Leg | None:
     """Standing at a viewpoint and looking as it does: of those that can be walked from the first
     for seed 1, the next for seed 2, and so on around; None if there is none."""
-    found = []
+    legs = []
     for cell, position, direction in viewpoints:
         away = np.linalg.norm(ground.eye - position, axis=1)
         away[ground.cell != cell] = np.inf
         nearest = int(away.argmin())
         if away[nearest] <= _NEAR:
-            found.append(Leg.at(nearest, direction))
-    return found[(seed - 1) % len(found)] if found else None
+            legs.append(Leg.at(nearest, direction))
+    return legs[(seed - 1) % len(legs)] if legs else None
 
 
 #: The middle of a leaf or portal is moved by such shares of the way to the height of eyes.

@@ -223,7 +223,7 @@ def _glances(motion: Motion, times: Floats, random: np.random.Generator) -> Floa
 def _followed(aim: Floats, step: float, rate: float, gain: float) -> Floats:
     """(n,) angles that follow (n,) others, a ``step`` of seconds apart, at no more than a ``rate``,
     which grows and shrinks by no more than a ``gain`` a second, all in radians."""
-    found = np.empty(len(aim))
+    result = np.empty(len(aim))
     angle, turning = float(aim[0]), 0.0
     for row, wanted in enumerate(aim.tolist()):
         left = math.remainder(wanted - angle, math.tau)
@@ -231,8 +231,8 @@ def _followed(aim: Floats, step: float, rate: float, gain: float) -> Floats:
         change = math.copysign(swift, left) - turning
         turning += max(-gain * step, min(gain * step, change))
         angle += turning * step
-        found[row] = angle
-    return found
+        result[row] = angle
+    return result
 
 
 #: How far apart the points are, along the way, to the middle between which one moves.
@@ -284,8 +284,8 @@ class Smoother:
         side = np.zeros_like(point)
         side[:, 0], side[:, 2] = -ahead[:, 2], ahead[:, 0]
         side *= np.divide(self._radius, length, out=np.zeros(len(point)), where=length > 0)[:, None]
-        found = []
+        crossings = []
         for below in self._below:
-            found.append(self._obstacles.crossed(point - below - side, point - below + side))
-            found.append(self._obstacles.crossed(point - below, point - below + ahead))
-        return np.stack(found, axis=1)
+            crossings.append(self._obstacles.crossed(point - below - side, point - below + side))
+            crossings.append(self._obstacles.crossed(point - below, point - below + ahead))
+        return np.stack(crossings, axis=1)

@@ -122,11 +122,11 @@ def _tried(ground: Ground, random: np.random.Generator) -> Ints:
     order = np.flatnonzero(spacious & (ground.cell >= 0))
     order = order[np.argsort(ground.cell[order], kind="stable")]
     _, first, count = np.unique(ground.cell[order], return_index=True, return_counts=True)
-    found = [order[:0]]
+    parts = [order[:0]]
     for begin, many in zip(first, count, strict=True):
         chosen = (np.arange(min(many, _TRIED)) + random.random()) * many / min(many, _TRIED)
-        found.append(order[begin + chosen.astype(np.int64)])
-    return np.concatenate(found)
+        parts.append(order[begin + chosen.astype(np.int64)])
+    return np.concatenate(parts)
 
 
 def _worth(
@@ -196,13 +196,13 @@ def tour(ground: Ground, middles: dict[int, int], views: Views, first: Leg) -> I
 def middles_of(ground: Ground, standing: Bools) -> dict[int, int]:
     """By each cell that (C,) ``standing`` marks and the ground reaches, a place in its middle: of
     those with most space around the nearest to all."""
-    found = {}
+    result = {}
     for cell in np.unique(ground.cell[ground.cell >= 0]):
         if standing[cell]:
             places = np.flatnonzero(ground.cell == cell)
             away = np.linalg.norm(ground.eye[places] - ground.eye[places].mean(axis=0), axis=1)
-            found[int(cell)] = int(places[np.lexsort((away, -ground.space[places]))[0]])
-    return found
+            result[int(cell)] = int(places[np.lexsort((away, -ground.space[places]))[0]])
+    return result
 
 
 def _round(

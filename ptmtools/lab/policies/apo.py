@@ -114,13 +114,13 @@ class ApoClient(EngineClient):
 
     def _next(self) -> int | None:
         """The octree in the frustum that is to be refined next."""
-        found = [
+        candidates = [
             (self._levels_asked(octree), float(self.distance[o]), octree)
             for o, octree in enumerate(self.octrees.tolist())
             if np.isfinite(self.distance[o])
         ]
         first = int(self.octrees[0]) if len(self.octrees) else 0
-        coarse = [each for each in found if each[0] < self._target_levels[each[2] - first]]
+        coarse = [each for each in candidates if each[0] < self._target_levels[each[2] - first]]
         return min(coarse)[2] if coarse else None
 
     def _levels_asked(self, octree: int) -> int:

@@ -160,12 +160,14 @@ class EngineClient(Client):
     def sight(self, age: int) -> Floats:
         """(T, K) the share of the item buffer that wants each level, in columns, as it was drawn
         so many frames ago: with the geometry that was there."""
-        found = np.zeros(self.world.catalogue.ends.shape)
+        result = np.zeros(self.world.catalogue.ends.shape)
         item, views = self._items.at_hand(age), self.world.views
         if item:
             rows = views.rows(item.view)
-            gather(rows.start, rows.stop, views.cell, views.texture, views.sight, item.there, found)
-        return found
+            gather(
+                rows.start, rows.stop, views.cell, views.texture, views.sight, item.there, result
+            )
+        return result
 
     def placeholders(self, age: int) -> Floats:
         """(C,) the share of the item buffer, so many frames old, that shows placeholders: of cells

@@ -58,9 +58,9 @@ def _drops(world: World) -> tuple[Singles, Singles]:
 
 def _discounted(table: Singles, frames: float) -> Singles:
     """Sums over what is to come, each frame of which counts less than the one before."""
-    found, kept = np.empty_like(table), np.exp(-1 / frames)
+    result, kept = np.empty_like(table), np.exp(-1 / frames)
     total = np.zeros_like(table[0])
     for f in range(len(table) - 1, -1, -1):
         total = total * kept + table[f]
-        found[f] = total
-    return found
+        result[f] = total
+    return result

@@ -222,12 +222,12 @@ class PaperClient(Client):
         if f == before or not way.any():
             return -1
         way = way * (AHEAD / float(world.time[f] - world.time[before]))
-        found, nearest = -1, np.inf
+        result, nearest = -1, np.inf
         for portal in world.catalogue.records[self.cell]["portals"]:
             far = _crossing(world.eye[f], way, np.array(portal["polygon"], dtype=np.float64))
             if far < nearest:
-                found, nearest = int(portal["neighbour"]), far
-        return found
+                result, nearest = int(portal["neighbour"]), far
+        return result
 
 
 def _crossing(eye: Floats, way: Floats, polygon: Floats) -> float:

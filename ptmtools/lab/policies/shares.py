@@ -105,11 +105,11 @@ def by_distance(client: EngineClient) -> Floats:
 def by_need(client: EngineClient) -> Floats:
     """(T, K) the shares that the record of the cell has as its need."""
     stock = client.world.catalogue
-    found = np.zeros(stock.ends.shape)
+    result = np.zeros(stock.ends.shape)
     for texture, first, *shares in stock.records[client.cell]["need"]:
-        found[texture, 1 : first + 1] = shares[0]
-        found[texture, first + 1 : first + 1 + len(shares)] = shares
-    return found
+        result[texture, 1 : first + 1] = shares[0]
+        result[texture, first + 1 : first + 1 + len(shares)] = shares
+    return result
 
 
 def every_level(client: EngineClient, share: Floats) -> Floats:
@@ -200,9 +200,9 @@ def _split(client: EngineClient, shapes: Ints, coverage: Floats) -> Floats:
 
 def _summed(stock: Catalogue, shapes: Ints, of_shape: Floats) -> Floats:
     """(T,) sums over the shapes of each texture."""
-    found = np.zeros(stock.texture_count)
-    np.add.at(found, stock.shapes.texture[shapes], of_shape)
-    return found
+    result = np.zeros(stock.texture_count)
+    np.add.at(result, stock.shapes.texture[shapes], of_shape)
+    return result
 
 
 #: (T, K) shares of pixels that want each column → (T, K) worth.

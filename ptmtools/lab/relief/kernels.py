@@ -42,10 +42,10 @@ def depth_of(sight: Sight, i: int, triangles: Triangles) -> float:
 
 
 @plain_kernel
-def depths(sight: Sight, triangles: Triangles, found: Floats) -> None:
+def depths(sight: Sight, triangles: Triangles, depth: Floats) -> None:
     """Writes `depth_of` each pixel to ``found`` (n,)."""
-    for i in range(len(found)):
-        found[i] = depth_of(sight, i, triangles)
+    for i in range(len(depth)):
+        depth[i] = depth_of(sight, i, triangles)
 
 
 @plain_kernel

@@ -89,8 +89,8 @@ def octree_columns(served: Served) -> Columns:
 
 
 def _rows(served: Served) -> Sequence[Mapping[str, Any]]:
-    found: Sequence[Mapping[str, Any]] = served.index.get("octrees", ())
-    return found
+    result: Sequence[Mapping[str, Any]] = served.index.get("octrees", ())
+    return result
 
 
 def _texels(served: Served, row: Mapping[str, Any]) -> NDArray[np.uint8]:

@@ -28,9 +28,9 @@ def without_octrees(stock: Catalogue, octrees: Octrees) -> Catalogue:
 def with_octrees(stock: Catalogue, served: Served, octrees: Octrees) -> Catalogue:
     """What a client knows that draws octrees; ``stock`` is of the textures alone."""
     columns = octree_columns(served)
-    found = stock.beside(columns, differences(served, octrees, columns), _shapes(served, octrees))
+    joined = stock.beside(columns, differences(served, octrees, columns), _shapes(served, octrees))
     # Behind them what nothing mends, see the package.
-    return _none(found, 1, octrees)
+    return _none(joined, 1, octrees)
 
 
 def _none(stock: Catalogue, count: int, octrees: Octrees) -> Catalogue:
@@ -46,7 +46,7 @@ def differences(served: Served, octrees: Octrees, columns: Columns) -> Floats:
     to 255. hints.json does not say them; who writes it could."""
     from ptmtools.lab.relief.kernels import DEEP, descend
 
-    found = np.zeros(columns.ends.shape)
+    result = np.zeros(columns.ends.shape)
     random, surfaces = np.random.default_rng(_SEED), served.surfaces
     for o in range(octrees.number):
         own = np.flatnonzero(octrees.of == o)
@@ -64,10 +64,10 @@ def differences(served: Served, octrees: Octrees, columns: Columns) -> Floats:
             for x, y, z in place.tolist():
                 count = descend(octrees, o, x, y, z, DEEP, light)
                 steps[1:count] += np.abs(np.diff(light[:count]))
-            found[o, 1 : levels + 1] = _BRIGHT * steps / _POINTS
-        stored = found[o, 1 : levels + 1]
-        found[o, 1 : levels + 1] = np.maximum(stored, LEAST)
-    return found
+            result[o, 1 : levels + 1] = _BRIGHT * steps / _POINTS
+        stored = result[o, 1 : levels + 1]
+        result[o, 1 : levels + 1] = np.maximum(stored, LEAST)
+    return result
 
 
 def _shapes(served: Served, octrees: Octrees) -> Shapes:

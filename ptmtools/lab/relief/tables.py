@@ -54,10 +54,10 @@ class Reference:
         from ptmtools.rendering.kernels import shade
 
         whole, cells = own_levels(self.pyramids), int(self.surfaces.cell.max(initial=-1)) + 1
-        found = np.empty((len(sight.ray), 3))
+        result = np.empty((len(sight.ray), 3))
         there = np.ones(cells, dtype=np.bool_)
-        shade(sight, self.triangles, whole, there, whole.last, found)
-        return found
+        shade(sight, self.triangles, whole, there, whole.last, result)
+        return result
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class Tally:
         self._sums = Sums(pair, *(np.zeros((len(self._pairs), n)) for n in columns))
         pixels = len(seen)
         self._pixels = (pixels, pixels, pixels, max(int(seen.sum()), 1))
-        self._found: list[Ints] = []
+        self._nonzero: list[Ints] = []
         self._rows = [[np.zeros((0, n), np.float32)] for n in columns]
 
     def add(self, sight: Sight) -> Sight:
@@ -129,18 +129,18 @@ class Tally:
             sight, self._triangles, self._lamps, octrees, self._full, exact, given, special,
             self._seen, self._sums, self._stuck,
         )  # fmt: skip
-        found = np.flatnonzero(self._sums.error.any(axis=1))
-        self._found.append(found)
+        nonzero = np.flatnonzero(self._sums.error.any(axis=1))
+        self._nonzero.append(nonzero)
         for rows, table, pixels in zip(self._rows, self._sums[1:], self._pixels, strict=True):
-            rows.append((table[found] / pixels).astype(np.float32))
-            table[found] = 0.0
+            rows.append((table[nonzero] / pixels).astype(np.float32))
+            table[nonzero] = 0.0
         return sight._replace(triangle=plain)
 
     @property
     def rows(self) -> Rows:
         """Those of all frames."""
-        frame = np.repeat(np.arange(len(self._found)), [len(found) for found in self._found])
-        pairs = self._pairs[np.concatenate([np.zeros(0, np.int64), *self._found])]
+        frame = np.repeat(np.arange(len(self._nonzero)), [len(pairs) for pairs in self._nonzero])
+        pairs = self._pairs[np.concatenate([np.zeros(0, np.int64), *self._nonzero])]
         error, square, need, sight = map(np.concatenate, self._rows)
         cell, texture = pairs.astype(np.int32).T
         return Rows(frame, cell, texture, error, square, need, sight)

@@ -143,12 +143,12 @@ def pareto(trials: Sequence[Trial]) -> tuple[Trial, ...]:
     """The trials by cost, the sound ones marked that have a smaller error than all cheaper ones."""
     ordered = sorted(trials, key=lambda t: (t.measured.seconds, t.measured.error))
     least = math.inf
-    found = []
+    marked = []
     for trial in ordered:
         best = trial.setting.sound and trial.measured.error < least
-        found.append(Trial(trial.setting, trial.measured, best))
+        marked.append(Trial(trial.setting, trial.measured, best))
         least = trial.measured.error if best else least
-    return tuple(found)
+    return tuple(marked)
 
 
 def rates(trials: Sequence[Trial], above: float) -> dict[str, float]:
@@ -171,8 +171,8 @@ def rates(trials: Sequence[Trial], above: float) -> dict[str, float]:
 def timed(work: Callable[[], Any]) -> tuple[Any, float]:
     """What ``work`` returns, and the processor seconds of this process that it took."""
     start = time.process_time()
-    found = work()
-    return found, time.process_time() - start
+    result = work()
+    return result, time.process_time() - start
 
 
 @dataclass(frozen=True)

@@ -62,8 +62,8 @@ class Knob:
     @property
     def option(self) -> str:
         """As a user gives it, with its dashes."""
-        found = next(each for each in fields(self.stage.options) if each.name == self.field)
-        return f"--{option_name(found)}"
+        option = next(each for each in fields(self.stage.options) if each.name == self.field)
+        return f"--{option_name(option)}"
 
     def said(self, value: Any) -> str:
         """A value as a user gives it."""
@@ -133,11 +133,11 @@ def settings(
 
 def concerned(stage: Stage[Any], own: Mapping[Stage[Any], Options]) -> list[Stage[Any]]:
     """A stage and those that read what it makes, in their order."""
-    found = [stage]
+    result = [stage]
     for later in STAGES.values():
-        if later in own and later not in found and set(later.read_with(own[later])) & set(found):
-            found.append(later)
-    return found
+        if later in own and later not in result and set(later.read_with(own[later])) & set(result):
+            result.append(later)
+    return result
 
 
 #: Seconds of one core that each stage took.
@@ -164,8 +164,8 @@ def copied(db: Path) -> Iterator[Path]:
 def build_again(db: Path, options: Own, progress: Progress = silent) -> Seconds:
     """Runs the stages whose options are given, whether or not they are current, in the order of
     the options, by one worker: nothing is kept that would have been cheap to keep."""
-    found: Seconds = {}
+    result: Seconds = {}
     for stage, chosen in options.items():
         run = partial(run_stage, db, chosen, workers=1, rebuild=True, progress=progress)
-        _, found[stage.name] = timed(run)
-    return found
+        _, result[stage.name] = timed(run)
+    return result

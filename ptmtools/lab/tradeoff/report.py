@@ -47,9 +47,11 @@ def table(trade: Trade, wanted: float | None = None) -> list[str]:
     for family, rate in trade.rates.items():
         lines.append(f"  {family}: error ∝ work^{rate:.2f}")
     if wanted is not None:
-        found = trade.cheapest(wanted)
+        cheapest = trade.cheapest(wanted)
         answer = (
-            found.setting.name if found else "none of these; the last one with a star comes closest"
+            cheapest.setting.name
+            if cheapest
+            else "none of these; the last one with a star comes closest"
         )
         lines.append(f"  cheapest for an error of at most {wanted:g}: {answer}")
     return lines
@@ -250,8 +252,8 @@ def settings_table(trade: WalkTrade, wanted: float | None = None) -> list[str]:
         lines += ["", f"{policy}, {rate_text(bandwidth)}, texture memory {memory}", head]
         lines += [f"  {row}" for row in _rows(trade, case, wide)]
         if wanted is not None:
-            found = _trade(trade, case).cheapest(wanted)
-            name = found.setting.name if found else "none of these"
+            cheapest = _trade(trade, case).cheapest(wanted)
+            name = cheapest.setting.name if cheapest else "none of these"
             lines.append(f"  cheapest for an error of at most {wanted:g}: {name}")
     problems = [f"{tried.name}: {tried.problem}" for tried in trade.trials if tried.problem]
     return [*lines, "", *problems] if problems else lines
@@ -282,7 +284,7 @@ def trades(trade: WalkTrade) -> list[Trade]:
 def _trade(trade: WalkTrade, case: Case) -> Trade:
     policy, bandwidth, memory = case
     where = f"{policy}, {rate_text(bandwidth)}, texture memory {memory}"
-    found = []
+    trials = []
     for tried in (trade.own, *trade.trials):
         if seen := tried.by(case):
             more = {"fetched": float(seen.fetched)}
@@ -290,5 +292,5 @@ def _trade(trade: WalkTrade, case: Case) -> Trade:
                 more["first"] = seen.first
             setting = Setting(tried.name or _AS_IS.name, {})
             measured = Measured(tried.build, tried.served, seen.e, seen.p95, more)
-            found.append(Trial(setting, measured))
-    return Trade("walk", "bytes served", f"e ({where})", 0.0, pareto(found), {})
+            trials.append(Trial(setting, measured))
+    return Trade("walk", "bytes served", f"e ({where})", 0.0, pareto(trials), {})

@@ -150,11 +150,11 @@ class CoverageTrade:
             seed=REFERENCE_SEED - (options.seed == REFERENCE_SEED),
             tolerance=None,
         )
-        found, _, _ = self.hints(reference)
-        self.truth = {cell: hints.row.value for cell, hints in found.items()}
+        hints_of, _, _ = self.hints(reference)
+        self.truth = {cell: hints.row.value for cell, hints in hints_of.items()}
         # Bounds of its error; its standard error is about half of that. Cells with too few usable
         # points have none.
-        bounds = np.array([hints.row.uncertain for hints in found.values()], dtype=np.float64)
+        bounds = np.array([hints.row.uncertain for hints in hints_of.values()], dtype=np.float64)
         bounds = bounds[np.isfinite(bounds)]
         self.reference_error = float(bounds.mean()) / 2 if len(bounds) else 0.0
 
@@ -176,11 +176,11 @@ class CoverageTrade:
     def measure(self, setting: Setting) -> Measured:
         """See `Experiment.measure`."""
         options = replace(self._options, **setting.knobs)
-        found, seconds, backend = self.hints(options)
-        errors = self.errors(found)
-        points = np.array([hints.samples for hints in found.values()])
-        missed = np.array([hints.missed for hints in found.values()])
-        many = max(len(found), 1)
+        hints_of, seconds, backend = self.hints(options)
+        errors = self.errors(hints_of)
+        points = np.array([hints.samples for hints in hints_of.values()])
+        missed = np.array([hints.missed for hints in hints_of.values()])
+        many = max(len(hints_of), 1)
         return Measured(
             seconds=seconds,
             work=float(points.sum()) * len(VIEWS) * options.side**2 / many,
@@ -193,12 +193,12 @@ class CoverageTrade:
             note=backend,
         )
 
-    def errors(self, found: Mapping[int, CellHints]) -> NDArray[np.float64]:
+    def errors(self, hints_of: Mapping[int, CellHints]) -> NDArray[np.float64]:
         """(n,) total variation between hints of n of the cells tried, by cell, and the reference.
 
         Raises KeyError for a cell that was not tried.
         """
-        pairs = ((hints.row.value, self.truth[cell]) for cell, hints in found.items())
+        pairs = ((hints.row.value, self.truth[cell]) for cell, hints in hints_of.items())
         return np.array([np.abs(value - truth).sum() / 2 for value, truth in pairs])
 
     def hints(
@@ -217,9 +217,9 @@ class CoverageTrade:
         try:
             if asked:
                 sampler.of_cell(asked[0])
-            found, seconds = timed(lambda: {cell: sampler.of_cell(cell) for cell in asked})
+            hints_of, seconds = timed(lambda: {cell: sampler.of_cell(cell) for cell in asked})
             seconds *= self._cells.cell_count / max(len(asked), 1)
-            return found, before + seconds, backend.name
+            return hints_of, before + seconds, backend.name
         finally:
             sampler.renderer.close()
 
@@ -326,8 +326,8 @@ class VisibilityTrade:
         """See `Experiment.measure`."""
         options = replace(_BASE, **setting.knobs)
         pvs, seconds = timed(lambda: compute_pvs(self._cells, options))
-        found = pvs.to_matrix()
-        extra, missing = found & ~self._truth, self._truth & ~found
+        seen = pvs.to_matrix()
+        extra, missing = seen & ~self._truth, self._truth & ~seen
         size = max(int(self._truth.sum()), 1)
         each = (extra | missing).sum(axis=1) / np.maximum(self._truth.sum(axis=1), 1)
         return Measured(

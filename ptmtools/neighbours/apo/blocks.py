@@ -108,14 +108,14 @@ def build(work: Work, executor: Executor, progress: Progress = silent) -> tuple[
     Raises LimitError PTM-L840: too many texels.
     """
     work, blocks = divided(work)
-    found, held = [], 0
+    results, held = [], 0
     for done, each in enumerate(executor.each(_block, work, blocks)):
         progress(done, len(blocks), "casting rays")
-        found.append(each)
+        results.append(each)
         held += texel_count(each.levels)
         check_count(held)
     progress(len(blocks), len(blocks), "casting rays")
-    parts = [each.cells for each in found]
+    parts = [each.cells for each in results]
     cells = Samples(
         np.concatenate([part.code for part in parts]),
         np.concatenate([part.count for part in parts]),
@@ -126,10 +126,10 @@ def build(work: Work, executor: Executor, progress: Progress = silent) -> tuple[
     # The cells themselves are divided by their own samples, whatever is done above them.
     above = divide(cells, 0, work.top, work.bounds)
     kept = above[work.top].code if len(above) > work.top else np.zeros(0, np.uint64)
-    below = joined([pruned(each.levels, kept, 0) for each in found], width)
+    below = joined([pruned(each.levels, kept, 0) for each in results], width)
     levels = [*above[: work.top], *(level for level in below if len(level.code))]
     total = int(cells.count.sum())
-    return averaged(levels), sum(each.missed for each in found) / max(total, 1)
+    return averaged(levels), sum(each.missed for each in results) / max(total, 1)
 
 
 def _halved(values: Floats, side: Ints) -> Floats:
@@ -138,8 +138,8 @@ def _halved(values: Floats, side: Ints) -> Floats:
     each = np.arange(len(values))
     a, b, c = (values[each, (side + k) % 3] for k in range(3))
     middle = (a + b) / 2
-    found: Floats = np.stack([a, middle, c, middle, b, c], axis=1).reshape(-1, 3, 3)
-    return found
+    result: Floats = np.stack([a, middle, c, middle, b, c], axis=1).reshape(-1, 3, 3)
+    return result
 
 
 def divided(work: Work) -> tuple[Work, list[Block]]:
@@ -208,21 +208,21 @@ def _values(work: Work, triangle: Ints, weight: Singles, own: Floats) -> Floats:
     """(n, k) unit normals and colours of the source; where no ray has hit, the mesh's own normal
     and mid-grey."""
     hit, source = triangle >= 0, work.source
-    found = np.full((len(triangle), 6 if source.paint else 3), 0.5)
-    found[:, :3] = own
+    result = np.full((len(triangle), 6 if source.paint else 3), 0.5)
+    result[:, :3] = own
     of, share = triangle[hit], weight[hit].astype(np.float64)
     normal = np.einsum("ij,ijk->ik", share, source.normals[of].astype(np.float64))
-    found[hit, :3] = _unit(normal, own[hit])
+    result[hit, :3] = _unit(normal, own[hit])
     if source.paint:
-        found[hit, 3:] = source.paint.colors(of, share)
-    return found
+        result[hit, 3:] = source.paint.colors(of, share)
+    return result
 
 
 def _unit(vectors: Floats, otherwise: Floats | None = None) -> Floats:
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     other = np.array([0.0, 1.0, 0.0]) if otherwise is None else otherwise
-    found: Floats = np.where(length > 0, vectors / np.where(length > 0, length, 1), other)
-    return found
+    result: Floats = np.where(length > 0, vectors / np.where(length > 0, length, 1), other)
+    return result
 
 
 def _summed(samples: Samples, work: Work) -> Samples:

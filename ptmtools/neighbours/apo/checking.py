@@ -44,7 +44,7 @@ _NAMES = (INDEX, NORMALS, COLORS, MESH, OBJ)
 
 def check_folder(folder: Path, limits: Limits) -> ValidationReport:
     """Checks all that can be checked without the source."""
-    found = Findings(CODES)
+    findings = Findings(CODES)
     try:
         there = sorted(os.listdir(folder))
     except OSError as fault:
@@ -53,67 +53,67 @@ def check_folder(folder: Path, limits: Limits) -> ValidationReport:
         ) from None
     for name in there:
         if name not in _NAMES:
-            found.add("PTM-D856", name, "", "is not part of an octree texture")
-    sizes = {name: _size(folder, name, found) for name in there if name in _NAMES}
+            findings.add("PTM-D856", name, "", "is not part of an octree texture")
+    sizes = {name: _size(folder, name, findings) for name in there if name in _NAMES}
     held = {name: bytes_ for name, bytes_ in sizes.items() if bytes_ is not None}
     try:
         index = read_index(folder)
     except PtmError as fault:
-        found.add("PTM-D851", INDEX, fault.place or "", fault.message)
+        findings.add("PTM-D851", INDEX, fault.place or "", fault.message)
     else:
         wanted = [NORMALS, MESH, OBJ, *([COLORS] if index.colors else [])]
         for name in wanted:
             if name not in there:
-                found.add("PTM-D850", name, "", "is missing")
-        _check_octree(folder, index, held, found)
+                findings.add("PTM-D850", name, "", "is missing")
+        _check_octree(folder, index, held, findings)
         if MESH in held:
-            _check_mesh(folder, index, held[MESH], found)
-    return ValidationReport(found.issues(), len(held), sum(held.values()))
+            _check_mesh(folder, index, held[MESH], findings)
+    return ValidationReport(findings.issues(), len(held), sum(held.values()))
 
 
-def _size(folder: Path, name: str, found: Findings) -> int | None:
+def _size(folder: Path, name: str, findings: Findings) -> int | None:
     """Bytes of a file, if it is one."""
     try:
         with open_below(folder, name) as file:
             return os.fstat(file.fileno()).st_size
     except OSError as fault:
-        found.add("PTM-D850", name, "", f"cannot be read ({fault.strerror or fault})")
+        findings.add("PTM-D850", name, "", f"cannot be read ({fault.strerror or fault})")
         return None
 
 
-def _check_octree(folder: Path, index: Index, held: Mapping[str, int], found: Findings) -> None:
+def _check_octree(folder: Path, index: Index, held: Mapping[str, int], findings: Findings) -> None:
     for stream in (index.normals, index.colors):
         if stream and held.get(stream.file, 0) > stream.ends[-1]:
-            found.add("PTM-D852", stream.file, "", "goes on behind the last level")
+            findings.add("PTM-D852", stream.file, "", "goes on behind the last level")
     if NORMALS not in held or (index.colors and COLORS not in held):
         return
     try:
         octree = read_octree(folder)
     except PtmError as fault:
-        found.add("PTM-D852", Path(fault.file or NORMALS).name, fault.place or "", fault.message)
+        findings.add("PTM-D852", Path(fault.file or NORMALS).name, fault.place or "", fault.message)
         return
     if wrong := fault_of(octree):
-        found.add("PTM-D853", NORMALS, *wrong)
+        findings.add("PTM-D853", NORMALS, *wrong)
 
 
-def _check_mesh(folder: Path, index: Index, size: int, found: Findings) -> None:
+def _check_mesh(folder: Path, index: Index, size: int, findings: Findings) -> None:
     if size != index.mesh["bytes"]:
-        found.add("PTM-D854", MESH, "", "is not the file that apo.json describes")
+        findings.add("PTM-D854", MESH, "", "is not the file that apo.json describes")
         return
     try:
         data = mesh_bytes(folder)
         if zlib.crc32(data) != index.mesh["crc32"]:
-            found.add("PTM-D854", MESH, "", "is not the file that apo.json describes")
+            findings.add("PTM-D854", MESH, "", "is not the file that apo.json describes")
             return
         mesh = mesh_of(data)
     except PtmError as fault:
-        found.add("PTM-D854", MESH, "", fault.message)
+        findings.add("PTM-D854", MESH, "", fault.message)
         return
     if len(mesh.triangles) != index.mesh["faces"]:
-        found.add("PTM-D854", MESH, "", "has not as many faces as apo.json says")
+        findings.add("PTM-D854", MESH, "", "has not as many faces as apo.json says")
     q = (mesh.points - index.low) / index.side
     if outside := int(((q < 0) | (q >= 1)).any(axis=1).sum()):
-        found.add("PTM-D855", MESH, "", f"{count(outside, 'point')} outside of the cube")
+        findings.add("PTM-D855", MESH, "", f"{count(outside, 'point')} outside of the cube")
 
 
 def _about(deviation: float | None) -> str:

@@ -243,7 +243,7 @@ def _index(data: bytes) -> Index:
             "tell apart",
             remedy=_AGAIN,
         )
-    found = Index(
+    result = Index(
         start.astype(np.int64),
         np.array(document["cube"]["low"], dtype=np.float64),
         float(document["cube"]["side"]),
@@ -252,8 +252,8 @@ def _index(data: bytes) -> Index:
         document["mesh"],
         document,
     )
-    _check(found)
-    return found
+    _check(result)
+    return result
 
 
 def _stream(row: Mapping[str, Any]) -> Stream:

@@ -58,8 +58,8 @@ class Cube:
     def inside(self, points: Floats) -> Floats:
         """(n, 3) points in the coordinates of the cube, 0 to less than 1."""
         last = np.nextafter(1.0, 0.0)
-        found: Floats = np.clip((points - self.low) / self.side, 0.0, last)
-        return found
+        result: Floats = np.clip((points - self.low) / self.side, 0.0, last)
+        return result
 
 
 def cube_around(points: Floats) -> Cube:
@@ -73,8 +73,8 @@ def codes_of(q: Floats, depth: int) -> Codes:
     """(n,) of the nodes of a depth, up to 20, in which (n, 3) points of the cube lie."""
     place = (q * float(1 << depth)).astype(np.uint64)
     x, y, z = (_spread(place[:, k]) for k in range(3))
-    found: Codes = x | y << np.uint64(1) | z << np.uint64(2)
-    return found
+    result: Codes = x | y << np.uint64(1) | z << np.uint64(2)
+    return result
 
 
 def _spread(value: Codes) -> Codes:
@@ -159,28 +159,28 @@ def divide(samples: Samples, top: int, bottom: int, bounds: Bounds) -> list[Leve
 def averaged(levels: list[Level]) -> list[Level]:
     """The same with each inner node the mean of its children (paper 2, §3.1), normals brought back
     to length 1; from the deepest level up."""
-    found = [levels[-1]] if levels else []
+    result = [levels[-1]] if levels else []
     for level in reversed(levels[:-1]):
         inner = level.children > 0
         each = popcount(level.children[inner])
         first = np.cumsum(each) - each
         value = level.value.copy()
         if inner.any():
-            below = np.add.reduceat(found[0].value.astype(np.float64), first, axis=0)
+            below = np.add.reduceat(result[0].value.astype(np.float64), first, axis=0)
             value[inner] = _means(below, each, otherwise=level.value[inner])
-        found.insert(0, Level(level.code, value, level.children))
-    return found
+        result.insert(0, Level(level.code, value, level.children))
+    return result
 
 
 def pruned(levels: list[Level], kept: Codes, above: int) -> list[Level]:
     """What of levels lies below the nodes ``kept``, sorted, of the level ``above`` these."""
-    found = []
+    result = []
     for k, level in enumerate(levels):
         root = level.code >> np.uint64(3 * (k + above))
         at = np.minimum(np.searchsorted(kept, root), max(len(kept) - 1, 0))
         here = kept[at] == root if len(kept) else np.zeros(len(root), dtype=bool)
-        found.append(Level(level.code[here], level.value[here], level.children[here]))
-    return found
+        result.append(Level(level.code[here], level.value[here], level.children[here]))
+    return result
 
 
 def joined(parts: list[list[Level]], width: int) -> list[Level]:
@@ -200,8 +200,8 @@ def joined(parts: list[list[Level]], width: int) -> list[Level]:
 
 def popcount(bits: NDArray[np.uint8]) -> Ints:
     """(n,) how many bits are set."""
-    found: Ints = np.unpackbits(bits[:, None], axis=1).sum(axis=1, dtype=np.int64)
-    return found
+    result: Ints = np.unpackbits(bits[:, None], axis=1).sum(axis=1, dtype=np.int64)
+    return result
 
 
 def _running(values: NDArray[np.generic]) -> NDArray[np.generic]:
@@ -215,22 +215,22 @@ def _deviates(n: Ints, sums: Floats, square: Floats, bounds: Bounds) -> Bools:
     The mean of ‖v − m‖² over unit vectors v is 2 − 2 |mean of v| for the unit vector m along it.
     """
     normal = np.linalg.norm(sums[:, :3], axis=1) / n
-    found: Bools = 2 - 2 * normal > bounds.error**2
+    result: Bools = 2 - 2 * normal > bounds.error**2
     if sums.shape[1] > 3:
         mean = sums[:, 3:] / n[:, None]
-        found |= square / n - (mean**2).sum(axis=1) > bounds.color_error**2
-    return found
+        result |= square / n - (mean**2).sum(axis=1) > bounds.color_error**2
+    return result
 
 
 def _means(sums: Floats, n: Ints, otherwise: Singles | None = None) -> Singles:
     """(m, k) means, normals of length 1; where normals cancel out, ``otherwise`` or up."""
-    found = (sums / n[:, None]).astype(np.float32)
+    result = (sums / n[:, None]).astype(np.float32)
     length = np.linalg.norm(sums[:, :3], axis=1)
     some = length > 0
     up = np.array([0, 1, 0], np.float32) if otherwise is None else otherwise[~some, :3]
-    found[~some, :3] = up
-    found[some, :3] = sums[some, :3] / length[some, None]
-    return found
+    result[~some, :3] = up
+    result[some, :3] = sums[some, :3] / length[some, None]
+    return result
 
 
 def _edges(codes: Codes, node: Codes, begin: Ints, end: Ints, left: int) -> Ints:
@@ -249,8 +249,8 @@ _BYTE = np.array([1, 1 << 8, 1 << 16])
 
 def normal_bytes(normal: Singles) -> NDArray[np.uint8]:
     """(n, 3) of (n, 3) unit normals."""
-    found: NDArray[np.uint8] = np.rint((normal / 2 + 0.5).clip(0, 1) * 255).astype(np.uint8)
-    return found
+    result: NDArray[np.uint8] = np.rint((normal / 2 + 0.5).clip(0, 1) * 255).astype(np.uint8)
+    return result
 
 
 def check_count(texels: int) -> None:
@@ -300,8 +300,8 @@ def octree_of(levels: list[Level], cube: Cube) -> Octree:
 def addresses(inner: NDArray[np.bool_]) -> Ints:
     """(n,) where each node of a level begins, in texels from the level's first."""
     size = 1 + inner.astype(np.int64)
-    found: Ints = np.cumsum(size) - size
-    return found
+    result: Ints = np.cumsum(size) - size
+    return result
 
 
 def fault_of(octree: Octree) -> tuple[str, str] | None:

@@ -24,9 +24,9 @@ def hits(corners: Floats, eyes: Floats, rays: Floats) -> Ints:
 
     Embree has float32: keep the coordinates near 1.
     """
-    found = np.full(len(rays), -1, dtype=np.int64)
+    result = np.full(len(rays), -1, dtype=np.int64)
     if not len(corners):
-        return found
+        return result
     from embreex.mesh_construction import TriangleMesh
     from embreex.rtcore_scene import EmbreeScene
 
@@ -36,8 +36,8 @@ def hits(corners: Floats, eyes: Floats, rays: Floats) -> Ints:
         part = slice(first, first + _RAYS)
         start = np.ascontiguousarray(eyes[part], dtype=np.float32)
         along = np.ascontiguousarray(rays[part], dtype=np.float32)
-        found[part] = tree.run(start, along, query="INTERSECT")
-    return found
+        result[part] = tree.run(start, along, query="INTERSECT")
+    return result
 
 
 @dataclass(frozen=True)
@@ -98,8 +98,8 @@ def draw(octree: Octree, corners: Floats, own: Floats, view: View, look: Look) -
     picture = np.empty((*shape, 3), dtype=np.uint8)
     picture[:] = look.background
     if look.levels:
-        found = look_up(octree, q, look.levels, stop)
-        normals, at = found.normals, found.address
+        nodes = look_up(octree, q, look.levels, stop)
+        normals, at = nodes.normals, nodes.address
     else:
         weight = weights(corners[triangle], q)
         normals, at = interpolated(weight, own[triangle]), np.full(len(q), -1)

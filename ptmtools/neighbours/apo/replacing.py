@@ -107,7 +107,7 @@ class Replacement:
         points = stored.array("points", np.float64, None, 3, finite=True)
         triangles = stored.indices("triangles", np.int32, None, 3, high=len(points))
         n, most = len(triangles), np.iinfo(np.int32).max
-        found = Replacement(
+        result = Replacement(
             stored.indices("objects", np.int32, None, high=most),
             points,
             triangles,
@@ -115,9 +115,9 @@ class Replacement:
             stored.array("uv", np.float64, n, 3, 2, finite=True),
             stored.array("colors", np.uint8, n, 3, 3) if "colors" in arrays else None,
         )
-        if (np.diff(found.source) < 0).any() or (np.diff(found.objects) <= 0).any():
+        if (np.diff(result.source) < 0).any() or (np.diff(result.objects) <= 0).any():
             raise ValueError("triangles or objects are not in order")
-        return found
+        return result
 
 
 def joined(parts: list[Replacement]) -> Replacement:
@@ -269,16 +269,16 @@ def _simplified(
         scene.uv[own] if painted else None,
         None if scene.colors is None else scene.colors[own],
     )
-    found = simplify(
+    simplified = simplify(
         mesh, SimplifyOptions(faces), lambda done, total, _: progress(done, total, what)
     )
-    left = found.mesh
+    left = simplified.mesh
     uv = np.zeros((len(left.triangles), 3, 2)) if left.uv is None else left.uv
-    return found, Replacement(
+    return simplified, Replacement(
         np.array([number], np.int32),
         np.clip(left.points, points.min(axis=0), points.max(axis=0)),
         left.triangles,
-        own[found.source].astype(np.int32),
+        own[simplified.source].astype(np.int32),
         uv,
         left.colors,
     )

@@ -46,15 +46,15 @@ class Points(NamedTuple):
 def areas(corner: Floats) -> Floats:
     """(m,) of (m, 3, 3) triangles."""
     cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    found: Floats = np.linalg.norm(cross, axis=1) / 2
-    return found
+    result: Floats = np.linalg.norm(cross, axis=1) / 2
+    return result
 
 
 def longest_first(corner: Floats) -> Ints:
     """(m,) the corner at which the longest edge of each of (m, 3, 3) triangles begins."""
     edge = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2)
-    found: Ints = edge.argmax(axis=1)
-    return found
+    result: Ints = edge.argmax(axis=1)
+    return result
 
 
 def spacing_for(corner: Floats, count: float) -> float:
@@ -112,8 +112,8 @@ def _counted(counts: Ints) -> tuple[Ints, Ints]:
 
 def at(values: Floats, points: Points) -> Floats:
     """(n, k) what (m, 3, k) values of corners are at points."""
-    found: Floats = np.einsum("ij,ijk->ik", points.weight, values[points.triangle])
-    return found
+    result: Floats = np.einsum("ij,ijk->ik", points.weight, values[points.triangle])
+    return result
 
 
 _WHITE = np.full((1, 1, 3), 255, np.uint8)
@@ -138,7 +138,7 @@ class Paint:
 
     def colors(self, triangle: Ints, weight: Floats) -> Floats:
         """(n, 3) sRGB, 0 to 1, at points of triangles; ``weight`` (n, 3) of the corners."""
-        found: Floats = np.einsum("ij,ijk->ik", weight, self.corner[triangle] / 255.0)
+        result: Floats = np.einsum("ij,ijk->ik", weight, self.corner[triangle] / 255.0)
         image = self.image[triangle]
         for number in np.unique(image[image >= 0]).tolist():
             here = np.flatnonzero(image == number)
@@ -148,8 +148,8 @@ class Paint:
             height, width = texels.shape[:2]
             column = np.minimum((kept[:, 0] * width).astype(np.int64), width - 1)
             row = np.minimum(((1 - kept[:, 1]) * height).astype(np.int64), height - 1)
-            found[here] *= texels[row, column] / 255.0
-        return found
+            result[here] *= texels[row, column] / 255.0
+        return result
 
 
 def paint_of(scene: Scene, kept: Ints) -> Paint:
@@ -263,13 +263,13 @@ def _cast(source: Source, origin: Floats, along: Floats, normal: Floats, limit: 
         rays = along[waiting].astype(np.float32)
         begin = (origin[waiting] + gone[waiting, None] * along[waiting]).astype(np.float32)
         left = np.maximum(limit[waiting] - gone[waiting], 0).astype(np.float32)
-        found = source.tree.run(begin, rays, dists=left, output=True)
-        hit = found["primID"].astype(np.int64)
+        hits = source.tree.run(begin, rays, dists=left, output=True)
+        hit = hits["primID"].astype(np.int64)
         met = hit >= 0
-        far = gone[waiting] + found["tfar"]
+        far = gone[waiting] + hits["tfar"]
         same = met & _same_way(source.facing[hit], normal[waiting])
         taken = waiting[same]
-        u, v = found["u"][same], found["v"][same]
+        u, v = hits["u"][same], hits["v"][same]
         triangle[taken], distance[taken] = hit[same], np.abs(far[same])
         weight[taken] = np.stack([1 - u - v, u, v], axis=1)
         on = met & ~same & (far < limit[waiting])

@@ -183,8 +183,8 @@ class OctreeShader:
         program = context.program(vertex_shader=WHOLE, fragment_shader=POINTS)
         texture = context.texture((width, height), 4, places.tobytes(), dtype="f4")
         texture.filter = (self._nearest, self._nearest)
-        found = context.texture((width, height), 2, dtype="i4")
-        target = context.framebuffer([found])
+        result = context.texture((width, height), 2, dtype="i4")
+        target = context.framebuffer([result])
         drawing = context.vertex_array(program, [])
         try:
             target.use()
@@ -193,9 +193,9 @@ class OctreeShader:
             program["places"].value = 1
             context.disable(context.DEPTH_TEST)
             drawing.render(context.TRIANGLES, vertices=3)
-            data = np.frombuffer(found.read(), dtype=np.int32).reshape(-1, 2)[: len(q)]
+            data = np.frombuffer(result.read(), dtype=np.int32).reshape(-1, 2)[: len(q)]
         finally:
-            for each in (drawing, target, found, texture, program):
+            for each in (drawing, target, result, texture, program):
                 each.release()
         return data[:, 0].astype(np.int64), data[:, 1].astype(np.int64)
 

@@ -211,8 +211,8 @@ def nearest(uv: Floats, at: Floats) -> Floats:
         np.divide(part, area, out=np.full(len(at), -1.0), where=~flat)
         for part in (_cross(at - a, c - a), _cross(b - a, at - a))
     )
-    found = np.stack([1 - second - third, second, third], axis=1)
-    outside = np.flatnonzero((found < 0).any(axis=1))
+    result = np.stack([1 - second - third, second, third], axis=1)
+    outside = np.flatnonzero((result < 0).any(axis=1))
     best = np.full(len(outside), np.inf)
     for k in range(3):
         start, end = uv[outside, k], uv[outside, (k + 1) % 3]
@@ -223,9 +223,9 @@ def nearest(uv: Floats, at: Floats) -> Floats:
         far = np.linalg.norm(start + along[:, None] * way - place, axis=1)
         nearer = far < best
         rows = outside[nearer]
-        best[nearer], found[rows] = far[nearer], 0.0
-        found[rows, k], found[rows, (k + 1) % 3] = 1 - along[nearer], along[nearer]
-    return found
+        best[nearer], result[rows] = far[nearer], 0.0
+        result[rows, k], result[rows, (k + 1) % 3] = 1 - along[nearer], along[nearer]
+    return result
 
 
 def _cross(a: Floats, b: Floats) -> Floats:

@@ -166,7 +166,7 @@ def _bases(
     scene: Scene, masks: Mapping[int, Mask], names: Names
 ) -> tuple[list[BaseImage], dict[int, int]]:
     """The textures, one for each distinct image and mask; and which of them each material has."""
-    found: dict[tuple[int, str], int] = {}
+    index_of: dict[tuple[int, str], int] = {}
     bases: list[BaseImage] = []
     of: dict[int, int] = {}
     for number, material in enumerate(scene.materials):
@@ -175,14 +175,14 @@ def _bases(
         image, mask = scene.images[material.image], masks.get(number)
         # By what is in the mask: two files may hold the same.
         key = material.image, "" if mask is None else _digest(mask)
-        if key not in found:
-            found[key] = len(bases)
+        if key not in index_of:
+            index_of[key] = len(bases)
             name = names.take(Path(image.name).stem, "texture")
             bases.append(BaseImage(name, image, alpha=False, mask=mask))
-        of[number] = found[key]
+        of[number] = index_of[key]
         if _cut_out(scene, material):
-            known = bases[found[key]]
-            bases[found[key]] = BaseImage(known.base, known.image, True, known.mask)
+            known = bases[index_of[key]]
+            bases[index_of[key]] = BaseImage(known.base, known.image, True, known.mask)
     return bases, of
 
 
@@ -204,15 +204,15 @@ def _materials(
     and (T,) which of them each face has."""
     key = 2 * scene.triangle_material.astype(np.int64) + scene.two_sided
     used, place = np.unique(key, return_inverse=True)
-    found = []
+    materials = []
     for number, both in (divmod(one, 2) for one in used.tolist()):
         base = bases[of[number]] if number in of else None
         given = scene.materials[number]
         channels = () if base is None else base.channels
         if base is not None and not _cut_out(scene, given):
             channels = tuple(channel for channel in channels if channel != ALPHA)
-        found.append(_material(given, base, channels, bool(both)))
-    return tuple(found), place.ravel().astype(np.int32)
+        materials.append(_material(given, base, channels, bool(both)))
+    return tuple(materials), place.ravel().astype(np.int32)
 
 
 def _material(

@@ -67,7 +67,7 @@ def bake(
     before.
     """
     sizes = (sizes[0] // 2, *sizes)
-    found: list[Lit] = []
+    result: list[Lit] = []
     below: tuple[Singles, NDArray[np.int32], Bools] | None = None
     for size in sizes:
         centre = cover(atlas.uv, size)
@@ -85,8 +85,8 @@ def bake(
         value[row, column] = _smoothed(value, chart, row, column, grain)
         below = value, chart, centre >= 0
         if size > sizes[0]:
-            found.append(Lit(fill(value, owner >= 0), len(row), int((owner >= 0).sum())))
-    return found
+            result.append(Lit(fill(value, owner >= 0), len(row), int((owner >= 0).sum())))
+    return result
 
 
 def fill(value: Singles, known: Bools) -> Singles:

@@ -138,11 +138,11 @@ class Painted:
         corners = self.uv[of]
         at = corners[:, 0] + share[:, :1] * (corners[:, 1] - corners[:, 0])
         at += share[:, 1:] * (corners[:, 2] - corners[:, 0])
-        found = np.ones(len(point), np.float32)
+        result = np.ones(len(point), np.float32)
         for index, image in enumerate(self.images):
             these = self.image[of] == index
-            found[these] = 1 - image.strength * (1 - _bilinear(image, at[these]))
-        return found
+            result[these] = 1 - image.strength * (1 - _bilinear(image, at[these]))
+        return result
 
 
 def _bilinear(image: LightImage, at: Floats) -> Singles:
@@ -200,11 +200,11 @@ def open_sides(around: Surroundings, corner: Floats, both: Bools, reach: float) 
             points_on(corner[face], np.tile(np.arange(points), len(chosen))),
             turns(len(face)),
         )
-        for found, side in ((front, 1.0), (back, -1.0)):
+        for counts, side in ((front, 1.0), (back, -1.0)):
             way = side * sign[face, None] * normal[face]
             rays = around, point, way, turn, _WALKS
             seen = escaping(*rays, _BOUNCES) if sky else light(*rays, reach)
-            found[chosen] = seen.reshape(len(chosen), points).sum(axis=1)
+            counts[chosen] = seen.reshape(len(chosen), points).sum(axis=1)
 
     chosen = np.unique(plane[wanted])
     for points, sky in ((_POINTS, True), (_MORE, True), (_MORE, False)):

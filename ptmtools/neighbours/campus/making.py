@@ -77,14 +77,14 @@ def levels(mesh: Mesh, lods: int, ratio: float, least: int, error: float) -> lis
     diagonal of its box."""
     bound = error * float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
     whole = len(mesh.triangles)
-    found = []
+    result = []
     for faces in level_faces(whole, lods, ratio, least):
         if faces == whole:
-            found.append(_level(mesh, np.arange(whole, dtype=np.int32), 0.0))
+            result.append(_level(mesh, np.arange(whole, dtype=np.int32), 0.0))
             continue
         less = simplify(mesh, SimplifyOptions(faces=faces, error=bound, keep_parts=True))
-        found.append(_level(less.mesh, less.source, less.error))
-    return found
+        result.append(_level(less.mesh, less.source, less.error))
+    return result
 
 
 def _level(mesh: Mesh, source: NDArray[np.int32], error: float) -> Level:

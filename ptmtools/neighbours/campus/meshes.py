@@ -133,18 +133,18 @@ def read_mesh(data: bytes) -> tuple[Primitive, ...]:
         view_bytes(document, binary)
         wanted = document["meshes"][0]["primitives"]
         held = len(binary)
-        found = []
+        parts = []
         for primitive in wanted:
-            found.append(_read(document, binary, primitive))
+            parts.append(_read(document, binary, primitive))
             # Each has arrays of its own, so all together are no larger than the bytes.
-            held -= found[-1].point.size * 4
+            held -= parts[-1].point.size * 4
             if held < 0:
                 raise ValueError("primitives that share their arrays")
     except (LookupError, TypeError, AttributeError) as fault:
         raise ValueError(f"not as a mesh of a campus is ({fault})") from None
-    if not found:
+    if not parts:
         raise ValueError("no primitives")
-    return tuple(found)
+    return tuple(parts)
 
 
 def view_bytes(document: Any, binary: bytes) -> int:

@@ -183,24 +183,24 @@ class Campus:
         """What all of the campus takes in each quality, for who has come near every object: every
         mesh, textures of the least size, of the preset's, and its lightmaps."""
         meshes = sum(mesh.bytes for each in self.objects for mesh in each.meshes)
-        found = []
+        parts = []
         for quality in PRESETS:
             total = meshes + self._bytes(quality.light, (LIGHT,))
             total += sum(self._bytes(size, CHANNELS) for size in {SIZES[0], quality.diffuse})
-            found.append(
+            parts.append(
                 Preset(**vars(quality), bytes=total, download=0 if quality.cached else total)
             )
-        return tuple(found)
+        return tuple(parts)
 
     def _bytes(self, size: int, channels: tuple[str, ...]) -> int:
         return sum(t.bytes for t in self.textures if t.size == size and t.channel in channels)
 
     def files(self) -> dict[str, tuple[int, int]]:
         """Bytes and CRC-32 of every file but the index, by name."""
-        found = {t.file: (t.bytes, t.crc32) for t in self.textures}
+        result = {t.file: (t.bytes, t.crc32) for t in self.textures}
         for each in self.objects:
-            found |= {mesh.file: (mesh.bytes, mesh.crc32) for mesh in each.meshes}
-        return found
+            result |= {mesh.file: (mesh.bytes, mesh.crc32) for mesh in each.meshes}
+        return result
 
     def to_document(self) -> dict[str, Any]:
         """As campus.json has it."""
@@ -233,27 +233,27 @@ class Campus:
         }
 
     @staticmethod
-    def from_document(found: Mapping[str, Any]) -> Campus:
+    def from_document(document: Mapping[str, Any]) -> Campus:
         """Of a document that its schema allows."""
         return Campus(
-            origin=tuple(found["origin"]),
-            unit=found["unit"],
-            up=found["up"],
-            lods=found["lods"],
-            lightmaps=found["lightmaps"],
-            objects=tuple(map(_object, found["objects"])),
-            materials=tuple(map(_material, found["materials"])),
+            origin=tuple(document["origin"]),
+            unit=document["unit"],
+            up=document["up"],
+            lods=document["lods"],
+            lightmaps=document["lightmaps"],
+            objects=tuple(map(_object, document["objects"])),
+            materials=tuple(map(_material, document["materials"])),
             textures=tuple(
                 TextureFile(**_fields(TextureFile, row) | {"source": tuple(row["source"])})
-                for row in found["textures"]
+                for row in document["textures"]
             ),
         )
 
 
 def _material_document(material: CampusMaterial) -> dict[str, Any]:
-    found = {**vars(material), "twoSided": material.two_sided}
-    del found["two_sided"]
-    return found
+    result = {**vars(material), "twoSided": material.two_sided}
+    del result["two_sided"]
+    return result
 
 
 def _fields(cls: Any, row: Mapping[str, Any]) -> dict[str, Any]:
@@ -262,20 +262,20 @@ def _fields(cls: Any, row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _material(row: Mapping[str, Any]) -> CampusMaterial:
-    found = _fields(CampusMaterial, row) | {"two_sided": row["twoSided"]}
+    fields = _fields(CampusMaterial, row) | {"two_sided": row["twoSided"]}
     for name in ("channels", "wrap", "color"):
-        found[name] = tuple(found[name])
-    return CampusMaterial(**found)
+        fields[name] = tuple(fields[name])
+    return CampusMaterial(**fields)
 
 
 def _object(row: Mapping[str, Any]) -> CampusObject:
-    found = _fields(CampusObject, row)
+    fields = _fields(CampusObject, row)
     for name in ("parts", "box", "barycentre", "materials"):
-        found[name] = tuple(found[name])
+        fields[name] = tuple(fields[name])
     viewpoint = row["viewpoint"]
-    found["viewpoint"] = tuple(viewpoint["position"]), tuple(viewpoint["direction"])
-    found["meshes"] = tuple(MeshFile(**_fields(MeshFile, mesh)) for mesh in row["meshes"])
-    return CampusObject(**found)
+    fields["viewpoint"] = tuple(viewpoint["position"]), tuple(viewpoint["direction"])
+    fields["meshes"] = tuple(MeshFile(**_fields(MeshFile, mesh)) for mesh in row["meshes"])
+    return CampusObject(**fields)
 
 
 #: Names that Windows keeps for devices, with or without a suffix.

@@ -69,31 +69,31 @@ def parts_of(scene: Scene, small: float) -> tuple[Part, ...]:
     sizes = np.bincount(of_object[scene.triangle_object], minlength=len(kept))
     members = np.argsort(of_object, kind="stable")
     named = np.split(members, np.cumsum(np.bincount(of_object))[:-1])
-    found = []
+    parts = []
     for triangles, these in zip(np.split(order, np.cumsum(sizes)[:-1]), named, strict=True):
         names = tuple(scene.objects[i] for i in these.tolist())
-        found.append(Part(_label(names), names, triangles))
-    return tuple(found)
+        parts.append(Part(_label(names), names, triangles))
+    return tuple(parts)
 
 
 def notes_on(parts: Sequence[Part]) -> tuple[str, ...]:
-    """What there is to say of the division."""
+    """Notes on the division into objects."""
     joined = [part for part in parts if len(part.parts) > 1]
-    found = []
+    notes = []
     if joined:
-        objects = sum(len(part.parts) for part in joined)
-        found.append(
-            f"{objects:,} small objects of the model are {len(joined):,} of the campus (--small)"
+        count = sum(len(part.parts) for part in joined)
+        notes.append(
+            f"{count:,} small objects of the model are {len(joined):,} of the campus (--small)"
         )
     faces = [len(part.triangles) for part in parts]
     if max(faces) > MOST_FACES * sum(faces):
         share = max(faces) / sum(faces)
         label = parts[faces.index(max(faces))].label
-        found.append(
+        notes.append(
             f"{label} has {share:.0%} of all faces, and a client loads objects as a whole; "
             "divide it in the model if it is more than a building"
         )
-    return tuple(found)
+    return tuple(notes)
 
 
 def _boxes(corners: Floats, of: np.ndarray, count: int) -> Floats:

@@ -103,17 +103,17 @@ class Surroundings:
         return self._upright(point, far, 1.0)
 
     def _upright(self, point: Floats, far: float, way: float) -> Floats:
-        found = np.full(len(point), self.ground)
+        result = np.full(len(point), self.ground)
         if self.tree is None:
-            return found
+            return result
         along = np.zeros((len(point), 3), np.float32)
         along[:, 1] = way
         limit = np.full(len(point), far + self.lift, np.float32)
         start = (point - self.middle).astype(np.float32)
         hit = self.tree.run(start, along, dists=limit.copy(), query="DISTANCE")
         there = hit < limit
-        found[there] = (point[:, 1] + way * hit)[there]
-        return found
+        result[there] = (point[:, 1] + way * hit)[there]
+        return result
 
 
 def outermost(around: Surroundings, point: Floats, normal: Floats, within: float) -> Floats:
@@ -148,7 +148,7 @@ def light(
     samples, reach: as in `CampusOptions`.
     """
     fan = hemisphere(samples)
-    found = np.empty(len(point), np.float32)
+    result = np.empty(len(point), np.float32)
     step = max(1, RAYS // samples)
     for at in range(0, len(point), step):
         part = slice(at, at + step)
@@ -156,8 +156,8 @@ def light(
         lifted = point[part] + around.lift * normal[part]
         origin = np.repeat((lifted - around.middle).astype(np.float32), samples, axis=0)
         share = _escaping(around, origin, along, reach)
-        found[part] = share.reshape(-1, samples).mean(axis=1)
-    return found
+        result[part] = share.reshape(-1, samples).mean(axis=1)
+    return result
 
 
 def escaping(
@@ -301,5 +301,5 @@ def spread_over(area: Floats, group: Ints, chosen: Ints, count: int) -> Ints:
     last = np.searchsorted(group[order], chosen, side="right")
     share = (np.arange(count) + 0.5) / count
     place = total[first, None] + share * (total[last] - total[first])[:, None]
-    found = np.searchsorted(total, place, side="right") - 1
-    return np.asarray(order[np.clip(found, first[:, None], last[:, None] - 1)])
+    index = np.searchsorted(total, place, side="right") - 1
+    return np.asarray(order[np.clip(index, first[:, None], last[:, None] - 1)])

@@ -100,7 +100,7 @@ class Kind:
 
 def kinds(campus: Campus) -> list[Kind]:
     """The textures of a campus, by channel and size."""
-    found = []
+    result = []
     for channel, sizes, paper in (
         *((channel, SIZES, PAPER_TEXTURES) for channel in CHANNELS),
         (LIGHT, LIGHT_SIZES, PAPER_LIGHTMAPS),
@@ -110,8 +110,8 @@ def kinds(campus: Campus) -> list[Kind]:
             if these:
                 total = sum(t.bytes for t in these)
                 enlarged = sum(t.bytes for t in these if side > max(t.source))
-                found.append(Kind(channel, side, len(these), total, enlarged, paper[side]))
-    return found
+                result.append(Kind(channel, side, len(these), total, enlarged, paper[side]))
+    return result
 
 
 def summary(campus: Campus) -> Iterator[str]:

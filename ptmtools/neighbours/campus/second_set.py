@@ -188,7 +188,7 @@ def _gltf_masks(
         return {}, ()
     source, faces = read.source, read.faces
     material = source.triangle_material[faces]
-    found, notes = {}, []
+    masks, notes = {}, []
     for number, index in enumerate(np.unique(material).tolist()):
         texture = source.materials[index].texture
         if texture is None or scene.materials[number].image < 0:
@@ -203,8 +203,8 @@ def _gltf_masks(
         if fault := _fault(mask, options):
             notes.append(_left_out(scene.materials[number].name, fault))
         else:
-            found[number] = mask
-    return found, tuple(notes)
+            masks[number] = mask
+    return masks, tuple(notes)
 
 
 def _shines(
@@ -212,7 +212,7 @@ def _shines(
 ) -> tuple[dict[int, Mask], tuple[str, ...]]:
     """Those that the scene's own reader came across."""
     folder = Folder(model.absolute().parent, options.allow_outside)
-    found, notes = {}, []
+    masks, notes = {}, []
     for number, (its, shine) in enumerate(zip(scene.materials, scene.shines, strict=True)):
         if its.image < 0 or shine is None:
             continue
@@ -227,8 +227,8 @@ def _shines(
             if fault := _fault(mask, options):
                 notes.append(_left_out(its.name, f"map_Ks {shine.file}: {fault}"))
             else:
-                found[number] = mask
-    return found, tuple(notes)
+                masks[number] = mask
+    return masks, tuple(notes)
 
 
 def _fault(mask: Mask, options: IngestOptions) -> str:

@@ -70,7 +70,7 @@ def texture_files(limits: tuple[int, int], base: BaseImage) -> list[Written]:
     Raises what decoding raises.
     """
     most, quality = limits
-    found: list[Written] = []
+    result: list[Written] = []
     if base.image is not None:
         image = _decoded(base.image.load(), most, base.image.name)
         alpha = None
@@ -80,10 +80,10 @@ def texture_files(limits: tuple[int, int], base: BaseImage) -> list[Written]:
         for size in SIZES:
             fitted = squared(colors, size) if alpha is None else weighted(colors, alpha, size)
             data = jpeg(fitted, quality)
-            found.append(_written(base.base, size, DIFFUSE, data, image.size))
+            result.append(_written(base.base, size, DIFFUSE, data, image.size))
             if alpha is not None:
                 data = jpeg(squared(alpha, size), quality)
-                found.append(_written(base.base, size, ALPHA, data, image.size))
+                result.append(_written(base.base, size, ALPHA, data, image.size))
     if base.mask is not None:
         image = _decoded(base.mask.load(), most, base.mask.label)
         held = np.asarray(
@@ -94,8 +94,8 @@ def texture_files(limits: tuple[int, int], base: BaseImage) -> list[Written]:
         shine = _grey(255 - held if base.mask.inverted else held)
         for size in SIZES:
             data = jpeg(squared(shine, size), quality)
-            found.append(_written(base.base, size, MASK, data, shine.size))
-    return found
+            result.append(_written(base.base, size, MASK, data, shine.size))
+    return result
 
 
 def light_files(

@@ -63,7 +63,7 @@ def check_campus(folder: Path, limits: Limits) -> ValidationReport:
     data = check.bytes_of(INDEX, "PTM-D820", LONGEST)
     if data is not None:
         check.index(data)
-    return ValidationReport(check.found.issues(), check.files, check.bytes)
+    return ValidationReport(check.findings.issues(), check.files, check.bytes)
 
 
 class _Check:
@@ -71,7 +71,7 @@ class _Check:
 
     def __init__(self, folder: Path, limits: Limits) -> None:
         self._folder, self._limits = folder, limits
-        self.found = Findings(CODES)
+        self.findings = Findings(CODES)
         self.files = self.bytes = 0
 
     def bytes_of(self, name: str, code: str, most: int) -> bytes | None:
@@ -81,7 +81,7 @@ class _Check:
                 data = stream.read(most + 1)
         except (OSError, ValueError) as fault:
             why = getattr(fault, "strerror", None) or str(fault)
-            self.found.add(code, name, "", f"cannot be read ({why})")
+            self.findings.add(code, name, "", f"cannot be read ({why})")
             return None
         self.files += 1
         self.bytes += len(data)
@@ -92,7 +92,7 @@ class _Check:
             document = schemas.parse(data)
             schemas.check(document, schemas.CAMPUS)
         except schemas.ShapeError as fault:
-            self.found.add("PTM-D821", INDEX, fault.place, fault.message)
+            self.findings.add("PTM-D821", INDEX, fault.place, fault.message)
             return
         campus = Campus.from_document(document)
         self._names(campus)
@@ -105,7 +105,7 @@ class _Check:
         self._unlisted({INDEX, *campus.files()})
 
     def _names(self, campus: Campus) -> None:
-        at = self.found.at(INDEX)
+        at = self.findings.at(INDEX)
         listed = [m.file for o in campus.objects for m in o.meshes]
         listed += [t.file for t in campus.textures]
         for what, names in (
@@ -122,7 +122,7 @@ class _Check:
                 at.add("PTM-D825", f"{t.file} is not called after its base", f"textures[{place}]")
 
     def _sums(self, campus: Campus, document: Mapping[str, Any]) -> None:
-        at = self.found.at(INDEX)
+        at = self.findings.at(INDEX)
         if document["start"] != campus.start:
             at.add("PTM-D831", f"{document['start']} is not {campus.start}", "start")
         wanted = json.loads(json.dumps([vars(preset) for preset in campus.presets]))
@@ -134,7 +134,7 @@ class _Check:
             at.add("PTM-D831", f"{len(wanted)} presets expected", "presets")
 
     def _textures_there(self, campus: Campus) -> None:
-        at = self.found.at(INDEX)
+        at = self.findings.at(INDEX)
         there = {(t.base, t.size, t.channel) for t in campus.textures}
         used: set[tuple[str, int, str]] = set()
         for place, material in enumerate(campus.materials):
@@ -173,7 +173,7 @@ class _Check:
             at.add(code, f"{texture_file(base, side, channel)} is not used", "textures")
 
     def _object(self, campus: Campus, where: str, each: CampusObject) -> None:
-        at = self.found.at(INDEX, where)
+        at = self.findings.at(INDEX, where)
         low, high = np.array(each.box[:3]), np.array(each.box[3:])
         middle = np.array(each.barycentre)
         if not ((low <= middle) & (middle <= high)).all():
@@ -211,10 +211,10 @@ class _Check:
             return None
         if len(data) != file.bytes:
             longer = "more than " if len(data) > file.bytes else f"{len(data)} bytes, not "
-            self.found.add("PTM-D823", file.file, "", f"{longer}{file.bytes} bytes")
+            self.findings.add("PTM-D823", file.file, "", f"{longer}{file.bytes} bytes")
             return None
         if zlib.crc32(data) != file.crc32:
-            self.found.add("PTM-D823", file.file, "", "its CRC-32 is not the recorded one")
+            self.findings.add("PTM-D823", file.file, "", "its CRC-32 is not the recorded one")
             return None
         return data
 
@@ -227,9 +227,11 @@ class _Check:
         try:
             primitives = read_mesh(data)
         except ValueError as fault:
-            self.found.add("PTM-D826", mesh.file, "", str(fault.args[0] if fault.args else fault))
+            self.findings.add(
+                "PTM-D826", mesh.file, "", str(fault.args[0] if fault.args else fault)
+            )
             return None
-        at = self.found.at(mesh.file)
+        at = self.findings.at(mesh.file)
         if (faces := sum(len(p.triangle) for p in primitives)) != mesh.faces:
             at.add("PTM-D827", f"{faces} faces, not {mesh.faces}")
         numbers = [p.material for p in primitives]
@@ -255,7 +257,7 @@ class _Check:
         if data is None:
             return
         if not data.startswith(b"\xff\xd8\xff"):
-            self.found.add("PTM-D828", texture.file, "", "is no JPEG")
+            self.findings.add("PTM-D828", texture.file, "", "is no JPEG")
             return
         try:
             with pillow_faults():
@@ -265,15 +267,17 @@ class _Check:
         except LimitError:
             raise
         except PtmError as fault:
-            self.found.add("PTM-D828", texture.file, "", fault.message)
+            self.findings.add("PTM-D828", texture.file, "", fault.message)
             return
         if image.size != (texture.size, texture.size):
             width, height = image.size
-            self.found.add("PTM-D828", texture.file, "", f"{width} x {height}, not {texture.size}²")
+            self.findings.add(
+                "PTM-D828", texture.file, "", f"{width} x {height}, not {texture.size}²"
+            )
 
     def _unlisted(self, known: set[str]) -> None:
         for place, _, files in os.walk(self._folder):
             for file in sorted(files):
                 name = (Path(place) / file).relative_to(self._folder).as_posix()
                 if name not in known:
-                    self.found.add("PTM-D824", name, "", "is not listed")
+                    self.findings.add("PTM-D824", name, "", "is not listed")

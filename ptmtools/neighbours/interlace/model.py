@@ -161,10 +161,10 @@ def axes_of(width: int, height: int, smallest: int) -> tuple[Axis, ...]:
 def sizes_of(width: int, height: int, axes: Iterable[Axis]) -> list[tuple[Size, Size]]:
     """(size of its image, size after joining) of each file, given the whole and the axes of its
     steps; the first file first."""
-    found: list[tuple[Size, Size]] = []
+    sizes: list[tuple[Size, Size]] = []
     for axis in reversed(list(axes)):
         joined = width, height
         width, height = (width >> 1, height) if axis == "columns" else (width, height >> 1)
-        found.append(((width, height), joined))
-    found.append(((width, height), (width, height)))
-    return found[::-1]
+        sizes.append(((width, height), joined))
+    sizes.append(((width, height), (width, height)))
+    return sizes[::-1]

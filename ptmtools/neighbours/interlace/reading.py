@@ -294,7 +294,7 @@ def validate_interlaced(folder: Path, limits: Limits = _LIMITS) -> ValidationRep
     ``limits``: for the whole image; beyond them checksums are compared, and nothing is decoded.
     Raises InputError PTM-I820 if there is no interlaced image.
     """
-    found = Findings(CODES)
+    findings = Findings(CODES)
     files = 1
     try:
         size = os.lstat(folder / INDEX).st_size
@@ -303,23 +303,23 @@ def validate_interlaced(folder: Path, limits: Limits = _LIMITS) -> ValidationRep
         if fault.code == "PTM-I820":
             raise
         code = "PTM-D800" if fault.code == "PTM-I824" else _FOUND[fault.code]
-        found.add(code, INDEX, fault.place or "", fault.message)
-        return ValidationReport(found.issues(), files, 0)
-    _check_split(interlaced, found.at(INDEX))
+        findings.add(code, INDEX, fault.place or "", fault.message)
+        return ValidationReport(findings.issues(), files, 0)
+    _check_split(interlaced, findings.at(INDEX))
     decoded = True
     try:
         check_joined(interlaced, len(interlaced.parts), limits, folder)
     except LimitError as fault:
-        found.add("PTM-D807", INDEX, "", fault.message)
+        findings.add("PTM-D807", INDEX, "", fault.message)
         decoded = False
     for part in interlaced.parts:
-        length = _check_part(folder, interlaced, part, decoded, found.at(part.name))
+        length = _check_part(folder, interlaced, part, decoded, findings.at(part.name))
         size += length
         files += length > 0
     named = {INDEX, *(part.name for part in interlaced.parts)}
     for name in sorted(set(os.listdir(folder)) - named):
-        found.add("PTM-D806", name, "", "is not named in interlace.json")
-    return ValidationReport(found.issues(), files, size)
+        findings.add("PTM-D806", name, "", "is not named in interlace.json")
+    return ValidationReport(findings.issues(), files, size)
 
 
 def _check_split(interlaced: Interlaced, at: Place) -> None:

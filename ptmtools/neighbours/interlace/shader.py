@@ -86,11 +86,11 @@ class StepShader:
             self._program["size"].value = (width, height)
             target.use()
             self._drawing.render(self._context.TRIANGLE_STRIP)
-            found = np.frombuffer(drawn.read(), first.dtype)
+            joined = np.frombuffer(drawn.read(), first.dtype)
         finally:
             for thing in (target, drawn, *images):
                 thing.release()
-        return found.reshape(height, width, -1)[:, :, :components].copy()
+        return joined.reshape(height, width, -1)[:, :, :components].copy()
 
     def _texture(self, texels: Texels) -> Any:
         height, width, components = texels.shape

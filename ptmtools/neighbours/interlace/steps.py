@@ -92,7 +92,7 @@ def scaled(image: Rows, width: int, height: int) -> NDArray[Any]:
     across, across_weight = _taps(old_width, width)
     down, down_weight = _taps(old_height, height)
     top = np.iinfo(image.dtype).max
-    found = np.empty((height, width, components), image.dtype)
+    result = np.empty((height, width, components), image.dtype)
     step = max(1, _STRIP_SAMPLES // (width * components))
     for y in range(0, height, step):
         rows = down[y : y + step]
@@ -100,8 +100,8 @@ def scaled(image: Rows, width: int, height: int) -> NDArray[Any]:
         strip = _weighted(np.asarray(image[low:high]).astype(np.float64), top)
         strip = _filtered(strip, rows - low, down_weight[y : y + step], 0)
         strip = _filtered(strip, across, across_weight, 1)
-        found[y : y + step] = np.floor(np.clip(_plain(strip, top), 0, top) + 0.5)
-    return found
+        result[y : y + step] = np.floor(np.clip(_plain(strip, top), 0, top) + 0.5)
+    return result
 
 
 def _taps(old: int, new: int) -> tuple[Ints, Floats]:

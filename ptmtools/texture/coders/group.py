@@ -158,8 +158,8 @@ def fitted(
         row[i] += (row[i] >> share) + ridge
     numerators, determinant = bareiss(rows)
     one = 2 << bits
-    found = [(one * n + determinant) // (2 * determinant) for n in numerators]
-    return np.clip(found, -top, top).astype(np.int64)
+    solution = [(one * n + determinant) // (2 * determinant) for n in numerators]
+    return np.clip(solution, -top, top).astype(np.int64)
 
 
 def bareiss(rows: list[list[int]]) -> tuple[list[int], int]:

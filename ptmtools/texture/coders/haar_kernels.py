@@ -357,11 +357,12 @@ def haar_pass(
                         rows, y, work.gradient[c, now], v[now], ev[now], r1, r2, near, w, a,
                         prediction, activity,
                     )  # fmt: skip
-                found = work.differences[k, c, row]
+                difference = work.differences[k, c, row]
                 if sink is not None:
                     _emit(
-                        found, prediction, activity, classes, CLASSES if k == 2 else zero, residual,
-                        near, sink.symbols[n : n + bw], sink.contexts[n : n + bw], sink.counts,
+                        difference, prediction, activity, classes, CLASSES if k == 2 else zero,
+                        residual, near, sink.symbols[n : n + bw], sink.contexts[n : n + bw],
+                        sink.counts,
                     )  # fmt: skip
                     n += bw
                 if source is not None:
@@ -374,7 +375,7 @@ def haar_pass(
                     escaped = fill_escapes(source.decoded, bw, source.escapes, escaped)
                     if at > source.limit or escaped < 0:
                         return TRUNCATED
-                    _absorb(source.decoded, prediction, residual, near, found)
+                    _absorb(source.decoded, prediction, residual, near, difference)
             if source is not None and y > 0:
                 upper, lower = source.pairs[0, plane], source.pairs[1, plane]
                 if source.tops[plane] > 0:

@@ -115,12 +115,12 @@ def fit_weights(
     residuals = np.zeros((nc, 3, len(y), bw), np.int32)
     for c, (plane, others) in enumerate(zip(plane_order(nc), references(nc), strict=True)):
         means, texels = (ranks[plane].take(one[..., plane]) for one in rows)
-        for k, (coefficient, found) in enumerate(_coefficients(means, texels)):
-            samples = np.stack([*found, *residuals[:others, k], coefficient], dtype=np.float64)
+        for k, (coefficient, terms) in enumerate(_coefficients(means, texels)):
+            samples = np.stack([*terms, *residuals[:others, k], coefficient], dtype=np.float64)
             samples = samples.reshape(-1, coefficient.size)
             features = samples[:-1]
             # Whole numbers, the sums of their products below 2^50.
-            weighted = features * _SLOPE_WEIGHTS.take(np.abs(found[0])).reshape(-1)
+            weighted = features * _SLOPE_WEIGHTS.take(np.abs(terms[0])).reshape(-1)
             own = fitted(weighted @ samples.T, 8, WEIGHT_TOP, ridge=4096, share=16)
             weights[c, k, sent[c, k]] = own
             predicted = np.floor((own @ features + 128) / 256)

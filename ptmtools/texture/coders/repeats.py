@@ -46,19 +46,19 @@ def find(level: Bytes, below: Bytes) -> Sink:
     return sink
 
 
-def new_texels(found: Sink) -> int:
+def new_texels(sink: Sink) -> int:
     """Texels that were not among the guesses, of the first three of each block."""
     from ptmtools.texture.coders.repeats_blocks import GUESS, TEXEL
     from ptmtools.texture.coders.repeats_kernels import DIFFERENCES
 
-    blocks = found.counts[GUESS:TEXEL, DIFFERENCES].sum()
-    texels = found.counts[TEXEL : TEXEL + 36, 5].sum()
+    blocks = sink.counts[GUESS:TEXEL, DIFFERENCES].sum()
+    texels = sink.counts[TEXEL : TEXEL + 36, 5].sum()
     return int(3 * blocks + texels)
 
 
-def write(found: Sink) -> bytes:
+def write(sink: Sink) -> bytes:
     """The group of these symbols."""
-    return b"".join(encode_symbols(found, len(found.counts), tables.built_in()))
+    return b"".join(encode_symbols(sink, len(sink.counts), tables.built_in()))
 
 
 def decode(data: bytes | memoryview, below: Bytes, shape: tuple[int, int, int]) -> Bytes:

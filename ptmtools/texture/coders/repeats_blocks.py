@@ -136,14 +136,14 @@ def texel_slot(
 @kernel
 def known(texel: Any, seen: Any, w: Any, n: Any, nw: Any, ne: Any) -> Any:
     """Number of the first guess that is the texel; 5 for none."""
-    found = 4 if texel == ne else 5
+    rank = 4 if texel == ne else 5
     if texel == nw:
-        found = 3
+        rank = 3
     if texel == n:
-        found = 2
+        rank = 2
     if texel == w:
-        found = 1
-    return 0 if texel == seen else found
+        rank = 1
+    return 0 if texel == seen else rank
 
 
 @kernel
@@ -152,21 +152,21 @@ def seen_texel(
     state: Any,
 ) -> Any:  # fmt: skip
     """A texel that is one of five guesses, or `OTHER`."""
-    found = known(texel, seen, w, n, nw, ne)
+    rank = known(texel, seen, w, n, nw, ne)
     if w == n:
         context += 1
     if (seen == w) | (seen == n):
         context += 2
-    found = symbol(found, context, sink, source, state)
+    rank = symbol(rank, context, sink, source, state)
     if source is not None:
-        texel = nw if found == 3 else ne
-        if found == 2:
+        texel = nw if rank == 3 else ne
+        if rank == 2:
             texel = n
-        if found == 1:
+        if rank == 1:
             texel = w
-        if found == 0:
+        if rank == 0:
             texel = seen
-    return texel if found < 5 else OTHER
+    return texel if rank < 5 else OTHER
 
 
 @kernel
@@ -275,12 +275,12 @@ def texel(
     context: Any, order: Any, weights: Any, classes: Any, sink: Any, source: Any, state: Any,
 ) -> Any:  # fmt: skip
     """p, q or r of a block."""
-    found = seen_texel(wanted, seen, w, n, nw, ne, context, sink, source, state)
-    if found == OTHER:
-        found = _samples(
+    result = seen_texel(wanted, seen, w, n, nw, ne, context, sink, source, state)
+    if result == OTHER:
+        result = _samples(
             wanted, mean, w, n, nw, ne, position, order, weights, classes, sink, source, state
         )
-    return found
+    return result
 
 
 @kernel
@@ -383,9 +383,9 @@ def edge_texel(
     """A texel that belongs to no block; a new one sample by sample, less the median of W, N and
     W + N - NW.
     """
-    found = seen_texel(texel, seen, w, n, nw, nw, TEXEL + 48, sink, source, state)
-    if found != OTHER:
-        return found
+    result = seen_texel(texel, seen, w, n, nw, nw, TEXEL + 48, sink, source, state)
+    if result != OTHER:
+        return result
     out = np.uint64(0)
     for c in range(components):
         at = np.uint64(8 * c)

@@ -225,7 +225,7 @@ def repeats_pass(
                 context += 2
             slot_p = texel_slot(mean, K0, w0, K2, n0, K3, nw, K4, n1, K5, shift)
             slot_q, slot_r, slot_s = slot_p, slot_p, slot_p
-            found = DIFFERENCES
+            choice = DIFFERENCES
             if sink is not None:
                 p, q, r, s = block
                 slot_q = texel_slot(mean, K1, p, K2, n1, K3, n0, K4, ne, K5, shift)
@@ -235,7 +235,7 @@ def repeats_pass(
                 familiar += 1 if known(q, np.uint64(seen[slot_q]), p, n1, n0, ne) < 5 else 0
                 familiar += 1 if known(r, np.uint64(seen[slot_r]), w1, p, w0, q) < 5 else 0
                 if familiar * order.size >= SMOOTH_KNOWN or spread(block, order.size) >= ROUGH:
-                    found = TEXELS
+                    choice = TEXELS
                 for i in range(2, -1, -1):
                     guess = flat
                     if places[i] > 0:
@@ -243,22 +243,22 @@ def repeats_pass(
                         if i == 2:
                             guess = shifted(guess, change)
                     if same(block, guess):
-                        found = i
-            found = symbol(found, context, sink, source, state)
+                        choice = i
+            choice = symbol(choice, context, sink, source, state)
             slots[1, b] = here + one
             slots[2, c] = here + one
             slots[3, d] = here + one
             slots[4, d] = mean
-            if found < GUESSES:
-                if source is not None and places[found] > 0:
-                    block = block_at(texels, places[found] - one, wide)
-                    if found == 2:
+            if choice < GUESSES:
+                if source is not None and places[choice] > 0:
+                    block = block_at(texels, places[choice] - one, wide)
+                    if choice == 2:
                         block = shifted(block, change)
             else:
                 before = 1
                 outcome[x] = 1
                 p, q, r, s = block
-                if found == TEXELS:
+                if choice == TEXELS:
                     context = TEXEL + 4 * near
                     p = texel(
                         _P, p, np.uint64(seen[slot_p]), mean, w0, n0, nw, n1, context, order,

@@ -166,13 +166,13 @@ def fit_weights(work: NDArray[np.uint32], level: NDArray[np.uint32], max_error: 
             neighbours, target = sample.of(k)
             f = np.stack([*neighbours, *errors[:others, k]])
             candidates = [_solve(f, target, LEAST_SPREAD + max_error), *_continuations(len(f))]
-            found = [target - _predicted(w, f) for w in candidates]
-            costs = [_cost(one) for one in found]
+            residuals_of = [target - _predicted(w, f) for w in candidates]
+            costs = [_cost(one) for one in residuals_of]
             # The others have to be better by a sixteenth of a bit each.
             costs[0] -= target.size // 16
             best = costs.index(min(costs))
             weights[c, k, : len(f)] = candidates[best]
-            errors[c, k] = _rounded(found[best], rough)
+            errors[c, k] = _rounded(residuals_of[best], rough)
     return weights
 
 

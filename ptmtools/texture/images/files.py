@@ -84,9 +84,9 @@ def check_image(source: bytes, limits: Limits = _LIMITS) -> None:
     """Raises what `read_image` would raise, without unpacking texels: for an image that Pillow has
     decoded already."""
     file = cast("BinaryIO", io.BytesIO(source))
-    found = _opened(file, None, limits)
-    if isinstance(found, Picture):
-        _check_depth(found)
+    opened = _opened(file, None, limits)
+    if isinstance(opened, Picture):
+        _check_depth(opened)
 
 
 def _check_depth(picture: Picture) -> None:
@@ -113,11 +113,11 @@ def read_ptm(path: str | os.PathLike[str]) -> bytes:
 def _load(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
     from ptmtools.texture.images.opening import pillow_faults
 
-    found = _opened(file, path, limits)
-    if isinstance(found, Picture):
-        return found
+    result = _opened(file, path, limits)
+    if isinstance(result, Picture):
+        return result
     with pillow_faults():
-        return found()
+        return result()
 
 
 def _opened(file: BinaryIO, path: str | None, limits: Limits) -> Picture | Callable[[], Picture]:
@@ -229,8 +229,8 @@ Writer = Callable[[IO[bytes], "Samples", Description], object]
 
 def writer(suffix: str) -> Writer:
     """What writes files of that suffix. Raises OutputError PTM-O101."""
-    found = WRITTEN.get(suffix.lower())
-    if found is None:
+    writer = WRITTEN.get(suffix.lower())
+    if writer is None:
         lossy = suffix.lower() in LOSSY
         why = "is lossy and would change the texels" if lossy else "is not written"
         raise OutputError(
@@ -238,7 +238,7 @@ def writer(suffix: str) -> Writer:
             f"the suffix {suffix!r} {why}",
             remedy=f"use one of {', '.join(WRITTEN)}",
         )
-    module, name = found
+    module, name = writer
     write: Writer = getattr(import_module(f"ptmtools.texture.images.{module}"), name)
     return write
 

@@ -173,8 +173,8 @@ def orientation_of(exif: Callable[[], Exif]) -> int:
     """The orientation, 1 to 8, in what ``exif`` makes; 1 where it has none, or an impossible one
     (some cameras write 0), or cannot be parsed: the texels are no worse for it."""
     try:
-        found = exif().get(ORIENTATION, 1)
-        return int(found) if found in range(1, 9) else 1
+        orientation = exif().get(ORIENTATION, 1)
+        return int(orientation) if orientation in range(1, 9) else 1
     except Exception:  # a malformed block can make Pillow's parser raise nearly anything
         return 1
 

@@ -87,12 +87,12 @@ class Strips:
     def __getitem__(self, rows: slice) -> Samples:
         height, width, components = self.shape
         start, stop, _ = rows.indices(height)
-        found = np.empty((max(0, stop - start), width, components), self.dtype)
+        result = np.empty((max(0, stop - start), width, components), self.dtype)
         step = max(1, _STRIP_TEXELS // width)
         for y in range(start, stop, step):
             end = min(y + step, stop)
-            found[y - start : end - start] = self.make(y, end)
-        return found
+            result[y - start : end - start] = self.make(y, end)
+        return result
 
 
 def raster(

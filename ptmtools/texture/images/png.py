@@ -116,16 +116,16 @@ def _filtered(image: NDArray[np.uint16]) -> Iterator[bytes]:
         here, left = padded[1:, texel:], padded[1:, :-texel]
         above, corner = padded[:-1, texel:], padded[:-1, :-texel]
         mean = (left.astype(np.uint16) + above) >> 1
-        found = np.stack(
+        filtered = np.stack(
             [here, here - left, here - above, here - mean, here - _paeth(left, above, corner)],
             dtype=np.uint8,
             casting="unsafe",
         )
-        cost = np.abs(found.view(np.int8).astype(np.int16)).sum(axis=2)
+        cost = np.abs(filtered.view(np.int8).astype(np.int16)).sum(axis=2)
         best = cost.argmin(axis=0)
         out = np.empty((len(here), 1 + width * texel), np.uint8)
         out[:, 0] = best
-        out[:, 1:] = found[best, np.arange(len(here))]
+        out[:, 1:] = filtered[best, np.arange(len(here))]
         yield out.tobytes()
 
 

@@ -74,8 +74,8 @@ def encode_tile(
             predictor=PREDICTORS[level.dtype.itemsize],
             bitspersample=8 * level.dtype.itemsize,
         )
-        found = codecs.jpeg8_decode(jpeg).reshape(texels.shape)
-        if not np.array_equal(found, texels):
+        decoded = codecs.jpeg8_decode(jpeg).reshape(texels.shape)
+        if not np.array_equal(decoded, texels):
             return Tile(plain, level)
         parts += [len(jpeg).to_bytes(_LENGTH, "little"), bytes(jpeg)]
     coded = b"".join(parts)
@@ -137,12 +137,12 @@ def _decoded(codecs: Any, jpeg: bytes, like: Samples) -> Samples:
     """The image in a JPEG, which has to have this size and type. Raises InputError PTM-I112."""
     _check_frame(jpeg, like)
     try:
-        found: Samples = codecs.jpeg8_decode(jpeg)
+        decoded: Samples = codecs.jpeg8_decode(jpeg)
     except (RuntimeError, ValueError) as error:
         raise damaged(f"its JPEG is damaged ({error})") from None
-    if found.dtype != like.dtype or found.size != like.size:
+    if decoded.dtype != like.dtype or decoded.size != like.size:
         raise damaged("its JPEG is of another size")
-    return found.reshape(like.shape)
+    return decoded.reshape(like.shape)
 
 
 def _check_frame(jpeg: bytes, like: Samples) -> None:

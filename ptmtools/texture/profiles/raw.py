@@ -118,8 +118,8 @@ def place_last(
     unsigned = np.dtype(f"u{level.dtype.itemsize}")
     escaped = codes == ESCAPE
     difference = codes.astype(unsigned)
-    found = _unpack_numbers(escapes, int(escaped.sum()), 8 * unsigned.itemsize)
-    difference[escaped] = found.astype(unsigned) + unsigned.type(ESCAPE)
+    numbers = _unpack_numbers(escapes, int(escaped.sum()), 8 * unsigned.itemsize)
+    difference[escaped] = numbers.astype(unsigned) + unsigned.type(ESCAPE)
     difference = (difference >> 1) ^ -(difference & 1)
     s[:] = from_ordered(_formula(p, q, r, below) + difference, level.dtype)
 
