@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ptmtools.lazy import names
+from ptmtools.lazy import lazy_exports
 from ptmtools.version import __version__ as __version__
 
 if TYPE_CHECKING:
@@ -72,4 +72,29 @@ if TYPE_CHECKING:
     from ptmtools.visibility.options import PvsOptions as PvsOptions
     from ptmtools.visibility.pvs import compute_pvs as compute_pvs
 
-__getattr__ = names(__name__)
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "ptmtools.cells": "Cells SubdivideOptions subdivide",
+        "ptmtools.coverage.ach": "compute_ach",
+        "ptmtools.coverage.model": "Ach",
+        "ptmtools.coverage.options": "AchOptions",
+        "ptmtools.diagnostics": "ValidationReport",
+        "ptmtools.errors": (
+            "CheckError DatabaseError InputError LimitError MissingComponentError OutputError "
+            "PtmError"
+        ),
+        "ptmtools.output": "EmitOptions PlotOptions emit plot_plan",
+        "ptmtools.pipeline": "Artifacts BuildReport TextureOptions build_scene run_stage validate",
+        "ptmtools.scene": "IngestOptions Scene ingest",
+        "ptmtools.store.folder": "DatabaseFolder",
+        "ptmtools.texture": (
+            "Description EncodeOptions Limits Picture PtmHeader PtmReader decode encode "
+            "encode_to load_image read_header read_image write_image"
+        ),
+        "ptmtools.texture.reader": "open",
+        "ptmtools.visibility.model": "Pvs",
+        "ptmtools.visibility.options": "PvsOptions",
+        "ptmtools.visibility.pvs": "compute_pvs",
+    },
+)

@@ -25,7 +25,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from os import PathLike, fspath
+
+
+@dataclass(frozen=True)
+class Rebuild:
+    """A remedy that is a build of the database: a text with {} in the place of the command."""
+
+    text: str
+    command: str = "ptm build-scene"
+
+    def __str__(self) -> str:
+        return self.text.format(f"`{self.command}`")
 
 
 class PtmError(Exception):
@@ -41,6 +53,7 @@ class PtmError(Exception):
     """
 
     exit_status = 1
+    remedy: str | Rebuild | None
 
     def __init__(
         self,
@@ -49,7 +62,7 @@ class PtmError(Exception):
         *,
         file: str | PathLike[str] | None = None,
         place: str | None = None,
-        remedy: str | None = None,
+        remedy: str | Rebuild | None = None,
     ) -> None:
         self.code = code
         self.message = message

@@ -1,15 +1,13 @@
-"""What is imported when it is first used, so that ``ptm --help`` is instant.
+"""Imports at the first use, so that ``ptm --help`` is instant.
 
-A package imports its names for type checkers only, and takes what `names` makes of that for its
-``__getattr__`` (PEP 562). A table says by `Lazy` where the function lives that does something.
+`Lazy` is a function in a table of declarations; `lazy_exports` are the names of a package.
 """
 
 from __future__ import annotations
 
-import ast
 import builtins
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Generic, TypeVar, cast
@@ -26,38 +24,35 @@ class Lazy(Generic[T]):
     place: str
 
     def load(self) -> T:
-        """What it stands for; imports the module."""
+        """The object; imports its module."""
         module, _, name = self.place.partition(":")
         return cast(T, getattr(import_module(module), name))
 
 
-def names(package: str) -> Callable[[str], Any]:
-    """The ``__getattr__`` of a package that imports what it offers ``if TYPE_CHECKING``, each name
-    as itself: ``from ptmtools.scene.ingestion import ingest as ingest``.
+def lazy_exports(package: str, table: Mapping[str, str]) -> Callable[[str], Any]:
+    """The ``__getattr__`` of a package (PEP 562) whose names are imported when they are first used.
 
-    They are its ``__all__`` too, but for those that Python itself has.
+    ``table`` is module → its names, separated by blanks. They become the package's ``__all__``,
+    without those of built-in functions. For type checkers the package imports the same names ``if
+    TYPE_CHECKING``.
     """
-    module: Any = sys.modules[package]
-    source = module.__loader__.get_source(package)
-    if source is None:
-        raise ImportError(f"{package} cannot be used without its source files")
-    statements = ast.walk(ast.parse(source))
-    imports = [node for node in statements if isinstance(node, ast.ImportFrom)]
-    home = {a.name: node.module for node in imports for a in node.names if a.name == a.asname}
-    module.__all__ = sorted(name for name in home if not hasattr(builtins, name))
+    home = {name: module for module, names in table.items() for name in names.split()}
+    sys.modules[package].__all__ = sorted(  # type: ignore[attr-defined]
+        name for name in home if not hasattr(builtins, name)
+    )
 
     def attribute(name: str) -> Any:
         if name not in home:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        return getattr(import_module(str(home[name])), name)
+        return getattr(import_module(home[name]), name)
 
     return attribute
 
 
 def component(module: str, code: str, message: str, extra: str) -> Any:
-    """A module that is an optional component, of the extra of that name.
+    """A module of an optional dependency, which the extra of that name installs.
 
-    Raises MissingComponentError with that code and message where it is not installed.
+    Raises MissingComponentError with the code and message if it is not installed.
     """
     try:
         return import_module(module)

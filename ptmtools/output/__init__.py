@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ptmtools.lazy import names
+from ptmtools.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from ptmtools.output.emission import emit as emit
@@ -23,4 +23,14 @@ if TYPE_CHECKING:
         validate_ptm as validate_ptm,
     )
 
-__getattr__ = names(__name__)
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "ptmtools.output.emission": "emit",
+        "ptmtools.output.model": (
+            "EmitOptions EmitReport GivenViewpoint PlotOptions PlotReport TextureRecord Viewpoint"
+        ),
+        "ptmtools.output.plan": "plot_plan",
+        "ptmtools.output.validation.database": "validate_database validate_ptm",
+    },
+)

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ptmtools import schemas
 from ptmtools.arrays import Bools, Floats, Ints, normals
-from ptmtools.errors import DatabaseError
+from ptmtools.errors import DatabaseError, Rebuild
 from ptmtools.files import open_regular
 from ptmtools.output.gltf import WRAPS
 from ptmtools.output.gltf_reader import ReadGlb, ReadPrimitive, read_glb
@@ -133,7 +133,7 @@ def _pairs(corner: Floats, among: Ints) -> tuple[Ints, Ints]:
 FORM = "gltf"
 #: Bytes that a gzip file has more than a zlib stream.
 _GZIP_MORE = 12
-BUILD = "build it again with `ptm build-scene`"
+BUILD = Rebuild("build it again with {}")
 
 Document = Mapping[str, Any]
 

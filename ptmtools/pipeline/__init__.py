@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ptmtools.lazy import names
+from ptmtools.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from ptmtools.pipeline.build import (
@@ -26,4 +26,14 @@ if TYPE_CHECKING:
     )
     from ptmtools.pipeline.validation import shoot_segments as shoot_segments, validate as validate
 
-__getattr__ = names(__name__)
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "ptmtools.pipeline.build": "StagePlan build_scene plan_build run_stage",
+        "ptmtools.pipeline.options": "TextureOptions",
+        "ptmtools.pipeline.report": "BuildReport StageReport",
+        "ptmtools.pipeline.run": "Artifacts",
+        "ptmtools.pipeline.status": "DatabaseStatus StageStatus database_status",
+        "ptmtools.pipeline.validation": "shoot_segments validate",
+    },
+)

@@ -5,16 +5,17 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
-from ptmtools.errors import DatabaseError
+from ptmtools.errors import DatabaseError, Rebuild
 from ptmtools.files import open_regular
 from ptmtools.options import arguments
 from ptmtools.pipeline.stages import STAGES
 from ptmtools.store.folder import DatabaseFolder, read_manifest
 from ptmtools.store.layout import MANIFEST
-from ptmtools.store.manifest import BUILD, StageRecord, listed_before
+from ptmtools.store.manifest import StageRecord, listed_before
 
 
 def build_command(db: str | PathLike[str]) -> str:
@@ -31,13 +32,13 @@ def build_command(db: str | PathLike[str]) -> str:
 
 @contextmanager
 def naming_command(db: str | PathLike[str]) -> Iterator[None]:
-    """Errors of the store know a database but not what its options mean: where one advises to
-    build, this puts the whole command in."""
+    """Completes the command of a `Rebuild` remedy by the model and the options of the database,
+    which the raising module does not know."""
     try:
         yield
     except DatabaseError as fault:
-        if fault.remedy and BUILD in fault.remedy:
-            fault.remedy = fault.remedy.replace(BUILD, f"`{build_command(db)}`")
+        if isinstance(fault.remedy, Rebuild):
+            fault.remedy = replace(fault.remedy, command=build_command(db))
         raise
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ptmtools.lazy import names
+from ptmtools.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from ptmtools.scene.ingestion import ingest as ingest
@@ -22,4 +22,11 @@ if TYPE_CHECKING:
     )
     from ptmtools.scene.options import IngestOptions as IngestOptions
 
-__getattr__ = names(__name__)
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "ptmtools.scene.ingestion": "ingest",
+        "ptmtools.scene.model": "Camera Material Note Scene SourceImage Space",
+        "ptmtools.scene.options": "IngestOptions",
+    },
+)

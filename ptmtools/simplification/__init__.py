@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ptmtools.lazy import names
+from ptmtools.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from ptmtools.simplification.model import (
@@ -18,4 +18,10 @@ if TYPE_CHECKING:
     )
     from ptmtools.simplification.simplification import simplify as simplify
 
-__getattr__ = names(__name__)
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "ptmtools.simplification.model": "Mesh Simplified SimplifyOptions",
+        "ptmtools.simplification.simplification": "simplify",
+    },
+)

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal
 from urllib.parse import quote, unquote
 
-from ptmtools.errors import DatabaseError, InputError, LimitError, naming
+from ptmtools.errors import DatabaseError, InputError, LimitError, Rebuild, naming
 from ptmtools.files import open_regular
 from ptmtools.options import option
 from ptmtools.output.emission import compressed
@@ -33,7 +33,6 @@ from ptmtools.pipeline.stages.emit import EMIT
 from ptmtools.progress import Progress, silent
 from ptmtools.store.folder import DatabaseFolder, damaged, unreadable
 from ptmtools.store.layout import SERVED, sha256
-from ptmtools.store.manifest import BUILD
 
 FORMAT = "ptmtools site"
 INDEX, DATA = "index.html", "data"
@@ -224,7 +223,7 @@ class _Builder:
                     "PTM-D901",
                     "was built by an earlier release: its hints lack what the page needs",
                     file=self._folder.path,
-                    remedy=f"run {BUILD}",
+                    remedy=Rebuild("run {}"),
                 )
             file, digest = self._place(row["file"])
             texture = web_texture(file, row)

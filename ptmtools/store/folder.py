@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ptmtools.errors import DatabaseError
+from ptmtools.errors import DatabaseError, Rebuild
 from ptmtools.files import open_regular
 from ptmtools.store.digests import Digests
 from ptmtools.store.layout import MANIFEST, arrays_of, sha256
-from ptmtools.store.manifest import BUILD, Manifest, StageRecord, damaged_manifest
+from ptmtools.store.manifest import Manifest, StageRecord, damaged_manifest
 
 if TYPE_CHECKING:
     import numpy as np
@@ -66,7 +66,7 @@ class DatabaseFolder:
                 "PTM-D004",
                 f"the {stage} stage has not been run, this command needs it",
                 file=self.path,
-                remedy=f"run {BUILD} first",
+                remedy=Rebuild("run {} first"),
             )
         return record
 
@@ -128,8 +128,7 @@ def damaged(file: Path, what: str) -> DatabaseError:
 
 
 def _unusable(code: str, message: str, file: Path) -> DatabaseError:
-    remedy = f"run {BUILD} again to rebuild it"
-    return DatabaseError(code, message, file=file, remedy=remedy)
+    return DatabaseError(code, message, file=file, remedy=Rebuild("run {} again to rebuild it"))
 
 
 def read_manifest(folder: Path) -> Manifest | None:

@@ -28,15 +28,12 @@ from os import PathLike
 from typing import Any, NamedTuple
 
 from ptmtools import schemas
-from ptmtools.errors import DatabaseError
+from ptmtools.errors import DatabaseError, Rebuild
 from ptmtools.files import leads_inside
 from ptmtools.store.layout import WRITTEN
 
 FORMAT = "ptmtools database"
 SCHEMA = 2
-#: What the remedies of the store's errors call the command that builds a database; who knows the
-#: options puts the whole of it in its place.
-BUILD = "`ptm build-scene`"
 
 #: Lists and objects may be nested this deep at most.
 _DEEPEST = 16
@@ -110,12 +107,13 @@ class Manifest:
                 "PTM-D001", "not a ptmtools database", file=file, remedy="give a database folder"
             )
         if document.get("schema") != SCHEMA:
-            anew = f"build it again with {BUILD}, or " if listed_before(data) else ""
             raise DatabaseError(
                 "PTM-D003",
                 f"schema version {document.get('schema')!r}, this ptmtools reads {SCHEMA}",
                 file=file,
-                remedy=f"{anew}use the ptmtools that wrote it",
+                remedy=Rebuild("build it again with {}, or use the ptmtools that wrote it")
+                if listed_before(data)
+                else "use the ptmtools that wrote it",
             )
         try:
             schemas.check(document, schemas.MANIFEST)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ptmtools.lazy import names
+from ptmtools.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from ptmtools.texture.container import read_header as read_header, whole_levels as whole_levels
@@ -35,4 +35,14 @@ if TYPE_CHECKING:
         open as open,
     )
 
-__getattr__ = names(__name__)
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "ptmtools.texture.container": "read_header whole_levels",
+        "ptmtools.texture.encoder": "encode encode_to",
+        "ptmtools.texture.images": "Picture load_image read_image read_ptm write_image",
+        "ptmtools.texture.model": "Description EncodeOptions Level Limits PtmHeader",
+        "ptmtools.texture.pyramid": "build_pyramid",
+        "ptmtools.texture.reader": "PtmReader check decode decode_levels open",
+    },
+)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ptmtools.lazy import names
+from ptmtools.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from ptmtools.visibility.model import Pvs as Pvs
@@ -19,4 +19,12 @@ if TYPE_CHECKING:
         check_conservative as check_conservative,
     )
 
-__getattr__ = names(__name__)
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "ptmtools.visibility.model": "Pvs",
+        "ptmtools.visibility.options": "PvsOptions",
+        "ptmtools.visibility.pvs": "compute_pvs",
+        "ptmtools.visibility.segments": "MissedPair SegmentReport check_conservative",
+    },
+)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import math
 import re
@@ -159,6 +160,25 @@ def test_the_public_names_are_there() -> None:
         assert getattr(ptmtools, name) is not None
     with pytest.raises(AttributeError, match="frobnicate"):
         ptmtools.frobnicate  # noqa: B018
+
+
+def test_packages_name_the_same_for_type_checkers_and_at_run_time() -> None:
+    """The table of `lazy_exports` has the imports ``if TYPE_CHECKING``."""
+    packages = list(Path(ptmtools.__file__).parent.rglob("__init__.py"))
+    found = 0
+    for package in packages:
+        tree = ast.parse(package.read_text("utf-8"))
+        tables = [
+            ast.literal_eval(node.args[1])
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "lazy_exports"
+        ]
+        found += len(tables)
+        if tables:
+            (checked,) = [node for node in tree.body if isinstance(node, ast.If)]
+            imports = [node for node in checked.body if isinstance(node, ast.ImportFrom)]
+            assert tables[0] == {n.module: " ".join(a.name for a in n.names) for n in imports}
+    assert found > 10
 
 
 def test_numbers_for_people() -> None:

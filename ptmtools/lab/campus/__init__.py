@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ptmtools.lazy import names
+from ptmtools.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from ptmtools.lab.campus.client import CampusClient as CampusClient
@@ -27,4 +27,13 @@ if TYPE_CHECKING:
         prepare_campus as prepare_campus,
     )
 
-__getattr__ = names(__name__)
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "ptmtools.lab.campus.client": "CampusClient",
+        "ptmtools.lab.campus.options": "CampusWalkOptions",
+        "ptmtools.lab.campus.simulation": "CampusRun simulate_campus walk_campus",
+        "ptmtools.lab.campus.stock": "Stock read_stock",
+        "ptmtools.lab.campus.world": "CampusWorld prepare_campus",
+    },
+)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ptmtools.lazy import names
+from ptmtools.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from ptmtools.neighbours.apo.files import (
@@ -20,4 +20,11 @@ if TYPE_CHECKING:
     from ptmtools.neighbours.apo.making import Made as Made, make_apo as make_apo
     from ptmtools.neighbours.apo.model import ApoOptions as ApoOptions, Octree as Octree
 
-__getattr__ = names(__name__)
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "ptmtools.neighbours.apo.files": "files_of read_mesh read_octree",
+        "ptmtools.neighbours.apo.making": "Made make_apo",
+        "ptmtools.neighbours.apo.model": "ApoOptions Octree",
+    },
+)

@@ -311,8 +311,7 @@ def _octree(
         )
     except LimitError as fault:
         fault.place = name
-        if fault.remedy:
-            fault.remedy = fault.remedy.replace("--", "--apo-")
+        fault.remedy = "give a greater --apo-error, a smaller --apo-depth or --apo-density"
         raise
     faces = len(part.triangles)
     return ReplacedObject(number, name, octree, len(own), faces, simplified.error, missed)

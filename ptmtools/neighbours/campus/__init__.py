@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ptmtools.lazy import names
+from ptmtools.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from ptmtools.neighbours.campus.building import Made as Made, make_campus as make_campus
@@ -20,4 +20,12 @@ if TYPE_CHECKING:
     from ptmtools.neighbours.campus.options import CampusOptions as CampusOptions
     from ptmtools.neighbours.campus.reading import read_campus as read_campus
 
-__getattr__ = names(__name__)
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "ptmtools.neighbours.campus.building": "Made make_campus",
+        "ptmtools.neighbours.campus.model": "Campus distances shader",
+        "ptmtools.neighbours.campus.options": "CampusOptions",
+        "ptmtools.neighbours.campus.reading": "read_campus",
+    },
+)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ptmtools.lazy import names
+from ptmtools.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from ptmtools.neighbours.interlace.model import (
@@ -30,4 +30,13 @@ if TYPE_CHECKING:
         write_folder as write_folder,
     )
 
-__getattr__ = names(__name__)
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "ptmtools.neighbours.interlace.model": "Axis Interlaced InterlaceOptions Part",
+        "ptmtools.neighbours.interlace.reading": "deinterlace read_manifest validate_interlaced",
+        "ptmtools.neighbours.interlace.shader": "StepShader",
+        "ptmtools.neighbours.interlace.steps": "join split",
+        "ptmtools.neighbours.interlace.writing": "interlace write_folder",
+    },
+)
