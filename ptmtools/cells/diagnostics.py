@@ -3,7 +3,7 @@ reach."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -153,6 +153,23 @@ def of_triangles(scene: Scene, pieces: Pieces, owner: NDArray[np.int32]) -> list
     nowhere[pieces.source[np.any(owner >= 0, axis=1)]] = False
     lost = int(np.count_nonzero(nowhere))
     return [f"{lost} triangles lie outside all cells, where nobody can see them"] * (lost > 0)
+
+
+def of_undecided(undecided: Mapping[str, int]) -> list[str]:
+    """Operations on polygons in a plane that ended in a safe answer, by name (`planar`)."""
+    dull = undecided.get("triangles", 0)
+    notes = [
+        f"{count(dull, 'flat surface')} could not be divided into fewer triangles, and "
+        f"{'keeps its' if dull == 1 else 'keep their'} own"
+    ] * (dull > 0)
+    overlays = {name: n for name, n in sorted(undecided.items()) if n and name != "triangles"}
+    if overlays:
+        listed = ", ".join(count(n, name) for name, n in overlays.items())
+        notes.append(
+            f"{count(sum(overlays.values()), 'operation')} on polygons in a plane ({listed}) had "
+            "no exact result; walls there may hide less than in the model, never more"
+        )
+    return notes
 
 
 def _place(room: CutOff) -> str:

@@ -4,6 +4,7 @@ The leaves that are reached, as cells: geometry, portals, and where somebody can
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
@@ -18,6 +19,7 @@ from ptmtools.cells.model import OUTSIDE, Cells, sunk
 from ptmtools.cells.options import SubdivideOptions, Walker
 from ptmtools.cells.ownership import Pieces
 from ptmtools.cells.places import Floors, detail_of, eye_region, find_places, meets
+from ptmtools.cells.planar import counting
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.portals import (
     Portal,
@@ -88,6 +90,8 @@ class Space:
     # `Cells.left_out`
     left_out: Floats = field(default_factory=lambda: np.zeros((0, 3, 3)))
     place: float = 0.0  # m² to stand on in all that is reached, known if something is left out
+    # Operations in a plane that ended in a safe answer, by name (`planar.counting`).
+    undecided: Counter[str] = field(default_factory=Counter)
 
 
 def divide_inside(building: Building, box: Floats) -> Space:
@@ -104,6 +108,12 @@ def divide(
     ------
     InputError: PTM-I301 if a viewpoint lies outside the box.
     """
+    with counting() as undecided:
+        space = _divided(building, root, progress, inside)
+    return replace(space, undecided=undecided)
+
+
+def _divided(building: Building, root: Polyhedron, progress: Progress, inside: bool) -> Space:
     structure, options = building.structure, building.options
     box = np.stack(bounds(root.points))
     planes = building.doors.planes

@@ -127,13 +127,15 @@ def _called_so(scene: Scene, triangles: Ints, slack: float) -> Slabs:
     whole[region] = piece
     fits = _door_sized(flat, slack)
     flat, whole = flat.only(fits), whole[fits]
-    filled = flat.filled() >= FILLED
+    grid = scene.tolerance.grid
+    filled = flat.filled(grid) >= FILLED
     flat, whole = flat.only(filled), whole[filled]
     leaf = _one_leaf(flat, slack)
     faces = np.bincount(leaf)[leaf]
     alone = np.bincount(whole)[whole] == 1 if len(whole) else np.zeros(0, dtype=bool)
     pieces = pieces.only(_door_sized(pieces, slack))
-    return pieces.only(pieces.filled() >= FILLED).joined(flat.only((faces > 1) | alone))
+    pieces = pieces.only(pieces.filled(grid) >= FILLED)
+    return pieces.joined(flat.only((faces > 1) | alone))
 
 
 def _flat(scene: Scene, structure: Structure, which: Ints) -> Slabs:

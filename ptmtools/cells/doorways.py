@@ -17,6 +17,7 @@ import numpy as np
 import shapely
 
 from ptmtools.arrays import Bools, Floats, Ints, cross, normals, summed
+from ptmtools.cells.planar import unite
 from ptmtools.cells.search import ByHeight
 from ptmtools.cells.structure import Structure, Surroundings
 
@@ -148,14 +149,11 @@ class Slabs:
         found: Floats = np.minimum(local.max(axis=1), self.high[one]) - low
         return found
 
-    def filled(self) -> Floats:
-        """(k,) the share of its rectangle, along and up, that each fills."""
+    def filled(self, grid: float) -> Floats:
+        """(k,) the share of its rectangle, along and up, that each fills, united on a ``grid``."""
         flat = np.einsum("nck,nak->nca", self.corners, self.axes[self.group][:, 1:])
-        shapes = shapely.polygons(flat)
-        solid = shapely.area(shapes) > 0
-        shapes, group = shapes[solid], self.group[solid]
-        begin = np.searchsorted(group, np.arange(len(self) + 1))
-        united = [shapely.union_all(shapes[a:b]) for a, b in itertools.pairwise(begin)]
+        begin = np.searchsorted(self.group, np.arange(len(self) + 1))
+        united = [unite(flat[a:b], grid) for a, b in itertools.pairwise(begin)]
         area = self.size[:, 1] * self.size[:, 2]
         share = np.divide(shapely.area(united), area, out=np.zeros(len(self)), where=area > 0)
         return np.asarray(share)

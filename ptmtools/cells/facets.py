@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, cross, normals, summed
 from ptmtools.cells.connectivity import Welded, across_edges, distinct
-from ptmtools.cells.planar import delaunay
+from ptmtools.cells.planar import bounded, count, divided, simplified
 from ptmtools.tolerance import Tolerance, ranked
 
 #: A corner lies in the plane of a region if it is within this share of the on-plane distance.
@@ -112,7 +112,8 @@ class Facets:
         self, chosen: Ints, area: Floats, outline: Bools, tolerance: Tolerance
     ) -> tuple[Floats, Ints]:
         """Triangles (m, 3, 3) of the chosen regions, whose ``area`` these (n, 3) edges outline, and
-        (m,) which of them each is of; none of a region whose outline bounds another area."""
+        (m,) which of them each is of; none of a region whose outline bounds another area,
+        or has no triangulation."""
         if not len(chosen):
             return np.zeros((0, 3, 3)), np.zeros(0, dtype=np.int64)
         at, k = np.nonzero(outline)
@@ -127,28 +128,30 @@ class Facets:
         flat = np.stack(
             [np.einsum("eki,ei->ek", space, u[of]), np.einsum("eki,ei->ek", space, v[of])], axis=2
         )
-        segments = shapely.linestrings(flat)
-        areas = shapely.build_area(shapely.multilinestrings(segments, indices=of))
+        areas = bounded(flat, of)
         straight = _STRAIGHT_SHARE * tolerance.plane
-        areas = shapely.simplify(areas, straight)
+        areas = simplified(areas, straight)
         allowed = straight * shapely.length(areas) + tolerance.rounding * tolerance.extent
         sound = shapely.is_valid(areas) & (np.abs(shapely.area(areas) - area) <= allowed)
         sound_rows = np.flatnonzero(sound)
-        parts, which = shapely.get_parts(delaunay(areas[sound_rows]), return_index=True)
-        which = sound_rows[which]
-        rings = shapely.get_coordinates(parts).reshape(-1, 4, 2)[:, :3]
-        return self._lifted(rings, which, flat, of, space), which
+        rings, which = divided(areas[sound_rows])
+        return self._lifted(rings, sound_rows[which], flat, of, space)
 
-    def _lifted(self, rings: Floats, which: Ints, flat: Floats, of: Ints, space: Floats) -> Floats:
-        """(m, 3, 3) positions of (m, 3, 2) triangles of regions ``which``: those of the ends of
-        edges, ``flat`` and in ``space``, (e, 2, …), of the regions ``of``."""
+    def _lifted(
+        self, rings: Floats, which: Ints, flat: Floats, of: Ints, space: Floats
+    ) -> tuple[Floats, Ints]:
+        """(m, 3, 3) positions of (k, 3, 2) triangles of regions ``which``, those of the ends of
+        edges, ``flat`` and in ``space``, (e, 2, …), of the regions ``of``; and (m,) the region of
+        each. None of a region with a corner where no edge ends: two of its edges cross."""
         known = np.column_stack([np.repeat(of, 2).astype(np.float64), flat.reshape(-1, 2)])
         asked = np.column_stack([np.repeat(which, 3).astype(np.float64), rings.reshape(-1, 2)])
         first, row = distinct(np.concatenate([known, asked]))
         origin = first[row[len(known) :]]
-        assert np.all(origin < len(known)), "a triangulation has new corners"
-        lifted: Floats = space.reshape(-1, 3)[origin].reshape(-1, 3, 3)
-        return lifted
+        fresh = (origin >= len(known)).reshape(-1, 3).any(axis=1)
+        crossed = np.unique(which[fresh])
+        count(["triangles"] * len(crossed))
+        kept = ~np.isin(which, crossed)
+        return space.reshape(-1, 3)[origin.reshape(-1, 3)[kept]], which[kept]
 
 
 def _axes(normal: Floats) -> tuple[Floats, Floats]:

@@ -38,7 +38,15 @@ from ptmtools.arrays import Bools, Floats, Ints, areas, normals, ranges
 from ptmtools.cells.connectivity import Welded
 from ptmtools.cells.facets import Facets
 from ptmtools.cells.options import SubdivideOptions, Walker
-from ptmtools.cells.planar import Geometry, delaunay, difference, intersection
+from ptmtools.cells.planar import (
+    Geometry,
+    buffer,
+    delaunay,
+    difference,
+    intersection,
+    straightened,
+    united_by,
+)
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.portals import FLOOR_COSINE
 from ptmtools.cells.roles import Designated, recognised
@@ -92,21 +100,6 @@ def clear_of(
         plan, half = halves(plan[crowded], tolerance.grid)
         slope, region = slope[crowded][half], region[crowded][half]
     return np.concatenate(left), np.concatenate(whose)
-
-
-def united_by(row: Ints, shapes: Geometry, grid: float) -> tuple[Ints, Geometry]:
-    """(g,) the rows, (n,), that shapes have, ascending, and the union of those of each; none of
-    those only that are as wide as rounding, whose union is empty."""
-    if not len(shapes):
-        return row, shapes
-    order = np.argsort(row, kind="stable")
-    names, first, count = np.unique(row[order], return_index=True, return_counts=True)
-    shapes = shapes[order]
-    united = shapes[first]
-    for i in np.flatnonzero(count > 1):
-        united[i] = shapely.union_all(shapes[first[i] : first[i] + count[i]], grid_size=grid)
-    some = ~shapely.is_empty(united)
-    return names[some], united[some]
 
 
 def _about(
@@ -172,7 +165,7 @@ def _less(
         near = shapely.dwithin(shadow, left[row[each]], (1 - 1e-6) * radius)
         shadow, whose = _merged(shadow[near], row[each[near]], radius, tolerance)
         # One by one: GEOS 3.14 buffers many lines at once with holes where they meet.
-        wide = shapely.buffer(shadow, radius, quad_segs=QUARTER)
+        wide = buffer(shadow, radius, quad_segs=QUARTER)
         names, taken = united_by(whose, wide, tolerance.grid)
         left[names] = difference(left[names], taken, tolerance.grid)
         first, end = end, int(_GROWTH * end) + 1
@@ -262,7 +255,8 @@ def tiled(shapes: Geometry, margin: float, grid: float) -> tuple[Geometry, Geome
         own, half = halves(own[large], grid)
         x0, y0, x1, y1 = shapely.bounds(own).T
         about = shapely.box(x0 - margin, y0 - margin, x1 + margin, y1 + margin)
-        shapes, which = intersection(shapes[large][half], about, grid), which[large][half]
+        shapes, which = shapes[large][half], which[large][half]
+        shapes = intersection(shapes, about, grid, more=True)
 
 
 def halves(shapes: Geometry, grid: float) -> tuple[Geometry, Ints]:
@@ -274,7 +268,7 @@ def halves(shapes: Geometry, grid: float) -> tuple[Geometry, Ints]:
         shapely.box(x0, y0, middle, level),
         shapely.box(np.where(middle < x1, middle, x0), np.where(level < y1, level, y0), x1, y1),
     )
-    both = np.concatenate([intersection(shapes, side, grid) for side in sides])
+    both = np.concatenate([intersection(shapes, side, grid, more=True) for side in sides])
     parts, which = shapely.get_parts(both, return_index=True)
     flat = shapely.area(parts) > 0
     return parts[flat], which[flat] % max(len(shapes), 1)
@@ -317,7 +311,7 @@ class Floors:
         height = self.corners[row, :, 1] + above
         meets = (height.min(axis=1) <= y1[box]) & (height.max(axis=1) >= y0[box])
         box, row = box[meets], row[meets]
-        pieces = intersection(plan[row], areas[box], grid)
+        pieces = intersection(plan[row], areas[box], grid, more=True)
         flat = np.flatnonzero(~shapely.is_empty(pieces))
         order = flat[np.argsort(self.region[row[flat]], kind="stable")]
         return pieces[order], self.region[row[order]]
@@ -352,16 +346,16 @@ def find_places(floors: Floors, structure: Structure, walker: Walker, boxes: Flo
     """Where somebody can stand, the middle of whose body is in one of (m, 2, 3) boxes, metres."""
     tolerance = structure.tolerance
     pieces, region = floors.within(boxes, walker.middle, tolerance.grid)
-    names, plan = united_by(region, pieces, tolerance.grid)
+    names, plan = united_by(region, pieces, tolerance.grid, more=True)
     slope = _slopes(floors)[names]
     body = (walker.step, walker.height)
     plan, whose = clear_of(structure.corners, plan, slope, body, walker.radius, tolerance)
     # A foot is on the uppermost of surfaces one step apart: not on the underside of a slab.
     foot = (2 * tolerance.plane, walker.step)
     plan, which = clear_of(floors.corners, plan, slope[whose], foot, 0.0, tolerance)
-    names, plan = united_by(whose[which], plan, tolerance.grid)
+    names, plan = united_by(whose[which], plan, tolerance.grid, more=True)
     # Less corners on straight edges, and with the rest in an order that does not depend on the way.
-    plan = shapely.simplify(shapely.normalize(plan), tolerance.grid)
+    plan = straightened(shapely.normalize(plan), tolerance.grid)
     return Places(plan, slope[names])
 
 
@@ -421,7 +415,8 @@ def eye_region(places: Places, walker: Walker, tolerance: Tolerance) -> Places:
     inside = walker.radius * np.cos(np.pi / (4 * QUARTER))  # of a circle that is a polygon
     reach = inside - min(2 * tolerance.plane, _SLACK * walker.radius)
     box, plan, which = tiled(places.plan, walker.radius, tolerance.grid)
-    eyes = intersection(shapely.buffer(plan, reach, quad_segs=QUARTER), box, tolerance.grid)
+    wide = buffer(plan, reach, more=True, quad_segs=QUARTER)
+    eyes = intersection(wide, box, tolerance.grid, more=True)
     some = ~shapely.is_empty(eyes)
     return Places(eyes[some], places.slope[which[some]])
 

@@ -1,29 +1,53 @@
-"""Polygons in a plane: union, intersection and difference that rounding cannot lead astray.
+"""Polygons in a plane: union, difference, intersection, buffers and triangles, which never raise.
 
-GEOS overlays in floating point find their own way out of rounding, and now and then the wrong one:
-of two rectangles 1.3 × 2.6 and 1.3 × 2.4 that share three sides, one of them but for 4e-16, GEOS
-3.14 gives a point as the intersection. A wall lost so opens a room, an opening lost so hides one.
-On a grid (snap rounding, exact) this cannot happen; ours is `Tolerance.grid`, a thousandth of what
-counts as rounding. Results hold polygons only: lines and points in which operands touch are
-dropped.
+Every overlay of the package goes through this module, on a grid: ours is `Tolerance.grid`, a
+thousandth of what counts as rounding. GEOS overlays in floating point find their own way out of
+rounding, and now and then the wrong one: of two rectangles 1.3 × 2.6 and 1.3 × 2.4 that share three
+sides, one of them but for 4e-16, GEOS 3.14 gives a point as the intersection. A wall lost so opens
+a room, an opening lost so hides one. On a grid (snap rounding, exact) this cannot happen.
 
-Polygons with holes into as few triangles as they have, and these as plump as possible.
+GEOS still gives up on some operands: polygons that cross themselves, and coordinates so large that
+the grid is finer than their last digit. Such an operation is tried again, alone,
 
-The constrained Delaunay triangulation of GEOS: it uses every corner, also one on a straight edge
-(the neighbour beyond that edge has it too), and makes none. Of 2,000 turned polygons with many such
-corners it divided all without a sliver."""
+1. on coarser grids, up to what counts as rounding, or as far above the last digit of the
+   coordinates;
+2. there, with its operands repaired (`shapely.make_valid`).
+
+If that fails too, the result is a safe answer, and `counting` counts it:
+
+============= ==================================================================================
+union         what could be united, without the smallest of the rest (a wall blocks less); with
+              ``more``, the box around all of it (an opening is wider)
+difference    the first operand (an opening is wider)
+intersection  nothing (a wall proposes no split); with ``more``, what the boxes of the operands
+              share (an opening is wider)
+buffer        the shape itself; with ``more``, the box around it, widened
+triangles     none (a piece is drawn as it is)
+============= ==================================================================================
+
+Results hold polygons only: lines and points in which operands touch are dropped.
+
+Triangulations are the constrained Delaunay ones of GEOS: as few triangles as there are, as plump as
+possible. They use every corner, also one on a straight edge (the neighbour beyond that edge has it
+too), and make none. Of 2,000 turned polygons with many such corners GEOS divided all without a
+sliver.
+"""
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
 import numpy as np
 import shapely
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.cells.connectivity import connected, first_alike
+from ptmtools.cells.connectivity import connected, distinct, first_alike
 from ptmtools.cells.search import along_a_curve
-from ptmtools.tolerance import Tolerance
+from ptmtools.tolerance import GRID_SHARE, ROUNDING_SHARE, Tolerance
 
 #: A shapely geometry, or an array of them.
 Geometry = Any
@@ -31,23 +55,45 @@ Geometry = Any
 _COLLECTION = 7
 #: So many polygons are united at a time.
 _CHUNK = 256
+#: Grids that are tried, in steps of the first: up to the distance that counts as rounding.
+_COARSER = tuple(float(step) for step in np.geomspace(1, ROUNDING_SHARE / GRID_SHARE, 3))
+#: None is finer than so many times the last digit of the coordinates.
+_DIGITS = 4.0
+
+_undecided: ContextVar[Counter[str] | None] = ContextVar("undecided", default=None)
+
+
+@contextmanager
+def counting() -> Iterator[Counter[str]]:
+    """Counts the operations that end in a safe answer, by name (``"union"``, …), until the context
+    ends; contexts inside it count for themselves."""
+    found: Counter[str] = Counter()
+    token = _undecided.set(found)
+    try:
+        yield found
+    finally:
+        _undecided.reset(token)
+
+
+def count(names: Iterable[str] | Mapping[str, int]) -> None:
+    """Adds operations, by name, to those that the innermost `counting` has counted."""
+    if (counter := _undecided.get()) is not None:
+        counter.update(names)
 
 
 def unite(triangles: Floats, grid: float) -> Geometry:
     """Union of (n, 3, 2) triangles of a plane: coplanar overlaps and T-junctions vanish."""
     polygons = shapely.polygons(np.concatenate([triangles, triangles[:, :1]], axis=1))
-    return union(shapely.make_valid(polygons), grid)
+    return union(_sound(polygons), grid)
 
 
-def union(shapes: Geometry, grid: float) -> Geometry:
+def union(shapes: Geometry, grid: float, *, more: bool = False) -> Geometry:
     """Union of an array of polygons, less corners on straight edges.
 
-    Here only the operands are brought to the grid: what would be lost is a wall, which shows too
-    much, never too little, and snap rounding takes the square of the corners on one line (10,000
-    slivers across a wall: 34 s instead of 6 s). For the same reason many polygons are united by
+    Snap rounding takes the square of the corners on one line, so many polygons are united by
     neighbourhoods, each rid of corners on straight edges, and these in turn.
     """
-    polygons = _polygons_in(shapely.set_precision(shapes, grid))
+    polygons = _polygons_in(_rounded(shapes, grid))
     before = 2 * len(polygons) + 1
     while _CHUNK < len(polygons) < before / 2:
         before = len(polygons)
@@ -55,19 +101,72 @@ def union(shapes: Geometry, grid: float) -> Geometry:
         boxes = shapely.bounds(polygons)
         polygons = polygons[along_a_curve((boxes[:, :2] + boxes[:, 2:]) / 2)]
         chunks = np.array_split(polygons, -(-before // _CHUNK))
-        united = [shapely.union_all(chunk) for chunk in chunks]
-        polygons = _polygons_in(shapely.simplify(united, grid))
-    return shapely.simplify(shapely.union_all(polygons), grid)
+        united = np.array([_union(chunk, grid, more) for chunk in chunks])
+        polygons = _polygons_in(straightened(united, grid))
+    return straightened(_union(polygons, grid, more), grid)
 
 
-def intersection(one: Geometry, other: Geometry, grid: float) -> Geometry:
+def united_by(
+    row: Ints, shapes: Geometry, grid: float, *, more: bool = False
+) -> tuple[Ints, Geometry]:
+    """(g,) the rows, (n,), that shapes have, ascending, and the union of those of each; none of
+    those only that are as wide as rounding, whose union is empty."""
+    if not len(shapes):
+        return row, shapes
+    order = np.argsort(row, kind="stable")
+    names, first, count = np.unique(row[order], return_index=True, return_counts=True)
+    shapes = shapes[order]
+    united = shapes[first]
+    for i in np.flatnonzero(count > 1):
+        united[i] = _union(shapes[first[i] : first[i] + count[i]], grid, more)
+    some = ~shapely.is_empty(united)
+    return names[some], united[some]
+
+
+def intersection(one: Geometry, other: Geometry, grid: float, *, more: bool = False) -> Geometry:
     """Pairwise intersection."""
-    return _polygonal(shapely.intersection(one, other, grid_size=grid))
+
+    def instead(one: Geometry, other: Geometry) -> Geometry:
+        return _common_box(one, other) if more else shapely.Polygon()
+
+    return _polygonal(_overlay(shapely.intersection, one, other, grid, instead))
 
 
 def difference(one: Geometry, other: Geometry, grid: float) -> Geometry:
     """Pairwise difference, ``one`` less ``other``."""
-    return _polygonal(shapely.difference(one, other, grid_size=grid))
+    return _polygonal(_overlay(shapely.difference, one, other, grid, lambda one, _: one))
+
+
+def buffer(
+    shapes: Geometry, distance: float, *, more: bool = False, **style: str | int
+) -> Geometry:
+    """Shapes widened by a distance, or narrowed if it is negative.
+
+    ``style``: as in `shapely.buffer`.
+    """
+
+    def instead(shape: Geometry) -> Geometry:
+        wide = np.array([-1, -1, 1, 1]) * max(distance, 0.0)
+        return shapely.box(*(shapely.bounds(shape) + wide)) if more else shape
+
+    def widened(shapes: Geometry) -> Geometry:
+        return shapely.buffer(shapes, distance, **style)
+
+    repaired = [lambda shape: widened(_repaired(shape))]
+    return _each("buffer", widened, (shapes,), repaired, instead)
+
+
+def straightened(shapes: Geometry, grid: float) -> Geometry:
+    """The same less corners on straight edges, where no polygon comes to cross itself by that."""
+    simple = simplified(shapes, grid)
+    return np.asarray(np.where(shapely.is_valid(simple), simple, shapes))[()]
+
+
+def simplified(shapes: Geometry, distance: float) -> Geometry:
+    """`shapely.simplify`; a shape at which GEOS gives up stays as it is."""
+    return _each(
+        "", lambda shapes: shapely.simplify(shapes, distance), (shapes,), [], lambda one: one
+    )
 
 
 def neighbours(polygons: Geometry, gap: float) -> Ints:
@@ -87,21 +186,168 @@ def left_open(region: Geometry, blocking: Geometry, tolerance: Tolerance) -> Geo
     """
     width, grid = tolerance.hairline, tolerance.grid
     opening = difference(region, blocking, grid)
-    core = shapely.buffer(opening, -width / 2, join_style="mitre")
-    grown = shapely.buffer(core, width, join_style="mitre")
-    return intersection(opening, grown, grid)
+    core = buffer(opening, -width / 2, join_style="mitre")
+    grown = buffer(core, width, more=True, join_style="mitre")
+    return intersection(opening, grown, grid, more=True)
+
+
+def bounded(segments: Floats, of: Ints) -> Geometry:
+    """The areas that (n, 2, 2) segments bound, one for each run of equal numbers in (n,) ``of``,
+    ascending; empty where they bound none that GEOS can tell."""
+    lines = shapely.multilinestrings(shapely.linestrings(segments), indices=of)
+    return _each("triangles", shapely.build_area, (lines,), [], lambda _: shapely.Polygon())
+
+
+def divided(shapes: Geometry) -> tuple[Floats, Ints]:
+    """(m, 3, 2) triangles of an array of polygons, and (m,) the polygon of each, ascending: the
+    constrained Delaunay triangulation, whose corners are those of the polygon to the last bit. None
+    of a polygon that GEOS cannot divide so, such as some whose holes touch; it is counted."""
+    parts, of = shapely.get_parts(delaunay(shapes), return_index=True)
+    triangle = shapely.get_coordinates(parts).reshape(-1, 4, 2)[:, :3]
+    corner, whose = shapely.get_coordinates(shapes, return_index=True)
+    rows = np.column_stack(
+        [
+            np.append(whose, np.repeat(of, 3)).astype(np.float64),
+            np.concatenate([corner, triangle.reshape(-1, 2)]),
+        ]
+    )
+    first, row = distinct(rows)
+    fresh = first[row[len(corner) :]] >= len(corner)
+    kept = ~np.isin(of, np.repeat(of, 3)[fresh])
+    whole = np.isin(np.arange(len(shapes)), of[kept]) | shapely.is_empty(shapes)
+    count(["triangles"] * np.count_nonzero(~whole))
+    return triangle[kept], of[kept]
 
 
 def delaunay(shapes: Geometry) -> Geometry:
-    """The constrained Delaunay triangulations of an array of polygons; empty for those at which
-    GEOS gives up, such as some whose holes touch."""
+    """The constrained Delaunay triangulations of an array of polygons, which may have corners of
+    their own where holes touch; empty for those at which GEOS gives up, which are not counted."""
+    return _each(
+        "",
+        shapely.constrained_delaunay_triangles,
+        (shapes,),
+        [],
+        lambda _: shapely.GeometryCollection(),
+    )
+
+
+def _overlay(
+    operation: Callable[..., Geometry],
+    one: Geometry,
+    other: Geometry,
+    grid: float,
+    instead: Callable[[Geometry, Geometry], Geometry],
+) -> Geometry:
+    """An operation on a grid, pair by pair; see the module's head."""
+    one, other = np.broadcast_arrays(np.asarray(one, object), np.asarray(other, object))
+
+    def on(step: float) -> Callable[[Geometry, Geometry], Geometry]:
+        return lambda one, other: operation(one, other, grid_size=step)
+
+    def again(times: float, *, repair: bool) -> Callable[[Geometry, Geometry], Geometry]:
+        def attempt(one: Geometry, other: Geometry) -> Geometry:
+            both = [_repaired(shape) if repair else shape for shape in (one, other)]
+            return operation(*both, grid_size=times * _step(grid, both))
+
+        return attempt
+
+    attempts = [again(times, repair=fix) for fix in (False, True) for times in _COARSER]
+    return _each(operation.__name__, on(grid), (one, other), attempts, instead)
+
+
+def _union(polygons: Geometry, grid: float, more: bool) -> Geometry:
+    """The union of an array of polygons on a grid; see the module's head."""
     try:
-        return shapely.constrained_delaunay_triangles(shapes)
+        united = shapely.union_all(polygons, grid_size=grid)
+        return united if shapely.is_empty(united) else _polygonal(united)
     except shapely.GEOSException:
-        if len(shapes) == 1:
-            return np.array([shapely.GeometryCollection()])
-        half = len(shapes) // 2
-        return np.concatenate([delaunay(shapes[:half]), delaunay(shapes[half:])])
+        pass
+    if len(polygons) == 1:
+        return polygons[0]
+    if len(polygons) > 2:
+        half = len(polygons) // 2
+        parts = [_union(some, grid, more) for some in (polygons[:half], polygons[half:])]
+        return _union(_polygonal(np.array(parts)), grid, more)
+
+    def instead(one: Geometry, other: Geometry) -> Geometry:
+        if more:
+            return shapely.box(*shapely.total_bounds([one, other]))
+        return max(one, other, key=shapely.area)
+
+    return _polygonal(_overlay(shapely.union, polygons[0], polygons[-1], grid, instead))
+
+
+def _each(
+    name: str,
+    operation: Callable[..., Geometry],
+    operands: Sequence[Geometry],
+    again: list[Callable[..., Geometry]],
+    instead: Callable[..., Geometry],
+) -> Geometry:
+    """An operation on all rows of its operands, arrays of one shape or single geometries, at once;
+    of those rows at which GEOS gives up, the first of ``again`` that succeeds, or ``instead``. The
+    latter counts if the operation has a ``name``."""
+    try:
+        return operation(*operands)
+    except shapely.GEOSException:
+        pass
+    operands = [np.asarray(each, object) for each in operands]
+    if (size := operands[0].size) > 1:
+        half = size // 2
+        sides = ([each[part] for each in operands] for part in (slice(half), slice(half, None)))
+        return np.concatenate([_each(name, operation, side, again, instead) for side in sides])
+    single = [each.reshape(-1)[0] for each in operands]
+    found = _first(again, single)
+    if found is None:
+        count([name] if name else [])
+        found = instead(*single)
+    array = np.empty(operands[0].shape, object)
+    array[...] = found
+    return array[()]
+
+
+def _first(attempts: list[Callable[..., Geometry]], operands: list[Geometry]) -> Geometry | None:
+    """The result of the first attempt that succeeds."""
+    for attempt in attempts:
+        try:
+            return attempt(*operands)
+        except shapely.GEOSException:
+            continue
+    return None
+
+
+def _step(grid: float, shapes: Geometry) -> float:
+    """A grid that is not finer than the coordinates of shapes are."""
+    largest = float(np.nanmax(np.abs(shapely.get_coordinates(shapes)), initial=0.0))
+    return max(grid, _DIGITS * float(np.spacing(largest)))
+
+
+def _rounded(shapes: Geometry, grid: float) -> Geometry:
+    """Polygons with their corners on a grid, where GEOS can; of what has no area there, nothing."""
+    return _each(
+        "",
+        lambda shapes: shapely.set_precision(shapes, grid),
+        (shapes,),
+        [lambda one: shapely.set_precision(one, _step(grid, one)), _repaired],
+        lambda one: one,
+    )
+
+
+def _sound(shapes: Geometry) -> Geometry:
+    """Polygons without crossings of their own outlines, where GEOS can."""
+    return _each("", shapely.make_valid, (shapes,), [], lambda one: one)
+
+
+def _repaired(shape: Geometry) -> Geometry:
+    """The polygons of a shape without crossings of its own outlines."""
+    return _polygonal(shapely.make_valid(shape))
+
+
+def _common_box(one: Geometry, other: Geometry) -> Geometry:
+    """What the boxes around two shapes have in common."""
+    a, b = shapely.bounds(one), shapely.bounds(other)
+    low, high = np.maximum(a[:2], b[:2]), np.minimum(a[2:], b[2:])
+    return shapely.box(*low, *high) if (low < high).all() else shapely.Polygon()
 
 
 def _polygons_in(shapes: Geometry) -> Geometry:
@@ -165,9 +411,8 @@ def _delaunay(corner: Floats, ring: Ints, polygon: Ints) -> tuple[Ints, Ints]:
     rings = shapely.linearrings(corner, indices=ring)  # it closes them
     shapes = shapely.polygons(rings, indices=place)
     sound = np.flatnonzero(shapely.is_valid(shapes))
-    parts, of = shapely.get_parts(delaunay(shapes[sound]), return_index=True)
-    points = shapely.get_coordinates(parts).reshape(-1, 4, 2)[:, :3].reshape(-1, 2)
-    of = sound[of]
+    triangles, of = divided(shapes[sound])
+    points, of = triangles.reshape(-1, 2), sound[of]
     # Which corner of its polygon a point is: they are the same to the last bit.
     whose = np.concatenate([place[ring], np.repeat(of, 3)])
     same = first_alike(np.column_stack([whose, np.concatenate([corner, points])]))

@@ -36,7 +36,7 @@ import shapely
 from ptmtools.arrays import Bools, Floats, Ints, cross, normals
 from ptmtools.cells.bsp import Tree
 from ptmtools.cells.options import Walker
-from ptmtools.cells.planar import Geometry, intersection, left_open, union
+from ptmtools.cells.planar import Geometry, buffer, intersection, left_open, union
 from ptmtools.cells.polyhedron import BOX_FACE, Polyhedron
 from ptmtools.cells.structure import Structure, Surroundings
 from ptmtools.tolerance import Tolerance, ranked
@@ -153,15 +153,16 @@ def _openings(
     j, i = shapely.STRtree(one).query(other, predicate="intersects")
     order = np.lexsort((i, j))
     j, i = j[order], i[order]
-    shared = intersection(one[i], other[j], tolerance.grid)
+    shared = intersection(one[i], other[j], tolerance.grid, more=True)
     wide = shapely.area(shared) > 0
     i, j, shared = i[wide], j[wide], shared[wide]
     if len(shared) == 0:
         return
-    opening = left_open(union(shared, tolerance.grid), wall.blocking, tolerance)
+    every = union(shared, tolerance.grid, more=True)
+    opening = left_open(every, wall.blocking, tolerance)
     if shapely.is_empty(opening):
         return
-    pieces = intersection(shared, opening, tolerance.grid)
+    pieces = intersection(shared, opening, tolerance.grid, more=True)
     for a, b, piece in zip(i.tolist(), j.tolist(), pieces, strict=True):
         for part in shapely.get_parts(piece):
             if _wider_than(part, tolerance.plane):
@@ -173,7 +174,7 @@ def _openings(
 
 def _wider_than(part: Geometry, width: float) -> bool:
     """Whether a disc of the given diameter fits into a polygon somewhere."""
-    return not shapely.is_empty(shapely.buffer(part, -width / 2, join_style="mitre"))
+    return not shapely.is_empty(buffer(part, -width / 2, join_style="mitre"))
 
 
 #: A surface whose normal leans less than this from the vertical can be stood on (cosine of 45°).

@@ -151,7 +151,8 @@ class _Regions(Groups):
         if len(self.near[a]) < len(self.near[b]):
             a, b = b, a
         self._volume[a] += self._volume[b]
-        self._plan[a] = self._plan[a].union(self._plan[b]).convex_hull
+        both = shapely.geometrycollections([self._plan[a], self._plan[b]])
+        self._plan[a] = shapely.convex_hull(both)
         self._section[a] = max(
             self._section[a], self._section[b], _section(self._volume[a], self._plan[a])
         )

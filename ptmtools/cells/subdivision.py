@@ -28,6 +28,7 @@ from ptmtools.cells.diagnostics import (
     of_leaves,
     of_no_doors,
     of_triangles,
+    of_undecided,
     of_unreached,
 )
 from ptmtools.cells.division import (
@@ -43,6 +44,7 @@ from ptmtools.cells.joining import joined
 from ptmtools.cells.model import Cells
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.ownership import cut_to_leaves
+from ptmtools.cells.planar import count, counting
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.portals import ROOFED, roofed_share
 from ptmtools.cells.roles import matches
@@ -119,6 +121,16 @@ def subdivide(
     """
     options = options or SubdivideOptions()
     _check(scene, options)
+    with counting() as undecided:
+        cells = _subdivided(scene, options, progress, executor or Executor())
+    cells = replace(cells, notes=(*cells.notes, *of_undecided(undecided)))
+    check_seen(scene, cells)
+    return cells
+
+
+def _subdivided(
+    scene: Scene, options: SubdivideOptions, progress: Progress, executor: Executor
+) -> Cells:
     axes = main_axes(scene.corners)
     building = Building.of(scene, options)
     corners, tolerance = building.structure.corners, building.structure.tolerance
@@ -128,7 +140,6 @@ def subdivide(
     wide = replace(wide, points=wide.points @ axes)
     tight = _thickened(*bounds(corners if len(corners) else scene.corners), tolerance)
     notes = of_detail(scene, building.structure.detail)
-    executor = executor or Executor()
     clipped = executor.submit(divide_inside, building, tight, long=len(scene.triangles) >= LARGE)
     try:
         space = divide(building, wide, progress)
@@ -162,9 +173,8 @@ def subdivide(
     owner = np.append(cells.leaf_cell, np.int32(-1))[owner]
     if options.doors == "hidden":
         owner[np.isin(pieces.source, opened)] = -1
-    cells = replace(cells, **vars(joined(scene, pieces, owner, tolerance)), opened=opened)
-    check_seen(scene, cells)
-    return cells
+    count(space.undecided)
+    return replace(cells, **vars(joined(scene, pieces, owner, tolerance)), opened=opened)
 
 
 def _check(scene: Scene, options: SubdivideOptions) -> None:

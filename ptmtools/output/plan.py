@@ -238,7 +238,7 @@ class _Plan:
             PolyCollection(polygons, facecolors=fills, edgecolors=fills, linewidths=0.5)
         )
         draw_view_only(axis, self._cells, sections, self._shown)
-        edges = _outlines(sections)
+        edges = _outlines(sections, self._cells.tolerance.grid)
         for zorder, colour, width, segments in (
             (2, _CELL_EDGE, 0.5, [e for outline in edges.values() for e in outline]),
             (2, _CHOSEN, 5, edges.get(self._options.cell, [])),
@@ -392,15 +392,17 @@ class _Plan:
 
 
 def _outlines(
-    sections: Sequence[tuple[int, NDArray[np.float64]]],
+    sections: Sequence[tuple[int, NDArray[np.float64]]], grid: float
 ) -> dict[int | None, list[NDArray[np.float64]]]:
     """Cell → closed lines around the union of the sections of its leaves."""
     import shapely
 
+    from ptmtools.cells.planar import union
+
     found: dict[int | None, list[NDArray[np.float64]]] = {}
     for cell in sorted({cell for cell, _ in sections}):
         leaves = [shapely.Polygon(polygon) for number, polygon in sections if number == cell]
-        rim = shapely.boundary(shapely.union_all(leaves) if len(leaves) > 1 else leaves[0])
+        rim = shapely.boundary(union(np.array(leaves), grid) if len(leaves) > 1 else leaves[0])
         found[cell] = [shapely.get_coordinates(line) for line in shapely.get_parts(rim)]
     return found
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import shapely
@@ -10,7 +12,9 @@ from ptmtools.arrays import areas
 from ptmtools.cells import SubdivideOptions, subdivide
 from ptmtools.cells.connectivity import Welded
 from ptmtools.cells.facets import Facets
+from ptmtools.cells.planar import counting
 from ptmtools.cells.structure import Structure, find_walls
+from ptmtools.scene import ingest
 from ptmtools.tolerance import Tolerance
 from tests.conftest import scene_of, subdivided
 
@@ -87,6 +91,29 @@ def test_a_bend_far_below_the_tolerance_does_not_add_up() -> None:
     for corners in found:
         middle = corners.mean(axis=0)
         assert abs(middle[2] - 2e-3 * (middle[0] - 5) ** 2) <= TOLERANCE.plane
+
+
+def test_a_triangulation_with_a_corner_of_its_own_is_not_taken() -> None:
+    facets = facets_of(grid(4))
+    space = np.array([[[0, 0, 1], [4, 0, 1]], [[4, 0, 1], [0, 4, 1]], [[0, 4, 1], [0, 0, 1.0]]])
+    space = np.concatenate([space, space])
+    flat, of = space[:, :, :2], np.repeat([3, 5], 3)
+    rings = np.array([[[0, 0], [4, 0], [0, 4]], [[0, 0], [4, 0], [2, 2]], [[0, 0], [2, 2], [0, 4]]])
+    with counting() as undecided:
+        found, which = facets._lifted(rings.astype(float), np.array([3, 5, 5]), flat, of, space)
+    assert np.array_equal(found, space[None, :3, 0])
+    assert which.tolist() == [3]
+    assert undecided == {"triangles": 1}
+
+
+def test_a_compressed_model_whose_outlines_cross_has_its_walls(shared: Path) -> None:
+    """At 14 bits, corners of furniture come to lie beyond the edges beside them."""
+    scene = ingest(shared / "scenes/apartment_gallery/gallery.glb")
+    with counting() as undecided:
+        structure = Structure.of(scene, SubdivideOptions(), scene.tolerance)
+    assert undecided["triangles"] > 0
+    opaque = scene.corners[scene.opaque]
+    assert areas(structure.corners).sum() == pytest.approx(areas(opaque).sum(), rel=0.05)
 
 
 def test_two_triangles_stay_two() -> None:
