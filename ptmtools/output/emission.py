@@ -1,34 +1,26 @@
-"""Artifacts → the files that are served (paper §6), by the emitters that are asked for.
+"""Artifacts → the served files (paper §6), by the emitters of `--format`, and the cost of a visit.
 
-Files below a folder, written a few at a time, with gzip copies if wanted.
+`write_files` writes several files at a time: each is on the disk before it has its name
+(`ptmtools.files`), and most of the time goes into waiting for that. A server sends a gzip copy in
+place of its file (nginx: `gzip_static on`), and VRML browsers open it by themselves. It holds no
+name and no time, so its bytes depend only on the file and the version of zlib.
 
-A file is on the disk before it has its name (`ptmtools.files`), and most of the time goes into
-waiting for that; meanwhile the next ones are made.
-
-A gzip copy is what servers hand out in place of a file (nginx: `gzip_static on`) and what VRML
-browsers open by themselves. It holds no name and no time, so its bytes depend on nothing but the
-file and the version of zlib.
-
-What a database means for a visitor: what it takes to look at it, and what is at hand on a walk.
-
-All are bytes as they lie on the disk, textures losslessly and whole unless said otherwise.
-
-A *VRML browser* opens the root and loads everything that this leads to: all cells, and the
-fallback image of every texture. A client of the *hints* fetches the index, the record of the cell
-that it is in, and of what that cell sees the geometry and the textures; the geometry in a form
-that has no entry of its own, and so is there for such clients, if one was written. For it **the
-first room is complete** when the index, the record of the first viewpoint's cell, the geometry of
-all cells that it sees and the textures of the cell itself are there, and of the textures of the
-other cells the coarsest level: nothing is missing, and the room is as fine as the model. **At
-hand** is what it holds in a cell once everything it sees is whole. Means are over
-places, not over cells: a cell counts by its volume."""
+`visit_of` measures a visit in bytes of files, with whole lossless textures unless stated otherwise.
+A *VRML browser* opens the root and loads all cells and the fallback image of every texture. A
+client of the *hints* fetches the index, the record of its cell, and the geometry and the textures
+of the cells visible from it; the geometry in a form without an entry file, if one was written. Its
+**first room is complete** with the index, the record of the first viewpoint's cell, the geometry of
+all cells visible from it, the cell's own textures and the coarsest level of the others: nothing is
+missing, and the room has the model's resolution. The **resident** set in a cell is everything that
+the client holds once all visible cells are loaded. Means are over places: a cell counts by its
+volume.
+"""
 
 from __future__ import annotations
 
 import os
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -40,9 +32,10 @@ from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
 from ptmtools.errors import DatabaseError
 from ptmtools.files import real_folder, refuse_existing, write_bytes, writing
+from ptmtools.lazy import Lazy
 from ptmtools.output.content import Content
 from ptmtools.output.emitters import GZIP, Emitter, chosen_emitters
-from ptmtools.output.model import EmitOptions, EmitReport, OctreeRecord, TextureRecord
+from ptmtools.output.model import EmitOptions, EmitReport, OctreeRecord, TextureRecord, Visit
 from ptmtools.output.names import BUNDLE, HINTS, RECORD_FILES, path_of
 from ptmtools.output.viewpoints import place_viewpoints
 from ptmtools.progress import Progress, silent
@@ -54,11 +47,23 @@ if TYPE_CHECKING:
     from ptmtools.coverage.required_levels import Need
 
 
-#: Files that wait for the disk at a time.
-_WRITERS = 8
+#: A path in the served folder and the file's content.
+File = tuple[str, str | bytes]
+
+#: Name of an emitter → function from a `Content` to its files, in the order of writing. The call
+#: itself, before the first file, raises what the emitter refuses.
+WRITERS: dict[str, Lazy[Callable[[Content], Iterator[File]]]] = {
+    "vrml": Lazy("ptmtools.output.vrml:vrml_files"),
+    "gltf": Lazy("ptmtools.output.gltf:gltf_files"),
+    "interlace": Lazy("ptmtools.output.interlacing:interlaced_files"),
+    "hints": Lazy("ptmtools.output.hints:hints_files"),
+}
+
+#: Files written at a time.
+_WRITER_THREADS = 8
 #: Deflate, no name, no time, best compression, no system (RFC 1952).
 _GZIP = bytes([0x1F, 0x8B, 8, 0, 0, 0, 0, 0, 2, 255])
-#: Suffixes of files that are copied.
+#: Suffixes of the files that get a gzip copy.
 _TEXT = (".wrl", ".json")
 
 
@@ -71,22 +76,22 @@ def compressed(data: bytes) -> bytes:
 
 
 def write_files(
-    folder: Path, files: Iterable[tuple[str, str | bytes]], *, force: bool, gzip: bool
+    folder: Path, files: Iterable[File], *, force: bool, gzip: bool
 ) -> Iterator[dict[str, int]]:
-    """Of each file what was written, itself and a copy, as name → bytes; at the end all are on the
-    disk.
+    """Writes files; yields for each the name → bytes of the file and its copy. At the end all are
+    on the disk.
 
     Parameters
     ----------
-    folder: an existing one.
-    files: name relative to the folder, and contents; folders on the way are made.
-    force: overwrite files; a gzip copy that is not written again goes.
-    gzip: write copies of VRML and JSON files.
+    folder: an existing folder.
+    files: names relative to the folder, and contents; missing folders are created.
+    force: overwrite files; a gzip copy that is not written again is deleted.
+    gzip: also write copies of VRML and JSON files.
 
     Raises OutputError: PTM-O001 to PTM-O003, PTM-O005, of the first file that cannot be written.
     """
 
-    def write(file: tuple[str, str | bytes]) -> dict[str, int]:
+    def write(file: File) -> dict[str, int]:
         name, content = file
         data = content.encode() if isinstance(content, str) else content
         copy = folder / f"{name}{GZIP}"
@@ -101,34 +106,11 @@ def write_files(
                 copy.unlink(missing_ok=True)
         return {name: len(data)}
 
-    return ordered(write, files, _WRITERS)
-
-
-@dataclass(frozen=True)
-class Visit:
-    """See the module's description.
-
-    Attributes
-    ----------
-    browser: bytes that a VRML browser fetches; None without VRML.
-    first_room: bytes until the first room is complete.
-    mean_at_hand, most_at_hand: bytes.
-    mean_volume, most_volume: share of the volume of all cells that is at hand.
-    mean_texels, most_texels: share of the texels in use; None without textures.
-    """
-
-    browser: int | None
-    first_room: int
-    mean_at_hand: int
-    most_at_hand: int
-    mean_volume: float
-    most_volume: float
-    mean_texels: float | None
-    most_texels: float | None
+    return ordered(write, files, _WRITER_THREADS)
 
 
 def visit_of(content: Content, sizes: Mapping[str, int]) -> Visit:
-    """What what has been written means for a visitor.
+    """The cost of a visit.
 
     ``sizes``: bytes of each file, by its path in the served folder.
     """
@@ -206,8 +188,8 @@ def emit(
     ----------
     textures: one record for every image that a material in use names.
     force: overwrite files of these names, gzip copies included.
-    need: how fine the textures are needed, if that is to be written.
-    octrees: the octree textures of objects, which are there already.
+    need: the levels that each cell requires, for the records; None leaves them out.
+    octrees: the octree textures of objects, already written.
     workers: threads that may be used.
 
     Raises
@@ -231,17 +213,17 @@ def emit(
     content = Content(
         scene, cells, pvs, ach, textures, viewpoints, options, progress, need, octrees, workers
     )
-    written = [emitter.files(content) for emitter in emitters]
+    written = [WRITERS[emitter.name].load()(content) for emitter in emitters]
     for name in owned:
         if name.endswith("/"):
             real_folder(folder, name[:-1])
     sizes: dict[str, int] = {}
     entries = {emitter.entry for emitter in emitters}
-    for given in written:
-        # What leads to others comes when those are there.
-        for _, files in groupby(given, lambda file: file[0] in entries):
-            for some in write_files(folder, files, force=force, gzip=options.gzip):
-                sizes |= some
+    for files in written:
+        # An entry is written after the files that it leads to are on the disk.
+        for _, group in groupby(files, lambda file: file[0] in entries):
+            for file_sizes in write_files(folder, group, force=force, gzip=options.gzip):
+                sizes |= file_sizes
     return EmitReport(
         files=tuple(sizes),
         viewpoints=viewpoints,

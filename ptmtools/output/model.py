@@ -23,7 +23,6 @@ from ptmtools.output.emitters import EMITTERS, chosen_emitters
 
 if TYPE_CHECKING:
     from ptmtools.cells.options import Walker
-    from ptmtools.output.emission import Visit
     from ptmtools.scene.model import Scene
     from ptmtools.texture.detail import Detail
     from ptmtools.texture.model import Level
@@ -237,6 +236,29 @@ class EmitOptions:
         """``avatar_size``, if need be that of whoever walks in the cells."""
         eye = round(walker.height * EYE, 6)
         return self.avatar_size or (walker.radius, eye, walker.step)
+
+
+@dataclass(frozen=True)
+class Visit:
+    """The cost of a visit, see `ptmtools.output.emission`.
+
+    Attributes
+    ----------
+    browser: bytes that a VRML browser fetches; None without VRML.
+    first_room: bytes until the first room is complete.
+    mean_at_hand, most_at_hand: resident bytes.
+    mean_volume, most_volume: share of the volume of all cells that is resident.
+    mean_texels, most_texels: share of the texels in use; None without textures.
+    """
+
+    browser: int | None
+    first_room: int
+    mean_at_hand: int
+    most_at_hand: int
+    mean_volume: float
+    most_volume: float
+    mean_texels: float | None
+    most_texels: float | None
 
 
 @dataclass(frozen=True)

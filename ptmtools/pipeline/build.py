@@ -43,7 +43,7 @@ class Visitor:
     ----------
     model: bytes of the model's files but for its images; None where they were not recorded.
     images: bytes of the files of its images, not of those inside the model's; likewise.
-    visit: the fields of `ptmtools.output.emission.Visit`.
+    visit: the fields of `ptmtools.output.model.Visit`.
     """
 
     model: int | None

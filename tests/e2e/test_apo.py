@@ -18,6 +18,7 @@ from ptmtools.neighbours.apo.octree import fault_of
 from ptmtools.neighbours.apo.traversal import look_up
 from tests.e2e.conftest import Ptm, make_museum
 from tests.neighbours.apo.statues import STATUES, write_rooms
+from tests.output.agreement import disagreements
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "benchmarks")]
@@ -46,6 +47,7 @@ def test_the_building_is_the_same(museum: Path, ptm: Ptm) -> None:
     db = museum / "light"
     checked = ptm("validate", db, "--strict", "--segments", 5000)
     assert checked.status == 0, checked.out
+    assert disagreements(db / "www") == []
     assert "0 errors, 0 warnings" in checked.out
     for name in ("cells", "leaves", "portals", "closed"):
         assert counts(db, "cells")[name] == counts(museum / "plain", "cells")[name], name

@@ -19,6 +19,7 @@ import pytest
 from ptmtools.pipeline.stages import STAGES
 from ptmtools.texture import decode, read_header, read_image, read_ptm
 from tests.e2e.conftest import TWO_ROOMS, Ptm, listing
+from tests.output.agreement import disagreements
 
 SCRIPT = Path(sys.executable).with_name("ptm")
 
@@ -111,6 +112,7 @@ def test_textures_within_an_error_have_twins_of_the_same_texels(
     options = ("--profile", "small", "--max-error", 3, "--max-level", -2)
     build(TWO_ROOMS / "two_rooms.obj", db, *options)
     assert ptm("validate", db, "--strict").status == 0
+    assert disagreements(db / "www") == []
     files = sorted((db / "www/textures").glob("*.ptm"))
     assert files
     for file in files:

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from ptmtools.cli.main import main
+from tests.output.agreement import disagreements
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests" / "e2e")]
@@ -53,6 +54,7 @@ def test_two_rooms(khronos: Any, database: Path, ptm: Any) -> None:
     before = {p: p.read_bytes() for p in www.rglob("*") if p.is_file()}
     assert clean(khronos, database) == counts(database)["triangles"] > 0
     assert ptm("validate", database).status == 0
+    assert disagreements(www) == []
     for format, folder, others in (("vrml", "gltf", "cells"), ("gltf", "cells", "gltf")):
         assert ptm("emit", database, "--format", format).status == 0
         assert not (www / folder).exists()

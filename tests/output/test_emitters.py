@@ -13,17 +13,17 @@ from ptmtools.errors import InputError, OutputError
 from ptmtools.lazy import Lazy
 from ptmtools.output import EmitOptions, emit, validate_database
 from ptmtools.output.content import Content
+from ptmtools.output.emission import WRITERS
 from ptmtools.output.emitters import EMITTERS, Emitter, all_emitters, owner_of
+from ptmtools.output.validation.database import CHECKERS, Checker
 from ptmtools.output.validation.files import ServedDatabase
+from tests.output.agreement import disagreements
 
 TOY = Emitter(
     name="toy",
     about="how many shapes there are",
     owns=("toy.txt", "toys/"),
     entry="toy.txt",
-    writer=Lazy(f"{__name__}:write_toy"),
-    reader=Lazy(f"{__name__}:read_toy"),
-    check=Lazy(f"{__name__}:check_toy"),
 )
 
 
@@ -39,15 +39,18 @@ def read_toy(path: str, data: bytes) -> int | None:
 
 
 def check_toy(database: ServedDatabase) -> Mapping[str, int]:
-    cells = [path for path in database.held if path.startswith("toys/")]
-    if database.held.get("toy.txt") != len(cells):
+    cells = [path for path in database.contents if path.startswith("toys/")]
+    if database.contents.get("toy.txt") != len(cells):
         database.at("toy.txt").add("PTM-D730", "counts other cells than there are")
-    return {"shapes": sum(database.held[path] for path in cells)}
+    return {"shapes": sum(database.contents[path] for path in cells)}
 
 
 @pytest.fixture
 def toy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(EMITTERS, TOY.name, TOY)
+    monkeypatch.setitem(WRITERS, TOY.name, Lazy(f"{__name__}:write_toy"))
+    checker = Checker(Lazy(f"{__name__}:read_toy"), Lazy(f"{__name__}:check_toy"))
+    monkeypatch.setitem(CHECKERS, TOY.name, checker)
 
 
 @pytest.mark.usefixtures("toy")
@@ -68,6 +71,7 @@ def test_a_toy_emitter(
         emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", EmitOptions(format=format))
     seal(db)
     assert validate_database(db).issues == ()
+    assert disagreements(db / "www") == []
     (db / "www/toys/3.txt").write_text("7 shapes\n")
     seal(db)
     assert {issue.code for issue in validate_database(db).issues} == {"PTM-D730"}
@@ -103,6 +107,14 @@ def test_both_by_default_and_each_alone(artifacts, tmp_path: Path, put_textures)
         assert ("gltf/c0000.glb" in report.files) is ("gltf" in format)
         index = json.loads((tmp_path / format / "hints.json").read_text())
         assert list(index["geometry"]) == format.split(",")
+
+
+def test_each_emitter_has_a_writer_and_a_check() -> None:
+    names = {emitter.name for emitter in all_emitters()}
+    assert set(WRITERS) == set(CHECKERS) == names
+    for name in names:
+        for function in (WRITERS[name], CHECKERS[name].read, CHECKERS[name].check):
+            assert callable(function.load())
 
 
 def test_each_declaration_names_what_there_is() -> None:

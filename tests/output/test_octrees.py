@@ -17,6 +17,7 @@ from ptmtools.output import EmitOptions, emit, validate_database
 from ptmtools.output.model import OctreeRecord
 from ptmtools.output.names import HINTS
 from tests.neighbours.apo.building import ball
+from tests.output.agreement import disagreements
 from tests.output.damage import (
     Damage,
     all_of,
@@ -67,6 +68,7 @@ def db(whole: Path, tmp_path: Path) -> Path:
 
 def test_the_hints_name_them(whole: Path) -> None:
     assert validate_database(whole).issues == ()
+    assert disagreements(whole / "www") == []
     first, second = json.loads((whole / "www" / HINTS).read_text())["octrees"]
     octree = ball(4, LOW, SIDE)
     assert first["object"] == second["object"] == "Statue ü"

@@ -16,6 +16,7 @@ from ptmtools.output import TextureRecord, emit, validate_database
 from ptmtools.output.content import Content
 from ptmtools.output.hints import RecordWriter
 from ptmtools.visibility.model import Pvs
+from tests.output.agreement import disagreements
 
 
 def test_textures_of_visible_cells(artifacts, tmp_path: Path) -> None:
@@ -58,6 +59,7 @@ def test_how_fine_textures_are_needed(artifacts, tmp_path: Path, put_textures, s
     emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", need=need)
     seal(db)
     assert validate_database(db).issues == ()
+    assert disagreements(db / "www") == []
     for cell in range(3):
         record = json.loads((db / f"www/hints/c000{cell}.json").read_text())
         rows = {records[place].image: (first, shares) for place, first, *shares in record["need"]}

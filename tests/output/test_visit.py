@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from ptmtools.output import EmitOptions, TextureRecord, emit
-from ptmtools.output.emission import Visit
+from ptmtools.output.model import Visit
 from ptmtools.visibility.model import Pvs, over_places
 
 #: The second room is twice as large as it looks, the third half as large.

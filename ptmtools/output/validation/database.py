@@ -1,42 +1,90 @@
 """The check of a database on disk, or of one `.ptm`: everything that a client may rely on.
 
-Each file is read once, compared with the hash in the manifest, and then against the others, by the
-checks of the emitters that wrote them. A finding never ends the check: what cannot be read is left
-out of the comparisons that need it.
+Each file is read once, compared with its hash in the manifest, and then with the other files, by
+the checks of the forms (`CHECKERS`). No issue ends the check: unreadable files are left out of the
+comparisons that need them.
 
-Files are read by several threads, since decoding textures and hashing, most of the work, leave the
-interpreter free. Their findings are gathered in the order of the files.
+Several threads read files, since decoding textures and hashing, most of the work, release the
+interpreter lock. Their issues are gathered in the order of the files.
 """
 
 from __future__ import annotations
 
+import hashlib
 import os
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ptmtools import schemas
-from ptmtools.diagnostics import Findings, ValidationReport, one_line
+from ptmtools.diagnostics import Findings, Place, ValidationReport, one_line
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.files import open_regular
-from ptmtools.output.emitters import Emitter, all_emitters, chosen_emitters, owner_of
-from ptmtools.output.model import EmitOptions
+from ptmtools.lazy import Lazy
+from ptmtools.output.emitters import (
+    GZIP,
+    Emitter,
+    all_emitters,
+    chosen_emitters,
+    owner_of,
+)
+from ptmtools.output.model import EmitOptions, FileError
 from ptmtools.output.names import HINTS, OCTREE_FOLDER, TEXTURE_FOLDER
-from ptmtools.output.validation.files import FileReader, ServedDatabase, check_names, served_files
+from ptmtools.output.validation.files import ServedDatabase, check_gzip, check_names, served_files
 from ptmtools.output.validation.findings import CODES
-from ptmtools.output.validation.textures import ReadTexture, check_ptm
+from ptmtools.output.validation.hints import gather
+from ptmtools.output.validation.textures import ReadTexture, check_ptm, read_png, read_texture
 from ptmtools.progress import Progress, silent
 from ptmtools.quantities import count
 from ptmtools.store.layout import MANIFEST, SERVED
 from ptmtools.texture.model import Limits
 
-#: Files of others that are named.
-_NAMED = 3
-#: The stages that write served files, and the record of one that has not run.
+
+@dataclass(frozen=True)
+class Checker:
+    """The check of a form's files.
+
+    Attributes
+    ----------
+    read: function from (path in the served folder, bytes) of one file to its content for the check,
+        None if the check needs nothing of it; called from several threads. Raises FileError.
+    check: function from a `ServedDatabase` to those counts of the manifest that it knows, by name.
+    """
+
+    read: Lazy[Callable[[str, bytes], object | None]]
+    check: Lazy[Callable[[ServedDatabase], Mapping[str, int]]]
+
+
+#: Name of an emitter → the check of its files.
+CHECKERS = {
+    "vrml": Checker(
+        Lazy("ptmtools.output.validation.vrml:read_file"),
+        Lazy("ptmtools.output.validation.vrml:check_files"),
+    ),
+    "gltf": Checker(
+        Lazy("ptmtools.output.validation.gltf:read_file"),
+        Lazy("ptmtools.output.validation.gltf:check_files"),
+    ),
+    "interlace": Checker(
+        Lazy("ptmtools.output.interlacing:read_file"),
+        Lazy("ptmtools.output.interlacing:check_files"),
+    ),
+    "hints": Checker(
+        Lazy("ptmtools.output.validation.hints:read_file"),
+        Lazy("ptmtools.output.validation.hints:check_files"),
+    ),
+}
+
+#: Foreign files listed by name in a note.
+_LISTED = 3
+#: Bytes hashed at a time, of a file beyond the limit.
+_PIECE = 1 << 20
+#: The stages that write served files, and the record of a stage that has not run.
 _TEXTURES, _EMIT = "textures", "emit"
-_NEVER: dict[str, dict[str, Any]] = {"parameters": {}, "outputs": {}, "counts": {}}
+_NO_RECORD: dict[str, dict[str, Any]] = {"parameters": {}, "outputs": {}, "counts": {}}
 _LIMITS = Limits()
 
 
@@ -51,10 +99,10 @@ def validate_database(
 
     Parameters
     ----------
-    limits: files and textures that take more memory are not looked into (PTM-D713).
+    limits: of files and textures that take more memory only the hash is checked (PTM-D713).
     workers: threads; 0 is one for each processor. The report is the same.
 
-    Raises DatabaseError: PTM-D605 if there is no such folder. All else stands in the report.
+    Raises DatabaseError: PTM-D605 if there is no such folder. All other faults are in the report.
     """
     folder = Path(db)
     if not folder.is_dir():
@@ -62,24 +110,24 @@ def validate_database(
             "PTM-D605", "no such folder", file=folder, remedy="give a database or a .ptm file"
         )
     check = _Check(folder, limits)
-    # Damaged numbers may be anything; what comes of them is compared, not trusted.
+    # Damaged files may hold any number; overflows only make comparisons fail.
     with np.errstate(all="ignore"):
         check.run(progress, workers or os.cpu_count() or 1)
-    return ValidationReport(check.found.issues(), check.files, check.bytes, check.notes)
+    return ValidationReport(check.findings.issues(), check.files, check.bytes, check.notes)
 
 
 def validate_ptm(path: str | os.PathLike[str], *, limits: Limits = _LIMITS) -> ValidationReport:
     """Checks a single `.ptm`.
 
-    Raises InputError: PTM-I602 if it cannot be read. All else stands in the report.
+    Raises InputError: PTM-I602 if it cannot be read. All other faults are in the report.
     """
-    file, found = Path(path), Findings(CODES)
-    at = found.at(os.fspath(path))
+    file, findings = Path(path), Findings(CODES)
+    at = findings.at(os.fspath(path))
     try:
         size = os.stat(file).st_size
-        if size > limits.decoded_bytes:  # a pipe has none
+        if size > limits.decoded_bytes:  # 0 for a pipe
             at.add("PTM-D713", f"{size} bytes")
-            return ValidationReport(found.issues(), 1, size)
+            return ValidationReport(findings.issues(), 1, size)
         data = file.read_bytes()
     except OSError as fault:
         raise InputError(
@@ -89,34 +137,142 @@ def validate_ptm(path: str | os.PathLike[str], *, limits: Limits = _LIMITS) -> V
             remedy="check the name and the permissions",
         ) from fault
     check_ptm(data, limits, at)
-    return ValidationReport(found.issues(), 1, len(data))
+    return ValidationReport(findings.issues(), 1, len(data))
+
+
+@dataclass
+class FileReading:
+    """The result of reading one file.
+
+    Attributes
+    ----------
+    findings: faults of the file by itself.
+    size: bytes; None if it could not be read.
+    intact: whether its hash is that of the manifest and its format is sound.
+    content: a `ReadTexture` of a `.ptm`, the result of `Checker.read` of an emitter's file.
+    """
+
+    findings: Findings
+    size: int | None = None
+    intact: bool = False
+    content: object | None = None
+
+
+@dataclass(frozen=True)
+class FileReader:
+    """Reads the files of a database; its method may be called from several threads.
+
+    Attributes
+    ----------
+    folder: of the database.
+    outputs: the stages' files, relative to the database, with their hashes.
+    served: the served files, relative to the served folder.
+    limits: larger files are only hashed.
+    """
+
+    folder: Path
+    outputs: Mapping[str, str]
+    served: Collection[str]
+    limits: Limits
+
+    def read(self, name: str) -> FileReading:
+        """Reads a file, named relative to the database."""
+        findings = Findings(CODES)
+        reading, at = FileReading(findings), findings.at(name)
+        if name.startswith(f"{SERVED}/") and not self._is_served(name):
+            # `served_files` has reported what exists and is no file.
+            if not os.path.lexists(self.folder / name):
+                at.add("PTM-D651", "missing")
+            return reading
+        try:
+            size, data, digest = self._content(name)
+        except FileNotFoundError:
+            at.add("PTM-D651", "missing")
+            return reading
+        except OSError as fault:
+            at.add("PTM-D654", f"cannot be read ({fault.strerror or fault})")
+            return reading
+        reading.size = size
+        reading.intact = self.outputs.get(name) == digest
+        if self.outputs and name not in self.outputs:
+            at.add("PTM-D653", "no stage wrote this file")
+        elif self.outputs.get(name, digest) != digest:
+            at.add("PTM-D652", "the hash differs from the manifest's")
+        if data is None:
+            reading.intact = False
+            at.add("PTM-D713", f"{size} bytes")
+        elif name.startswith(f"{SERVED}/"):
+            with np.errstate(all="ignore"):  # which each thread has of its own
+                self._parse(reading, name, data, digest, at)
+        return reading
+
+    def _content(self, name: str) -> tuple[int, bytes | None, str]:
+        """(size, bytes, SHA-256) of a file; no bytes beyond the limit."""
+        with open_regular(self.folder / name) as file:
+            size = os.fstat(file.fileno()).st_size
+            if size <= self.limits.decoded_bytes:
+                data = file.read(size)
+                return len(data), data, hashlib.sha256(data).hexdigest()
+            digest = hashlib.sha256()
+            while piece := file.read(_PIECE):
+                digest.update(piece)
+            return size, None, digest.hexdigest()
+
+    def _parse(self, reading: FileReading, name: str, data: bytes, digest: str, at: Place) -> None:
+        stem, suffix = os.path.splitext(name)
+        path = name.removeprefix(f"{SERVED}/")
+        emitter = owner_of(path)
+        if suffix == GZIP:
+            check_gzip(data, self._neighbour(stem), at)
+        elif suffix == ".png" and emitter is None and not self._is_served(f"{stem}.ptm"):
+            read_png(data, self.limits, at)
+        elif suffix == ".ptm":
+            fallback = self._neighbour(f"{stem}.png")
+            reading.content = read_texture(data, digest, fallback, self.limits, at)
+            reading.intact &= reading.content is not None
+        elif emitter:
+            try:
+                reading.content = CHECKERS[emitter.name].read.load()(path, data)
+            except FileError as fault:
+                at.add(fault.code, fault.message, fault.place)
+            reading.intact &= reading.content is not None
+
+    def _is_served(self, name: str) -> bool:
+        return name.removeprefix(f"{SERVED}/") in self.served
+
+    def _neighbour(self, name: str) -> bytes | None:
+        """The bytes of another served file, if it exists and can be read."""
+        try:
+            return self._content(name)[1] if self._is_served(name) else None
+        except OSError:
+            return None
 
 
 class _Check:
     """One validation of one database."""
 
     def __init__(self, folder: Path, limits: Limits) -> None:
-        self.found = Findings(CODES)
+        self.findings = Findings(CODES)
         self.notes: tuple[str, ...] = ()
         self.files = 0
         self.bytes = 0
         self._folder = folder
         self._limits = limits
-        self._manifest = self.found.at(MANIFEST)
+        self._manifest = self.findings.at(MANIFEST)
         self._stages: dict[str, dict[str, Any]] = {}
         #: Name relative to the database → hash in the manifest.
         self._outputs: dict[str, str] = {}
-        #: Bytes of the files that are as they were written, and could be read.
+        #: Bytes of the intact files.
         self._sizes: dict[str, int] = {}
         self._strays = False
 
     def run(self, progress: Progress, workers: int) -> None:
         self._read_manifest()
-        there = served_files(self._folder / SERVED, self.found)
-        check_names(there, self.found)
-        database = ServedDatabase(self._folder / SERVED, there, self.found, self._limits)
-        ours = {path for path in there if self._is_ours(path)}
-        self._note_others([path for path in there if path not in ours])
+        served = served_files(self._folder / SERVED, self.findings)
+        check_names(served, self.findings)
+        database = ServedDatabase(self._folder / SERVED, served, self.findings, self._limits)
+        ours = {path for path in served if self._is_ours(path)}
+        self._note_foreign([path for path in served if path not in ours])
         self._strays = any(f"{SERVED}/{path}" not in self._outputs for path in ours)
         self._read_files(ours, database, progress, workers)
         if _EMIT not in self._stages and not any(e.entry in ours for e in all_emitters()):
@@ -124,13 +280,14 @@ class _Check:
             return
         listed = {path for path in ours if f"{SERVED}/{path}" in self._outputs} or ours
         present = [e for e in all_emitters() if any(map(e.is_owner, listed))]
-        for emitter in {*present, *self._asked_for(present)}:
+        for emitter in {*present, *self._chosen(present)}:
             for name in emitter.owns:
                 if not (name.endswith("/") or name in ours or f"{SERVED}/{name}" in self._outputs):
                     database.at(name).add("PTM-D651", "missing")
+        database.hints = gather(database)
         counts: dict[str, int] = {}
         for emitter in present:
-            counts |= emitter.validate(database)
+            counts |= CHECKERS[emitter.name].check.load()(database)
         self._check_counts(_TEXTURES, _texture_counts(self._sizes, database))
         self._check_counts(_EMIT, counts)
         for path in sorted(ours - database.named):
@@ -140,48 +297,46 @@ class _Check:
                 database.at(path).add("PTM-D864", "no other file names it")
 
     def _read_manifest(self) -> None:
-        """Fills in what the stages wrote."""
         try:
             with open_regular(self._folder / MANIFEST) as file:
                 self._stages = schemas.read(file.read(), schemas.MANIFEST)["stages"]
+        except FileNotFoundError:
+            self._manifest.add("PTM-D650", "missing")
         except OSError as fault:
-            gone = isinstance(fault, FileNotFoundError)
-            message = "missing" if gone else f"cannot be read ({fault.strerror or fault})"
-            self._manifest.add("PTM-D650", message)
+            self._manifest.add("PTM-D650", f"cannot be read ({fault.strerror or fault})")
         except schemas.ShapeError as fault:
             self._manifest.add("PTM-D650", fault.message, fault.place)
         for stage, record in self._stages.items():
             at = self._manifest.at(f"stages.{stage}")
             for name in sorted(self._outputs.keys() & record["outputs"].keys()):
-                at.add("PTM-D650", f"another stage has written {name}, too")
+                at.add("PTM-D650", f"another stage lists {name}, too")
             self._outputs |= record["outputs"]
         for stage, record in self._stages.items():
+            at = self._manifest.at(f"stages.{stage}")
             for name, digest in record["inputs"].items():
                 if self._outputs.get(name, digest) != digest:
-                    at = self._manifest.at(f"stages.{stage}")
-                    at.add("PTM-D656", f"made from an earlier {name}")
+                    at.add("PTM-D656", f"computed from an earlier {name}")
 
     def _is_ours(self, path: str) -> bool:
-        """Whether a served file is one that was written, or lies where such files do."""
-        written = f"{SERVED}/{path}" in self._outputs
-        folder = path.partition("/")[0]
-        ours = folder in (TEXTURE_FOLDER, OCTREE_FOLDER) or owner_of(path) is not None
-        return written or ours
+        """Whether a stage wrote a served file, or it lies in a folder of such files."""
+        in_folder = path.partition("/")[0] in (TEXTURE_FOLDER, OCTREE_FOLDER)
+        return f"{SERVED}/{path}" in self._outputs or in_folder or owner_of(path) is not None
 
-    def _note_others(self, paths: Sequence[str]) -> None:
-        """Other files that users add are theirs."""
+    def _note_foreign(self, paths: Sequence[str]) -> None:
+        """Notes the files that users have added."""
         if paths:
-            named = ", ".join([*map(one_line, paths[:_NAMED]), *(["…"] if paths[_NAMED:] else [])])
+            listed = ", ".join(
+                [*map(one_line, paths[:_LISTED]), *(["…"] if paths[_LISTED:] else [])]
+            )
             are, were = ("is", "was") if len(paths) == 1 else ("are", "were")
-            what = f"{count(len(paths), 'file')} in {SERVED}/ {are} not from ptmtools"
-            self.notes = (f"{what}, and {were} not checked: {named}",)
+            subject = f"{count(len(paths), 'file')} in {SERVED}/ {are} not from ptmtools"
+            self.notes = (f"{subject} and {were} not checked: {listed}",)
 
-    def _asked_for(self, present: Sequence[Emitter]) -> Sequence[Emitter]:
-        """The emitters that the manifest names; if it names none, those that there are, or the
-        default."""
-        asked = self._stages.get(_EMIT, _NEVER)["parameters"].get("format")
+    def _chosen(self, present: Sequence[Emitter]) -> Sequence[Emitter]:
+        """The emitters that the manifest names; if it names none, those present or the default."""
+        format = self._stages.get(_EMIT, _NO_RECORD)["parameters"].get("format")
         try:
-            return chosen_emitters(str(asked))
+            return chosen_emitters(str(format))
         except ValueError:
             return present or chosen_emitters(EmitOptions().format)
 
@@ -194,7 +349,7 @@ class _Check:
         names = sorted({*self._outputs, *(f"{SERVED}/{path}" for path in ours)})
         for i, reading in enumerate(ordered(reader.read, names, workers)):
             progress(i, len(names), "files")
-            self.found.take(reading.found.issues())
+            self.findings.take(reading.findings.issues())
             if reading.size is None:
                 continue
             self.files += 1
@@ -202,22 +357,22 @@ class _Check:
             path = names[i].removeprefix(f"{SERVED}/")
             if reading.intact:
                 self._sizes[names[i]] = reading.size
-            if isinstance(reading.held, ReadTexture):
-                database.textures[path] = reading.held
-            elif reading.held is not None:
-                database.held[path] = reading.held
+            if isinstance(reading.content, ReadTexture):
+                database.textures[path] = reading.content
+            elif reading.content is not None:
+                database.contents[path] = reading.content
         progress(len(names), len(names), "files")
 
     def _check_counts(self, stage: str, counts: Mapping[str, int]) -> None:
-        """Holds a stage's counts in the manifest against those of its files; not if one of them is
-        not as it was written or could not be read, or if there are more."""
-        record = self._stages.get(stage, _NEVER)
+        """Compares a stage's counts in the manifest with those of its files, if all of these are
+        intact and there are no others."""
+        record = self._stages.get(stage, _NO_RECORD)
         if self._strays or record["outputs"].keys() - self._sizes.keys():
             return
         sizes = [self._sizes[name] for name in record["outputs"]]
-        for name, true in {"files": len(sizes), "bytes": sum(sizes), **counts}.items():
-            if record["counts"].get(name, true) != true:
-                message = f"is {record['counts'][name]!r}, but the files have {true}"
+        for name, actual in {"files": len(sizes), "bytes": sum(sizes), **counts}.items():
+            if record["counts"].get(name, actual) != actual:
+                message = f"is {record['counts'][name]!r}, but the files have {actual}"
                 self._manifest.at(f"stages.{stage}.counts.{name}").add("PTM-D659", message)
 
 

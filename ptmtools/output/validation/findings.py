@@ -59,7 +59,6 @@ CODES: dict[str, tuple[Severity, str]] = {
         "error",
         "the hints do not match their schemas, or an index in them is out of range",
     ),
-    "PTM-D701": ("error", "the hints and the cell files disagree"),
     "PTM-D702": (
         "error",
         "the ach values in a record are outside 0 to 1, do not sum to 1, or are not aligned",
@@ -70,7 +69,7 @@ CODES: dict[str, tuple[Severity, str]] = {
     ),
     "PTM-D704": ("error", "the hints and a texture file disagree"),
     "PTM-D705": ("error", "portals in a record are wrong, or do not match the adjacent cells"),
-    "PTM-D706": ("error", "viewpoints in hints.json are wrong, or do not match the root file"),
+    "PTM-D706": ("error", "a viewpoint in hints.json lies outside of its cell, or is wrong"),
     "PTM-D707": ("error", "the coverage statistics do not match the ach values"),
     "PTM-D708": ("warning", "a texture is listed in hints.json that no cell uses"),
     "PTM-D709": (
@@ -90,8 +89,6 @@ CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D734": ("error", "indices of a GLB are out of range, or not a list of triangles"),
     "PTM-D735": ("error", "a number in a GLB is not finite, or bounds do not match the data"),
     "PTM-D736": ("error", "a GLB and hints.json disagree about a texture"),
-    "PTM-D738": ("error", "a GLB and its cell's VRML file have different triangles"),
-    "PTM-D739": ("error", "a material of a GLB differs from that of its shape in the VRML file"),
     "PTM-D740": ("error", "the hints have another schema: the database is of another release"),
     "PTM-D741": ("error", "the index, the records and the statistics contradict each other"),
     "PTM-D742": ("error", "a first-look bundle is not what its cell's record and the textures say"),

@@ -1,19 +1,14 @@
-"""What the hints must satisfy beside their schemas: the index, the records and the statistics, each
-by itself and beside each other. The emitters' checks hold them against their own files.
-
-First-look bundles beside the records that list what is in them, and the textures' files.
-
-How fine textures are needed, as a record says it: whether that can be."""
+"""The check of the hints beyond their schemas: the index, the records and the statistics against
+each other, and textures and first-look bundles against them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ptmtools import schemas
 from ptmtools.diagnostics import Place
@@ -21,18 +16,20 @@ from ptmtools.output.emitters import EMITTERS
 from ptmtools.output.hints import RECORD_FORMAT as FORMAT, SCHEMA
 from ptmtools.output.model import FileError, shaped
 from ptmtools.output.names import BUNDLE, HINTS, HINTS_FOLDER, STATISTICS, path_of
-from ptmtools.output.validation.files import ServedDatabase
+from ptmtools.output.validation.files import Images, ReadHints, Row, ServedDatabase
 from ptmtools.output.validation.findings import check_graph, check_list, check_shares
 from ptmtools.output.validation.gltf import check_octrees
 from ptmtools.output.validation.space import check_space
 from ptmtools.output.validation.textures import check_record
+from ptmtools.tolerance import PARALLEL_COSINE
 
-#: A texture, and where in its file the bytes begin and end.
+#: A texture, and the start and end of bytes in its file.
 _Piece = tuple[int, int, int]
 
 
-def check_first_looks(hints: ReadHints, database: ServedDatabase) -> None:
-    """That there are bundles, and of the bytes that they should have; the files are read again."""
+def _check_first_looks(hints: ReadHints, database: ServedDatabase) -> None:
+    """Compares each bundle with the bytes of the textures that its record lists; reads the files
+    again."""
     template: str | None = hints.index.get("firstLook")
     urls = hints.expanded(template) if template else []
     ends = [row["ends"] for row in hints.index["textures"]]
@@ -40,11 +37,11 @@ def check_first_looks(hints: ReadHints, database: ServedDatabase) -> None:
     for i, record in hints.known():
         at = database.at(hints.paths[i], "firstLook")
         if (template is None) != ("firstLook" not in record):
-            at.add("PTM-D742", "the index and the record disagree about whether there is a bundle")
+            at.add("PTM-D742", "only one of the index and the record names a bundle")
             continue
         pieces = _pieces(record, ends)
         if pieces is None:
-            at.add("PTM-D742", "a pair does not refine a texture in sight")
+            at.add("PTM-D742", "a pair does not refine a visible texture")
         elif pieces and (path := database.resolve(HINTS, urls[i])):
             bundles[path] = pieces
     lengths: dict[int, int] = {}
@@ -53,107 +50,65 @@ def check_first_looks(hints: ReadHints, database: ServedDatabase) -> None:
     files = {t: hints.images[t][-1] for t in lengths}
     heads = {t: database.head(file, lengths[t]) for t, file in files.items() if file}
     for path, pieces in bundles.items():
-        wanted = b"".join(heads.get(t, b"")[start:end] for t, start, end in pieces)
-        if database.head(path, len(wanted) + 1) != wanted:
-            at = database.at(path)
-            at.add("PTM-D742", "does not hold the bytes of the textures that its record lists")
+        expected = b"".join(heads.get(t, b"")[start:end] for t, start, end in pieces)
+        if database.head(path, len(expected) + 1) != expected:
+            message = "does not consist of the bytes of the textures that its record lists"
+            database.at(path).add("PTM-D742", message)
 
 
 def _pieces(record: Row, ends: Sequence[Sequence[int]]) -> list[_Piece] | None:
-    """What the pairs of a record stand for; None if one of them cannot be."""
-    seen = {texture for row in record["textures"] for texture in row}
-    there: dict[int, int] = {}
+    """The pieces of a record's bundle; None if a pair is invalid."""
+    visible = {texture for row in record["textures"] for texture in row}
+    reached: dict[int, int] = {}
     pieces = []
     for texture, level in record.get("firstLook", ()):
-        before = there.get(texture, -1)
-        if texture not in seen or not before < level < len(ends[texture]):
+        before = reached.get(texture, -1)
+        if texture not in visible or not before < level < len(ends[texture]):
             return None
         pieces.append((texture, ends[texture][before] if before >= 0 else 0, ends[texture][level]))
-        there[texture] = level
+        reached[texture] = level
     return pieces
 
 
-#: How far shares, which are rounded, may sum up above 1.
-SHARES_ROUNDED = 1e-2
+#: Slack of a sum of shares above 1, since they are rounded.
+_NEED_SLACK = 1e-2
 
 
-def impossible_need(record: Mapping[str, Any], levels: Sequence[int]) -> str:
-    """What is wrong with the `need` of a record, "" if nothing is or there is none; ``levels``: how
-    many each texture has."""
+def need_fault(record: Row, levels: Sequence[int]) -> str:
+    """The fault of the `need` of a record, "" if there is none; ``levels``: the number of levels of
+    each texture."""
     rows: Sequence[Sequence[Any]] = record.get("need", ())
     textures = [row[0] for row in rows]
-    in_sight = {texture for row in record["textures"] for texture in row}
+    visible = {texture for row in record["textures"] for texture in row}
     if any(one >= other for one, other in pairwise(textures)):
-        return "its textures do not ascend"
+        return "its textures are not in ascending order"
     for texture, first, *shares in rows:
-        if texture not in in_sight:
-            return f"texture {texture} is not in sight"
+        if texture not in visible:
+            return f"texture {texture} is not visible"
         if first + len(shares) > levels[texture]:
             return f"texture {texture} has only {levels[texture]} levels"
         if any(one < other for one, other in pairwise(shares)):
             return f"the shares of texture {texture} increase"
-    if sum(row[2] for row in rows) > 1 + SHARES_ROUNDED:
+    if sum(row[2] for row in rows) > 1 + _NEED_SLACK:
         return "the shares of the view sum to more than 1"
     return ""
 
 
-#: How far sums of statistics, which are rounded, may be off.
-ROUNDED = 1e-3
-#: How far the ach values may sum up beside 1.
-ACH_SLACK = 1e-9
-#: Missed mass above this is worth a warning.
-MISSED = 1e-4
+#: Slack of sums of statistics, which are rounded.
+_STATISTICS_SLACK = 1e-3
+#: Slack of the sum of the ach values.
+_ACH_SLACK = 1e-9
+#: Missed mass above this is reported.
+_MISSED = 1e-4
 
-#: What the statistics have a row for each of the index of.
+#: The lists of the index that the statistics have a row for each entry of.
 _LISTS = ("cells", "textures")
-
-#: Hints, or an object in them, as JSON has them: as the schema says, and every index in range.
-Row = Mapping[str, Any]
-#: The files of a texture in the served folder, the fallback image first; None is not there.
-Images = tuple[str | None, ...]
-
-
-@dataclass(frozen=True)
-class ReadHints:
-    """The hints as far as they can be used.
-
-    Attributes
-    ----------
-    index: what `hints.json` holds.
-    paths: of each cell where its record should be, in the served folder.
-    records: of each cell its record, whose indices are in range; None without.
-    statistics: None without; as many rows as the index has.
-    images: of each texture its files.
-    """
-
-    index: Row
-    paths: Sequence[str]
-    records: Sequence[Row | None]
-    statistics: Row | None
-    images: Sequence[Images]
-
-    def urls(self, form: str) -> list[str] | None:
-        """The URLs of the cells' geometry in a form; None if the index does not name it."""
-        template: str | None = self.index["geometry"].get(form)
-        return None if template is None else self.expanded(template)
-
-    def expanded(self, template: str) -> list[str]:
-        """The URLs of the cells by a template."""
-        return [_expanded(template, cell) for cell in self.index["cells"]]
-
-    def known(self) -> Iterator[tuple[int, Row]]:
-        """The records that can be used, with their cells' numbers."""
-        return ((i, record) for i, record in enumerate(self.records) if record is not None)
-
-
-def _expanded(template: str, cell: Row) -> str:
-    return template.replace("{name}", cell["name"])
 
 
 def read_file(path: str, data: bytes) -> Row | int | None:
-    """The index, a record or the statistics; of a bundle its length, of other files nothing.
+    """The index, a record or the statistics; the length of a bundle; None of other files.
 
-    Raises FileError: PTM-D740 of another schema; PTM-D700 not as the schema says.
+    Raises FileError: PTM-D740 of another schema; PTM-D700 not valid against the schema.
     """
     if path == HINTS:
         index = _read(data, schemas.HINTS)
@@ -181,22 +136,22 @@ def _read(data: bytes, name: str) -> Row:
 
 
 def gather(database: ServedDatabase) -> ReadHints | None:
-    """The hints of a database, whose URLs are resolved on the way; None without an index."""
-    index: Row | None = database.held.get(HINTS)
+    """The hints of a database, with all their URLs resolved; None without an index."""
+    index: Row | None = database.contents.get(HINTS)
     if index is None:
         return None
     cells, textures = index["cells"], index["textures"]
-    urls = [_expanded(index["record"], cell) for cell in cells]
+    urls = [index["record"].replace("{name}", cell["name"]) for cell in cells]
     paths = database.resolve_each(HINTS, "cells", urls)
     database.resolve(HINTS, index["statistics"])
     records: list[Row | None] = []
     for i, path in enumerate(paths):
-        record = database.held.get(path) if path else None
-        if record is not None and (fault := _misplaced(record, i, len(cells), len(textures))):
+        record = database.contents.get(path) if path else None
+        if record is not None and (fault := _record_fault(record, i, cells, len(textures))):
             database.at(path or "", fault.place).add(fault.code, fault.message)
             record = None
         records.append(record)
-    statistics: Row | None = database.held.get(STATISTICS)
+    statistics: Row | None = database.contents.get(STATISTICS)
     if statistics is not None:
         counts = [f"{len(rows[name])} {name}" for rows in (statistics, index) for name in _LISTS]
         if counts[:2] != counts[2:]:
@@ -208,12 +163,12 @@ def gather(database: ServedDatabase) -> ReadHints | None:
     for row, file in zip(textures, files, strict=True):
         fallback = row["fallback"]
         images.append((file,) if fallback is None else (database.resolve(HINTS, fallback), file))
-    shown = [path or url for path, url in zip(paths, urls, strict=True)]
-    return ReadHints(index, shown, records, statistics, images)
+    paths_or_urls = [path or url for path, url in zip(paths, urls, strict=True)]
+    return ReadHints(index, paths_or_urls, records, statistics, images)
 
 
 def check_files(database: ServedDatabase) -> Mapping[str, int]:
-    """Checks all that needs no cell files; counts nothing."""
+    """Checks everything that needs no cell files; returns no counts."""
     hints = database.hints
     if hints is None:
         return {}
@@ -223,10 +178,10 @@ def check_files(database: ServedDatabase) -> Mapping[str, int]:
     levels = [len(row["ends"]) for row in hints.index["textures"]]
     for i, record in known.items():
         _check_record(record, i, places[i])
-        if wrong := impossible_need(record, levels):
-            places[i].add("PTM-D743", wrong, "need")
-        if not _holds(hints.index["cells"][i]["box"], record["leaves"]):
-            at.add("PTM-D741", "does not hold the leaves of the cell", f"cells[{i}].box")
+        if fault := need_fault(record, levels):
+            places[i].add("PTM-D743", fault, "need")
+        if not _contains(hints.index["cells"][i]["box"], record["leaves"]):
+            at.add("PTM-D741", "does not contain the leaves of the cell", f"cells[{i}].box")
     adjacent, visible = (
         {i: record[name] for i, record in known.items()} for name in ("adjacent", "visible")
     )
@@ -235,30 +190,33 @@ def check_files(database: ServedDatabase) -> Mapping[str, int]:
     _check_own_textures(known, own, places)
     _check_textures(hints, {t for textures in own.values() for t in textures}, database)
     _check_statistics(hints, database)
-    check_first_looks(hints, database)
+    _check_first_looks(hints, database)
     check_octrees(hints, database)
     _check_forms(hints, database)
     check_space(hints.records, hints.index["viewpoints"], places, at)
     for i, view in enumerate(hints.index["viewpoints"]):
         if not hints.index["cells"][view["cell"]].get("standing", True):
-            message = f"nobody can stand in cell {view['cell']}"
+            message = f"lies in cell {view['cell']}, which has no place to stand"
             at.add("PTM-D706", message, f"viewpoints[{i}]")
+        if abs(math.hypot(*view["direction"]) - 1) > 1 - PARALLEL_COSINE:
+            at.add("PTM-D706", "is no unit vector", f"viewpoints[{i}].direction")
     return {}
 
 
-def _misplaced(record: Any, i: int, cells: int, textures: int) -> FileError | None:
-    """Why what is held of a file is no record of the cell ``i`` of so many."""
+def _record_fault(record: Any, i: int, cells: Sequence[Row], textures: int) -> FileError | None:
+    """The reason why the content of a file is no record of the cell ``i``; None if it is one."""
     if not isinstance(record, dict) or record["format"] != FORMAT:
-        return FileError("PTM-D741", "", "is no record of a cell, as the index has it")
-    if record["cell"] != i:
-        return FileError("PTM-D741", "cell", f"is {record['cell']}, in the index {i}")
+        return FileError("PTM-D741", "", "is not a record of a cell")
+    for name, expected in (("cell", i), ("name", cells[i]["name"])):
+        if record[name] != expected:
+            return FileError("PTM-D741", name, f"is {record[name]!r}, in the index {expected!r}")
     try:
         for name in ("adjacent", "visible"):
-            _in_range(record[name], cells, name)
+            _in_range(record[name], len(cells), name)
         for k, row in enumerate(record["textures"]):
             _in_range(row, textures, f"textures[{k}]")
         for k, portal in enumerate(record["portals"]):
-            _in_range([portal["neighbour"]], cells, f"portals[{k}].neighbour")
+            _in_range([portal["neighbour"]], len(cells), f"portals[{k}].neighbour")
         for k, leaf in enumerate(record["leaves"]):
             for f, loop in enumerate(leaf["faces"]):
                 _in_range(loop, len(leaf["points"]), f"leaves[{k}].faces[{f}]")
@@ -283,17 +241,17 @@ def _check_record(record: Row, i: int, at: Place) -> None:
     for textures in record["textures"]:
         check_list("textures", None, textures, at)
     ach = np.array(record["ach"], dtype=np.float64)
-    check_shares(ach, ACH_SLACK, ("PTM-D702", "PTM-D702"), at)
+    check_shares(ach, _ACH_SLACK, ("PTM-D702", "PTM-D702"), at)
     for name in ("ach", "textures", "textureShares"):
         if len(record.get(name, ach)) != len(record["visible"]):
             at.add("PTM-D702", f"{name} is not aligned with visible")
     for shares, share in zip(record.get("textureShares", ()), ach, strict=False):
-        if abs(sum(part for _, part in shares) - share) > ROUNDED:
+        if abs(sum(part for _, part in shares) - share) > _STATISTICS_SLACK:
             at.add("PTM-D707", "the shares of textures do not sum to those of their cells")
             break
 
 
-def _holds(box: Sequence[float], leaves: Sequence[Row]) -> bool:
+def _contains(box: Sequence[float], leaves: Sequence[Row]) -> bool:
     points = np.array([point for leaf in leaves for point in leaf["points"]])
     return bool((points >= box[:3]).all() and (points <= box[3:]).all())
 
@@ -301,11 +259,11 @@ def _holds(box: Sequence[float], leaves: Sequence[Row]) -> bool:
 def _check_own_textures(
     records: Mapping[int, Row], own: Mapping[int, Sequence[int]], places: Sequence[Place]
 ) -> None:
-    """What a record says of the textures of other cells is what theirs say."""
+    """Each record lists the textures of other cells as their own records do."""
     for i, record in records.items():
         for other, textures in zip(record["visible"], record["textures"], strict=False):
             if own.get(other, textures) != textures:
-                places[i].add("PTM-D741", f"not the textures of cell {other}", "textures")
+                places[i].add("PTM-D741", f"are not the textures of cell {other}", "textures")
 
 
 def _check_textures(hints: ReadHints, used: set[int], database: ServedDatabase) -> None:
@@ -327,41 +285,41 @@ def _check_statistics(hints: ReadHints, database: ServedDatabase) -> None:
     rows = hints.statistics["cells"] if hints.statistics else ()
     for i, (row, record) in enumerate(zip(rows, hints.records, strict=False)):
         at = database.at(STATISTICS, f"cells[{i}]")
-        if record is not None and (wrong := _misfit(row, record["ach"])):
-            at.add("PTM-D707", wrong)
-        if row["missed"] > MISSED:
+        if record is not None and (fault := _statistics_fault(row, record["ach"])):
+            at.add("PTM-D707", fault)
+        if row["missed"] > _MISSED:
             share = f"{row['missed']:.3g} of the pixels"
             at.add("PTM-D703", f"{share} fell on cells outside the PVS")
 
 
-def _misfit(row: Row, ach: Sequence[float] | NDArray[np.float64]) -> str:
-    """What is wrong with the statistics of (n,) shares; empty if nothing is."""
+def _statistics_fault(row: Row, ach: Sequence[float]) -> str:
+    """The fault of the statistics of (n,) shares; "" if there is none."""
     columns = {name: row[name] for name in ("error", "p95", "seen")}
     columns |= {f"views[{i}]": view for i, view in enumerate(row["views"])}
     for name, values in columns.items():
         if len(values) != len(ach):
             return f"{name} is not aligned with ach"
-    if any(abs(sum(view) - 1) > ROUNDED for view in row["views"]):
+    if any(abs(sum(view) - 1) > _STATISTICS_SLACK for view in row["views"]):
         return "the shares of a view do not sum to 1"
-    # But for a cell that sees nothing, which has 1 for itself.
+    # The own share of a cell without any hit is 1.
     if any(seen == 0 < share < 1 for seen, share in zip(row["seen"], ach, strict=True)):
-        return "what is seen from nowhere has a share"
+        return "a cell that is seen from nowhere has a share"
     return ""
 
 
 def _check_forms(hints: ReadHints, database: ServedDatabase) -> None:
-    """The index names the forms that there are, and no other. What the emitters' checks know is
-    left to them."""
+    """The index names the forms whose files exist, and no other; the checks of the forms compare
+    their files."""
     at, geometry = database.at(HINTS, "geometry"), hints.index["geometry"]
     if not geometry:
-        at.add("PTM-D741", "there is no geometry")
-    there = {form for form in EMITTERS if _is_there(form, len(hints.records), database)}
-    for form in sorted(there - set(geometry)):
-        at.add("PTM-D741", f"{form} is there, and not named")
-    for form in sorted(set(geometry) - there):
+        at.add("PTM-D741", "names no form")
+    present = {form for form in EMITTERS if _is_present(form, len(hints.records), database)}
+    for form in sorted(present - set(geometry)):
+        at.add("PTM-D741", f"does not name {form}, whose files exist")
+    for form in sorted(set(geometry) - present):
         database.resolve_each(HINTS, "geometry", hints.urls(form) or ())
 
 
-def _is_there(form: str, cells: int, database: ServedDatabase) -> bool:
+def _is_present(form: str, cells: int, database: ServedDatabase) -> bool:
     files = EMITTERS[form].cell_files
     return bool(files) and any(path_of(cell, files) in database.files for cell in range(cells))

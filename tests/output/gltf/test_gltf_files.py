@@ -20,6 +20,7 @@ from ptmtools.output import EmitOptions, validate_database
 from ptmtools.output.gltf import BufferWriter, linear, pack, unpack
 from ptmtools.output.vrml_reader import Node, parse
 from ptmtools.scene.model import Material
+from tests.output.agreement import disagreements
 
 EmitGltf = Callable[..., Path]
 
@@ -187,6 +188,7 @@ def test_without_fallback_only_the_ptm_is_named(
         png.unlink()
     seal(tmp_path / "db")
     assert validate_database(tmp_path / "db").issues == ()
+    assert disagreements(tmp_path / "db/www") == []
 
 
 def test_a_good_database_has_no_issue(gltf_database: Path) -> None:
@@ -214,6 +216,7 @@ def test_an_empty_cell_is_a_file(
     assert meshes(www / "gltf/c0001.glb") == []
     seal(tmp_path / "db")
     assert validate_database(tmp_path / "db").issues == ()
+    assert disagreements(tmp_path / "db/www") == []
 
 
 def test_the_index_names_them(gltf_finished: Path) -> None:
@@ -243,6 +246,7 @@ def test_names_are_percent_encoded(
     assert uris == {f"../textures/{n}%20%C3%BC%23%2541.png" for n in "ab"}
     seal(tmp_path / "db")
     assert validate_database(tmp_path / "db").issues == ()
+    assert disagreements(tmp_path / "db/www") == []
 
 
 def test_vrml_alone(artifacts: Any, tmp_path: Path, emit_gltf: EmitGltf) -> None:

@@ -1,11 +1,8 @@
-"""The interlaced images of a database's textures: what the emitter `interlace` writes and checks.
+"""The interlaced images of a database's textures, written and checked.
 
-Of each `.ptm` the finest level is interlaced, as it is served: with what `--max-error` and `--trim`
-have left of it. Sides that are no powers of two are scaled, and one that is short is one file
-(docs/formats/interlace.md). Floats, which images do not hold, are taken in eight bits, as clients
-show them.
-
-A database and an interlaced image know nothing of each other; this is above both.
+The finest served level of each `.ptm`, after `--max-error` and `--trim`, is interlaced. Sides that
+are no powers of two are scaled; a short side is not split (docs/formats/interlace.md). Floats
+become eight bits, as clients show them, since the image formats lack them.
 """
 
 from __future__ import annotations
@@ -34,9 +31,9 @@ from ptmtools.texture.model import Limits
 from ptmtools.texture.parallel import ordered
 from ptmtools.texture.samples import KINDS, in_eight_bits
 
-#: Files that no manifest of a set names are found by the check of the database.
+#: Files that a set's manifest does not name; the check of the database reports them.
 _STRAY = "PTM-D806"
-#: Samples of what floats are shown as.
+#: The kind of samples that floats become.
 EIGHT_BITS = "uint8"
 
 
@@ -45,7 +42,7 @@ def interlaced_files(content: Content) -> Iterator[tuple[str, str | bytes]]:
 
     Raises
     ------
-    DatabaseError: PTM-D602 a texture is not at hand.
+    DatabaseError: PTM-D602 a texture was not encoded.
     InputError, LimitError: what reading a `.ptm` and `interlace` raise.
     """
     for record in content.textures:
@@ -65,92 +62,91 @@ def interlaced_files(content: Content) -> Iterator[tuple[str, str | bytes]]:
 def _interlaced(record: TextureRecord) -> Written:
     assert record.stored
     finest = record.levels[-1]
-    # What was encoded once can be decoded: its levels, and room to work in.
+    # Enough for all levels of a texture that has been encoded.
     limits = Limits(64 * finest.width * finest.height * record.components + (1 << 20))
     with naming(record.stored):
         return interlace(Picture(_finest(record.stored, limits)), limits=limits)
 
 
 def _finest(file: Path, limits: Limits) -> NDArray[Any]:
-    """The finest level of a `.ptm`, as it is shown."""
+    """The finest level of a `.ptm`, floats in eight bits."""
     with reader.open(file, limits=limits) as ptm:
         texels = ptm.level(len(ptm.header.levels) - 1)
     return np.ascontiguousarray(in_eight_bits(texels) if texels.dtype.kind == "f" else texels)
 
 
 def read_file(path: str, data: bytes) -> int:
-    """Nothing of a file is kept but its length: the sets are checked one by one."""
+    """The length of a file; `check_files` reads the sets."""
     return len(data)
 
 
-def check_sets(database: ServedDatabase) -> Mapping[str, int]:
-    """Checks each texture's set, and that it is that of its texture; counts nothing."""
+def check_files(database: ServedDatabase) -> Mapping[str, int]:
+    """Checks each texture's set against the texture; returns no counts."""
     hints = database.hints
     if hints is None:
         return {}
     template = hints.index.get("textureSets", {}).get(INTERLACE.name)
     if template is None:
-        database.at(HINTS, "textureSets").add("PTM-D741", f"{INTERLACE.name} is there, not named")
+        database.at(HINTS, "textureSets").add(
+            "PTM-D741", f"does not name {INTERLACE.name}, whose files exist"
+        )
         return {}
     rows = hints.index["textures"]
-    wanted = [template.replace("{name}", texture_name(row["file"])) + INDEX for row in rows]
-    found = database.resolve_each(HINTS, "textureSets", wanted)
-    for row, images, path in zip(rows, hints.images, found, strict=True):
+    expected = [template.replace("{name}", texture_name(row["file"])) + INDEX for row in rows]
+    indices = database.resolve_each(HINTS, "textureSets", expected)
+    for row, images, path in zip(rows, hints.images, indices, strict=True):
         if path is not None:
             _check_set(database, path.removesuffix(INDEX), row, images)
-    sets = {p for p in database.files if p.startswith(f"{INTERLACE_FOLDER}/") and _is_index(p)}
-    for path in sorted(sets - set(found)):
-        database.at(path).add("PTM-D744", "is of no texture")
+    folder = f"{INTERLACE_FOLDER}/"
+    sets = {p for p in database.files if p.startswith(folder) and p.endswith(f"/{INDEX}")}
+    for path in sorted(sets - set(indices)):
+        database.at(path).add("PTM-D744", "belongs to no texture")
     return {}
-
-
-def _is_index(path: str) -> bool:
-    return path.endswith(f"/{INDEX}")
 
 
 def _check_set(
     database: ServedDatabase, folder: str, row: Mapping[str, Any], images: Sequence[str | None]
 ) -> None:
-    """One set, by the check of interlaced images, and beside its texture."""
+    """Checks one set by itself and against its texture."""
     report = validate_interlaced(database.folder / folder, database.limits)
     database.take(folder, (issue for issue in report.issues if issue.code != _STRAY))
     try:
         interlaced = read_manifest(database.folder / folder)
     except InputError:
-        return  # has been found
+        return  # already reported
     texture = database.textures.get(images[-1] or "")
-    wrong = _misfit(interlaced, row, texture)
-    if not wrong and texture and not report.issues:
-        wrong = _other_texels(database, folder, interlaced, images[-1] or "")
-    if wrong:
-        database.at(f"{folder}{INDEX}").add("PTM-D744", wrong)
+    fault = _fault(interlaced, row, texture)
+    if not fault and texture and not report.issues:
+        fault = _other_texels(database, folder, interlaced, images[-1] or "")
+    if fault:
+        database.at(f"{folder}{INDEX}").add("PTM-D744", fault)
 
 
 def _other_texels(
     database: ServedDatabase, folder: str, interlaced: Interlaced, texture: str
 ) -> str:
-    """How many texels of a set are not those of its texture; empty if all are, or if there is more
-    than can be read."""
+    """The number of texels of a set that differ from the texture's, as a message; "" if none do or
+    the images cannot be read."""
     try:
         texels = _finest(database.folder / texture, database.limits)
-        shown = deinterlace(database.folder / folder, limits=database.limits)
+        joined = deinterlace(database.folder / folder, limits=database.limits)
     except PtmError:
-        return ""  # has been found, or is too large
+        return ""  # already reported, or beyond the limit
     width, height = interlaced.width, interlaced.height
     if texels.shape[:2] != (height, width):
         texels = scaled(texels, width, height)
-    differ = (texels.reshape(shown.shape) != shown).any(axis=-1)
+    differ = (texels.reshape(joined.shape) != joined).any(axis=-1)
     return f"{differ.sum():,} texels differ from those of the texture" if differ.any() else ""
 
 
-def _misfit(interlaced: Interlaced, row: Mapping[str, Any], texture: ReadTexture | None) -> str:
-    """In what a set is not that of a texture; empty if it is."""
+def _fault(interlaced: Interlaced, row: Mapping[str, Any], texture: ReadTexture | None) -> str:
+    """The reason why a set is not that of a texture; "" if it is."""
     if not interlaced.lossless:
-        return f"{interlaced.container} is not exact"
+        return f"{interlaced.container} is not lossless"
     size = row["width"], row["height"]
     if interlaced.original != size:
         old = " x ".join(map(str, interlaced.original))
-        return f"was made of {old} texels, the texture has {size[0]} x {size[1]}"
+        return f"has {old} texels, the texture {size[0]} x {size[1]}"
     if interlaced.components != row["components"]:
         return f"has {interlaced.components} components, the texture {row['components']}"
     if texture:

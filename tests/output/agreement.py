@@ -1,0 +1,225 @@
+"""Compares the forms of one emitted database with each other: VRML, GLB and hints.
+
+`ptm validate` checks each form by itself; only the emitters can make two forms differ, so their
+tests compare them here. Files that cannot be read are left out.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ptmtools.output.gltf import WRAPS, flipped, linear
+from ptmtools.output.gltf_reader import ReadGlb, ReadMaterial, ReadPrimitive, read_glb
+from ptmtools.output.model import FileError
+from ptmtools.output.vrml_reader import Document, Node, parse
+from ptmtools.scene.colors import to_srgb
+from ptmtools.tolerance import PARALLEL_COSINE
+
+#: Slack of a colour that went through the decimals of VRML.
+COLOR_SLACK = 1e-5
+#: Half a level of 255, and the loss in 16 bits of linear light.
+LEVEL_SLACK = 0.6 / 255
+
+
+def disagreements(www: Path) -> list[str]:
+    """The differences between the forms, each as "KIND: where and what". KIND is "cell" (record
+    and VRML file), "viewpoint" (index and root), "triangles" or "material" (GLB and VRML file)."""
+    index = _json(www / "hints.json")
+    cells = {p.stem: d for p in sorted(www.glob("cells/*.wrl")) if (d := _document(p))}
+    lines: list[str] = []
+    if index is not None:
+        lines += _cells(www, index, cells)
+        root = _document(www / "root.wrl")
+        if root is not None:
+            lines += _viewpoints(index, root)
+    for name, document in cells.items():
+        path = www / f"gltf/{name}.glb"
+        with suppress(FileError, OSError):
+            lines += _shapes(name, read_glb(path.read_bytes()), document.of_type("Shape"))
+    return lines
+
+
+def kinds(www: Path) -> set[str]:
+    """The kinds of the differences."""
+    return {line.partition(":")[0] for line in disagreements(www)}
+
+
+def _json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return None
+
+
+def _document(path: Path) -> Document | None:
+    try:
+        return parse(path.read_bytes())
+    except (OSError, FileError):
+        return None
+
+
+# Hints and VRML files
+
+
+def _cells(www: Path, index: Any, documents: Mapping[str, Document]) -> Iterator[str]:
+    with suppress(KeyError, TypeError):
+        known = [cell["name"] for cell in index["cells"]]
+        images = [{row["file"], row["fallback"]} - {None} for row in index["textures"]]
+        for name in known:
+            record, document = _json(www / f"hints/{name}.json"), documents.get(name)
+            nodes = document.of_type("PTMCell") if document else []
+            if record is None or document is None or len(nodes) != 1 or nodes[0].lacks:
+                continue
+            with suppress(KeyError, TypeError, IndexError, ValueError):
+                for field in _differences(record, nodes[0].fields, document, known, images):
+                    yield f"cell: {name}: {field}"
+
+
+def _differences(
+    record: Any, cell: Any, document: Document, known: Sequence[str], images: Sequence[set[str]]
+) -> list[str]:
+    """The fields in which a record differs from the cell's VRML file."""
+    textures = [shape.at("appearance", "texture") for shape in document.of_type("Shape")]
+    shown = {frozenset(u.removeprefix("../") for u in t["url"]) for t in textures if "url" in t}
+    leaves = []
+    if "leafPoint" in cell:
+        leaves = np.split(cell["leafPoint"], cell["leafStart"][1:])
+    equal = {
+        "name": record["name"] == cell["cellName"],
+        "adjacent": [f"{known[c]}.wrl" for c in record["adjacent"]] == list(cell["adjacentUrl"]),
+        "visible": [f"{known[c]}.wrl" for c in record["visible"]] == list(cell["visibleUrl"]),
+        "ach": _equal_single(record["ach"], cell["ach"]),
+        "leaves": _same_leaves(record["leaves"], leaves, cell["hullPoint"]),
+        "textures": {frozenset(images[t]) for t in record["textures"][0]} == shown,
+    }
+    return [field for field, same in equal.items() if not same]
+
+
+def _equal_single(full: Sequence[Any], written: Any) -> bool:
+    return np.array_equal(np.array(full, np.float32), np.asarray(written).astype(np.float32))
+
+
+def _same_leaves(leaves: Sequence[Any], written: Sequence[Any], hull: Any) -> bool:
+    """Whether the leaves are those of the file, if it has several, and as large as its hull."""
+    if len(leaves) != max(len(written), 1) or not len(hull):
+        return False
+    points = [point for leaf in leaves for point in leaf["points"]]
+    pairs = zip(leaves, written, strict=False)
+    return all(_equal_single(leaf["points"], rows) for leaf, rows in pairs) and all(
+        _equal_single(end(points, axis=0), end(hull, axis=0)) for end in (np.min, np.max)
+    )
+
+
+def _viewpoints(index: Any, root: Document) -> Iterator[str]:
+    views, cells = index["viewpoints"], index["cells"]
+    cell_of = {
+        node.fields.get("viewpoint"): node.fields.get("cellUrl")
+        for node in root.of_type("PTMViewpointCell")
+    }
+    with suppress(KeyError, TypeError, IndexError):
+        expected = {view["name"]: (f"cells/{cells[view['cell']]['name']}.wrl",) for view in views}
+        if expected != cell_of or len(expected) < len(views):
+            yield "viewpoint: other names or cells"
+        poses = {node.name: node.fields for node in root.of_type("Viewpoint")}
+        for view in views:
+            for name, written in poses.get(view["name"], {}).items():
+                if name == "orientation":
+                    same = _turns(written, view["direction"])
+                elif isinstance(written, str):
+                    same = written == " ".join(view[name].split())
+                else:
+                    same = _equal_single(np.ravel(view[name]), np.ravel(written))
+                if not same:
+                    yield f"viewpoint: {view['name']}: {name}"
+
+
+def _turns(orientation: Sequence[float], direction: Sequence[float]) -> bool:
+    """Whether a rotation, axis and angle, brings -Z to a direction."""
+    axis, angle = np.array(orientation[:3], np.float64), orientation[3]
+    ahead = np.array([0.0, 0.0, -1.0])
+    turned = (
+        ahead * np.cos(angle)
+        + np.cross(axis, ahead) * np.sin(angle)
+        + axis * (axis @ ahead) * (1 - np.cos(angle))
+    )
+    unit = abs(axis @ axis - 1) <= 1 - PARALLEL_COSINE
+    return bool(unit and turned @ direction >= PARALLEL_COSINE)
+
+
+# GLBs and VRML files
+
+
+def _shapes(name: str, glb: ReadGlb, shapes: Sequence[Node]) -> Iterator[str]:
+    if len(shapes) != len(glb.primitives):
+        yield f"triangles: {name}: {len(glb.primitives)} primitives for {len(shapes)} shapes"
+        return
+    for primitive, shape in zip(glb.primitives, shapes, strict=True):
+        corners = _corners(shape, "coord", "coordIndex")
+        if corners is None:
+            continue
+        points = primitive.point[primitive.triangle]
+        if not np.array_equal(corners.astype(np.float32), points):
+            yield f"triangles: {name}: {primitive.place}, positions"
+        uv = None if primitive.uv is None else primitive.uv[primitive.triangle]
+        mapped = _corners(shape, "texCoord", "texCoordIndex")
+        if mapped is None:
+            same = uv is None or "texCoord" in shape.at("geometry")
+        else:
+            same = uv is not None and np.array_equal(flipped(mapped.astype(np.float32)), uv)
+        if not same:
+            yield f"triangles: {name}: {primitive.place}, texture coordinates"
+        if fault := _other_colors(primitive, shape) or _other_material(primitive.material, shape):
+            yield f"material: {name}: {primitive.place}, {fault}"
+
+
+def _other_material(material: ReadMaterial, shape: Node) -> str:
+    """The property in which a material differs from a VRML shape; "" if in none."""
+    geometry = shape.at("geometry")
+    texture, surface = shape.at("appearance", "texture"), shape.at("appearance", "material")
+    if material.two_sided == geometry.get("solid", True):
+        return "sides"
+    urls = sorted(url for url in (material.image, material.ptm) if url is not None)
+    if sorted(texture.get("url", ())) != urls:
+        return "images"
+    wrap = tuple(
+        WRAPS["repeat" if texture.get(name, True) else "clamp"] for name in ("repeatS", "repeatT")
+    )
+    if material.wrap != wrap:
+        return "wrap"
+    faces = shape.at("geometry", "color").get("color", np.ones((1, 3)))
+    if geometry.get("colorPerVertex", True):  # colours of corners are no tint
+        faces = np.ones((1, 3))
+    color = surface.get("diffuseColor", faces)
+    alpha = 1 - surface.get("transparency", np.zeros(1))
+    expected = np.array([*(linear(float(c)) for c in np.ravel(color)[:3]), *alpha])
+    if len(expected) != 4 or np.abs(expected - material.factor).max() > COLOR_SLACK:
+        return "colour"
+    return "opaque" if material.factor[3] < 1 and not material.blends else ""
+
+
+def _other_colors(primitive: ReadPrimitive, shape: Node) -> str:
+    geometry = shape.at("geometry")
+    painted = "colorIndex" in geometry and geometry.get("colorPerVertex", True)
+    if painted != (primitive.color is not None):
+        return "colours of corners"
+    colors = _corners(shape, "color", "colorIndex", "color") if painted else None
+    if colors is None or primitive.color is None:
+        return ""
+    given = to_srgb(primitive.color)[primitive.triangle]
+    same = given.shape == colors.shape and np.abs(given - colors).max(initial=0.0) <= LEVEL_SLACK
+    return "" if same else "colours of corners"
+
+
+def _corners(shape: Node, values: str, index: str, field: str = "point") -> Any:
+    """(m, 3, k) the values at the corners of a shape's triangles; None without."""
+    try:
+        rows = shape.at("geometry")[index].reshape(-1, 4)[:, :3]
+        return shape.at("geometry", values)[field][rows]
+    except (KeyError, ValueError, IndexError):
+        return None
