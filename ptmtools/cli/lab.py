@@ -158,8 +158,8 @@ def walk_campus(
     The output is Markdown: a row for each measure, and the MB received per half minute.
     """
     options = take(CampusWalkOptions, values)
+    from ptmtools.lab.campus import report
     from ptmtools.lab.campus.simulation import simulate_campus
-    from ptmtools.visibility.report import report
 
     walk = read_walk(walk_file)
     trace = read_trace(trace_file) if trace_file else None

@@ -151,13 +151,13 @@ def next_fetch(
 @plain_kernel
 def gather(
     start: int, end: int, cell: Numbers, texture: Numbers, table: Singles,
-    there: Bools, worth: Floats,
+    loaded: Bools, worth: Floats,
 ) -> None:  # fmt: skip
     """Adds rows of a table (R, L) of pairs to their textures' worth (T, L + 1), from its second
     column on, for the cells that are there (C,)."""
     for r in range(start, end):
         t = texture[r]
-        if t < 0 or not there[cell[r]]:
+        if t < 0 or not loaded[cell[r]]:
             continue
         for k in range(table.shape[1]):
             worth[t, k + 1] += table[r, k]
@@ -166,7 +166,7 @@ def gather(
 @plain_kernel
 def holes(
     ray: Floats, owner: Numbers, depth: Singles, eye: Floats,
-    low: Floats, high: Floats, there: Bools, missing: Ints, share: Floats,
+    low: Floats, high: Floats, loaded: Bools, missing: Ints, share: Floats,
 ) -> None:  # fmt: skip
     """Adds to ``share`` (C,) the pixels that would show placeholders of cells whose geometry is
     missing: the far faces of their boxes, which are rooms.
@@ -179,7 +179,7 @@ def holes(
     """
     for i in range(len(owner)):
         nearest, nearest_cell = np.inf, -1
-        if owner[i] >= 0 and there[owner[i]]:
+        if owner[i] >= 0 and loaded[owner[i]]:
             nearest = depth[i]
         for m in range(len(missing)):
             cell = missing[m]
@@ -201,7 +201,7 @@ def holes(
 @plain_kernel
 def picture(
     start: int, end: int, cell: Numbers, texture: Numbers, error: Singles,
-    square: Singles, need: Singles, there: Bools, column: Ints, colored: bool,
+    square: Singles, need: Singles, loaded: Bools, column: Ints, colored: bool,
     shown: Bools, drawn: Bools,
 ) -> tuple[float, float, float]:  # fmt: skip
     """The mean error, the mean of its square, and the share of wanted levels that is missing, of
@@ -217,7 +217,7 @@ def picture(
     mean, squared, missing, wanted = 0.0, 0.0, 0.0, 0.0
     for r in range(start, end):
         t = texture[r]
-        if not there[cell[r]]:
+        if not loaded[cell[r]]:
             mean += error[r, 0]
             squared += square[r, 0]
             if t >= 0:

@@ -124,13 +124,13 @@ class Files:
 
     def __init__(self, kind: Kind, size: Ints) -> None:
         self.kind, self.size = kind, size
-        self.asked, self.there = np.zeros(len(size), np.int64), np.zeros(len(size), np.int64)
+        self.asked, self.loaded = np.zeros(len(size), np.int64), np.zeros(len(size), np.int64)
         self._waiting: dict[int, deque[list[int]]] = {}
 
     @property
     def whole(self) -> Bools:
         """(n,) which are there from beginning to end."""
-        result: Bools = self.there >= self.size
+        result: Bools = self.loaded >= self.size
         return result
 
     def ask(self, number: int, end: int) -> Range:
@@ -165,7 +165,7 @@ class Files:
         """Counts what is there without a gap."""
         waiting = self._waiting[number]
         while waiting and waiting[0][1]:
-            self.there[number] = waiting.popleft()[0]
+            self.loaded[number] = waiting.popleft()[0]
 
 
 class Client(ABC):
@@ -211,7 +211,7 @@ class Client(ABC):
     def have(self) -> Ints:
         """(T,) columns that are downloaded whole."""
         stock = self.world.catalogue
-        held = (stock.ends <= self.textures.there[:, None]).sum(axis=1) - 1
+        held = (stock.ends <= self.textures.loaded[:, None]).sum(axis=1) - 1
         columns: Ints = np.minimum(held, stock.levels)
         return columns
 

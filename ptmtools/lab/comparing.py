@@ -132,8 +132,8 @@ def require_hints(served: Served, policies: Sequence[Declared]) -> None:
     there in its form."""
     for policy in policies:
         form = FORMS[policy.form]
-        there = {*served.index, *served.index.get("textureSets", ())}
-        if form.needs and form.needs[0] not in there:
+        available = {*served.index, *served.index.get("textureSets", ())}
+        if form.needs and form.needs[0] not in available:
             raise InputError(
                 "PTM-I701",
                 f"policy {policy.name} needs {form.about}, which the database does not have",

@@ -160,13 +160,13 @@ def draw_view(
         within = (pyramids.size.max(axis=2) <= options.max_side) & (pyramids.size[:, :, 0] > 0)
         column = np.minimum(np.maximum(within.sum(axis=1), 1), column)
     shown = np.empty((len(sight.ray), 3))
-    there = np.ones(served.cell_count, dtype=np.bool_)
-    shade(sight, triangles, own_levels(pyramids), there, column, shown)
+    loaded = np.ones(served.cell_count, dtype=np.bool_)
+    shade(sight, triangles, own_levels(pyramids), loaded, column, shown)
     if options.lit:
         from ptmtools.lab.relief.kernels import relieve
 
         octrees = read_octrees(served)
-        relieve(sight, triangles, lamps(surfaces.corner), octrees, there, octrees.levels, shown)
+        relieve(sight, triangles, lamps(surfaces.corner), octrees, loaded, octrees.levels, shown)
     else:
         _shade_plain(sight, triangles, shown)
     shown[sight.triangle < 0] = _SKY

@@ -94,7 +94,7 @@ def frames(world: World, run: Run, every: float) -> Iterator[tuple[str, bytes]]:
     step = max(1, round(every * world.rate))
     for f in range(0, world.frames, step):
         sight = renderer.look(world.eye[f], world.direction[f])
-        colors = renderer.colors(sight, run.there[f], run.column[f])
+        colors = renderer.colors(sight, run.loaded[f], run.column[f])
         yield f"{world.time[f]:07.1f}.png", png(as_bytes(colors))
 
 
@@ -111,7 +111,7 @@ def strip(world: World, played: Played, policy_options: Sequence[object] = ()) -
     frames = []
     for instant in INSTANTS:
         f = int(np.searchsorted(stays.time, instant - 0.5 / stays.rate))
-        colors = renderer.colors(sight, run.there[f], run.column[f])
+        colors = renderer.colors(sight, run.loaded[f], run.column[f])
         label = f"{instant:g} s, {run.fetched[f] / 1e6:.2f} MB, e {run.error[f]:.2f}"
         frames.append((label, as_bytes(colors)))
     frames.append(("full", as_bytes(renderer.full(sight))))

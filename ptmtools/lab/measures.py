@@ -164,13 +164,13 @@ class Flip:
         """(n,) the mean FLIP of each of the frames."""
         return np.array(
             [
-                self._of(k, run.there[f], run.column[f])
+                self._of(k, run.loaded[f], run.column[f])
                 for k, f in enumerate(self.frame.tolist())
             ]
         )  # fmt: skip
 
-    def _of(self, k: int, there: Bools, column: Ints) -> float:
-        return flip(self._full[k], self._renderer.colors(self._sights[k], there, column))
+    def _of(self, k: int, loaded: Bools, column: Ints) -> float:
+        return flip(self._full[k], self._renderer.colors(self._sights[k], loaded, column))
 
 
 def flip(reference: Floats, test: Floats) -> float:

@@ -45,10 +45,10 @@ class Renderer:
         """What is seen from an eye (3,) in a direction (3,)."""
         return self._caster.look(self._camera, eye, direction)
 
-    def colors(self, sight: Sight, there: Bools, column: Ints) -> Floats:
+    def colors(self, sight: Sight, loaded: Bools, column: Ints) -> Floats:
         """(height, width, 3) 0 to 255, with the geometry of cells (C,) that is there and a column
         (T,) of each texture."""
-        return self._drawn(sight, self._shows, there, column)
+        return self._drawn(sight, self._shows, loaded, column)
 
     def full(self, sight: Sight) -> Floats:
         """The same with everything there, in whatever form clients take it: all levels of the
@@ -56,23 +56,23 @@ class Renderer:
         relief = self._world.relief
         if relief and relief.reference:
             return self._picture(relief.reference.shown(relief.reference.look(sight)))
-        there = np.ones(self._world.catalogue.cell_count, dtype=np.bool_)
+        loaded = np.ones(self._world.catalogue.cell_count, dtype=np.bool_)
         last = self._full.last
         if relief:
             last = np.concatenate([last, relief.octrees.levels])
-        return self._drawn(sight, self._full, there, last)
+        return self._drawn(sight, self._full, loaded, last)
 
-    def _drawn(self, sight: Sight, shows: Shows, there: Bools, column: Ints) -> Floats:
+    def _drawn(self, sight: Sight, shows: Shows, loaded: Bools, column: Ints) -> Floats:
         from ptmtools.rendering.kernels import shade
 
         shown = np.empty((len(sight.ray), 3))
-        shade(sight, self._triangles, shows, there, column, shown)
+        shade(sight, self._triangles, shows, loaded, column, shown)
         if self._world.relief:
             from ptmtools.lab.relief.kernels import relieve
 
             octrees, first = self._world.relief.octrees, len(self._world.pyramids.levels)
             held = column[first : first + octrees.number]
-            relieve(sight, self._triangles, self._lamps, octrees, there, held, shown)
+            relieve(sight, self._triangles, self._lamps, octrees, loaded, held, shown)
         return self._picture(shown)
 
     def _picture(self, shown: Floats) -> Floats:

@@ -59,7 +59,7 @@ class Run:
     memory: Ints
     fetched: Floats
     column: Ints
-    there: Bools
+    loaded: Bools
     body: float
     overhead: float
     cancelled: float
@@ -84,7 +84,7 @@ def simulate(world: World, policy: Declared, conditions: Conditions, budget: int
     error, square, missing, quality, fetched = (np.zeros(frames) for _ in range(5))
     memory = np.zeros(frames, np.int64)
     column = np.zeros((frames, stock.texture_count), np.int64)
-    there = np.zeros((frames, stock.cell_count), dtype=bool)
+    loaded = np.zeros((frames, stock.cell_count), dtype=bool)
     shown = np.zeros(stock.ends.shape, dtype=bool)
     drawn = np.zeros(stock.cell_count, dtype=bool)
     each = np.arange(stock.texture_count)
@@ -95,12 +95,12 @@ def simulate(world: World, policy: Declared, conditions: Conditions, budget: int
             passing.until(float((1 - part) * world.time[f - 1] + part * world.time[f]))
             client.tick()
         passing.frame(f)
-        column[f], there[f] = client.column, client.geometry.whole
+        column[f], loaded[f] = client.column, client.geometry.whole
         memory[f] = stock.memory[each, client.column].sum()
         rows = views.rows(int(world.view[f]))
         error[f], square[f], missing[f] = picture(
             rows.start, rows.stop, views.cell, views.texture, views.error, views.square, views.need,
-            there[f], client.column, world.colored, shown, drawn,
+            loaded[f], client.column, world.colored, shown, drawn,
         )  # fmt: skip
         quality[f] = _quality(client)
         arriving = sum(request.received for request in client.waiting)
@@ -123,16 +123,16 @@ def simulate(world: World, policy: Declared, conditions: Conditions, budget: int
         memory=memory,
         fetched=fetched,
         column=column,
-        there=there,
+        loaded=loaded,
         body=float(fetched[-1]),
         overhead=link.overhead_bytes,
         cancelled=link.wasted,
-        documents=sum(int(client.files[kind].there.sum()) for kind in DOCUMENTS),
+        documents=sum(int(client.files[kind].loaded.sum()) for kind in DOCUMENTS),
         useful=textures + float(stock.geometry_bytes[drawn].sum()),
         uploads=int(np.maximum(held[0] - held[1], 0).sum()),
         switches=int(np.count_nonzero(steps)),
         requests=link.requests - passing.page,
-        stalls=int((~there[np.arange(frames), world.cell]).sum()),
+        stalls=int((~loaded[np.arange(frames), world.cell]).sum()),
         overruns=int((memory > policy.limits(world, budget)).sum()),
     )
 

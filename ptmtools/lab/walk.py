@@ -102,31 +102,33 @@ class Browser:
             raise InputError("PTM-I807", f"the recording of a browser has {wrong}")
 
 
-def browser_of(told: Mapping[str, Any], time: Floats) -> Browser:
+def browser_of(recorded: Mapping[str, Any], time: Floats) -> Browser:
     """What a document of a walk with samples at (n,) seconds says, as its schema has it; raises
     InputError PTM-I807."""
     samples = len(time)
-    if len(told["frames"]) != samples:
+    if len(recorded["frames"]) != samples:
         raise InputError(
-            "PTM-I807", f"the recording of a browser has {len(told['frames'])} frames, "
+            "PTM-I807", f"the recording of a browser has {len(recorded['frames'])} frames, "
             f"and {samples} samples",
         )  # fmt: skip
-    frames = np.array(told["frames"], dtype=np.float64).reshape(-1, 3)
-    sent, taken = (np.array(told[k], dtype=np.float64).reshape(-1, 2) for k in ("sent", "taken"))
-    time = told["begun"] + time
+    frames = np.array(recorded["frames"], dtype=np.float64).reshape(-1, 3)
+    sent, taken = (
+        np.array(recorded[k], dtype=np.float64).reshape(-1, 2) for k in ("sent", "taken")
+    )
+    time = recorded["begun"] + time
     # It was busy since it last gave a sign, and before there was a client at all.
     signs = np.sort(np.concatenate([[0.0], time, taken[:, 1], sent[:, 0]]))
     since = signs[np.maximum(np.searchsorted(signs, taken[:, 0], "right") - 1, 0)]
     taken = np.column_stack([np.minimum(since, taken[:, 0]), taken[:, 1]])
     busy = np.column_stack([time - frames[:, 2], time])
     return Browser(
-        begun=float(told["begun"]),
-        lines=told["lines"],
-        budget=told["budget"],
-        policy=told["policy"],
-        record_bytes=np.array(told["recordBytes"], dtype=np.int64),
-        geometry_bytes=np.array(told["geometryBytes"], dtype=np.int64),
-        files=tuple(sorted(Given(*row) for row in told["files"])),
+        begun=float(recorded["begun"]),
+        lines=recorded["lines"],
+        budget=recorded["budget"],
+        policy=recorded["policy"],
+        record_bytes=np.array(recorded["recordBytes"], dtype=np.int64),
+        geometry_bytes=np.array(recorded["geometryBytes"], dtype=np.int64),
+        files=tuple(sorted(Given(*row) for row in recorded["files"])),
         cell=frames[:, 0].astype(np.int64),
         age=frames[:, 1],
         sent=Waits(sent),

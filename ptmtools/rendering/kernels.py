@@ -301,7 +301,7 @@ def shade(
     sight: Sight,
     triangles: Triangles,
     shows: Shows,
-    there: Bools,
+    loaded: Bools,
     column: Ints,
     shown: Floats,
 ) -> None:
@@ -316,7 +316,7 @@ def shade(
         if f < 0:
             pixel[:] = 0.0
             continue
-        if not there[triangles.cell[f]]:
+        if not loaded[triangles.cell[f]]:
             pixel[:] = GREY
             continue
         t = triangles.texture[f]

@@ -172,8 +172,8 @@ class Frustum:
 
     def distance(self, low: Floats, high: Floats) -> Floats:
         """(n,) metres from the eye to the nearest point of each box."""
-        beside = np.maximum(np.maximum(low - self.eye, self.eye - high), 0)
-        return np.asarray(np.linalg.norm(beside, axis=1))
+        outside = np.maximum(np.maximum(low - self.eye, self.eye - high), 0)
+        return np.asarray(np.linalg.norm(outside, axis=1))
 
     def covered(self, low: Floats, high: Floats) -> Floats:
         """(n,) the share of the screen that the projected box around each box covers; all of it if

@@ -135,10 +135,10 @@ def simplify(
 def _simplified(
     mesh: Mesh, surface: Surface, options: SimplifyOptions, progress: Progress
 ) -> Simplified:
-    there = topology(surface)
+    counts = topology(surface)
     state = _state(mesh, surface)
     state.worst[1] = _square(options.error / surface.scale)
-    held = PER_HANDLE * there.handles if options.keep_parts else there.held
+    held = PER_HANDLE * counts.handles if options.keep_parts else counts.held
     if held > HELD * options.faces:
         state.number[TOPOLOGY] = CLOSE if options.keep_parts else DROP
     _collapse(state, options.faces, progress)
@@ -151,9 +151,9 @@ def _simplified(
         edges_of(surface.triangle, len(surface.point)), len(surface.source)
     )
     left = len(np.unique(part[result.source]))
-    if left == there.parts:
+    if left == counts.parts:
         return result
-    gone = f"{there.parts - left:,} of {there.parts:,} parts are gone"
+    gone = f"{counts.parts - left:,} of {counts.parts:,} parts are gone"
     return replace(result, notes=(f"{gone}: they would hold many of the faces", *result.notes))
 
 

@@ -210,8 +210,8 @@ def _by_imagecodecs(name: str, function: str, **settings: Any) -> Codec:
         texels: Samples = getattr(imagecodecs, f"{function}_decode")(data)
         return texels.reshape(shape)
 
-    there = imagecodecs is not None and getattr(imagecodecs, function.upper()).available
-    return Codec(name, encode, decode, remedy=None if there else _CODECS)
+    available = imagecodecs is not None and getattr(imagecodecs, function.upper()).available
+    return Codec(name, encode, decode, remedy=None if available else _CODECS)
 
 
 def _plain(image: Samples) -> Samples:

@@ -187,6 +187,6 @@ def lifted(cells: Cells, leaves: Bools) -> Bools:
     rows, columns = np.nonzero(from_places(leaves, cells.leaf_standing) & owned[:, None] & owned)
     matrix = np.zeros((cells.cell_count, cells.cell_count), dtype=np.bool_)
     matrix[cells.leaf_cell[rows], cells.leaf_cell[columns]] = True
-    for cell, beside in enumerate(cells.adjacent()):
-        matrix[cell, beside] = True
+    for cell, adjacent in enumerate(cells.adjacent()):
+        matrix[cell, adjacent] = True
     return matrix

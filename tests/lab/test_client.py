@@ -47,10 +47,10 @@ def test_files_against_single_bytes(acts: list[tuple[str, int]]) -> None:
                 held[part.begin : part.begin + received] = True
                 asked = part.begin + received
             assert files.asked[1] == asked
-        assert files.there[1] == (200 if held.all() else held.argmin())
+        assert files.loaded[1] == (200 if held.all() else held.argmin())
         assert files.whole.tolist() == [False, held.all()]
-        assert files.there[1] <= files.asked[1]
-        assert files.asked[0] == files.there[0] == 0
+        assert files.loaded[1] <= files.asked[1]
+        assert files.asked[0] == files.loaded[0] == 0
 
 
 def test_the_last_byte_counts() -> None:
@@ -65,11 +65,11 @@ def test_the_last_byte_counts() -> None:
             files.arrived(files.ask(number, size))
             assert files.whole[number], kind
     for t, texture in enumerate(textures):
-        client.textures.there[t] = 0
+        client.textures.loaded[t] = 0
         for level, end in enumerate(itertools.accumulate(texture.groups)):
-            client.textures.there[t] = end - 1
+            client.textures.loaded[t] = end - 1
             assert client.have[t] == level
-            client.textures.there[t] = end
+            client.textures.loaded[t] = end
             assert client.have[t] == level + 1
 
 
@@ -77,5 +77,5 @@ def test_who_gives_up_before_anything_came_has_nothing_of_what_is_before_it() ->
     files = Files(Kind.TEXTURE, np.array([200]))
     files.ask(0, 100)
     assert files.given_up(files.ask(0, 200), 0)
-    assert files.there[0] == 0
+    assert files.loaded[0] == 0
     assert files.asked[0] == 100

@@ -53,7 +53,7 @@ def played(
 def did(run: Run, _: Client, asked: list[Request], frames: int | None = None) -> tuple[Any, ...]:
     """All that a client has done, until the last of its first frames."""
     until = run.time[:frames][-1]
-    tables = [table[:frames].tobytes() for table in (run.column, run.there, run.fetched)]
+    tables = [table[:frames].tobytes() for table in (run.column, run.loaded, run.fetched)]
     return tables, [(r.issued, r.tag, r.priority) for r in asked if r.issued <= until]
 
 

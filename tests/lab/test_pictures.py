@@ -116,7 +116,7 @@ def test_large_pictures_say_what_tables_do(world: World) -> None:
     drawn = []
     for f in some:
         sight = renderer.look(world.eye[f], world.direction[f])
-        apart = renderer.colors(sight, run.there[f], run.column[f]) - renderer.full(sight)
+        apart = renderer.colors(sight, run.loaded[f], run.column[f]) - renderer.full(sight)
         drawn.append(np.sqrt((apart**2).mean(axis=2)).mean())
     table = run.error[list(some)]
     assert table.max() > 5

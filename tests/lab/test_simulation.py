@@ -129,7 +129,7 @@ def _check_changes(run: Run, world: World) -> None:
             uploads += int(memory[max(before, after)] - memory[before])
             switches += before != after
     assert (run.uploads, run.switches) == (uploads, switches)
-    assert run.stalls == sum(not run.there[f, c] for f, c in enumerate(world.cell.tolist()))
+    assert run.stalls == sum(not run.loaded[f, c] for f, c in enumerate(world.cell.tolist()))
 
 
 def _check_once(seen: Witness) -> None:
@@ -211,7 +211,7 @@ def test_a_run_counted_by_hand(policy: str) -> None:
     assert run.memory[-1] == run.uploads == sum(sum(t.memory) for t in textures)
     assert run.quality[-1] == 1
     # Geometry comes after the index, and for who waits for it also after the record.
-    assert run.stalls == run.there[:, 0].argmax() == (2 if policy in ("lru", "gpuii") else 1)
+    assert run.stalls == run.loaded[:, 0].argmax() == (2 if policy in ("lru", "gpuii") else 1)
 
 
 def test_a_client_that_takes_more_memory_than_there_is() -> None:

@@ -63,7 +63,7 @@ class CampusClient:
         self.low = [stock.low(o) for o in range(stock.objects)]
         self.high = [stock.high(o, quality, options.lightmaps) for o in range(stock.objects)]
         files = len(stock.names)
-        self.there: Bools = np.zeros(files, dtype=np.bool_)
+        self.loaded: Bools = np.zeros(files, dtype=np.bool_)
         self.asked: Bools = np.zeros(files, dtype=np.bool_)
         self.shown: Bools = np.zeros(files, dtype=np.bool_)
         self.idle: list[list[float]] = []
@@ -91,7 +91,7 @@ class CampusClient:
     def begun(self) -> bool:
         """Whether all that is loaded first and has room is there."""
         base = [f for files in self.low for f in files if self._room[f]]
-        return bool(len(self.order) and self.there[base].all())
+        return bool(len(self.order) and self.loaded[base].all())
 
     def full(self, number: int) -> bool:
         """Whether an object is shown in the preset's detail."""
@@ -101,12 +101,12 @@ class CampusClient:
         """The viewpoint is at (3,); what is in graphics memory changes."""
         self._eye = np.array(eye, dtype=np.float64)
         self._sort()
-        self.shown = self.there & self._room
+        self.shown = self.loaded & self._room
 
     def arrived(self, request: Request) -> None:
         """A request is finished: its thread goes on."""
         file = int(request.tag)  # type: ignore[call-overload]
-        self.there[file] = True
+        self.loaded[file] = True
         _, rest = self._threads.pop(file)
         if file == _INDEX:
             self._sort()
@@ -117,7 +117,7 @@ class CampusClient:
         something has arrived."""
         if not self.asked[_INDEX]:
             self._continue(deque([_INDEX]))
-        elif self.there[_INDEX]:
+        elif self.loaded[_INDEX]:
             while len(self._threads) < self.options.threads and (job := self._job()):
                 self._continue(job)
         if bool(self.idle and len(self.idle[-1]) == 1) == bool(self._threads):
@@ -128,7 +128,7 @@ class CampusClient:
 
     def _sort(self) -> None:
         """Objects by their distance, and what follows from it, if the viewpoint has moved."""
-        if self._eye is None or not self.there[_INDEX]:
+        if self._eye is None or not self.loaded[_INDEX]:
             return
         if self._sorted_at is not None:
             moved = float(np.linalg.norm(self._eye - self._sorted_at))

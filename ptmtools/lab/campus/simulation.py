@@ -245,7 +245,7 @@ class _Waits:
             client = self.client
             files = list(client.stock.textures(number, client.quality.diffuse))
             self.wanted += len(files)
-            self.reused += int(client.there[files].sum())
+            self.reused += int(client.loaded[files].sum())
 
 
 @dataclass(frozen=True)
@@ -312,7 +312,7 @@ def _run(
         memory=run.memory,
         fetched=run.fetched,
         column=np.zeros((frames, 0), np.int64),
-        there=np.zeros((frames, 0), np.bool_),
+        loaded=np.zeros((frames, 0), np.bool_),
         body=run.body,
         overhead=run.overhead,
         cancelled=0.0,

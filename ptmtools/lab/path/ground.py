@@ -158,11 +158,11 @@ def over_floors(cells: Cells, obstacles: Obstacles, eye_height: float) -> Ground
     missed[cell[cell >= 0]] = False
     floor = cells.eye_floor[_below(cells, missed, eye_height)]
     if len(floor):
-        fine, there = _surfaces(floor, _FINE * GRID, eyes, obstacles, walker, eye_height)
+        fine, present = _surfaces(floor, _FINE * GRID, eyes, obstacles, walker, eye_height)
         within = cells.locate(fine)
         extra = (within >= 0) & missed[within]
         point, cell = np.concatenate([point, fine[extra]]), np.append(cell, within[extra])
-        firm = np.append(firm, there[extra])
+        firm = np.append(firm, present[extra])
     steps = _steps(point, walker, eyes, obstacles)
     space = np.where(firm, _space(point, obstacles, eye_height), 0.0)
     return Ground.of(
@@ -198,9 +198,9 @@ def _surfaces(
     column, eye = column[inside], eye[inside]
     down = np.tile([0.0, -1.0, 0.0], (len(eye), 1))
     _, far = obstacles.first(eye, down, 2 * eye_height)
-    there = abs(far - eye_height) <= _UNDERFOOT * walker.step
-    chosen = _footholds(column, eye[:, 1], there, walker.step)
-    return eye[chosen], there[chosen]
+    underfoot = abs(far - eye_height) <= _UNDERFOOT * walker.step
+    chosen = _footholds(column, eye[:, 1], underfoot, walker.step)
+    return eye[chosen], underfoot[chosen]
 
 
 def grid_points(floor: Floats, grid: float) -> tuple[Ints, Floats]:
@@ -227,17 +227,17 @@ def grid_points(floor: Floats, grid: float) -> tuple[Ints, Floats]:
     row = np.repeat(row, count)
     # By the shares of the corners.
     away = column[:, None] - plan[row]
-    beside = edge[row][:, :, 0] * away[:, :, 1] - edge[row][:, :, 1] * away[:, :, 0]
-    share = np.roll(beside, -1, axis=1) / wide[row, None]
+    offset = edge[row][:, :, 0] * away[:, :, 1] - edge[row][:, :, 1] * away[:, :, 0]
+    share = np.roll(offset, -1, axis=1) / wide[row, None]
     height = (share * floor[row, :, 1]).sum(axis=1)
     at = (column + _SHIFT) * grid
     return column, np.column_stack([at[:, 0], height, at[:, 1]])
 
 
-def _footholds(column: Ints, height: Floats, there: Bools, step: float) -> Ints:
+def _footholds(column: Ints, height: Floats, present: Bools, step: float) -> Ints:
     """Which of the surfaces in each column a foot can be on: those that are there before those that
     are not, the upper before the lower, and none less than a step from another."""
-    left = np.lexsort((-height, ~there, column[:, 1], column[:, 0]))
+    left = np.lexsort((-height, ~present, column[:, 1], column[:, 0]))
     kept = [left[:0]]
     while len(left):
         same = (np.diff(column[left], axis=0) == 0).all(axis=1)
@@ -257,13 +257,13 @@ def _steps(point: Floats, walker: Walker, eyes: EyeRegion, obstacles: Obstacles)
     key = box[:, 0] * wide + box[:, 1]
     order = np.argsort(key, kind="stable")
     pairs = [np.zeros((0, 2), dtype=np.int64)]
-    for beside in (0, 1, wide - 1, wide, wide + 1):
-        low = np.searchsorted(key[order], key + beside)
-        count = np.searchsorted(key[order], key + beside, "right") - low
+    for neighbour in (0, 1, wide - 1, wide, wide + 1):
+        low = np.searchsorted(key[order], key + neighbour)
+        count = np.searchsorted(key[order], key + neighbour, "right") - low
         one, other = np.repeat(np.arange(len(point)), count), order[ranges(low, count)]
         far = point[other] - point[one]
         near = (np.hypot(far[:, 0], far[:, 2]) <= reach) & (abs(far[:, 1]) <= walker.step)
-        near &= (one < other) | (beside > 0)
+        near &= (one < other) | (neighbour > 0)
         pairs.append(np.column_stack([one, other])[near])
     steps = np.concatenate(pairs)
     steps = steps[np.lexsort((steps[:, 1], steps[:, 0]))]

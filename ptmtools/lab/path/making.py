@@ -89,8 +89,8 @@ def _in_portal(cells: Cells, portal: int, leaf: Floats) -> Floats:
     side = np.cross(np.roll(corner, -1, axis=0) - corner, normal)
     for share in _SHARES:
         tried = middle + share * rise * up
-        beside = np.einsum("ij,ij->i", tried - corner, side)
-        if (beside >= 0).all() or (beside <= 0).all():
+        lateral = np.einsum("ij,ij->i", tried - corner, side)
+        if (lateral >= 0).all() or (lateral <= 0).all():
             return np.asarray(tried)
     return np.asarray(middle)
 

@@ -84,10 +84,10 @@ class ApoClient(EngineClient):
         self.distance = np.full(len(self.octrees), np.inf)
         if not len(self.octrees):
             return
-        there = np.flatnonzero(
+        loaded = np.flatnonzero(
             self.geometry.whole[shapes.cell] & (shapes.texture >= self.octrees[0])
         )
-        met = there[self.frustum.meets_boxes(shapes.low[there], shapes.high[there])]
+        met = loaded[self.frustum.meets_boxes(shapes.low[loaded], shapes.high[loaded])]
         number = shapes.texture[met] - self.octrees[0]
         far = np.maximum(self.frustum.distance(shapes.low[met], shapes.high[met]), NEAR)
         np.minimum.at(self.distance, number, far)

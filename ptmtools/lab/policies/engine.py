@@ -41,7 +41,7 @@ class Item(NamedTuple):
 
     view: int
     frame: int
-    there: Bools
+    loaded: Bools
     missing: Ints
 
 
@@ -88,10 +88,10 @@ class Items:
         frame = int(world.drawn[self._frame])
         if frame < 0:
             return None
-        there = self._since <= world.time[frame]
+        loaded = self._since <= world.time[frame]
         entered = bisect_right(self._times, world.time[frame]) - 1
         known = stock.visible[self._cells[entered]] if entered >= 0 else np.zeros(0, np.int64)
-        return Item(int(world.view[self._frame]), frame, there, known[~there[known]])
+        return Item(int(world.view[self._frame]), frame, loaded, known[~loaded[known]])
 
 
 #: A range takes so many seconds of the link, and at least so many bytes.
@@ -165,7 +165,7 @@ class EngineClient(Client):
         if item:
             rows = views.rows(item.view)
             gather(
-                rows.start, rows.stop, views.cell, views.texture, views.sight, item.there, result
+                rows.start, rows.stop, views.cell, views.texture, views.sight, item.loaded, result
             )
         return result
 
@@ -176,11 +176,11 @@ class EngineClient(Client):
         share = np.zeros(stock.cell_count)
         item = self._items.at_hand(age)
         if item and len(item.missing):
-            there = item.there if world.browser else self.geometry.whole
+            loaded = item.loaded if world.browser else self.geometry.whole
             rays, _ = world.camera.rays(world.direction[item.frame : item.frame + 1])
             holes(
                 rays.reshape(-1, 3)[world.camera.sparse], world.views.owner[item.view],
-                world.views.depth[item.view], world.eye[item.frame], stock.low, stock.high, there,
+                world.views.depth[item.view], world.eye[item.frame], stock.low, stock.high, loaded,
                 item.missing, share,
             )  # fmt: skip
         return share
@@ -193,11 +193,11 @@ class EngineClient(Client):
         """Average coverage hints, aligned with `known`."""
         return self.world.catalogue.coverage[self.cell]
 
-    def shapes_there(self) -> Ints:
+    def loaded_shapes(self) -> Ints:
         """The shapes with a texture of the cells whose geometry is there."""
         stock = self.world.catalogue
-        there = self.geometry.whole[stock.shapes.cell] & (stock.shapes.texture >= 0)
-        return np.flatnonzero(there)
+        loaded = self.geometry.whole[stock.shapes.cell] & (stock.shapes.texture >= 0)
+        return np.flatnonzero(loaded)
 
     # What the engine does.
 
@@ -314,7 +314,7 @@ class EngineClient(Client):
         asked = self.textures.asked
         if not self.world.one_range:
             return asked
-        under_way = asked > self.textures.there
+        under_way = asked > self.textures.loaded
         return np.where(under_way, self.textures.size, asked)
 
     def _overhead(self) -> int:

@@ -203,10 +203,10 @@ class PaperClient(Client):
     def _cull(self) -> None:
         stock = self.world.catalogue
         frustum = self.world.frustum(self.frame)
-        there = self.geometry.whole
+        loaded = self.geometry.whole
         known, hint = self.known(), stock.coverage[self.cell]
         seen = np.array(
-            [there[c] and (c == self.cell or frustum.meets_hull(self._hulls[c])) for c in known]
+            [loaded[c] and (c == self.cell or frustum.meets_hull(self._hulls[c])) for c in known]
         )
         order = np.argsort(-hint[seen], kind="stable")
         self._cells, self._weight = known[seen][order], hint[seen][order]
@@ -239,6 +239,6 @@ def _crossing(eye: Floats, way: Floats, polygon: Floats) -> float:
     share = float(turned @ (polygon[0] - eye)) / facing
     if not 0 <= share <= 1:
         return float(np.inf)
-    beside = polygon - (eye + share * way)
-    sides = np.cross(beside, np.roll(beside, -1, axis=0)) @ turned
+    offset = polygon - (eye + share * way)
+    sides = np.cross(offset, np.roll(offset, -1, axis=0)) @ turned
     return share if (sides >= 0).all() or (sides <= 0).all() else float(np.inf)

@@ -95,7 +95,7 @@ def by_distance(client: EngineClient) -> Floats:
     """(T, K) shares that fall with the square of the distance of the nearest shape; they sum to
     1."""
     stock = client.world.catalogue
-    shapes, here = stock.shapes, client.shapes_there()
+    shapes, here = stock.shapes, client.loaded_shapes()
     far = client.frustum.distance(shapes.low[here], shapes.high[here])
     share = np.zeros(stock.texture_count)
     np.maximum.at(share, shapes.texture[here], 1 / np.maximum(far, NEAREST) ** 2)
@@ -132,8 +132,8 @@ class Weighted:
     def __call__(self, client: EngineClient) -> Worth:
         """See `Policy`."""
         shapes = client.world.catalogue.shapes
-        there = client.shapes_there()
-        ahead = there[client.frustum.meets_boxes(shapes.low[there], shapes.high[there])]
+        loaded = client.loaded_shapes()
+        ahead = loaded[client.frustum.meets_boxes(shapes.low[loaded], shapes.high[loaded])]
         worth = every_level(client, self.weights(client, ahead))
         return Worth(worth, worth, geometry_by_coverage(client))
 

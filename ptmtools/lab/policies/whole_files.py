@@ -74,8 +74,8 @@ class LruClient(WholeClient):
         self.frame = frame
         stock, shapes = self.world.catalogue, self.world.catalogue.shapes
         frustum = self.world.frustum(frame)
-        there = self.geometry.whole[shapes.cell] & (shapes.texture >= 0)
-        met = shapes.texture[there & frustum.meets_boxes(shapes.low, shapes.high)]
+        loaded = self.geometry.whole[shapes.cell] & (shapes.texture >= 0)
+        met = shapes.texture[loaded & frustum.meets_boxes(shapes.low, shapes.high)]
         for t in dict.fromkeys(met.tolist()):
             if self._seen[t] < 0:
                 self._queue.append(t)
@@ -164,8 +164,8 @@ class GpuiiClient(WholeClient):
         """Finds what is visible, how near it is, and how far it is to be refined."""
         stock, shapes = self.world.catalogue, self.world.catalogue.shapes
         frustum = self.world.frustum(self.frame)
-        there = np.flatnonzero(self.geometry.whole[shapes.cell] & (shapes.texture >= 0))
-        met = there[frustum.meets_boxes(shapes.low[there], shapes.high[there])]
+        loaded = np.flatnonzero(self.geometry.whole[shapes.cell] & (shapes.texture >= 0))
+        met = loaded[frustum.meets_boxes(shapes.low[loaded], shapes.high[loaded])]
         texture = shapes.texture[met]
         far = np.maximum(frustum.distance(shapes.low[met], shapes.high[met]), NEAR)
         self.distance = np.full(stock.texture_count, np.inf)

@@ -184,7 +184,7 @@ def relieve(
     triangles: Triangles,
     lamps: Floats,
     octrees: Octrees,
-    there: Bools,
+    loaded: Bools,
     held: Ints,
     shown: Floats,
 ) -> None:
@@ -193,7 +193,7 @@ def relieve(
     light = np.zeros(DEEP)
     for i in range(len(shown)):
         f = sight.triangle[i]
-        if f < 0 or not there[triangles.cell[f]]:
+        if f < 0 or not loaded[triangles.cell[f]]:
             continue
         o = octrees.of[f]
         if o < 0 or held[o] == 0:
@@ -207,11 +207,11 @@ def relieve(
 
 
 @plain_kernel
-def told(
+def mark_special(
     sight: Sight, far: Floats, other: Floats, given: bool, of: NDArray[np.int32],
     texture: NDArray[np.int32], apart: float, special: Bools, plain: Ints,
 ) -> None:  # fmt: skip
-    """Tells which pixels are ``special`` (n,): those that show an octree's object, or of which the
+    """Marks the ``special`` (n,) pixels: those that show an octree's object, or of which the
     geometries ``far`` and ``other`` (n,) away are ``apart`` by more than so large a share; writes
     to ``plain`` (n,) what is left for other tables, which have the textures of octrees' objects."""
     for i in range(len(special)):

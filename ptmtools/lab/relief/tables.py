@@ -55,8 +55,8 @@ class Reference:
 
         whole, cells = own_levels(self.pyramids), int(self.surfaces.cell.max(initial=-1)) + 1
         result = np.empty((len(sight.ray), 3))
-        there = np.ones(cells, dtype=np.bool_)
-        shade(sight, self.triangles, whole, there, whole.last, result)
+        loaded = np.ones(cells, dtype=np.bool_)
+        shade(sight, self.triangles, whole, loaded, whole.last, result)
         return result
 
 
@@ -112,7 +112,7 @@ class Tally:
 
     def add(self, sight: Sight) -> Sight:
         """Makes the rows of the next frame; returns what of it is left for other tables."""
-        from ptmtools.lab.relief.kernels import add_relief, depths, told
+        from ptmtools.lab.relief.kernels import add_relief, depths, mark_special
 
         reference, octrees = self._relief.reference, self._relief.octrees
         count = len(sight.triangle)
@@ -124,7 +124,9 @@ class Tally:
             exact = reference.shown(seen)
         special, plain = np.zeros(count, dtype=np.bool_), np.empty(count, np.int64)
         given = reference is not None
-        told(sight, far, other, given, octrees.of, self._triangles.texture, APART, special, plain)
+        mark_special(
+            sight, far, other, given, octrees.of, self._triangles.texture, APART, special, plain
+        )
         add_relief(
             sight, self._triangles, self._lamps, octrees, self._full, exact, given, special,
             self._seen, self._sums, self._stuck,

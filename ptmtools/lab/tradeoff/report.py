@@ -147,13 +147,13 @@ def telling(some: Sequence[Tried], own: Tried) -> Tried:
     """Of the settings of a knob the one to tell of: where the picture is best, if that is better
     than the database's own; else, of those that nobody can tell from it, the one that saves most
     bytes, then seconds; else the one that loses least."""
-    there = [tried for tried in some if not tried.problem]
-    if not there:
+    valid = [tried for tried in some if not tried.problem]
+    if not valid:
         return some[0]
-    least = min(there, key=lambda tried: _change(tried, own))
+    least = min(valid, key=lambda tried: _change(tried, own))
     if any(_noticed(*pair) for pair in _pairs(least, own)):
         return least
-    alike = [t for t in there if not any(_noticed(*pair) for pair in _pairs(t, own))]
+    alike = [t for t in valid if not any(_noticed(*pair) for pair in _pairs(t, own))]
     return min(alike, key=lambda tried: (tried.served, tried.build))
 
 
@@ -174,11 +174,11 @@ def sentence(tried: Tried, trade: WalkTrade) -> str:
         ]
         changes.append(f"{way} {_and(parts)}")
     policies = {seen.policy for _, seen in pairs} - {seen.policy for seen in own.seen[:1]}
-    whose = f" to the client {policies.pop()}" if len(policies) == 1 else ""
+    client = f" to the client {policies.pop()}" if len(policies) == 1 else ""
     if not changes:
-        seen = f"no difference{whose} that can be seen"
+        seen = f"no difference{client} that can be seen"
     else:
-        seen = f"the picture{whose} is {_and(changes)}"
+        seen = f"the picture{client} is {_and(changes)}"
         if len(noticed) < len(pairs):
             seen += ", and the same otherwise"
     return f"{tried.name} instead of {tried.own} {saved}; {seen}."

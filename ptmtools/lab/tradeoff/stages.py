@@ -114,9 +114,9 @@ GRID = (
 def prepare(subject: Subject) -> CoverageTrade:
     """See `EXPERIMENTS`. Of the options what settings choose is left open."""
     options = replace(subject.options(ACH), samples=None, face=None, placement=None, tolerance=None)
-    made = subject.artifacts
+    artifacts = subject.artifacts
     tried, points = subject.cells_tried, subject.reference_points
-    return CoverageTrade(made[APO], made[CELLS], made[PVS], options, tried, points)
+    return CoverageTrade(artifacts[APO], artifacts[CELLS], artifacts[PVS], options, tried, points)
 
 
 class CoverageTrade:

@@ -209,10 +209,10 @@ def read_index(folder: str | os.PathLike[str]) -> Index:
     """
     file = Path(folder) / INDEX
     if not os.path.lexists(file):
-        there = Path(folder).is_dir()
+        exists = Path(folder).is_dir()
         raise InputError(
             "PTM-I841",
-            f"holds no octree texture: there is no {INDEX} in it" if there else "is no folder",
+            f"holds no octree texture: there is no {INDEX} in it" if exists else "is no folder",
             file=folder,
             remedy="name a folder that `ptm apo` wrote",
         )
@@ -224,10 +224,10 @@ def read_index(folder: str | os.PathLike[str]) -> Index:
 def _index(data: bytes) -> Index:
     try:
         document = schemas.parse(data)
-        said = document if isinstance(document, dict) else {}
-        if (said.get("format"), said.get("schema")) != (FORMAT, SCHEMA):
+        declared = document if isinstance(document, dict) else {}
+        if (declared.get("format"), declared.get("schema")) != (FORMAT, SCHEMA):
             raise schemas.ShapeError(
-                f"is {said.get('format')!r}, schema {said.get('schema')!r}, not "
+                f"is {declared.get('format')!r}, schema {declared.get('schema')!r}, not "
                 f"{FORMAT!r}, schema {SCHEMA}"
             )
         schemas.check(document, schemas.APO)

@@ -147,10 +147,10 @@ def divide(samples: Samples, top: int, bottom: int, bounds: Bounds) -> list[Leve
             parted &= (n >= ENOUGH) | (opposed & (n > 1))
         children = np.zeros(len(begin), np.uint8)
         edges = _edges(samples.code, code[parted], begin[parted], end[parted], bottom - depth)
-        there = edges[:, 1:] > edges[:, :-1]
-        children[parted] = np.packbits(there, axis=1, bitorder="little")[:, 0]
+        occupied = edges[:, 1:] > edges[:, :-1]
+        children[parted] = np.packbits(occupied, axis=1, bitorder="little")[:, 0]
         levels.append(Level(code, _means(sums, n), children))
-        begin, end = edges[:, :-1][there], edges[:, 1:][there]
+        begin, end = edges[:, :-1][occupied], edges[:, 1:][occupied]
         if not len(begin):
             break
     return levels
@@ -322,13 +322,13 @@ def fault_of(octree: Octree) -> tuple[str, str] | None:
             last = k == octree.levels - 1
             return None if last else (f"level {k + 1}", "is below leaves only")
         children, pointer = texels[at[inner], 3], texels[at[inner] + 1]
-        there, flags = (
+        present, flags = (
             np.unpackbits(bits[:, None], axis=1, bitorder="little") > 0
             for bits in (children, pointer[:, 3])
         )
-        if (flags & ~there).any():
+        if (flags & ~present).any():
             return f"level {k}", "a child that is not there is said to be an inner node"
-        below = flags[there]
+        below = flags[present]
         each = popcount(children)
         first = start[k + 1] + addresses(below)[np.cumsum(each) - each]
         if (pointer[:, :3].astype(np.int64) @ _BYTE != first).any():

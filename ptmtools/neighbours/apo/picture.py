@@ -109,10 +109,10 @@ def render_view(
     normals: Floats | None = None,
 ) -> Rendering:
     """The same from a given view, in the units of the mesh."""
-    there = octree.levels if levels is None else min(levels, octree.levels)
-    look = Look(there, what)
+    available = octree.levels if levels is None else min(levels, octree.levels)
+    look = Look(available, what)
     corners = ((points - octree.low) / octree.side)[triangles]
-    own = _own(points, triangles, normals) if there == 0 else np.zeros_like(corners)
+    own = _own(points, triangles, normals) if available == 0 else np.zeros_like(corners)
     inside = View(
         (view.eye - octree.low) / octree.side,
         (view.target - octree.low) / octree.side,

@@ -84,8 +84,8 @@ def seen(corners: Floats, view: View) -> Seen:
             far = reach / (ray * across).sum(axis=1)
             return np.asarray(view.eye + far[:, None] * ray)
 
-    there = place(column, row), place(column ^ 1, row), place(column, row ^ 1)
-    return Seen(row, column, triangle, *there)
+    points = place(column, row), place(column ^ 1, row), place(column, row ^ 1)
+    return Seen(row, column, triangle, *points)
 
 
 def draw(octree: Octree, corners: Floats, own: Floats, view: View, look: Look) -> Drawn:

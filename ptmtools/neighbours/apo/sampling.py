@@ -105,9 +105,9 @@ def spread(corner: Floats, spacing: float) -> Points:
 
 def _counted(counts: Ints) -> tuple[Ints, Ints]:
     """Of each of ``counts`` things: (n,) whose it is, and its number among those."""
-    whose = np.repeat(np.arange(len(counts)), counts)
+    owner = np.repeat(np.arange(len(counts)), counts)
     begin = np.cumsum(counts) - counts
-    return whose, np.arange(len(whose)) - begin[whose]
+    return owner, np.arange(len(owner)) - begin[owner]
 
 
 def at(values: Floats, points: Points) -> Floats:

@@ -257,10 +257,10 @@ class OctreeShader:
         )
 
     def _levels(self, levels: int | None) -> int:
-        there = self._octree.levels if levels is None else min(levels, self._octree.levels)
-        if there < 1:
+        available = self._octree.levels if levels is None else min(levels, self._octree.levels)
+        if available < 1:
             raise ValueError("there is no level to look up in")
-        return there
+        return available
 
     def _bind(self, program: Any, levels: int) -> None:
         self._texture.use(0)

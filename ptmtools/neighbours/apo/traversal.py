@@ -73,10 +73,10 @@ def plain_look_up(
         red, green, blue, inner = texel[here + 1].T
         below = (1 << child) - 1
         first = red + (green << 8) + (blue << 16)
-        there = first + np.bitwise_count(present & below) + np.bitwise_count(inner & below)
-        on = (present >> child & 1 == 1) & (there < len(texel))
+        address_of = first + np.bitwise_count(present & below) + np.bitwise_count(inner & below)
+        on = (present >> child & 1 == 1) & (address_of < len(texel))
         going = going[on]
-        at[going] = there[on]
+        at[going] = address_of[on]
         depth[going] += 1
     return Found(at, depth, unpacked(octree.texels[at]))
 
@@ -140,8 +140,8 @@ def child_of(texel: NDArray[np.uint8], address: int, child: int) -> int:
     first = int(np.int64(texel[address + 1, 0]))
     first += int(np.int64(texel[address + 1, 1])) << 8
     first += int(np.int64(texel[address + 1, 2])) << 16
-    there = first + _ones(present & below) + _ones(inner & below)
-    return there if there < count else -1
+    result = first + _ones(present & below) + _ones(inner & below)
+    return result if result < count else -1
 
 
 @plain_kernel
@@ -158,9 +158,9 @@ def _walk(texel: NDArray[np.uint8], q: Floats, limit: Ints, at: Ints, deep: Ints
                 child, y = child + 2, y - 1
             if z >= 1:
                 child, z = child + 4, z - 1
-            there = child_of(texel, address, child)
-            if there < 0:
+            next_address = child_of(texel, address, child)
+            if next_address < 0:
                 break
-            address = there
+            address = next_address
             depth += 1
         at[i], deep[i] = address, depth

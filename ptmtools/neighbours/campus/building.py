@@ -110,7 +110,7 @@ def make_campus(
                 put(record.file, data)
                 textures.append(record)
         clock.end("textures")
-        made: list[ObjectMade] = []
+        results: list[ObjectMade] = []
         tasks = [(names.take(part.label, "object"), part) for part in parts]
         for done, each in enumerate(executor.each(make_object, work, tasks)):
             progress(done, len(tasks), "objects")
@@ -119,7 +119,7 @@ def make_campus(
             for record, data in each.lightmaps:
                 put(record.file, data)
                 textures.append(record)
-            made.append(ObjectMade(each.record, (), (), each.notes, each.covered, each.computed))
+            results.append(ObjectMade(each.record, (), (), each.notes, each.covered, each.computed))
         progress(len(tasks), len(tasks), "objects")
         clock.end("objects")
         campus = Campus(
@@ -128,7 +128,7 @@ def make_campus(
             scene.space.up,
             options.lods,
             options.lightmaps,
-            tuple(each.record for each in made),
+            tuple(each.record for each in results),
             materials,
             tuple(textures),
         )
@@ -137,10 +137,10 @@ def make_campus(
     return Made(
         campus,
         scene,
-        (*notes, *notes_on(parts), *(note for each in made for note in each.notes)),
+        (*notes, *notes_on(parts), *(note for each in results for note in each.notes)),
         clock.seconds,
-        sum(each.covered for each in made),
-        sum(each.computed for each in made),
+        sum(each.covered for each in results),
+        sum(each.computed for each in results),
     )
 
 

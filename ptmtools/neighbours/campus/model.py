@@ -334,11 +334,11 @@ def shader(channels: Iterable[str]) -> str:
 
     Raises KeyError for an unknown channel.
     """
-    there = set(channels)
-    if unknown := there - set(PARTS):
+    available = set(channels)
+    if unknown := available - set(PARTS):
         raise KeyError(min(unknown))
-    first = "" if DIFFUSE in there else "color"
-    return "+".join(filter(None, [first, *(PARTS[c] for c in PARTS if c in there)]))
+    first = "" if DIFFUSE in available else "color"
+    return "+".join(filter(None, [first, *(PARTS[c] for c in PARTS if c in available)]))
 
 
 def distances(eye: Floats, boxes: Floats, barycentres: Floats) -> Floats:

@@ -111,8 +111,8 @@ class Surroundings:
         limit = np.full(len(point), far + self.lift, np.float32)
         start = (point - self.middle).astype(np.float32)
         hit = self.tree.run(start, along, dists=limit.copy(), query="DISTANCE")
-        there = hit < limit
-        result[there] = (point[:, 1] + way * hit)[there]
+        blocked = hit < limit
+        result[blocked] = (point[:, 1] + way * hit)[blocked]
         return result
 
 

@@ -103,10 +103,10 @@ def _missing(model: Path, material: str, number: int, read: _Read) -> InputError
     # Each material that got no texture it asked for left a note, in the same order.
     textures = zip(read.asked, read.source.materials, strict=True)
     lost = [k for k, (asked, m) in enumerate(textures) if asked and m.texture is None]
-    said = read.missing[min(lost.index(number), len(read.missing) - 1)]
+    fault = read.missing[min(lost.index(number), len(read.missing) - 1)]
     return InputError(
         "PTM-I831",
-        f"the lightmap of material {material}, {said}",
+        f"the lightmap of material {material}, {fault}",
         file=model,
         remedy="put it where the model says (or give --allow-outside, where it lies elsewhere), or "
         "give --lightmaps bake",
@@ -216,14 +216,14 @@ def _shines(
     for number, (its, shine) in enumerate(zip(scene.materials, scene.shines, strict=True)):
         if its.image < 0 or shine is None:
             continue
-        there = None if shine.fault else folder.find(shine.file, shine.base)
-        if there is None:
+        file = None if shine.fault else folder.find(shine.file, shine.base)
+        if file is None:
             notes.append(_left_out(its.name, shine.fault))
-        elif there.path is None:
-            why = _NOT_THERE[there.outcome]
+        elif file.path is None:
+            why = _NOT_THERE[file.outcome]
             notes.append(_left_out(its.name, f"map_Ks {shine.file}: {why}"))
         else:
-            mask = Mask(FileRange(there.path), there.path.name)
+            mask = Mask(FileRange(file.path), file.path.name)
             if fault := _fault(mask, options):
                 notes.append(_left_out(its.name, f"map_Ks {shine.file}: {fault}"))
             else:

@@ -60,8 +60,8 @@ class BaseImage:
     @property
     def channels(self) -> tuple[str, ...]:
         """Those that it has, in their order."""
-        there = (DIFFUSE, self.image), (ALPHA, self.alpha), (MASK, self.mask)
-        return tuple(channel for channel, wanted in there if wanted)
+        layers = (DIFFUSE, self.image), (ALPHA, self.alpha), (MASK, self.mask)
+        return tuple(channel for channel, wanted in layers if wanted)
 
 
 def texture_files(limits: tuple[int, int], base: BaseImage) -> list[Written]:
@@ -138,10 +138,10 @@ def weighted(colors: Image.Image, alpha: Image.Image, size: int) -> Image.Image:
     plain = squared(colors, size)
     held = np.asarray(plain, np.float32).copy()
     # Interpolation overshoots beside what is clear.
-    there = total >= 1
+    covered = total >= 1
     for band in range(3):
         of = _resized(np.asarray(colors.getchannel(band), np.float32) * share, size)
-        held[there, band] = of[there] / total[there]
+        held[covered, band] = of[covered] / total[covered]
     return Image.fromarray(np.rint(np.clip(held, 0, 255)).astype(np.uint8))
 
 

@@ -45,10 +45,10 @@ def read_manifest(folder: str | os.PathLike[str]) -> Interlaced:
     """
     file = Path(folder) / INDEX
     if not os.path.lexists(file):
-        there = Path(folder).is_dir()
+        exists = Path(folder).is_dir()
         raise InputError(
             "PTM-I820",
-            f"holds no interlaced image: there is no {INDEX} in it" if there else "is no folder",
+            f"holds no interlaced image: there is no {INDEX} in it" if exists else "is no folder",
             file=folder,
             remedy="name a folder that `ptm interlace` wrote",
         )

@@ -96,12 +96,12 @@ class StepShader:
         height, width, components = texels.shape
         padded = np.zeros((height, width, _held(components)), texels.dtype)
         padded[:, :, :components] = texels
-        made = self._context.texture(
+        texture = self._context.texture(
             (width, height), padded.shape[2], padded.tobytes(), dtype=_type(texels), alignment=1
         )
-        made.filter = (self._context.NEAREST, self._context.NEAREST)
-        made.repeat_x = made.repeat_y = False
-        return made
+        texture.filter = (self._context.NEAREST, self._context.NEAREST)
+        texture.repeat_x = texture.repeat_y = False
+        return texture
 
     def close(self) -> None:
         """Gives the context back."""
