@@ -1,1 +1,1 @@
-"""A database as a site that any visitor walks through in a browser: the page, and what it reads."""
+"""A database as a site for browsers: its files and the page, publishing and serving."""

@@ -1,8 +1,8 @@
-"""The files of a site: what a browser needs to walk through a database.
+"""Collects the files of a site, with which a browser walks through a database.
 
 Every file but the page has a hash of its contents in its name, so that caches may keep it for ever
 and a site that changes is never half old. The index is that of the hints, with names and sizes of
-each file instead of templates: a client plans with what a record and the geometry of a cell cost.
+each file instead of templates: a client plans with the sizes of records and geometry.
 The page itself is built by ``web/page/build.py`` and committed in ``page/``.
 
 The geometry stays GLB. (Tried, benchmarks/RESULTS.md: differences of vertices in planes of
@@ -142,10 +142,10 @@ def site_of(
 
     Raises
     ------
-    DatabaseError: PTM-D001 to D003 there is no database, or one of another version; PTM-D901 its
+    DatabaseError: PTM-D001 to D003 no database, or one of another version; PTM-D901 its
         hints are of an earlier release; PTM-D004 it is not finished; PTM-D005, D006 a file is
-        missing or damaged; PTM-D606 there is no geometry in glTF.
-    InputError: PTM-I900 the installed page is incomplete; and what `web_texture` raises.
+        missing or damaged; PTM-D606 it has no geometry in glTF.
+    InputError: PTM-I900 the installed page is incomplete; and as `web_texture`.
     LimitError: as `web_texture`.
     """
     options = options or SiteOptions()
@@ -221,7 +221,7 @@ class _Builder:
             if _NEEDED - row.keys():
                 raise DatabaseError(
                     "PTM-D901",
-                    "was built by an earlier release: its hints lack what the page needs",
+                    "was built by an earlier release: its hints lack fields that the page needs",
                     file=self._folder.path,
                     remedy=Rebuild("run {}"),
                 )
@@ -313,8 +313,8 @@ def _picture_file(file: str) -> tuple[str, str, bytes]:
         with open_regular(file) as stream:
             data = stream.read()
     except OSError as fault:
-        what = f"cannot be read ({fault.strerror or fault})"
-        raise InputError("PTM-I901", what, file=file) from None
+        reason = f"cannot be read ({fault.strerror or fault})"
+        raise InputError("PTM-I901", reason, file=file) from None
     for begin, media, suffix in _MAGIC:
         if re.match(begin, data, re.DOTALL):
             return media, suffix, data
@@ -353,7 +353,7 @@ def page(settings: Mapping[str, Any], script: str, preload: Sequence[str]) -> En
     Parameters
     ----------
     settings: the JSON that its script reads (docs/guide/publish.md).
-    script: URL of its script. preload: URLs of what it fetches first.
+    script: URL of its script. preload: URLs of the files that it fetches first.
 
     Raises InputError: PTM-I900 the template is missing.
     """
@@ -397,7 +397,7 @@ def web_texture(file: Path, row: Mapping[str, Any]) -> Texture:
 
     Raises
     ------
-    DatabaseError: PTM-D005, D006 the file is missing or damaged, or not what the index says.
+    DatabaseError: PTM-D005, D006 the file is missing, damaged, or another than the index says.
     LimitError: those of `ptmtools.texture.open` and `PtmReader.level`.
     """
     from ptmtools.texture.container import HEAD_MAX, read_header

@@ -1,4 +1,4 @@
-"""Finds the file that a URL names, and nothing outside what is served.
+"""Finds the file that a URL names, and nothing outside the served folder.
 
 Names are compared after percent-decoding, once, component by component. A name that decodes to a
 slash, a backslash, a colon, a NUL or a dotted step matches no file.
@@ -88,7 +88,7 @@ def files_of(folder: str | PathLike[str]) -> Lookup:
     Raises
     ------
     DatabaseError: PTM-D001 it is neither; PTM-D002, D003 a damaged database, or one of another
-        schema; PTM-D004 one that is not finished; and what `site_of` raises.
+        schema; PTM-D004 one that is not finished; and as `site_of`.
     """
     path = Path(folder)
     if (path / INDEX).is_file() and not (path / MANIFEST).exists():

@@ -1,9 +1,9 @@
 """Pictures of viewpoints, as the page draws them: a poster, and a small one for each in the menu.
 
-Rays find what the pixels show (`ptmtools.rendering.rays`), and textures are sampled at the
+Rays find the surfaces of the pixels (`ptmtools.rendering.rays`), and textures are sampled at the
 level nearest to what a pixel covers, of those up to `FINEST` texels a side: of a texture that no
 picture shows nothing is read, and of the others their first bytes. (Tried: the compiled sampling of
-`ptmtools.rendering`, trilinear: nobody tells the two apart at this size, and where it is not
+`ptmtools.rendering`, trilinear: the two look the same at this size, and where it is not
 compiled yet that takes four seconds.)
 """
 
@@ -35,7 +35,7 @@ _FINER = 1.5
 MOST = 32
 #: Texels of the longer side of the finest level that is sampled.
 FINEST = 256
-#: What is behind everything, 0 to 1, and the light on surfaces without texture: as the page has it.
+#: The background, 0 to 1, and the light on surfaces without texture: as in the page.
 _SKY = (0.16, 0.17, 0.19)
 _AMBIENT = 0.25
 _LIMITS = Limits(decoded_bytes=1 << 33)
@@ -52,7 +52,7 @@ def pictures(served: Served) -> tuple[bytes, list[bytes]]:
 
     Raises
     ------
-    ImportError: there is no Embree.
+    ImportError: Embree is missing.
     InputError, LimitError: those of `ptmtools.texture.open` and `PtmReader.levels`.
     """
     viewpoints = served.index["viewpoints"][:MOST]
@@ -103,7 +103,7 @@ def _look(caster: Caster, size: tuple[int, int], viewpoint: Mapping[str, Any]) -
     width, height = _rays(size)
     camera = Camera(width, height, viewpoint["fieldOfView"], width / height)
     sight = caster.look(camera, np.array(viewpoint["position"]), np.array(viewpoint["direction"]))
-    # Levels are chosen for the pixels that there are.
+    # Levels are chosen for the pixels of the picture.
     return sight._replace(pixel=2 * np.tan(camera.field_of_view / 2) / size[1])
 
 
@@ -111,18 +111,18 @@ def _levels(served: Served, texture: int) -> Levels:
     """Those of a texture up to `FINEST`, the coarsest in any case."""
     from ptmtools.texture import open as open_ptm
 
-    found: list[NDArray[np.uint8]] = []
+    colors: list[NDArray[np.uint8]] = []
     with open_ptm(served.texture_file(texture), limits=_LIMITS) as ptm:
         sides = [max(level.width, level.height) for level in ptm.header.levels]
         count = max(1, sum(side <= FINEST for side in sides))
         for samples in islice(ptm.levels(), count):
             shown = in_eight_bits(samples)
-            found.append(shown[:, :, :3] if shown.shape[2] >= 3 else shown[:, :, [0, 0, 0]])
-    return found
+            colors.append(shown[:, :, :3] if shown.shape[2] >= 3 else shown[:, :, [0, 0, 0]])
+    return colors
 
 
 def _colors(sight: Sight, triangles: Triangles, textures: Mapping[int, Levels]) -> Floats:
-    """(n, 3) what the rays show, 0 to 255."""
+    """(n, 3) colours of the rays, 0 to 255."""
     shown = np.empty((len(sight.ray), 3))
     shown[:] = np.multiply(_SKY, 255)
     hit = np.flatnonzero(sight.triangle >= 0)
@@ -131,22 +131,22 @@ def _colors(sight: Sight, triangles: Triangles, textures: Mapping[int, Levels]) 
     facing = np.einsum("ij,ij->i", normal, ray)
     length = np.linalg.norm(normal, axis=1) * np.linalg.norm(ray, axis=1)
     light = _AMBIENT + (1 - _AMBIENT) * np.abs(facing) / np.maximum(length, 1e-300)
-    found = np.repeat(255.0 * light[:, None], 3, axis=1)
+    lit = np.repeat(255.0 * light[:, None], 3, axis=1)
     texture = triangles.texture[triangle]
     facing = np.where(facing == 0, 1e-300, facing)
     for number, levels in textures.items():
         rows = np.flatnonzero(texture == number)
         if len(rows):
             of = hit[rows]
-            found[rows] = _sampled(sight, of, facing[rows], triangles, levels)
-    shown[hit] = found * triangles.color[triangle]
+            lit[rows] = _sampled(sight, of, facing[rows], triangles, levels)
+    shown[hit] = lit * triangles.color[triangle]
     return shown
 
 
 def _sampled(
     sight: Sight, pixel: Ints, facing: Floats, triangles: Triangles, levels: Levels
 ) -> Floats:
-    """(n, 3) what some pixels show of a texture; ``facing`` is the normal along the ray."""
+    """(n, 3) colours that some pixels show of a texture; ``facing`` is the normal along the ray."""
     triangle, ray = sight.triangle[pixel], sight.ray[pixel]
     normal, gradient = triangles.normal[triangle], triangles.gradient[triangle]
     offset = triangles.corner[triangle, 0] - sight.eye
@@ -163,11 +163,11 @@ def _sampled(
     finest = len(levels) - 1
     coarser = np.clip(np.rint(np.log2(np.maximum(covered, 1.0))), 0, finest).astype(np.int64)
     clamped = triangles.clamped[triangle]
-    found = np.empty((len(pixel), 3))
+    colors = np.empty((len(pixel), 3))
     for step in np.unique(coarser):
         rows = np.flatnonzero(coarser == step)
-        found[rows] = _bilinear(levels[finest - step], uv[rows], clamped[rows])
-    return found
+        colors[rows] = _bilinear(levels[finest - step], uv[rows], clamped[rows])
+    return colors
 
 
 def _bilinear(level: NDArray[np.uint8], uv: Floats, clamped: NDArray[np.bool_]) -> Floats:
@@ -183,5 +183,5 @@ def _bilinear(level: NDArray[np.uint8], uv: Floats, clamped: NDArray[np.bool_]) 
     across, down = share[:, :1], share[:, 1:]
     upper = level[x[:, 1], x[:, 0]] * (1 - across) + level[x[:, 1], y[:, 0]] * across
     lower = level[y[:, 1], x[:, 0]] * (1 - across) + level[y[:, 1], y[:, 0]] * across
-    found: Floats = upper * (1 - down) + lower * down
-    return found
+    color: Floats = upper * (1 - down) + lower * down
+    return color

@@ -60,8 +60,7 @@ class PublishOptions:
 
 @dataclass(frozen=True)
 class Published:
-    """What became of a folder: names of files that were written, that were there already, and that
-    were removed."""
+    """Names of the files of a folder that were written, left unchanged, and removed."""
 
     written: tuple[str, ...]
     unchanged: tuple[str, ...]
@@ -90,7 +89,7 @@ def publish(
     before = _checked(root, force)
     options = options or PublishOptions()
     files = dict(_files(site, options))
-    # In the end the page: what it names is there.
+    # The page last, after the files that it names.
     names = [*sorted(files.keys() - {INDEX}), INDEX]
     for name in names:
         if name not in before and not force:
@@ -122,19 +121,19 @@ def _checked(root: Path, force: bool) -> dict[str, str]:
     with writing(root):
         if not root.exists() or not any(root.iterdir()):
             return {}
-    found = _read_list(root)
-    if found is None and not force:
+    listed = _read_list(root)
+    if listed is None and not force:
         raise OutputError(
             "PTM-O900",
             "the folder is not empty and not a site that `ptm publish` wrote",
             file=root,
             remedy="name another folder with -o, or give --force to write into it",
         )
-    return found or {}
+    return listed or {}
 
 
 def _read_list(root: Path) -> dict[str, str] | None:
-    """What a folder's list names that may be ours; None if there is no such list."""
+    """The names in a folder's list that may be ours; None without such a list."""
     try:
         with open_regular(root / LIST) as stream:
             document: Any = json.loads(stream.read())
@@ -170,7 +169,7 @@ def _files(site: Site, options: PublishOptions) -> Iterator[tuple[str, Entry]]:
 
 
 def _headers(entries: Iterable[Entry]) -> bytes:
-    """How Netlify and Cloudflare Pages are told of types and caching: by folder and suffix."""
+    """Types and caching for Netlify and Cloudflare Pages, by folder and suffix."""
     folders = sorted({f"/{e.name.partition('/')[0]}/*" for e in entries if e.forever})
     forever = "\n  Cache-Control: public, max-age=31536000, immutable\n"
     parts = [f"{folder}{forever}" for folder in folders]
@@ -180,7 +179,7 @@ def _headers(entries: Iterable[Entry]) -> bytes:
 
 
 def _digest(entry: Entry) -> str:
-    """The SHA-256 of an entry, which is the one that its name tells."""
+    """The SHA-256 of an entry, whose name must contain it."""
     if isinstance(entry.source, bytes):
         return sha256(entry.source)
     with _reading(entry.source):
@@ -207,7 +206,7 @@ def _file_digest(file: Path) -> str:
 
 
 def _held(root: Path, name: str) -> str | None:
-    """The SHA-256 of a file of the folder, None if there is none."""
+    """The SHA-256 of a file of the folder, None if it does not exist."""
     file = real_file(root, name)
     if file is None:
         return None
@@ -224,19 +223,19 @@ def _write(root: Path, name: str, entry: Entry, digest: str) -> None:
         return
 
     def copy(file: IO[bytes]) -> None:
-        found = hashlib.sha256()
+        copied = hashlib.sha256()
         with _reading(source), open_regular(source) as stream:
             for piece in iter(lambda: stream.read(_PIECE), b""):
-                found.update(piece)
+                copied.update(piece)
                 file.write(piece)
-        if found.hexdigest() != digest:
+        if copied.hexdigest() != digest:
             raise damaged(source, "it changed while it was copied")
 
     write_with(target, copy, force=True)
 
 
 def _remove(root: Path, files: Mapping[str, str]) -> Iterator[str]:
-    """Removes what is still as it was written, and folders that are empty then."""
+    """Removes files that are unchanged since they were written, then empty folders."""
     for name, digest in files.items():
         if _held(root, name) == digest:
             with writing(root / name):

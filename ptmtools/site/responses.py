@@ -239,7 +239,7 @@ class Content:
 
 
 class Copies:
-    """Gzip copies, each made for the first request and kept."""
+    """Gzip copies, compressed at the first request and kept."""
 
     def __init__(self) -> None:
         self._kept: dict[str, tuple[str, Content | None]] = {}

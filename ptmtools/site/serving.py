@@ -56,7 +56,7 @@ class ServeOptions:
     )
 
     def __post_init__(self) -> None:
-        self.throttle  # noqa: B018 - raises for what cannot be read
+        self.throttle  # noqa: B018 - raises for unreadable values
 
     @property
     def throttle(self) -> Throttle:

@@ -1,4 +1,4 @@
-// The walk as the interface has it, and tests and the curious, who find it at `window.ptm`.
+// The application: what the interface, tests and users of the console (`window.ptm`) call.
 
 import { clock } from "./net/fetcher.js";
 import { POLICIES } from "./policy/policies.js";
@@ -14,9 +14,9 @@ import { Walkthrough } from "./walkthrough.js";
 const BUDGET = 256 << 20, SMALL_BUDGET = 64 << 20;
 /** MiB that a visitor may say at most. */
 const MOST = 4096;
-/** Seconds of a frame for what one may bump into. */
+/** Seconds of a frame for collision geometry. */
 const SOLID_TIME = 0.004;
-/** The longest step of a walk, s: who comes back to a hidden tab has not walked. */
+/** The longest step of a walk, s: a hidden tab does not walk. */
 const LONGEST = 0.1;
 
 /** @typedef {import("./walk/walker.js").Pose} Pose */
@@ -61,7 +61,7 @@ export class App {
     if (linked) queueMicrotask(() => this.follow(linked));
   }
 
-  /** Goes where a link leads, if there is anything. @param {Pose} pose */
+  /** Goes to the pose of a link, if it is inside the building. @param {Pose} pose */
   follow(pose) {
     const { low, high, C } = this.walk.catalogue;
     for (let c = 0; c < C; c++) {
@@ -90,7 +90,7 @@ export class App {
     for (const listener of this.#listeners.get(name) ?? []) listener(detail);
   };
 
-  /** What went wrong, in order. */
+  /** All errors, in order. */
   get errors() {
     return this.walk.faults;
   }
@@ -133,12 +133,12 @@ export class App {
     this.walk.freeze(on);
   }
 
-  /** @param {boolean} on whether the right half shows what every level would */
+  /** @param {boolean} on whether the right half shows full resolution */
   compare(on) {
     this.walk.compare(on);
   }
 
-  /** @param {boolean} on whether nothing is fetched but what is on the screen */
+  /** @param {boolean} on whether only visible textures and cells are fetched */
   setDataSaver(on) {
     this.walk.saving = on;
   }
@@ -148,12 +148,12 @@ export class App {
     this.walk.recorder = new Recorder(this.walk);
   }
 
-  /** What was recorded, as `ptm simulate --walk` reads it; null if nothing was. */
+  /** The recording, as `ptm simulate --walk` reads it, or null. */
   get recording() {
     return this.walk.recorder?.document ?? null;
   }
 
-  /** What a map shows: the cells, where the visitor is, and what can be seen from there. */
+  /** The data of the map: the cells, the visitor's cell, and the cells visible from it. */
   plan() {
     const { walk, index } = this;
     const cells = index.cells.map(({ box }, cell) => {
@@ -165,7 +165,7 @@ export class App {
   }
 
   /**
-   * A frame: the step of the walker, the picture, and what follows from both.
+   * Computes a frame: the step of the walker, then the picture and the requests.
    * @param {number} dt s
    * @param {import("./walk/walker.js").Wishes} wishes
    */
@@ -175,7 +175,7 @@ export class App {
     this.walk.frame(this.walker.pose);
   }
 
-  /** What one may bump into: the cell and its neighbours, as long as there is time. */
+  /** Adds collision geometry of the cell and its neighbours, as long as the frame has time. */
   #solidify() {
     const until = clock() + SOLID_TIME, late = () => clock() > until;
     const { walk, solids } = this, { records, shapes } = walk.stream;

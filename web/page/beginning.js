@@ -1,4 +1,4 @@
-// How far the first picture is: the room, then the coarse levels of what is seen of it.
+// Progress until the first picture: the room, then the coarse levels of its visible textures.
 
 /** Levels of a texture that make a first picture. */
 const FIRST_LEVELS = 5;
@@ -17,7 +17,7 @@ export function beginningOf(walk) {
   const room = parts < 2 || total === 2;
   return {
     progress: { stage: room ? "Loading the room" : "Loading textures", loaded, total: room ? 12 : total },
-    // Whatever else is there: without the room there is no picture.
+    // Without the room there is no picture.
     over: parts === 2 && ((!room && loaded >= total) || walk.complete),
   };
 }

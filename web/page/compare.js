@@ -1,5 +1,5 @@
-// What the view would be with every level: a second texture memory, for as long as somebody looks at
-// both, and halves of the picture drawn from one and the other.
+// The comparison with full resolution: a second texture memory with every level that the view can
+// resolve, from which the right half of the picture is drawn.
 
 import { Renderer } from "./gl/renderer.js";
 import { TextureMemory } from "./gl/texture-memory.js";
@@ -15,7 +15,7 @@ export class Comparison {
     this.renderer = new Renderer(gl, this.memory, means);
   }
 
-  /** Asks for what the view shows, to the finest level that it can resolve; true once it is there. */
+  /** Requests the visible textures to the finest level that the view resolves; true once all are here. */
   settle() {
     const { walk, memory } = this, { client, catalogue, present, estimate } = walk;
     const { T, K, levels, ends } = catalogue;

@@ -1,4 +1,4 @@
-// The page's beginning: reads the index, makes the walk, and lets the interface at it.
+// The entry of the page: reads the index, creates the application and runs its frames.
 
 import { DecoderWorkers, hasSimd } from "../ptm/src/index.js";
 import { App } from "./app.js";

@@ -1,5 +1,5 @@
-// A walk as it was, for the simulator to walk it again (docs/design/walkthrough.md): a sample of each
-// frame, the age of the item buffer in it, and what the page had asked for before the first.
+// Records a walk for the simulator (docs/design/walkthrough.md): a sample of each frame, the age of the
+// item buffer in it, and the requests of the page before the first.
 
 import { clock } from "./net/fetcher.js";
 
@@ -12,7 +12,7 @@ export class Recorder {
   /** @type {number[][]} cell, age of the item buffer, −1 for none, and s for which nothing else ran */
   #frames = [];
   #begun = -1;
-  /** @type {Map<string, number[]>} when what came from each address was taken note of, s */
+  /** @type {Map<string, number[]>} when each answer was processed, by URL, s */
   #taken = new Map();
 
   /** @param {import("./walkthrough.js").Walkthrough} walk */
@@ -56,7 +56,7 @@ export class Recorder {
     };
   }
 
-  /** What came without the client's asking for it: when, kind, number, bytes. */
+  /** Files that the client did not request: time, kind, number, bytes. */
   #files() {
     const { site } = this.walk, asked = new Map([[site.address, ["index", 0]]]);
     site.index.cells.forEach((_, cell) => {
@@ -72,7 +72,7 @@ export class Recorder {
         [short(requestStart / 1000), ...(asked.get(name) ?? ["page", 0]), encodedBodySize]);
   }
 
-  /** From when to when requests waited for the browser, and what had come for the page. */
+  /** Times between which requests waited for the browser, and answers for the page. */
   #waits() {
     /** @type {number[][]} */
     const sent = [], taken = [];

@@ -1,4 +1,4 @@
-// The numbers of the overlay, for tests and for the curious (docs/guide/viewer.md).
+// The numbers of the details panel, also for tests and the console (docs/guide/viewer.md).
 
 /** @param {import("./walkthrough.js").Walkthrough} walk */
 export function stateOf(walk) {
@@ -30,7 +30,7 @@ export function stateOf(walk) {
   };
 }
 
-/** What is held, as the paper counts. @param {import("./walkthrough.js").Walkthrough} walk */
+/** Bytes in texture memory, as the paper counts. @param {import("./walkthrough.js").Walkthrough} walk */
 function paperBytes({ index, rows, memory }) {
   return index.textures.reduce((sum, { components }, t) => {
     const texels = rows[t].sizes.slice(0, memory.held[t]);

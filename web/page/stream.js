@@ -1,4 +1,4 @@
-// Carries out what the client asks for: requests go out, and what comes is given to whom it concerns.
+// Carries out the requests of the client and passes the answers on.
 
 import { PtmError } from "../ptm/src/index.js";
 import { readGlb } from "./data/glb.js";
@@ -11,7 +11,7 @@ import { TextureFile } from "./net/texture-file.js";
 /** @typedef {import("./data/site.js").CellRecord} CellRecord */
 /** @typedef {import("./data/glb.js").Shape} Shape */
 
-/** Seconds until a file that could not be had is asked for again. */
+/** Seconds until a failed file is requested again. */
 const REST = 10;
 const CONNECTIONS = 6;
 
@@ -20,13 +20,13 @@ export class Stream {
   records = new Map();
   /** @type {Map<number, Shape[]>} */
   shapes = new Map();
-  /** Whether anything has arrived that was not looked at yet. */
+  /** Whether anything has arrived since the last look. */
   news = false;
   /** @type {Request[]} */
   #queue = [];
   /** @type {Set<Request>} */
   #sent = new Set();
-  /** The level at which a texture was found to be damaged. @type {Map<number, number>} */
+  /** The damaged level of a texture. @type {Map<number, number>} */
   #suspect = new Map();
   #cannotDecode = false;
 
@@ -38,8 +38,8 @@ export class Stream {
    * @param {import("./policy/estimate.js").Estimate} parts.estimate
    * @param {import("./net/fetcher.js").Fetcher} parts.fetcher
    * @param {import("../ptm/src/workers.js").DecoderWorkers} parts.workers
-   * @param {() => boolean} parts.rests whether nothing more is asked for
-   * @param {(error: PageError, kind: string, number: number) => void} parts.report what it is about
+   * @param {() => boolean} parts.rests whether to make no more requests
+   * @param {(error: PageError, kind: string, number: number) => void} parts.report
    */
   constructor({ site, client, locator, estimate, fetcher, workers, rests, report }) {
     this.site = site;
@@ -53,7 +53,7 @@ export class Stream {
     this.files = site.index.textures.map((row) => new TextureFile(row, workers));
   }
 
-  /** Asks for what is worth most, as long as the link would run dry. */
+  /** Makes the most urgent requests, as long as the link would run dry. */
   pump() {
     while (!this.rests()) {
       const request = this.client.next(this.estimate);
@@ -72,7 +72,7 @@ export class Stream {
   }
 
   #send() {
-    // Those that wait to be made again take no connection.
+    // Requests that pause before another try take no connection.
     const busy = () => [...this.#sent].filter(({ waits }) => !waits).length;
     while (busy() < CONNECTIONS && this.#queue.length) {
       const { priority } = this.#queue.reduce((a, b) => (b.priority > a.priority ? b : a));
@@ -134,20 +134,20 @@ export class Stream {
     const size = file.row.ends[file.row.ends.length - 1];
     const url = this.site.texture(number), cache = this.#suspect.has(number) ? "no-store" : "default";
     const part = await this.fetcher.range(url, begin, end, size, request, cache);
-    // What was here before it may have been found to be damaged.
+    // The bytes before it may have turned out damaged.
     if (part.begin <= file.length) file.append(part.begin, part.body);
     this.client.arrived(request, file.length);
   }
 
   /**
    * The first levels, so many, of a texture whose bytes are here. A level that is damaged is asked for
-   * once more; if that is damaged as well, what is below it remains.
+   * once more; if that is damaged as well, the levels below it remain.
    * @param {number} texture
    * @param {number} levels
    */
   async decode(texture, levels) {
     const file = this.files[texture];
-    // What was damaged is on its way once more.
+    // The damaged bytes are on their way again.
     if (levels > this.client.have[texture]) throw new Error("not here");
     try {
       const images = await file.decode(levels);
@@ -162,7 +162,7 @@ export class Stream {
         this.#cannotDecode ||= this.workers.failed;
         throw fault;
       }
-      // Somebody else has found it out.
+      // Another call has reported it.
       if (levels > this.client.have[texture]) throw fault;
       const { level = 0 } = /** @type {{level?: number}} */ (fault);
       const kept = level > 0 ? file.row.ends[level - 1] : 0;
@@ -185,7 +185,7 @@ export class Stream {
 /**
  * @param {Uint8Array<ArrayBuffer>} body
  * @param {number} cell
- * @param {number} textures that there are
+ * @param {number} textures in the index
  */
 function readShapes(body, cell, textures) {
   const read = readGlb(body.buffer, textures);

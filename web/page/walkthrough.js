@@ -1,5 +1,5 @@
-// The walk: each frame where the visitor is, what is drawn, what goes into texture memory and what is
-// asked for next (docs/formats/client.md).
+// The walk. Each frame decides where the visitor is, what is drawn, what goes into texture memory and
+// what is requested next (docs/formats/client.md).
 
 import { Locator } from "../client/src/locating.js";
 import { beginningOf } from "./beginning.js";
@@ -24,7 +24,7 @@ import { Stillness } from "./walk/stillness.js";
 
 /** Seconds between item buffers, and between looks of the client. */
 const ITEM_EVERY = 0.1, LOOK_EVERY = 0.2;
-/** Seconds between pictures of who stands, and until one does. */
+/** Seconds between pictures while the visitor stands, and of rest until then. */
 const PAINT_EVERY = 0.05, RESTING = 0.4;
 /** Seconds of a frame for uploads, and for geometry that comes into view. */
 const UPLOAD_TIME = 0.004, GEOMETRY_TIME = 0.004;
@@ -37,21 +37,21 @@ export class Walkthrough {
   /** @type {Drawn[]} */
   drawn = [];
   cell = -1;
-  /** What went wrong, in order. @type {{code: string, message: string}[]} */
+  /** All errors, in order. @type {{code: string, message: string}[]} */
   faults = [];
-  /** Whether there was a picture of the room. */
+  /** Whether the first picture of the room has been drawn. */
   begun = false;
   /** Whether texture memory stays as it is, and nothing is asked for. */
   frozen = false;
-  /** Whether nothing is fetched but what is on the screen. */
+  /** Whether only visible textures and cells are fetched. */
   saving = false;
-  /** Whether both halves are to be seen, and what that takes. */
+  /** Whether to compare with full resolution, and the means for it. */
   comparing = false;
   /** @type {Comparison | null} */
   comparison = null;
   /** @type {import("./recorder.js").Recorder | null} */
   recorder = null;
-  /** When what is drawn has last changed, and was drawn, s. */
+  /** Times of the last change of the scene, and of the last picture, s. */
   #changed = 0;
   #painted = -1;
   #looked = -1;
@@ -109,7 +109,7 @@ export class Walkthrough {
     this.means = index.textures.map(({ color }) => color);
     const low = [0, 1, 2].map((k) => Math.min(...index.cells.map(({ box }) => box[k])));
     const high = [0, 1, 2].map((k) => Math.max(...index.cells.map(({ box }) => box[k + 3])));
-    // What lies outside of the cells is drawn, too.
+    // Geometry outside of the cells is drawn, too.
     this.far = 10 + 3 * Math.hypot(...high.map((x, k) => x - low[k]));
     this.angle = index.viewpoints[0]?.fieldOfView ?? Math.PI / 3;
     this.#make();
@@ -126,9 +126,9 @@ export class Walkthrough {
   }
 
   /**
-   * Without the first room, or a decoder, there is no walk; whatever else is missing, it goes on.
+   * Reports an error: without the first room, or a decoder, the walk cannot begin; otherwise it goes on.
    * @param {import("./net/errors.js").PageError} error
-   * @param {string} kind of what is missing
+   * @param {string} kind of the missing file
    * @param {number} number
    */
   #report(error, kind, number) {
@@ -144,7 +144,7 @@ export class Walkthrough {
     this.touch();
   }
 
-  /** Something that is drawn has changed. */
+  /** The scene has changed. */
   touch() {
     this.#changed = clock();
   }
@@ -168,9 +168,9 @@ export class Walkthrough {
 
   /** @param {Pose} pose */
   locate(pose) {
-    const found = this.locator.locate(pose.eye, this.cell);
-    if (found >= 0) return this.enter(found);
-    // Among cells that are not known yet, the one that one is said to be in.
+    const cell = this.locator.locate(pose.eye, this.cell);
+    if (cell >= 0) return this.enter(cell);
+    // Among cells without a record, one whose box holds the eye.
     const maybe = this.locator.candidates(pose.eye, this.cell);
     if (maybe.length && !maybe.includes(this.cell)) this.enter(maybe[0]);
   }
@@ -218,8 +218,7 @@ export class Walkthrough {
     this.stream.pump();
   }
 
-  /** Whether nothing more is asked for: what is on the screen may be enough, or the rest of the link
-   * be for the comparison. */
+  /** Whether to make no requests beyond the screen, or none at all. */
   get #rests() {
     const enough = this.saving || document.hidden || this.comparing;
     return this.frozen || (enough && this.client.missing(true) === 0);
@@ -245,13 +244,13 @@ export class Walkthrough {
     this.#frames = [...this.#frames.filter((at) => at > now - 1), now];
   }
 
-  /** @param {boolean} on whether texture memory stays as it is, and nothing is asked for */
+  /** @param {boolean} on whether texture memory stays unchanged and no requests are made */
   freeze(on) {
     this.frozen = on;
     if (on) this.memory.hold();
   }
 
-  /** @param {boolean} on whether the right half shows what every level would */
+  /** @param {boolean} on whether the right half shows full resolution */
   compare(on) {
     this.comparing = on;
     if (this.gl.isContextLost()) return;
@@ -267,14 +266,13 @@ export class Walkthrough {
     this.client.policy = POLICIES[policy];
   }
 
-  /** What the view wants of each texture, or null before anything was seen. */
+  /** The levels that the view wants of each texture, or null before the first item buffer. */
   get present() {
     return this.#sight?.present ?? null;
   }
 
   /**
-   * Puts on the GPU the geometry of what can be seen, as long as there is time, and takes off what
-   * cannot.
+   * Uploads the geometry of visible cells, as long as the frame has time, and frees the others.
    * @param {number} until s
    */
   #bring(until) {
@@ -366,12 +364,12 @@ export class Walkthrough {
     return this.#frames.length;
   }
 
-  /** Seconds since the item buffer that is gone by was drawn; null before there is one. */
+  /** Seconds since the item buffer in use was drawn; null before the first. */
   get bufferAge() {
     return this.#sightDrawn < 0 ? null : clock() - this.#sightDrawn;
   }
 
-  /** Whether nothing that this view could use is missing within the budget. */
+  /** Whether everything that this view could use within the budget is present. */
   get complete() {
     const { client, memory, present, catalogue: { T, K } } = this;
     if (!present || this.#sightDrawn < this.#changed || this.#looked < this.#changed) return false;

@@ -1,4 +1,4 @@
-// What the package offers: see README.md.
+// Exports of the package; see README.md.
 
 export { levelSizes } from "./levels.js";
 export { Locator } from "./locating.js";

@@ -1,4 +1,4 @@
-// The shapes of a cell, from its GLB: the form that docs/formats/gltf.md specifies, and no other.
+// Reads the shapes of a cell from its GLB, in the form that docs/formats/gltf.md specifies and no other.
 
 /**
  * Triangles with one look.
@@ -12,7 +12,7 @@
  * @property {boolean} clampU whether u stops at the edge of the texture instead of repeating it
  * @property {boolean} clampV
  * @property {number[]} factor r, g, b in linear light, and opacity
- * @property {boolean} blends whether what is behind shows through
+ * @property {boolean} blends whether surfaces behind it show through
  * @property {number} cutoff texels of less alpha are not drawn, all others are opaque; 0 if it blends
  * @property {boolean} twoSided
  * @property {number[]} low corner of their box
@@ -27,9 +27,9 @@ const ARRAYS = { 5126: Float32Array, 5123: Uint16Array, 5125: Uint32Array };
 const ITEMS = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
 
 /**
- * The cell that a GLB is of, and its shapes; throws what is damaged.
+ * The cell and the shapes of a GLB. Throws an Error if it is damaged.
  * @param {ArrayBuffer} buffer
- * @param {number} [textures] that there are
+ * @param {number} [textures] in the index
  * @returns {{cell: number, shapes: Shape[]}}
  */
 export function readGlb(buffer, textures = Infinity) {
@@ -67,14 +67,14 @@ export function readGlb(buffer, textures = Infinity) {
       const painted = attributes.COLOR_0 !== undefined;
       const colors = painted ? /** @type {Uint16Array} */ (accessor(attributes.COLOR_0)) : null;
       if (!Number.isInteger(texture) || texture >= textures) {
-        throw new Error("has a texture that the index has not");
+        throw new Error("has a texture that is not in the index");
       }
       const factor = base.baseColorFactor ?? [1, 1, 1, 1];
       if (!Array.isArray(factor) || factor.length !== 4 || !factor.every(Number.isFinite)) {
-        throw new Error("has a colour that is none");
+        throw new Error("has an invalid colour");
       }
       if (![min, max].every((corner) => corner?.length === 3 && corner.every(Number.isFinite))) {
-        throw new Error("does not say how large it is");
+        throw new Error("has no bounding box");
       }
       if (uvs && 3 * uvs.length !== 2 * positions.length) throw new Error("has too few coordinates");
       if (colors && 3 * colors.length !== 4 * positions.length) throw new Error("has too few colours");

@@ -1,5 +1,4 @@
-// The record of a cell: read, and refused if it is not what docs/formats/hints.md describes, since a file
-// may be damaged and still be JSON.
+// Reads and validates the record of a cell (docs/formats/hints.md): a damaged file may still be JSON.
 
 /** @typedef {import("./site.js").CellRecord} CellRecord */
 
@@ -15,10 +14,10 @@ const below = (count) => (/** @type {unknown} */ n) =>
 const isPoint = (point) => each(point, Number.isFinite, 3);
 
 /**
- * Throws what is not a record of this cell.
+ * The record of a cell. Throws an Error if it is not valid.
  * @param {Uint8Array} body
  * @param {number} cell
- * @param {number} cells that there are
+ * @param {number} cells in the index
  * @param {number} textures
  * @returns {CellRecord}
  */

@@ -70,7 +70,7 @@ export function readConfig() {
   return JSON.parse(document.getElementById("site")?.textContent ?? "{}");
 }
 
-/** A site: its index, and the addresses of what the index names. */
+/** A site: its index, and the URLs of the files in it. */
 export class Site {
   /**
    * @param {Index} index

@@ -1,4 +1,4 @@
-// What the programs need to know of a view.
+// The matrices of a view, as the programs take them.
 
 /**
  * @typedef {object} Pose
@@ -12,7 +12,7 @@
  * @property {number[]} lens of x, of y, and scale and offset of depth
  */
 
-/** Nothing nearer is drawn, metres: less than half of what walls keep from the eye. */
+/** Near plane, metres: less than half of the distance that walls keep from the eye. */
 const NEAR = 0.1;
 
 /**

@@ -1,5 +1,5 @@
 // The geometry of a cell on the GPU: one buffer of vertices, one of indices, a range of triangles for
-// each look.
+// each material.
 
 /** @typedef {import("../data/glb.js").Shape} Shape */
 

@@ -1,5 +1,5 @@
-// Which textures the screen shows, and how finely: a small picture of them, read back without
-// waiting, and a second one of placeholders for what is not there yet.
+// The item buffer: a small picture of the visible textures and their levels of detail, read back
+// without waiting, and a second one of placeholders for missing cells.
 
 import { aim, programOf } from "./program.js";
 
@@ -115,7 +115,7 @@ export class ItemBuffer {
   }
 
   /**
-   * The far faces of the boxes of cells, which are rooms, behind what is drawn already.
+   * The far faces of the boxes of cells, which are rooms, behind the surfaces drawn so far.
    * @param {Camera} camera
    * @param {{cell: number, box: number[]}[]} missing
    */
@@ -147,7 +147,7 @@ export class ItemBuffer {
   }
 
   /**
-   * What was drawn last, once it can be had without waiting.
+   * The item buffer drawn last, once it can be read without waiting.
    * @returns {Reading | null}
    */
   poll() {
@@ -156,14 +156,14 @@ export class ItemBuffer {
     gl.deleteSync(waiting.sync);
     this.#waiting = null;
     const pixels = this.width * this.height;
-    const found = [0, 1].slice(0, waiting.second ? 2 : 1).map((k) => {
+    const read = [0, 1].slice(0, waiting.second ? 2 : 1).map((k) => {
       const numbers = new Uint16Array(2 * pixels);
       gl.bindBuffer(gl.PIXEL_PACK_BUFFER, this.packs[k]);
       gl.getBufferSubData(gl.PIXEL_PACK_BUFFER, 0, numbers);
       return numbers;
     });
     gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
-    return { pixels, items: found[0], placeholders: found[1] ?? null, drawn: waiting.drawn };
+    return { pixels, items: read[0], placeholders: read[1] ?? null, drawn: waiting.drawn };
   }
 }
 

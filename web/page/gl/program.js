@@ -1,4 +1,4 @@
-// Compiled programs and where their uniforms are.
+// Compiles programs and looks up their uniforms.
 
 import { SOURCES } from "./shaders.js";
 
@@ -38,7 +38,7 @@ export function programOf(gl, name) {
 }
 
 /**
- * Sets what the vertices of a program need.
+ * Sets the uniforms of the vertex shader.
  * @param {WebGL2RenderingContext} gl
  * @param {Program} use
  * @param {import("./camera.js").Camera} camera

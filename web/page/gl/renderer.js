@@ -1,4 +1,4 @@
-// Draws the cells: what is opaque cell by cell, then what one sees through, the farthest first.
+// Draws the cells: opaque surfaces cell by cell, then transparent ones, the farthest first.
 
 import { CellBuffers, pack } from "./cell-buffers.js";
 import { aim, programOf } from "./program.js";
@@ -6,20 +6,20 @@ import { aim, programOf } from "./program.js";
 /** @typedef {import("./cell-buffers.js").Batch} Batch */
 
 /**
- * What is drawn of a cell.
+ * The visible batches of a cell.
  * @typedef {object} Drawn
  * @property {number} cell
  * @property {CellBuffers} buffers
  * @property {Batch[]} batches
  */
 
-/** What is behind everything. */
+/** The background. */
 const SKY = [0.16, 0.17, 0.19, 1];
 
 export class Renderer {
   /** @type {Map<number, CellBuffers>} */
   cells = new Map();
-  /** Of cells that are not there yet. @type {Map<number, ReturnType<typeof pack>>} */
+  /** Packing of cells under way. @type {Map<number, ReturnType<typeof pack>>} */
   #packing = new Map();
 
   /**
@@ -35,7 +35,7 @@ export class Renderer {
   }
 
   /**
-   * Adds a cell, or as much of it as there is time for; true once it is there.
+   * Adds a cell, or as much of it as time permits; true once it is complete.
    * @param {number} cell
    * @param {import("../data/glb.js").Shape[]} shapes
    * @param {() => boolean} late whether the time has come
@@ -76,7 +76,7 @@ export class Renderer {
   }
 
   /**
-   * Draws into what is bound; true as long as something fades in.
+   * Draws into the bound framebuffer; true as long as something fades in.
    * @param {import("./camera.js").Camera} camera
    * @param {Drawn[]} drawn nearest cells first
    * @param {number} now s

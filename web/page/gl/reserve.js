@@ -1,8 +1,8 @@
-// What of the budget is kept free for a texture that is twice in memory while it grows or shrinks: at
-// most the greatest one less its finest level.
+// The part of the budget that stays free for a texture that is in memory twice while it grows or
+// shrinks: at most the largest texture without its finest level.
 //
-// What is kept free decides which levels fit, and they decide what must be kept free. Whatever was
-// needed once is therefore kept for as long as the visitor is in a cell, lest a level go in and out.
+// The reserve decides which levels fit, and these decide the reserve. So it never shrinks while the
+// visitor stays in a cell; otherwise a level could come and go.
 
 export class Reserve {
   /** That are kept free. */

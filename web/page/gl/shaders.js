@@ -1,5 +1,5 @@
-// The programs. Positions are taken relative to the eye before anything is multiplied, and the view
-// only turns them: so what is far from the origin loses no digits.
+// The programs. Positions are taken relative to the eye before any multiplication, and the view only
+// rotates them, so that scenes far from the origin lose no digits.
 
 const CORNERS = `#version 300 es
 precision highp float;
@@ -19,18 +19,18 @@ void main() {
   gl_Position = vec4(seen.xy * lens.xy, seen.z * lens.z + lens.w, -seen.z);
 }`;
 
-/** What a textured surface shows; of one or two channels grey, and alpha in the second. */
+/** The texel of a surface; one or two channels are grey, the second is alpha. */
 const TEXEL = `
 uniform sampler2D map;
-uniform int channels; // 0: nothing of the texture is there
+uniform int channels; // 0: no level is present
 uniform vec4 color;
 uniform vec3 mean;
 uniform bool textured;
 vec4 texel() {
-  vec4 found = texture(map, uv);
-  if (channels == 1) found = vec4(found.rrr, 1.0);
-  if (channels == 2) found = found.rrrg;
-  return channels == 0 ? vec4(mean, 1.0) : found;
+  vec4 sampled = texture(map, uv);
+  if (channels == 1) sampled = vec4(sampled.rrr, 1.0);
+  if (channels == 2) sampled = sampled.rrrg;
+  return channels == 0 ? vec4(mean, 1.0) : sampled;
 }`;
 
 /**
@@ -46,15 +46,15 @@ uniform float cutoff;
 out vec4 shown;
 ${TEXEL}
 void main() {
-  vec4 found = texel();
+  vec4 sampled = texel();
   float light = 1.0;
   if (!textured) {
     vec3 normal = cross(dFdx(seen), dFdy(seen));
     float size = length(normal);
     light = 0.25 + 0.75 * (size > 0.0 ? abs(dot(normal, normalize(seen))) / size : 1.0);
-    found = vec4(1.0);
+    sampled = vec4(1.0);
   }
-  shown = vec4(found.rgb * color.rgb * painted * light, found.a * color.a);
+  shown = vec4(sampled.rgb * color.rgb * painted * light, sampled.a * color.a);
   if (shown.a < max(cutoff, 0.004)) discard;
   if (cutoff > 0.0) shown.a = 1.0;
 }`;

@@ -1,4 +1,4 @@
-// How finely the canvas is drawn: as finely as the screen is, but for who moves on a machine that
+// The resolution of the canvas: that of the screen, and less while the visitor moves on a machine that
 // cannot keep up.
 
 /** Screens finer than this are drawn at so many pixels for one of CSS. */
@@ -19,7 +19,7 @@ export class Sharpness {
     this.canvas = canvas;
   }
 
-  /** Lines of the screen that pictures are made for. */
+  /** Lines of the screen at full resolution. */
   get lines() {
     return this.#size(1)[1];
   }

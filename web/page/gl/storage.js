@@ -1,6 +1,6 @@
-// A texture on the GPU that holds the coarsest levels, up to one, and no room for finer ones: storage
-// for the whole pyramid takes all of its memory at once, and no level of it can be given back. So to
-// grow or to shrink is to make another.
+// A texture on the GPU with its coarsest levels, up to one, and no room for finer ones: storage of the
+// whole pyramid would take all of its memory at once, and no level of it can be freed. So growing and
+// shrinking mean another storage.
 
 /** Bytes of one upload: so large a stripe blocks for 7 ms at most, a whole level of 2048² for 137. */
 export const STRIPE = 256 << 10;

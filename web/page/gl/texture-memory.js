@@ -1,9 +1,9 @@
-// What of each texture is on the GPU: never more bytes than the budget, those of a texture that is
-// replaced counted twice while it is; uploads in stripes, as long as a frame has time.
+// The levels of each texture on the GPU: never more bytes than the budget, those of a texture that is
+// being replaced counted twice; uploads in stripes, as long as a frame has time.
 //
-// Levels are decoded again for each replacement, a third more work than the finest alone. (Copying on
-// the GPU those that both have works as well. It takes a decoder that is kept open for each texture,
-// with four bytes for each of its texels, and a second way of shrinking.)
+// Levels are decoded again for each replacement, a third more work than the finest alone. (Tried:
+// copying the common levels on the GPU. That needs an open decoder for each texture, with four bytes
+// for each of its texels, and a second way of shrinking.)
 
 import { Storage } from "./storage.js";
 
@@ -21,7 +21,7 @@ import { Storage } from "./storage.js";
 /** Textures that are decoded at a time, and that are on their way at most. */
 const DECODING = 3, UNDER_WAY = 6;
 
-/** What is to be in place of a texture's storage. */
+/** A replacement of a texture's storage. */
 class Replacement {
   /** @type {Image[] | null} */
   images = null;
@@ -79,8 +79,8 @@ export class TextureMemory {
   }
 
   /**
-   * Begins what leads to other columns, the greatest priority first; what is to shrink before what is
-   * to grow. What is not wanted at all goes at once.
+   * Starts the replacements that lead to these columns, the greatest priority first; shrinking ones
+   * before growing ones. Textures that are not wanted at all are freed at once.
    * @param {Int32Array} want columns
    * @param {Float64Array} priority
    */
@@ -101,12 +101,12 @@ export class TextureMemory {
     this.#next();
   }
 
-  /** What is there, or was before the context was lost, stays and comes back; nothing else does. */
+  /** Keeps the present levels, or those before the context was lost, and adds no others. */
   hold() {
     this.#want = this.held.map((held, t) => Math.max(held, Math.min(this.#want[t] ?? 0, this.#lost[t])));
   }
 
-  /** What was wanted before the context was lost comes back. */
+  /** Restores the levels that were wanted before the context was lost. */
   resume() {
     this.#next();
   }
@@ -124,13 +124,13 @@ export class TextureMemory {
     return best;
   }
 
-  /** Decodes what is worth most, as long as decoders are free. */
+  /** Decodes the most urgent textures, as long as decoders are free. */
   #next() {
     const { held } = this, want = this.#want, priority = this.#priority;
     for (;;) {
       const under = [...this.#underWay.values()];
       if (under.filter(({ images }) => !images).length >= DECODING) return;
-      // What shrinks makes room for those that wait.
+      // Shrinking makes room for the others.
       const all = under.length < UNDER_WAY;
       const next = this.#best(
         (t) => want[t] > 0 && (want[t] < held[t] || (all && want[t] > held[t])) && !this.#underWay.has(t),
@@ -165,7 +165,7 @@ export class TextureMemory {
   }
 
   /**
-   * Uploads stripes until there is none left, or the time has come; true if anything was done.
+   * Uploads stripes until none is left or the time is up; true if it uploaded any.
    * @param {number} now s
    * @param {() => boolean} late
    */
@@ -180,7 +180,7 @@ export class TextureMemory {
   }
 
   /**
-   * One stripe of a texture; false if there is nothing more to do, or no room.
+   * Uploads one stripe of a texture; false if none is left or memory is full.
    * @param {Replacement} replacement
    * @param {number} now
    */
@@ -188,7 +188,7 @@ export class TextureMemory {
     const { texture, to, images } = replacement, held = this.held[texture];
     if (!images || this.#underWay.get(texture) !== replacement) return false;
     const want = this.#want[texture];
-    // Not wanted any more; more than is wanted; or less than is there and wanted.
+    // Not wanted any more; more than wanted; or less than present and wanted.
     if (want === 0 || to > want || (to <= held && want >= held)) {
       this.#drop(replacement);
       return false;
@@ -211,8 +211,8 @@ export class TextureMemory {
   }
 
   /**
-   * Storage for so many levels, or null if there is no room. What grows leaves room for what is to
-   * shrink, without which there would be none in the end.
+   * Storage for so many levels, or null if memory is full. Growing leaves room for textures that are to
+   * shrink; otherwise they never could.
    * @param {number} texture
    * @param {number} levels
    */
@@ -245,7 +245,7 @@ export class TextureMemory {
     storage.delete();
   }
 
-  /** Gives all of it back, also what is on its way. */
+  /** Frees everything, replacements under way included. */
   delete() {
     this.#want = new Int32Array(this.rows.length);
     for (const replacement of [...this.#underWay.values()]) this.#drop(replacement);

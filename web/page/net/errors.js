@@ -1,4 +1,4 @@
-// What goes wrong, in words for visitors; the codes are those of docs/guide/viewer.md.
+// Errors with a message for visitors; the codes are those of docs/guide/viewer.md.
 
 export class PageError extends Error {
   /**

@@ -1,18 +1,18 @@
-// Requests: whole files, and ranges of files. Each answer is checked before anybody sees it, and asked
-// for again, ever more slowly, if it is not what it should be.
+// Requests for whole files and for ranges. Each answer is checked before use; a wrong one is requested
+// again, with growing pauses.
 
 import { PageError } from "./errors.js";
 
-/** Tries, and seconds until the second one; each waits twice as long as the one before. */
+/** Tries, and the pause before the second one, s; each pause is twice the one before. */
 const TRIES = 6, FIRST_WAIT = 0.5;
 /** Seconds without a byte after which an answer is given up. */
 const PATIENCE = 20;
 
-/** A fault that asking again may mend. */
+/** An error that another request may correct. */
 class Passing extends Error {
   /**
    * @param {string} message
-   * @param {boolean} [anew] whether caches are to be passed by
+   * @param {boolean} [anew] whether the next request bypasses caches
    */
   constructor(message, anew = false) {
     super(message);
@@ -20,14 +20,14 @@ class Passing extends Error {
   }
 }
 
-/** Seconds, of the clock that all of the page goes by. */
+/** Seconds on the clock of the page. */
 export const clock = () => performance.now() / 1000;
 
 export class Fetcher {
-  /** @param {(message: string) => void} notice told once that the host ignores ranges */
+  /** @param {(message: string) => void} notice called once if the host ignores ranges */
   constructor(notice) {
     this.notice = notice;
-    /** Told of each answer: when, s, it was asked for, began and ended, and how many bytes it had.
+    /** Receives of each answer the times of request, begin and end, s, and its bytes.
      * @type {((asked: number, began: number, ended: number, bytes: number) => void) | null} */
     this.measured = null;
     this.requests = 0;
@@ -37,12 +37,12 @@ export class Fetcher {
   }
 
   /**
-   * What is made of all of a file. If nothing can be made of it, it is asked for once more, past the
-   * cache: it may be a page that somebody put in its place.
+   * A whole file, parsed. If it cannot be parsed, it is requested once more, bypassing caches: a
+   * captive portal may have answered.
    * @template T
    * @param {string} url
    * @param {(body: Uint8Array<ArrayBuffer>) => T} read throws if it is damaged
-   * @param {{left: number}} [progress] told what is still to come
+   * @param {{left: number}} [progress] bytes still to come, updated
    * @returns {Promise<T>}
    */
   whole(url, read, progress) {
@@ -66,7 +66,7 @@ export class Fetcher {
    * @param {number} end
    * @param {number} size
    * @param {{left: number}} [progress]
-   * @param {RequestCache} [cache] "no-store" for what was found to be damaged
+   * @param {RequestCache} [cache] "no-store" for bytes that were damaged
    */
   range(url, begin, end, size, progress, cache = "default") {
     const range = `bytes=${begin}-${end - 1}`;
@@ -74,20 +74,20 @@ export class Fetcher {
       const { response, body } = await this.#get(url, { cache, headers: { range } }, progress);
       if (response.status === 200) {
         if (body.length !== size) throw new Passing(`${body.length} of ${size} bytes`, true);
-        this.#tell();
+        this.#reportRanges();
         return { begin: 0, body };
       }
       if (response.status !== 206) throw refused(url, response.status);
       // Hosts of other origins may hide it.
-      const told = response.headers.get("content-range") ?? `bytes ${begin}-${end - 1}/${size}`;
-      if (told !== `bytes ${begin}-${end - 1}/${size}` || body.length !== end - begin) {
-        throw new Passing(`${body.length} bytes, "${told}", in place of ${range}`, true);
+      const answered = response.headers.get("content-range") ?? `bytes ${begin}-${end - 1}/${size}`;
+      if (answered !== `bytes ${begin}-${end - 1}/${size}` || body.length !== end - begin) {
+        throw new Passing(`${body.length} bytes, "${answered}", in place of ${range}`, true);
       }
       return { begin, body };
     });
   }
 
-  #tell() {
+  #reportRanges() {
     if (this.ignoresRanges) return;
     this.ignoresRanges = true;
     console.warn("This host ignores byte ranges: each texture is downloaded whole before it is seen.");
@@ -179,8 +179,8 @@ function joined(parts) {
  */
 function refused(url, status) {
   if (status >= 500 || status === 429 || status === 408) return new Passing(`status ${status}`);
-  const what = status === 404 ? "is missing" : `is refused with status ${status}`;
-  return new PageError("PTM-V103", `${nameOf(url)} ${what} on this site`);
+  const reason = status === 404 ? "is missing" : `is refused with status ${status}`;
+  return new PageError("PTM-V103", `${nameOf(url)} ${reason} on this site`);
 }
 
 /** @param {string} url */
@@ -188,7 +188,7 @@ function nameOf(url) {
   return decodeURIComponent(new URL(url, location.href).pathname.split("/").pop() ?? url);
 }
 
-/** Waits, or until there is a connection again. @param {number} seconds */
+/** Waits, at most until the browser is online again. @param {number} seconds */
 function wait(seconds) {
   return new Promise((resolve) => {
     const done = () => {

@@ -1,4 +1,4 @@
-// The beginning of a `.ptm` that is here, and its levels, decoded in a worker.
+// The downloaded beginning of a `.ptm`, and its levels, decoded in a worker.
 
 import { PtmError } from "../../ptm/src/index.js";
 import { levelSizes } from "../../client/src/levels.js";
@@ -38,7 +38,7 @@ export class TextureFile {
   }
 
   /**
-   * Forgets what is behind so many bytes.
+   * Forgets the bytes from `length` on.
    * @param {number} length
    */
   cut(length) {

@@ -1,6 +1,6 @@
-// What the browser itself noted of each download, told to the estimate of the link: its network has a
-// clock of its own, so that a main thread that is busy drawing does not pass for a thin link. What the
-// page itself took is the first that is known.
+// Passes the browser's own timings of each download to the estimate of the link. They come from the
+// network process, so that a main thread that is busy drawing is not taken for a slow link. The
+// download of the page itself is the first.
 
 /**
  * @param {import("../policy/estimate.js").Estimate} estimate
@@ -16,16 +16,16 @@ export function watchLink(estimate, fetcher) {
     estimate.bytes(ended, bytes);
     estimate.finished(number, ended);
   };
-  // Safari before 16.4 does not say how much there was.
+  // Safari before 16.4 reports no sizes.
   if (!("transferSize" in PerformanceResourceTiming.prototype)) {
     fetcher.measured = take;
     return;
   }
-  /** @param {PerformanceEntryList} found */
-  const note = (found) => {
-    const entries = /** @type {PerformanceResourceTiming[]} */ (found);
+  /** @param {PerformanceEntryList} list */
+  const note = (list) => {
+    const entries = /** @type {PerformanceResourceTiming[]} */ (list);
     for (const entry of entries.sort((a, b) => a.responseEnd - b.responseEnd)) {
-      // Nothing that came out of a cache; and other origins may hide how much there was.
+      // Skips cached files, and those of other origins, which may hide their sizes.
       if (!entry.transferSize || !entry.responseStart) continue;
       const { requestStart, responseStart, responseEnd, encodedBodySize } = entry;
       take(requestStart / 1000, responseStart / 1000, responseEnd / 1000, encodedBodySize);

@@ -1,12 +1,12 @@
-// The levels that are worth most for their bytes. What a level is worth is given one by one, but a
-// coarse level that adds nothing may lead to a fine one that does: a step is therefore any number
-// of levels, and the best is the one of the greatest worth per byte. Steps of all textures in the
-// order of that worth, as long as they fit, solve a knapsack whose items are chains, greedily.
+// Chooses the levels that are worth most for their bytes. Each level has a worth of its own, but a
+// coarse level that adds nothing may lead to a fine one that does: so a step is any number of levels,
+// and the best step has the greatest worth per byte. Taking steps of all textures in that order, as
+// long as they fit, solves greedily a knapsack whose items are chains.
 
 /**
- * What is worth fetching next, or a step of one texture.
+ * The best next request, or a step of one texture.
  * @typedef {{density: number, texture: number, column: number}} Step worth per byte, of which
- *   texture (−1: there is none), and the column that it leads to
+ *   texture (−1: none), and the column that it leads to
  */
 
 /**
@@ -34,7 +34,7 @@ export function bestStep(worth, cost, at, column, paid, last, step) {
 }
 
 /**
- * Writes to `column` (T) what each texture should hold; returns the bytes, at most `budget`.
+ * Writes to `column` (T) the column of each texture; returns the bytes, at most `budget`.
  * @param {Float64Array} worth (T × K) see `bestStep`
  * @param {Float64Array} cost
  * @param {Int32Array} last (T) the last column that each may have
@@ -46,7 +46,7 @@ export function allocate(worth, cost, last, budget, column) {
   const density = new Float64Array(count), to = new Int32Array(count), limit = last.slice();
   /** @type {Step} */
   const step = { density: 0, texture: -1, column: 0 };
-  /** @param {number} t whether it has a step left, which is noted */
+  /** @param {number} t whether it has a step left, which is stored */
   const steps = (t) => {
     const at = t * wide, here = column[t];
     bestStep(worth, cost, at, here, cost[at + here], limit[t], step);
@@ -59,7 +59,7 @@ export function allocate(worth, cost, last, budget, column) {
   let size = 0;
   /** @param {number} a @param {number} b */
   const before = (a, b) => density[a] > density[b] || (density[a] === density[b] && a < b);
-  /** @param {number} i moves down what is there */
+  /** @param {number} i moves the texture at i down */
   const sink = (i) => {
     const t = heap[i];
     for (;;) {

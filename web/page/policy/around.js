@@ -1,15 +1,15 @@
-// What lies around a client, as shares of pixels by texture and column, and what the geometry of
-// cells is worth.
+// The surroundings of the eye as shares of pixels, by texture and column, and the worth of the geometry
+// of cells.
 
 import { distance } from "../space/frustum.js";
 
 /** @typedef {import("./client.js").Client} Client */
 
-/** What a pixel is wrong by where there is nothing, 0 to 255. */
+/** Error of a pixel without geometry, 0 to 255. */
 export const NOTHING = 64;
-// What is nearer counts as being as far as this, metres.
+// The least distance that counts, metres.
 const NEAREST = 0.5;
-// What a cell counts that is out of sight, or is seen from a neighbouring cell only.
+// Weight of a cell out of sight, and of one seen from a neighbouring cell only.
 const BEHIND = 0.2, BEYOND = 0.05;
 
 /**
@@ -32,8 +32,8 @@ function byDistance({ catalogue, shapes, frustum }) {
 }
 
 /**
- * Writes to `around` (T × K) the mean of what is near and of what the record of the cell needs;
- * what is near alone, if the record does not tell.
+ * Writes to `around` (T × K) the mean of the shares by distance and of the needs in the record of the
+ * cell; the shares by distance alone, if the record has no needs.
  * @param {Client} client
  * @param {Float64Array} around
  */
@@ -55,8 +55,8 @@ export function lookAround(client, around) {
 }
 
 /**
- * Writes to `worth` (C) what the geometry of each cell adds: by how much of the item buffer shows
- * its placeholder, and by what it covers on average.
+ * Writes to `worth` (C) the gain by the geometry of each cell: from the share of the item buffer that
+ * shows its placeholder, and from its average coverage.
  * @param {Client} client
  * @param {Float64Array} worth
  */
@@ -66,10 +66,10 @@ export function weighGeometry({ known, cell, hidden, left }, worth) {
   if (!here) return;
   here.visible.forEach((c, i) => (worth[c] = BEHIND * here.coverage[i]));
   for (const neighbour of here.adjacent) {
-    const there = known[neighbour];
-    there?.visible.forEach((c, i) => {
-      // What was forgotten is not fetched again for being seen from elsewhere.
-      if (!left[c]) worth[c] = Math.max(worth[c], BEYOND * there.coverage[i]);
+    const next = known[neighbour];
+    next?.visible.forEach((c, i) => {
+      // Forgotten geometry is not fetched again for a view from elsewhere.
+      if (!left[c]) worth[c] = Math.max(worth[c], BEYOND * next.coverage[i]);
     });
   }
   for (let c = 0; c < worth.length; c++) worth[c] = NOTHING * (worth[c] + hidden[c]);

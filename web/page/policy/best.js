@@ -1,8 +1,7 @@
-// The policy of docs/formats/client.md: what is worth most for its bytes, by the pixels of the view,
-// by what is near and by what is needed. What should be in texture memory is chosen to the last level
-// that fits; what is missing of that is asked for in ranges of a fraction of a second, so that
-// little is under way that may not be wanted any more. When nothing is missing it goes on with what
-// is worth most beyond the budget.
+// The policy of docs/formats/client.md: the greatest worth for its bytes, by the pixels of the view, by
+// distance and by the needs of the cell. Texture memory is allocated to the last level that fits;
+// missing levels are requested in ranges of a fraction of a second, so that few requests under way
+// become useless. After that, it requests the levels that are worth most beyond the budget.
 
 import { allocate, nextFetch } from "./allocation.js";
 import { lookAround, NOTHING, weighGeometry } from "./around.js";
@@ -21,7 +20,7 @@ const CONNECTIONS = 6;
 const LONGEST_WAIT = 2 ** 20;
 // The record of a neighbouring cell is worth as much as so large a share of the screen.
 const RECORD_SHARE = 0.005;
-// What lies around counts so much beside what is on the screen, and of that so much for what is to
+// Weight of the surroundings beside the screen, and of these for what is to
 // be in texture memory now.
 const AROUND = 0.1, HELD = 0.1;
 // A level that is not wanted any more is held on to, at so small a share of its worth, which halves
@@ -44,7 +43,7 @@ export function room(estimate, waiting) {
 }
 
 /**
- * Bytes that a request costs besides its own: headers, and what its connection could have brought
+ * Bytes that a request costs besides its own: headers, and those that its connection could have brought
  * while it waits. So of a fast link more levels are asked for at once.
  * @param {Belief} estimate
  */
@@ -56,8 +55,8 @@ function overheadOf({ latency, bandwidth }) {
 /** @implements {Policy} */
 export class Best {
   #client; #geometry; #wanted;
-  /** @type {Float64Array} (T × K) what each column adds on the screen now, and soon; what it adds
-   *   beyond the budget; what it added lately */
+  /** @type {Float64Array} (T × K) gain of each column on the screen now, and soon; beyond the
+   *   budget; and lately */
   #hold; #fetch; #ahead; #kept;
   #weighed = false;
   #looked = -Infinity;
@@ -71,9 +70,9 @@ export class Best {
     this.#fetch = new Float64Array(T * K);
     this.#ahead = new Float64Array(T * K);
     this.#kept = new Float64Array(T * K);
-    /** (C) what the geometry of each cell adds. */
+    /** (C) gain of the geometry of each cell. */
     this.#geometry = new Float64Array(C);
-    /** (T) what would be in texture memory if all of it were downloaded. */
+    /** (T) the allocation if everything were downloaded. */
     this.#wanted = new Int32Array(T);
   }
 
@@ -99,7 +98,7 @@ export class Best {
     if (cell >= 0) allocate(this.#holding(), catalogue.memory, have, budget, column);
   }
 
-  /** (T × K) what each column is worth in texture memory. */
+  /** (T × K) worth of each column in texture memory. */
   #holding() {
     const { differences } = this.#client.catalogue, kept = this.#kept;
     return this.#hold.map((hold, i) => hold + HELD_ON * kept[i] + HELD_ON ** 2 * differences[i]);
@@ -126,12 +125,12 @@ export class Best {
       this.#client;
     const { T, K, memory, levels, low, high } = catalogue;
     let count = 0;
-    if (!downloads.there("record", here) && counts("record", here)) count++;
+    if (!downloads.has("record", here) && counts("record", here)) count++;
     if (cell < 0 || !frustum) return count;
     this.#weigh();
     for (const c of known[cell]?.visible ?? []) {
       const seen = c === here || hidden[c] > 0 || meetsBox(frustum, low, high, 3 * c);
-      if (seen && !downloads.there("geometry", c) && counts("geometry", c)) count++;
+      if (seen && !downloads.has("geometry", c) && counts("geometry", c)) count++;
     }
     allocate(this.#holding(), memory, levels, budget, this.#wanted);
     for (let t = 0; t < T; t++) {

@@ -1,6 +1,6 @@
-// What can be fetched and what the index says of it, as arrays. A texture holds column k if its
-// levels 0 to k − 1 are there: column 0 is nothing. Tables of T textures and K columns are flat,
-// texture by texture; behind a texture's last column they repeat it.
+// Sizes of everything that can be fetched, as arrays from the index. A texture holds column k if it has
+// the levels 0 to k − 1; column 0 is nothing. Tables of T textures and K columns are flat, texture by
+// texture; after a texture's last column they repeat it.
 
 /**
  * @typedef {object} Catalogue
@@ -11,7 +11,7 @@
  * @property {Float64Array} ends (T × K) bytes of the file that hold each column
  * @property {Float64Array} memory (T × K) bytes of texture memory that each column takes
  * @property {Float64Array} differences (T × K) of each column to the one before it, 0 to 255; of
- *   what lies behind the last 0
+ *   columns after the last 0
  * @property {Float64Array} colors (T × 3) mean colour, 0 to 255
  * @property {Float64Array} low (C × 3) corner of the box of each cell, metres
  * @property {Float64Array} high (C × 3)
@@ -28,7 +28,7 @@
  * @property {{box: number[], recordBytes?: number, geometryBytes?: number}[]} cells
  */
 
-// A level that only repeats the texels of the one below still sharpens what is filtered between.
+// A level that only repeats the texels of the one below still sharpens interpolated colours.
 const LEAST = 0.5;
 const RECORD_BYTES = 1000, GEOMETRY_BYTES = 4000;
 const GREY = [128, 128, 128];
@@ -49,10 +49,10 @@ export function catalogueOf({ textures, cells }) {
     for (let k = 1; k < K; k++) {
       const at = t * K + k, shift = levels[t] - k;
       const texels = Math.max(1, width >> shift) * Math.max(1, height >> shift);
-      const there = k <= levels[t];
-      ends[at] = there ? texture.ends[k - 1] : ends[at - 1];
-      memory[at] = memory[at - 1] + (there ? texels * (texture.gpuTexelBytes ?? stored) : 0);
-      differences[at] = there ? Math.max(texture.differences?.[k - 1] ?? 0, LEAST) : 0;
+      const exists = k <= levels[t];
+      ends[at] = exists ? texture.ends[k - 1] : ends[at - 1];
+      memory[at] = memory[at - 1] + (exists ? texels * (texture.gpuTexelBytes ?? stored) : 0);
+      differences[at] = exists ? Math.max(texture.differences?.[k - 1] ?? 0, LEAST) : 0;
     }
     whole += memory[t * K + K - 1];
   });

@@ -1,5 +1,5 @@
-// A client on a walk: it knows what has arrived, and a policy says from that what should be in
-// texture memory and what to ask for next (docs/formats/client.md).
+// A client on a walk: it keeps account of downloads, and its policy decides from these what should be
+// in texture memory and what to request next (docs/formats/client.md).
 
 import { Downloads } from "./downloads.js";
 import { knownOf, shapesOf } from "./knowledge.js";
@@ -15,19 +15,19 @@ import { knownOf, shapesOf } from "./knowledge.js";
 /** @typedef {Float32Array | Float64Array} Shares */
 
 /**
- * What a policy does for a client.
+ * A policy of a client.
  * @typedef {object} Policy
  * @property {Int32Array} target (T) columns that it wants to download
  * @property {() => void} look the walker is somewhere: sets `client.column`
- * @property {() => void} learned there is a record, geometry or item buffer that was not there
+ * @property {() => void} learned a record, geometry or item buffer has arrived
  * @property {(estimate: Belief) => Request | null} next
- * @property {(counts: (kind: Kind, number: number) => boolean) => number} missing how much of what
- *   counts is not there
+ * @property {(counts: (kind: Kind, number: number) => boolean) => number} missing number of
+ *   counted files and levels that are missing
  * @property {() => void} [fit] chooses `client.column` once more at the same look, for another budget
  */
 
 /**
- * Where the walker is, and what it sees.
+ * The place and the view of the walker.
  * @typedef {object} Look
  * @property {number} now s, on any clock
  * @property {number} cell that the eye is in; one whose record is not there yet is asked for, and
@@ -52,7 +52,7 @@ export class Client {
     this.catalogue = catalogue;
     /** Bytes of texture memory; a change counts from the next look on. */
     this.budget = budget;
-    /** (T) what of each texture should be in texture memory. */
+    /** (T) the column that each texture should hold in memory. */
     this.column = new Int32Array(T);
     this.downloads = new Downloads(catalogue);
     /** The cell that the eye is in, and the one whose record is gone by; −1 for none. */
@@ -76,7 +76,7 @@ export class Client {
     this.#policy = policy(this);
   }
 
-  /** Another policy goes on with what is there. @param {(client: Client) => Policy} policy */
+  /** Another policy continues with the downloaded data. @param {(client: Client) => Policy} policy */
   set policy(policy) {
     this.#policy = policy(this);
   }
@@ -110,8 +110,8 @@ export class Client {
   }
 
   /**
-   * The geometry of a cell is not there any more: neither its bytes nor what was made of them. Its
-   * boxes still tell what is near. (Geometry that only leaves the GPU need not be forgotten.)
+   * Forgets the geometry of a cell: its bytes are gone. Its boxes still serve for distances. (Geometry
+   * that only leaves the GPU need not be forgotten.)
    * @param {number} cell
    */
   forgetGeometry(cell) {
@@ -153,8 +153,8 @@ export class Client {
   }
 
   /**
-   * How much that this view could use, and that fits into the budget, is not there yet.
-   * @param {boolean} [free] whether to leave out what was asked for, or cannot be now
+   * Number of files and levels that this view could use within the budget and that are missing.
+   * @param {boolean} [free] whether to omit those that are requested already or cannot be now
    */
   missing(free = false) {
     const { downloads } = this;
@@ -163,7 +163,7 @@ export class Client {
   }
 
   /**
-   * What to ask for now, which then counts as asked for; to be called until there is nothing.
+   * The next request, which then counts as made; to be called until it is null.
    * @param {Belief} estimate
    */
   next(estimate) {
@@ -171,8 +171,8 @@ export class Client {
   }
 
   /**
-   * A request is finished. What a record or geometry says is told by `learnRecord` and
-   * `learnGeometry`; of a texture the bytes up to `end` are there, be it that it broke off or that
+   * A request is finished. `learnRecord` and `learnGeometry` take the contents of records and
+   * geometry; of a texture the bytes up to `end` have arrived, be it that it broke off or that
    * a server sent more.
    * @param {Request} request
    */
@@ -181,7 +181,7 @@ export class Client {
   }
 
   /**
-   * A request came to nothing and may be made again, though not before `until`, s.
+   * A request failed and may be made again, though not before `until`, s.
    * @param {Request} request
    */
   failed(request, until = 0) {

@@ -1,6 +1,6 @@
-// What was asked for, and what is there. Records and geometry are asked for whole; of a texture one
-// range at a time, each where the last one ended: caches of browsers ask once more for ranges of a
-// file that they are still receiving.
+// Requested and downloaded bytes. Records and geometry are requested whole; of a texture one range at
+// a time, each where the last one ended: caches of browsers request ranges again while they still
+// receive the file.
 
 /** @typedef {import("./catalogue.js").Catalogue} Catalogue */
 /** @typedef {"record" | "geometry" | "texture"} Kind */
@@ -11,11 +11,11 @@
  * @property {Kind} kind
  * @property {number} number of the cell or texture
  * @property {number} begin
- * @property {number} end a guess for what is asked for whole, if the index does not say it
+ * @property {number} end an estimate for whole files whose size is not in the index
  * @property {number} priority the greater, the sooner; it may grow
- * @property {number} left bytes that are yet to come, headers included: for whoever receives them
+ * @property {number} left bytes still to come, headers included: for the receiver
  *   to keep up to date
- * @property {boolean} [waits] whether nothing is on the way, until it is made again
+ * @property {boolean} [waits] whether it pauses before another try
  */
 
 /** Bytes of the headers of a request. */
@@ -41,11 +41,11 @@ export class Downloads {
     };
     /** (T) bytes of each texture, from its beginning. */
     this.bytes = new Float64Array(T);
-    /** (T) columns that are there whole. */
+    /** (T) complete columns. */
     this.have = new Int32Array(T);
     /** @type {Set<Request>} on the way */
     this.waiting = new Set();
-    /** Seconds, on the clock of whoever looks. */
+    /** Seconds, on the clock of the caller. */
     this.now = 0;
   }
 
@@ -64,8 +64,8 @@ export class Downloads {
     return this.#rests[kind][number] === Infinity;
   }
 
-  /** Whether all of a record or of geometry is there. @param {Kind} kind @param {number} number */
-  there(kind, number) {
+  /** Whether a record or geometry is complete. @param {Kind} kind @param {number} number */
+  has(kind, number) {
     return this.#state[kind][number] === THERE;
   }
 
@@ -97,7 +97,7 @@ export class Downloads {
   }
 
   /**
-   * A request is over; of a texture the bytes up to `end` are there.
+   * A request is over; of a texture the bytes up to `end` have arrived.
    * @param {Request} request
    * @param {number} end
    */
@@ -127,7 +127,7 @@ export class Downloads {
   }
 
   /**
-   * A request came to nothing; it is not to be made again before `until`.
+   * A request failed; it is not made again before `until`.
    * @param {Request} request
    * @param {number} until
    */

@@ -1,8 +1,8 @@
-// What a client believes of its link, from what it has downloaded lately. Bandwidth is bytes over
-// the time during which any were arriving, both forgotten with a half-life of such time: a pause
-// neither lowers the estimate nor ages it, and parallel requests do not count against each other.
-// What comes between two looks fades as if it came evenly, so it does not matter how often one looks.
-// Latency is the mean of the last few, of requests whose response did not wait for those of others.
+// Estimates the link from recent downloads. Bandwidth is bytes over the time during which any arrived,
+// both forgotten with a half-life of such time: a pause neither lowers the estimate nor ages it, and
+// parallel requests do not count against each other. Bytes between two looks fade as if they arrived
+// evenly, so that the frequency of looks does not matter. Latency is the mean of the last few requests
+// whose response did not wait for another.
 
 /**
  * @typedef {object} Belief

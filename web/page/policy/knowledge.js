@@ -1,4 +1,4 @@
-// What is known of a cell, from its record and its geometry.
+// The data of a cell that policies use, from its record and its geometry.
 
 /**
  * The parts of a record that are read here (docs/formats/hints.md).
@@ -14,7 +14,7 @@
  */
 
 /**
- * What a record says.
+ * The contents of a record.
  * @typedef {object} Known
  * @property {number[]} adjacent cells beyond its portals
  * @property {number[]} visible cells that it may see, itself first

@@ -47,7 +47,7 @@ export class Paper {
     while (this.#way[0].now < downloads.now - BEFORE - 1e-9) this.#way.shift();
     if (!here) return;
     if (cell !== this.#entered) {
-      // What the visible set of the new cell does not use is dropped.
+      // Textures that the visible set of the new cell does not use are dropped.
       this.#entered = cell;
       this.#used = new Set(here.textures);
       column.forEach((_, t) => this.#used.has(t) || (column[t] = 0));
@@ -65,7 +65,7 @@ export class Paper {
     if (!here || !frustum) return [];
     for (const [i, c] of here.visible.entries()) {
       const some = shapes[c], hull = known[c]?.hull;
-      if (!some || !downloads.there("geometry", c)) continue;
+      if (!some || !downloads.has("geometry", c)) continue;
       if (c !== cell && !(hull ? meetsHull(frustum, hull) : this.#boxed(c))) continue;
       const { textures, boxes } = some;
       const ahead = textures.filter((_, s) => meetsBox(frustum, boxes, boxes, 6 * s, 6 * s + 3));
@@ -83,10 +83,10 @@ export class Paper {
   /** @param {(kind: Kind, number: number) => boolean} counts */
   missing(counts) {
     const { cell, here, known, downloads } = this.#client;
-    let count = downloads.there("record", here) || !counts("record", here) ? 0 : 1;
+    let count = downloads.has("record", here) || !counts("record", here) ? 0 : 1;
     for (const c of known[cell]?.visible ?? []) {
       const seen = c === cell || this.#boxed(c);
-      if (seen && !downloads.there("geometry", c) && counts("geometry", c)) count++;
+      if (seen && !downloads.has("geometry", c) && counts("geometry", c)) count++;
     }
     return count + this.#asks.filter((t) => counts("texture", t)).length;
   }
@@ -106,7 +106,7 @@ export class Paper {
   }
 
   /**
-   * Asks for the first of files that is not there; those on the way may become more urgent.
+   * Requests the first missing file; those on the way may become more urgent.
    * @param {[Kind, number, number][]} files
    */
   #first(files) {

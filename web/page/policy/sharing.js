@@ -1,4 +1,4 @@
-// Two steps of the paper's client: memory is shared out (§6.1), levels come and go (§6.2).
+// Two steps of the paper's client: sharing memory (§6.1), adding and removing levels (§6.2).
 
 /** @typedef {import("./catalogue.js").Catalogue} Catalogue */
 /**
@@ -37,7 +37,7 @@ export function shareOut({ K, memory, levels }, cells, column, budget, share) {
 }
 
 /**
- * Removes and adds a level of each texture in `column` (T), by what it keeps and what is there;
+ * Removes and adds a level of each texture in `column` (T), by its share and its downloads;
  * returns the textures that want their next level downloaded. More levels are removed for as long
  * as all of them exceed the budget, as when it has shrunk.
  * @param {Catalogue} stock

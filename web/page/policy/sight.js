@@ -1,4 +1,4 @@
-// From the pixels of an item buffer to what the view wants (docs/formats/client.md, step 2).
+// Computes from the pixels of an item buffer what the view wants (docs/formats/client.md, step 2).
 
 /**
  * @typedef {object} Sight

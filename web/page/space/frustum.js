@@ -1,4 +1,4 @@
-// What a camera takes in: boxes and hulls that reach into its frustum.
+// The frustum of a camera, and tests of boxes and hulls against it.
 
 import { cross } from "../../client/src/vectors.js";
 
@@ -11,7 +11,7 @@ import { cross } from "../../client/src/vectors.js";
  * @property {number[]} right
  * @property {number[]} up
  * @property {Float64Array} planes inward normals, through the eye, x, y, z of each: of the left,
- *   the right, the lower and the upper side, and of what is ahead
+ *   the right, the lower and the upper side, and of the half space ahead
  */
 
 /** @typedef {{eye: number[], yaw: number, pitch: number}} Pose metres, radians: see `directionOf` */

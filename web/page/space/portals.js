@@ -1,4 +1,4 @@
-// Ways through portals.
+// Finds the portal that a movement passes.
 
 import { cross, dot, facing, minus } from "../../client/src/vectors.js";
 
@@ -27,10 +27,10 @@ export function crossing(eye, way, polygon) {
  * @param {Vector} way
  */
 export function nextCell(portals, eye, way) {
-  let found = -1, nearest = Infinity;
+  let next = -1, nearest = Infinity;
   for (const { neighbour, polygon } of portals) {
     const far = crossing(eye, way, polygon);
-    if (far < nearest) [found, nearest] = [neighbour, far];
+    if (far < nearest) [next, nearest] = [neighbour, far];
   }
-  return found;
+  return next;
 }

@@ -1,4 +1,4 @@
-// A place as the fragment of the address: #x,y,z,yaw and perhaps pitch, metres and degrees.
+// A pose as the fragment of the URL: #x,y,z,yaw and optionally pitch, metres and degrees.
 
 import { find, make } from "./elements.js";
 import { showNotice } from "./errors.js";
@@ -6,7 +6,7 @@ import { showNotice } from "./errors.js";
 /** @typedef {import("../walk/walker.js").Pose} Pose */
 
 const DEGREES = 180 / Math.PI;
-/** How often the address may follow the visitor, ms: browsers refuse what is much faster. */
+/** How often the address may follow the visitor, ms: browsers refuse much faster updates. */
 const OFTEN = 500;
 
 /** @param {string} fragment @returns {Pose | null} */

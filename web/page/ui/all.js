@@ -1,4 +1,4 @@
-// The interface: what is needed at once, and panels that are made when they are first opened.
+// The interface: controls and notices at once, panels when they are first opened.
 
 import { loadLater } from "../load-later.js";
 import { attachAddress } from "./address.js";
@@ -9,10 +9,10 @@ import { attachLoading } from "./loading.js";
 import { attachMenu } from "./menu.js";
 
 /**
- * What main.js gives: the walk, as the interface sees it.
+ * The application, as the interface sees it.
  * @typedef {object} App
  * @property {{viewpoints: {name: string, description: string, thumbnail?: string}[]}} index
- * @property {{index: string}} config what the page says of the site
+ * @property {{index: string}} config the settings in the page
  * @property {import("../walk/walker.js").Walker} walker
  * @property {HTMLCanvasElement} canvas
  * @property {(place: number | import("../walk/walker.js").Pose) => void} goTo
@@ -114,7 +114,7 @@ function attachPanels(root, app) {
 }
 
 /**
- * Attaches all of it to the page; what the visitor wants is asked for in each frame.
+ * Attaches the interface to the page; returns the controls, which are read in each frame.
  * @param {App} app
  */
 export function attachUi(app) {

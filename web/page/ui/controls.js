@@ -1,4 +1,4 @@
-// What the visitor wants: keys, a mouse that drags the picture, one thumb that walks.
+// Reads the visitor's input: keys, dragging with a mouse, one or two fingers.
 
 import { find } from "./elements.js";
 
@@ -6,7 +6,7 @@ import { find } from "./elements.js";
 /** @typedef {{id: number, x: number, y: number, u: number, v: number, touch: boolean}} Pointer
  *   where it went down, and where it is, pixels */
 
-/** What a key does, as [wish, sign]. @type {Record<string, [string, number]>} */
+/** The effect of each key, as [wish, sign]. @type {Record<string, [string, number]>} */
 const KEYS = {
   KeyW: ["forward", 1], ArrowUp: ["forward", 1], KeyS: ["forward", -1], ArrowDown: ["forward", -1],
   KeyA: ["turn", 1], ArrowLeft: ["turn", 1], KeyD: ["turn", -1], ArrowRight: ["turn", -1],
@@ -16,7 +16,7 @@ const KEYS = {
 const OWN = "input, select, textarea, ol, #panels section";
 /** Pixels that a thumb goes for all of a wish, and that are none. */
 const REACH = 56, REST = 8;
-/** Vertical field of view, radians: what is dragged stays under the pointer. */
+/** Vertical field of view, radians: a dragged point stays under the pointer. */
 const VIEW = Math.PI / 3;
 
 /** @param {number} pixels */
@@ -54,7 +54,7 @@ export function attachControls(root, { canvas }) {
   addEventListener("keydown", (event) => {
     run = event.shiftKey;
     const { target, code } = event;
-    // Of a key that is held together with these nobody hears that it was let go.
+    // The release of a key that is held together with these is not reported.
     if (event.ctrlKey || event.altKey || event.metaKey) return keys.clear();
     if (!(code in KEYS)) return;
     if (target instanceof Element && target.closest(OWN)) return;
@@ -91,7 +91,7 @@ export function attachControls(root, { canvas }) {
   for (const kind of /** @type {const} */ (["pointerup", "pointercancel"])) {
     canvas.addEventListener(kind, ({ pointerId }) => {
       pointers = pointers.filter(({ id }) => id !== pointerId);
-      // Who lifts one of two fingers does not walk off with the other.
+      // Lifting one of two fingers does not start a walk with the other.
       for (const one of pointers) [one.x, one.y] = [one.u, one.v];
       show();
     });
@@ -99,22 +99,22 @@ export function attachControls(root, { canvas }) {
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());
 
   const wishes = () => {
-    const told = { forward: 0, right: 0, turn: 0, look: 0, run, yaw, pitch };
+    const wishes = { forward: 0, right: 0, turn: 0, look: 0, run, yaw, pitch };
     yaw = pitch = 0;
     for (const code of keys) {
       let [wish, sign] = KEYS[code];
       if (run && code.startsWith("Arrow") && wish === "turn") [wish, sign] = ["right", -sign];
-      told[/** @type {"forward" | "right" | "turn" | "look"} */ (wish)] += sign;
+      wishes[/** @type {"forward" | "right" | "turn" | "look"} */ (wish)] += sign;
     }
     const one = thumb();
     if (one) {
-      told.forward += pushed(one.y - one.v);
-      told.turn += pushed(one.x - one.u);
+      wishes.forward += pushed(one.y - one.v);
+      wishes.turn += pushed(one.x - one.u);
     }
     for (const wish of /** @type {const} */ (["forward", "right", "turn", "look"])) {
-      told[wish] = Math.max(-1, Math.min(1, told[wish]));
+      wishes[wish] = Math.max(-1, Math.min(1, wishes[wish]));
     }
-    return told;
+    return wishes;
   };
   return { wishes };
 }

@@ -1,13 +1,13 @@
-// Elements of the page: found, and made.
+// Finds and creates elements of the page.
 
 /**
  * An element that index.html has.
  * @param {ParentNode} root @param {string} selector @returns {any}
  */
 export function find(root, selector) {
-  const found = root.querySelector(selector);
-  if (!found) throw new Error(`the page has no ${selector}`);
-  return found;
+  const element = root.querySelector(selector);
+  if (!element) throw new Error(`the page has no ${selector}`);
+  return element;
 }
 
 /**

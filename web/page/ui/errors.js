@@ -1,10 +1,10 @@
-// What went wrong, in words, and what to do about it.
+// Shows errors, with their remedies, and notices.
 
 import { find, make } from "./elements.js";
 
 const TELL = "Tell the owner of this site: publishing it again should repair it.";
 const BROWSER = "Use a current Chrome, Edge or Firefox, or Safari 16.4 or newer";
-/** What to do, by the code of the error. @type {Record<string, string>} */
+/** Remedies, by the code of the error. @type {Record<string, string>} */
 const REMEDIES = {
   "PTM-V101": `${BROWSER}, with hardware acceleration on.`,
   "PTM-V102": `${BROWSER}.`,
@@ -17,7 +17,7 @@ const OTHERWISE = "Reload the page. If that does not help, tell the owner of thi
 /** How long a notice stays, ms. */
 const STAYS = 8000;
 
-/** What an error is in the way of. */
+/** Parts of the page that an error disables. */
 const BEHIND = ["nav", "#panels", "#view"];
 
 /** Shows an error, in the way of everything. @param {Document} root
@@ -47,7 +47,7 @@ function hideError(root) {
 export function showNotice(root, ...message) {
   const line = make("p", {}, ...message);
   find(root, "#notices").append(line);
-  // Not from under whoever is in it.
+  // A notice that has the focus stays.
   const leave = () => {
     if (line.contains(root.activeElement)) setTimeout(leave, STAYS);
     else line.remove();
@@ -58,12 +58,12 @@ export function showNotice(root, ...message) {
 /** Each notice is given once. @param {Document} root @param {import("./all.js").App} app */
 export function attachErrors(root, app) {
   /** @type {Set<string>} */
-  const said = new Set();
+  const shown = new Set();
   app.on("error", (error) => showError(root, error));
   app.on("first-picture", () => hideError(root));
   app.on("notice", ({ message }) => {
-    if (said.has(message)) return;
-    said.add(message);
+    if (shown.has(message)) return;
+    shown.add(message);
     showNotice(root, message);
   });
 }

@@ -1,12 +1,12 @@
-// What is seen before the first picture: the poster and the bar, which are in the page as it comes.
+// Shows the progress until the first picture, in the bar that the page contains.
 
 import { find } from "./elements.js";
 
 /** @param {Document} root @param {Pick<import("./all.js").App, "on">} app */
 export function attachLoading(root, app) {
   const bar = find(root, "#progress"), stage = find(root, "#stage");
-  app.on("progress", ({ stage: what, loaded, total }) => {
-    stage.textContent = what;
+  app.on("progress", ({ stage: text, loaded, total }) => {
+    stage.textContent = text;
     if (total > 0) {
       bar.max = total;
       bar.value = loaded;

@@ -1,4 +1,4 @@
-// The viewpoints, as a menu.
+// The menu of viewpoints.
 
 import { calm, make } from "./elements.js";
 

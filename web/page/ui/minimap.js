@@ -1,4 +1,4 @@
-// The storey from above: its cells, those that may be seen from here, and the visitor.
+// The map: the cells of the storey, those visible from here, and the visitor.
 
 import { make } from "./elements.js";
 
@@ -77,13 +77,13 @@ export function attachMinimap(root, app) {
 /** The lowest floor of each storey. @param {{low: number[], high: number[]}[]} cells */
 function storeysOf(cells) {
   /** @type {{lowest: number, area: number}[]} */
-  const found = [];
+  const storeys = [];
   for (const { low, high } of [...cells].sort((a, b) => a.low[1] - b.low[1])) {
-    const last = found[found.length - 1], floor = low[1];
+    const last = storeys[storeys.length - 1], floor = low[1];
     const area = (high[0] - low[0]) * (high[2] - low[2]);
     if (last && floor - last.lowest <= STOREY) last.area += area;
-    else found.push({ lowest: floor, area });
+    else storeys.push({ lowest: floor, area });
   }
-  const least = SHARE * Math.max(...found.map(({ area }) => area));
-  return found.filter(({ area }) => area >= least).map(({ lowest }) => lowest);
+  const least = SHARE * Math.max(...storeys.map(({ area }) => area));
+  return storeys.filter(({ area }) => area >= least).map(({ lowest }) => lowest);
 }

@@ -1,4 +1,4 @@
-// The numbers of the walk, several times a second, and the settings that change them.
+// The details panel: numbers of the walk, several times a second, and the settings.
 
 import { inBytes, inMemory, make } from "./elements.js";
 import { attachSettings } from "./settings.js";
@@ -38,8 +38,8 @@ export function attachOverlay(root, app) {
     memory.textContent = `Texture memory: ${inMemory(residentBytes)} of ${inMemory(budgetBytes)}`;
     fill.max = budgetBytes;
     fill.value = residentBytes;
-    ROWS.forEach(([, told], k) => {
-      const text = told(state);
+    ROWS.forEach(([, textOf], k) => {
+      const text = textOf(state);
       if (values[k].textContent !== text) values[k].textContent = text;
     });
     const most = Math.max(1, ...levels);

@@ -1,4 +1,4 @@
-// What a visitor may choose: fewer bytes, memory, patience, the policy; and a picture to compare.
+// The settings: data saver, texture memory, patience, policy, freezing and comparing.
 
 import { find, inMemory, make } from "./elements.js";
 
@@ -9,17 +9,17 @@ const MIB = 2 ** 20, POLICIES = ["best", "paper"];
 /**
  * A slider that is moved by factors of the square root of two.
  * @param {string} name @param {number[]} range least and greatest @param {number} now
- * @param {(value: number) => string} told @param {(value: number) => void} choose
+ * @param {(value: number) => string} textOf @param {(value: number) => void} choose
  */
-function slider(name, [least, greatest], now, told, choose) {
-  const shown = make("span", { ariaHidden: "true" }, told(now));
+function slider(name, [least, greatest], now, textOf, choose) {
+  const shown = make("span", { ariaHidden: "true" }, textOf(now));
   const at = (/** @type {number} */ value) => Math.round(2 * Math.log2(value / least));
   const input = make("input", { type: "range", min: 0, max: at(greatest), value: at(now) });
   const value = () => least * 2 ** (input.value / 2);
-  const say = () => (shown.textContent = input.ariaValueText = told(value()));
-  input.oninput = say;
+  const show = () => (shown.textContent = input.ariaValueText = textOf(value()));
+  input.oninput = show;
   input.onchange = () => choose(value());
-  input.ariaValueText = told(now);
+  input.ariaValueText = textOf(now);
   return make("label", {}, name, shown, input);
 }
 

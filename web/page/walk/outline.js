@@ -1,15 +1,15 @@
-// Triangles as who stands upright meets them: cut to a range of heights, and seen from above.
+// Triangles as an upright cylinder meets them: cut to a range of heights and projected on the floor.
 
 /** A convex polygon in x and z; mostly a wall, then as thin as a line. */
 export class Outline {
   /** @type {number[]} x, y, z of each corner */
   #points = [];
-  /** What of it is next to the point last asked for. */
+  /** The nearest point of the last query. */
   x = 0;
   z = 0;
 
   /**
-   * Of a triangle what is between two heights.
+   * The part of a triangle between two heights.
    * @param {Float32Array} corners @param {number} at @param {number} bottom @param {number} top
    */
   cut(corners, at, bottom, top) {
@@ -57,7 +57,7 @@ export class Outline {
     return 0;
   }
 
-  /** Whether a line from here to there meets it. @param {number} x @param {number} z
+  /** Whether a line between two points meets it. @param {number} x @param {number} z
    * @param {number} u @param {number} w */
   crosses(x, z, u, w) {
     const p = this.#points;

@@ -1,7 +1,7 @@
-// What a walker meets: the triangles of the cells whose geometry is there, each cell's in a tree.
+// The triangles that a walker can collide with: those of the loaded cells, in a tree for each cell.
 //
-// A triangle carries who stands on it, if it is within 45° of level, and is in the way of who
-// walks, unless it lies in the opening of a portal: there hangs a door.
+// A triangle within 45° of level carries the walker. Any other one blocks the way, unless it lies in the
+// opening of a portal, where a door hangs.
 
 /** @typedef {import("../data/glb.js").Shape} Shape */
 /** @typedef {{portals: {polygon: number[][]}[]}} Openings */
@@ -18,7 +18,7 @@ const INSIDE = 0.03;
 const FEW = 4;
 /** Triangles that are looked at without a pause. */
 const AT_ONCE = 64, MANY = 1 << 14;
-/** Cells out of sight are kept until there are so many. */
+/** Number of cells kept out of sight. */
 const MOST = 64;
 
 /**
@@ -54,7 +54,7 @@ function openingOf(polygon) {
 }
 
 /** Triangles in a tree: nodes in the order of a walk through it, each with where the next begins
- * that is not below it. It is made step by step: thousands of triangles take longer than a frame. */
+ * that is not below it. It is built step by step: thousands of triangles take longer than a frame. */
 class Tree {
   corners = new Float32Array(0);
   kinds = new Uint8Array(0);
@@ -99,7 +99,7 @@ class Tree {
     this.boxes = new Float32Array(12 * count + 6);
     this.next = new Uint32Array(2 * count + 1);
     this.ranges = new Uint32Array(4 * count + 2);
-    // What is still to be made, the next at the end; between them nodes that are over then.
+    // Work left, the next at the end; between the items nodes that are finished then.
     const left = count ? [{ begin: 0, end: count, over: -1 }] : [];
     for (let next = left.pop(); next; next = left.pop()) {
       const { begin, end, over } = next;
@@ -162,15 +162,15 @@ class Tree {
   }
 }
 
-/** The triangles of the cells that are there. */
+/** The triangles of the loaded cells. */
 export class Solids {
   /** @type {Map<number, Tree>} */
   #trees = new Map();
-  /** @type {Map<number, Tree>} of cells that are not there yet */
+  /** @type {Map<number, Tree>} of cells that are being added */
   #growing = new Map();
 
   /**
-   * Adds a cell, or as much of it as there is time for: it is there when all of it is, by further
+   * Adds a cell, or as much of it as time permits: it counts once it is complete, by further
    * calls; true if it is.
    * @param {number} cell @param {Shape[]} shapes @param {Openings} record
    * @param {() => boolean} [late] whether the time has come
@@ -184,7 +184,7 @@ export class Solids {
     return true;
   }
 
-  /** Forgets all but some cells, once there are many. @param {Set<number>} cells */
+  /** Forgets all but some cells, once they are many. @param {Set<number>} cells */
   keep(cells) {
     if (this.#trees.size < MOST) return;
     for (const trees of [this.#trees, this.#growing]) {

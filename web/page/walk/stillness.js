@@ -1,6 +1,6 @@
-// Since when who walks has not moved.
+// Measures how long the visitor has not moved.
 
-/** Who has moved less than this for a second is still: metres and radians. */
+/** Movement within a second that still counts as standing: metres and radians. */
 const STILL = { seconds: 1, metres: 1e-3, radians: 0.0175 };
 
 /** @typedef {import("./walker.js").Pose} Pose */

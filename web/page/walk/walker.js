@@ -1,9 +1,9 @@
-// A visitor's body: an upright cylinder that glides along walls, climbs steps, and falls.
+// The visitor's body: an upright cylinder that glides along walls, climbs steps, and falls.
 //
-// The cylinder begins at step height: what is lower is climbed, not bumped into. No triangle comes
-// nearer to its axis than the radius, or than it already is, and what the body stands in up to a
-// height does not hold it: so who was put inside something can walk out of it, and through nothing.
-// A part of a step is shorter than the radius, so no wall is too thin.
+// The cylinder begins at step height: lower obstacles are climbed. No triangle comes nearer to its axis
+// than the radius, or than it already is, and obstacles around the body up to a height do not hold it:
+// so a visitor placed inside an object can walk out of it, and through nothing. A part of a step is
+// shorter than the radius, so no wall is too thin.
 
 import { BLOCKS, CARRIES } from "./solids.js";
 import { Outline } from "./outline.js";
@@ -11,7 +11,7 @@ import { Outline } from "./outline.js";
 /** @typedef {import("./solids.js").Solids} Solids */
 /** @typedef {{eye: number[], yaw: number, pitch: number}} Pose world metres and radians */
 /**
- * What a visitor wants: −1 to 1, and what a pointer has turned since the last time, radians.
+ * The visitor's input: −1 to 1, and the pointer's turns since the last time, radians.
  * @typedef {object} Wishes
  * @property {number} forward
  * @property {number} right
@@ -24,7 +24,7 @@ import { Outline } from "./outline.js";
 
 /** m/s, times, radians/s, radians. */
 const WALK = 1.6, RUN = 2.2, TURN = 1.7, STEEPEST = 1.5;
-/** Seconds in which speed and the height of the eye are nearly what they should be. */
+/** Seconds in which speed and the height of the eye nearly reach their targets. */
 const SWIFT = 0.07, GLIDE = 0.1;
 /** m/s², m/s: gravity, and the fastest fall. */
 const GRAVITY = 9.8, TERMINAL = 20;
@@ -44,7 +44,7 @@ const PUSHES = 6, AWAY = 1e-6, SAME = 1e-9;
 /** @param {number} value */
 const whole = (value) => (Math.abs(value) < NONE ? 0 : value);
 
-/** Walks where there is geometry. */
+/** Walks on the geometry. */
 export class Walker {
   /** @type {Pose} */
   pose = { eye: [0, 0, 0], yaw: 0, pitch: 0 };
@@ -74,7 +74,7 @@ export class Walker {
     this.climb = step + 1e-3;
   }
 
-  /** Puts the eye there; it stays exactly there until the first step. @param {Pose} pose */
+  /** Places the eye; it stays exactly there until the first step. @param {Pose} pose */
   place({ eye, yaw, pitch }) {
     this.pose = { eye: [...eye], yaw, pitch };
     this.#feet = NaN;
@@ -159,14 +159,14 @@ export class Walker {
     eye[1] = this.#feet + this.height + this.#lift;
   }
 
-  /** What is in reach, each with its distance now.
+  /** Obstacles in reach, with their present distances.
    * @param {number} x @param {number} z @param {number} feet @param {number} way */
   #around(x, z, feet, way) {
     const reach = this.radius + way, lowest = feet - (this.#fall && (this.#fall + 1) * PART);
     const highest = feet + this.climb + this.height + Math.max(0, this.#lift) + FOREHEAD;
     const low = [x - reach, lowest, z - reach], high = [x + reach, highest, z + reach];
     /** @type {Obstacle[]} */
-    const found = [];
+    const near = [];
     let inside = -Infinity;
     this.solids.near(low, high, (corners, at, kind) => {
       if (!(kind & BLOCKS) || this.#astray) return;
@@ -176,9 +176,9 @@ export class Walker {
       const furniture = top > inside && top < feet + FURNITURE * this.height;
       if (furniture && this.#distance(one, x, z, feet, 0) === 0) inside = top;
       one.now = this.#distance(one, x, z, feet);
-      found.push(one);
+      near.push(one);
     });
-    return found.filter(({ top }) => top > inside);
+    return near.filter(({ top }) => top > inside);
   }
 
   /** Whether something is too near; then the outline's nearest point becomes where to go instead.
@@ -200,7 +200,7 @@ export class Walker {
     return true;
   }
 
-  /** Goes there, up or down to the floor; false if that cannot be.
+  /** Moves to a point, up or down to the floor; false if that is impossible.
    * @param {number} dt @param {number} x @param {number} z @param {Obstacle[]} obstacles */
   #settle(dt, x, z, obstacles) {
     const { eye } = this.pose, feet = this.#feet;
@@ -231,7 +231,7 @@ export class Walker {
     });
   }
 
-  /** Whether the geometry around a place is there, as far as is known.
+  /** Whether the geometry around a place is loaded, as far as is known.
    * @param {number} x @param {number} z @param {number} feet @param {number} floor */
   #known(x, z, feet, floor) {
     const cell = this.locate([x, feet + this.height + this.#lift, z]);

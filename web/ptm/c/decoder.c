@@ -1,4 +1,4 @@
-// What the host calls: room for a tile, then one of three coders.
+// The exports of the module: room for a tile, then one of three coders.
 
 #include "memory.h"
 #include "rans.h"
@@ -42,7 +42,7 @@ void *take(u32 size) {
 EXPORT(geometric_tables) u16 *geometric_tables(void) { return geometric[0]; }
 EXPORT(token_tables) u16 *token_tables(void) { return tokens[0]; }
 
-// Room for a tile of so many bytes and texels; false if there is not as much memory.
+// Room for a tile of so many bytes and texels; false if memory is short.
 EXPORT(reserve) bool reserve(u32 length, i32 width, i32 height, i32 components) {
   used = ((u64)(uintptr_t)&__heap_base + 15) & ~(u64)15;
   i32 bw = width >> 1, bh = height >> 1;

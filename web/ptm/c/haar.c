@@ -1,11 +1,11 @@
 // The Haar coder (docs/formats/ptm.md, "Haar coder"), eight blocks at a time.
 //
-// What is predicted of a row of differences, and the tables of its symbols, do not depend on the
-// symbols of the row itself. So one pass over a row predicts, one decodes, one makes differences of
-// the symbols; once V, h and g of a block row are there, one makes texels of them.
+// The predictions of a row of differences, and the tables of its symbols, do not depend on the symbols
+// of the row itself. So one pass over a row predicts, one decodes, one computes differences from the
+// symbols; once V, h and g of a block row are complete, one computes its texels.
 //
-// All is in 16 bits. In a file that an encoder has written V, h and g lie within ±510; whatever
-// leaves ±1024 is refused in the end, so it does not matter that arithmetic with it may overflow.
+// All arithmetic has 16 bits. In a file from an encoder V, h and g lie within ±510; a value beyond ±1024
+// is refused in the end, so overflow of arithmetic with it does not matter.
 
 #include <wasm_simd128.h>
 
@@ -15,7 +15,7 @@
 enum { CLASSES = 14, EDGE_TABLE = 28, TABLES = 29, PREDICTION_TOP = 1020, ACTIVITY_TOP = 1023,
        DIFFERENCE_TOP = 1024 };
 
-// In 1/64, by the number of references: of what surrounds a block, its activity in sixteenths.
+// In 1/64, by the number of references: of the neighbourhood of a block, its activity in sixteenths.
 static const i16 activity_weights[3][3][7] = {
     {{154, 139, 0, 0, 0, 0, 0}, {61, 153, 0, 0, 25, 0, 0}, {11, 67, 0, 0, 22, 66, 88}},
     {{9, 98, 36, 0, 0, 0, 0}, {3, 99, 51, 0, 60, 0, 0}, {1, 27, 57, 0, 17, 50, 49}},
@@ -47,7 +47,7 @@ static inline void summed(v128_t a, v128_t b, v128_t weights, v128_t *low, v128_
 }
 
 // Predictions and activities of a row of difference k, which is a constant where this is called, in
-// block row y. What a plane does not refer to are zeros: to leave it out would be three times the
+// block row y. Planes without a reference use zeros: to omit them would be three times the
 // code, and no faster by more than a twentieth.
 static inline __attribute__((always_inline)) void predict(Plane *plane, i32 y, const i32 k) {
   const i32 side = y & 1;
@@ -135,7 +135,7 @@ static void decode_row(const Table *first) {
   stream.word = word;
   stream.count += (u32)x;
   for (; x < n; x++) out[x] = (u16)plain_symbol(table_of(first, lively[x]));
-  // Behind the row there are no residuals.
+  // Behind the row are no residuals.
   wasm_v128_store(out + n, wasm_i16x8_splat(0));
 }
 
@@ -154,10 +154,10 @@ static void absorb(i16 *residual, i16 *value) {
       z = wasm_v128_load(from + x);
     }
     v128_t e = wasm_v128_xor(wasm_u16x8_shr(z, 1), wasm_i16x8_neg(wasm_v128_and(z, one)));
-    v128_t found = more(e, load(predicted + x));
+    v128_t sum = more(e, load(predicted + x));
     wasm_v128_store(residual + x, e);
-    wasm_v128_store(value + x, found);
-    v128_t raised = more(found, wasm_i16x8_splat(DIFFERENCE_TOP));
+    wasm_v128_store(value + x, sum);
+    v128_t raised = more(sum, wasm_i16x8_splat(DIFFERENCE_TOP));
     stray = wasm_v128_or(stray, wasm_v128_and(raised, wasm_i16x8_splat(~(2 * DIFFERENCE_TOP - 1))));
   }
   value[bw] = 0;
@@ -217,7 +217,7 @@ static void rebuild_ranked(Plane *plane, i32 y) {
   }
 }
 
-// Sixteen texels at a time from their components. Behind the row is what is written later.
+// Sixteen texels at a time from their components. Texels behind the row are written later.
 static void write_row(u32 *out, const u16 *const rows[MOST_PLANES]) {
   for (i32 x = 0; x < tile.bw; x += BLOCKS, out += 2 * BLOCKS) {
     v128_t a = wasm_v128_load(rows[0] + x), b = wasm_v128_load(rows[1] + x);
@@ -275,7 +275,7 @@ static void decode_edge(void) {
   }
 }
 
-// All that there is of block row y in a plane, and g of the row before it.
+// Block row y of a plane, and g of the row before it.
 static bool decode_plane(Plane *plane, i32 y) {
   const i32 now = y & 1;
   if (y < tile.bh) {

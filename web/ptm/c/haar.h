@@ -1,4 +1,4 @@
-// The planes of a group of the Haar coder, and the rows that decoding it takes.
+// The planes of a group of the Haar coder, and the rows that decoding needs.
 
 #ifndef PTM_HAAR_H
 #define PTM_HAAR_H
@@ -17,7 +17,7 @@ typedef struct {
   i16 *rows[8];         // ranks of the level below: row y is number y & 7
   i16 *gradient[2];     // of block row y: number y & 1, here and below
   i16 *value[3][2];     // V, h, g
-  i16 *residual[3][2];  // and what was not predicted of them
+  i16 *residual[3][2];  // and their residuals
   u16 *upper, *lower;   // texels of a row of blocks, two to a number, the left one in the low byte
   i32 top;              // the highest rank, 0 where values stand for themselves
   u8 rank[256], values[256];
@@ -25,9 +25,9 @@ typedef struct {
 
 extern Plane planes[MOST_PLANES];
 extern i16 *zeros, *prediction;
-extern u16 *activity, *symbols, *rest;  // rest: of what is above the components
+extern u16 *activity, *symbols, *rest;  // rest: the bits above the components
 
-// Room for all rows; false if there is no more memory.
+// Room for all rows; false if memory is short.
 bool take_rows(void);
 
 // Flags, ranks and weights from *data on, which is moved behind them; false if they are damaged.

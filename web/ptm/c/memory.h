@@ -1,9 +1,8 @@
-// What the parts of the decoder share: its memory, and the bytes that it reads from.
+// The memory of the decoder, and its reader of bytes.
 //
-// A tile at a time. The host asks for room (`reserve`), writes the tile's bytes and the texels below
-// into it, calls one of the coders and reads the texels. Nothing else is kept between calls but the
-// built-in tables. All sizes have been checked by the host: sides up to 65536, and no more memory
-// than it allows.
+// The host decodes a tile at a time: it asks for room (`reserve`), writes the tile's bytes and the texels
+// below into it, calls one of the coders and reads the texels. Only the built-in tables persist between
+// calls. The host has checked all sizes: sides up to 65536, and no more memory than it allows.
 
 #ifndef PTM_MEMORY_H
 #define PTM_MEMORY_H
@@ -20,7 +19,7 @@ typedef int32_t i32;
 typedef uint64_t u64;
 typedef int64_t i64;
 
-// What a coder returns.
+// Results of a coder.
 enum { OK, DAMAGED, NO_MEMORY };
 
 // Texels that may be read and written behind the last one of a row, eight blocks at a time.
@@ -38,7 +37,7 @@ typedef struct {
 extern Tile tile;
 
 // So many bytes of zeros at an address that is a multiple of 16, until the next `reserve`; NULL if
-// there is no more memory.
+// memory is short.
 void *take(u32 size);
 
 static inline u32 word16(const u8 *at) {
@@ -47,7 +46,7 @@ static inline u32 word16(const u8 *at) {
   return word;
 }
 
-// What stands above the components of a texel.
+// The bits above the components of a texel.
 static inline u32 opaque(void) { return tile.components == 3 ? 0xff000000 : 0; }
 
 static inline i32 at_least(i32 a, i32 low) { return a < low ? low : a; }
@@ -78,7 +77,7 @@ static inline i32 edge_place(i32 i) {
   return i < tall ? i * tile.width + tile.width - 1 : (tile.height - 1) * tile.width + i - tall;
 }
 
-// What an edge texel is predicted from: what is there stands for what is not, 0 for all of it.
+// The neighbours that predict an edge texel: present ones stand for missing ones, 0 if all are missing.
 typedef struct {
   u32 w, n, nw;
 } Around;

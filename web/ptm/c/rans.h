@@ -40,7 +40,7 @@ bool begin_stream(const u8 *data);
 // Whether all of the stream has been used and nothing impossible has happened.
 bool end_stream(void);
 
-// What stands for a symbol 255.
+// The value of a symbol 255.
 static inline u32 next_escape(void) {
   if (stream.escape == stream.escapes_end) {
     stream.stray = true;

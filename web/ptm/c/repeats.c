@@ -10,7 +10,7 @@ enum { LONGEST_RUN = 254, TEXELS = 3, MOST_BITS = 13, CLASSES = 10 };
 static const u32 K0 = 0x9e3779b1, K1 = 0x85ebca6b, K2 = 0xc2b2ae35;
 static const u32 K3 = 0x27d4eb2f, K4 = 0x165667b1, K5 = 0xa24baed5;
 
-// What was seen last in each slot: a block as its place and 1, 0 for none; in FIRST as its place
+// The last entry of each slot: a block as its place and 1, 0 for none; in FIRST as its place
 // << 2 | trust; the mean of the block in CHANGE; in SEEN a texel.
 enum { FIRST, AROUND, MEAN, CHANGE, CHANGE_MEAN, SEEN, SORTS };
 static u32 slots[SORTS][1 << MOST_BITS];
@@ -60,7 +60,7 @@ static inline u32 in_byte(i32 value) {
   return (u32)value & 255;
 }
 
-// What surrounds a block: two texels to the west, two above, the corners above.
+// The neighbourhood of a block: two texels to the west, two above, the corners above.
 typedef struct {
   u32 mean, w0, w1, n0, n1, nw, ne;
 } Block;
@@ -208,7 +208,7 @@ static void by_differences(u32 *here, const Block *b, u32 e, u32 s, u32 sw, u32 
   slots[SEEN][at_s] = block[3];
 }
 
-// Decodes a block; whether it was not found as a whole.
+// Decodes a block; whether it is no copy of a whole block.
 static u32 decode_block(i32 y, i32 x, u32 near) {
   i32 width = tile.width, bw = tile.bw;
   u32 place = (u32)(2 * (y * width + x));
@@ -246,14 +246,14 @@ static u32 decode_block(i32 y, i32 x, u32 near) {
                        minus(b.w1, i) * K4 + minus(e, i) * K5 + minus(s, i) * K1);
   u32 places[3] = {slots[AROUND][around], slots[MEAN][mean], slots[CHANGE][change]};
   u32 by = minus(i, slots[CHANGE_MEAN][change]);
-  u32 found = symbol(GUESS + 4 * near + (places[0] > 0) + 2 * (places[1] > 0));
+  u32 guess = symbol(GUESS + 4 * near + (places[0] > 0) + 2 * (places[1] > 0));
   slots[AROUND][around] = slots[MEAN][mean] = slots[CHANGE][change] = place + 1;
   slots[CHANGE_MEAN][change] = i;
-  if (found < TEXELS) {
-    if (places[found] == 0) {
+  if (guess < TEXELS) {
+    if (places[guess] == 0) {
       put(here, i, i, i, i);
-    } else if (found < 2) {
-      copy(here, places[found] - 1);
+    } else if (guess < 2) {
+      copy(here, places[guess] - 1);
     } else {
       const u32 *from = tile.texels + places[2] - 1;
       u32 p = plus(from[0], by), q = plus(from[1], by);
@@ -263,7 +263,7 @@ static u32 decode_block(i32 y, i32 x, u32 near) {
   }
   b.nw = !y ? b.w0 : x ? up[-1] : b.n0;
   b.ne = !y ? i : east ? up[2] : b.n1;
-  if (found == TEXELS) {
+  if (guess == TEXELS) {
     texel_by_texel(here, &b, near);
   } else {
     by_differences(here, &b, e, s, sw, se);
@@ -292,9 +292,9 @@ static void decode_edge(void) {
     i32 place = edge_place(i);
     Around a = around_edge(place);
     u32 slot = slot_of(a.w * K4 + a.n * K3 + a.nw * K2), seen = slots[SEEN][slot], texel = 0;
-    u32 found = symbol(EDGE + (a.w == a.n) + 2 * ((seen == a.w) | (seen == a.n)));
-    if (found < 5) {
-      texel = found == 0 ? seen : found == 1 ? a.w : found == 2 ? a.n : a.nw;
+    u32 choice = symbol(EDGE + (a.w == a.n) + 2 * ((seen == a.w) | (seen == a.n)));
+    if (choice < 5) {
+      texel = choice == 0 ? seen : choice == 1 ? a.w : choice == 2 ? a.n : a.nw;
     } else {
       for (u32 at = 0; at < 8 * (u32)tile.components; at += 8) {
         i32 guess = median(sample(a.w, at), sample(a.n, at), sample(a.nw, at));

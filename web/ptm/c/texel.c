@@ -45,11 +45,11 @@ static struct {
 } bits;
 
 static u32 plain_bits(u32 count) {
-  u32 found = 0;
+  u32 value = 0;
   for (u32 i = 0; i < count; i++, bits.at++) {
-    if (bits.at < bits.end) found |= (u32)(bits.bytes[bits.at >> 3] >> (bits.at & 7) & 1) << i;
+    if (bits.at < bits.end) value |= (u32)(bits.bytes[bits.at >> 3] >> (bits.at & 7) & 1) << i;
   }
-  return found;
+  return value;
 }
 
 // A number below 2^33: a token, and for large ones plain bits.

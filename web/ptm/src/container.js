@@ -52,7 +52,7 @@ const KINDS = ["8-bit", "16-bit", "half float", "float"];
  *
  * Throws PtmError: PTM-I101 not such a file, PTM-I102 a Polynomial Texture Map, PTM-I103 cut inside
  * the head, PTM-I104 a version, profile or kind of sample that this decoder does not read, PTM-I105
- * damaged, PTM-L101 larger than the format allows. Allocates nothing that grows with the sizes told.
+ * damaged, PTM-L101 larger than the format allows. Its memory does not grow with the sizes in the head.
  *
  * @param {Uint8Array} bytes
  * @returns {Header}
@@ -76,10 +76,10 @@ export function readHeader(bytes) {
   }
   const profile = bytes[10];
   if (profile > FAST || bytes[11] !== 0) {
-    const what = `${PROFILES[profile] ?? profile} of ${KINDS[bytes[11]] ?? bytes[11]} samples`;
+    const samples = `${PROFILES[profile] ?? profile} of ${KINDS[bytes[11]] ?? bytes[11]} samples`;
     throw new PtmError(
       "PTM-I104",
-      `profile ${what} is not read here, only fast and raw of 8 bits; encode it again`,
+      `profile ${samples} is not read here, only fast and raw of 8 bits; encode it again`,
     );
   }
   const width = view.getUint32(12, true);
@@ -140,7 +140,7 @@ export function pyramidSizes(width, height) {
 }
 
 /**
- * Sizes of the levels that are stored; none if there are no such levels.
+ * Sizes of the stored levels; none for an impossible number of levels.
  * @param {number} width
  * @param {number} height
  * @param {number} count
@@ -179,7 +179,7 @@ function cutHead(size) {
   return new PtmError("PTM-I103", `cut inside its head, after ${size} bytes`);
 }
 
-/** @param {string} what */
-function damagedHead(what) {
-  return new PtmError("PTM-I105", `the head is damaged: ${what}`);
+/** @param {string} reason */
+function damagedHead(reason) {
+  return new PtmError("PTM-I105", `the head is damaged: ${reason}`);
 }

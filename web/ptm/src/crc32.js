@@ -4,17 +4,17 @@
 let tables;
 
 function makeTables() {
-  const made = new Uint32Array(8 * 256);
+  const table = new Uint32Array(8 * 256);
   for (let i = 0; i < 256; i++) {
     let crc = i;
     for (let bit = 0; bit < 8; bit++) crc = crc & 1 ? (crc >>> 1) ^ 0xedb88320 : crc >>> 1;
-    made[i] = crc;
+    table[i] = crc;
   }
-  for (let i = 256; i < made.length; i++) {
-    const before = made[i - 256];
-    made[i] = (before >>> 8) ^ made[before & 255];
+  for (let i = 256; i < table.length; i++) {
+    const before = table[i - 256];
+    table[i] = (before >>> 8) ^ table[before & 255];
   }
-  return made;
+  return table;
 }
 
 /**

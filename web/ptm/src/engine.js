@@ -21,13 +21,13 @@ import { geometricTables, tokenTables } from "./families.js";
  */
 
 /**
- * What the module exports; numbers are addresses unless said otherwise.
+ * The exports of the module; numbers are addresses unless stated otherwise.
  * @typedef {object} Exports
  * @property {WebAssembly.Memory} memory
  * @property {() => number} geometric_tables
  * @property {() => number} token_tables
  * @property {(length: number, width: number, height: number, components: number) => number} reserve
- *   whether there is room
+ *   whether memory suffices
  * @property {() => number} data
  * @property {() => number} below
  * @property {() => number} texels
@@ -122,5 +122,5 @@ function engineOf(module) {
 }
 
 function noMemory() {
-  return new PtmError("PTM-L103", "there is not as much memory as decoding takes");
+  return new PtmError("PTM-L103", "decoding needs more memory than is available");
 }

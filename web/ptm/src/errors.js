@@ -1,4 +1,4 @@
-// What is wrong with a file, under the codes that `ptm` has for it (docs/guide/cli.md).
+// Errors of files, with the codes of `ptm` (docs/guide/cli.md).
 
 export class PtmError extends Error {
   /**
@@ -14,8 +14,8 @@ export class PtmError extends Error {
 
 /**
  * A group whose contents contradict each other.
- * @param {string} what
+ * @param {string} reason
  */
-export function damaged(what) {
-  return new PtmError("PTM-I112", `the group cannot be decoded: ${what}`);
+export function damaged(reason) {
+  return new PtmError("PTM-I112", `the group cannot be decoded: ${reason}`);
 }

@@ -12,7 +12,7 @@ const EVEN = [2, 3, 4, 5, 6, 9, 16];
 const TOKENS = 132;
 
 /** @type {Map<string, Uint16Array>} */
-const made = new Map();
+const computed = new Map();
 
 /** The tables of the coders Haar and repeats: frequencies, 256 for each, table 1 first. */
 export function geometricTables() {
@@ -33,12 +33,12 @@ export function tokenTables() {
  * @param {() => number[][]} weights
  */
 function remembered(name, weights) {
-  let tables = made.get(name);
+  let tables = computed.get(name);
   if (!tables) {
     const rows = weights();
     tables = new Uint16Array(256 * rows.length);
     rows.forEach((row, i) => tables?.set(normalised(row), 256 * i));
-    made.set(name, tables);
+    computed.set(name, tables);
   }
   return tables;
 }

@@ -1,4 +1,4 @@
-// What the package offers: see README.md.
+// Exports of the package; see README.md.
 
 export { HEAD_MAX, readHeader } from "./container.js";
 export { DECODER_URL, hasSimd, loadEngine } from "./engine.js";

@@ -1,4 +1,4 @@
-// From groups to levels, each refining the one before it; tile by tile, checksums first.
+// Decodes groups to levels, each refining the one before it; tile by tile, checksums first.
 
 import { FAST, RAW, pyramidSizes } from "./container.js";
 import { crc32 } from "./crc32.js";
@@ -42,7 +42,7 @@ const PLAIN = 1;
 const FIXED_MEMORY = 2 ** 21;
 
 /**
- * Bytes that decoding a level takes at most: its texels and those below it, what comes out, and of
+ * Bytes that decoding a level takes at most: its texels and those below it, the image, and of
  * its largest tile the bytes, the texels and those below, and the rows that are under way.
  * @param {Header} header
  * @param {number} number of the level
@@ -79,10 +79,10 @@ export class LevelDecoder {
   }
 
   /**
-   * The next level from its group, all of its bytes. What is refused leaves the decoder as it was,
-   * so better bytes may be given.
+   * The next level from its group, all of its bytes. An error leaves the decoder unchanged, so that
+   * correct bytes may follow.
    *
-   * Throws PtmError: PTM-I106 there is no further level, PTM-I107 too few bytes, PTM-I108 a wrong
+   * Throws PtmError: PTM-I106 no further level, PTM-I107 too few bytes, PTM-I108 a wrong
    * checksum, PTM-I112 bytes that no encoder writes, PTM-L103 beyond the limit of memory.
    *
    * @param {Uint8Array} data
@@ -111,7 +111,7 @@ export class LevelDecoder {
       : this.#tile(checked(group, level.crc32, `level ${number}`), this.#texels, shape, !number);
     const channels = this.format === "rgba" ? 4 : components;
     const out = channels === 4 ? toRgba(texels, components) : toNative(texels, components);
-    // Nothing refines the finest level. An engine may overwrite what it handed out.
+    // Nothing refines the finest level. An engine may overwrite its result.
     const last = number === this.header.levels.length - 1;
     this.#texels = last ? new Uint32Array(0) : tiled ? texels : texels.slice();
     this.level = number;

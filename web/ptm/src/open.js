@@ -1,4 +1,4 @@
-// A file that is read range by range: as much of it as the levels that are wanted.
+// Reads a file range by range, as far as the wanted levels.
 
 import { readHeader } from "./container.js";
 import { loadEngine } from "./engine.js";
@@ -27,14 +27,14 @@ import { LevelDecoder } from "./level-decoder.js";
  *   workers?: import("./workers.js").DecoderWorkers,
  * }} DecodeOptions
  *   `to`: the finest level that is wanted; it is an error then if it is not whole in the file.
- *   `workers` or, without them, `engine`: what decodes; otherwise this thread by `loadEngine`.
+ *   `workers` or, without them, `engine` decode; by default this thread, by `loadEngine`.
  */
 
 /** Bytes that are read at first: a customary page, no more than a packet or three. */
 const FIRST = 4096;
 
 /**
- * Reads the head of a file. Throws what `readHeader` throws, and what `read` does.
+ * Reads the head of a file. Throws as `readHeader` and `read` do.
  * @param {ReadRange} read
  * @param {OpenOptions} [options]
  */
@@ -69,9 +69,9 @@ export class Ptm {
    * @param {number} level
    */
   rangeOf(level) {
-    const found = this.levels[level];
-    if (!found) throw new PtmError("PTM-I106", `there is no level ${level}`);
-    return { offset: found.offset, length: found.length };
+    const group = this.levels[level];
+    if (!group) throw new PtmError("PTM-I106", `there is no level ${level}`);
+    return { offset: group.offset, length: group.length };
   }
 
   /**
@@ -112,7 +112,7 @@ export class Ptm {
   }
 
   /**
-   * Bytes of the file; what was read at first is not read again.
+   * Bytes of the file; the first range is not read again.
    * @param {number} offset
    * @param {number} length
    * @param {AbortSignal} [signal]

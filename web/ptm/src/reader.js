@@ -1,4 +1,4 @@
-// Bytes from the front. To ask for more than there are is an error.
+// Reads bytes in order; reading past the end is an error.
 
 import { damaged } from "./errors.js";
 

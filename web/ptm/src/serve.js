@@ -1,4 +1,4 @@
-// The worker's side: decoders by number, each told what to do next.
+// The worker's side: decoders by number, and the orders that they obey.
 
 import { readHeader } from "./container.js";
 import { loadEngine } from "./engine.js";
@@ -18,7 +18,7 @@ import { LevelDecoder } from "./level-decoder.js";
  */
 
 /**
- * The answer to bytes: the levels that were decoded, and what is wrong with the next.
+ * The answer to bytes: the decoded levels, and the error of the next.
  * @typedef {object} Answer
  * @property {import("./level-decoder.js").Image[]} images
  * @property {{code: string | null, message: string} | null} fault
@@ -26,7 +26,7 @@ import { LevelDecoder } from "./level-decoder.js";
  */
 
 /**
- * What both sides talk through: a Worker, the inside of one, or a MessagePort.
+ * The channel of both sides: a Worker, its inside, or a MessagePort.
  * @typedef {object} Port
  * @property {(message: any, transfer: Transferable[]) => void} postMessage
  * @property {((event: any) => void) | null} onmessage
@@ -82,7 +82,7 @@ export function serve(port) {
 }
 
 /**
- * The first levels of a file. Throws what `readHeader` and `refine` throw; PTM-I105 if its levels do not
+ * The first levels of a file. Throws as `readHeader` and `refine` do; PTM-I105 if its levels do not
  * end where they should.
  * @param {{bytes: Uint8Array, ends: number[], levels: number,
  *   options: import("./level-decoder.js").DecoderOptions}} order

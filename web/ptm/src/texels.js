@@ -1,6 +1,6 @@
-// Texels as numbers of 32 bits, component c in bits 8 c to 8 c + 7. Above three components is the
-// alpha of what is opaque, so that most of what is decoded is ready for upload as it is; above fewer
-// are zeros. How they come from stored bytes, and what they become for those who asked for them.
+// Texels as numbers of 32 bits, component c in bits 8 c to 8 c + 7. With three components the upper
+// byte is opaque alpha, so that most texels are ready for upload as they are; with fewer the upper
+// bytes are zero. Conversions from stored bytes and to the requested format.
 
 import { damaged } from "./errors.js";
 import { Reader } from "./reader.js";

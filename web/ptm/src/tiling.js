@@ -1,4 +1,4 @@
-// How a level is cut into tiles (docs/formats/ptm.md, "Groups and tiles").
+// The tiles of a level (docs/formats/ptm.md, "Groups and tiles").
 
 /**
  * Tiles across and down.
@@ -12,7 +12,7 @@ export function tileCounts(width, height, side) {
 }
 
 /**
- * Where a tile begins along one side, and its size: the last takes what is left over.
+ * Where a tile begins along one side, and its size: the last takes the rest.
  * @param {number} i its number along that side
  * @param {number} count of the tiles
  * @param {number} side

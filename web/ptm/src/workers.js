@@ -1,4 +1,4 @@
-// Decoders that work in Workers: bytes go there as copies, texels come back in transferred buffers.
+// Decoders in Workers: bytes go there as copies, texels come back in transferred buffers.
 
 import { PtmError } from "./errors.js";
 
@@ -11,8 +11,8 @@ import { PtmError } from "./errors.js";
  * @typedef {object} WorkersOptions
  * @property {number} [count] of workers; one less than there are processors, 1 to 4
  * @property {ModuleSource | Promise<ModuleSource>} [wasm] where `decoder.wasm` is, if elsewhere, or
- *   what will be made of it while the workers start
- * @property {() => import("./serve.js").Port} [create] how a worker is made, if otherwise
+ *   a promise of it while the workers start
+ * @property {() => import("./serve.js").Port} [create] creates a worker
  */
 
 /** Bytes on their way through a worker. */
@@ -30,7 +30,7 @@ class Task {
       this.resolve = resolve;
       this.reject = reject;
     });
-    // Whoever asked may have gone.
+    // The caller may have left.
     this.images.catch(() => {});
   }
 }
@@ -48,7 +48,7 @@ class Lane {
    */
   constructor(port, wasm) {
     this.port = port;
-    // A worker that is not told of a module looks for it by itself.
+    // A worker without a module fetches it by itself.
     this.ready = Promise.resolve(wasm).then(
       (wasm) => port.postMessage({ wasm }, []),
       () => {},
@@ -61,11 +61,11 @@ class Lane {
   }
 
   /**
-   * What comes behind the module, in order.
+   * Sends an order after the module.
    * @param {import("./serve.js").Order} order
    * @param {Transferable[]} [transfer]
    */
-  tell(order, transfer = []) {
+  send(order, transfer = []) {
     this.ready.then(() => this.port.postMessage(order, transfer));
   }
 
@@ -86,7 +86,7 @@ class Lane {
     return place >= 0;
   }
 
-  /** Nothing comes of a worker that has failed. @param {Error} error */
+  /** Marks the worker as failed and rejects its tasks. @param {Error} error */
   fail(error) {
     this.failure = error;
     for (const task of [this.#task, ...this.#waiting]) task?.reject(error);
@@ -99,7 +99,7 @@ class Lane {
     this.#task = this.#waiting.shift();
     if (!this.#task) return;
     const { order } = this.#task, bytes = order.bytes.slice();
-    this.tell({ ...order, bytes }, [bytes.buffer]);
+    this.send({ ...order, bytes }, [bytes.buffer]);
   }
 
   /** @param {import("./serve.js").Answer} answer */
@@ -136,8 +136,8 @@ class RemoteDecoder {
   }
 
   /**
-   * The next level from its group, as `LevelDecoder.refine`; one at a time. What is aborted while a
-   * worker is at it is not lost: the next call returns it, whatever bytes it is given.
+   * The next level from its group, as `LevelDecoder.refine`; one at a time. A level aborted while
+   * a worker decodes it is not lost: the next call returns it, whatever bytes it is given.
    * @param {Uint8Array} data all bytes of the group
    * @param {{signal?: AbortSignal}} [options] rejects with the signal's reason
    * @returns {Promise<Image>}
@@ -164,11 +164,11 @@ class RemoteDecoder {
     }
   }
 
-  /** Gives back what the worker keeps of it; it cannot be used any more. */
+  /** Ends the decoder and frees its memory in the worker. */
   close() {
     if (this.#task) this.lane.callOff(this.#task);
     this.lane.decoders--;
-    this.lane.tell({ decoder: this.number });
+    this.lane.send({ decoder: this.number });
   }
 }
 
@@ -199,7 +199,7 @@ export class DecoderWorkers {
     const lane = this.#lane();
     lane.decoders++;
     const number = this.#decoders++;
-    lane.tell({ decoder: number, header, options });
+    lane.send({ decoder: number, header, options });
     return new RemoteDecoder(lane, number);
   }
 
@@ -226,7 +226,7 @@ export class DecoderWorkers {
     );
   }
 
-  /** Ends all workers at once; what is under way is rejected. */
+  /** Ends all workers at once; tasks under way are rejected. */
   close() {
     for (const { port } of this.lanes) (port.terminate ?? port.close)?.call(port);
     for (const lane of this.lanes) lane.fail(new Error("the workers were closed"));

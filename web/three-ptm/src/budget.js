@@ -1,6 +1,6 @@
-// Texture memory, shared out by what covers the view.
+// Shares texture memory out by coverage of the view.
 
-/** As GPUs hold a texel here: what has three components or one takes the room of four. */
+/** Bytes of a texel on the GPU, whatever its components. */
 export const TEXEL_BYTES = 4;
 
 /**
@@ -8,7 +8,7 @@ export const TEXEL_BYTES = 4;
  * @typedef {object} Want
  * @property {{width: number, height: number}[]} sizes of its levels, coarsest first
  * @property {number} share of the view, or anything in proportion to it
- * @property {number} copies textures of three.js that show it, as there is one for each way to wrap
+ * @property {number} copies textures of three.js that show it, one for each way to wrap
  */
 
 /**
@@ -23,8 +23,8 @@ export function pyramidBytes(sizes, level) {
 
 /**
  * The level that each texture may have: the finest that fits into its part of the memory, at least
- * the coarsest. What a texture leaves of its part goes to the others. Room is kept for one of them
- * to be there twice while its storage is exchanged.
+ * the coarsest. Unused parts go to the others. One of them may
+ * be in memory twice while its storage is exchanged.
  * @param {Want[]} wants
  * @param {number} gpuBytes
  * @returns {number[]} aligned with `wants`
@@ -45,7 +45,7 @@ function fill(wants, gpuBytes) {
   const levels = new Array(wants.length).fill(0);
   let left = gpuBytes;
   let shares = wants.reduce((sum, { share }) => sum + share, 0);
-  // Those that need least for their share first: what they leave is all the others'.
+  // Those that need least for their share first: the rest goes to the others.
   const order = [...wants.keys()].sort(
     (a, b) => all(wants[a]) / wants[a].share - all(wants[b]) / wants[b].share,
   );

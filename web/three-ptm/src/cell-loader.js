@@ -60,7 +60,7 @@ export class CellLoader {
 }
 
 /**
- * Gives back what the GPU has of a cell. Its textures may be others' too, and stay.
+ * Frees the GPU memory of a cell. Its textures stay, since other cells may use them.
  * @param {Group} cell
  */
 export function disposeCell(cell) {

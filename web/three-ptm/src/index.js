@@ -1,4 +1,4 @@
-// What the package offers: see README.md.
+// Exports of the package; see README.md.
 
 export { shareOut } from "./budget.js";
 export { CellLoader, disposeCell } from "./cell-loader.js";

@@ -1,13 +1,13 @@
-// A texture that holds exactly the levels asked for.
+// A texture that holds exactly the requested levels.
 //
-// GL allocates a pyramid at once and cannot let go of one of its levels. So the storage is as large
-// as the finest level that is there, and another takes its place when that changes: what both have
-// is copied on the GPU (exactly, as sRGB of 8 bits survives that), what is new is uploaded in
-// stripes, and only then is the old one given back. Until then both are counted. Textures of a
-// renderer do so one after the other, so that not more than one is there twice.
+// GL allocates a pyramid at once and cannot free one of its levels. So the storage is as large as the
+// finest level present, and another storage replaces it when that changes: common levels are copied on
+// the GPU (exactly, as sRGB of 8 bits survives that), new ones are uploaded in stripes, and only then is
+// the old storage freed. Until then both count. Textures of a renderer take turns, so that at most one is
+// present twice.
 //
-// The object that materials refer to stays the same: three.js finds the new storage behind it, as
-// textures with equal settings share that of their source.
+// Materials keep referring to the same object: three.js finds the new storage behind it, as textures
+// with equal settings share that of their source.
 //
 // Tried: `needsUpdate`, which uploads all levels again; RGB, which in sRGB comes out black.
 
@@ -31,12 +31,12 @@ import { RangeFile } from "./range-file.js";
  * @typedef {object} TextureOptions
  * @property {DecoderWorkers} [workers] that decode; all textures without share some
  * @property {number[]} [ends] the index's: saves the request that finds out where levels end
- * @property {number[]} [color] red, green, blue, 0 to 255: what it shows before any level is there
- * @property {number} [wrapS] `RepeatWrapping`, unless told otherwise
+ * @property {number[]} [color] red, green, blue, 0 to 255: shown before the first level
+ * @property {number} [wrapS] `RepeatWrapping` by default
  * @property {number} [wrapT]
  */
 
-/** Bytes of the first request where nobody knows how long the levels are. */
+/** Bytes of the first request where the ends of the levels are unknown. */
 const FIRST = 4096;
 /** Levels of fewer texels wait for the next: they are not worth a storage. */
 const LEAST = 32 * 32;
@@ -68,7 +68,7 @@ export class PtmTexture extends DataTexture {
   #storages = new Map();
 
   /**
-   * Settings that samplers depend on (wraps, filters, anisotropy) are made before `refine`.
+   * Settings that samplers depend on (wraps, filters, anisotropy) must precede `refine`.
    * @param {WebGLRenderer} renderer the one that shows it
    * @param {RangeFile | string | URL} file textures that share a file download it once
    * @param {TextureOptions} [options]
@@ -78,7 +78,7 @@ export class PtmTexture extends DataTexture {
     this.#renderer = renderer;
     this.#options = options;
     this.file = file instanceof RangeFile ? file : new RangeFile(file);
-    /** The finest level that is there, -1 if none is. */
+    /** The finest level present, -1 for none. */
     this.level = -1;
     this.colorSpace = SRGBColorSpace;
     this.magFilter = LinearFilter;
@@ -90,7 +90,7 @@ export class PtmTexture extends DataTexture {
     renderer.domElement.addEventListener("webglcontextrestored", this.#restored);
   }
 
-  /** What the GPU has of it, bytes: while storage is exchanged, the old and the new. */
+  /** Its bytes on the GPU: while storage is exchanged, of the old and the new. */
   get gpuBytes() {
     return [...this.#storages.values()].reduce((sum, bytes) => sum + bytes, 0);
   }
@@ -98,10 +98,10 @@ export class PtmTexture extends DataTexture {
   /**
    * Fetches, decodes and shows the levels up to this one, coarsest first, and gives finer ones
    * back; -1 leaves nothing but the colour. Levels larger than the GPU's limit are left out. Calls
-   * off what was asked for before. After a loss of the context all comes back from the bytes at
-   * hand.
+   * off earlier requests. After a loss of the context all comes back from the downloaded
+   * bytes.
    *
-   * Rejects with what `openPtm` and decoding throw, and with an Error that names the file if it
+   * Rejects as `openPtm` and decoding do, and with an Error that names the file if it
    * does not come; levels that were shown before stay.
    *
    * @param {number} level
@@ -131,7 +131,7 @@ export class PtmTexture extends DataTexture {
     this.#free();
   }
 
-  // Now, since what is left of a lost context cannot be given back to the next one.
+  // Now, since objects of a lost context cannot be freed in the next one.
   #lost = () => {
     this.#control.abort();
     for (const storage of this.#storages.keys()) if (storage !== this) storage.dispose();
@@ -228,7 +228,7 @@ export class PtmTexture extends DataTexture {
   }
 
   /**
-   * Storage of the levels up to this one, filled with what is there and with images.
+   * Storage of the levels up to this one, filled with present levels and images.
    * @param {number} level
    * @param {Image[]} images
    * @param {AbortSignal} signal

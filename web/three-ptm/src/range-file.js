@@ -1,6 +1,5 @@
-// The first bytes of a file on a server, as many as were wanted so far: read by range requests, one
-// at a time, each of which goes on where the last one ended. What has come is kept, also of a
-// request that broke or was called off.
+// The downloaded beginning of a file: extended by range requests, one at a time, each of which goes on
+// where the last one ended. Bytes of a broken or aborted request are kept.
 
 /** How often in a row a request may fail, and the pause after the first time, ms. */
 const ATTEMPTS = 3;
@@ -11,7 +10,7 @@ const SHORT = 65536;
 /** Hosts that were seen to ignore ranges. */
 const rangeless = new Set();
 
-/** What no further request mends. */
+/** An error that no further request corrects. */
 class Unusable extends Error {}
 
 /**
@@ -28,7 +27,7 @@ export class RangeFile {
   #bytes = new Uint8Array(0);
   #held = 0;
   #size = Infinity;
-  /** Whether caches are to be passed by. */
+  /** Whether requests bypass caches. */
   #anew = false;
   /** @type {Body | undefined} */
   #body;
@@ -40,17 +39,17 @@ export class RangeFile {
   /** @param {string | URL} url */
   constructor(url) {
     this.url = new URL(url, globalThis.document?.baseURI);
-    /** How far a request should lead at least: set it before reading what lies below. */
+    /** How far a request should lead at least: set it before reading bytes below it. */
     this.until = 0;
   }
 
-  /** Bytes that are there. */
+  /** Number of downloaded bytes. */
   get held() {
     return this.#held;
   }
 
   /**
-   * Bytes of the file, as soon as these are there; fewer only where it ends. Calls take turns.
+   * Bytes of the file, as soon as they have arrived; fewer only where it ends. Calls take turns.
    * Rejects with the signal's reason, or with an Error that names the file.
    * @param {number} offset
    * @param {number} length
@@ -62,7 +61,7 @@ export class RangeFile {
   }
 
   /**
-   * Lets go of the connection. A short rest of what was asked for is awaited, so that it is not
+   * Lets go of the connection. A short rest of the answer is awaited, so that it is not
    * fetched again, and all of the file where a host ignores ranges.
    * @param {AbortSignal} [signal]
    */
@@ -75,7 +74,7 @@ export class RangeFile {
   }
 
   /**
-   * Forgets the bytes from there on, which turned out to be wrong: they are asked for again.
+   * Forgets the bytes from `offset` on, which are damaged: they are requested again.
    * @param {number} offset
    */
   forget(offset) {
@@ -132,7 +131,7 @@ export class RangeFile {
     if (value) this.#append(value, body);
     if (!done && body.at < body.end) return;
     if (body.at > body.end || (!done && !(await body.reader.read()).done)) {
-      throw new Unusable(`${this.url}: more bytes than the server said`);
+      throw new Unusable(`${this.url}: more bytes than the server announced`);
     }
     this.#body = undefined;
     if (body.all) this.#size = body.at;
@@ -141,7 +140,7 @@ export class RangeFile {
   }
 
   /**
-   * Of the whole file only what is new.
+   * Appends the new bytes of a piece.
    * @param {Uint8Array} piece
    * @param {Body} body
    */

@@ -1,4 +1,4 @@
-// A walk through a database: what can be seen from the viewer's cell, as its hints say
+// A walk through a database: shows the cells that the hints of the viewer's cell list as visible
 // (docs/formats/hints.md).
 
 import { Group } from "three";
@@ -38,13 +38,13 @@ import { RangeFile } from "./range-file.js";
  * @property {number} [budget] texture memory, bytes; 256 MiB
  * @property {number} [connections] requests at a time; 4, as browsers open six over HTTP/1.1
  * @property {DecoderWorkers} [workers] that decode; its own, unless given
- * @property {(error: unknown) => void} [onError] told of a file that does not come
+ * @property {(error: unknown) => void} [onError] called for a file that cannot be loaded
  */
 
 /** Texels of a side: so far all textures are refined before any is refined further. */
 const FIRST_LOOK = 64;
 
-/** Shows what can be seen from a cell, and frees what cannot: see `update` and `enter`. */
+/** Shows the cells visible from a cell and frees the others: see `update` and `enter`. */
 export class Walk {
   /** Everything that can be seen from the cell; to be added to a scene. */
   shown = new Group();
@@ -60,7 +60,7 @@ export class Walk {
   #records = new Map();
   /** @type {Map<number, {control: AbortController, done: Promise<void>}>} */
   #cells = new Map();
-  /** Of each texture its file and what shows it, by how it is wrapped.
+  /** The file of each texture and its copies, by wraps.
    * @type {Map<number, {file: RangeFile, copies: Map<string, PtmTexture>}>} */
   #textures = new Map();
   #entered = new AbortController();
@@ -100,7 +100,7 @@ export class Walk {
     return this.textures.reduce((sum, { texture }) => sum + texture.gpuBytes, 0);
   }
 
-  /** What shows the textures now, with their numbers in the index. */
+  /** The present textures, with their numbers in the index. */
   get textures() {
     return [...this.#textures].flatMap(([number, { copies }]) =>
       [...copies.values()].map((texture) => ({ number, texture })),
@@ -115,7 +115,7 @@ export class Walk {
     if (this.#locating) return;
     this.#locating = true;
     const cell = await this.locate(position)
-      .catch((error) => (this.#tell(error), -1))
+      .catch((error) => (this.#report(error), -1))
       .finally(() => (this.#locating = false));
     if (cell >= 0 && cell !== this.cell) await this.enter(cell);
   }
@@ -136,11 +136,11 @@ export class Walk {
   }
 
   /**
-   * Frees what cannot be seen from a cell, fetches what can, and shares out texture memory by what
-   * covers the view. Calls off what a cell entered before still needs alone.
+   * Frees cells out of sight, fetches visible ones, and shares texture memory out by coverage of the
+   * view. Calls off requests of the cell entered before.
    * @param {number} cell
    * @param {number} [budget] texture memory, bytes, from now on
-   * @returns {Promise<boolean>} whether all is there; false if another cell was entered since
+   * @returns {Promise<boolean>} whether everything is loaded; false if another cell was entered since
    */
   async enter(cell, budget = this.budget) {
     this.#entered.abort();
@@ -156,7 +156,7 @@ export class Walk {
       await this.#all(order.map((n) => () => this.#load(record.visible[n])), signal);
       if (!signal.aborted) await this.#refine(shares, signal);
     } catch (error) {
-      this.#tell(error);
+      this.#report(error);
     }
     return !signal.aborted;
   }
@@ -169,7 +169,7 @@ export class Walk {
   }
 
   /** @param {unknown} error */
-  #tell(error) {
+  #report(error) {
     (this.#options.onError ?? console.error)(error);
   }
 
@@ -181,28 +181,28 @@ export class Walk {
       this.#locator.learn(cell, record);
       return record;
     };
-    const found = this.#records.get(cell) ?? read();
-    this.#records.set(cell, found);
-    found.catch(() => this.#records.delete(cell));
-    return found;
+    const record = this.#records.get(cell) ?? read();
+    this.#records.set(cell, record);
+    record.catch(() => this.#records.delete(cell));
+    return record;
   }
 
   /**
    * @param {number} cell
-   * @param {"record" | "geometry"} what
+   * @param {"record" | "geometry"} kind
    */
-  #address(cell, what) {
+  #address(cell, kind) {
     const row = this.index.cells[cell];
-    const template = what === "record" ? this.index.record : this.index.geometry?.gltf;
-    const url = row[what] ?? template?.replace("{name}", row.name);
-    if (url === undefined) throw new Error(`${this.#url}: cells without ${what} as glTF`);
+    const template = kind === "record" ? this.index.record : this.index.geometry?.gltf;
+    const url = row[kind] ?? template?.replace("{name}", row.name);
+    if (url === undefined) throw new Error(`${this.#url}: cells without ${kind} as glTF`);
     return new URL(url, this.#url);
   }
 
   /** @param {number} cell */
   #load(cell) {
-    const found = this.#cells.get(cell);
-    if (found) return found.done;
+    const loading = this.#cells.get(cell);
+    if (loading) return loading.done;
     const control = new AbortController();
     const load = async () => {
       try {
@@ -259,8 +259,8 @@ export class Walk {
   }
 
   /**
-   * What has too much gives it back before anything grows; then all get a little; then the rest,
-   * beginning with what covers most.
+   * Textures with too many levels shrink before any grows; then all get coarse levels; then the rest,
+   * beginning with the greatest coverage.
    * @param {Map<number, number>} shares
    * @param {AbortSignal} signal
    */
@@ -276,7 +276,7 @@ export class Walk {
     const pass = (target) =>
       this.#all(
         order.map((n) => async () => {
-          // One after the other: the second finds the bytes there.
+          // One after the other: the second uses the bytes of the first.
           for (const texture of wants[n].all) await texture.refine(target(n, texture.level));
         }),
         signal,
@@ -291,7 +291,7 @@ export class Walk {
   }
 
   /**
-   * Does them in order, a few at a time; one that fails is told of.
+   * Runs jobs in order, a few at a time; errors are reported.
    * @param {(() => Promise<void>)[]} jobs
    * @param {AbortSignal} signal
    */
@@ -299,7 +299,7 @@ export class Walk {
     const left = [...jobs];
     const lane = async () => {
       for (let job; !signal.aborted && (job = left.shift()); ) {
-        await job().catch((error) => this.#tell(error));
+        await job().catch((error) => this.#report(error));
       }
     };
     await Promise.all(Array.from({ length: this.#options.connections ?? 4 }, lane));
