@@ -98,10 +98,10 @@ def read(kind: str, seed: int, number: int) -> tuple[str, float]:
 def _decoded(path: Path) -> str:
     """As the reader of glTF has it decoded."""
     from ptmtools.scene.gltf import draco as reader
-    from ptmtools.scene.sandbox import run_apart
+    from ptmtools.scene.sandbox import run_in_sandbox
 
     path.rename(path.with_name("0.drc"))
-    run_apart(reader.__name__, "Draco", path.with_name("0.drc"), str(path.parent), "1")
+    run_in_sandbox(reader.__name__, "Draco", path.with_name("0.drc"), str(path.parent), "1")
     return "read" if path.with_name("0.npz").exists() else ""
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from benchmarks.fuzz.databases import Interrupted, ManifestText, Npz, Served, Vrml
 from benchmarks.fuzz.folders import ApoFolder, CampusFolder, Interlaced
-from benchmarks.fuzz.models import Gltf, Handed, Mesh, Meshopt, Mtl, Obj
+from benchmarks.fuzz.models import Gltf, Mesh, Meshopt, Messages, Mtl, Obj
 from benchmarks.fuzz.textures import Images, Ptm
 
 
@@ -28,7 +28,7 @@ KINDS: dict[str, Kind] = {
     "obj": Kind(Obj, 14),
     "gltf": Kind(Gltf, 8),
     "meshopt": Kind(Meshopt, 8),
-    "handed": Kind(Handed, 4),
+    "messages": Kind(Messages, 4),
     "mesh": Kind(Mesh, 3),
     "image": Kind(Images, 10),
     "interlaced": Kind(Interlaced, 4),

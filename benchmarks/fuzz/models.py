@@ -437,14 +437,15 @@ class Meshopt:
         return case.facts["mode"].lower()
 
 
-class Handed:
-    """What a process apart hands over of a model that it has read (IFC, USD)."""
+class Messages:
+    """Messages of sandboxed readers (IFC, USD)."""
 
     limit = 1 << 26
 
     def __init__(self, folder: Path, outside: Path) -> None:
-        from ptmtools.scene import messages as handed
-        from ptmtools.scene.source import Findings, Source, SourceMaterial
+        from ptmtools.scene import messages
+        from ptmtools.scene.notes import Findings
+        from ptmtools.scene.source import Source, SourceMaterial
 
         self._names = furnished(folder, outside)
         self._model, self._scratch = folder / "a.usda", folder / "scratch"
@@ -463,15 +464,15 @@ class Handed:
             colors=np.zeros((2, 3, 3), np.uint8),
             kinds=("door", ""),
         )
-        images = {0: handed.NamedImage("wall.png", "/a")}
+        images = {0: messages.NamedImage("wall.png", "/a")}
         findings = Findings(self._model)
-        findings.say("PTM-N224", "left out", "/b")
-        self._answer = handed.hand_over(source, images, findings, str(self._scratch))
+        findings.note("PTM-N224", "left out", "/b")
+        self._answer = messages.pack_source(source, images, findings, str(self._scratch))
         self._arrays = (self._scratch / "source.npz").read_bytes()
-        self._handed = handed
+        self._messages = messages
 
     def make(self, rng: Random) -> Case:
-        """Another answer, or other arrays."""
+        """Another message, or other arrays."""
         if rng.random() < 0.3:
             return Case(damaged(rng, self._arrays), self._answer)
         answer = json.loads(json.dumps(self._answer))
@@ -482,12 +483,12 @@ class Handed:
         return Case(self._arrays, reply)
 
     def read(self, case: Case) -> str:
-        """Takes it over."""
-        from ptmtools.scene.source import Findings
+        """Reads the message."""
+        from ptmtools.scene.notes import Findings
 
         (self._scratch / "source.npz").write_bytes(case.data)
-        self._handed.run_apart = lambda *given, **options: case.facts
-        taken = self._handed.take_over(
+        self._messages.run_in_sandbox = lambda *given, **options: case.facts
+        source = self._messages.read_in_sandbox(
             "", "the library", self._model, Findings(self._model), str(self._scratch)
         )
-        return f"{len(taken.triangles)} triangles"
+        return f"{len(source.triangles)} triangles"

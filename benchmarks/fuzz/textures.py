@@ -182,7 +182,8 @@ class Images:
 
     def _of_a_scene(self, data: bytes) -> str:
         from ptmtools.scene.images import ImageStore
-        from ptmtools.scene.source import Findings, HeldBytes, Texture
+        from ptmtools.scene.notes import Findings
+        from ptmtools.scene.source import HeldBytes, Texture
 
         store = ImageStore(Findings(self._file), LIMITS.decoded_bytes)
         texture = Texture(HeldBytes(data), "a/../b.png", "map_Kd", "a.mtl:1")

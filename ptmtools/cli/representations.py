@@ -104,7 +104,7 @@ def _convert(
     from ptmtools.neighbours.apo.making import make_apo
     from ptmtools.parallel import open_executor, processors
     from ptmtools.scene import ingest
-    from ptmtools.scene.notes import outside, warnings
+    from ptmtools.scene.notes import exterior_notes, warnings
 
     options, read = take(ApoOptions, values), take(IngestOptions, values)
     FORM.check(folder, force=force)
@@ -116,7 +116,7 @@ def _convert(
             scene = ingest(model, read, progress, workers=workers or processors())
         octree = make_apo(scene, options, executor, progress)
     FORM.write(folder, files_of(octree), force=force)
-    for warning in [*warnings(outside(scene.notes)), *octree.notes]:
+    for warning in [*warnings(exterior_notes(scene.notes)), *octree.notes]:
         console.warn(warning)
 
 
@@ -160,13 +160,13 @@ def campus(
     options, reading = take(CampusOptions, values), take(IngestOptions, values)
     from ptmtools.neighbours.campus.building import make_campus
     from ptmtools.parallel import open_executor
-    from ptmtools.scene.notes import line, outside, warnings
+    from ptmtools.scene.notes import exterior_notes, line, warnings
 
     with console.progress() as progress, open_executor(workers) as executor:
         result = make_campus(
             model, folder, options, reading, executor, force=force, progress=progress
         )
-    scene_notes = outside(result.scene.notes)
+    scene_notes = exterior_notes(result.scene.notes)
     if as_json:
         seconds = {name: round(value, 3) for name, value in result.seconds.items()}
         notes = [line(note) for note in scene_notes]

@@ -1,7 +1,6 @@
-"""A model file becomes arrays in metres, Y up.
+"""Ingest: reads a model file (OBJ, glTF and others) into a `Scene`: arrays in metres, Y up.
 
-`ingest` reads a model (OBJ, glTF, and others) into a `Scene`; the readers and their libraries
-are imported when they are first asked for.
+Readers and their libraries are imported on first use.
 """
 
 from __future__ import annotations

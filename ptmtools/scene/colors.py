@@ -1,9 +1,8 @@
-"""Linear light and sRGB (IEC 61966-2-1).
+"""Converts between linear light and sRGB (IEC 61966-2-1), and computes gradients over triangles.
 
-How textures and colours lie on triangles.
-
-Tried: inverting the Gram matrix of two edges. It squares what is lost to rounding on slivers, of
-which one model of furniture had gradients that were off by 2e-9, and gives the same levels."""
+Rejected for gradients: inverting the Gram matrix of two edges. It squares the rounding error on
+slivers, by which gradients of one model of furniture were off by 2e-9, and gives the same levels.
+"""
 
 from __future__ import annotations
 
@@ -14,26 +13,26 @@ from ptmtools.arrays import Floats
 
 
 def to_srgb(light: Floats) -> Floats:
-    """Linear light, any shape, as it is encoded in sRGB, both from 0 to 1; what is outside, and
-    what is no number, is brought into that."""
-    held = np.clip(np.nan_to_num(light, nan=0.0), 0.0, 1.0)
-    bright = np.where(held < 1, 1.055 * held ** (1 / 2.4) - 0.055, 1.0)  # 1 is 1, to the last bit
-    return np.where(held <= 0.0031308, 12.92 * held, bright)
+    """Linear light of any shape, encoded in sRGB, both from 0 to 1; values are clipped, and NaN
+    is 0."""
+    clipped = np.clip(np.nan_to_num(light, nan=0.0), 0.0, 1.0)
+    bright = np.where(clipped < 1, 1.055 * clipped ** (1 / 2.4) - 0.055, 1.0)  # exact at 1
+    return np.where(clipped <= 0.0031308, 12.92 * clipped, bright)
 
 
 def encoded(light: Floats) -> NDArray[np.uint8]:
-    """Linear light as bytes of sRGB."""
+    """Linear light as sRGB bytes."""
     return np.rint(255 * to_srgb(light)).astype(np.uint8)
 
 
 def to_linear(encoded: Floats) -> Floats:
     """The inverse of `to_srgb`."""
-    held = np.clip(encoded, 0.0, 1.0)
-    return np.where(held <= 0.04045, held / 12.92, ((held + 0.055) / 1.055) ** 2.4)
+    clipped = np.clip(encoded, 0.0, 1.0)
+    return np.where(clipped <= 0.04045, clipped / 12.92, ((clipped + 0.055) / 1.055) ** 2.4)
 
 
 def packed(colors: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """(...,) a number for each of (..., 3) colours."""
+    """(...,) one number for each of (..., 3) colours."""
     red, green, blue = np.moveaxis(colors.astype(np.int64), -1, 0)
     return np.asarray(red << 16 | green << 8 | blue)
 
@@ -44,8 +43,8 @@ def unpacked(numbers: NDArray[np.int64]) -> NDArray[np.uint8]:
 
 
 def gradients(corners: Floats, uv: Floats) -> Floats:
-    """(T, k, 3) how the texture coordinates u and v, or other values of corners, change along the
-    plane of each triangle, per metre; 0 for triangles without area.
+    """(T, k, 3) gradients of texture coordinates, or other values of corners, in the plane of each
+    triangle, per metre; 0 for triangles without area.
 
     Parameters
     ----------

@@ -1,9 +1,8 @@
-"""Which faces of a model are kept: welding, degenerate faces, duplicates.
+"""Cleans the faces of a model: welds points, drops degenerate and duplicate faces.
 
-Points are welded where their coordinates are equal, not where they are near: what is near is for
-the planes of the cells to judge. A face is degenerate where its height is below the rounding of
-the coordinates themselves. Duplicates are found by their three points, whichever comes first and
-whichever way round.
+Points are welded if their coordinates are equal, not if they are near: nearness is decided by the
+planes of the cells. A face is degenerate if its height is below the rounding of the coordinates.
+Duplicates have the same three points and winding, in any rotation.
 """
 
 from __future__ import annotations
@@ -18,16 +17,16 @@ from ptmtools.tolerance import ROUNDING_SHARE
 
 @dataclass(frozen=True)
 class KeptFaces:
-    """The faces that remain.
+    """The cleaned faces.
 
     Attributes
     ----------
     points: (V, 3) float64 distinct points in the order of first use, each used.
     triangles: (T, 3) int64 into `points`.
-    source: (T,) int64 the kept faces' numbers before, increasing.
+    source: (T,) int64 number of each face before cleaning, increasing.
     paired: (T,) bool, another kept face has the same points and the opposite winding.
-    also: (N,) int64 for every face before: the face kept in its place (itself, if it is kept), or
-        -1 where it was dropped as degenerate or not finite.
+    keeper: (N,) int64 for every face before cleaning: the face kept in its place, or -1 if it was
+        dropped as degenerate or not finite.
     not_finite, degenerate: numbers of dropped faces.
     """
 
@@ -35,13 +34,13 @@ class KeptFaces:
     triangles: NDArray[np.int64]
     source: NDArray[np.int64]
     paired: NDArray[np.bool_]
-    also: NDArray[np.int64]
+    keeper: NDArray[np.int64]
     not_finite: int
     degenerate: int
 
 
 def keep_faces(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> KeptFaces:
-    """Clean (T, 3) triangles over (P, 3) points; every index is in range."""
+    """Cleans (T, 3) triangles over (P, 3) points; every index is in range."""
     finite_point = np.asarray(np.isfinite(points).all(axis=1))
     finite = finite_point[triangles].all(axis=1)
     source = np.flatnonzero(finite)
@@ -49,7 +48,7 @@ def keep_faces(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> Kep
 
     thin = _degenerate(welded, index)
     source, index = source[~thin], index[~thin]
-    also = np.full(len(triangles), -1, dtype=np.int64)
+    keeper = np.full(len(triangles), -1, dtype=np.int64)
 
     # Rotated so that the smallest point is first, two faces differ only by their winding.
     turn = index.argmin(axis=1)[:, None]
@@ -60,9 +59,9 @@ def keep_faces(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> Kep
     same_points = (ordered[order][1:] == ordered[order][:-1]).all(axis=1)
     same_face = same_points & (winding[order][1:] == winding[order][:-1])
     first = np.concatenate([[True], ~same_face])[: len(order)]
-    keeper = order[np.maximum.accumulate(np.where(first, np.arange(len(order)), 0))]
-    also[source[order]] = source[keeper]
-    # Of faces with the same points at most two are kept, and they stand next to one another.
+    first_equal = order[np.maximum.accumulate(np.where(first, np.arange(len(order)), 0))]
+    keeper[source[order]] = source[first_equal]
+    # At most two faces with the same points are kept, and they are adjacent in the order.
     kept = order[first]
     pair = (ordered[kept][1:] == ordered[kept][:-1]).all(axis=1)
     paired = np.zeros(len(index), dtype=bool)
@@ -76,7 +75,7 @@ def keep_faces(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> Kep
         triangles=index,
         source=source[kept],
         paired=paired[kept],
-        also=also,
+        keeper=keeper,
         not_finite=int((~finite).sum()),
         degenerate=int(thin.sum()),
     )
@@ -85,7 +84,7 @@ def keep_faces(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> Kep
 def _weld(
     points: NDArray[np.float64], triangles: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Distinct used points, and the triangles over them."""
+    """The distinct used points, and the triangles over them."""
     used, index = _compact(points, triangles)
     if not len(used):
         return used, index
@@ -100,7 +99,7 @@ def _weld(
 def _compact(
     points: NDArray[np.float64], triangles: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Only the points in use, in the order of first use."""
+    """The used points in the order of first use, and the triangles over them."""
     flat = triangles.reshape(-1)
     first = np.full(len(points), len(flat), dtype=np.int64)
     np.minimum.at(first, flat, np.arange(len(flat)))
@@ -119,9 +118,9 @@ def _degenerate(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> ND
     with np.errstate(over="ignore"):
         extent = float((points.max(axis=0) - low).max())
     if not (np.isfinite(extent) and extent > 0):
-        # No size, or one beyond float64: for the caller to report.
+        # No extent, or one beyond float64, which the caller reports.
         return np.full(len(triangles), not extent > 0)
-    # In shares of the extent, so that neither tiny nor huge coordinates leave float64's range.
+    # Relative to the extent, so that products of tiny or huge coordinates stay in range.
     local = ((points - low) / extent)[triangles]
     rounding = max(ROUNDING_SHARE, 4 * float(np.spacing(np.abs(points).max())) / extent)
     edge = np.roll(local, -1, axis=1) - local

@@ -1,15 +1,12 @@
-"""Reads the other formats: PLY, STL and OFF through trimesh, IFC through IfcOpenShell (`ifc`), USD
-through usd-core (`usd`), the rest through pymeshlab.
+"""Reads formats other than OBJ and glTF: PLY, STL and OFF through trimesh, IFC through IfcOpenShell
+(`ifc`), USD through usd-core (`usd`), the rest through pymeshlab.
 
-What pymeshlab reads it converts to OBJ in a temporary folder (`ptmtools.scene.formats`), and our
-own reader reads that. The same way is taken where trimesh gives up (mixed polygons in OFF) and for
-textured PLY, of which trimesh keeps one image. Both libraries cut polygons as fans.
-
-Converts a model to OBJ files through pymeshlab, in a process of its own (`apart`).
-
-pymeshlab (GPL-3, needs libGL) does not say which face has which texture, but writes it into an
-OBJ file. As a program: ``python -P -m ptmtools.scene.formats MEMORY MODEL FOLDER`` writes
-``0.obj``, … and answers with their labels."""
+pymeshlab (GPL-3, needs libGL) does not expose which face has which texture, but writes it into OBJ
+files. So a child process (`sandbox`) converts the model to OBJ in a temporary folder, and `obj`
+reads the result: ``python -P -m ptmtools.scene.formats MEMORY MODEL FOLDER`` writes ``0.obj``, …
+and replies with their labels. The same path reads files that trimesh cannot read (mixed polygons in
+OFF), and textured PLY, of which trimesh keeps one image. Both libraries cut polygons as fans.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +14,6 @@ import ctypes
 import os
 import sys
 import tempfile
-from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -26,26 +22,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, MissingComponentError
+from ptmtools.scene.notes import Findings
 from ptmtools.scene.options import IFC, SUFFIXES, TRIMESH, USD
-from ptmtools.scene.rows import joined_colors
-from ptmtools.scene.sandbox import run_apart, serve
-from ptmtools.scene.source import MAX_VERTICES, Findings, Source, SourceMaterial, too_many_triangles
+from ptmtools.scene.rows import Rows
+from ptmtools.scene.sandbox import run_in_sandbox, serve
+from ptmtools.scene.source import MAX_VERTICES, Source, SourceMaterial, too_many_triangles
 
 
 def convert(path: Path, scratch: Path) -> list[tuple[Path, str]]:
-    """The meshes of a model as OBJ files in ``scratch``, with their labels.
+    """Writes the meshes of a model as OBJ files into ``scratch``; returns these with their labels.
 
-    Raises InputError PTM-I254 for what pymeshlab cannot read, MissingComponentError PTM-M200.
+    Raises InputError PTM-I254 if pymeshlab cannot read the model, MissingComponentError PTM-M200.
     """
     if fault := _absence():
-        raise _missing(fault)
-    labels = run_apart(__name__, "pymeshlab", path, path.absolute(), scratch)
+        raise MissingComponentError(
+            "PTM-M200",
+            f"pymeshlab is unavailable ({fault})",
+            remedy="pip install pymeshlab; apt install libopengl0 libgl1; or convert to GLB",
+        )
+    labels = run_in_sandbox(__name__, "pymeshlab", path, path.absolute(), scratch)
     return [(scratch / f"{i}.obj", label) for i, label in enumerate(labels)]
 
 
 def _absence() -> str:
-    """Why pymeshlab cannot be used. Without OpenGL it imports, prints a page of complaints and
-    knows no format, so that library is looked for first."""
+    """The reason why pymeshlab is unavailable, or "". Without OpenGL it imports, prints a page of
+    warnings and supports no format, so libOpenGL is checked first."""
     try:
         if sys.platform == "linux":
             ctypes.CDLL("libOpenGL.so.0")
@@ -54,16 +55,8 @@ def _absence() -> str:
     return "" if find_spec("pymeshlab") else "No module named 'pymeshlab'"
 
 
-def _missing(why: str) -> MissingComponentError:
-    return MissingComponentError(
-        "PTM-M200",
-        f"pymeshlab cannot be used ({why})",
-        remedy="pip install pymeshlab; apt install libopengl0 libgl1; or convert to GLB",
-    )
-
-
-def _convert_here(path: str, scratch: str) -> list[str]:
-    """The labels of the meshes that it writes."""
+def _convert(path: str, scratch: str) -> list[str]:
+    """Writes the meshes; returns their labels."""
     import pymeshlab
 
     meshes = pymeshlab.MeshSet()
@@ -85,25 +78,24 @@ def _convert_here(path: str, scratch: str) -> list[str]:
 
 
 if __name__ == "__main__":
-    serve(_convert_here)
+    serve(_convert)
 
 
-#: Enough of a PLY file for its header.
+#: Bytes of a PLY file that contain its header.
 _HEADER = 1 << 14
 
 
 def read_other(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) -> Source:
-    """Read a file that is neither OBJ nor glTF, by its suffix.
+    """Reads a file that is neither OBJ nor glTF, by its suffix.
 
-    Raises InputError for unknown suffixes and for what no library can read, LimitError PTM-L203 for
-    more than ``max_triangles``, and MissingComponentError if a library is needed and cannot be
-    imported.
+    Raises InputError for unknown suffixes and unreadable files, LimitError PTM-L203 for more than
+    ``max_triangles``, and MissingComponentError if a required library cannot be imported.
     """
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise InputError(
             "PTM-I243",
-            f"models of type {suffix or '(no suffix)'} are not supported",
+            f"unsupported format {suffix or '(no suffix)'}",
             file=path,
             remedy=f"give one of {' '.join(SUFFIXES)}",
         )
@@ -121,14 +113,14 @@ def read_other(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES
         source = _read_trimesh(path, findings)
     except InputError:
         raise
-    except Exception as error:  # trimesh raises whatever a damaged file provokes
-        if suffix == ".stl":  # there are no two kinds of triangles: it is damaged
+    except Exception as error:  # trimesh raises any exception for a damaged file
+        if suffix == ".stl":  # pymeshlab supports no variants that trimesh lacks
             raise InputError(
-                "PTM-I254", f"is damaged ({error})", file=path, remedy="export it again"
+                "PTM-I254", f"damaged ({error})", file=path, remedy="export it again"
             ) from None
         source = _read_meshlab(path, findings, max_triangles)
-        findings.say(
-            "PTM-N230", f"read through pymeshlab, as trimesh gave up ({type(error).__name__})"
+        findings.note(
+            "PTM-N230", f"read by pymeshlab because trimesh failed ({type(error).__name__})"
         )
     if len(source.triangles) > max_triangles:
         raise too_many_triangles(max_triangles, path)
@@ -140,7 +132,7 @@ def _textured_ply(path: Path, findings: Findings) -> bool:
         head = stream.read(_HEADER).split(b"end_header")[0].lower()
     textured = b"texturefile" in head
     if textured and b" red" in head:
-        findings.say("PTM-N223", "colours of vertices are not carried over beside textures")
+        findings.note("PTM-N223", "colours of vertices dropped in favour of textures")
     return textured
 
 
@@ -149,43 +141,35 @@ def _read_trimesh(path: Path, findings: Findings) -> Source:
 
     with open(path, "rb") as stream:
         scene = trimesh.load_scene(stream, file_type=path.suffix.lower()[1:], process=False)
-    parts = []
+    rows = Rows()
     for name in scene.graph.nodes_geometry:
         matrix, geometry = scene.graph.get(name)
         mesh = scene.geometry[geometry]
         faces = np.asarray(getattr(mesh, "faces", np.zeros((0, 3))), dtype=np.int64)
-        local = np.asarray(mesh.vertices, dtype=np.float64)
-        if len(faces) and not 0 <= faces.min() <= faces.max() < len(local):
-            raise InputError("PTM-I246", "a face names a vertex that does not exist", file=path)
-        # Infinite ones are told of with the faces that have them.
-        with np.errstate(invalid="ignore", over="ignore"):
-            points = local @ matrix[:3, :3].T + matrix[:3, 3]
-        parts.append(
-            Source(
-                points=points,
-                triangles=faces,
-                uv=np.zeros((len(faces), 3, 2)),
-                triangle_object=np.zeros(len(faces), dtype=np.int64),
-                triangle_material=np.zeros(len(faces), dtype=np.int64),
-                objects=(path.stem if len(scene.geometry) == 1 else str(geometry),),
-                materials=(SourceMaterial("default"),),
-                colors=_colors(mesh, faces, findings),
-            )
-        )
-    joined = _joined(path, parts)
-    material = np.zeros_like(joined.triangle_material)
-    return replace(joined, materials=joined.materials[:1], triangle_material=material)
+        points = np.asarray(mesh.vertices, dtype=np.float64)
+        if len(faces) and not 0 <= faces.min() <= faces.max() < len(points):
+            raise InputError("PTM-I246", "a face refers to a missing vertex", file=path)
+        colors, uv = _colors(mesh, faces, findings), np.zeros((len(faces), 3, 2))
+        rows.add(np.asarray(matrix)[None], points, faces, uv, 0, colors, len(rows.names))
+        rows.names.append(path.stem if len(scene.geometry) == 1 else str(geometry))
+    if not any(map(len, rows.triangles)):
+        raise _no_faces(path)
+    return rows.source(materials=(SourceMaterial("default"),))
+
+
+def _no_faces(path: Path) -> InputError:
+    return InputError("PTM-I247", "no faces", file=path, remedy="give a model with faces")
 
 
 def _colors(mesh: Any, faces: NDArray[np.int64], findings: Findings) -> NDArray[np.uint8] | None:
-    """(T, 3, 3) sRGB of corners, if vertices or faces have colours of their own."""
+    """(T, 3, 3) sRGB of corners, if vertices or faces have colours."""
     kind = getattr(mesh.visual, "kind", None)
     if kind not in ("vertex", "face"):
         return None
-    own = mesh.visual.vertex_colors if kind == "vertex" else mesh.visual.face_colors
-    rows = np.asarray(own, dtype=np.uint8)
+    colors = mesh.visual.vertex_colors if kind == "vertex" else mesh.visual.face_colors
+    rows = np.asarray(colors, dtype=np.uint8)
     if (rows[:, 3:] < 255).any():
-        findings.say("PTM-N223", "opacities of vertices and faces are not carried over")
+        findings.note("PTM-N223", "opacities of vertices and faces dropped")
     return rows[faces, :3] if kind == "vertex" else np.repeat(rows[:, None, :3], 3, axis=1)
 
 
@@ -197,28 +181,14 @@ def _read_meshlab(path: Path, findings: Findings, max_triangles: int) -> Source:
         findings.folder.admit(Path(scratch))
         for converted, label in convert(path, Path(scratch)):
             part = read_obj(converted, findings, max_triangles=max_triangles)
-            parts.append(replace(part, objects=(label or path.stem,)))
-    return _joined(path, parts)
-
-
-def _joined(path: Path, parts: list[Source]) -> Source:
-    """One source of several, in order. Raises InputError PTM-I247 if they have no face."""
-    if not any(len(part.triangles) for part in parts):
-        raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with faces")
-
-    def counted_on(name: str, counted: str) -> NDArray[np.int64]:
-        """An array of indices of all of them, behind what the parts before have."""
-        first = np.cumsum([0] + [len(getattr(part, counted)) for part in parts])
-        rows = [getattr(part, name) + n for part, n in zip(parts, first, strict=False)]
-        return np.concatenate(rows)
-
-    return Source(
-        points=np.concatenate([part.points for part in parts]),
-        triangles=counted_on("triangles", "points"),
-        uv=np.concatenate([part.uv for part in parts]),
-        triangle_object=counted_on("triangle_object", "objects"),
-        triangle_material=counted_on("triangle_material", "materials"),
-        objects=tuple(name for part in parts for name in part.objects),
-        materials=tuple(material for part in parts for material in part.materials),
-        colors=joined_colors([p.colors for p in parts], [len(p.triangles) for p in parts]),
-    )
+            parts.append((label or path.stem, part))
+    if not parts:
+        raise _no_faces(path)
+    rows = Rows()
+    materials: list[SourceMaterial] = []
+    for name, part in parts:
+        first, numbers = len(rows.names), part.triangle_material + len(materials)
+        rows.add(np.eye(4)[None], part.points, part.triangles, part.uv, numbers, part.colors, first)
+        rows.names.append(name)
+        materials += part.materials
+    return rows.source(materials=tuple(materials))

@@ -1,15 +1,15 @@
-"""The distinct images of a scene, their names, and which of their texels are not opaque.
+"""Collects the distinct images of a scene, their names and transparent texels; merges masks.
 
-Each image that some face uses is read and decoded once, several at a time: a file that cannot be
-decoded is found here and not hours later, and whether an alpha channel is more than 255s cannot be
-known otherwise. What is kept is the digest, the means to read the bytes again, and a mask of the
-texels that are not opaque where there are any, in bits. An image that declares more texels than are
-allowed ends the ingest before memory is taken for it, and no format is tried but those that become
-textures: Pillow would hand PostScript to an interpreter.
+Ingest reads and decodes each image that some face uses once, several in parallel: damage is
+reported here and not hours later, and only decoding shows whether an alpha channel contains values
+below 255. The store keeps the digest, a function that reads the bytes again, and the mask of
+transparent texels, packed in bits. An image that declares more texels than the limit ends the
+ingest before memory is allocated. Only formats that can become textures are opened: Pillow would
+start an interpreter for PostScript.
 
-Images of opacities (``map_d``), which become the alpha of the image that they belong to.
-
-Neither VRML nor the GLB cells have a second image for it."""
+A mask (``map_d``) becomes the alpha channel of the image that it belongs to, because neither VRML
+nor the GLB cells support a second image.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +33,8 @@ from ptmtools.arrays import Ints
 from ptmtools.errors import InputError, LimitError, MissingComponentError, naming
 from ptmtools.progress import Progress
 from ptmtools.scene.model import SourceImage
-from ptmtools.scene.source import FileRange, Findings, Source, SourceMaterial, Texture
+from ptmtools.scene.notes import Findings
+from ptmtools.scene.source import FileRange, Source, SourceMaterial, Texture
 from ptmtools.texture.images.picture import check_bytes, check_size
 from ptmtools.texture.model import Description, Limits
 
@@ -41,14 +42,14 @@ if TYPE_CHECKING:
     from PIL import Image
 
 
-#: Names that Windows keeps for devices, with or without a suffix.
+#: Names that Windows reserves for devices, with or without a suffix.
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)$", re.IGNORECASE)
-#: Longest stem of a file name that is given out, in characters.
+#: Longest stem of an emitted file name, in characters.
 _LONGEST_STEM = 80
-#: What looks like the suffix of a file, and not like the end of "wood 1.2".
+#: The suffix of a file name, but not the end of "wood 1.2".
 _NAME_SUFFIX = re.compile(r"\.[A-Za-z][A-Za-z0-9]{1,4}$")
 _SUFFIX = {"JPEG": "jpg", "TIFF": "tif", "MPO": "jpg", "JPEG2000": "jp2"}
-#: About so many texels of an image are looked at at a time.
+#: Approximate number of texels of a strip, the unit in which alpha is examined.
 _STRIP_TEXELS = 1 << 20
 _MASK_BANDS = {"r": "R", "g": "G", "b": "B"}
 
@@ -57,9 +58,9 @@ _Bits = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class VerifiedBytes:
-    """Reads an image again, and makes sure that it still is what ingest saw.
+    """Reads an image again and compares it with its digest.
 
-    Raises InputError if the file is gone, cannot be read, or has changed.
+    Raises InputError PTM-I252 if the file is missing, cannot be read, or has changed.
     """
 
     read: Callable[[], bytes]
@@ -81,10 +82,10 @@ class VerifiedBytes:
 
 
 @dataclass(frozen=True)
-class _Examined:
-    """What was found out about an image: digest, Pillow's name for its format, whether it can be
-    other than opaque, which texels are not, in bits along its rows, since a scene may have many and
-    its images unfold; or the fault that keeps it from being an image."""
+class _ImageRecord:
+    """Properties of an image: digest, Pillow's name of its format, whether it has an alpha channel,
+    and its transparent texels as bits packed along rows; or the reason why it cannot be decoded.
+    """
 
     sha256: str = ""
     format: str = ""
@@ -95,26 +96,26 @@ class _Examined:
 
     @property
     def holes(self) -> NDArray[np.bool_] | None:
-        """(H, W) bool, rows from the top, which texels are not opaque; None if all are."""
+        """(H, W) bool, rows from the top, the texels that are not opaque; None if all are."""
         if self.bits is None:
             return None
         return np.unpackbits(self.bits, axis=1, count=self.width).view(np.bool_)
 
 
 class ImageStore:
-    """Images by digest, in the order in which they were first asked for.
+    """The images of a scene by digest, in the order of their addition.
 
-    ``limit`` is the most bytes that the texels of an image may take, at four for each.
+    ``limit`` is the largest size of the decoded texels of an image, in bytes, at four per texel.
     """
 
     def __init__(self, findings: Findings, limit: int) -> None:
         self._findings = findings
         self.limit = limit
-        self._examined: dict[tuple[Callable[[], bytes], str | None], _Examined] = {}
+        self._examined: dict[tuple[Callable[[], bytes], str | None], _ImageRecord] = {}
         self._index: dict[str, int] = {}
         self._images: list[SourceImage] = []
         self._files: list[set[str]] = []
-        self._parts: set[str] = set()
+        self._inputs: set[str] = set()
         self._stems: set[str] = set()
 
     @property
@@ -122,78 +123,78 @@ class ImageStore:
         return tuple(
             replace(
                 image,
-                plain=image.plain and self._parts.isdisjoint(files),
+                plain=image.plain and self._inputs.isdisjoint(files),
                 files=tuple(sorted(files)),
             )
             for image, files in zip(self._images, self._files, strict=True)
         )
 
     def examine(self, textures: Iterable[Texture], workers: int, progress: Progress) -> None:
-        """Decodes the images of these textures, ``workers`` at a time, before they are added.
+        """Decodes the images of these textures with ``workers`` threads, before they are added.
 
-        Raises LimitError PTM-L104, PTM-L106, as do the others.
+        Raises LimitError PTM-L104, PTM-L106, as the other methods do.
         """
-        unknown = [texture for texture in textures if (texture.read, None) not in self._examined]
-        wanted = {texture.read: texture for texture in reversed(unknown)}
-        wanted = dict(reversed(wanted.items()))
+        pending: dict[Callable[[], bytes], Texture] = {}
+        for texture in textures:
+            if (texture.read, None) not in self._examined:
+                pending.setdefault(texture.read, texture)
         with _unwarned(), ThreadPoolExecutor(workers) as pool:
-            examined = pool.map(lambda texture: _examine(texture, self.limit), wanted.values())
-            for done, (read, found) in enumerate(zip(wanted, examined, strict=True)):
-                progress(done, len(wanted), "images")
-                self._examined[read, None] = found
-        progress(len(wanted), len(wanted), "images")
+            records = pool.map(lambda texture: _examine(texture, self.limit), pending.values())
+            for done, (read, record) in enumerate(zip(pending, records, strict=True)):
+                progress(done, len(pending), "images")
+                self._examined[read, None] = record
+        progress(len(pending), len(pending), "images")
 
     def add(self, texture: Texture) -> tuple[int, NDArray[np.bool_] | None] | None:
-        """The number of a texture's image, and (H, W), rows from the top, which of its texels are
-        not opaque, None if all are; or None (and a miss is recorded) if it cannot be decoded."""
-        found = self._sound(texture)
-        if found is None:
+        """The number of a texture's image, and its `holes`; None, and a miss, if it cannot be
+        decoded."""
+        record = self._record(texture)
+        if record is None:
             return None
-        index = self._index.setdefault(found.sha256, len(self._images))
+        index = self._index.setdefault(record.sha256, len(self._images))
         if index == len(self._images):
-            name = self._name(texture.label, found.format)
-            load = VerifiedBytes(texture.read, found.sha256, texture.label)
-            self._images.append(SourceImage(name, found.sha256, load, plain=not found.alpha))
+            name = self._name(texture.label, record.format)
+            load = VerifiedBytes(texture.read, record.sha256, texture.label)
+            self._images.append(SourceImage(name, record.sha256, load, plain=not record.alpha))
             self._files.append(set())
         if file := self._whole_file(texture):
             self._files[index].add(file)
-        return index, found.holes
+        return index, record.holes
 
     def _whole_file(self, texture: Texture) -> str | None:
-        """The file that an image is all of, relative to the model's folder."""
+        """The file that consists of a texture's image, relative to the model's folder."""
         read, folder = texture.read, self._findings.folder
         if not isinstance(read, FileRange) or read.offset or read.length is not None:
             return None
         name = Path(os.path.relpath(read.path, folder.root)).as_posix()
         return name if name in folder.sought else None
 
-    def made_into_another(self, texture: Texture) -> None:
-        """To be told of an image of whose texels another one is made."""
+    def mark_as_input(self, texture: Texture) -> None:
+        """Records that another image is derived from this one, which is then not `plain`."""
         if file := self._whole_file(texture):
-            self._parts.add(file)
+            self._inputs.add(file)
 
-    def masks(self, mask: Texture) -> bool | None:
-        """Whether some texel of a mask (``map_d``) is not opaque; None (and a miss is recorded) if
-        it cannot be decoded."""
-        found = self._sound(mask, mask.channel)
-        return None if found is None else found.bits is not None
+    def mask_has_holes(self, mask: Texture) -> bool | None:
+        """Whether some texel of a mask (``map_d``) is not opaque; None, and a miss, if it cannot be
+        decoded."""
+        record = self._record(mask, mask.channel)
+        return None if record is None else record.bits is not None
 
     def has_alpha(self, texture: Texture) -> bool | None:
-        """Whether an image has an alpha channel; None (and a miss is recorded) if it cannot be
-        decoded."""
-        found = self._sound(texture)
-        return None if found is None else found.alpha
+        """Whether an image has an alpha channel; None, and a miss, if it cannot be decoded."""
+        record = self._record(texture)
+        return None if record is None else record.alpha
 
     def holes(self, texture: Texture) -> tuple[str, NDArray[np.bool_]] | None:
-        """The digest of an image, and (H, W), rows from the top, which of its texels are not
-        opaque; None if all are, or (and a miss is recorded) if it cannot be decoded."""
-        found = self._sound(texture)
-        if found is None or (holes := found.holes) is None:
+        """The digest of an image, and (H, W), rows from the top, the texels that are not opaque;
+        None if all are, or, with a miss, if it cannot be decoded."""
+        record = self._record(texture)
+        if record is None or (holes := record.holes) is None:
             return None
-        return found.sha256, holes
+        return record.sha256, holes
 
-    def _sound(self, texture: Texture, channel: str | None = None) -> _Examined | None:
-        """What `_examine` finds, once; None (and a miss is recorded) if that is a fault."""
+    def _record(self, texture: Texture, channel: str | None = None) -> _ImageRecord | None:
+        """The result of `_examine`, cached; None, and a miss, if the image cannot be decoded."""
         key = texture.read, channel
         if key not in self._examined:
             with _unwarned():
@@ -204,10 +205,10 @@ class ImageStore:
         return self._examined[key]
 
     def _name(self, label: str, kind: str) -> str:
-        """A safe name whose stem alone is unique without regard to case."""
+        """A portable file name; its stem is unique regardless of case."""
         stem = re.split(r"[\\/]", label)[-1]
-        if known := _NAME_SUFFIX.search(stem):
-            stem = stem[: known.start()] or stem
+        if suffix := _NAME_SUFFIX.search(stem):
+            stem = stem[: suffix.start()] or stem
         stem = unicodedata.normalize("NFKD", stem).encode("ascii", "ignore").decode()
         stem = re.sub(r"[^A-Za-z0-9_-]+", "_", stem).strip("_")[:_LONGEST_STEM] or "image"
         if _DEVICES.match(stem):
@@ -220,8 +221,8 @@ class ImageStore:
         return f"{unique}.{_suffix(kind)}"
 
 
-def _examine(texture: Texture, limit: int, channel: str | None = None) -> _Examined:
-    """Reads and decodes an image; ``channel`` is that of a mask, see `Texture`.
+def _examine(texture: Texture, limit: int, channel: str | None = None) -> _ImageRecord:
+    """Reads and decodes an image; ``channel`` as in `_holes`.
 
     Raises LimitError PTM-L104, PTM-L106.
     """
@@ -239,10 +240,10 @@ def _examine(texture: Texture, limit: int, channel: str | None = None) -> _Exami
     except LimitError:
         raise
     except InputError as error:
-        return _Examined(fault=error.message)
+        return _ImageRecord(fault=error.message)
     except OSError as error:
-        return _Examined(fault=error.strerror or str(error))
-    return _Examined(
+        return _ImageRecord(fault=error.strerror or str(error))
+    return _ImageRecord(
         hashlib.sha256(data).hexdigest(),
         opened.format or "",
         opened.has_transparency_data,
@@ -252,10 +253,10 @@ def _examine(texture: Texture, limit: int, channel: str | None = None) -> _Exami
 
 
 def integers(data: bytes, limit: int) -> tuple[NDArray[Any], Description]:
-    """(h, w, c) texels of 8 or 16 bits, and what else an image says, to make another of it.
+    """(h, w, c) texels of 8 or 16 bits and the description of an image, to derive another from it.
 
-    ``limit`` as of `ImageStore`. Raises InputError if it cannot be decoded, or has other samples,
-    LimitError PTM-L104, PTM-L106.
+    ``limit`` as in `ImageStore`. Raises InputError if the image cannot be decoded or has other
+    samples, LimitError PTM-L104, PTM-L106.
     """
     from ptmtools.texture.images.files import load_image
 
@@ -264,15 +265,15 @@ def integers(data: bytes, limit: int) -> tuple[NDArray[Any], Description]:
     except MissingComponentError as error:
         raise InputError(error.code, error.message) from None
     if picture.texels.dtype.kind != "u":
-        raise InputError("PTM-I126", "its samples are floats, of which no other image is made")
+        raise InputError("PTM-I126", "images of floats cannot be combined or converted")
     return picture.texels[0 : picture.texels.shape[0]], picture.description
 
 
 def is_plain(data: bytes, name: str, limit: int) -> bool:
-    """Whether an image can take the place of a plain one of this name and change nothing else of
-    its scene: it can be decoded, has no alpha channel, and would have a name with that suffix.
+    """Whether an image can replace a plain one of this name without another change to the scene: it
+    can be decoded, has no alpha channel, and its format has the suffix of the name.
 
-    ``limit`` as of `ImageStore`. Raises LimitError PTM-L104, PTM-L106.
+    ``limit`` as in `ImageStore`. Raises LimitError PTM-L104, PTM-L106.
     """
     try:
         with _unwarned():
@@ -286,14 +287,14 @@ def is_plain(data: bytes, name: str, limit: int) -> bool:
 
 @contextmanager
 def _unwarned() -> Iterator[None]:
-    """Pillow's warnings are not shown. For all threads, so it is entered by the first of them."""
+    """Hides Pillow's warnings, in all threads; entered before these start."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
 
 
 def _decode(data: bytes, limit: int) -> Image.Image:
-    """Raises InputError if that cannot be, LimitError PTM-L104, PTM-L106."""
+    """Raises InputError if the image cannot be decoded, LimitError PTM-L104, PTM-L106."""
     from ptmtools.texture.images.opening import load, opened, pillow_faults
 
     if not data:
@@ -311,18 +312,20 @@ def _suffix(kind: str) -> str:
 
 
 def _holes(opened: Image.Image, channel: str | None) -> _Bits | None:
-    """Which texels are not opaque, a strip of rows at a time; None if all are. ``channel`` is that
-    of a mask, and None for an image, of which its alpha tells."""
+    """The texels that are not opaque, as bits packed along rows; None if all are opaque.
+
+    ``channel`` is that of a mask (`Texture`), None for the alpha of an image.
+    """
     mode, band = ("RGB", _MASK_BANDS[channel]) if channel in _MASK_BANDS else ("L", "L")
     if opened.has_transparency_data and channel in (None, "", "m"):
         mode, band = "RGBA", "A"
     elif channel is None:
         return None
 
-    def clear(strip: Image.Image) -> NDArray[np.bool_]:
+    def transparent(strip: Image.Image) -> NDArray[np.bool_]:
         if opened.mode.startswith("I"):  # 16 bits, which convert() would clip
             texels = np.asarray(strip)
-            # Of an alpha there is but a colour that stands for none.
+            # The only alpha in this mode is one transparent value.
             return texels == opened.info["transparency"] if band == "A" else texels < 65535
         return np.asarray(strip.convert(mode).getchannel(band)) < 255
 
@@ -330,7 +333,7 @@ def _holes(opened: Image.Image, channel: str | None) -> _Bits | None:
     step = max(1, _STRIP_TEXELS // width)
     tops = range(0, height, step)
     strips = (opened.crop((0, y, width, min(y + step, height))) for y in tops)
-    bits = np.concatenate([np.packbits(clear(strip), axis=1) for strip in strips])
+    bits = np.concatenate([np.packbits(transparent(strip), axis=1) for strip in strips])
     return bits if bits.any() else None
 
 
@@ -339,11 +342,11 @@ _BANDS = {"r": 0, "g": 1, "b": 2}
 
 @dataclass(frozen=True)
 class MaskedBytes:
-    """The bytes of a PNG with the colours of an image, white without one, and the opacities of a
-    mask, times its own alpha; as large as the image.
+    """The bytes of a PNG in the size of an image, with its colours, or white without an image; its
+    alpha is that of the image times the opacities of a mask.
 
-    ``channel`` is that of the mask, see `Texture`, and ``limit`` as of `ImageStore`. Raises what
-    reading raises, and InputError or LimitError for what cannot be decoded or has no 8 or 16 bits.
+    ``channel`` of the mask as in `Texture`, ``limit`` as in `ImageStore`. Raises the errors of
+    reading, and InputError or LimitError for images that cannot be decoded or have no 8 or 16 bits.
     """
 
     read: Callable[[], bytes] | None
@@ -366,13 +369,13 @@ class MaskedBytes:
             components -= 1
         else:
             alpha *= np.iinfo(texels.dtype).max
-        held = np.rint(alpha).astype(texels.dtype)[..., None]
-        return png_bytes(np.concatenate([texels[..., :components], held], axis=2), description)
+        alpha = np.rint(alpha).astype(texels.dtype)[..., None]
+        return png_bytes(np.concatenate([texels[..., :components], alpha], axis=2), description)
 
 
 def _opacities(texels: NDArray[Any], channel: str) -> NDArray[np.uint8]:
-    """(h, w) what a mask says: its matte where it has one and that is asked for, else one of its
-    colours or its luminance."""
+    """(h, w) opacities of a mask: its matte if it has one and ``channel`` allows it, otherwise one
+    of its colours or its luminance."""
     if texels.dtype != np.uint8:
         texels = (texels >> 8).astype(np.uint8)
     matte = texels.shape[2] in (2, 4)
@@ -383,7 +386,7 @@ def _opacities(texels: NDArray[Any], channel: str) -> NDArray[np.uint8]:
         return np.asarray(colors[..., 0])
     if channel in _BANDS:
         return np.asarray(colors[..., _BANDS[channel]])
-    # ITU-R 601, as Pillow has it.
+    # ITU-R 601, as in Pillow.
     return np.asarray(np.rint(colors @ np.array([0.299, 0.587, 0.114])).astype(np.uint8))
 
 
@@ -396,37 +399,36 @@ def _resized(opacity: NDArray[np.uint8], width: int, height: int) -> NDArray[np.
     return opacity.astype(np.float64)
 
 
-def masked(source: Source, used: Ints, store: ImageStore, findings: Findings) -> Source:
-    """The same with the masks of the materials that are ``used`` in their images.
+def merge_masks(source: Source, used: Ints, store: ImageStore, findings: Findings) -> Source:
+    """The source with the masks of the ``used`` materials merged into their images.
 
     Raises LimitError PTM-L104, PTM-L106.
     """
     materials = list(source.materials)
     for index in used.tolist():
-        materials[index] = _masked(materials[index], store, findings)
+        materials[index] = _merge_mask(materials[index], store, findings)
     return replace(source, materials=tuple(materials))
 
 
-def _masked(given: SourceMaterial, store: ImageStore, findings: Findings) -> SourceMaterial:
-    mask, texture = given.mask, given.texture
+def _merge_mask(material: SourceMaterial, store: ImageStore, findings: Findings) -> SourceMaterial:
+    mask, texture = material.mask, material.texture
     if mask is None:
-        return given
-    without = replace(given, mask=None)
-    through = store.masks(mask)
-    if through is None:  # better see too much than too little
+        return material
+    without = replace(material, mask=None)
+    holes = store.mask_has_holes(mask)
+    if holes is None:  # an unreadable mask must not hide anything
         return replace(without, see_through=True)
-    matte = None if texture is None else store.has_alpha(texture)
-    if texture is not None and texture.read == mask.read and matte and mask.channel in ("", "m"):
-        return without  # it is the image's own alpha
-    if not through:
+    alpha = None if texture is None else store.has_alpha(texture)
+    own = texture is not None and texture.read == mask.read and mask.channel in ("", "m")
+    if (alpha and own) or not holes:  # the mask is the alpha of the image, or opaque
         return without
-    colors = None if matte is None or texture is None else texture.read
+    colors = None if alpha is None or texture is None else texture.read
     read = MaskedBytes(colors, mask.read, mask.channel, store.limit)
-    made = replace(texture or mask, read=read, what=mask.what, place=mask.place)
+    merged = replace(texture or mask, read=read, what=mask.what, place=mask.place)
     for part in (texture, mask):
         if part is not None:
-            store.made_into_another(part)
-    if store.has_alpha(made) is None:  # which the store has said of the mask
+            store.mark_as_input(part)
+    if store.has_alpha(merged) is None:  # the store has recorded the miss
         return replace(without, see_through=True)
-    findings.say("PTM-N217", f"{mask.what}: is baked into an image as its alpha", mask.place)
-    return replace(without, texture=made)
+    findings.note("PTM-N217", f"{mask.what}: baked into an image as its alpha", mask.place)
+    return replace(without, texture=merged)

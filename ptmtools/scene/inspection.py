@@ -1,4 +1,4 @@
-"""What a model is, before anything is made of it."""
+"""Describes a model file: format, objects, images, and the likely units and up axes."""
 
 from __future__ import annotations
 
@@ -6,20 +6,19 @@ import io
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ptmtools.progress import Progress, silent
-from ptmtools.scene.gltf.document import document_json, outcome_of
+from ptmtools.scene.gltf.document import document_json, support_of
 from ptmtools.scene.ingestion import ingest
 from ptmtools.scene.model import Scene, SourceImage
 from ptmtools.scene.options import IngestOptions
-from ptmtools.scene.up_axis import USUAL_UP, Named, Reading, Up, looks, readings
+from ptmtools.scene.up_axis import USUAL_UP, Candidate, NamedFaces, Up, candidates, evidence
 from ptmtools.texture.images.opening import opened
 from ptmtools.texture.model import Limits
 
-#: The formats by the suffixes of their files.
+#: Format by suffix.
 _FORMATS = {
     ".3ds": "3D Studio",
     ".3mf": "3MF",
@@ -44,7 +43,7 @@ _FORMATS = {
 
 @dataclass(frozen=True)
 class ImageFacts:
-    """An image that some face uses: its format as Pillow calls it, size in texels and bytes."""
+    """An image that some face uses: Pillow's name of its format, size in texels and bytes."""
 
     name: str
     format: str
@@ -55,8 +54,8 @@ class ImageFacts:
 
 @dataclass(frozen=True)
 class Guess:
-    """A reading of the model (`readings`): what it would be, why, how unusual that is, and whether
-    it costs at most `RUNNER_UP` times as much as the best one."""
+    """A candidate for unit and up axis (`up_axis`): size, reasons, cost, and whether it costs at
+    most `RUNNER_UP` times as much as the best one."""
 
     unit: str
     up: Up
@@ -68,18 +67,18 @@ class Guess:
 
 @dataclass(frozen=True)
 class Inspection:
-    """What a model file holds.
+    """The content of a model file.
 
     Attributes
     ----------
-    format, generator: of the file, and what wrote it, "" if that is not known.
-    extensions: of glTF, by name, with what becomes of each.
-    objects: by name, with the triangles of all objects of that name, those with most first.
+    format, generator: of the file, and the program that wrote it, "" if unknown.
+    extensions: of glTF, by name, with their support.
+    objects: triangles by name, summed over objects of the same name, the largest first.
     images: that faces use, in the order of the file.
-    best: the likeliest reading of its looks.
-    others: the likeliest one with the other axis up, and the likeliest one with the same axis up
-        and another unit; the likelier first.
-    scene: all of it as it would be built.
+    best: the most likely candidate for unit and up axis.
+    others: the best candidate with the other axis, and the best one with another unit; the more
+        likely first.
+    scene: the result of ingest.
     """
 
     format: str
@@ -100,21 +99,22 @@ def inspect(
     *,
     workers: int = 1,
 ) -> Inspection:
-    """Read a model and say what it is. Raises what `ingest` raises."""
+    """Reads a model and describes it. Raises the errors of `ingest`."""
     scene = ingest(path, options, progress, workers=workers)
     suffix = path.suffix.lower()
     tree = document_json(path) if suffix in (".glb", ".gltf") else {}
-    version = str(tree.get("asset", {}).get("version", ""))
-    count = Counter[str]()
-    for index, triangles in enumerate(np.bincount(scene.triangle_object).tolist()):
-        count[scene.objects[index]] += triangles
+    asset = tree.get("asset", {})
+    extensions = tree.get("extensionsUsed", []) + tree.get("extensionsRequired", [])
+    triangles = Counter[str]()
+    for index, count in enumerate(np.bincount(scene.triangle_object).tolist()):
+        triangles[scene.objects[index]] += count
     best, *others = _guesses(scene, USUAL_UP.get(suffix))
     return Inspection(
-        format=" ".join(part for part in (_FORMATS.get(suffix, suffix), version) if part),
-        generator=str(tree.get("asset", {}).get("generator", "")),
+        format=f"{_FORMATS.get(suffix, suffix)} {asset.get('version', '')}".strip(),
+        generator=str(asset.get("generator", "")),
         bytes=path.stat().st_size,
-        extensions={name: outcome_of(name) for name in sorted(_listed(tree))},
-        objects=dict(count.most_common()),
+        extensions={name: support_of(name) for name in sorted({*map(str, extensions)})},
+        objects=dict(triangles.most_common()),
         images=tuple(_facts(image, options) for image in scene.images),
         best=best,
         others=tuple(others),
@@ -122,44 +122,37 @@ def inspect(
     )
 
 
-def _listed(tree: dict[str, Any]) -> set[str]:
-    return {
-        *map(str, tree.get("extensionsUsed", [])),
-        *map(str, tree.get("extensionsRequired", [])),
-    }
-
-
 def _facts(image: SourceImage, options: IngestOptions) -> ImageFacts:
     data = image.load()
-    found = opened(io.BytesIO(data), Limits(options.limit << 20))  # it has been decoded before
-    return ImageFacts(image.name, found.format or "", *found.size, len(data))
+    picture = opened(io.BytesIO(data), Limits(options.limit << 20))  # ingest has decoded it
+    return ImageFacts(image.name, picture.format or "", *picture.size, len(data))
 
 
 def _guesses(scene: Scene, usual: Up | None) -> list[Guess]:
-    """The likeliest reading by the looks of the model, in its own unit and axes, then the likeliest
-    ones of the other axis and of another unit."""
+    """The most likely candidate, in the unit and axes of the model, then the best ones with the
+    other axis and with another unit."""
     space = scene.space
     points = scene.points / space.metres
-    if space.up == "z":  # the way back from `space.turned`
+    if space.up == "z":  # the inverse of `space.rotated`
         points = np.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=1)
-    named = Named.of(
+    named = NamedFaces.of(
         (scene.objects, scene.triangle_object),
         ([material.name for material in scene.materials], scene.triangle_material),
     )
-    ranked = readings(looks(points, scene.triangles, named), usual=usual)
+    ranked = candidates(evidence(points, scene.triangles, named), usual=usual)
     best = ranked[0]
-    axis = next(reading for reading in ranked if reading.up != best.up)
-    unit = next(reading for reading in ranked[1:] if reading.up == best.up)
-    others = [reading for reading in ranked if reading in (axis, unit)]
+    axis = next(candidate for candidate in ranked if candidate.up != best.up)
+    unit = next(candidate for candidate in ranked[1:] if candidate.up == best.up)
+    others = [candidate for candidate in ranked if candidate in (axis, unit)]
     return [_guess(best, others[0]), *(_guess(other, best) for other in others)]
 
 
-def _guess(reading: Reading, other: Reading) -> Guess:
+def _guess(candidate: Candidate, other: Candidate) -> Guess:
     return Guess(
-        unit=reading.unit,
-        up=reading.up,
-        size=reading.size,
-        reasons=tuple(reading.reasons(other)),
-        cost=round(reading.cost, 3),
-        rival=reading.rivals(other),
+        unit=candidate.unit,
+        up=candidate.up,
+        size=candidate.size,
+        reasons=tuple(candidate.reasons(other)),
+        cost=round(candidate.cost, 3),
+        rival=candidate.rivals(other),
     )

@@ -1,6 +1,6 @@
-"""KTX2 images with Basis Universal textures (KHR_texture_basisu), as PNG.
+"""Transcodes KTX2 images with Basis Universal textures (KHR_texture_basisu) to PNG.
 
-Their transcoder, in C++, is run in a process of its own (`apart`). As a program:
+The transcoder, in C++, runs in a child process (`sandbox`):
 ``python -P -m ptmtools.scene.ktx2 MEMORY IN OUT``.
 """
 
@@ -14,27 +14,24 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from ptmtools.errors import InputError, MissingComponentError
-from ptmtools.scene.sandbox import run_apart, serve
+from ptmtools.scene.sandbox import run_in_sandbox, serve
 from ptmtools.scene.source import FileRange
 
 MAGIC = b"\xabKTX 20\xbb\r\n\x1a\n"
-#: Where the header has width and height, in texels.
+#: Width and height in texels, and their offset in the header.
 _SIZE, _SIZE_AT = struct.Struct("<II"), 20
-#: No GPU takes a larger texture.
-_MOST = 1 << 14
+#: Largest side; no GPU supports a larger texture.
+_LARGEST_SIDE = 1 << 14
 
 
 @dataclass(frozen=True)
 class TranscodedBytes:
-    """The bytes of a PNG made of those of a KTX2 image; of any other image, its own.
-
-    Raises what `transcoded` does.
-    """
+    """The bytes of an image, as PNG if it is KTX2. Raises the errors of `transcoded`."""
 
     read: Callable[[], bytes]
 
     def size(self) -> int:
-        """How many bytes are read for it. Raises OSError."""
+        """The number of bytes that reading takes. Raises OSError."""
         return self.read.size() if isinstance(self.read, FileRange) else 0
 
     def __call__(self) -> bytes:
@@ -48,9 +45,9 @@ def transcoded(data: bytes) -> bytes:
     Raises InputError PTM-I258, and MissingComponentError PTM-M204 without opengl-basisu.
     """
     if len(data) < _SIZE_AT + _SIZE.size:
-        raise InputError("PTM-I258", "is cut short")
+        raise InputError("PTM-I258", "truncated KTX2 image")
     width, height = _SIZE.unpack_from(data, _SIZE_AT)
-    if not (0 < width <= _MOST and 0 < height <= _MOST):
+    if not (0 < width <= _LARGEST_SIDE and 0 < height <= _LARGEST_SIDE):
         raise InputError("PTM-I258", f"{width} x {height} texels in a KTX2 image")
     if find_spec("opengl_basisu") is None:
         raise MissingComponentError(
@@ -60,24 +57,24 @@ def transcoded(data: bytes) -> bytes:
             "run `npx @gltf-transform/cli ktxdecompress IN.glb OUT.glb`",
         )
     with tempfile.TemporaryDirectory() as scratch:
-        given, made = Path(scratch, "image.ktx2"), Path(scratch, "image.png")
-        given.write_bytes(data)
+        ktx2, png = Path(scratch, "image.ktx2"), Path(scratch, "image.png")
+        ktx2.write_bytes(data)
         try:
-            run_apart(__name__, "the transcoder", given, given, made)
+            run_in_sandbox(__name__, "the transcoder", ktx2, ktx2, png)
         except InputError as error:
             raise InputError("PTM-I258", error.message) from None
-        return made.read_bytes()
+        return png.read_bytes()
 
 
-def _transcode_here(given: str, made: str) -> None:
+def _transcode(ktx2: str, png: str) -> None:
     import opengl_basisu
     from PIL import Image
 
-    texture = opengl_basisu.open(given)
+    texture = opengl_basisu.open(ktx2)
     texels = texture.transcode("rgba8").data
-    shown = Image.fromarray(texels.reshape(texture.height, texture.width, 4), "RGBA")
-    (shown if texture.has_alpha else shown.convert("RGB")).save(made)
+    image = Image.fromarray(texels.reshape(texture.height, texture.width, 4), "RGBA")
+    (image if texture.has_alpha else image.convert("RGB")).save(png)
 
 
 if __name__ == "__main__":
-    serve(_transcode_here)
+    serve(_transcode)

@@ -1,7 +1,8 @@
-"""Hands what a reader has made of a model from a process apart (`apart`) to this one.
+"""Passes the result of a reader from its sandbox (`sandbox`) to this process.
 
-Arrays go through a file, all else through the answer. Images are handed over by name: which files
-may be read, and where they are, is judged here (`reference`).
+A file carries the arrays, and a JSON message (schema ``messages``) everything else. The message
+names images instead of containing them: `reference` decides in this process which files may be
+read.
 """
 
 from __future__ import annotations
@@ -16,15 +17,9 @@ import numpy as np
 from ptmtools import schemas
 from ptmtools.errors import DatabaseError
 from ptmtools.scene.model import Camera, Storey, fields_of
-from ptmtools.scene.sandbox import run_apart, unreadable
-from ptmtools.scene.source import (
-    FileRange,
-    Findings,
-    Source,
-    SourceMaterial,
-    SourceWrap,
-    Texture,
-)
+from ptmtools.scene.notes import Findings
+from ptmtools.scene.sandbox import run_in_sandbox, unreadable
+from ptmtools.scene.source import FileRange, Source, SourceMaterial, SourceWrap, Texture
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.store.checked import Stored
 
@@ -35,15 +30,15 @@ _FAULTS = (ArithmeticError, LookupError, OSError, TypeError, ValueError, Databas
 
 @dataclass(frozen=True)
 class NamedImage:
-    """An image as a model names it.
+    """A reference of a model to an image.
 
     Attributes
     ----------
-    name: of its file, as it stands in the model.
-    place: where in the model, for notes.
-    wrap_s, wrap_t: beyond [0, 1].
-    offset, length: bytes of the model's own file that hold it (USDZ); None for a file beside it.
-    package: the file beside the model that these are bytes of, if it is not the model's own.
+    name: file name as written in the model.
+    place: location in the model, for notes.
+    wrap_s, wrap_t: wrap modes beyond [0, 1].
+    offset, length: byte range of the image in the model file (USDZ); None for a separate file.
+    package: the separate file that the byte range refers to, "" for the model file.
     """
 
     name: str
@@ -55,17 +50,17 @@ class NamedImage:
     package: str = ""
 
 
-def hand_over(
+def pack_source(
     source: Source,
     images: dict[int, NamedImage],
     findings: Findings,
     scratch: str,
     files: Iterable[str] = (),
 ) -> dict[str, Any]:
-    """The answer for `take_over`.
+    """The message to `read_in_sandbox`; writes the arrays into the folder ``scratch``.
 
-    ``source`` has materials without textures; ``images`` are those of its materials, by number;
-    ``files`` are named that it was read from, or should have been, beside the model.
+    The materials of ``source`` have no textures; ``images`` are their images by number of material.
+    ``files`` names the other files that the model consists of, missing ones included.
     """
     arrays = {name: getattr(source, name) for name in _NAMES}
     if source.colors is not None:
@@ -80,42 +75,45 @@ def hand_over(
         "storeys": [vars(storey) for storey in source.storeys],
         "metres": source.metres,
         "up": source.up,
-        "findings": findings.told(),
+        "findings": findings.records(),
         "files": list(files),
     }
 
 
-def take_over(
+def read_in_sandbox(
     module: str,
     library: str,
     model: Path,
     findings: Findings,
     scratch: str,
     *arguments: str,
-    beside: int = 0,
+    other_bytes: int = 0,
 ) -> Source:
-    """What a module's reader, called with the folder ``scratch``, the model and ``arguments``, has
-    handed over; ``beside`` as of `run_apart`.
+    """The source that the reader of a module packs; its arguments are the folder ``scratch``, the
+    model and ``arguments``. ``other_bytes`` as in `run_in_sandbox`.
 
-    Raises the reader's own `PtmError`, and InputError PTM-I254 for what the library cannot read.
+    Raises the `PtmError` of the reader, and InputError PTM-I254 if the library cannot read the
+    model.
     """
-    answer = run_apart(module, library, model, scratch, model.absolute(), *arguments, beside=beside)
+    message = run_in_sandbox(
+        module, library, model, scratch, model.absolute(), *arguments, other_bytes=other_bytes
+    )
     try:
-        schemas.check(answer, schemas.HANDED)
+        schemas.check(message, schemas.MESSAGES)
         file = Path(scratch, _ARRAYS)
         arrays = unpack_arrays(file.read_bytes(), file=file)
         stored = Stored(arrays)
         points = stored.array("points", np.float64, None, 3)
         triangles = stored.indices("triangles", np.int64, None, 3, high=len(points))
         n = len(triangles)
-        findings.take(answer["findings"])
-        for name in answer["files"]:
+        findings.add_records(message["findings"])
+        for name in message["files"]:
             findings.folder.find(name)
-        materials = [SourceMaterial(**fields_of(row)) for row in answer["materials"]]
-        for number, row in answer["images"].items():
+        materials = [SourceMaterial(**fields_of(row)) for row in message["materials"]]
+        for number, row in message["images"].items():
             texture = _texture(NamedImage(**row), model, findings)
             materials[int(number)] = replace(materials[int(number)], texture=texture)
-        objects = tuple(answer["objects"])
+        objects = tuple(message["objects"])
         return Source(
             points=points,
             triangles=triangles,
@@ -124,33 +122,26 @@ def take_over(
             triangle_material=stored.indices("triangle_material", np.int64, n, high=len(materials)),
             objects=objects,
             materials=tuple(materials),
-            cameras=tuple(Camera(**fields_of(row)) for row in answer["cameras"]),
-            metres=answer["metres"],
-            up=answer["up"],
+            cameras=tuple(Camera(**fields_of(row)) for row in message["cameras"]),
+            metres=message["metres"],
+            up=message["up"],
             colors=stored.array("colors", np.uint8, n, 3, 3) if "colors" in arrays else None,
-            kinds=tuple(answer["kinds"]),
-            storeys=tuple(Storey(**row) for row in answer["storeys"]),
+            kinds=tuple(message["kinds"]),
+            storeys=tuple(Storey(**row) for row in message["storeys"]),
         )
-    except _FAULTS as error:  # the library has spoilt its own process
+    except _FAULTS as error:  # the library has corrupted its own process
         raise unreadable(library, model, str(error)) from None
 
 
 def _texture(image: NamedImage, model: Path, findings: Findings) -> Texture | None:
-    if image.offset is None:
-        file = findings.locate(image.name, image.name, image.place)
-        if file is None:
-            return None
-        read, label = FileRange(file), file.name
-    else:
-        package: Path | None = model
-        if image.package:
-            package = findings.locate(image.package, image.package, image.place)
-        if package is None:
-            return None
-        read, label = FileRange(package, image.offset, image.length), image.name
+    name = image.package or image.name
+    embedded = image.offset is not None and not image.package
+    file = model if embedded else findings.locate(name, name, image.place)
+    if file is None:
+        return None
     return Texture(
-        read=read,
-        label=label,
+        read=FileRange(file, image.offset or 0, image.length),
+        label=file.name if image.offset is None else image.name,
         what=image.name,
         place=image.place,
         wrap_s=image.wrap_s,

@@ -1,7 +1,7 @@
-"""The scene: what ingest makes of a model file, and all that later stages know of it.
+"""The scene: the result of ingest and the input of all later stages.
 
 Coordinates are world coordinates: float64, metres, Y up, with the centre of the model's floor at
-the origin (design, "Space"). Arrays are never modified in place.
+the origin (docs/design/architecture.md). Arrays are never modified in place.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from ptmtools.store.checked import Stored
 from ptmtools.tolerance import Tolerance
 
 Wrap = Literal["repeat", "clamp"]
-#: What an object is by the class that its format gives it: a part of the structure, never a part of
-#: it, a door leaf, or "" where that is left to its shape and name.
+#: The role of an object by its class in the model: structure, never structure, a door leaf, or ""
+#: if its shape and name decide.
 Kind = Literal["structural", "detail", "door", ""]
 
 
 @dataclass(frozen=True)
 class Space:
-    """How world coordinates arise from the model's: ``world = R(up) @ (model - origin) * metres``.
+    """The map from model to world coordinates: ``world = R(up) @ (model - origin) * metres``.
 
     Attributes
     ----------
     origin: (3,) centre of the floor of the bounding box, in the model's units and axes.
-    metres: metres in one unit of the model.
+    metres: length of one unit of the model.
     up: "y" or "z", the model's up axis; Z-up maps (x, y, z) to (x, z, -y).
-    unit_guessed, up_guessed: whether the value was guessed rather than given.
+    unit_guessed, up_guessed: whether neither the user nor the format defines the value.
     """
 
     origin: tuple[float, float, float]
@@ -47,19 +47,19 @@ class Space:
 
 @dataclass(frozen=True)
 class Material:
-    """What the emitted files need of a material.
+    """A material as emitted.
 
     Attributes
     ----------
-    name: the model's name for it.
-    color: (r, g, b) in [0, 1], multiplied with the image where there is one (Kd, baseColorFactor).
+    name: its name in the model.
+    color: (r, g, b) in [0, 1], multiplied with the image if there is one (Kd, baseColorFactor).
     opacity: in [0, 1].
     image: index into `Scene.images`, or -1.
-    wrap_s, wrap_t: what the image does beyond [0, 1].
+    wrap_s, wrap_t: wrap modes beyond [0, 1].
     transparent: never occludes: `opacity` < 1, alpha blending or testing, or a used texel with
         alpha < 255 unless the mode of the material ignores alpha.
     cutoff: texels with less alpha than this, in [0, 1], are not drawn, and all others are opaque;
-        None where they are blended.
+        None if texels are blended.
     """
 
     name: str
@@ -74,17 +74,17 @@ class Material:
 
 @dataclass(frozen=True)
 class SourceImage:
-    """One distinct image of the model, as the bytes of its file.
+    """A distinct image of the model, as the bytes of its file.
 
     Attributes
     ----------
-    name: file name with suffix, unique in the scene without regard to case, safe on any system.
+    name: file name with suffix, unique in the scene regardless of case, valid on any system.
     sha256: hex digest of the bytes; distinct images have distinct digests.
     load: returns the bytes.
-    files: the files that hold it and nothing else, relative to the model's folder, "/" between
-        names; none if it is part of a larger file.
-    plain: nothing of the scene but this image depends on its texels: it has no alpha channel, and
-        no other image is made of it.
+    files: the files with exactly these bytes, relative to the model's folder, "/" between names;
+        none if the image is part of a larger file.
+    plain: nothing else in the scene depends on its texels: it has no alpha channel, and no other
+        image is derived from it.
     """
 
     name: str
@@ -96,13 +96,13 @@ class SourceImage:
 
 @dataclass(frozen=True)
 class Shine:
-    """Where a material reflects, as the model says it (``map_Ks`` of OBJ); nothing was looked for.
+    """The reflection map of a material (``map_Ks`` of OBJ), not yet looked up.
 
     Attributes
     ----------
-    file: the name of the image as it stands.
-    base: folder that it is relative to.
-    fault: why it cannot be had beside the colours, or "".
+    file: name of the image as written in the model.
+    base: folder that the name is relative to.
+    fault: why it cannot be combined with the colours, or "".
     """
 
     file: str
@@ -123,7 +123,7 @@ class Camera:
 
 @dataclass(frozen=True)
 class Storey:
-    """A storey as the model names it, and the height of its floor in world metres."""
+    """A storey named by the model, and the height of its floor in world metres."""
 
     name: str
     height: float
@@ -131,7 +131,7 @@ class Storey:
 
 @dataclass(frozen=True)
 class Note:
-    """Something ingest did or missed: stable code, one line of text, where, and how often."""
+    """A guess, conversion or omission of ingest: stable code, one line of text, place, count."""
 
     code: str
     message: str
@@ -147,23 +147,23 @@ class Scene:
     ----------
     points: (V, 3) float64, metres.
     triangles: (T, 3) int32 indices into `points`, counter-clockwise seen from the front.
-    uv: (T, 3, 2) float64 per corner, origin at the image's lower left; 0 where there is none.
+    uv: (T, 3, 2) float64 per corner, origin at the image's lower left; 0 without coordinates.
     triangle_object: (T,) int32 index into `objects`.
     triangle_material: (T,) int32 index into `materials`.
     two_sided: (T,) bool; False for glTF faces whose material is not doubleSided, and for both of
         two coincident faces of opposite winding (each belongs to the side that it faces).
     objects: names, unique not required.
-    tolerance: what counts as equal, as flat and as open; derived here, once, for all stages.
+    tolerance: derived once, for all stages.
     materials, images, cameras: see their classes.
     colors: (T, 3, 3) uint8 sRGB per corner, multiplied with the image's; None if no corner has a
-        colour of its own. Materials of triangles with colours other than white are white.
-    kinds: (of `objects`) what each is by its class; empty if the format knows no classes.
-    storeys: those that the model names, from the lowest.
-    space: how the model was brought to world coordinates.
-    notes: what was dropped, missed or guessed, in the order of the model file.
-    files: what was read or looked for beside the model file, relative to its folder, "/" between
-        names: a change to any of these may change the scene. Not part of the artifact.
-    shines: (of `materials`) where each reflects, or None. Not part of the artifact.
+        colour. Materials of triangles with colours other than white are white.
+    kinds: for each object its role by class; empty for formats without classes.
+    storeys: named by the model, from the lowest.
+    space: the map from model to world coordinates.
+    notes: in the order of the model file.
+    files: other files that were read or are missing, relative to the model's folder, "/" between
+        names: a change to any of them may change the scene. Not part of the artifact.
+    shines: for each material its reflection map, or None. Not part of the artifact.
     """
 
     points: NDArray[np.float64]
@@ -197,17 +197,17 @@ class Scene:
         return opaque[self.triangle_material]
 
     def with_points(self, points: NDArray[np.float64]) -> Scene:
-        """The same triangles over (V, 3) other points, with the tolerances of those."""
+        """The same triangles over other points (V, 3), with the tolerances of those."""
         return replace(
             self, points=points, tolerance=tolerance_of(points, self.triangles, self.tolerance.step)
         )
 
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:
-        """The scene as plain arrays, without its images: what is made of the arrays alone does
-        not depend on them."""
+        """The scene as plain arrays, without its images: stages that read only the arrays do not
+        depend on the images."""
         about = {
             "objects": self.objects,
-            "materials": [_said(m) for m in self.materials],
+            "materials": [_material_row(m) for m in self.materials],
             "cameras": [vars(c) for c in self.cameras],
             "space": vars(self.space),
             "notes": [vars(n) for n in self.notes],
@@ -234,9 +234,9 @@ class Scene:
     def from_arrays(
         arrays: Mapping[str, NDArray[np.generic]], images: Sequence[SourceImage] = ()
     ) -> Scene:
-        """Inverse of `to_arrays`; ``images`` in the order in which materials count them.
+        """Inverse of `to_arrays`; ``images`` in the order of `Material.image`.
 
-        Raises KeyError or ValueError for what no scene has.
+        Raises KeyError or ValueError for arrays that are not those of a scene.
         """
         stored = Stored(arrays)
         text = stored.array("about", np.uint8, None).tobytes()
@@ -244,7 +244,7 @@ class Scene:
         objects, images = tuple(about["objects"]), tuple(images)
         materials = tuple(Material(**fields_of(row)) for row in about["materials"])
         if any(material.image >= len(images) for material in materials):
-            raise ValueError("a material has an image that is not there")
+            raise ValueError("a material refers to a missing image")
         points = stored.array("points", np.float64, None, 3, finite=True)
         triangles = stored.indices("triangles", np.int32, None, 3, high=len(points))
         n = len(triangles)
@@ -268,17 +268,17 @@ class Scene:
         )
 
 
-def _said(material: Material) -> dict[str, Any]:
-    """The fields of a material; of what few have, only what it has."""
+def _material_row(material: Material) -> dict[str, Any]:
+    """The fields of a material, without an absent `cutoff`."""
     return {name: v for name, v in vars(material).items() if name != "cutoff" or v is not None}
 
 
-def _kinds(given: Sequence[Kind], objects: int) -> tuple[Kind, ...]:
-    if given and len(given) != objects:
-        raise ValueError("there are not as many kinds as objects")
-    return tuple(given)
+def _kinds(kinds: Sequence[Kind], objects: int) -> tuple[Kind, ...]:
+    if kinds and len(kinds) != objects:
+        raise ValueError("the numbers of kinds and objects differ")
+    return tuple(kinds)
 
 
 def fields_of(row: Mapping[str, Any]) -> dict[str, Any]:
-    """The fields of a dataclass, of which JSON has made tuples lists."""
+    """The fields of a dataclass from JSON, with lists as tuples."""
     return {name: tuple(v) if isinstance(v, list) else v for name, v in row.items()}

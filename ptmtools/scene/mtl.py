@@ -1,9 +1,9 @@
 """Reads MTL, the materials of an OBJ file.
 
-Only what the emitted files need is kept: ``Kd``, ``d``/``Tr``, ``map_Kd``, ``map_d``, and
-``map_Ks`` for a campus. The statements of physically based extensions (``Pr``, ``norm``, …) are
-passed over. The format has no quoting, so the name of a texture is all that follows the last
-option, spaces included.
+The reader keeps the statements that the emitted files use: ``Kd``, ``d``/``Tr``, ``map_Kd``,
+``map_d``, and ``map_Ks`` for a campus. It ignores those of physically based extensions (``Pr``,
+``norm``, …). The format has no quoting, so the name of a texture is the rest of the statement after
+the last option, spaces included.
 """
 
 from __future__ import annotations
@@ -17,12 +17,13 @@ from pathlib import Path
 
 from ptmtools.errors import LimitError
 from ptmtools.files import open_regular
-from ptmtools.scene.source import Findings, decode
+from ptmtools.scene.notes import Findings
+from ptmtools.scene.source import decode
 
-#: Largest library that is read, MiB; those of whole cities have a few.
+#: Size limit of a library, MiB; those of whole cities have a few.
 LARGEST = 64
-#: Options of a texture statement with the least and the greatest number of their arguments: words,
-#: and numbers.
+#: Options of a texture statement with their smallest and largest number of arguments: words, and
+#: numbers.
 _WORDS = dict.fromkeys(("-blendu", "-blendv", "-cc", "-clamp", "-imfchan", "-type"), (1, 1))
 _NUMBERS = {"-mm": (2, 2), **dict.fromkeys(("-o", "-s", "-t"), (1, 3))}
 _NUMBERS |= dict.fromkeys(("-bm", "-boost", "-texres"), (1, 1))
@@ -43,11 +44,11 @@ class MapStatement:
 
     Attributes
     ----------
-    file: the name as it stands, spaces included.
+    file: the name as written, spaces included.
     scale, offset: texture coordinates become ``uv * scale + offset``.
     clamp: ``-clamp on``.
     channel: of ``-imfchan``, or "".
-    ignored: options that would change the picture and are not carried over.
+    ignored: unsupported options that would change the image.
     line: number of the line, from 1.
     """
 
@@ -61,9 +62,9 @@ class MapStatement:
 
 
 def parse_map(text: str, line: int = 0) -> MapStatement:
-    """Parse what follows the keyword of a texture statement.
+    """Parses the text after the keyword of a texture statement.
 
-    Raises ValueError where an option lacks its arguments or no file is named.
+    Raises ValueError if an option lacks its arguments or the file is missing.
     """
     words = [(m.group(), m.start()) for m in re.finditer(r"[^ \t]+", text.strip(" \t\r\n"))]
     word: dict[str, str] = {}
@@ -79,16 +80,16 @@ def parse_map(text: str, line: int = 0) -> MapStatement:
             word[name] = arguments[0].lower()
             continue
         numbers[name] = [number(argument) for argument in arguments]
-        # Further arguments only if they are numbers, and the last word is always the file's.
+        # Further arguments only if they are numbers; the last word always belongs to the file.
         with suppress(ValueError):
             while len(numbers[name]) < most and at < len(words) - 1:
                 numbers[name].append(number(words[at][0]))
                 at += 1
     if at >= len(words):
-        raise ValueError("no file is named")
+        raise ValueError("the file is missing")
     scale = [*numbers.get("-s", ()), 1.0, 1.0]
     offset = [*numbers.get("-o", ()), 0.0, 0.0]
-    # What changes colours or positions and is not carried over.
+    # Unsupported options that change colours or positions.
     changes = {
         "-cc": word.get("-cc") == "on",
         "-mm": numbers.get("-mm", [0.0, 1.0]) != [0.0, 1.0],
@@ -107,8 +108,8 @@ def parse_map(text: str, line: int = 0) -> MapStatement:
 
 @dataclass
 class MtlMaterial:
-    """A ``newmtl`` block of a library; ``dissolve`` is ``d``, or 1 - ``Tr`` where only that is
-    given. That ``map_Ks`` is not understood is no miss, since few ask for it: ``map_ks_fault``."""
+    """A ``newmtl`` block of a library; ``dissolve`` is ``d``, or else 1 - ``Tr``. An invalid
+    ``map_Ks`` is no miss, since few builds use it; ``map_ks_fault`` is its error."""
 
     library: Path
     color: tuple[float, float, float] | None = None
@@ -121,18 +122,18 @@ class MtlMaterial:
 
 
 def read_mtl(path: Path, findings: Findings) -> dict[str, MtlMaterial]:
-    """Materials by name, in the order of the file; of two with one name the first is kept.
+    """The materials by name, in the order of the file, the first of each name.
 
-    A line that cannot be understood is a miss. Raises LimitError
-    PTM-L204 for a library larger than `LARGEST`, and OSError.
+    An invalid line is a miss. Raises LimitError PTM-L204 for a library larger than `LARGEST`, and
+    OSError.
     """
     with open_regular(path) as stream:
         if os.fstat(stream.fileno()).st_size > LARGEST << 20:
             raise LimitError(
                 "PTM-L204",
-                f"is larger than {LARGEST} MiB",
+                f"larger than {LARGEST} MiB",
                 file=path,
-                remedy="remove the materials that are not used",
+                remedy="remove the unused materials",
             )
         data = stream.read()
     label = findings.folder.label(path)
@@ -147,20 +148,20 @@ def read_mtl(path: Path, findings: Findings) -> dict[str, MtlMaterial]:
         if key == "newmtl":
             current = MtlMaterial(path)
             if materials.setdefault(rest, current) is not current:
-                findings.say(
-                    "PTM-N218", f"material {rest} is defined again; the first counts", place
+                findings.note(
+                    "PTM-N218", f"material {rest} defined again; the first definition used", place
                 )
         elif current is not None:
             try:
                 _statement(current, key, rest, index)
             except ValueError as error:
-                what = f"{line.strip()[:80]}: not understood ({error})"
-                findings.miss("PTM-N214", what, place)
+                message = f"invalid statement {line.strip()[:80]} ({error})"
+                findings.miss("PTM-N214", message, place)
     return materials
 
 
 def _share(words: list[str]) -> float:
-    """The first word as a number, brought into [0, 1]."""
+    """The first word as a number, clipped to [0, 1]."""
     if not words:
         raise ValueError("a number is missing")
     return min(max(number(words[0]), 0.0), 1.0)
@@ -170,7 +171,7 @@ def _statement(material: MtlMaterial, key: str, rest: str, line: int) -> None:
     words = rest.split()
     if key == "kd":
         if words and words[0].lower() in ("spectral", "xyz"):
-            raise ValueError("only Kd r g b is read")
+            raise ValueError("only Kd r g b is supported")
         red = _share(words)
         green, blue = (_share(words[k:]) if len(words) > 2 else red for k in (1, 2))
         material.color = (red, green, blue)

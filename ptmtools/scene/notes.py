@@ -1,15 +1,20 @@
-"""The notes of ingest as lines, and which of them are warnings; codes are in docs/guide/cli.md."""
+"""The notes of an ingest: their collection, their text, and which of them are warnings.
+
+docs/guide/cli.md lists the codes.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 
+from ptmtools.errors import InputError
 from ptmtools.scene.model import Note
+from ptmtools.scene.reference import Folder
 
-#: The codes of warnings, in the order in which they are told. All numbers are wrong in a model that
-#: lies on its side or has another unit; nothing is seen in one that is inside out; surfaces are
-#: plain without their materials and images, and there are holes where faces, or whole products, are
-#: missing.
+#: Codes of warnings in the order of printing, the most serious first: orientation and unit, which
+#: make all numbers wrong; a model that is inside out; missing materials and images; missing faces
+#: and products.
 WARNINGS = (
     "PTM-N234",
     "PTM-N232",
@@ -26,22 +31,96 @@ WARNINGS = (
     "PTM-N259",
     "PTM-N244",
 )
-
-
-#: The runner-up of the up axis: no warning, and shown without ``-v`` all the same.
+#: The second best up axis: not a warning, but printed without ``-v``.
 RUNNER_UP = "PTM-N238"
-#: Of no meaning where a model is looked at from outside, as statues and the buildings of a campus
-#: are: there a face that is turned away from all rooms is as it should be.
-OF_ROOMS = frozenset({"PTM-N235"})
+#: Irrelevant for models that are viewed from outside, such as statues and campus buildings: their
+#: faces are supposed to be turned away from the rooms.
+INTERIOR_ONLY = frozenset({"PTM-N235"})
 
 
-def outside(notes: Iterable[Note]) -> list[Note]:
-    """Those that matter to who stands outside."""
-    return [note for note in notes if note.code not in OF_ROOMS]
+class Findings:
+    """The notes of one ingest, and the folder in which its files are looked up.
+
+    A *miss* is a note on something that the model requires and that is unavailable: a file, a
+    material, a face. With ``strict`` a miss is an error. Note and error share their number: note
+    PTM-N203 is error PTM-I203.
+    """
+
+    def __init__(self, model: Path, allow_outside: bool = False) -> None:
+        self.model = model
+        self.folder = Folder(model.absolute().parent, allow_outside)
+        self._notes: dict[tuple[str, str, str], int] = {}
+        self._misses: dict[tuple[str, str, str], None] = {}
+
+    def note(self, code: str, message: str, place: str = "", count: int = 1) -> None:
+        """Records a guess, a conversion or an omission."""
+        key = (code, message, place)
+        self._notes[key] = self._notes.get(key, 0) + count
+
+    def miss(self, code: str, message: str, place: str = "", count: int = 1) -> None:
+        """Records a note that is an error with ``strict``."""
+        if (code, message, place) not in self._notes:
+            self._misses[code, message, place] = None
+        self.note(code, message, place, count)
+
+    def locate(
+        self,
+        name: str,
+        what: str,
+        place: str,
+        missing: str = "PTM-N204",
+        base: Path | None = None,
+        hint: str = "",
+    ) -> Path | None:
+        """`Folder.find` with a note if the file is elsewhere, outside or missing.
+
+        ``what`` begins the message, ``hint`` ends it if the file is missing.
+        """
+        result = self.folder.find(name, base)
+        if result.outcome == "outside":
+            self.miss("PTM-N205", f"{what}: lies outside the model's folder", place)
+        elif result.path is None:
+            self.miss(missing, f"{what}: not found{hint}", place)
+        elif result.outcome == "elsewhere":
+            self.note("PTM-N208", f"{what}: found as {self.folder.label(result.path)}", place)
+        return result.path
+
+    def records(self) -> list[tuple[str, str, str, int, bool]]:
+        """All notes for `add_records` in another process: code, message, place, count, and whether
+        the note is a miss."""
+        return [(*key, count, key in self._misses) for key, count in self._notes.items()]
+
+    def add_records(self, records: Iterable[tuple[str, str, str, int, bool]]) -> None:
+        """Adds the `records` of another process."""
+        for code, message, place, count, missed in records:
+            (self.miss if missed else self.note)(code, message, place, count)
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        return tuple(Note(*key, count) for key, count in self._notes.items())
+
+    def enforce(self) -> None:
+        """Raises InputError for the first miss, with the number of the others."""
+        if not self._misses:
+            return
+        code, message, place = next(iter(self._misses))
+        more = len(self._misses) - 1
+        raise InputError(
+            code.replace("-N", "-I"),
+            message + (f" (and {more} more findings)" if more else ""),
+            file=self.model,
+            place=place or None,
+            remedy="correct the model, or build without --strict",
+        )
+
+
+def exterior_notes(notes: Iterable[Note]) -> list[Note]:
+    """The notes that are relevant for a model that is viewed from outside."""
+    return [note for note in notes if note.code not in INTERIOR_ONLY]
 
 
 def line(note: Note, more: int = 0) -> str:
-    """A note in one line, which may stand for more of its code."""
+    """The text of a note, with the number of further notes of its code."""
     where = f"{note.place}: " if note.place else ""
     times = f" ({note.count:,} times)" if note.count > 1 else ""
     others = f", and {more:,} more like it" if more else ""
@@ -49,7 +128,7 @@ def line(note: Note, more: int = 0) -> str:
 
 
 def warnings(notes: Iterable[Note]) -> Iterator[str]:
-    """The gravest of some notes, a line for each code."""
+    """The text of the warnings among some notes, one line for each code."""
     by_code: dict[str, list[Note]] = {}
     for note in notes:
         by_code.setdefault(note.code, []).append(note)

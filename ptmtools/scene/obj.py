@@ -1,15 +1,13 @@
-"""Reads Wavefront OBJ.
+"""Reads Wavefront OBJ files and resolves their materials.
 
-A reader of our own rather than trimesh's, because trimesh (5.2) reads the first ``mtllib`` only,
-knows neither ``d``, ``Tr`` and ``map_d`` nor the options of ``map_Kd``, cuts concave quads and
-polygons as fans, joins the names of objects and materials into one, passes over missing files in
-silence, and forgets which line anything came from. Statements are read line by line into flat
-arrays: 1,002,528 triangles (65 MB) take 9 s of one core and 0.5 GB, cleaning included. Normals and
-smoothing groups are not used by later stages and are skipped; curves, lines and points are skipped
-and counted. Vertices may have colours (``v x y z r g b``), which no specification has and many
-scanners write; where one has, these take the place of ``Kd``.
-
-Materials of an OBJ file: finds the libraries that it names, and in them what it uses."""
+trimesh (5.2) is not used because it reads the first ``mtllib`` only, supports neither ``d``, ``Tr``
+and ``map_d`` nor the options of ``map_Kd``, cuts concave quads and polygons as fans, joins the
+names of objects and materials, ignores missing files silently, and loses line numbers. Statements
+are read line by line into flat arrays: 1,002,528 triangles (65 MB) take 9 s of one core and 0.5 GB,
+cleaning included. Normals and smoothing groups are skipped, since later stages do not use them;
+curves, lines and points are skipped and counted. Vertices may have colours (``v x y z r g b``), an
+unspecified extension that many scanners write; these replace ``Kd``.
+"""
 
 from __future__ import annotations
 
@@ -27,105 +25,104 @@ from ptmtools.errors import InputError, LimitError
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Shine, Wrap
 from ptmtools.scene.mtl import MapStatement, MtlMaterial, read_mtl
+from ptmtools.scene.notes import Findings
 from ptmtools.scene.polygon import triangulate
-from ptmtools.scene.rows import painted
+from ptmtools.scene.rows import vertex_colors
 from ptmtools.scene.source import (
     MAX_VERTICES,
     FileRange,
-    Findings,
     Source,
     SourceMaterial,
     Texture,
     too_many_triangles,
 )
 
-#: The next file of a mtllib statement, which ends as such files do, or all that is left.
+#: The next file of a mtllib statement, up to its suffix, or the rest of the statement.
 _LIBRARIES = re.compile(r".*?\.mtl[\"']*(?: |$)|.+", re.IGNORECASE)
 
 
 def library_names(text: str) -> list[str]:
-    """The files of a mtllib statement: several, divided by blanks that names may contain too."""
+    """The files of a mtllib statement, separated by blanks, which may also be part of names."""
     return [name.strip() for name in _LIBRARIES.findall(text) if name.strip()]
 
 
-def resolved(
+def resolve_materials(
     path: Path,
     libraries: Iterable[tuple[str, int]],
     named: Mapping[str, tuple[int, int]],
     used: Set[int],
     findings: Findings,
 ) -> tuple[tuple[SourceMaterial, ...], dict[int, MapStatement]]:
-    """The materials of an OBJ file, and the map_Kd of those that have one, by number.
+    """The materials of an OBJ file, and the map_Kd statements by number of material.
 
     Parameters
     ----------
-    libraries: what each mtllib statement says, and its line.
-    named: of the materials in their order, by name: number, and line of the first usemtl.
-    used: the numbers of those that some face has; of the others no image is looked for.
+    libraries: text and line of each mtllib statement.
+    named: by name of material, in order: its number, and the line of the first usemtl.
+    used: numbers of the materials of faces; the images of others are not looked up.
 
-    Raises what `read_mtl` raises.
+    Raises the errors of `read_mtl`.
     """
     defined: dict[str, MtlMaterial] = {}
     read: set[Path] = set()
     for text, line in libraries:
         place = f"{path.name}:{line}"
         for name in library_names(text):
-            there = findings.folder.find(name).path is not None
-            suggestion = "" if there else _suggestion(path, name)
-            file = findings.locate(name, f"mtllib {name}", place, "PTM-N203", hint=suggestion)
+            missing = findings.folder.find(name).path is None
+            hint = _renaming_hint(path, name) if missing else ""
+            file = findings.locate(name, f"mtllib {name}", place, "PTM-N203", hint=hint)
             if file is None or (real := file.resolve()) in read:
                 continue
             read.add(real)
-            for key, material in read_mtl(file, findings).items():
-                defined.setdefault(key, material)
+            for key, block in read_mtl(file, findings).items():
+                defined.setdefault(key, block)
 
     materials: list[SourceMaterial] = []
     maps: dict[int, MapStatement] = {}
     for name, (index, line) in named.items():
-        known = defined.get(name)
-        if known is None:
+        material = defined.get(name)
+        if material is None:
             if name and index in used:
                 findings.miss("PTM-N207", f"usemtl {name}: no such material", f"{path.name}:{line}")
             materials.append(SourceMaterial(name or "default"))
             continue
         texture = mask = None
         if index in used:
-            texture = _texture(known, "map_Kd", known.map_kd, findings)
-            mask = _texture(known, "map_d", known.map_d, findings)
-        if texture is not None and known.map_kd is not None:
-            maps[index] = known.map_kd
+            texture = _texture(material, "map_Kd", material.map_kd, findings)
+            mask = _texture(material, "map_d", material.map_d, findings)
+        if texture is not None and material.map_kd is not None:
+            maps[index] = material.map_kd
         materials.append(
             SourceMaterial(
                 name=name,
-                color=known.color,
-                opacity=known.dissolve,
-                # A mask that cannot be read: better see too much than too little.
-                see_through=known.dissolve < 1 or (known.map_d is not None and mask is None),
+                color=material.color,
+                opacity=material.dissolve,
+                # A missing mask must not hide anything.
+                see_through=material.dissolve < 1 or (material.map_d is not None and mask is None),
                 texture=texture,
                 mask=mask,
-                shine=_shine(known),
+                shine=_shine(material),
             )
         )
     return tuple(materials), maps
 
 
 def _shine(material: MtlMaterial) -> Shine | None:
-    colors, said, base = material.map_kd, material.map_ks, material.library.parent
+    colors, reflection, base = material.map_kd, material.map_ks, material.library.parent
     if material.map_ks_fault:
         return Shine("", base, f"map_Ks: {material.map_ks_fault}")
-    if said is None:
+    if reflection is None:
         return None
-    alike = colors is None or (colors.scale, colors.offset) == (said.scale, said.offset)
-    return Shine(said.file, base, "" if alike else "other texture coordinates")
+    same = colors is None or (colors.scale, colors.offset) == (reflection.scale, reflection.offset)
+    return Shine(reflection.file, base, "" if same else "other texture coordinates")
 
 
-def _suggestion(path: Path, name: str) -> str:
-    """What to do about a missing library: a model that was renamed still asks for what its
-    library was called."""
-    beside = [p.name for p in path.absolute().parent.glob("*") if p.suffix.lower() == ".mtl"]
-    if len(beside) != 1:
+def _renaming_hint(path: Path, name: str) -> str:
+    """A hint for a missing library: a renamed model still refers to the old name of its library."""
+    libraries = [p.name for p in path.absolute().parent.glob("*") if p.suffix.lower() == ".mtl"]
+    if len(libraries) != 1:
         return ""
-    return f"; if {beside[0]} beside the model is meant, rename it to {Path(name).name}"
+    return f"; if {libraries[0]} is the library of the model, rename it to {Path(name).name}"
 
 
 def _texture(
@@ -139,15 +136,13 @@ def _texture(
     if file is None:
         return None
     if statement.ignored:
-        findings.say("PTM-N215", f"{what}: ignored {' '.join(statement.ignored)}", place)
-    if statement.scale != (1.0, 1.0) or statement.offset != (0.0, 0.0):
+        findings.note("PTM-N215", f"{what}: ignored {' '.join(statement.ignored)}", place)
+    transform, colors = (statement.scale, statement.offset), material.map_kd
+    if transform != ((1.0, 1.0), (0.0, 0.0)):
         if key == "map_Kd":
-            findings.say("PTM-N216", f"{what}: -s and -o are baked into its faces", place)
-        elif material.map_kd is None or (statement.scale, statement.offset) != (
-            material.map_kd.scale,
-            material.map_kd.offset,
-        ):
-            findings.say("PTM-N215", f"{what}: ignored -s -o", place)
+            findings.note("PTM-N216", f"{what}: -s and -o baked into its faces", place)
+        elif colors is None or transform != (colors.scale, colors.offset):
+            findings.note("PTM-N215", f"{what}: ignored -s -o", place)
     wrap: Wrap = "clamp" if statement.clamp else "repeat"
     return Texture(
         read=FileRange(file),
@@ -160,7 +155,7 @@ def _texture(
     )
 
 
-#: Statements that say nothing about surfaces, skipped without a word.
+#: Statements without effect on surfaces, skipped without a note.
 # fmt: off
 _SILENT = frozenset({
     "vn", "vp", "s", "mg", "bevel", "c_interp", "d_interp", "lod", "shadow_obj", "trace_obj",
@@ -168,10 +163,10 @@ _SILENT = frozenset({
     "end", "con", "ctech", "stech", "call", "csh",
 })
 # fmt: on
-#: Statements that would draw something that is not a surface of triangles.
+#: Statements that draw other primitives than triangles.
 _NOT_DRAWN = {"l": "lines", "p": "points", "curv": "curves", "curv2": "curves", "surf": "surfaces"}
 _LINES_A_TICK = 1 << 16
-#: Longest line, with those that a backslash joins to it, in characters.
+#: Longest line, with its continuation lines, in characters.
 LONGEST_LINE = 1 << 24
 #: A UTF-8 byte order mark, read as Latin-1.
 _MARK = "\u00ef\u00bb\u00bf"
@@ -179,8 +174,7 @@ _MARK = "\u00ef\u00bb\u00bf"
 
 @dataclass
 class _Statements:
-    """The statements of a file: flat arrays, and of materials the number and the line where each
-    first stands."""
+    """The statements of a file as flat arrays, and the number and first line of each material."""
 
     points: array[float] = field(default_factory=lambda: array("d"))
     colored: array[int] = field(default_factory=lambda: array("q"))
@@ -204,19 +198,20 @@ def read_obj(
     progress: Progress = silent,
     max_triangles: int = MAX_VERTICES,
 ) -> Source:
-    """Read an OBJ file with its materials.
+    """Reads an OBJ file with its materials.
 
-    Raises InputError with the line for what cannot be read, and where there is no face at all;
+    Raises InputError with the line of an invalid statement, and for a file without faces;
     LimitError for more vertices than int32 can number (PTM-L200), a line longer than `LONGEST_LINE`
-    (PTM-L202), more than ``max_triangles`` (PTM-L203, before polygons are cut), and what `read_mtl`
-    raises.
+    (PTM-L202), more than ``max_triangles`` (PTM-L203, before polygons are cut), and the errors of
+    `read_mtl`.
     """
-    said = _read_statements(path, findings, progress, max_triangles)
-    for key, lines in said.unknown.items():
-        what = _NOT_DRAWN.get(key, "not known")
-        findings.say("PTM-N219", f"{key}: {what}, skipped", f"{path.name}:{lines[0]}", len(lines))
-    if not said.face_line:
-        garbage = next(iter(said.unknown.values()), None) if not said.points else None
+    statements = _read_statements(path, findings, progress, max_triangles)
+    for key, lines in statements.unknown.items():
+        kind = _NOT_DRAWN.get(key, "unknown statement")
+        findings.note("PTM-N219", f"{key}: {kind}, skipped", f"{path.name}:{lines[0]}", len(lines))
+    if not statements.face_line:
+        unknown = next(iter(statements.unknown.values()), None)
+        garbage = None if statements.points else unknown
         raise InputError(
             "PTM-I247",
             "not an OBJ file" if garbage else "no faces",
@@ -224,50 +219,52 @@ def read_obj(
             place=f"line {garbage[0]}" if garbage else None,
             remedy="give a model with f statements",
         )
-    start = np.frombuffer(said.face_start, dtype=np.int64)
-    line = np.frombuffer(said.face_line, dtype=np.int64)
-    points = np.frombuffer(said.points, dtype=np.float64).reshape(-1, 3)
-    coords = np.frombuffer(said.coords, dtype=np.float64).reshape(-1, 2)
-    corner_point = np.frombuffer(said.corner_point, dtype=np.int64)
-    corner_coord = np.frombuffer(said.corner_coord, dtype=np.int64)
-    for corner, count, what in (
+    start = np.frombuffer(statements.face_start, dtype=np.int64)
+    line = np.frombuffer(statements.face_line, dtype=np.int64)
+    points = np.frombuffer(statements.points, dtype=np.float64).reshape(-1, 3)
+    coords = np.frombuffer(statements.coords, dtype=np.float64).reshape(-1, 2)
+    corner_point = np.frombuffer(statements.corner_point, dtype=np.int64)
+    corner_coord = np.frombuffer(statements.corner_coord, dtype=np.int64)
+    for corner, count, item in (
         (corner_point, len(points), "vertex"),
         (corner_coord, len(coords), "texture coordinate"),
     ):
-        wrong = np.flatnonzero(corner >= count)
-        if len(wrong):
-            face = int(np.searchsorted(start, wrong[0], side="right")) - 1
+        invalid = np.flatnonzero(corner >= count)
+        if len(invalid):
+            face = int(np.searchsorted(start, invalid[0], side="right")) - 1
             raise InputError(
                 "PTM-I246",
-                f"{what} {corner[wrong[0]] + 1} does not exist, there are {count}",
+                f"{item} {corner[invalid[0]] + 1} of {count} does not exist",
                 file=path,
                 place=f"line {line[face]}",
-                remedy="the file may be cut short",
+                remedy="the file may be truncated",
             )
 
     cut = triangulate(points[corner_point], start)
     if cut.tangled:
-        findings.say(
+        findings.note(
             "PTM-N221",
-            "polygons with crossing edges, or too many corners, were cut into fans of triangles",
+            "polygons with crossing edges or too many corners cut into fans of triangles",
             path.name,
             cut.tangled,
         )
     coord = corner_coord[cut.corner]
     uv = np.zeros((len(coord), 3, 2))
     uv[coord >= 0] = coords[coord[coord >= 0]]
-    face_material = np.frombuffer(said.face_material, dtype=np.int64)
+    face_material = np.frombuffer(statements.face_material, dtype=np.int64)
     used = set(np.unique(face_material).tolist())
-    materials, maps = resolved(path, said.libraries, said.materials, used, findings)
+    materials, maps = resolve_materials(
+        path, statements.libraries, statements.materials, used, findings
+    )
     triangle_material = face_material[cut.polygon]
     ends = np.cumsum(np.bincount(triangle_material, minlength=len(materials)))
     grouped = np.split(np.argsort(triangle_material, kind="stable"), ends[:-1])
     for index, statement in maps.items():
-        which = grouped[index]
-        uv[which] = uv[which] * statement.scale + statement.offset
-        bare = np.unique(cut.polygon[which[(coord[which] < 0).any(axis=1)]])
+        rows = grouped[index]
+        uv[rows] = uv[rows] * statement.scale + statement.offset
+        bare = np.unique(cut.polygon[rows[(coord[rows] < 0).any(axis=1)]])
         if len(bare):
-            findings.say(
+            findings.note(
                 "PTM-N229",
                 f"faces of textured material {materials[index].name} have no texture coordinates",
                 f"{path.name}:{line[bare[0]]}",
@@ -275,24 +272,24 @@ def read_obj(
             )
     triangles = corner_point[cut.corner]
     colors = None
-    if said.colored:
-        colored = np.frombuffer(said.colored, dtype=np.int64)
-        given = np.frombuffer(said.colors, dtype=np.float64).reshape(-1, 3)
-        materials, colors = painted(materials, triangles, triangle_material, colored, given)
+    if statements.colored:
+        colored = np.frombuffer(statements.colored, dtype=np.int64)
+        values = np.frombuffer(statements.colors, dtype=np.float64).reshape(-1, 3)
+        materials, colors = vertex_colors(materials, triangles, triangle_material, colored, values)
     return Source(
         points=points,
         triangles=triangles,
         uv=uv,
-        triangle_object=np.frombuffer(said.face_object, dtype=np.int64)[cut.polygon],
+        triangle_object=np.frombuffer(statements.face_object, dtype=np.int64)[cut.polygon],
         triangle_material=triangle_material,
-        objects=tuple(said.objects),
+        objects=tuple(statements.objects),
         materials=materials,
         colors=colors,
     )
 
 
 def _name(text: str) -> str:
-    """A name as it was meant: the stream is read as Latin-1, most files are UTF-8."""
+    """A name in UTF-8, if it is valid; the stream is read as Latin-1."""
     try:
         return text.encode("latin-1").decode("utf-8")
     except UnicodeDecodeError:
@@ -300,13 +297,14 @@ def _name(text: str) -> str:
 
 
 def _rest(line: str, key: str) -> str:
-    """What follows the keyword; only blanks are trimmed (a stray UTF-8 byte may look like one)."""
+    """The text after the keyword; only ASCII blanks are trimmed, since a byte of UTF-8 may look
+    like one in Latin-1."""
     return _name(line.strip(" \t\r\n")[len(key) :].strip(" \t"))
 
 
 def _logical_lines(stream: TextIO, path: Path) -> Iterator[tuple[int, str]]:
-    """Lines with their numbers from 1; a backslash at the end joins the next one. Raises LimitError
-    PTM-L202."""
+    """The lines with their numbers from 1, joined with those that follow a final backslash. Raises
+    LimitError PTM-L202."""
     number = 0
     while line := stream.readline(LONGEST_LINE + 1):
         number += 1
@@ -322,7 +320,7 @@ def _logical_lines(stream: TextIO, path: Path) -> Iterator[tuple[int, str]]:
         if length > LONGEST_LINE:
             raise LimitError(
                 "PTM-L202",
-                f"is longer than {LONGEST_LINE} characters",
+                f"longer than {LONGEST_LINE} characters",
                 file=path,
                 place=f"line {first}",
                 remedy="if this is an OBJ file, split the face",
@@ -333,8 +331,8 @@ def _logical_lines(stream: TextIO, path: Path) -> Iterator[tuple[int, str]]:
 def _read_statements(
     path: Path, findings: Findings, progress: Progress, max_triangles: int
 ) -> _Statements:
-    said = _Statements()
-    points, coords = said.points, said.coords
+    statements = _Statements()
+    points, coords = statements.points, statements.coords
     size = path.stat().st_size
     object_name = group_name = ""
     object_index = material_index = -1
@@ -357,8 +355,8 @@ def _read_statements(
             try:
                 if key == "v":
                     if len(words) >= 7:
-                        said.colored.append(len(points) // 3)
-                        said.colors.extend(map(float, words[4:7]))
+                        statements.colored.append(len(points) // 3)
+                        statements.colors.extend(map(float, words[4:7]))
                     points.extend(map(float, words[1:4]))
                     if len(words) < 4:
                         raise ValueError("a vertex has three coordinates")
@@ -371,33 +369,35 @@ def _read_statements(
                         continue
                     if object_index < 0:
                         name = "/".join(part for part in (object_name, group_name) if part)
-                        object_index = said.objects.setdefault(name or path.stem, len(said.objects))
+                        object_index = statements.objects.setdefault(
+                            name or path.stem, len(statements.objects)
+                        )
                     if material_index < 0:
-                        unnamed = len(said.materials), number
-                        material_index, _ = said.materials.setdefault("", unnamed)
-                    _face(said, words)
-                    said.face_line.append(number)
-                    said.face_object.append(object_index)
-                    said.face_material.append(material_index)
-                    if len(said.corner_point) - 2 * len(said.face_line) > max_triangles:
+                        unnamed = len(statements.materials), number
+                        material_index, _ = statements.materials.setdefault("", unnamed)
+                    _face(statements, words)
+                    statements.face_line.append(number)
+                    statements.face_object.append(object_index)
+                    statements.face_material.append(material_index)
+                    if len(statements.corner_point) - 2 * len(statements.face_line) > max_triangles:
                         raise too_many_triangles(max_triangles, path)
                 elif key == "usemtl":
-                    name, new = _rest(line, "usemtl"), (len(said.materials), number)
-                    material_index, _ = said.materials.setdefault(name, new)
+                    name, new = _rest(line, "usemtl"), (len(statements.materials), number)
+                    material_index, _ = statements.materials.setdefault(name, new)
                 elif key == "o":
                     object_name, group_name, object_index = _rest(line, "o"), "", -1
                 elif key == "g":
                     group_name, object_index = _rest(line, "g"), -1
                 elif key == "mtllib":
-                    said.libraries.append((_rest(line, "mtllib"), number))
+                    statements.libraries.append((_rest(line, "mtllib"), number))
                 elif key not in _SILENT:
                     if "\0" in line:
                         raise ValueError("binary data")
-                    said.unknown.setdefault(key[:40], []).append(number)
+                    statements.unknown.setdefault(key[:40], []).append(number)
             except (ValueError, IndexError, OverflowError) as error:
                 raise InputError(
                     "PTM-I245",
-                    f"{line.strip()[:60]!r} is not understood"
+                    f"invalid statement {line.strip()[:60]!r}"
                     + ("" if isinstance(error, IndexError) else f" ({error})"),
                     file=path,
                     place=f"line {number}",
@@ -411,21 +411,21 @@ def _read_statements(
             "PTM-N220", "faces of fewer than three corners", f"{path.name}:{short[0]}", len(short)
         )
     progress(size, size, "reading")
-    return said
+    return statements
 
 
-def _face(said: _Statements, words: list[str]) -> None:
-    """Append the corners of a face: ``p``, ``p/t``, ``p//n`` or ``p/t/n``; -1 is the last one."""
+def _face(statements: _Statements, words: list[str]) -> None:
+    """Appends the corners of a face: ``p``, ``p/t``, ``p//n`` or ``p/t/n``; -1 is the last one."""
     for word in words[1:]:
         parts = word.split("/")
         point = int(parts[0])
         coord = int(parts[1]) if len(parts) > 1 and parts[1] else None
         if point < 0:
-            point += len(said.points) // 3 + 1
+            point += len(statements.points) // 3 + 1
         if coord is not None and coord < 0:
-            coord += len(said.coords) // 2 + 1
+            coord += len(statements.coords) // 2 + 1
         if point < 1 or (coord is not None and coord < 1):
-            raise ValueError(f"{word} counts back beyond the first, or is 0")
-        said.corner_point.append(point - 1)
-        said.corner_coord.append(-1 if coord is None else coord - 1)
-    said.face_start.append(len(said.corner_point))
+            raise ValueError(f"{word} is 0 or before the first one")
+        statements.corner_point.append(point - 1)
+        statements.corner_coord.append(-1 if coord is None else coord - 1)
+    statements.face_start.append(len(statements.corner_point))

@@ -1,4 +1,4 @@
-"""Options of ingest, and the file formats that it reads."""
+"""Options of ingest, and the supported file formats."""
 
 from __future__ import annotations
 
@@ -21,8 +21,7 @@ SUFFIXES = (*OWN, *TRIMESH, *MESHLAB, *IFC, *USD)
 class IngestOptions:
     """Options of `ptmtools.scene.ingest`.
 
-    Raises InputError: PTM-I250 an unknown unit, PTM-I251 an unknown up axis, PTM-I257 a limit
-    below 1.
+    Raises InputError: PTM-I250 unknown unit, PTM-I251 unknown up axis, PTM-I257 limit below 1.
     """
 
     heading: ClassVar[str] = "Model"
@@ -48,7 +47,7 @@ class IngestOptions:
         basic=True,
     )
     allow_outside: bool = option(False, "Also read files outside the model's folder.")
-    # Limits end a build or change nothing in it, so they do not decide whether a stage is current.
+    # Limits either end a build or have no effect, so a changed limit does not invalidate a stage.
     limit: int = option(1024, "Largest decoded size of an image.", metavar="MIB", compare=False)
     max_triangles: int = option(
         20_000_000, "Largest number of triangles of the model.", compare=False
@@ -56,7 +55,7 @@ class IngestOptions:
 
     def __post_init__(self) -> None:
         if self.up not in (None, "y", "z"):
-            raise InputError("PTM-I251", f"up axis {self.up!r} is not known", remedy="give y or z")
+            raise InputError("PTM-I251", f"unknown up axis {self.up!r}", remedy="give y or z")
         if self.limit < 1 or self.max_triangles < 1:
             raise InputError(
                 "PTM-I257",

@@ -1,17 +1,17 @@
 """Cuts polygons into triangles without adding points.
 
-Convex polygons become fans around their first vertex, as every viewer draws them; a quad whose
-fan would fold over takes its other diagonal. All others are cut by clipping ears in the plane of
-their Newell normal (Meisters 1975), which also serves concave, slightly bent and keyhole outlines.
-Shapely's constrained Delaunay triangulation was rejected: it refuses outlines that touch
-themselves, and needs a GEOS newer than the one we ask for. So was mapbox_earcut (2.1), which would
-save 40 statements: its time has no bound. A spiral of 10,000 corners takes it 6.6 s, a star of
-100,000 takes 6 s, and one of a million had not ended after a minute; here none of them takes 4 s.
+Convex polygons become fans around their first vertex, as every viewer draws them; a quad whose fan
+would fold over uses the other diagonal. All others are cut by ear clipping in the plane of their
+Newell normal (Meisters 1975), which also handles concave, slightly bent and keyhole outlines.
+Rejected: Shapely's constrained Delaunay triangulation, which refuses outlines that touch themselves
+and needs a newer GEOS than required here; and mapbox_earcut (2.1), which would save 40 statements
+but has no bound on its time: a spiral of 10,000 corners takes it 6.6 s, a star of 100,000 takes
+6 s, and one of a million had not ended after a minute; here none of them takes 4 s.
 
-Clipping (`polygon_kernels`) takes a time that grows with the square of an outline, and for outlines
-made to be difficult faster. The steps that all of them together may take grow with the number of
-corners only; an outline for which they do not suffice becomes a fan, and is counted as tangled.
-That happens to single concave polygons from 50,000 corners on.
+The time of ear clipping (`polygon_kernels`) grows with the square of the number of corners, and
+faster for adversarial outlines. The budget of steps for all outlines together is linear in the
+number of corners; an outline that exceeds it becomes a fan and counts as tangled. That affects
+single concave polygons from 50,000 corners on.
 """
 
 from __future__ import annotations
@@ -23,21 +23,20 @@ from numpy.typing import NDArray
 
 from ptmtools.tolerance import ROUNDING_SHARE
 
-#: Steps of clipping, of about 3 ns, one for each corner that is looked at: for all outlines
-#: together, and for each of their corners besides.
+#: Budget of clipping steps (one tested corner, about 3 ns): constant, and per corner of an outline.
 _BASE_STEPS, _CORNER_STEPS = 1_000_000_000, 30_000
 
 
 @dataclass(frozen=True)
 class Triangulation:
-    """Triangles of polygons.
+    """The triangles of polygons.
 
     Attributes
     ----------
     corner: (T, 3) int64 indices into the corners, ordered by polygon.
     polygon: (T,) int64 the polygon of each triangle.
-    tangled: number of polygons whose outline crosses itself or is too intricate; they are cut as
-        fans.
+    tangled: number of polygons cut as fans because their outline crosses itself or exceeds the
+        budget.
     """
 
     corner: NDArray[np.int64]
@@ -46,7 +45,7 @@ class Triangulation:
 
 
 def triangulate(corners: NDArray[np.float64], start: NDArray[np.int64]) -> Triangulation:
-    """Cut each polygon into triangles of the same winding.
+    """Cuts each polygon into triangles of the same winding.
 
     Parameters
     ----------
@@ -59,26 +58,26 @@ def triangulate(corners: NDArray[np.float64], start: NDArray[np.int64]) -> Trian
     tangled = 0
     steps = _BASE_STEPS + _CORNER_STEPS * len(corners)
     for n in np.unique(size).tolist():
-        which = np.flatnonzero(size == n)
-        index = start[which][:, None] + np.arange(n)
+        same_size = np.flatnonzero(size == n)
+        index = start[same_size][:, None] + np.arange(n)
         if n == 3:
             corner.append(index)
-            polygon.append(which)
+            polygon.append(same_size)
             continue
-        with np.errstate(all="ignore"):  # moved to the first vertex, scaled to a size of 1
+        with np.errstate(all="ignore"):  # relative to the first vertex, scaled to an extent of 1
             shape = corners[index] - corners[index[:, :1]]
             scale = np.abs(shape).max(axis=(1, 2), keepdims=True)
             shape /= np.where(scale > 0, scale, 1.0)
         cut, done = _fans(shape)
         corner.append(np.take_along_axis(index[done], cut[done].reshape(-1, 3 * (n - 2)), axis=1))
         corner[-1] = corner[-1].reshape(-1, 3)
-        polygon.append(np.repeat(which[done], n - 2))
+        polygon.append(np.repeat(same_size[done], n - 2))
         for row in np.flatnonzero(~done):
-            ears, simple, taken = _clip_ears(shape[row], steps)
-            steps -= taken
+            ears, simple, used = _clip_ears(shape[row], steps)
+            steps -= used
             tangled += not simple
             corner.append(index[row][ears])
-            polygon.append(np.full(len(ears), which[row]))
+            polygon.append(np.full(len(ears), same_size[row]))
     if not corner:
         return Triangulation(np.zeros((0, 3), np.int64), np.zeros(0, np.int64), 0)
     owner = np.concatenate(polygon)
@@ -87,10 +86,9 @@ def triangulate(corners: NDArray[np.float64], start: NDArray[np.int64]) -> Trian
 
 
 def _fans(shape: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Fans (m, n - 2, 3) of local indices, and for which polygons they are right."""
+    """Fans (m, n - 2, 3) of local indices, and (m,) whether they are valid."""
     m, n, _ = shape.shape
-    steps = np.arange(1, n - 1)
-    fan = np.stack([np.zeros_like(steps), steps, steps + 1], axis=1)
+    fan = _fan(n)
     with np.errstate(all="ignore"):
         cross = np.cross(shape[:, 1:-1], shape[:, 2:])
         normal = cross.sum(axis=1)
@@ -104,20 +102,25 @@ def _fans(shape: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.boo
             turned = (np.einsum("mkc,mc->mk", halves, normal) > ROUNDING_SHARE).all(axis=1)
         cut[turned & ~right] = other
         right |= turned
-    # What is not finite is dropped later; there is nothing to clip.
+    # Ingest drops non-finite polygons later, and they cannot be clipped.
     right |= ~np.isfinite(shape).all(axis=(1, 2))
     return cut, right
 
 
+def _fan(n: int) -> NDArray[np.int64]:
+    """(n - 2, 3) local indices of the fan around the first corner."""
+    second = np.arange(1, n - 1)
+    return np.stack([np.zeros_like(second), second, second + 1], axis=1)
+
+
 def _clip_ears(shape: NDArray[np.float64], steps: int) -> tuple[NDArray[np.int64], bool, int]:
-    """Triangles (k, 3) of one polygon, whether its outline is simple, and the steps taken, about
-    ``steps`` at most."""
+    """Triangles (k, 3) of one polygon, whether its outline is simple, and the number of steps,
+    about ``steps`` at most."""
     n = len(shape)
     cross = np.cross(shape[1:-1], shape[2:])
-    first = np.arange(1, n - 1)
-    fan = np.stack([np.zeros_like(first), first, first + 1], axis=1)
+    fan = _fan(n)
     if np.abs(cross).max() <= ROUNDING_SHARE:
-        return fan[:1], True, 0  # a line or a point: one degenerate triangle stands for it
+        return fan[:1], True, 0  # a line or a point, represented by one degenerate triangle
     normal = cross.sum(axis=0)
     axis = int(np.abs(normal).argmax())
     if abs(normal[axis]) <= ROUNDING_SHARE or n * n > steps:

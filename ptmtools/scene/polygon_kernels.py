@@ -1,4 +1,4 @@
-"""Clips the ears of one outline (see `polygon`)."""
+"""The compiled ear clipping of `polygon`."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from ptmtools.compiled import kernel
 def clip_ears(
     flat: NDArray[np.float64], rounding: float, most: int
 ) -> tuple[NDArray[np.int64], bool, int]:
-    """Triangles (k, 3) of an outline (n, 2), counter-clockwise, in indices of its corners; whether
-    they are all ears; and the steps taken. After ``most`` steps, and where no ear is left, the rest
-    becomes a fan. Corners whose triangle has less than the area ``rounding`` lie on an edge.
+    """Triangles (k, 3) of an outline (n, 2), counter-clockwise, as indices of its corners; whether
+    all are ears; and the number of steps. After ``most`` steps, or without an ear, the rest becomes
+    a fan. Corners whose triangle has less than the area ``rounding`` lie on an edge.
     """
     x, y = flat[:, 0].copy(), flat[:, 1].copy()
     ring = np.arange(len(flat))

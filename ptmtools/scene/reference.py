@@ -1,10 +1,10 @@
-"""Finds the files that a model names: libraries of materials, textures, buffers.
+"""Finds the files that a model refers to: material libraries, textures, buffers.
 
-What a model says and what lies on the disk differ in known ways: backslashes, drive letters and
-leading slashes of the author's machine, upper and lower case, composed and decomposed umlauts.
-All of these are tried, inside the model's folder. Reads outside of that folder, also by way of a
-symbolic link, are refused unless asked for. What is no file, such as a named pipe or a device, is
-never opened. A name is looked for in a bounded number of places, however it is made.
+References differ from the files on the disk in known ways: backslashes, drive letters and leading
+slashes of the author's machine, upper and lower case, composed and decomposed umlauts. The search
+tries all of these inside the model's folder, in a bounded number of places. It refuses files
+outside the folder, also through a symbolic link, unless the user allows them, and returns regular
+files only, never a named pipe or a device.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from typing import Literal
 
 Outcome = Literal["found", "elsewhere", "outside", "missing"]
 
-#: Longer names no system has, in characters.
+#: Longest name that a system supports, in characters.
 _LONGEST = 4096
-#: So many folders of a name's end are looked for under another folder than it says.
+#: Largest number of parts at the end of a name that are searched below another folder.
 _DEEPEST = 32
 
 
@@ -29,21 +29,21 @@ def _fold(name: str) -> str:
 
 
 @dataclass(frozen=True)
-class Reference:
-    """The result of a search: a path unless it is "outside" or "missing"; "elsewhere" means that
-    only the end of the name was found, under another folder than the model says."""
+class SearchResult:
+    """A path unless the outcome is "outside" or "missing"; "elsewhere" means that only the end of
+    the name was found, below another folder than the reference states."""
 
     outcome: Outcome
     path: Path | None = None
 
 
 class Folder:
-    """The folder of a model, searched without regard to case where nothing else is found.
+    """The folder of a model, searched regardless of case if the exact name does not exist.
 
     Attributes
     ----------
-    sought: the files found, relative to the root, and the names of those not found, as keys in
-        the order in which they were asked for.
+    sought: the files found, relative to the root, and the missing names, as keys in the order of
+        the searches.
     """
 
     def __init__(self, root: Path, allow_outside: bool = False) -> None:
@@ -53,29 +53,29 @@ class Folder:
         self._roots = [root]
         self._real = [root.resolve()]
         self._listing: dict[Path, dict[str, str]] = {}
-        self._known: dict[tuple[str, Path], Reference] = {}
+        self._results: dict[tuple[str, Path], SearchResult] = {}
 
     def admit(self, folder: Path) -> None:
-        """Another folder may be read, too, for files made on the way."""
+        """Allows another folder, for temporary files."""
         self._roots.append(folder)
         self._real.append(folder.resolve())
 
-    def find(self, reference: str, base: Path | None = None) -> Reference:
-        """Find the file called ``reference`` in a file that lies in ``base`` (default: root).
+    def find(self, reference: str, base: Path | None = None) -> SearchResult:
+        """Finds the file for a ``reference`` in a file in the folder ``base`` (default: root).
 
-        Tried in this order: the name as it stands; the name below ``base`` and below the root;
-        with ``allow_outside`` an absolute name; then ever shorter ends of the name, which serves
-        absolute paths of another machine.
+        The order of the search: the unchanged name; the name below ``base`` and below the root;
+        with ``allow_outside`` an absolute name; then ever shorter ends of the name, for absolute
+        paths of another machine.
         """
         base = self.root if base is None else base
-        if (reference, base) not in self._known:
-            self._known[reference, base] = self._find(reference, base)
-        return self._known[reference, base]
+        if (reference, base) not in self._results:
+            self._results[reference, base] = self._find(reference, base)
+        return self._results[reference, base]
 
-    def _find(self, reference: str, base: Path) -> Reference:
-        halves = any("\ud800" <= letter <= "\udfff" for letter in reference)  # of UTF-16, in JSON
-        if len(reference) > _LONGEST or halves:
-            return Reference("missing")
+    def _find(self, reference: str, base: Path) -> SearchResult:
+        surrogate = any("\ud800" <= letter <= "\udfff" for letter in reference)  # from JSON
+        if len(reference) > _LONGEST or surrogate:
+            return SearchResult("missing")
         bases = [base, *(folder for folder in self._roots if folder != base)]
         name = reference.strip(" \t\r\n")
         if len(name) > 1 and name[0] == name[-1] and name[0] in "\"'":
@@ -87,7 +87,7 @@ class Folder:
         outside = False
 
         tries: list[tuple[Path, list[str], Outcome]] = []
-        if "\\" in name:  # an archive unpacked where a backslash is a letter like any other
+        if "\\" in name:  # an archive unpacked on a system that allows backslashes in names
             tries += [(b, [name], "found") for b in bases]
         if not absolute:
             tries += [(b, parts, "found") for b in bases]
@@ -104,18 +104,18 @@ class Folder:
             if self.allow_outside or any(real.is_relative_to(folder) for folder in self._real):
                 if not any(path.is_relative_to(folder) for folder in self._roots[1:]):
                     self.sought[Path(os.path.relpath(path, self.root)).as_posix()] = None
-                return Reference(outcome, path)
+                return SearchResult(outcome, path)
             outside = True
         if absolute and not self.allow_outside and not outside:
             outside = self._walk(Path("/"), parts) is not None
         if outside:
-            return Reference("outside")
+            return SearchResult("outside")
         if ".." not in parts:
             self.sought["/".join(parts)] = None
-        return Reference("missing")
+        return SearchResult("missing")
 
     def label(self, path: Path) -> str:
-        """The path as notes show it: below the model's folder, or else the bare name."""
+        """The path in notes: relative to the model's folder, or the file name outside it."""
         return str(path.relative_to(self.root)) if path.is_relative_to(self.root) else path.name
 
     def _walk(self, start: Path, steps: list[str]) -> Path | None:
@@ -133,7 +133,7 @@ class Folder:
                     exact = here / listing[_fold(step)]
                 here = exact
             return here if steps and here.is_file() else None
-        except (OSError, ValueError):  # a name too long, or with a NUL byte
+        except (OSError, ValueError):  # a name that is too long or contains a NUL byte
             return None
 
     def _list(self, folder: Path) -> dict[str, str]:

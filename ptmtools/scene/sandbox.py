@@ -1,11 +1,11 @@
-"""Runs readers of other people's making in a process of their own.
+"""Runs readers that call third-party libraries in a child process with limited memory and time.
 
-Libraries in C++ trust what a file declares: a header of 2 GB in an STL file of 134 bytes keeps one
-busy for minutes, others end the process. Here that does no harm: a crash is an error of the file,
-and memory and time are bounded by the file's size.
+Libraries in C++ trust the sizes that a file declares: an STL file of 134 bytes with a header of
+2 GB keeps one busy for minutes, and others crash. In a child process a crash is an error of the
+file, and the size of the file bounds memory and time.
 
-A module that is to be run so ends with ``serve(reader)`` under ``__main__``, where the reader is
-called with what `run_apart` was given as ``arguments`` and returns something that JSON can hold.
+A module with such a reader ends with ``serve(reader)`` under ``__main__``. The reader gets the
+``arguments`` of `run_in_sandbox` as strings and returns a value that JSON can represent.
 """
 
 from __future__ import annotations
@@ -22,31 +22,32 @@ from typing import Any
 import ptmtools
 from ptmtools.errors import InputError, LimitError, MissingComponentError, PtmError
 
-#: Memory, bytes, and time, seconds, for any model and for each byte of its file besides.
+#: Memory in bytes and time in seconds: for any model, and per byte of its files.
 _MEMORY, _MEMORY_PER_BYTE = 4 << 30, 500
 _SECONDS, _SECONDS_PER_BYTE = 60.0, 1e-4
-#: Where an answer begins: what a library prints may come before it.
+#: Begins the reply on standard output, which may follow output of the library.
 _MARK = "ptmtools answers: "
 _ERRORS = {kind.__name__: kind for kind in (InputError, LimitError, MissingComponentError)}
 
 
-def run_apart(
+def run_in_sandbox(
     module: str,
     library: str,
     model: Path,
     *arguments: str | os.PathLike[str],
-    beside: int = 0,
+    other_bytes: int = 0,
 ) -> Any:
-    """What a module's reader answers.
+    """The result of the reader of a module.
 
-    ``library`` is what the reader is called in messages; ``model`` the file that is at fault, and
-    whose size bounds memory and time, with the ``beside`` bytes of other files of the model. Raises
-    the reader's own `PtmError`, and InputError PTM-I254 where it raises anything else, crashes, or
-    takes too long.
+    ``library`` names the reader in messages. ``model`` is the file that errors refer to; its size
+    and ``other_bytes``, the size of other files of the model, bound memory and time.
+
+    Raises the `PtmError` of the reader, and InputError PTM-I254 if the reader raises anything else,
+    crashes or exceeds its time.
     """
-    size = model.stat().st_size + beside
-    home = os.fspath(Path(ptmtools.__file__).parent.parent)
-    known = os.environ.get("PYTHONPATH")
+    size = model.stat().st_size + other_bytes
+    root = os.fspath(Path(ptmtools.__file__).parent.parent)
+    search = os.environ.get("PYTHONPATH")
     command = [sys.executable, "-P", "-m", module, str(_MEMORY + _MEMORY_PER_BYTE * size)]
     try:
         run = subprocess.run(
@@ -54,38 +55,38 @@ def run_apart(
             stdin=subprocess.DEVNULL,
             capture_output=True,
             timeout=_SECONDS + _SECONDS_PER_BYTE * size,
-            env={**os.environ, "PYTHONPATH": f"{home}{os.pathsep}{known}" if known else home},
+            env={**os.environ, "PYTHONPATH": f"{root}{os.pathsep}{search}" if search else root},
         )
     except subprocess.TimeoutExpired as error:
         raise unreadable(library, model, f"it did not end in {error.timeout:.0f} s") from None
-    _, found, text = run.stdout.decode("utf-8", "replace").rpartition(_MARK)
+    _, mark, text = run.stdout.decode("utf-8", "replace").rpartition(_MARK)
     try:
-        answer = json.loads(text) if found else {}
+        reply = json.loads(text) if mark else {}
     except ValueError:
-        answer = {}
-    if not isinstance(answer, dict):
-        answer = {}
-    if "error" in answer:
-        kind, fields = answer["error"]
+        reply = {}
+    if not isinstance(reply, dict):
+        reply = {}
+    if "error" in reply:
+        kind, fields = reply["error"]
         raise _ERRORS.get(kind, InputError)(**fields)
-    if "answer" not in answer:
-        why = answer.get("fault") or f"it ended with status {run.returncode}"
-        raise unreadable(library, model, why)
-    return answer["answer"]
+    if "answer" not in reply:
+        reason = reply.get("fault") or f"it ended with status {run.returncode}"
+        raise unreadable(library, model, reason)
+    return reply["answer"]
 
 
-def unreadable(library: str, model: Path, why: str) -> InputError:
+def unreadable(library: str, model: Path, reason: str) -> InputError:
     """The error for a file that a library cannot read, PTM-I254."""
     return InputError(
         "PTM-I254",
-        f"{library} cannot read it ({why})",
+        f"{library} cannot read it ({reason})",
         file=model,
         remedy="export it again, or convert it to GLB",
     )
 
 
 def serve(reader: Callable[..., Any]) -> None:
-    """Answers `run_apart` and ends this process."""
+    """Replies to `run_in_sandbox` and ends this process."""
     memory, *arguments = sys.argv[1:]
     with suppress(ImportError, ValueError, OSError):  # a system without limits, or with lower ones
         import resource
@@ -93,11 +94,11 @@ def serve(reader: Callable[..., Any]) -> None:
         resource.setrlimit(resource.RLIMIT_AS, (int(memory), int(memory)))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     try:
-        answer = {"answer": reader(*arguments)}
+        reply = {"answer": reader(*arguments)}
     except PtmError as error:
-        answer = {"error": (type(error).__name__, vars(error))}
-    except Exception as error:  # what libraries raise has no class in common
+        reply = {"error": (type(error).__name__, vars(error))}
+    except Exception as error:  # the libraries share no exception class
         lines = str(error).splitlines() or [type(error).__name__]
-        answer = {"fault": lines[0]}
-    print(f"\n{_MARK}{json.dumps(answer)}", flush=True)
-    os._exit(0)  # libraries may fail once more as they are unloaded
+        reply = {"fault": lines[0]}
+    print(f"\n{_MARK}{json.dumps(reply)}", flush=True)
+    os._exit(0)  # a library may crash while it is unloaded

@@ -1,14 +1,13 @@
-"""What a reader makes of a model file, before anything is judged, dropped or moved.
+"""The output of a reader: triangles, materials and textures in the units and axes of the file.
 
-Coordinates are the file's own. A reader resolves the names of textures to something that can be
-read, but opens no image: which of them some surface uses is known only after the faces have been
-cleaned.
+A reader resolves the names of textures to files but opens no image: only the cleaning of the faces
+(`faces`) shows which images some face uses.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -16,10 +15,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.errors import InputError, LimitError
+from ptmtools.errors import LimitError
 from ptmtools.files import open_regular
-from ptmtools.scene.model import Camera, Kind, Note, Shine, Storey, Wrap
-from ptmtools.scene.reference import Folder
+from ptmtools.scene.model import Camera, Kind, Shine, Storey, Wrap
 
 SourceWrap = Literal[Wrap, "mirror"]
 #: `Scene.triangles` is int32: more vertices cannot be numbered.
@@ -27,18 +25,18 @@ MAX_VERTICES = 2**31 - 1
 
 
 def decode(raw: bytes) -> str:
-    """Text of a model file: UTF-8 with or without a mark, and Latin-1 where it is not that."""
+    """The text of a model file: UTF-8 with or without a byte order mark, otherwise Latin-1."""
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError:
         return raw.decode("latin-1")
 
 
-def too_many_triangles(most: int, file: Path) -> LimitError:
-    """The error for a model of more triangles than are to be read, PTM-L203."""
+def too_many_triangles(limit: int, file: Path) -> LimitError:
+    """The error for a model of more triangles than the limit, PTM-L203."""
     return LimitError(
         "PTM-L203",
-        f"has more than {most:,} triangles",
+        f"has more than {limit:,} triangles",
         file=file,
         remedy="raise the limit (--max-triangles), or split the model",
     )
@@ -46,7 +44,7 @@ def too_many_triangles(most: int, file: Path) -> LimitError:
 
 @dataclass(frozen=True)
 class FileRange:
-    """Reads bytes of a file: all of it, or ``length`` bytes from ``offset``."""
+    """Reads a file from ``offset``: ``length`` bytes, or to its end."""
 
     path: Path
     offset: int = 0
@@ -58,14 +56,14 @@ class FileRange:
             return stream.read() if self.length is None else stream.read(self.length)
 
     def size(self) -> int:
-        """How many bytes there are, read or not. Raises OSError."""
-        there = max(0, os.stat(self.path).st_size - self.offset)
-        return there if self.length is None else min(there, self.length)
+        """The size of the range in bytes, without reading it. Raises OSError."""
+        rest = max(0, os.stat(self.path).st_size - self.offset)
+        return rest if self.length is None else min(rest, self.length)
 
 
 @dataclass(frozen=True)
 class HeldBytes:
-    """Bytes that have no file of their own (a data URI)."""
+    """Bytes without a file of their own (a data URI)."""
 
     data: bytes
 
@@ -75,18 +73,18 @@ class HeldBytes:
 
 @dataclass(frozen=True)
 class Texture:
-    """An image as a material names it.
+    """A reference of a material to an image.
 
     Attributes
     ----------
-    read: returns the bytes of the image's file.
-    label: the name the emitted file is called after.
-    what: how the model speaks of it ("map_Kd bricks.png"), for notes.
-    place: where it does ("museum.mtl:12").
-    wrap_s, wrap_t: beyond [0, 1]; "mirror" is a repetition of which every other is mirrored.
-    channel: the channel that a mask takes its values from: "m" (matte), "l" (luminance), "r",
-        "g", "b", or "" for matte where there is one and luminance elsewhere.
-    strength: how much of it applies, in [0, 1] (glTF's occlusionTexture).
+    read: returns the bytes of the image file.
+    label: the emitted file is named after it.
+    what: the reference as written in the model ("map_Kd bricks.png"), for notes.
+    place: location of the reference ("museum.mtl:12").
+    wrap_s, wrap_t: wrap modes beyond [0, 1]; "mirror" mirrors every second repetition.
+    channel: the channel that contains the values of a mask: "m" (matte), "l" (luminance), "r",
+        "g", "b", or "": matte if the image has one, otherwise luminance.
+    strength: weight in [0, 1] (glTF's occlusionTexture).
     """
 
     read: Callable[[], bytes]
@@ -105,15 +103,15 @@ class SourceMaterial:
 
     Attributes
     ----------
-    color: tint in [0, 1], sRGB; None where the model says nothing.
+    color: tint in [0, 1], sRGB; None if the model defines none.
     opacity: in [0, 1].
-    see_through: the material itself says that it is blended, tested or transmitting.
+    see_through: the material is blended, alpha-tested or transmitting by its own definition.
     ignores_alpha: the alpha of its texture has no effect, by the mode of the material (glTF, USD).
-    cutoff: texels of less alpha are not drawn and all others are opaque (alpha testing); None where
-        they are blended.
-    two_sided: whether its faces have a back.
+    cutoff: alpha testing: texels of less alpha are not drawn, all others are opaque; None if
+        texels are blended.
+    two_sided: whether both sides of its faces are drawn.
     texture, mask: colours, and a separate image of opacities (``map_d``).
-    shine: where it reflects.
+    shine: its reflection map.
     """
 
     name: str
@@ -130,23 +128,23 @@ class SourceMaterial:
 
 @dataclass(frozen=True)
 class Source:
-    """Triangles in the file's units and axes.
+    """Triangles in the units and axes of the file.
 
-    What a format does not say is left out: its default.
+    Fields that a format does not define keep their defaults.
 
     Attributes
     ----------
     points: (P, 3) float64, may be non-finite, unused or repeated.
     triangles: (T, 3) int64 into `points`, in the order of the file.
-    uv: (T, 3, 2) float64 per corner, origin at the image's lower left.
+    uv: (T, 3, 2) float64 per corner, origin at the lower left of the image.
     triangle_object, triangle_material: (T,) int64.
-    objects, materials, cameras: see `ptmtools.scene.model`; cameras in the file's space.
-    metres, up: fixed by the format (glTF), else None.
-    colors: (T, 3, 3) uint8 sRGB per corner, multiplied with the material's; None where no surface
-        has any.
-    step: of the coarsest grid that points lie on, in the file's units; 0 where it is float32's.
-    kinds: what each object is by its class (IFC); empty where the format knows no classes.
-    storeys: named by the file, their heights along its up axis in its units.
+    objects, materials, cameras: see `ptmtools.scene.model`; cameras in the space of the file.
+    metres, up: unit and up axis if the format defines them, otherwise None.
+    colors: (T, 3, 3) uint8 sRGB per corner, multiplied with the material's; None if no corner has
+        a colour.
+    step: step of the coarsest grid of coordinates, in units of the file; 0 for float32.
+    kinds: the kind of each object by its class (IFC); empty for formats without classes.
+    storeys: named by the file; heights along its up axis, in its units.
     """
 
     points: NDArray[np.float64]
@@ -163,78 +161,3 @@ class Source:
     step: float = 0.0
     kinds: tuple[Kind, ...] = ()
     storeys: tuple[Storey, ...] = ()
-
-
-class Findings:
-    """Collects the notes of one ingest, in whose folder the model's files are looked for; under
-    ``strict`` a miss becomes an error at the end.
-
-    Misses are what the model asks for and does not get: files, materials, faces. Error and note
-    share their number: note PTM-N203 is error PTM-I203.
-    """
-
-    def __init__(self, model: Path, allow_outside: bool = False) -> None:
-        self.model = model
-        self.folder = Folder(model.absolute().parent, allow_outside)
-        self._notes: dict[tuple[str, str, str], int] = {}
-        self._misses: list[tuple[str, str, str]] = []
-
-    def say(self, code: str, message: str, place: str = "", count: int = 1) -> None:
-        """Record something done or guessed."""
-        key = (code, message, place)
-        self._notes[key] = self._notes.get(key, 0) + count
-
-    def miss(self, code: str, message: str, place: str = "", count: int = 1) -> None:
-        """Record something that ``strict`` does not tolerate."""
-        if (code, message, place) not in self._notes:
-            self._misses.append((code, message, place))
-        self.say(code, message, place, count)
-
-    def locate(
-        self,
-        name: str,
-        what: str,
-        place: str,
-        missing: str = "PTM-N204",
-        base: Path | None = None,
-        hint: str = "",
-    ) -> Path | None:
-        """`Folder.find` with a note of where the file is or why there is none, and a ``hint`` for
-        what is missing."""
-        found = self.folder.find(name, base)
-        if found.path is None:
-            if found.outcome == "outside":
-                self.miss("PTM-N205", f"{what}: lies outside the model's folder", place)
-            else:
-                self.miss(missing, f"{what}: not found{hint}", place)
-        elif found.outcome == "elsewhere":
-            self.say("PTM-N208", f"{what}: found as {self.folder.label(found.path)}", place)
-        return found.path
-
-    def told(self) -> list[tuple[str, str, str, int, bool]]:
-        """All of them, for `take` in another process."""
-        missed = set(self._misses)
-        return [(*key, count, key in missed) for key, count in self._notes.items()]
-
-    def take(self, told: Iterable[tuple[str, str, str, int, bool]]) -> None:
-        """Record what others have `told`."""
-        for code, message, place, count, missed in told:
-            (self.miss if missed else self.say)(code, message, place, count)
-
-    @property
-    def notes(self) -> tuple[Note, ...]:
-        return tuple(Note(*key, count) for key, count in self._notes.items())
-
-    def enforce(self) -> None:
-        """Raise the first miss as an `InputError`, and say how many more there are."""
-        if not self._misses:
-            return
-        code, message, place = self._misses[0]
-        more = len(self._misses) - 1
-        raise InputError(
-            code.replace("-N", "-I"),
-            message + (f" (and {more} more findings)" if more else ""),
-            file=self.model,
-            place=place or None,
-            remedy="correct the model, or build without --strict",
-        )

@@ -1,16 +1,16 @@
-"""Whether some texel that a surface uses is not opaque.
+"""Tests whether the faces of a material use transparent texels, and drops alpha that is ignored.
 
-Atlases often have an alpha channel that is below 255 only where no face takes its colours from,
-so the whole image says nothing, and neither do the bounding boxes of faces. A summed-area table
-sorts out, for all triangles at once, those whose box holds no such texel; the others are tested
-row by row. A texel counts as used if the triangle reaches into the square that bilinear filtering
-spreads it over, two texels wide; those of a row are one run, in which the table counts. (Tried:
-texel by texel. A thousand large triangles beside the holes of an image of 4096², files of 50 KB,
-take a quarter of an hour. Rasterising with Pillow: its polygons miss texels at slivers and corners,
-and that errs to the wrong side.)
+Atlases often have alpha below 255 only in regions that no face uses, so neither the whole image nor
+the bounding boxes of faces decide. A summed-area table excludes, for all triangles at once, those
+whose box contains no transparent texel (*hole*); the others are tested row by row. A triangle uses
+a texel if it overlaps the square, two texels wide, over which bilinear filtering spreads it; the
+used texels of a row are one run, in which the table counts holes. (Rejected: testing texel by
+texel. A thousand large triangles beside the holes of an image of 4096², files of 50 KB, take a
+quarter of an hour. Rasterising with Pillow: its polygons omit texels at slivers and corners, which
+is an error to the wrong side.)
 
-Materials whose mode ignores alpha get an image without alpha, but only where their faces use
-texels that are not opaque: an atlas that opaque and blended materials share stays one image.
+Materials whose mode ignores alpha get an image without alpha if their faces use holes: an atlas
+that opaque and blended materials share remains one image.
 """
 
 from __future__ import annotations
@@ -25,12 +25,11 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.scene.images import ImageStore, integers
 from ptmtools.scene.model import Wrap
 from ptmtools.scene.source import Source, Texture
-from ptmtools.scene.wrapping import told
+from ptmtools.scene.wrapping import emitted_wraps
 
-#: A triangle repeating the image more often than this, counted in images, is taken to use all.
+#: A triangle over more repetitions of the image than this is assumed to use every texel.
 _MANY_TILES = 16
-#: How far, as a share of a texel or of its distance from the origin, a run is widened so that
-#: rounding does not shorten it.
+#: Widening of a run against rounding, relative to a texel or its distance from the origin.
 _SLACK = 1e-9
 
 
@@ -41,9 +40,9 @@ def uses_holes(
 
     Parameters
     ----------
-    holes: (H, W) bool, rows from the top.
+    holes: (H, W) bool, rows from the top, the texels that are not opaque.
     uv: (T, 3, 2) float64, origin at the lower left.
-    wrap_s, wrap_t: what lies beyond [0, 1].
+    wrap_s, wrap_t: wrap modes beyond [0, 1].
     """
     if not holes.any() or not len(uv):
         return False
@@ -59,7 +58,7 @@ def uses_holes(
     low = np.floor(texel.min(axis=1) - 0.5)
     high = np.ceil(texel.max(axis=1) + 0.5)
     span = (high - low) / [width, height]
-    # Beyond a clamped edge a triangle smears: its box stands for it.
+    # Beyond a clamped edge a triangle smears; its box is used instead.
     smeared = np.zeros(len(uv), dtype=bool)
     for axis, size in enumerate((width, height)):
         if wraps[axis] == "clamp":
@@ -69,7 +68,7 @@ def uses_holes(
             span[:, axis] = np.minimum(span[:, axis], 1.0)
     if (span.prod(axis=1) > _MANY_TILES).any():
         return True
-    # Whole images away the texels are the same; near zero the numbers stay small and exact.
+    # Shifted by whole repetitions, so that the numbers are small and exact.
     for axis, size in enumerate((width, height)):
         if wraps[axis] == "repeat":
             shift = np.floor(low[:, axis] / size) * size
@@ -86,7 +85,7 @@ def uses_holes(
     if (smeared & (inside > 0)).any():
         return True
     candidates = np.flatnonzero(inside)
-    # The smallest first: a used hole is found soonest where there is little to test.
+    # The smallest first, which are the cheapest to test.
     spans = (box[:, 2] - box[:, 0]) * (box[:, 3] - box[:, 1])
     return any(
         _touches(table, texel[t], box[t])
@@ -95,7 +94,7 @@ def uses_holes(
 
 
 def _table(holes: NDArray[np.bool_]) -> NDArray[np.uint32]:
-    """(H + 1, W + 1) number of holes above and to the left."""
+    """(H + 1, W + 1) number of holes above and to the left of each texel corner."""
     table = np.zeros((holes.shape[0] + 1, holes.shape[1] + 1), dtype=np.uint32)
     inner = table[1:, 1:]
     inner[:] = holes
@@ -123,7 +122,7 @@ def _up_to(
 def _touches(
     table: NDArray[np.uint32], triangle: NDArray[np.float64], box: NDArray[np.int64]
 ) -> bool:
-    """Whether a (3, 2) triangle in texels reaches into the square of a hole within its box."""
+    """Whether a (3, 2) triangle in texels overlaps the square of a hole within its box."""
     height, width = table.shape[0] - 1, table.shape[1] - 1
     x0, y0, x1, y1 = box.tolist()
     (ax, ay), (bx, by), (cx, cy) = triangle.tolist()
@@ -133,7 +132,7 @@ def _touches(
     # The middle of each texel; its square reaches one texel to every side.
     py = rows + 0.5
     reached = (min(ay, by, cy) < py + 1) & (max(ay, by, cy) > py - 1)
-    # Columns likewise, to the last bit: the corners of an atlas often lie in the middle of texels.
+    # Columns likewise, exactly: corners in an atlas often lie in the middle of texels.
     columns = np.arange(x0, x1)
     within = (min(ax, bx, cx) < columns + 1.5) & (max(ax, bx, cx) > columns - 0.5)
     if not within.any():
@@ -171,8 +170,8 @@ def _touches(
 class OpaqueBytes:
     """The bytes of a PNG of an image without its alpha.
 
-    ``limit`` as of `ImageStore`. Raises what reading raises, and InputError or LimitError for what
-    cannot be decoded or has no 8 or 16 bits.
+    ``limit`` as in `ImageStore`. Raises the errors of reading, and InputError or LimitError for
+    images that cannot be decoded or have no 8 or 16 bits.
     """
 
     read: Callable[[], bytes]
@@ -186,33 +185,33 @@ class OpaqueBytes:
         return png_bytes(texels[..., :colors], description)
 
 
-def without_alpha(
+def drop_alpha(
     source: Source, used: Ints, faces: Sequence[Ints], uv: Floats, store: ImageStore
 ) -> Source:
-    """The same with images without alpha where materials ignore it and would show it.
+    """The source with opaque images for materials that ignore alpha and use holes.
 
-    ``faces`` are the rows of ``uv``, (T, 3, 2), of each material that is ``used``, by number. VRML,
-    whose textures show their alpha always, needs such an image; a material that blends the same
-    image keeps it as it is. Where faces use opaque texels only, the image stays one.
-    Raises LimitError PTM-L104, PTM-L106.
+    ``used`` are numbers of materials, and ``faces`` the rows of ``uv``, (T, 3, 2), of each. VRML
+    always applies the alpha of textures, so it requires such an image; a material that blends the
+    same image keeps the original. Raises LimitError PTM-L104, PTM-L106.
     """
     materials = list(source.materials)
     ignoring: list[tuple[int, Texture, str]] = []
-    shown: set[str] = set()
+    visible: set[str] = set()
     for index, rows in zip(used.tolist(), faces, strict=True):
-        given = materials[index]
-        sound = store.holes(given.texture) if given.ignores_alpha and given.texture else None
-        if sound is None or given.texture is None:
+        texture = materials[index].texture
+        if texture is None or not materials[index].ignores_alpha:
             continue
-        sha256, holes = sound
-        ignoring.append((index, given.texture, sha256))
-        wraps = told(given.texture.wrap_s), told(given.texture.wrap_t)
-        if sha256 not in shown and uses_holes(holes, uv[rows], *wraps):
-            shown.add(sha256)
+        image = store.holes(texture)
+        if image is None:
+            continue
+        sha256, holes = image
+        ignoring.append((index, texture, sha256))
+        if sha256 not in visible and uses_holes(holes, uv[rows], *emitted_wraps(texture)):
+            visible.add(sha256)
     for index, texture, sha256 in ignoring:
-        if sha256 in shown:
-            made = replace(texture, read=OpaqueBytes(texture.read, store.limit))
-            store.made_into_another(texture)
-            if store.has_alpha(made) is not None:
-                materials[index] = replace(materials[index], texture=made)
+        if sha256 in visible:
+            opaque = replace(texture, read=OpaqueBytes(texture.read, store.limit))
+            store.mark_as_input(texture)
+            if store.has_alpha(opaque) is not None:
+                materials[index] = replace(materials[index], texture=opaque)
     return replace(source, materials=tuple(materials))

@@ -1,15 +1,14 @@
-"""Textures that are mirrored where they repeat, which neither VRML nor the clients know.
+"""Bakes mirrored repetition into textures, and moves texture coordinates near the origin.
 
-Most surfaces with such a texture lie within one repetition, for which its coordinates can be
-mirrored instead, exactly. Where one does not, the image is made twice as large, with its mirror
-image beside it, and repeats as others do. (Rejected: to carry the mode over. VRML97 has none, so
-its files would show something else than the GLB cells.)
+Neither VRML nor the clients support mirrored repetition. Most surfaces with such a texture lie
+within one repetition; there the coordinates are mirrored instead, exactly. Otherwise the image is
+doubled, with its mirror image beside it, and repeats normally. (Rejected: emitting the mode. VRML97
+has none, so its files would differ from the GLB cells.)
 
-Texture coordinates far from the origin, as projected map coordinates are.
-
-Files have them in single precision, which at 1,024 repetitions still tells apart the texels of an
-image of 4,096, and at five million has two steps to a repetition. Where a texture repeats, whole
-repetitions more or less show the same."""
+Projected map coordinates are far from the origin. Emitted files store single precision, which at
+1,024 repetitions still separates the texels of an image of 4,096, and at five million has two steps
+per repetition. A repeating texture looks the same after a shift by whole repetitions.
+"""
 
 from __future__ import annotations
 
@@ -22,15 +21,16 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.errors import InputError
 from ptmtools.scene.images import ImageStore, integers
 from ptmtools.scene.model import Wrap
-from ptmtools.scene.source import Findings, Source, SourceWrap, Texture
+from ptmtools.scene.notes import Findings
+from ptmtools.scene.source import Source, SourceWrap, Texture
 
 
 @dataclass(frozen=True)
 class MirroredBytes:
-    """The bytes of a PNG of an image beside its mirror images, ``across``, ``down`` or both.
+    """The bytes of a PNG of an image and its mirror images, ``across``, ``down`` or both.
 
-    ``limit`` as of `ImageStore`. Raises what reading raises, and InputError or LimitError for what
-    cannot be decoded; InputError PTM-I125 for what would be too large.
+    ``limit`` as in `ImageStore`. Raises the errors of ``read``; InputError or LimitError if the
+    image cannot be decoded; InputError PTM-I125 if the result would be too large.
     """
 
     read: Callable[[], bytes]
@@ -44,7 +44,7 @@ class MirroredBytes:
         texels, description = integers(self.read(), self.limit)
         height, width, _ = texels.shape
         if 4 * height * width * (1 + self.across) * (1 + self.down) > self.limit:
-            raise InputError("PTM-I125", "would be too large beside its mirror images; it repeats")
+            raise InputError("PTM-I125", "too large for its mirror images; repeated unmirrored")
         if self.across:
             texels = np.concatenate([texels, texels[:, ::-1]], axis=1)
         if self.down:
@@ -52,7 +52,7 @@ class MirroredBytes:
         return png_bytes(texels, description)
 
 
-def unmirrored(
+def bake_mirrors(
     source: Source,
     used: Ints,
     faces: Sequence[Ints],
@@ -60,36 +60,37 @@ def unmirrored(
     store: ImageStore,
     findings: Findings,
 ) -> tuple[Source, Floats]:
-    """The same without textures that are mirrored, and their coordinates.
+    """The source without mirrored textures, and the changed coordinates.
 
-    ``faces`` are the rows of ``uv``, (T, 3, 2), of each material that is ``used``, by number. A
-    texture that cannot be made so repeats as it is, and a miss is recorded.
+    ``used`` are numbers of materials, and ``faces`` the rows of ``uv``, (T, 3, 2), of each. A
+    texture that cannot be converted repeats unmirrored, which is a miss.
     """
     materials = list(source.materials)
-    wanted = [
+    mirrored = [
         (index, rows)
         for index, rows in zip(used.tolist(), faces, strict=True)
         if (texture := materials[index].texture) is not None
         and "mirror" in (texture.wrap_s, texture.wrap_t)
     ]
-    uv = uv.copy() if wanted else uv
-    for index, rows in wanted:
-        given = materials[index].texture
-        assert given is not None
-        made, coords = _unmirrored(given, uv[rows], store.limit)
-        if made.read != given.read:
-            store.made_into_another(given)  # also where it fails: another image may not
-            if store.has_alpha(given) is None or store.has_alpha(made) is None:
-                plain = replace(given, wrap_s=told(given.wrap_s), wrap_t=told(given.wrap_t))
+    uv = uv.copy() if mirrored else uv
+    for index, rows in mirrored:
+        texture = materials[index].texture
+        assert texture is not None
+        baked, coords = _bake_mirror(texture, uv[rows], store.limit)
+        if baked.read != texture.read:
+            store.mark_as_input(texture)  # also if it fails: another image may succeed
+            if store.has_alpha(texture) is None or store.has_alpha(baked) is None:
+                wrap_s, wrap_t = emitted_wraps(texture)
+                plain = replace(texture, wrap_s=wrap_s, wrap_t=wrap_t)
                 materials[index] = replace(materials[index], texture=plain)
                 continue
-        materials[index], uv[rows] = replace(materials[index], texture=made), coords
-        findings.say("PTM-N222", f"{given.what}: its mirrored repeat is baked in", given.place)
+        materials[index], uv[rows] = replace(materials[index], texture=baked), coords
+        findings.note("PTM-N222", f"{texture.what}: mirrored repetition baked in", texture.place)
     return replace(source, materials=tuple(materials)), uv
 
 
-def _unmirrored(texture: Texture, uv: Floats, limit: int) -> tuple[Texture, Floats]:
-    """The texture, and its (n, 3, 2) coordinates, which are changed."""
+def _bake_mirror(texture: Texture, uv: Floats, limit: int) -> tuple[Texture, Floats]:
+    """The converted texture, and its (n, 3, 2) coordinates, changed in place."""
     wraps: list[SourceWrap] = [texture.wrap_s, texture.wrap_t]
     doubled = [False, False]
     for axis in (0, 1):
@@ -101,7 +102,7 @@ def _unmirrored(texture: Texture, uv: Floats, limit: int) -> tuple[Texture, Floa
             uv[..., axis] /= 2
         else:
             wraps[axis], uv[..., axis] = "clamp", folded
-    if doubled[1]:  # from the lower left: its own half is the upper one
+    if doubled[1]:  # the origin is the lower left, and the image is the upper half
         uv[..., 1] += 0.5
     read = (
         MirroredBytes(texture.read, doubled[0], doubled[1], limit) if any(doubled) else texture.read
@@ -110,34 +111,36 @@ def _unmirrored(texture: Texture, uv: Floats, limit: int) -> tuple[Texture, Floa
 
 
 def _folded(coordinate: Floats) -> Floats | None:
-    """(T, 3) coordinates of triangles brought into [0, 1]; None if one leaves its repetition."""
+    """(T, 3) coordinates of triangles mirrored into [0, 1]; None if a triangle crosses the edge of
+    a repetition."""
     lowest = np.floor(coordinate.min(axis=1, initial=np.inf))
-    # What ends at the edge of a repetition lies in the one before it.
+    # A triangle that ends at an edge lies in the repetition before it.
     if (coordinate.max(axis=1, initial=-np.inf) > lowest + 1).any():
         return None
     place = coordinate - lowest[:, None]
     return np.asarray(np.where(lowest[:, None] % 2 == 1, 1 - place, place))
 
 
-def told(wrap: SourceWrap) -> Wrap:
-    """As a scene has it, which has no mirrored repetition (any more)."""
-    return "repeat" if wrap == "mirror" else wrap
+def emitted_wraps(texture: Texture | None) -> tuple[Wrap, Wrap]:
+    """The wrap modes of a texture without mirrored repetition; "repeat" without a texture."""
+    wrap_s, wrap_t = (texture.wrap_s, texture.wrap_t) if texture else ("repeat", "repeat")
+    return "repeat" if wrap_s == "mirror" else wrap_s, "repeat" if wrap_t == "mirror" else wrap_t
 
 
-#: Repetitions from the origin up to which coordinates stay as they are.
+#: Coordinates up to this distance from the origin, in repetitions, are unchanged.
 FAR = 1024.0
-#: Beyond it single precision has no fractions.
-MOST = 2.0**24
+#: Larger coordinates have no fractions in single precision.
+LARGEST = 2.0**24
 
 
 def near_origin(uv: Floats, group: Ints, repeats: Bools) -> Floats:
-    """(T, 3, 2) finite coordinates, moved near the origin by whole repetitions.
+    """(T, 3, 2) finite coordinates, shifted near the origin by even numbers of repetitions, which
+    also preserves mirrored repetition.
 
     Parameters
     ----------
-    group: (T,) what is moved as one: faces of one group stay as far from each other as they were.
-    repeats: (T, 2) whether the texture repeats along each axis, alike in a group. By an even number
-        it may be moved even where every other repetition is mirrored.
+    group: (T,) faces of one group are shifted together.
+    repeats: (T, 2) whether the texture repeats along each axis, equal within a group.
     """
     if not (uv.max(initial=0.0) > FAR or uv.min(initial=0.0) < -FAR):
         return uv

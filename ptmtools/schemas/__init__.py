@@ -29,7 +29,7 @@ from typing import Any
 HINTS, CELL, STATISTICS = "hints", "cell", "statistics"
 MANIFEST, VALIDATION, GLB, SCENE = "manifest", "validation", "glb", "scene"
 WALK, TRACE, SIMULATION, SITE = "walk", "trace", "simulation", "site"
-HANDED = "handed"
+MESSAGES = "messages"
 INTERLACE, APO, CAMPUS, CAMPUS_WALK = "interlace", "apo", "campus", "campus_walk"
 #: So many lists and objects lie in each other at most, where anything may stand.
 DEEPEST = 16

@@ -22,14 +22,14 @@ def test_duplicates_of_either_winding() -> None:
     result = kept([[0, 1, 2], [2, 0, 1], [2, 1, 0], [0, 1, 3], [5, 2, 0], [1, 0, 2]])
     assert result.source.tolist() == [0, 2, 3]
     assert result.paired.tolist() == [True, True, False]
-    assert result.also.tolist() == [0, 0, 2, 3, 0, 2]
+    assert result.keeper.tolist() == [0, 0, 2, 3, 0, 2]
     assert len(result.points) == 4
 
 
 def test_degenerate_and_not_finite() -> None:
     result = kept([[0, 4, 1], [0, 0, 2], [1, 5, 2], [0, 6, 2], [0, 1, 2]])
     assert (result.degenerate, result.not_finite) == (3, 1)
-    assert result.also.tolist() == [-1, -1, -1, -1, 4]
+    assert result.keeper.tolist() == [-1, -1, -1, -1, 4]
 
 
 def test_points_are_those_in_use_in_the_order_of_their_use() -> None:

@@ -11,7 +11,7 @@ import pytest
 from ptmtools.arrays import Floats
 from ptmtools.cli.main import main
 from ptmtools.scene import IngestOptions, ingest
-from ptmtools.scene.facing import TURNED_AWAY, turned_away
+from ptmtools.scene.facing import TURNED_AWAY, share_turned_away
 
 from .conftest import Gltf, Put
 from .made import (
@@ -51,7 +51,7 @@ SOUND = {
 
 def share(triangles: Floats, backed: bool = False) -> float:
     points, faces = welded(triangles)
-    return turned_away(points, faces, np.full(len(faces), backed))
+    return share_turned_away(points, faces, np.full(len(faces), backed))
 
 
 @pytest.mark.parametrize("name", SOUND)
@@ -122,5 +122,5 @@ def test_real_models(shared: Path, name: str) -> None:
     """As if their faces had no backs. (The fourth has two faces for nearly all of its walls.)"""
     scene = ingest(shared / "scenes" / name / f"{name}.obj")
     none = np.zeros(len(scene.triangles), dtype=bool)
-    assert turned_away(scene.points, scene.triangles, none) < 0.1
-    assert turned_away(scene.points, scene.triangles[:, ::-1], none) > 0.8
+    assert share_turned_away(scene.points, scene.triangles, none) < 0.1
+    assert share_turned_away(scene.points, scene.triangles[:, ::-1], none) > 0.8

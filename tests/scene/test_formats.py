@@ -13,7 +13,7 @@ import pytest
 from ptmtools.errors import InputError, LimitError, MissingComponentError
 from ptmtools.scene import ingest, sandbox as apart
 from ptmtools.scene.formats import read_other
-from ptmtools.scene.source import Findings
+from ptmtools.scene.notes import Findings
 
 from .conftest import Put, noise, png
 

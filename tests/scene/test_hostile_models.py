@@ -31,8 +31,9 @@ from ptmtools.scene import (
 )
 from ptmtools.scene.gltf import document as gltf_document
 from ptmtools.scene.images import ImageStore
+from ptmtools.scene.notes import Findings
 from ptmtools.scene.obj import read_obj
-from ptmtools.scene.source import FileRange, Findings
+from ptmtools.scene.source import FileRange
 from tests.memory import little_memory
 
 from .conftest import FACE, QUAD, Gltf, Put, broken, noise, png

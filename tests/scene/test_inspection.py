@@ -137,4 +137,4 @@ def test_what_is_no_model_is_one_line(
 def test_the_library_beside_is_named(put: Put, capsys: pytest.CaptureFixture[str]) -> None:
     put("museum.mtl", "newmtl wall\n")
     text = info(put("a.obj", f"mtllib house.mtl\n{QUAD}usemtl wall\n{FACE}"), capsys)
-    assert "if museum.mtl beside the model is meant, rename it to house.mtl [PTM-N203]" in text
+    assert "if museum.mtl is the library of the model, rename it to house.mtl [PTM-N203]" in text

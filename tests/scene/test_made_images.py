@@ -13,8 +13,9 @@ from PIL import Image
 
 from ptmtools.scene import IngestOptions, Scene, ingest
 from ptmtools.scene.images import ImageStore
-from ptmtools.scene.source import FileRange, Findings, Source, SourceMaterial, Texture
-from ptmtools.scene.wrapping import unmirrored
+from ptmtools.scene.notes import Findings
+from ptmtools.scene.source import FileRange, Source, SourceMaterial, Texture
+from ptmtools.scene.wrapping import bake_mirrors
 from tests.scene.conftest import Put, noise, png
 
 Textured = Callable[..., Path]
@@ -109,7 +110,7 @@ def mirrored(put: Put, uv: list[list[float]], limit: int) -> tuple[Source, np.nd
     )
     store = ImageStore(findings, limit)
     used = np.array([0])
-    source, found = unmirrored(source, used, [np.array([0])], corners, store, findings)
+    source, found = bake_mirrors(source, used, [np.array([0])], corners, store, findings)
     return replace(source, uv=found), corners, findings
 
 

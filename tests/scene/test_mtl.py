@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ptmtools.scene.mtl import MapStatement, parse_map, read_mtl
-from ptmtools.scene.source import Findings
+from ptmtools.scene.notes import Findings
 
 finite = st.floats(-1e3, 1e3, allow_nan=False).map(lambda x: round(x, 4))
 word = st.text(st.sampled_from("abcXYZ0123456789_ü()."), min_size=1, max_size=8)

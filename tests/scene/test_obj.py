@@ -10,8 +10,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from ptmtools.errors import InputError
+from ptmtools.scene.notes import Findings
 from ptmtools.scene.obj import read_obj
-from ptmtools.scene.source import Findings, Source
+from ptmtools.scene.source import Source
 
 from .conftest import QUAD
 

@@ -10,9 +10,9 @@ import pytest
 from ptmtools.arrays import Floats
 from ptmtools.errors import InputError
 from ptmtools.scene.model import Space
-from ptmtools.scene.source import Findings
-from ptmtools.scene.space import UNITS, Said, parse_unit, settle, turned
-from ptmtools.scene.up_axis import Named
+from ptmtools.scene.notes import Findings
+from ptmtools.scene.space import UNITS, DeclaredSpace, parse_unit, rotated, settle
+from ptmtools.scene.up_axis import NamedFaces
 
 from .made import atrium, box, corridor, house, site_plan, tower, welded, y_up
 
@@ -32,89 +32,96 @@ def test_units_that_are_none(given: str | float) -> None:
 
 
 def test_turning_is_a_rotation() -> None:
-    axes = turned(np.eye(3), "z")
+    axes = rotated(np.eye(3), "z")
     assert axes.tolist() == [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
     assert np.linalg.det(axes) == 1
     assert not np.signbit(axes[0]).any()
-    assert turned(np.eye(3), "y").tolist() == np.eye(3).tolist()
+    assert rotated(np.eye(3), "y").tolist() == np.eye(3).tolist()
 
 
 def test_each_unit_can_be_guessed_or_given() -> None:
     assert list(UNITS) == ["m", "cm", "mm", "in", "ft"]
 
 
-def told(triangles: Floats, said: Said = Said(), by_format: Said = Said()) -> tuple[Space, dict]:  # noqa: B008
+NOTHING = DeclaredSpace()
+
+
+def settled(
+    triangles: Floats,
+    by_user: DeclaredSpace = NOTHING,
+    by_format: DeclaredSpace = NOTHING,
+) -> tuple[Space, dict]:
     """The space of triangles, and the notes on it by code."""
     points, faces = welded(triangles)
     findings = Findings(Path("house.obj"))
-    named = Named(*np.zeros((2, len(faces)), dtype=bool))
-    space = settle(Path("house.obj"), points, faces, named, said, by_format, findings)
+    named = NamedFaces(*np.zeros((2, len(faces)), dtype=bool))
+    space = settle(Path("house.obj"), points, faces, named, by_user, by_format, findings)
     return space, {note.code: note.message for note in findings.notes}
 
 
 def test_guesses_are_noted() -> None:
-    space, notes = told(house() / 0.0254)
+    space, notes = settled(house() / 0.0254)
     assert (space.metres, space.up, space.unit_guessed, space.up_guessed) == (0.0254, "z", 1, 1)
     assert list(notes) == ["PTM-N202", "PTM-N238", "PTM-N201"]
     assert notes["PTM-N202"].startswith(
         "up axis guessed: z, 19.2 m wide and 3.5 m high, free height"
     )
     assert "rooms wider than high" in notes["PTM-N202"]
-    assert notes["PTM-N201"].startswith("unit guessed: in (it would be 19.2 m wide")
+    assert notes["PTM-N201"].startswith("unit guessed: in (19.2 m wide")
     assert notes["PTM-N238"].startswith("the runner-up is y up in cm: 7.56 m wide and 4.57 m high")
-    assert notes["PTM-N238"].endswith("give --up y to take it")
+    assert notes["PTM-N238"].endswith("give --up y to select it")
 
 
 def test_a_runner_up_far_behind_is_not_noted() -> None:
     """Two storeys of rooms, Y up as an OBJ file should have it."""
-    _, notes = told(y_up(house(storeys=2)))
+    _, notes = settled(y_up(house(storeys=2)))
     assert list(notes) == ["PTM-N202", "PTM-N201"]
-    _, notes = told(house(storeys=2))
+    _, notes = settled(house(storeys=2))
     assert list(notes) == ["PTM-N202", "PTM-N238", "PTM-N201"]
 
 
 def test_an_uncertain_courtyard_is_noted_although_a_convention_decides() -> None:
-    space, notes = told(y_up(atrium()) * 100)
+    space, notes = settled(y_up(atrium()) * 100)
     assert (space.up, space.metres) == ("y", 0.01)
-    assert "y is taken, 37.2 m wide and 15.6 m high" in notes["PTM-N232"]
+    assert "assuming y, 37.2 m wide and 15.6 m high" in notes["PTM-N232"]
     assert "z is nearly as likely, 37.2 m wide and 22.9 m high" in notes["PTM-N232"]
 
 
 def test_what_is_uncertain_is_noted_with_the_runner_up() -> None:
-    space, notes = told(box((0, 0, 0), (300, 300, 300)))
+    space, notes = settled(box((0, 0, 0), (300, 300, 300)))
     assert space.metres == 0.01
     assert list(notes) == ["PTM-N232", "PTM-N201"]
     assert space.up == "y"
     assert notes["PTM-N232"].endswith("give --up y or --up z")
-    _, notes = told(house() / 0.3048)
+    _, notes = settled(house() / 0.3048)
     assert list(notes) == ["PTM-N202", "PTM-N238", "PTM-N233"]
-    assert "m is taken" in notes["PTM-N233"]
+    assert "assuming m" in notes["PTM-N233"]
     assert "ft is nearly as likely (19.2 m wide" in notes["PTM-N233"]
     assert notes["PTM-N233"].endswith("give --unit m or --unit ft")
 
 
 def test_what_is_given_is_not_judged() -> None:
-    space, notes = told(house(), Said(0.3048, "y"))
+    space, notes = settled(house(), DeclaredSpace(0.3048, "y"))
     assert (space.metres, space.up, space.unit_guessed, space.up_guessed) == (0.3048, "y", 0, 0)
     assert not notes
-    space, notes = told(y_up(house()), Said(up="y"))
+    space, notes = settled(y_up(house()), DeclaredSpace(up="y"))
     assert (space.up, space.up_guessed, list(notes)) == ("y", False, ["PTM-N201"])
-    space, notes = told(house(), Said(metres=1.0))
+    space, notes = settled(house(), DeclaredSpace(metres=1.0))
     assert (space.up, space.unit_guessed, list(notes)) == ("z", False, ["PTM-N202", "PTM-N238"])
 
 
 def test_a_format_is_believed_and_doubted() -> None:
-    """glTF has metres and Y up: what lies on its side is not turned without being asked."""
-    gltf = Said(1.0, "y")
-    assert told(y_up(house()), by_format=gltf)[1] == {}
-    space, notes = told(house(), by_format=gltf)
+    """glTF has metres and Y up: what lies on its side is not rotated unless asked."""
+    gltf = DeclaredSpace(1.0, "y")
+    assert settled(y_up(house()), by_format=gltf)[1] == {}
+    space, notes = settled(house(), by_format=gltf)
     assert (space.up, space.up_guessed, list(notes)) == ("y", False, ["PTM-N234"])
     assert "with y up it is 19.2 m wide and 11.6 m high" in notes["PTM-N234"]
     assert "with z up 19.2 m wide and 3.5 m high" in notes["PTM-N234"]
-    assert notes["PTM-N234"].endswith("give --up z to turn it")
-    space, notes = told(house(), Said(up="z"), gltf)
+    assert notes["PTM-N234"].endswith("give --up z to rotate it")
+    space, notes = settled(house(), DeclaredSpace(up="z"), gltf)
     assert (space.up, notes) == ("z", {})
-    space, notes = told(y_up(house()) * 100, by_format=gltf)
+    space, notes = settled(y_up(house()) * 100, by_format=gltf)
     assert (space.metres, list(notes)) == (1.0, ["PTM-N227"])
     assert "cm would be more likely" in notes["PTM-N227"]
 
@@ -122,19 +129,19 @@ def test_a_format_is_believed_and_doubted() -> None:
 def test_a_format_is_doubted_where_the_other_axis_is_somewhat_likelier() -> None:
     """As of a tower that lies on its side, and may be a hall of many bays; but not of a cube or a
     corridor, of which little can be told."""
-    gltf = Said(1.0, "y")
-    space, notes = told(tower(), by_format=gltf)
+    gltf = DeclaredSpace(1.0, "y")
+    space, notes = settled(tower(), by_format=gltf)
     assert (space.up, space.up_guessed, list(notes)) == ("y", False, ["PTM-N232"])
     assert "the format has y up, 64.2 m wide and 8 m high" in notes["PTM-N232"]
-    assert "z is rather more likely, 8 m wide and 64.2 m high" in notes["PTM-N232"]
+    assert "z is more likely, 8 m wide and 64.2 m high" in notes["PTM-N232"]
     assert notes["PTM-N232"].endswith("give --up y or --up z")
-    assert told(y_up(tower()), by_format=gltf)[1] == {}
-    assert told(tower(), Said(up="y"), gltf)[1] == {}
+    assert settled(y_up(tower()), by_format=gltf)[1] == {}
+    assert settled(tower(), DeclaredSpace(up="y"), gltf)[1] == {}
     for plain in (box((0, 0, 0), (3, 3, 3)), corridor(40, 2, 3, rooms=False)):
-        assert told(y_up(plain), by_format=gltf)[1] == {}
+        assert settled(y_up(plain), by_format=gltf)[1] == {}
 
 
 def test_a_plan_does_not_lie_on_its_side() -> None:
     """A sheet standing upright in a glTF file may be a picture or a wall."""
     sheet = site_plan()[:2]
-    assert told(sheet, by_format=Said(1.0, "y"))[1] == {}
+    assert settled(sheet, by_format=DeclaredSpace(1.0, "y"))[1] == {}

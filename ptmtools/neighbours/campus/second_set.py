@@ -30,9 +30,10 @@ from ptmtools.neighbours.campus.lights import LightImage
 from ptmtools.neighbours.campus.textures import Mask, decoded_lightmap
 from ptmtools.scene.faces import keep_faces
 from ptmtools.scene.model import Scene
+from ptmtools.scene.notes import Findings
 from ptmtools.scene.options import IngestOptions
 from ptmtools.scene.reference import Folder
-from ptmtools.scene.source import FileRange, Findings, Source, Texture
+from ptmtools.scene.source import FileRange, Source, Texture
 
 if TYPE_CHECKING:
     from ptmtools.scene.gltf.material import TextureOf

@@ -27,8 +27,9 @@ from ptmtools.errors import InputError, LimitError
 from ptmtools.files import open_regular
 from ptmtools.glb import BINARY, COMPONENTS, ITEMS, MAGIC, elements, glb_chunks, meaning, natural
 from ptmtools.scene.gltf.meshopt import EXTENSIONS, decode as decode_view
+from ptmtools.scene.notes import Findings
 from ptmtools.scene.reference import Folder
-from ptmtools.scene.source import FileRange, Findings, HeldBytes, decode
+from ptmtools.scene.source import FileRange, HeldBytes, decode
 
 #: How JSON writes halves of characters of UTF-16, of which one alone is no text.
 _HALF = re.compile(r"\\u[dD][89a-fA-F]")
@@ -313,7 +314,7 @@ _WORDS: dict[Outcome, str] = {
 _ANY = "open it in Blender and export it as glTF again"
 
 
-def outcome_of(name: str) -> str:
+def support_of(name: str) -> str:
     """What becomes of an extension, in words."""
     return _WORDS[KNOWN.get(name, "noted")]
 
@@ -337,4 +338,4 @@ def check_extensions(tree: dict[str, object], findings: Findings) -> None:
         )
     for name in sorted({str(name) for name in used}):
         if KNOWN.get(name, "noted") == "noted":
-            findings.say("PTM-N224", f"{name} is not carried over")
+            findings.note("PTM-N224", f"{name} is not carried over")

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ptmtools.errors import MissingComponentError
 from ptmtools.scene.gltf.document import Document
-from ptmtools.scene.sandbox import run_apart, serve
+from ptmtools.scene.sandbox import run_in_sandbox, serve
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 
 EXTENSION = "KHR_draco_mesh_compression"
@@ -96,7 +96,7 @@ def decode_primitives(document: Document, views: Iterable[int]) -> dict[int, Dec
         for k, view in enumerate(wanted):
             buffer, start, length = document.view(view)
             Path(scratch, f"{k}.drc").write_bytes(buffer.data[start : start + length])
-        run_apart(__name__, "Draco", document.path, scratch, str(len(wanted)))
+        run_in_sandbox(__name__, "Draco", document.path, scratch, str(len(wanted)))
         for k, view in enumerate(wanted):
             file = Path(scratch, f"{k}.npz")
             arrays = unpack_arrays(file.read_bytes(), file=file)
@@ -107,7 +107,7 @@ def decode_primitives(document: Document, views: Iterable[int]) -> dict[int, Dec
     return found
 
 
-def _decode_here(folder: str, count: str) -> None:
+def _decode(folder: str, count: str) -> None:
     import DracoPy
 
     for k in range(int(count)):
@@ -119,4 +119,4 @@ def _decode_here(folder: str, count: str) -> None:
 
 
 if __name__ == "__main__":
-    serve(_decode_here)
+    serve(_decode)

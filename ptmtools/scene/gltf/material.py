@@ -20,14 +20,8 @@ from numpy.typing import NDArray
 from ptmtools.scene.colors import to_srgb
 from ptmtools.scene.gltf.document import Document, data_uri
 from ptmtools.scene.ktx2 import TranscodedBytes
-from ptmtools.scene.source import (
-    FileRange,
-    Findings,
-    HeldBytes,
-    SourceMaterial,
-    SourceWrap,
-    Texture,
-)
+from ptmtools.scene.notes import Findings
+from ptmtools.scene.source import FileRange, HeldBytes, SourceMaterial, SourceWrap, Texture
 
 #: A material of a document → a texture of it, with its texture coordinates.
 TextureOf = Callable[[dict[str, Any]], dict[str, Any] | None]
@@ -37,7 +31,7 @@ _WRAPS: dict[int | None, SourceWrap] = {33071: "clamp", 33648: "mirror"}
 
 
 @dataclass(frozen=True)
-class Painted:
+class MaterialUse:
     """How a material applies to a primitive.
 
     Attributes
@@ -69,14 +63,14 @@ class MaterialReader:
         self._document = document
         self._findings = findings
         self._texture_of = texture_of
-        self._painted: dict[tuple[int | None, bool], Painted] = {}
+        self._painted: dict[tuple[int | None, bool], MaterialUse] = {}
         self._materials: list[SourceMaterial] = []
 
     @property
     def materials(self) -> tuple[SourceMaterial, ...]:
         return tuple(self._materials)
 
-    def read(self, index: int | None, colored: bool) -> Painted:
+    def read(self, index: int | None, colored: bool) -> MaterialUse:
         """The material of a primitive; None is the default material of the format. Vertices that
         are ``colored`` have its base colour in theirs, so that the two are multiplied as light."""
         if (index, colored) not in self._painted:
@@ -84,7 +78,7 @@ class MaterialReader:
             self._painted[index, colored] = self._read(entry, index, colored)
         return self._painted[index, colored]
 
-    def _read(self, entry: dict[str, Any], index: int | None, colored: bool) -> Painted:
+    def _read(self, entry: dict[str, Any], index: int | None, colored: bool) -> MaterialUse:
         place = f"material {index}"
         name = str(entry.get("name") or ("default" if index is None else place))
         extensions = entry.get("extensions", {})
@@ -99,7 +93,7 @@ class MaterialReader:
             use = self._texture_of(entry)
         r, g, b, a = (_share(value) for value in factor)
         if (r, g, b) != (1.0, 1.0, 1.0):
-            self._findings.say("PTM-N226", f"{name}: colour factor converted to sRGB", place)
+            self._findings.note("PTM-N226", f"{name}: colour factor converted to sRGB", place)
         light = np.array([r, g, b], dtype=np.float64)
         red, green, blue = (1.0, 1.0, 1.0) if colored else to_srgb(light).tolist()
         mode = entry.get("alphaMode", "OPAQUE")
@@ -108,7 +102,7 @@ class MaterialReader:
         opacity = {"BLEND": a, "MASK": float(a >= cutoff)}.get(mode, 1.0)
         see_through = mode in ("MASK", "BLEND")
         if extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0) > 0:
-            self._findings.say("PTM-N224", f"{name}: transmits light, never occludes", place)
+            self._findings.note("PTM-N224", f"{name}: transmits light, never occludes", place)
             see_through = True
 
         texture, coords, matrix = None, "TEXCOORD_0", np.eye(2, 3)
@@ -118,7 +112,7 @@ class MaterialReader:
             matrix = _transform(moved)
             coords = f"TEXCOORD_{moved.get('texCoord', use.get('texCoord', 0))}"
             if moved:
-                self._findings.say(
+                self._findings.note(
                     "PTM-N216", f"{name}: KHR_texture_transform is baked into its faces", place
                 )
         self._materials.append(
@@ -134,7 +128,7 @@ class MaterialReader:
                 texture=texture,
             )
         )
-        return Painted(len(self._materials) - 1, coords, matrix, see_through, light)
+        return MaterialUse(len(self._materials) - 1, coords, matrix, see_through, light)
 
     def _texture(self, index: int, place: str, strength: float) -> Texture | None:
         tree = self._document.tree

@@ -27,10 +27,11 @@ from ptmtools.glb import COMPONENTS, meaning, natural
 from ptmtools.scene.colors import encoded
 from ptmtools.scene.gltf.document import Document, check_extensions, damaged, open_document
 from ptmtools.scene.gltf.draco import EXTENSION as DRACO, Decoded, decode_primitives
-from ptmtools.scene.gltf.material import MaterialReader, Painted, TextureOf
+from ptmtools.scene.gltf.material import MaterialReader, MaterialUse, TextureOf
 from ptmtools.scene.model import Camera
+from ptmtools.scene.notes import Findings
 from ptmtools.scene.rows import Rows
-from ptmtools.scene.source import MAX_VERTICES, Findings, Source, too_many_triangles
+from ptmtools.scene.source import MAX_VERTICES, Source, too_many_triangles
 
 _INSTANCING = "EXT_mesh_gpu_instancing"
 _DEFAULTS = {
@@ -59,7 +60,7 @@ def world_matrices(tree: dict[str, Any], findings: Findings) -> dict[int, Floats
         entry = nodes[node]
         visibility = entry.get("extensions", {}).get("KHR_node_visibility", {})
         if visibility.get("visible", True) is False:
-            findings.say("PTM-N224", "not visible, and so is what hangs on it", f"node {node}")
+            findings.note("PTM-N224", "not visible, and so is what hangs on it", f"node {node}")
             continue
         with np.errstate(all="ignore"):
             world[node] = above @ _local_matrix(entry)
@@ -154,7 +155,7 @@ def cameras(
         yfov = given.get("perspective", {}).get("yfov", 0.0)
         usable = np.isfinite(position).all() and math.isfinite(length) and length > 0
         if not (usable and 0 < yfov < math.pi):
-            findings.say("PTM-N225", f"camera {name} has no perspective, skipped", f"node {node}")
+            findings.note("PTM-N225", f"camera {name} has no perspective, skipped", f"node {node}")
             continue
         x, y, z = position.tolist()
         dx, dy, dz = (direction / length).tolist()
@@ -280,16 +281,16 @@ def _draws(document: Document, node: int, findings: Findings) -> Iterator[_Draw]
     mesh = tree["meshes"][entry["mesh"]]
     name = str(entry.get("name") or mesh.get("name") or f"node {node}")
     if "skin" in entry:
-        findings.say("PTM-N224", "skin: shown in its rest pose", f"node {node}")
+        findings.note("PTM-N224", "skin: shown in its rest pose", f"node {node}")
     times = instance_count(document, node)
     for k, primitive in enumerate(mesh["primitives"]):
         place = f"mesh {entry['mesh']}, primitive {k}"
         mode = primitive.get("mode", _TRIANGLES)
         if mode not in (_TRIANGLES, _STRIP, _FAN):
-            findings.say("PTM-N219", f"primitive of mode {mode} (points or lines), skipped", place)
+            findings.note("PTM-N219", f"primitive of mode {mode} (points or lines), skipped", place)
             continue
         if primitive.get("targets"):
-            findings.say("PTM-N224", "morph targets are not carried over", place)
+            findings.note("PTM-N224", "morph targets are not carried over", place)
         yield _Draw(node, name, primitive, place, times)
 
 
@@ -391,7 +392,7 @@ class _Values:
         return index
 
 
-def _mesh(values: _Values, draw: _Draw, paint: Painted, findings: Findings) -> _Mesh:
+def _mesh(values: _Values, draw: _Draw, paint: MaterialUse, findings: Findings) -> _Mesh:
     points = values.attribute("POSITION")
     if points is None:
         raise KeyError("POSITION")
@@ -406,7 +407,7 @@ def _mesh(values: _Values, draw: _Draw, paint: Painted, findings: Findings) -> _
     if raw is not None:
         colors = encoded(raw[:, :3] * paint.light)[triangles]
     if raw is not None and paint.see_through and not (raw[:, 3:] == 1).all():
-        findings.say("PTM-N223", "opacities of vertices are not carried over", draw.place)
+        findings.note("PTM-N223", "opacities of vertices are not carried over", draw.place)
     return _Mesh(points, triangles, uv[triangles], colors)
 
 

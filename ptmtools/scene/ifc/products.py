@@ -7,7 +7,7 @@ they are sorted by the number of their product in the file. A product may come i
 representations, of which one is drawn.
 
 As a program: ``python -P -m ptmtools.scene.ifc.products MEMORY FOLDER MODEL FILE TRIANGLES`` reads
-FILE, the model or what was packed in it, and hands over what `handed.take_over` takes.
+FILE, the model or what was packed in it, and hands over what `handed.read_in_sandbox` takes.
 
 The shapes that IfcOpenShell's geometry kernels make of products.
 
@@ -44,10 +44,11 @@ from ptmtools.scene.ifc.properties import (
     one_line,
     storeys,
 )
-from ptmtools.scene.messages import hand_over
+from ptmtools.scene.messages import pack_source
 from ptmtools.scene.model import Kind
+from ptmtools.scene.notes import Findings
 from ptmtools.scene.sandbox import serve, unreadable
-from ptmtools.scene.source import Findings, Source, SourceMaterial, too_many_triangles
+from ptmtools.scene.source import Source, SourceMaterial, too_many_triangles
 
 _PLAIN, _DIRECT = "opencascade", "passthrough"
 _THREADS = 1
@@ -138,9 +139,9 @@ def read_products(file: Any, findings: Findings, max_triangles: int) -> Source:
     """
     unit, metres = length_unit(file)
     if metres is None:
-        findings.say("PTM-N241", "the file says no unit of length")
+        findings.note("PTM-N241", "the file says no unit of length")
     elif metres != 1:
-        findings.say("PTM-N240", f"lengths are in {unit} ({metres:g} m), and read as metres")
+        findings.note("PTM-N240", f"lengths are in {unit} ({metres:g} m), and read as metres")
     products = _shown(file, findings)
     shapes = _shapes(file, products, max_triangles, findings.model) if products else []
     _note_products(products, shapes, findings)
@@ -190,11 +191,11 @@ def _shown(file: Any, findings: Findings) -> list[Any]:
         if not drawn(product.is_a):
             hidden[product.is_a()] += 1
         elif not _has_body(product):
-            findings.say("PTM-N243", f"{product.is_a()}: has no surface, only lines")
+            findings.note("PTM-N243", f"{product.is_a()}: has no surface, only lines")
         else:
             shown.append(product)
     for name, count in hidden.items():
-        findings.say("PTM-N242", f"{name}: not drawn", "", count)
+        findings.note("PTM-N242", f"{name}: not drawn", "", count)
     return shown
 
 
@@ -297,11 +298,11 @@ def _open(path: str, findings: Findings) -> Any:
     return file
 
 
-def _read_here(scratch: str, model: str, path: str, most: str) -> dict[str, Any]:
+def _read_in_child(scratch: str, model: str, path: str, most: str) -> dict[str, Any]:
     findings = Findings(Path(model))
     source = read_products(_open(path, findings), findings, int(most))
-    return hand_over(source, {}, findings, scratch)
+    return pack_source(source, {}, findings, scratch)
 
 
 if __name__ == "__main__":
-    serve(_read_here)
+    serve(_read_in_child)

@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 
 from ptmtools.scene.model import Kind, Storey
-from ptmtools.scene.source import Findings, SourceMaterial
+from ptmtools.scene.notes import Findings
+from ptmtools.scene.source import SourceMaterial
 
 #: Drawn though its superclass is not: it bears the ground.
 _GROUND = "IfcSite"
@@ -206,7 +207,7 @@ def note_lost(file: Any, findings: Findings) -> None:
         except RuntimeError:  # no class of this schema
             continue
         if count:
-            findings.say("PTM-N245", what, "", count)
+            findings.note("PTM-N245", what, "", count)
 
 
 def _shade(color: tuple[float, float, float] | None) -> str:

@@ -18,8 +18,9 @@ from typing import IO
 
 from ptmtools.errors import InputError, LimitError, MissingComponentError, naming
 from ptmtools.files import open_regular
-from ptmtools.scene.messages import take_over
-from ptmtools.scene.source import MAX_VERTICES, Findings, Source
+from ptmtools.scene.messages import read_in_sandbox
+from ptmtools.scene.notes import Findings
+from ptmtools.scene.source import MAX_VERTICES, Source
 
 #: ISO 10303-21: how such a file begins, and how it ends.
 _BEGINS = re.compile(rb"(\xef\xbb\xbf)?\s*ISO-10303-21\s*;")
@@ -67,8 +68,10 @@ def read_ifc(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) 
             )
         arguments = str(file), str(max_triangles)
         module = "ptmtools.scene.ifc.products"
-        beside = 0 if file == path.absolute() else file.stat().st_size
-        return take_over(module, "ifcopenshell", path, findings, scratch, *arguments, beside=beside)
+        other_bytes = 0 if file == path.absolute() else file.stat().st_size
+        return read_in_sandbox(
+            module, "ifcopenshell", path, findings, scratch, *arguments, other_bytes=other_bytes
+        )
 
 
 def _check(file: Path) -> None:

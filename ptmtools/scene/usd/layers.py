@@ -16,8 +16,8 @@ from typing import Any, Literal
 from pxr import Ar, Sdf, Tf, Usd, UsdGeom
 
 from ptmtools.errors import InputError
+from ptmtools.scene.notes import Findings
 from ptmtools.scene.sandbox import unreadable
-from ptmtools.scene.source import Findings
 
 #: What the library is called in messages.
 LIBRARY = "usd-core"

@@ -23,7 +23,8 @@ from pxr import Ar, Sdf, Usd, UsdGeom, UsdShade
 from ptmtools.arrays import Floats, Ints
 from ptmtools.scene.colors import encoded, to_srgb
 from ptmtools.scene.messages import NamedImage
-from ptmtools.scene.source import Findings, SourceMaterial, SourceWrap
+from ptmtools.scene.notes import Findings
+from ptmtools.scene.source import SourceMaterial, SourceWrap
 from ptmtools.scene.usd.layers import TIME
 from ptmtools.scene.usd.mesh import Shape, array, at_corners
 
@@ -97,7 +98,7 @@ class MaterialReader:
         value, source, output = _followed(shader.GetInput("diffuseColor"))
         if source is None:
             color = tint(_numbers(value, _DIFFUSE))
-            self._findings.say("PTM-N226", f"{name}: colour factor converted to sRGB", place)
+            self._findings.note("PTM-N226", f"{name}: colour factor converted to sRGB", place)
             return Surface(name, color, opacity, see_through or from_image is not None)
         kind = str(source.GetIdAttr().Get(TIME))
         if kind.startswith("UsdPrimvarReader_float"):
@@ -110,12 +111,12 @@ class MaterialReader:
         file = _followed(source.GetInput("file"))[0]
         if from_image is not None and from_image != (_path_of(file), "a"):
             what = f"{name}: its opacity is an image of its own"
-            self._findings.say(
+            self._findings.note(
                 "PTM-N217", f"{what}, which makes it transparent and is not written", place
             )
             see_through = True
         if output not in ("rgb", "rgba"):
-            self._findings.say("PTM-N215", f"{name}: ignored that its colour is {output}", place)
+            self._findings.note("PTM-N215", f"{name}: ignored that its colour is {output}", place)
         image = self._image(source, file, name, place)
         if image is None:
             return Surface(name, None, opacity, see_through)
@@ -148,7 +149,7 @@ class MaterialReader:
             return opacity, False, None
         if source.GetIdAttr().Get(TIME) == "UsdUVTexture":
             return 1.0, threshold > 0, (_path_of(_followed(source.GetInput("file"))[0]), output)
-        self._findings.say("PTM-N215", f"{name}: ignored its opacity, it never occludes", place)
+        self._findings.note("PTM-N215", f"{name}: ignored its opacity, it never occludes", place)
         return 1.0, True, None
 
     def _image(self, texture: Any, file: Any, name: str, place: str) -> NamedImage | None:
@@ -162,7 +163,7 @@ class MaterialReader:
         scale = _numbers(_followed(texture.GetInput("scale"))[0], _ONES)
         bias = _numbers(_followed(texture.GetInput("bias"))[0], _ZEROS)
         if scale != _ONES or bias != _ZEROS:
-            self._findings.say("PTM-N215", f"{path}: ignored scale and bias", place)
+            self._findings.note("PTM-N215", f"{path}: ignored scale and bias", place)
         wrap_s, wrap_t = (self._wrap(texture, key, path, place) for key in ("wrapS", "wrapT"))
         return self._named(file, place, wrap_s, wrap_t)
 
@@ -201,7 +202,7 @@ class MaterialReader:
     def _wrap(self, texture: Any, key: str, path: str, place: str) -> SourceWrap:
         mode = str(_followed(texture.GetInput(key))[0] or "useMetadata")
         if mode not in _WRAPS:  # without metadata it is black, too
-            self._findings.say("PTM-N222", f"{path}: black beyond its edge becomes clamp", place)
+            self._findings.note("PTM-N222", f"{path}: black beyond its edge becomes clamp", place)
         return _WRAPS.get(mode, "clamp")
 
     def _coords(self, texture: Any, name: str, place: str) -> tuple[str, Floats]:
@@ -214,7 +215,9 @@ class MaterialReader:
             matrix, moved = matrix @ _transform(source), True
             source = _followed(source.GetInput("in"))[1]
         if moved:
-            self._findings.say("PTM-N216", f"{name}: UsdTransform2d is baked into its faces", place)
+            self._findings.note(
+                "PTM-N216", f"{name}: UsdTransform2d is baked into its faces", place
+            )
         if source is None or source.GetIdAttr().Get(TIME) != "UsdPrimvarReader_float2":
             return "", matrix[:2]
         return str(_followed(source.GetInput("varname"))[0] or ""), matrix[:2]
@@ -371,10 +374,10 @@ class Painter:
             if values is None or values.shape[2] != 3:
                 self._findings.miss("PTM-N265", f"{name}: does not fit the mesh, ignored", place)
             elif primvar.GetInterpolation() == UsdGeom.Tokens.constant:
-                self._findings.say("PTM-N226", f"{name}: colour factor converted to sRGB")
+                self._findings.note("PTM-N226", f"{name}: colour factor converted to sRGB")
                 found = tint(values[0, 0]), None
             else:
-                self._findings.say("PTM-N226", f"{name}: colour factor converted to sRGB")
+                self._findings.note("PTM-N226", f"{name}: colour factor converted to sRGB")
                 found = (1.0, 1.0, 1.0), encoded(values)
             self._colors[known] = found
         found = self._colors[known]
@@ -391,7 +394,7 @@ class Painter:
         if (values == values[0]).all():
             return float(values[0]), False
         place = str(prim.GetPath())
-        self._findings.say("PTM-N215", "displayOpacity: ignored, the mesh never occludes", place)
+        self._findings.note("PTM-N215", "displayOpacity: ignored, the mesh never occludes", place)
         return 1.0, True
 
     def _at(self, prim: Any, shape: Shape, key: Any, surface: Surface) -> Floats:
@@ -404,7 +407,7 @@ class Painter:
             values = None
             if not surface.coords or not primvar or not primvar.HasValue():
                 bare = f"faces of textured material {surface.name} have no texture coordinates"
-                self._findings.say("PTM-N229", bare, place, len(shape.face))
+                self._findings.note("PTM-N229", bare, place, len(shape.face))
             else:
                 values = at_corners(primvar, shape)
                 if values is None or values.shape[2] != 2:

@@ -17,8 +17,8 @@ from pxr import UsdGeom
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError
+from ptmtools.scene.notes import Findings
 from ptmtools.scene.polygon import triangulate
-from ptmtools.scene.source import Findings
 from ptmtools.scene.usd.layers import TIME
 
 #: The corners of a cube of two units, and its faces.
@@ -122,7 +122,7 @@ def cut(prim: Any, findings: Findings, model: Path) -> Shape:
     start = np.concatenate([[0], np.cumsum(counts[face])])
     made = triangulate(points[vertex[corner]], start)
     if made.tangled:
-        findings.say(
+        findings.note(
             "PTM-N221",
             "polygons with crossing edges, or too many corners, were cut into fans of triangles",
             place,
@@ -182,13 +182,13 @@ def _note(prim: Any, mesh: Any, findings: Findings) -> None:
     """Says once for each mesh what of it is not shown."""
     scheme = mesh.GetSubdivisionSchemeAttr().Get(TIME)
     if scheme not in (None, UsdGeom.Tokens.none):
-        findings.say("PTM-N261", f"surfaces to be subdivided ({scheme}) are drawn as their cages")
+        findings.note("PTM-N261", f"surfaces to be subdivided ({scheme}) are drawn as their cages")
     if prim.HasAttribute("primvars:skel:jointIndices"):
-        findings.say("PTM-N224", "skins are shown in their rest pose")
+        findings.note("PTM-N224", "skins are shown in their rest pose")
     if prim.HasRelationship("skel:blendShapeTargets"):
-        findings.say("PTM-N224", "blend shapes are not carried over")
+        findings.note("PTM-N224", "blend shapes are not carried over")
     if any(
         attribute.ValueMightBeTimeVarying()
         for attribute in (mesh.GetPointsAttr(), mesh.GetFaceVertexIndicesAttr())
     ):
-        findings.say("PTM-N224", "meshes that change are shown as they are at first")
+        findings.note("PTM-N224", "meshes that change are shown as they are at first")

@@ -17,10 +17,11 @@ from pathlib import Path
 from typing import Any
 
 from ptmtools.errors import MissingComponentError
-from ptmtools.scene.messages import hand_over, take_over
+from ptmtools.scene.messages import pack_source, read_in_sandbox
+from ptmtools.scene.notes import Findings
 from ptmtools.scene.options import USD
 from ptmtools.scene.sandbox import serve
-from ptmtools.scene.source import MAX_VERTICES, Findings, Source
+from ptmtools.scene.source import MAX_VERTICES, Source
 
 #: So many files of the model's folder are looked at for their size.
 _MOST_FILES = 100_000
@@ -42,7 +43,7 @@ def read_usd(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) 
         )
     outside = "outside" if findings.folder.allow_outside else ""
     with tempfile.TemporaryDirectory() as scratch:
-        return take_over(
+        return read_in_sandbox(
             __name__,
             "usd-core",
             path,
@@ -50,7 +51,7 @@ def read_usd(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) 
             scratch,
             str(max_triangles),
             outside,
-            beside=_bytes_of_layers(findings.folder.root),
+            other_bytes=_bytes_of_layers(findings.folder.root),
         )
 
 
@@ -68,15 +69,15 @@ def _bytes_of_layers(folder: Path) -> int:
     return total
 
 
-def _read_here(scratch: str, model: str, most: str, outside: str) -> dict[str, Any]:
+def _read_in_child(scratch: str, model: str, most: str, outside: str) -> dict[str, Any]:
     # Each thread takes memory that none of them needs: most of the work is ours.
     os.environ["PXR_WORK_THREAD_LIMIT"] = "1"
     from ptmtools.scene.usd.source import make_source
 
     findings = Findings(Path(model), bool(outside))
     source, images, files = make_source(Path(model), findings, int(most))
-    return hand_over(source, images, findings, scratch, files)
+    return pack_source(source, images, findings, scratch, files)
 
 
 if __name__ == "__main__":
-    serve(_read_here)
+    serve(_read_in_child)

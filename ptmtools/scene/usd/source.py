@@ -23,9 +23,10 @@ from ptmtools.arrays import Floats
 from ptmtools.errors import InputError
 from ptmtools.scene.messages import NamedImage
 from ptmtools.scene.model import Camera
+from ptmtools.scene.notes import Findings
 from ptmtools.scene.rows import Rows
 from ptmtools.scene.sandbox import unreadable
-from ptmtools.scene.source import Findings, Source, too_many_triangles
+from ptmtools.scene.source import Source, too_many_triangles
 from ptmtools.scene.usd.layers import (
     LIBRARY,
     TIME,
@@ -100,7 +101,7 @@ class Traversal:
         """All that is drawn, and notes of what is not. Raises InputError PTM-I270."""
         found = self._below(self._stage.GetPseudoRoot(), None)
         for (missed, code, message), count in self._left_out.items():
-            (self._findings.miss if missed else self._findings.say)(code, message, "", count)
+            (self._findings.miss if missed else self._findings.note)(code, message, "", count)
         return found
 
     def name(self, prim: Any) -> str:
@@ -290,7 +291,7 @@ def _cameras(found: list[tuple[str, Floats, Any]], findings: Findings) -> tuple[
         if flat or not (
             usable and math.isfinite(height / (distance or 1)) and height > 0 < distance
         ):
-            findings.say("PTM-N225", f"camera {name} has no perspective, skipped", name)
+            findings.note("PTM-N225", f"camera {name} has no perspective, skipped", name)
             continue
         x, y, z = position.tolist()
         dx, dy, dz = (direction / length).tolist()

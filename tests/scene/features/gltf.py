@@ -25,12 +25,12 @@ from tests.scene.features.registry import (
     four,
     half,
     mirrored,
-    painted,
     seen,
     shown,
     the_quad,
     three_quads,
     twice,
+    vertex_colors,
 )
 
 
@@ -73,7 +73,7 @@ def _(put: Put) -> str:
 CORNERS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]], np.float32)
 
 
-@feature("glTF", "colours of vertices", "carried over", painted)
+@feature("glTF", "colours of vertices", "carried over", vertex_colors)
 def _(put: Put) -> str:
     doc = Gltf()
     quad = doc.quad()
@@ -82,7 +82,7 @@ def _(put: Put) -> str:
     return glb(put, doc)
 
 
-@feature("glTF", "colours of vertices", "carried over", painted)
+@feature("glTF", "colours of vertices", "carried over", vertex_colors)
 def _colours_of_bytes(put: Put) -> str:
     """Normalised, with an alpha that an opaque material does not heed."""
     doc = Gltf()

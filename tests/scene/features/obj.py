@@ -14,12 +14,12 @@ from tests.scene.features.registry import (
     feature,
     four,
     half,
-    painted,
     shown,
     the_quad,
     tinted,
     twice,
     untextured,
+    vertex_colors,
 )
 
 
@@ -44,20 +44,20 @@ def _(put: Put) -> str:
 COLORED = "v 0 0 0 1 0 0\nv 10 0 0 0 1 0\nv 10 4 0 0 0 1\nv 0 4 0 0 0 0\n"
 
 
-@feature("OBJ", "colours of vertices", "carried over", painted)
+@feature("OBJ", "colours of vertices", "carried over", vertex_colors)
 def _(put: Put) -> str:
     put("a.obj", COLORED + "f 1 2 3 4\n")
     return "a.obj"
 
 
-@feature("OBJ", "colours of vertices", "carried over", painted)
+@feature("OBJ", "colours of vertices", "carried over", vertex_colors)
 def _colours_beyond_1(put: Put) -> str:
     """By rounding, and of a vertex that no face has."""
     put("a.obj", COLORED.replace("0 1 0 0", "0 1.000001 0 0", 1) + "f 1 2 3 4\nv 0 0 9 1.4 0 0\n")
     return "a.obj"
 
 
-@feature("OBJ", "colours of vertices", "carried over", painted)
+@feature("OBJ", "colours of vertices", "carried over", vertex_colors)
 def _colours_to_255(put: Put) -> str:
     """As some scanners write them; and they take the place of Kd."""
     put("a.mtl", "newmtl wall\nKd 0.2 0.2 0.2\n")
@@ -111,7 +111,7 @@ def suggested(scene: Scene) -> None:
     untextured(scene)
     (message,) = [note.message for note in scene.notes if note.code == "PTM-N203"]
     assert message == (
-        "mtllib house.mtl: not found; if a.mtl beside the model is meant, rename it to house.mtl"
+        "mtllib house.mtl: not found; if a.mtl is the library of the model, rename it to house.mtl"
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tests.scene.conftest import Put
-from tests.scene.features.registry import feature, painted
+from tests.scene.features.registry import feature, vertex_colors
 
 PLY_ROWS = "".join(
     f"{place} {color}\n"
@@ -16,7 +16,7 @@ PLY_ROWS = "".join(
 )
 
 
-@feature("PLY", "colours of vertices", "carried over", painted)
+@feature("PLY", "colours of vertices", "carried over", vertex_colors)
 def _(put: Put) -> str:
     colors = "".join(f"property uchar {name}\n" for name in ("red", "green", "blue"))
     axes = "".join(f"property float {axis}\n" for axis in "xyz")

@@ -122,7 +122,7 @@ def tinted(scene: Scene) -> None:
     assert np.allclose(scene.materials[0].color, (1.0, 0.5, 0.0), atol=1e-6)
 
 
-def painted(scene: Scene) -> None:
+def vertex_colors(scene: Scene) -> None:
     the_quad(scene)
     assert scene.colors is not None
     assert at_corners(scene, scene.colors) == {

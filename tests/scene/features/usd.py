@@ -17,12 +17,12 @@ from tests.scene.features.registry import (
     four,
     half,
     mirrored,
-    painted,
     seen,
     the_quad,
     three_quads,
     tinted,
     twice,
+    vertex_colors,
 )
 
 #: Linear light of half of sRGB.
@@ -56,7 +56,7 @@ def _(put: Put) -> str:
     return written(put, on)
 
 
-@feature("USD", "colours of vertices", "carried over", painted, "PTM-N226")
+@feature("USD", "colours of vertices", "carried over", vertex_colors, "PTM-N226")
 def _(put: Put) -> str:
     on = made().stage()
     corners = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, 0)]

@@ -18,7 +18,8 @@ from ptmtools.errors import InputError, LimitError, MissingComponentError
 from ptmtools.scene import IngestOptions, Scene, ingest
 from ptmtools.scene.ifc import products as ifc_products, reader as ifc
 from ptmtools.scene.model import Kind, Storey
-from ptmtools.scene.source import MAX_VERTICES, Findings, Source
+from ptmtools.scene.notes import Findings
+from ptmtools.scene.source import MAX_VERTICES, Source
 from tests.scene.conftest import Put
 from tests.scene.ifc.ifc_house import DEEP, HIGH, STOREY, THICK, WIDE, Ifc, house
 

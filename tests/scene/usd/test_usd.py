@@ -19,7 +19,8 @@ from ptmtools.errors import InputError, LimitError, MissingComponentError, PtmEr
 from ptmtools.scene import IngestOptions, ingest
 from ptmtools.scene.formats import read_other
 from ptmtools.scene.messages import NamedImage
-from ptmtools.scene.source import MAX_VERTICES, FileRange, Findings, Source
+from ptmtools.scene.notes import Findings
+from ptmtools.scene.source import MAX_VERTICES, FileRange, Source
 from tests.scene.conftest import Put, noise, png
 
 if TYPE_CHECKING:

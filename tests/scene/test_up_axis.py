@@ -17,12 +17,12 @@ from ptmtools.scene.up_axis import (
     CLOSE_UNIT,
     UNITS,
     UNUSUAL_UP,
-    Look,
-    Named,
-    Reading,
+    Candidate,
+    Evidence,
+    NamedFaces,
     Up,
-    looks,
-    readings,
+    candidates,
+    evidence,
 )
 
 from .made import (
@@ -85,18 +85,18 @@ UNSURE = {
 FAR = np.array([512_345.0, 5_400_123.0, 250.0])
 
 
-def read(triangles: Floats, usual: Up | None = None) -> list[Reading]:
+def read(triangles: Floats, usual: Up | None = None) -> list[Candidate]:
     points, faces = welded(triangles)
-    named = Named(*np.zeros((2, len(faces)), dtype=bool))
-    return readings(looks(points, faces, named), usual=usual)
+    named = NamedFaces(*np.zeros((2, len(faces)), dtype=bool))
+    return candidates(evidence(points, faces, named), usual=usual)
 
 
-def axis_ahead(ranked: list[Reading]) -> float:
+def axis_ahead(ranked: list[Candidate]) -> float:
     """How much more the cheapest reading of the other axis costs."""
     return next(r.cost for r in ranked if r.up != ranked[0].up) - ranked[0].cost
 
 
-def unit_ahead(ranked: list[Reading]) -> float:
+def unit_ahead(ranked: list[Candidate]) -> float:
     """How much more the next unit costs."""
     same = [r.cost for r in ranked if r.up == ranked[0].up]
     return same[1] - same[0]
@@ -132,7 +132,7 @@ def test_a_courtyard_with_arcades_does_not_turn_over() -> None:
     assert np.allclose(np.ptp(y_up(atrium()) * 100, axis=(0, 1)), [3721, 1556, 2287], atol=1)
     assert (best.up, best.unit) == ("y", "cm")
     assert axis_ahead(ranked) >= CLOSE_AXIS
-    assert "a usual up axis" in best.reasons(next(r for r in ranked if r.up == "z"))
+    assert "usual up axis" in best.reasons(next(r for r in ranked if r.up == "z"))
     assert read(y_up(atrium()) * 100)[0].up == "y"
     assert read(atrium() * 100)[0].up == "z"
 
@@ -142,9 +142,9 @@ def test_the_width_that_counts_is_that_of_rooms() -> None:
     slab = box((-400, -400, -0.6), (400, 400, -0.3))
     for site in (meadow(house(), 3000), np.concatenate([house(), slab])):
         best = read(site)[0]
-        assert best.look.width >= 800
-        assert 15 < best.look.built < 20
-        assert best.costs["a usual size"] == 0
+        assert best.evidence.width >= 800
+        assert 15 < best.evidence.built < 20
+        assert best.costs["usual size"] == 0
         assert not best.flat
 
 
@@ -172,11 +172,11 @@ def test_a_house_with_doors_8_feet_high_rooms_is_in_feet() -> None:
     shell = np.concatenate([box((0, 0, 0), (40, 30, 8)), leaf])
     points, faces = welded(shell)
     none = np.zeros(len(faces), dtype=bool)
-    plain = readings(looks(points, faces, Named(none, none)))
+    plain = candidates(evidence(points, faces, NamedFaces(none, none)))
     assert plain[0].unit == "m"
     assert unit_ahead(plain) < CLOSE_UNIT
     doors = (np.arange(12, len(faces)),)
-    assert readings(looks(points, faces, Named(none, none, doors)))[0].unit == "ft"
+    assert candidates(evidence(points, faces, NamedFaces(none, none, doors)))[0].unit == "ft"
 
 
 @pytest.mark.parametrize("name", ["walls only", "closed", "tower of 30 m, 8 m wide"])
@@ -199,28 +199,28 @@ def test_names_decide_where_shapes_do_not() -> None:
     for up, axis in (("y", 1), ("z", 2)):
         lies = np.ptp(cube[:, :, axis], axis=1) == 0
         names = ["floor.001" if lies[2 * i] else "Wall_north" for i in range(6)]
-        named = Named.of((names, face), (["paint"], np.zeros(12, dtype=int)))
+        named = NamedFaces.of((names, face), (["paint"], np.zeros(12, dtype=int)))
         ranked = read_with(cube, named)
         assert ranked[0].up == up
         assert axis_ahead(ranked) >= CLOSE_AXIS
-        assert "faces lie and stand as they are called" in ranked[0].reasons(ranked[-1])
+        assert "faces match their names" in ranked[0].reasons(ranked[-1])
 
 
-def read_with(triangles: Floats, named: Named) -> list[Reading]:
+def read_with(triangles: Floats, named: NamedFaces) -> list[Candidate]:
     """As `read`, with the triangles in their order."""
     points, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
-    return readings(looks(points, index.reshape(-1, 3), named))
+    return candidates(evidence(points, index.reshape(-1, 3), named))
 
 
 def test_words_in_names() -> None:
     names = ["GroundFloor", "floor_lamp", "Drywall", "south-wall", "indoor", "Tür 2", "Poster"]
-    named = Named.of((names, np.arange(7)), (["Decke"] + [""] * 6, np.arange(7)))
+    named = NamedFaces.of((names, np.arange(7)), (["Decke"] + [""] * 6, np.arange(7)))
     assert np.flatnonzero(named.level).tolist() == [0, 1]
     assert np.flatnonzero(named.upright).tolist() == [3]
     assert [leaf.tolist() for leaf in named.doors] == [[5]]
 
 
-PLAIN = Look(20, 6, 20, 3, 0.5, 3, 0.5, 1.0, 0.5, 1.0, 0.0)
+PLAIN = Evidence(20, 6, 20, 3, 0.5, 3, 0.5, 1.0, 0.5, 1.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -241,14 +241,14 @@ PLAIN = Look(20, 6, 20, 3, 0.5, 3, 0.5, 1.0, 0.5, 1.0, 0.0)
 )
 def test_units_by_size_alone(width: float, height: float, unit: str) -> None:
     look = replace(PLAIN, width=width, height=height, built=width, room=0.0, alike=0.0)
-    assert readings({"y": look, "z": look})[0].unit == unit
+    assert candidates({"y": look, "z": look})[0].unit == unit
 
 
 @pytest.mark.parametrize("size", [0.0, 5e-324, 1e-300, 1e300, 1.7e308])
 def test_sizes_at_the_ends_of_numbers_have_a_reading(size: float) -> None:
     look = replace(PLAIN, width=size, height=size, built=size, room=size, door=size)
     for other in (look, PLAIN):
-        ranked = readings({"y": look, "z": other})
+        ranked = candidates({"y": look, "z": other})
         assert len(ranked) == 2 * len(UNITS)
         assert all(math.isfinite(reading.cost) for reading in ranked)
         assert ranked[0].size
@@ -256,5 +256,5 @@ def test_sizes_at_the_ends_of_numbers_have_a_reading(size: float) -> None:
 
 def test_a_known_unit_is_the_only_one() -> None:
     look = replace(PLAIN, width=20.0)
-    assert {r.unit for r in readings({"y": look, "z": look}, 0.0254)} == {"in"}
-    assert {(r.unit, r.metres) for r in readings({"y": look, "z": look}, 3.0)} == {("", 3.0)}
+    assert {r.unit for r in candidates({"y": look, "z": look}, 0.0254)} == {"in"}
+    assert {(r.unit, r.metres) for r in candidates({"y": look, "z": look}, 3.0)} == {("", 3.0)}
