@@ -22,7 +22,7 @@ import numpy as np
 
 from benchmarks.fuzz.mutation import NAMES, NUMBERS, Case, damaged, dumped, garbled, twisted
 from ptmtools.cli.main import main
-from ptmtools.pipeline.run import Artifacts
+from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS, STAGES
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.store.folder import DatabaseFolder

@@ -35,7 +35,8 @@ from ptmtools.output.emitters import GLTF
 from ptmtools.pipeline.build import Visitor, build_scene as build, run_stage
 from ptmtools.pipeline.command import build_command, open_database
 from ptmtools.pipeline.report import BuildReport, StageReport
-from ptmtools.pipeline.run import NEVER_RUN, Artifacts
+from ptmtools.pipeline.records import NEVER_RUN, StageReport
+from ptmtools.pipeline.stage import Artifacts, Stage
 from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages import CELLS, EMIT, PVS, STAGES
 from ptmtools.quantities import count, size

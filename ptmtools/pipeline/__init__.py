@@ -16,9 +16,9 @@ if TYPE_CHECKING:
         plan_build as plan_build,
         run_stage as run_stage,
     )
-    from ptmtools.pipeline.options import TextureOptions as TextureOptions
+    from ptmtools.pipeline.encoding import TextureOptions as TextureOptions
     from ptmtools.pipeline.report import BuildReport as BuildReport, StageReport as StageReport
-    from ptmtools.pipeline.run import Artifacts as Artifacts
+    from ptmtools.pipeline.stage import Artifacts as Artifacts
     from ptmtools.pipeline.status import (
         DatabaseStatus as DatabaseStatus,
         StageStatus as StageStatus,

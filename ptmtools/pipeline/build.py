@@ -23,7 +23,7 @@ from ptmtools.lazy import Lazy
 from ptmtools.parallel import Workers
 from ptmtools.pipeline.command import naming_command
 from ptmtools.pipeline.report import BuildReport, StageReport, peak_memory
-from ptmtools.pipeline.run import Artifacts, Run, reasons, work_of
+from ptmtools.pipeline.stage import Artifacts, Run, reasons, work_of
 from ptmtools.pipeline.stage import Options, Stage
 from ptmtools.pipeline.stages import EMIT, SCENE, STAGES
 from ptmtools.progress import Progress, silent

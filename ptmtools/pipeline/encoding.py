@@ -1,6 +1,6 @@
 """Encodes one image as a task: a `.ptm`, the `Detail` of its levels, a fallback image.
 
-`encoded_image` takes and returns bytes. `encoded_there` is for processes, of this machine or
+`encoded_image` takes and returns bytes. `encoded_on_disk` is for processes, of this machine or
 others, that see the disk of the database: only names and digests travel. (The bytes of images
 and textures would keep the process that builds so busy that it serves eight workers and no more,
 docs/design/scaling.md.) A worker writes to a folder with a new name in every run, so one that an
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import secrets
 import shutil
 from collections.abc import Iterator
@@ -19,18 +20,64 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ptmtools.errors import WorkerError, naming
+from ptmtools.errors import InputError, WorkerError, naming
 from ptmtools.files import write_bytes
-from ptmtools.parallel import Executor
-from ptmtools.pipeline.options import TextureOptions
+from ptmtools.options import option
 from ptmtools.store.layout import IMAGES, STAGING, sha256
-from ptmtools.store.transaction import Transaction
+from ptmtools.texture.model import EncodeOptions
 
 if TYPE_CHECKING:
+    from ptmtools.parallel import Executor
+    from ptmtools.store.transaction import Transaction
     from ptmtools.texture.detail import Detail
     from ptmtools.texture.model import PtmHeader
 
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
+
+
+@dataclass(frozen=True)
+class TextureOptions(EncodeOptions):
+    """Options of the textures stage."""
+
+    fallback: bool = option(
+        True, "Also write a PNG of each texture, for clients that cannot read .ptm."
+    )
+    fallback_size: int = option(
+        0,
+        "Largest side of the PNGs, which hold the finest level within it; 0 for the finest level.",
+        metavar="TEXELS",
+    )
+    trim: bool = option(
+        False,
+        "Leave out levels that no screen of --trim-height resolves from any place where a visitor "
+        "can stand. Larger screens and flying cameras see them blurred.",
+        basic=True,
+    )
+    trim_height: int = option(
+        1080, "Height of the screen that --trim assumes; it is 16:9.", metavar="PIXELS"
+    )
+    trim_fov: float = option(60.0, "Vertical field of view that --trim assumes.", metavar="DEGREES")
+    trim_distance: float = option(
+        0.25, "Smallest distance of an eye from a surface that --trim assumes.", metavar="METRES"
+    )
+    limit: int = option(1024, "Largest decoded size of an image.", metavar="MIB", compare=False)
+
+    def __post_init__(self) -> None:
+        """Raises InputError PTM-I111 for values out of range."""
+        from ptmtools.texture.encoder import check_options
+
+        check_options(self)
+        possible = {
+            "trim_height": self.trim_height > 0,
+            "trim_fov": 0 < self.trim_fov < 180,
+            "trim_distance": 0 < self.trim_distance < math.inf,
+        }
+        for name in (name for name, fits in possible.items() if not fits):
+            raise InputError(
+                "PTM-I111",
+                f"{name} is {getattr(self, name):g}",
+                remedy="give a number above 0, and for an angle below 180",
+            )
 
 
 def encoded_image(options: TextureOptions, image: tuple[str, bytes, int]) -> list[bytes]:
@@ -107,7 +154,7 @@ def shared_disk(
         shutil.rmtree(out, ignore_errors=True)
 
 
-def encoded_there(disk: SharedDisk, image: ImageTask) -> list[tuple[str, str]]:
+def encoded_on_disk(disk: SharedDisk, image: ImageTask) -> list[tuple[str, str]]:
     """Writes the results of `encoded_image` to the shared disk: (file, SHA-256) of each.
 
     Raises what that raises; WorkerError PTM-W005 where the disk cannot be seen.

@@ -1,38 +1,47 @@
-"""What a stage is: one frozen value that says all that a build has to know of it.
+"""The contract of the stages: a stage's declaration, its artifacts, and its job in one run.
 
-Each stands in a file of its own in `stages/`, and in the table there. Build, plan, status, info,
-validate, tradeoff and the command line loop over that table.
+A stage is one frozen value in a file of its own in `stages/`, with a line in the table there.
+Build, plan, status, info, validate, tradeoff and the command line loop over that table.
+
+`ptmtools.pipeline.command` completes the command of their `Rebuild` remedies.
 """
 
 from __future__ import annotations
 
-import json
-import typing
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
-from dataclasses import asdict, dataclass, field, fields, is_dataclass
-from types import UnionType
-from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar, Union, get_args, get_origin
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
-from ptmtools.errors import PtmError
+from ptmtools.diagnostics import warnings_in
+from ptmtools.errors import DatabaseError, Rebuild, naming
 from ptmtools.lazy import Lazy
-from ptmtools.options import option_of
-from ptmtools.store.layout import arrays_of
+from ptmtools.pipeline.records import StageReport, options_of, parameters, reasons
+from ptmtools.progress import Progress, silent
+from ptmtools.store.folder import DatabaseFolder, damaged
+from ptmtools.store.layout import MANIFEST, arrays_of
+from ptmtools.store.manifest import StageRecord, damaged_manifest
 
 if TYPE_CHECKING:
-    from ptmtools.pipeline.run import Artifacts, Job
-    from ptmtools.store.manifest import StageRecord
+    from pathlib import Path
 
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ptmtools.parallel import Workers
+    from ptmtools.store.transaction import Transaction
+    from ptmtools.store.writer import DatabaseWriter
 
 A = TypeVar("A")
+T = TypeVar("T")
 
-#: The options that a stage is run with: an instance of its `Stage.options`.
+#: The options of a run of a stage: an instance of its `Stage.options`.
 Options = Any
 Counts = Mapping[str, Any]
 
-
-def _nothing(*_: Any) -> tuple[str, ...]:
-    return ()
+#: The exceptions that damaged contents cause in their readers.
+_FAULTS = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,40 +51,32 @@ class Stage(Generic[A]):
     Attributes
     ----------
     name: in the manifest, as a command, and of its arrays' file.
-    about: what it does, a sentence for ``--help``.
-    recipe: a number that is raised when the stage makes different bytes from the same inputs, so
-        that a new release runs again what it changed and nothing else.
-    changed: what the recipe changed that a user notices, for who has a database of an earlier one.
+    about: one sentence for ``--help``.
+    recipe: a number that rises when the stage gives other bytes for the same inputs, so that a new
+        release repeats only the stages that it changed.
+    changed: the visible effect of the last rise of the recipe.
     options: the frozen class of its options. A field's metadata may have ``default_before``: a
-        recipe, and what the default was before that.
-    reads: the stages that it reads, in the order in which `compute` takes their artifacts; a
-        function of the options if it depends on them.
-    changes: the stage whose artifact it makes another of, of the same class; where it has stored no
-        arrays it is that one. Who reads it reads the arrays of both.
-    files: of the stages that it reads, those of which it reads all files, not the arrays alone.
-    artifact: the class of what it makes, with ``to_arrays`` and ``from_arrays``; None if it makes
+        recipe, and the default before that.
+    reads: the stages whose artifacts `compute` takes, in this order; a function of the options if
+        it depends on them.
+    files: those of `reads` of which it reads all files, not only the arrays.
+    inputs: ``inputs(artifacts, options)``: name → SHA-256 of its inputs, if these are not the files
+        of `reads`.
+    changes: the stage whose artifact it replaces by another of the same class. If it stores no
+        arrays, the artifact is unchanged. A stage that reads it reads the arrays of both.
+    artifact: the class of its artifact, with ``to_arrays`` and ``from_arrays``; None if it writes
         files only.
-    compute: ``compute(*artifacts, options, progress, executor)``, which makes the artifact.
-    counts: its figures, of an artifact. They are recorded, and checked by ``ptm validate``.
-    notes: what there is to say of an artifact and the options, one line each; `Warned` are those
-        that are told first.
-    summary: what was made, in one line, of the recorded counts.
-    fits: for stages whose artifacts this one refers to: what is wrong with (own, other), or "".
-    job: how it is run; the default computes the artifact and stores its arrays.
-    inputs: ``inputs(artifacts, options)``: name → SHA-256 of what it reads; by default the arrays
-        of the stages that it reads, or all the files of one that has none.
-    foresee: ``foresee(artifacts, work)``: whether what others read of it is known before a run
-        that would do ``work``; ``artifacts`` then hold it.
-    tasks: ``tasks(artifacts, work)``: of a stage that consists of tasks, the names of those that a
-        run would do.
-    load: its artifact of the stored arrays, where that takes more than them.
-    check: ``check(artifacts, artifact)``: what else of its files is missing, as (file, place,
-        message), for ``ptm validate``.
-    from_model: it reads the model itself: its command takes one.
-    hidden: it has no command of its own, but is run by the next one's.
-    joined: what it makes is committed with the next stage: a model that cannot be cut into cells
-        leaves no database behind.
-    one_thread: it leaves the other processors free for what can be done in the background.
+    compute: ``compute(*artifacts, options, progress, executor)`` returns the artifact.
+    counts: the figures of an artifact, for the manifest; ``ptm validate`` checks them.
+    notes: lines on an artifact and the options; those of type `Warned` are warnings.
+    summary: one line from the recorded counts.
+    fits: for stages whose artifacts this one refers to: a function of both artifacts that returns
+        the fault, or "".
+    job: the class that runs it.
+    joined: it has no command of its own, and its outputs are committed with those of the next
+        stage: a model that cannot be cut into cells leaves no database behind.
+    from_model: its command takes a model, and runs the stages before it too.
+    one_thread: it leaves the other processors to later stages that can begin.
     """
 
     name: str
@@ -84,113 +85,344 @@ class Stage(Generic[A]):
     options: type
     changed: str = ""
     reads: tuple[Stage[Any], ...] | Callable[[Options], tuple[Stage[Any], ...]] = ()
-    changes: Stage[A] | None = None
     files: tuple[Stage[Any], ...] = ()
+    inputs: Callable[[Artifacts, Options], Mapping[str, str]] | None = None
+    changes: Stage[A] | None = None
     artifact: Lazy[Any] | None = None
     compute: Lazy[Callable[..., A]] | None = None
-    counts: Callable[[A], Counts] | None = None
-    notes: Callable[[A, Options], Iterable[str]] = _nothing
+    counts: Callable[[A], Counts] = field(default=lambda artifact: {})
+    notes: Callable[[A, Options], Iterable[str]] = field(default=lambda artifact, options: ())
     summary: Callable[[Counts], str] = field(default=lambda counts: "")
     fits: Mapping[Stage[Any], Callable[[A, Any], str]] = field(default_factory=dict)
-    job: Lazy[type[Job]] = field(default=Lazy("ptmtools.pipeline.run:ArraysJob"))
-    inputs: Lazy[Callable[[Artifacts, Options], Mapping[str, str]]] | None = None
-    foresee: Lazy[Callable[[Artifacts, StageRecord], bool]] | None = None
-    tasks: Lazy[Callable[[Artifacts, StageRecord], list[str]]] | None = None
-    load: Lazy[Callable[[Artifacts, Mapping[str, Any]], A]] | None = None
-    check: Lazy[Callable[[Artifacts, A], Iterable[tuple[str, str, str]]]] | None = None
-    from_model: bool = False
-    hidden: bool = False
+    job: type[Job] = field(default_factory=lambda: Job)
     joined: bool = False
+    from_model: bool = False
     one_thread: bool = False
 
     def read_with(self, options: Options) -> tuple[Stage[Any], ...]:
-        """The stages that it reads when it is run with these options."""
+        """The stages that it reads with these options."""
         return self.reads(options) if callable(self.reads) else self.reads
 
     def sources(self, options: Options) -> tuple[Stage[Any], ...]:
-        """The stages whose files it reads: also those that one of `read_with` changes."""
+        """The stages whose files it reads: those of `read_with`, and the ones that these change."""
         reads = self.read_with(options)
         changed = (read.changes for read in reads if read.changes)
         return tuple(dict.fromkeys((*changed, *reads)))
 
-    def files_read(
-        self, options: Options, outputs: Callable[[Stage[Any]], Mapping[str, str]]
-    ) -> dict[str, str]:
-        """Name → SHA-256 of what it reads of other stages, whose ``outputs`` are given; "" for
-        arrays that are not among these."""
-        found: dict[str, str] = {}
-        for read in self.sources(options):
-            there, name = outputs(read), arrays_of(read.name)
-            if read.artifact is None or read in self.files:
-                found |= there
-            elif name in there or not read.changes:
-                found[name] = there.get(name, "")
-        return found
-
     def summarize(self, counts: Counts) -> str:
-        """`summary`; a manifest may say anything."""
+        """`summary`, of counts from a manifest, which may be invalid."""
         try:
             return self.summary(counts)
         except (ArithmeticError, LookupError, TypeError, ValueError):
-            return "figures that make no sense"
+            return "invalid counts"
 
     def recorded(self, record: StageRecord) -> Options:
-        """The options of a run, of the parameters that its record has.
-
-        Raises ValueError if they are not such. Fields that the class does not have any more are
-        passed over, and those that it has gained have their default; so has what was the default
-        when it was recorded.
-        """
-        parameters = record.parameters
-        hints = typing.get_type_hints(self.options)
-        given: dict[str, Any] = {}
+        """The options that its record has; raises ValueError if they are impossible."""
         try:
-            for each in fields(self.options):
-                former = (name.replace("-", "_") for name in option_of(each).was)
-                for name in (each.name, *former):
-                    if name in parameters and each.compare:
-                        value = _restored(hints[each.name], parameters[name])
-                        recipe, former = option_of(each).default_before or (0, None)
-                        if record.recipe >= recipe or value != former:
-                            given[each.name] = value
-                        break
-            return self.options(**given)
-        except (PtmError, AttributeError, LookupError, TypeError) as fault:
+            return options_of(self.options, record)
+        except ValueError as fault:
             raise ValueError(f"stage {self.name} has impossible parameters: {fault}") from fault
 
-
-def parameters(options: Any) -> dict[str, Any]:
-    """The options that can change an artifact, as JSON reads them back; those that cannot are not
-    compared in their class (``field(compare=False)``)."""
-    if not is_dataclass(options) or isinstance(options, type):
-        raise TypeError(f"{options!r} is not an options dataclass")
-    plain = asdict(options)
-    for each in fields(options):
-        if not each.compare:
-            del plain[each.name]
-    result: dict[str, Any] = json.loads(json.dumps(plain))
-    return result
+    def work(self, options: Options, inputs: Mapping[str, str]) -> StageRecord:
+        """The record of a run with these options and inputs, still without outputs."""
+        return StageRecord(self.recipe, parameters(options), dict(inputs), {})
 
 
-def _restored(hint: Any, value: Any) -> Any:
-    """What JSON makes of an option of the type ``hint``, as it was; raises TypeError if it is no
-    such option."""
-    parts = get_args(hint)
-    if get_origin(hint) in (Union, UnionType):
-        for part in parts:
-            with suppress(TypeError):
-                return _restored(part, value)
-    elif get_origin(hint) is tuple and isinstance(value, list):
-        inner = [parts[0]] * len(value) if parts[-1] is Ellipsis else parts
-        if len(inner) == len(value):
-            return tuple(map(_restored, inner, value))
-    elif isinstance(hint, type) and is_dataclass(hint) and isinstance(value, dict):
-        hints = typing.get_type_hints(hint)
-        return hint(**{name: _restored(hints.get(name), each) for name, each in value.items()})
-    elif (
-        (get_origin(hint) is Literal and value in parts)
-        or type(value) is hint
-        or (hint is float and type(value) is int)
-    ):
-        return value
-    raise TypeError(f"{value!r} is not {hint}")
+class Artifacts:
+    """The artifacts of a database: ``artifacts[CELLS]``, read at first use.
+
+    Attributes
+    ----------
+    db: the database.
+    model: the model file, where it is known.
+    """
+
+    def __init__(
+        self, db: DatabaseFolder, model: Path | None = None, *, planned: bool = False
+    ) -> None:
+        """With ``planned``, a stage that has not run has no outputs, instead of an error."""
+        self.db = db
+        self.model = model
+        self._planned = planned
+        self._files: dict[str, Any] = {}
+        self._artifacts: dict[Stage[Any], Any] = {}
+
+    def __getitem__(self, stage: Stage[A]) -> A:
+        """Raises PTM-D004 to PTM-D006, also where artifacts do not fit together; PTM-D008 if
+        another release of ptmtools computed the artifact."""
+        if stage not in self._artifacts:
+            stored = stage if self.is_stored(stage) else stage.changes
+            assert stored
+            artifact = self._read(stage) if stored is stage else self[stored]
+            with self.reading(arrays_of(stored.name)):
+                self._check_fit(stage, artifact)
+            self._artifacts[stage] = artifact
+        return cast(A, self._artifacts[stage])
+
+    def _read(self, stage: Stage[A]) -> A:
+        if self.record(stage).recipe != stage.recipe:
+            raise DatabaseError(
+                "PTM-D008",
+                f"the {stage.name} stage was run by another release of ptmtools",
+                file=self.db.path,
+                remedy=Rebuild("run {} to bring the database up to date"),
+            )
+        arrays = self.db.read_arrays(stage.name)
+        with self.reading(arrays_of(stage.name)):
+            return cast(A, stage.job.load(self, stage, arrays))
+
+    def keep(self, stage: Stage[A], artifact: A) -> None:
+        """Sets the artifact that a stage has just computed."""
+        self._artifacts[stage] = artifact
+
+    def cached(self, name: str, read: Callable[[], T]) -> T:
+        """The result of ``read``, which is called once for each file; damage is PTM-D006."""
+        if name not in self._files:
+            with self.reading(name):
+                self._files[name] = read()
+        return cast(T, self._files[name])
+
+    def cache(self, name: str, value: Any) -> None:
+        """Sets what `cached` returns."""
+        self._files[name] = value
+
+    def record(self, stage: Stage[Any]) -> StageRecord:
+        """The record of a stage's last run; raises PTM-D004 if there was none."""
+        return self._last(stage) or self.db.record(stage.name)
+
+    def before(self, stage: Stage[Any]) -> StageRecord | None:
+        """The record that decides whether a stage is current, or None."""
+        return self._last(stage)
+
+    def _last(self, stage: Stage[Any]) -> StageRecord | None:
+        return self.db.manifest.stages.get(stage.name)
+
+    def outputs(self, stage: Stage[Any]) -> Mapping[str, str]:
+        """The outputs of a stage: name → SHA-256; raises PTM-D004 if it has not run.
+
+        Databases of earlier releases lack stages that change an artifact; they changed nothing.
+        """
+        if self._last(stage) is None and (stage.changes or self._planned):
+            return {}
+        return self.record(stage).outputs
+
+    def is_stored(self, stage: Stage[Any]) -> bool:
+        """Whether a stage has stored an artifact, or left the one unchanged that it `changes`;
+        raises as `outputs`."""
+        return not stage.changes or arrays_of(stage.name) in self.outputs(stage)
+
+    def recorded(self, stage: Stage[Any]) -> Options:
+        """The options of a stage's last run; raises PTM-D002 if they are impossible."""
+        record = self.record(stage)
+        try:
+            return stage.recorded(record)
+        except ValueError as fault:
+            raise damaged_manifest(self.db.path / MANIFEST, str(fault)) from fault
+
+    def inputs(self, stage: Stage[Any], options: Options) -> dict[str, str]:
+        """Name → SHA-256 of the inputs of a run with these options; raises PTM-D004 and
+        PTM-D002."""
+        if stage.inputs:
+            return dict(stage.inputs(self, options))
+        inputs: dict[str, str] = {}
+        for read in stage.sources(options):
+            outputs, arrays = self.outputs(read), arrays_of(read.name)
+            if read.artifact is None or read in stage.files:
+                inputs |= outputs
+            elif arrays in outputs:
+                inputs[arrays] = outputs[arrays]
+            elif not read.changes:
+                inputs[arrays] = "" if self._planned else self.db.output(read.name, arrays)
+        return inputs
+
+    def outdated(self, stage: Stage[Any]) -> str:
+        """The input of a stage's last run that has changed since; "" if there is none."""
+        if stage.changes and self._last(stage) is None:
+            return ""
+        record = self.record(stage)
+        if record.recipe != stage.recipe:
+            return "release of ptmtools"
+        try:
+            options = self.recorded(stage)
+            if not stage.read_with(options):  # it reads the model, which may be elsewhere
+                return ""
+            inputs = self.inputs(stage, options)
+        except DatabaseError:
+            return ""  # the fault is in the stage that it reads
+        names = inputs.keys() | record.inputs.keys()
+        changed = [name for name in names if record.inputs.get(name) != inputs.get(name)]
+        if not changed:
+            return ""
+        return stage.read_with(options)[0].name if stage.inputs else min(changed)
+
+    def _check_fit(self, stage: Stage[A], artifact: A) -> None:
+        """Raises ValueError if an artifact does not fit those that were read before."""
+        together = {**self._artifacts, stage: artifact}
+        for one, own in together.items():
+            for other, check in one.fits.items():
+                concerned = stage in (one, other) and other in together
+                if concerned and (fault := check(own, together[other])):
+                    raise ValueError(fault)
+
+    @contextmanager
+    def reading(self, name: str) -> Iterator[None]:
+        """Turns faults in the contents of a file of the database into PTM-D006."""
+        try:
+            yield
+        except _FAULTS as fault:
+            raise damaged(self.db.path / name, f"{type(fault).__name__} {fault}") from fault
+
+
+class Run(Artifacts):
+    """A database being written: the artifacts, and the outputs that are not committed yet."""
+
+    def __init__(
+        self,
+        db: DatabaseWriter,
+        workers: Workers,
+        progress: Progress = silent,
+        model: Path | None = None,
+        *,
+        rebuild: bool = False,
+    ) -> None:
+        super().__init__(db, model)
+        self.writer, self.workers, self.progress, self.rebuild = db, workers, progress, rebuild
+        self.reports: list[StageReport] = []
+        self._joint: Transaction | None = None
+        self._uncommitted: dict[str, StageRecord] = {}
+
+    def _last(self, stage: Stage[Any]) -> StageRecord | None:
+        return self._uncommitted.get(stage.name) or super()._last(stage)
+
+    def before(self, stage: Stage[Any]) -> StageRecord | None:
+        """See `Artifacts.before`; None if everything is run again."""
+        return None if self.rebuild else super()._last(stage)
+
+    def begin(self, stage: Stage[Any]) -> Transaction:
+        """The transaction for the outputs of a stage."""
+        return self._joint or self.writer.begin(stage.name)
+
+    def settle(self, stage: Stage[Any], transaction: Transaction, record: StageRecord) -> None:
+        """Sets the record of a stage, whose outputs were put into the transaction since the last
+        call."""
+        earlier = {name for record in self._uncommitted.values() for name in record.outputs}
+        outputs = {n: d for n, d in transaction.pending().items() if n not in earlier}
+        self._uncommitted[stage.name] = replace(record, outputs=outputs)
+        self._joint = transaction
+
+    def end(
+        self,
+        stage: Stage[Any],
+        why: tuple[str, ...],
+        seconds: float,
+        tasks: tuple[int, int, int] | None = None,
+    ) -> None:
+        """Ends the turn of a stage: commits, unless it is `Stage.joined` to the next, and reports.
+
+        A stage that could change an artifact, and neither did nor had, is not reported.
+        """
+        record = self.record(stage)
+        committed = self.db.manifest.stages.get(stage.name)
+        if self._joint and not stage.joined:
+            self._joint.commit(self._uncommitted)
+            self._joint, self._uncommitted = None, {}
+        idle = not record.outputs and not record.notes and not (committed and committed.outputs)
+        if not (stage.changes and idle):
+            notes, warnings = tuple(record.notes), tuple(record.warnings)
+            self.reports.append(
+                StageReport(
+                    stage.name, bool(why), seconds, record.counts, notes, why, tasks, warnings
+                )
+            )
+
+
+class Job:
+    """One stage in one run: computes the artifact, and stores its arrays.
+
+    A stage with other outputs has a subclass, which also holds the functions that only it needs.
+    """
+
+    def __init__(self, run: Run, stage: Stage[Any], options: Options) -> None:
+        self.run, self.stage, self.options = run, stage, options
+
+    @staticmethod
+    def load(
+        artifacts: Artifacts, stage: Stage[Any], arrays: Mapping[str, NDArray[np.generic]]
+    ) -> Any:
+        """The artifact of the stored arrays; raises one of `_FAULTS` if they are damaged."""
+        assert stage.artifact
+        return stage.artifact.load().from_arrays(arrays)
+
+    @staticmethod
+    def missing(artifacts: Artifacts, artifact: Any) -> Iterable[tuple[str, str, str]]:
+        """The files that an artifact refers to and the database lacks, as (file, place, message),
+        for ``ptm validate``."""
+        return ()
+
+    @staticmethod
+    def foresee(artifacts: Artifacts, work: StageRecord) -> bool:
+        """Whether the files that other stages read are known before a run that would do ``work``;
+        ``artifacts`` are then as after that run."""
+        return False
+
+    @staticmethod
+    def tasks(artifacts: Artifacts, work: StageRecord) -> list[str]:
+        """The tasks that a run would do, for a stage that consists of tasks."""
+        return []
+
+    def begin(self) -> None:
+        """Begins in the background, once all inputs are known, while a stage of one thread runs."""
+
+    def raise_failure(self) -> None:
+        """Raises the exception that ended the background work."""
+
+    def abandon(self) -> None:
+        """Ends the background work: the run has failed."""
+
+    def do(self) -> None:
+        """Runs the stage unless it is current, and reports."""
+        start = time.perf_counter()
+        work, why = self.planned()
+        if why:
+            transaction = self.run.begin(self.stage)
+            self.run.settle(self.stage, transaction, self.make(transaction, work))
+        self.run.end(self.stage, why, time.perf_counter() - start)
+
+    def planned(self) -> tuple[StageRecord, tuple[str, ...]]:
+        """The work, and why it has to be done; no reasons if the stage is current.
+
+        Raises
+        ------
+        DatabaseError: PTM-D002, PTM-D004; PTM-D008 if a stage that it reads is outdated.
+        """
+        run, stage = self.run, self.stage
+        work = stage.work(self.options, run.inputs(stage, self.options))
+        for read in stage.sources(self.options):
+            if earlier := run.outdated(read):
+                raise DatabaseError(
+                    "PTM-D008",
+                    f"the {read.name} stage was made from an earlier {earlier}",
+                    file=run.db.path,
+                    remedy=Rebuild("run {} first"),
+                )
+        if run.rebuild:
+            return work, ("a rebuild was asked for",)
+        return work, reasons(run.before(stage), work, run.db, stage.changed)
+
+    def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
+        """Puts the outputs into the transaction; returns the record, still without outputs."""
+        run, stage, options = self.run, self.stage, self.options
+        assert stage.compute
+        reads = [run[read] for read in stage.read_with(options)]
+        executor = run.workers.alone if stage.one_thread else run.workers.executor
+        with naming(run.model if stage.from_model else None):
+            artifact = stage.compute.load()(*reads, options, run.progress, executor)
+        run.keep(stage, artifact)
+        transaction.put_arrays(stage.name, artifact.to_arrays())
+        notes = tuple(stage.notes(artifact, options))
+        return replace(
+            work,
+            counts=stage.counts(artifact),
+            notes=tuple(map(str, notes)),
+            warnings=warnings_in(notes),
+        )

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ptmtools.pipeline.command import naming_command
-from ptmtools.pipeline.run import Artifacts
+from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages import STAGES
 from ptmtools.store.folder import DatabaseFolder, read_manifest

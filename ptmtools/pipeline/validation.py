@@ -31,7 +31,7 @@ from ptmtools.lazy import Lazy
 from ptmtools.output import validate_database, validate_ptm
 from ptmtools.output.validation.findings import CODES
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.run import Artifacts
+from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages import APO, CELLS, PVS, STAGES
 from ptmtools.progress import Progress, silent

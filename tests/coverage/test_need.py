@@ -23,7 +23,7 @@ from ptmtools.coverage.sampling import Sampler
 from ptmtools.errors import InputError
 from ptmtools.pipeline import build_scene
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.run import Artifacts
+from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import CELLS, PVS, SCENE
 
 TWO_ROOMS = Path(__file__).parents[2] / "sample_data/two_rooms/two_rooms.obj"

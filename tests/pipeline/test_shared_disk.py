@@ -12,7 +12,7 @@ from ptmtools import parallel
 from ptmtools.errors import OutputError, WorkerError
 from ptmtools.parallel import Executor
 from ptmtools.pipeline import TextureOptions, build_scene
-from ptmtools.pipeline.encoding import ImageTask, _sees, encoded_there, shared_disk
+from ptmtools.pipeline.encoding import ImageTask, _sees, encoded_on_disk, shared_disk
 from ptmtools.store.layout import sha256
 from ptmtools.store.writer import DatabaseWriter
 
@@ -60,7 +60,7 @@ def test_names_or_bytes_make_the_same_database(tmp_path, monkeypatch) -> None:
     expected = built(tmp_path / "near", monkeypatch, near)
     assert built(tmp_path / "far", monkeypatch, far) == expected
     assert built(tmp_path / "blind", monkeypatch, blind) == expected
-    assert "encoded_there" in far.asked
+    assert "encoded_on_disk" in far.asked
     assert "encoded_image" not in far.asked
     assert "encoded_image" in blind.asked
 
@@ -83,16 +83,16 @@ def test_an_image_is_found_before_and_after_its_commit(tmp_path, transaction) ->
     with shared_disk(transaction, database, TextureOptions(), Remote()) as disk:
         assert disk is not None
         with pytest.raises(WorkerError, match="PTM-W005"):
-            encoded_there(disk, task)
+            encoded_on_disk(disk, task)
         made = []
         for folder in (".ptm-new/scene/stages/images", "stages/images"):
             (database / folder).mkdir(parents=True)
             (database / folder / task.sha256).write_bytes(image)
-            made.append([digest for _, digest in encoded_there(disk, task)])
+            made.append([digest for _, digest in encoded_on_disk(disk, task)])
             (database / folder / task.sha256).write_bytes(image[:-1])
         assert made[0] == made[1]
         with pytest.raises(WorkerError, match="PTM-W005"):  # damaged, both of them
-            encoded_there(disk, task)
+            encoded_on_disk(disk, task)
 
 
 def test_a_forgotten_worker_writes_to_nowhere(tmp_path, transaction) -> None:
@@ -104,7 +104,7 @@ def test_a_forgotten_worker_writes_to_nowhere(tmp_path, transaction) -> None:
         assert disk is not None
     before = sorted(tmp_path.rglob("*"))
     with pytest.raises(OutputError):
-        encoded_there(disk, ImageTask("a.png", sha256(image), "0"))
+        encoded_on_disk(disk, ImageTask("a.png", sha256(image), "0"))
     assert sorted(tmp_path.rglob("*")) == before
 
 

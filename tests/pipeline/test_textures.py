@@ -15,9 +15,9 @@ from ptmtools import parallel
 from ptmtools.parallel import Executor, Workers
 from ptmtools.pipeline import TextureOptions, build_scene, run_stage
 from ptmtools.pipeline.encoding import bare_png
-from ptmtools.pipeline.run import Run
+from ptmtools.pipeline.stage import Run
 from ptmtools.pipeline.stages import CELLS, TEXTURES
-from ptmtools.pipeline.textures import TexturesJob, texture_names
+from ptmtools.pipeline.stages.textures import TexturesJob, texture_names
 from ptmtools.store.writer import DatabaseWriter
 from ptmtools.texture import read_image
 

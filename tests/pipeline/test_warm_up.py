@@ -13,7 +13,8 @@ from ptmtools.cli.main import main
 from ptmtools.errors import InputError
 from ptmtools.pipeline.build import WARM_UP, build_scene
 from ptmtools.pipeline.stages import CELLS
-from ptmtools.pipeline.warm_up import warm_up, write_building
+from ptmtools.pipeline.build import warm_up
+from ptmtools.pipeline.warm_up import write_building
 from ptmtools.portal_flow import line_kernels
 
 
@@ -53,7 +54,7 @@ def test_the_building(tmp_path: Path) -> None:
 def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Where nothing has been compiled; what would be, is not."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "place"))
-    monkeypatch.setattr("ptmtools.pipeline.warm_up.warm_up", lambda: None)
+    monkeypatch.setattr("ptmtools.pipeline.build.warm_up", lambda: None)
     return tmp_path / "place"
 
 

@@ -1,30 +1,180 @@
-"""Objects of the scene become simplified meshes with octree textures; without any nothing is done.
+"""Replaces objects of the scene by simplified meshes with octree textures (paper 2).
 
-Stages that mean what is shown read this one; those that mean the model and its images read the
-scene.
+Only the new arrays of the scene are stored. The octrees are served files, listed in a file of
+their own, so that a finer octree changes neither the cells nor the stages after them.
+
+Stages that concern the drawn geometry read this stage; those that concern the model and its images
+read the scene. Without objects to replace, this stage writes nothing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+import math
+import re
+import unicodedata
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from ptmtools.diagnostics import warnings_in
 from ptmtools.lazy import Lazy
 from ptmtools.neighbours.apo.options import ReplaceOptions
-from ptmtools.pipeline.stage import Stage
+from ptmtools.output.names import OCTREE_FOLDER
+from ptmtools.pipeline.stage import Artifacts, Job, Stage
 from ptmtools.pipeline.stages.scene import SCENE
 from ptmtools.quantities import count, size
+from ptmtools.store.layout import OCTREE_LIST, SERVED, arrays_of
+from ptmtools.store.manifest import StageRecord
+from ptmtools.store.transaction import Transaction
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ptmtools.neighbours.apo.replacing import ReplacedObject
+    from ptmtools.output.model import OctreeRecord
     from ptmtools.scene.model import Scene
+
+_ILLEGAL = re.compile(r"[^A-Za-z0-9_]+")
+_FILE = re.compile(rf"{OCTREE_FOLDER}/[A-Za-z0-9_]+\.bin")
+#: Longer object names come from generators and are cut.
+_LONGEST = 48
+
+
+class ReplacingJob(Job):
+    """Replaces the selected objects."""
+
+    @staticmethod
+    def load(
+        artifacts: Artifacts, stage: Stage[Any], arrays: Mapping[str, NDArray[np.generic]]
+    ) -> Scene:
+        """See `Job.load`."""
+        from ptmtools.neighbours.apo.replacing import Replacement
+
+        replacement = Replacement.from_arrays(arrays)
+        numbers = [record.number for record in octree_records(artifacts)]
+        if numbers != replacement.objects.tolist():
+            raise ValueError(f"{arrays_of(APO.name)} and {OCTREE_LIST} are of other objects")
+        return replacement.of(artifacts[SCENE])
+
+    @staticmethod
+    def missing(artifacts: Artifacts, artifact: Scene) -> Iterator[tuple[str, str, str]]:
+        """The octrees without a file in the database, see `Job.missing`."""
+        outputs = artifacts.outputs(APO)
+        for record in octree_records(artifacts):
+            if f"{SERVED}/{record.file}" not in outputs:
+                yield OCTREE_LIST, record.object, "has no octree in the database"
+
+    @staticmethod
+    def foresee(artifacts: Artifacts, work: StageRecord) -> bool:
+        """See `Job.foresee`: known if nothing was replaced, and nothing will be."""
+        before = artifacts.before(APO)
+        return not work.parameters["apo"] and not (before and before.outputs)
+
+    def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
+        """Raises the errors of `replaced`."""
+        if not self.options.apo:
+            return replace(work, counts={"octrees": 0})
+        from ptmtools.neighbours.apo.replacing import replaced
+
+        run = self.run
+        result = replaced(run[SCENE], self.options, run.workers.executor, run.progress)
+        rows = []
+        files = octree_files(octree.name for octree in result.octrees)
+        for file, octree in zip(files, result.octrees, strict=True):
+            row, data = _row(file, octree)
+            rows.append(row)
+            transaction.put(f"{SERVED}/{file}", data)
+        if result.replacement:
+            transaction.put_arrays(APO.name, result.replacement.to_arrays())
+            text = json.dumps({"octrees": rows}, indent=1, ensure_ascii=False) + "\n"
+            transaction.put(OCTREE_LIST, text.encode())
+            run.cache(OCTREE_LIST, tuple(map(_record, rows)))
+        run.keep(APO, result.scene)
+        counts = {
+            "octrees": len(rows),
+            "source": sum(row["source"] for row in rows),
+            "faces": sum(row["faces"] for row in rows),
+            "texels": sum(sum(row["levels"]) for row in rows),
+            "bytes": sum(row["ends"][-1] for row in rows),
+            "triangles": len(result.scene.triangles),
+            "deviation": max((row["deviation"] for row in rows), default=0.0),
+        }
+        notes = tuple(map(str, result.notes))
+        return replace(work, counts=counts, notes=notes, warnings=warnings_in(result.notes))
+
+
+def octree_files(objects: Iterable[str]) -> list[str]:
+    """The file of each object's octree, relative to the served folder, unique without regard to
+    case."""
+    taken: set[str] = set()
+    files = []
+    for name in objects:
+        plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
+        stem = _ILLEGAL.sub("_", plain).strip("_")[:_LONGEST] or "object"
+        unique, number = stem, 1
+        while unique.casefold() in taken:
+            number += 1
+            unique = f"{stem}_{number}"
+        taken.add(unique.casefold())
+        files.append(f"{OCTREE_FOLDER}/{unique}.bin")
+    return files
+
+
+def _row(file: str, replaced: ReplacedObject) -> tuple[dict[str, Any], bytes]:
+    """The row of an octree in the list, and its stream."""
+    import numpy as np
+
+    from ptmtools.neighbours.apo.files import streamed
+
+    data, levels = streamed(replaced.octree.texels, replaced.octree)
+    row = {
+        "object": replaced.name,
+        "number": replaced.object,
+        "file": file,
+        "low": replaced.octree.low.tolist(),
+        "side": replaced.octree.side,
+        "levels": np.diff(replaced.octree.start).tolist(),
+        **levels,
+        "source": replaced.source,
+        "faces": replaced.faces,
+        "deviation": replaced.deviation,
+        "missed": replaced.missed,
+    }
+    return row, data
+
+
+def octree_records(artifacts: Artifacts) -> tuple[OctreeRecord, ...]:
+    """The octree textures of a database, for the served files; raises PTM-D004 to PTM-D006."""
+    if OCTREE_LIST not in artifacts.outputs(APO):
+        return ()
+
+    def read() -> tuple[OctreeRecord, ...]:
+        rows = json.loads(artifacts.db.read_output(APO.name, OCTREE_LIST))["octrees"]
+        return tuple(map(_record, rows))
+
+    return artifacts.cached(OCTREE_LIST, read)
+
+
+def _record(row: Mapping[str, Any]) -> OctreeRecord:
+    """Raises ValueError, KeyError or TypeError for a row that no list has."""
+    from ptmtools.output.model import OctreeRecord
+
+    low, side = tuple(map(float, row["low"])), float(row["side"])
+    levels, ends, checks = (tuple(map(int, row[name])) for name in ("levels", "ends", "crc32"))
+    number = int(row["number"])
+    if not isinstance(row["object"], str) or number < 0 or not _FILE.fullmatch(row["file"]):
+        raise ValueError("an octree with an impossible name")
+    if len(low) != 3 or not all(map(math.isfinite, low)) or not 0 < side < math.inf:
+        raise ValueError("an octree without a place")
+    if not len(levels) == len(ends) == len(checks) > 0:
+        raise ValueError("an octree whose lists are not aligned")
+    return OctreeRecord(row["object"], number, row["file"], low, side, levels, ends, checks)
 
 
 def _reads(options: ReplaceOptions) -> tuple[Stage[Any], ...]:
     return (SCENE,) if options.apo else ()
-
-
-def _counts(scene: Scene) -> Mapping[str, Any]:
-    return {"triangles": len(scene.triangles)}
 
 
 def _summary(n: Mapping[str, Any]) -> str:
@@ -46,12 +196,8 @@ APO: Stage[Scene] = Stage(
     reads=_reads,
     changes=SCENE,
     artifact=Lazy("ptmtools.scene.model:Scene"),
-    counts=_counts,
+    counts=lambda scene: {"triangles": len(scene.triangles)},
     summary=_summary,
-    job=Lazy("ptmtools.pipeline.replacing:ReplacingJob"),
-    foresee=Lazy("ptmtools.pipeline.replacing:foresee"),
-    load=Lazy("ptmtools.pipeline.replacing:load_scene"),
-    check=Lazy("ptmtools.pipeline.replacing:missing_octrees"),
-    hidden=True,
+    job=ReplacingJob,
     joined=True,
 )

@@ -1,19 +1,113 @@
-"""All that was computed becomes the served files (paper §6)."""
+"""Writes the served files from all artifacts (paper §6)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, replace
+from typing import TYPE_CHECKING, Any
 
-from ptmtools.lazy import Lazy
+from ptmtools.diagnostics import warnings_in
 from ptmtools.output.model import EmitOptions
-from ptmtools.pipeline.stage import Stage
+from ptmtools.pipeline.encoding import fallback_level, read_detail
+from ptmtools.pipeline.stage import Artifacts, Job, Stage
 from ptmtools.pipeline.stages.ach import ACH
-from ptmtools.pipeline.stages.apo import APO
+from ptmtools.pipeline.stages.apo import APO, octree_records
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.pvs import PVS
-from ptmtools.pipeline.stages.textures import TEXTURES
+from ptmtools.pipeline.stages.scene import image_digests
+from ptmtools.pipeline.stages.textures import TEXTURES, detail_file, header_of, texture_files
 from ptmtools.quantities import count, size
+from ptmtools.store.layout import SERVED
+from ptmtools.store.manifest import StageRecord
+from ptmtools.store.transaction import Transaction
+
+if TYPE_CHECKING:
+    from ptmtools.coverage.required_levels import Need
+    from ptmtools.output.model import TextureRecord
+    from ptmtools.texture.detail import Detail
+
+
+class EmissionJob(Job):
+    """Writes the served files; raises what `ptmtools.output.emit` raises."""
+
+    def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
+        """See `Job.make`."""
+        from ptmtools.output import emit
+
+        run, textures = self.run, texture_records(self.run)
+        report = emit(
+            run[APO],
+            run[CELLS],
+            run[PVS],
+            run[ACH],
+            textures,
+            transaction.subfolder(SERVED),
+            self.options,
+            run.progress,
+            force=True,
+            need=self._need(textures),
+            octrees=octree_records(run),
+            workers=run.workers.executor.workers,
+        )
+        for name in report.files:
+            transaction.take(f"{SERVED}/{name}", transaction.folder / SERVED / name)
+        counts = {
+            "files": len(report.files),
+            "bytes": report.bytes,
+            "first_look": report.first_look,
+            "shapes": report.shapes,
+            "triangles": report.triangles,
+            "visible": run[CELLS].visible,
+            "owners": run[CELLS].owners,
+            "collapsed": report.collapsed,
+            "viewpoints": len(report.viewpoints),
+            "visit": asdict(report.visit),
+        }
+        return replace(work, counts=counts, notes=report.notes, warnings=warnings_in(report.notes))
+
+    def _need(self, textures: Iterable[TextureRecord]) -> Need | None:
+        """How fine textures are needed, if that is asked for."""
+        if not self.options.need:
+            return None
+        from ptmtools.coverage.required_levels import TextureSize, compute_need
+
+        run = self.run
+        sizes = {t.image: TextureSize(t.width, t.height, len(t.levels)) for t in textures}
+        return compute_need(run[APO], run[CELLS], run[PVS], sizes, self.options.need, run.progress)
+
+
+def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
+    """What the emitted files say of the textures of a database."""
+    from ptmtools.output import TextureRecord
+
+    def detail(name: str) -> Detail:
+        kept = detail_file(name)
+        return run.cached(kept, lambda: read_detail(run.db.read_output(TEXTURES.name, kept)))
+
+    record = run.record(TEXTURES)
+    options, served = run.recorded(TEXTURES), run.db.path / SERVED
+    records = []
+    for i, name in enumerate(texture_files(image_digests(run))):
+        png = f"{name.removesuffix('ptm')}png"
+        fallback = png if f"{SERVED}/{png}" in record.outputs else None
+        header = header_of(served / name)
+        records.append(
+            TextureRecord(
+                image=i,
+                file=name,
+                fallback=fallback,
+                width=header.levels[-1].width,
+                height=header.levels[-1].height,
+                components=header.components,
+                levels=header.levels,
+                sha256=run.db.output(TEXTURES.name, f"{SERVED}/{name}"),
+                fallback_level=fallback_level(header, options.fallback_size) if fallback else None,
+                fallback_bytes=(served / fallback).stat().st_size if fallback else 0,
+                detail=detail(name),
+                stored=served / name,
+            )
+        )
+    return tuple(records)
 
 
 def _summary(n: Mapping[str, Any]) -> str:
@@ -40,6 +134,6 @@ EMIT: Stage[None] = Stage(
     options=EmitOptions,
     reads=(APO, CELLS, PVS, ACH, TEXTURES),
     files=(APO,),
-    job=Lazy("ptmtools.pipeline.emission:EmissionJob"),
     summary=_summary,
+    job=EmissionJob,
 )

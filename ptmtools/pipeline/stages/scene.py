@@ -1,17 +1,246 @@
-"""The model becomes arrays in metres, a list of its images, and a copy of each."""
+"""Reads the model: arrays in metres, a list of its images, and a copy of each image.
+
+The list is a file of its own beside the arrays, so that a repainted texture changes neither the
+cells nor the stages after them. If only the contents of plain images (see `SourceImage`) have
+changed, the model is not read again: the arrays would be the same.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ptmtools.errors import DatabaseError, naming
 from ptmtools.lazy import Lazy
-from ptmtools.pipeline.stage import Stage
+from ptmtools.pipeline.stage import Artifacts, Job, Stage
 from ptmtools.quantities import count
 from ptmtools.scene.options import IngestOptions
+from ptmtools.store.digests import Digests
+from ptmtools.store.layout import IMAGE_LIST, IMAGES, sha256
+from ptmtools.store.manifest import StageRecord
+from ptmtools.store.transaction import Transaction
 
 if TYPE_CHECKING:
-    from ptmtools.scene.model import Scene
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ptmtools.scene.model import Scene, SourceImage
+
+
+_IMAGE_NAME = re.compile(r"[A-Za-z0-9_-]+\.[A-Za-z0-9]+")
+_SHA256 = re.compile(r"[0-9a-f]{64}")
+
+
+def image_rows(artifacts: Artifacts) -> list[Mapping[str, Any]]:
+    """The list of the scene's images: name, sha256, files and plain, as in `SourceImage`.
+
+    Names and digests become file names, so only the form that ingest writes is accepted. Raises
+    PTM-D004 to PTM-D006.
+    """
+
+    def read() -> list[Mapping[str, Any]]:
+        rows: list[Mapping[str, Any]]
+        rows = json.loads(artifacts.db.read_output(SCENE.name, IMAGE_LIST))["images"]
+        for row in rows:
+            if not (_IMAGE_NAME.fullmatch(row["name"]) and _SHA256.fullmatch(row["sha256"])):
+                raise ValueError("an image with an impossible name or digest")
+            texts = isinstance(row["files"], list) and all(isinstance(f, str) for f in row["files"])
+            if not texts or not isinstance(row["plain"], bool):
+                raise TypeError("an image without a list of files")
+        return rows
+
+    return artifacts.cached(IMAGE_LIST, read)
+
+
+def image_digests(artifacts: Artifacts) -> dict[str, str]:
+    """Name → SHA-256 of the scene's images, in their order; raises as `image_rows`."""
+    return {row["name"]: row["sha256"] for row in image_rows(artifacts)}
+
+
+def images_of(artifacts: Artifacts) -> tuple[SourceImage, ...]:
+    """The scene's images, each read when it is loaded; raises as `image_rows`."""
+    from ptmtools.scene.model import SourceImage
+
+    def image(row: Mapping[str, Any]) -> SourceImage:
+        digest = row["sha256"]
+
+        def load() -> bytes:
+            return artifacts.db.read(f"{IMAGES}/{digest}", digest)
+
+        return SourceImage(row["name"], digest, load, tuple(row["files"]), row["plain"])
+
+    return artifacts.cached(IMAGES, lambda: tuple(map(image, image_rows(artifacts))))
+
+
+def _inputs(artifacts: Artifacts, _: IngestOptions) -> dict[str, str]:
+    """See `Stage.inputs`: the files of the last run, as others are not known before the model is
+    read."""
+    assert artifacts.model
+    before = artifacts.before(SCENE)
+    return _digests(artifacts.model, before.inputs if before else (), artifacts.db.digests)
+
+
+def _digests(model: Path, names: Iterable[str], digests: Digests) -> dict[str, str]:
+    """Name → SHA-256 of the files of a model, "" for one that is absent."""
+    result = {}
+    for name in dict.fromkeys((model.name, *names)):
+        file = model.parent / name
+        try:
+            result[name] = digests.of(file) if file.is_file() else ""
+        except OSError:
+            result[name] = ""
+    return result
+
+
+def _repainted(artifacts: Artifacts, work: StageRecord) -> dict[int, str] | None:
+    """Row in the list → file of the repainted images, if the contents of plain images are all that
+    has changed since the last run; else None."""
+    before = artifacts.before(SCENE)
+    if before is None or before.inputs.keys() != work.inputs.keys():
+        return None
+    if (before.recipe, before.parameters) != (work.recipe, work.parameters):
+        return None
+    try:
+        rows = image_rows(artifacts)
+    except DatabaseError:
+        return None
+    row_of = {row["files"][0]: i for i, row in enumerate(rows) if len(row["files"]) == 1}
+    repainted: dict[int, str] = {}
+    for name, digest in work.inputs.items():
+        if before.inputs[name] != digest:
+            row = rows[row_of[name]] if name in row_of else None
+            if row is None or not row["plain"] or row["sha256"] != before.inputs[name]:
+                return None
+            repainted[row_of[name]] = name
+    digests = {
+        work.inputs[repainted[i]] if i in repainted else row["sha256"] for i, row in enumerate(rows)
+    }
+    return repainted if len(digests) == len(rows) else None
+
+
+class ReadingJob(Job):
+    """Reads the model, or its repainted images alone."""
+
+    @staticmethod
+    def load(
+        artifacts: Artifacts, stage: Stage[Any], arrays: Mapping[str, NDArray[np.generic]]
+    ) -> Scene:
+        """See `Job.load`."""
+        from ptmtools.scene.model import Scene
+
+        return Scene.from_arrays(arrays, images_of(artifacts))
+
+    @staticmethod
+    def missing(artifacts: Artifacts, artifact: Scene) -> Iterator[tuple[str, str, str]]:
+        """The images without a copy in the database, see `Job.missing`."""
+        outputs = artifacts.record(SCENE).outputs
+        for image in artifact.images:
+            if outputs.get(f"{IMAGES}/{image.sha256}") != image.sha256:
+                yield IMAGE_LIST, image.name, "is not in the database"
+
+    @staticmethod
+    def foresee(artifacts: Artifacts, work: StageRecord) -> bool:
+        """See `Job.foresee`: known if only plain images were repainted."""
+        repainted = _repainted(artifacts, work)
+        if repainted is None:
+            return False
+        new = {i: {"sha256": work.inputs[name]} for i, name in repainted.items()}
+        rows = [{**row, **new.get(i, {})} for i, row in enumerate(image_rows(artifacts))]
+        artifacts.cache(IMAGE_LIST, rows)
+        return True
+
+    @property
+    def _model(self) -> Path:
+        assert self.run.model
+        return self.run.model
+
+    def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
+        """Raises the errors of `ingest` and `check_image`."""
+        return self._repaint(transaction, work) or self._read(transaction, work)
+
+    def _read(self, transaction: Transaction, work: StageRecord) -> StageRecord:
+        from ptmtools.scene import ingest
+        from ptmtools.scene.notes import line, warnings
+
+        run = self.run
+        scene = ingest(self._model, self.options, run.progress, workers=run.workers.here)
+        run.keep(SCENE, scene)
+        transaction.put_arrays(SCENE.name, scene.to_arrays())
+        self._put_images(transaction, scene.images, scene.images)
+        return replace(
+            work,
+            inputs=_digests(self._model, scene.files, run.db.digests),
+            counts={**_counts(scene), **self._bytes(scene.files, scene.images)},
+            notes=tuple(map(line, scene.notes)),
+            warnings=tuple(warnings(scene.notes)),
+        )
+
+    def _repaint(self, transaction: Transaction, work: StageRecord) -> StageRecord | None:
+        """Reads the repainted images; None if more has changed."""
+        from ptmtools.scene.images import is_plain
+        from ptmtools.scene.model import SourceImage
+        from ptmtools.scene.source import FileRange, HeldBytes
+
+        repainted = _repainted(self.run, work)
+        if repainted is None:
+            return None
+        before, rows = self.run.record(SCENE), image_rows(self.run)
+        fresh: dict[int, SourceImage] = {}
+        for i, name in repainted.items():
+            try:
+                data = FileRange(self._model.parent / name)()
+            except OSError:
+                return None
+            limit = self.options.limit << 20
+            if sha256(data) != work.inputs[name] or not is_plain(data, rows[i]["name"], limit):
+                return None
+            held = HeldBytes(data)
+            fresh[i] = SourceImage(rows[i]["name"], work.inputs[name], held, (name,), True)
+        old = {f"{IMAGES}/{before.inputs[name]}" for name in repainted.values()} | {IMAGE_LIST}
+        kept = {name: digest for name, digest in before.outputs.items() if name not in old}
+        if not transaction.keep(kept):
+            return None
+        images = [fresh.get(i, image) for i, image in enumerate(images_of(self.run))]
+        self._put_images(transaction, images, fresh.values())
+        counts = {**before.counts, **self._bytes(work.inputs, images)}
+        return replace(work, counts=counts, notes=before.notes, warnings=before.warnings)
+
+    def _bytes(self, names: Iterable[str], images: Iterable[SourceImage]) -> dict[str, int]:
+        """The sizes of the model's files without its images, and of these."""
+        painted = {name for image in images for name in image.files} - {self._model.name}
+        files = {name: self._model.parent / name for name in {self._model.name, *names} | painted}
+        sizes = {name: f.stat().st_size for name, f in files.items() if f.is_file()}
+        image_bytes = sum(length for name, length in sizes.items() if name in painted)
+        return {"model_bytes": sum(sizes.values()) - image_bytes, "image_bytes": image_bytes}
+
+    def _put_images(
+        self,
+        transaction: Transaction,
+        images: Iterable[SourceImage],
+        fresh: Iterable[SourceImage],
+    ) -> None:
+        """Stages the list of images, and a copy of each fresh one, which must be decodable."""
+        from ptmtools.texture.images import check_image
+        from ptmtools.texture.model import Limits
+
+        images = tuple(images)
+        rows = [
+            {"name": i.name, "sha256": i.sha256, "files": list(i.files), "plain": i.plain}
+            for i in images
+        ]
+        self.run.cache(IMAGES, images)
+        self.run.cache(IMAGE_LIST, rows)
+        text = json.dumps({"images": rows}, indent=1, ensure_ascii=False) + "\n"
+        transaction.put(IMAGE_LIST, text.encode())
+        for image in fresh:
+            data = image.load()
+            with naming(image.name):
+                check_image(data, Limits(self.options.limit << 20))
+            transaction.put(f"{IMAGES}/{image.sha256}", data)
 
 
 def _counts(scene: Scene) -> Mapping[str, Any]:
@@ -30,10 +259,10 @@ def _counts(scene: Scene) -> Mapping[str, Any]:
 
 
 def _summary(n: Mapping[str, Any]) -> str:
-    guessed = [what for what, key in (("unit", "unit"), ("up axis", "up")) if n[f"{key}_guessed"]]
+    guessed = [text for text, key in (("unit", "unit"), ("up axis", "up")) if n[f"{key}_guessed"]]
     how = f" ({' and '.join(guessed)} guessed)" if guessed else ""
     extent = ""
-    if "size" in n:  # which databases of earlier releases do not say
+    if "size" in n:  # absent from databases of earlier releases
         width, height, depth = n["size"]
         extent = f"; {width:.3g} × {depth:.3g} m, {height:.3g} m high"
     return (
@@ -48,15 +277,10 @@ SCENE: Stage[Scene] = Stage(
     recipe=7,
     changed="OBJ has Y up by convention, and opaque materials ignore the alpha of textures",
     options=IngestOptions,
+    inputs=_inputs,
     artifact=Lazy("ptmtools.scene.model:Scene"),
     counts=_counts,
     summary=_summary,
-    job=Lazy("ptmtools.pipeline.reading:ReadingJob"),
-    inputs=Lazy("ptmtools.pipeline.reading:inputs_of"),
-    foresee=Lazy("ptmtools.pipeline.reading:foresee"),
-    load=Lazy("ptmtools.pipeline.reading:load_scene"),
-    check=Lazy("ptmtools.pipeline.reading:missing_images"),
-    from_model=True,
-    hidden=True,
+    job=ReadingJob,
     joined=True,
 )
