@@ -32,18 +32,17 @@ from ptmtools.cli.parameters import (
 )
 from ptmtools.lazy import Lazy
 from ptmtools.output.emitters import GLTF
-from ptmtools.pipeline.build import Visitor, build_scene as build, run_stage
+from ptmtools.pipeline.build import build_scene as build, run_stage
 from ptmtools.pipeline.command import build_command, open_database
-from ptmtools.pipeline.report import BuildReport, StageReport
 from ptmtools.pipeline.records import NEVER_RUN, StageReport
+from ptmtools.pipeline.report import BuildReport, Visitor
 from ptmtools.pipeline.stage import Artifacts, Stage
-from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages import CELLS, EMIT, PVS, STAGES
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import SERVED
 
 if TYPE_CHECKING:
-    from ptmtools.pipeline.build import StagePlan
+    from ptmtools.pipeline.status import StagePlan
 
 
 @dataclass(frozen=True)
@@ -126,7 +125,7 @@ def _from_model(last: Stage[Any] | None) -> Callable[..., None]:
         """
         options: list[Any] = [take(stage.options, values) for stage in stages]
         if dry_run:
-            from ptmtools.pipeline.build import plan_build
+            from ptmtools.pipeline.status import plan_build
 
             plans = plan_build(model, db, *options, force=force)
             print_plan(console, plans[: len(stages)], as_json)

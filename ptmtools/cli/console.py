@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ptmtools.errors import PtmError
+from ptmtools.errors import DatabaseError, PtmError
 from ptmtools.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -158,6 +158,10 @@ def describe(fault: BaseException) -> tuple[int, str]:
     """(exit status, one line) of the exception that ended a command; the line may be empty."""
     match fault:
         case PtmError():
+            if isinstance(fault, DatabaseError):
+                from ptmtools.pipeline.command import complete_remedy
+
+                complete_remedy(fault)
             return fault.exit_status, str(fault)
         case click.exceptions.NoArgsIsHelpError():
             return USAGE, fault.format_message()

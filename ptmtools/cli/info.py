@@ -67,8 +67,8 @@ def _info_folder(console: Console, folder: Path, kind: FolderKind, as_json: bool
 def _info_database(console: Console, target: str, as_json: bool) -> None:
     from ptmtools.cli.build import print_visitor
     from ptmtools.options import arguments
-    from ptmtools.pipeline.build import Visitor
     from ptmtools.pipeline.command import build_command, open_database
+    from ptmtools.pipeline.report import Visitor
     from ptmtools.pipeline.stages import STAGES
 
     db = open_database(target)

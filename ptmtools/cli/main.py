@@ -120,7 +120,7 @@ def _stages() -> dict[str, Stage[Any]]:
     """The stages that have a command, by its name."""
     from ptmtools.pipeline.stages import STAGES
 
-    return {name: stage for name, stage in STAGES.items() if not stage.hidden}
+    return {name: stage for name, stage in STAGES.items() if not stage.joined}
 
 
 @click.group(

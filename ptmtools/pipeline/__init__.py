@@ -11,29 +11,33 @@ from ptmtools.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from ptmtools.pipeline.build import (
-        StagePlan as StagePlan,
         build_scene as build_scene,
-        plan_build as plan_build,
         run_stage as run_stage,
     )
     from ptmtools.pipeline.encoding import TextureOptions as TextureOptions
-    from ptmtools.pipeline.report import BuildReport as BuildReport, StageReport as StageReport
+    from ptmtools.pipeline.records import StageReport as StageReport
+    from ptmtools.pipeline.report import BuildReport as BuildReport
     from ptmtools.pipeline.stage import Artifacts as Artifacts
     from ptmtools.pipeline.status import (
         DatabaseStatus as DatabaseStatus,
+        StagePlan as StagePlan,
         StageStatus as StageStatus,
         database_status as database_status,
+        plan_build as plan_build,
     )
     from ptmtools.pipeline.validation import shoot_segments as shoot_segments, validate as validate
 
 __getattr__ = lazy_exports(
     __name__,
     {
-        "ptmtools.pipeline.build": "StagePlan build_scene plan_build run_stage",
-        "ptmtools.pipeline.options": "TextureOptions",
-        "ptmtools.pipeline.report": "BuildReport StageReport",
-        "ptmtools.pipeline.run": "Artifacts",
-        "ptmtools.pipeline.status": "DatabaseStatus StageStatus database_status",
+        "ptmtools.pipeline.build": "build_scene run_stage",
+        "ptmtools.pipeline.encoding": "TextureOptions",
+        "ptmtools.pipeline.records": "StageReport",
+        "ptmtools.pipeline.report": "BuildReport",
+        "ptmtools.pipeline.stage": "Artifacts",
+        "ptmtools.pipeline.status": (
+            "DatabaseStatus StagePlan StageStatus database_status plan_build"
+        ),
         "ptmtools.pipeline.validation": "shoot_segments validate",
     },
 )

@@ -32,14 +32,26 @@ def build_command(db: str | PathLike[str]) -> str:
 
 @contextmanager
 def naming_command(db: str | PathLike[str]) -> Iterator[None]:
-    """Completes the command of a `Rebuild` remedy by the model and the options of the database,
-    which the raising module does not know."""
+    """Completes the `Rebuild` remedy of an error of the database."""
     try:
         yield
     except DatabaseError as fault:
         if isinstance(fault.remedy, Rebuild):
             fault.remedy = replace(fault.remedy, command=build_command(db))
         raise
+
+
+def complete_remedy(fault: DatabaseError) -> None:
+    """As `naming_command`, for the database that contains the file of the error."""
+    if (
+        isinstance(fault.remedy, Rebuild)
+        and fault.file
+        and fault.remedy == Rebuild(fault.remedy.text)
+    ):
+        for folder in (Path(fault.file), *Path(fault.file).parents):
+            if _recorded(folder)[0]:
+                fault.remedy = replace(fault.remedy, command=build_command(folder))
+                return
 
 
 def open_database(db: str | PathLike[str]) -> DatabaseFolder:

@@ -19,7 +19,7 @@ from ptmtools.options import option_of
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.manifest import SCHEMA, StageRecord
 
-O = TypeVar("O")  # noqa: E741
+O = TypeVar("O")
 
 #: Files that a reason lists by name.
 _NAMED = 3
@@ -135,7 +135,9 @@ def reasons(
     lines = []
     if before.recipe != work.recipe:
         change = f": {changed}" if changed and before.recipe < work.recipe else ""
-        lines.append(f"this ptmtools computes it differently (recipe {before.recipe} before){change}")
+        lines.append(
+            f"this ptmtools computes it differently (recipe {before.recipe} before){change}"
+        )
     for name in dict.fromkeys((*before.parameters, *work.parameters)):
         old, new = before.parameters.get(name), work.parameters.get(name)
         both = name in before.parameters and name in work.parameters

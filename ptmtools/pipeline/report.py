@@ -1,63 +1,90 @@
-"""What a run over a database did."""
+"""The report of a run over a database, and the downloads of a visitor of its served files."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from ptmtools.pipeline.build import Visitor
+from ptmtools.pipeline.records import StageReport
+from ptmtools.pipeline.stages import EMIT, SCENE
+from ptmtools.quantities import size
+from ptmtools.store.manifest import Manifest
+
+#: A download of at least this many times the bytes of the model is called heavier.
+HEAVIER = 1.05
 
 
 @dataclass(frozen=True)
-class StageReport:
-    """What became of a stage.
+class Visitor:
+    """The downloads of a visitor, beside the size of the source model, from the recorded counts.
 
     Attributes
     ----------
-    stage: its name.
-    ran: False if it was current and nothing had to be done.
-    seconds: that it took, checking included. Textures are encoded beside the other stages where
-        there is more than one worker, so the sum may be more than the whole.
-    counts: the figures recorded in the manifest.
-    notes: what it has to say, one line each.
-    warnings: the gravest of that, one line for each kind.
-    reasons: why it ran, one line each.
-    tasks: of a stage that consists of tasks: how many there are, how many had been done before and
-        stayed, and how many were taken over from an interrupted run.
+    model: bytes of the model's files without its images; None where they were not recorded.
+    images: bytes of the files of its images, without those inside the model's; likewise.
+    visit: the fields of `ptmtools.output.model.Visit`.
     """
 
-    stage: str
-    ran: bool
-    seconds: float
-    counts: Mapping[str, Any]
-    notes: tuple[str, ...] = ()
-    reasons: tuple[str, ...] = ()
-    tasks: tuple[int, int, int] | None = None
-    warnings: tuple[str, ...] = ()
+    model: int | None
+    images: int | None
+    visit: Mapping[str, Any]
 
-    @property
-    def further(self) -> tuple[str, ...]:
-        """The notes that no warning repeats."""
-        return tuple(note for note in self.notes if note not in self.warnings)
+    @staticmethod
+    def of(manifest: Manifest) -> Visitor | None:
+        """None if nothing is served, or files of an earlier release."""
+        emitted, read = manifest.stages.get(EMIT.name), manifest.stages.get(SCENE.name)
+        visit = emitted.counts.get("visit") if emitted else None
+        if not isinstance(visit, Mapping):
+            return None
+        counts = read.counts if read else {}
+        return Visitor(counts.get("model_bytes"), counts.get("image_bytes"), visit)
+
+    def lines(self) -> list[str]:
+        """Lines of text; none if the manifest has invalid counts."""
+        try:
+            return self._lines()
+        except (ArithmeticError, LookupError, TypeError, ValueError):
+            return []
+
+    def _lines(self) -> list[str]:
+        visit, whole = self.visit, None
+        lines = []
+        if self.model is not None and self.images is not None:
+            whole = self.model + self.images
+            parts = f" ({size(self.model)}, and {size(self.images)} of image files)"
+            lines.append(f"the model as it was: {size(whole)}{parts if self.images else ''}")
+
+        def compared(count: int) -> str:
+            heavier = whole and count > HEAVIER * whole
+            return size(count) + (", heavier than the model" if heavier else "")
+
+        if visit["browser"] is not None:
+            lines.append(f"a VRML browser fetches {compared(visit['browser'])}")
+        lines.append(f"the first room is complete after {compared(visit['first_room'])}")
+        for key, when in (("mean", "on average"), ("most", "at most")):
+            shares = f"{visit[f'{key}_volume']:.1%} of the volume"
+            if visit[f"{key}_texels"] is not None:
+                shares += f" and {visit[f'{key}_texels']:.1%} of the texels"
+            lines.append(f"at hand {when} {shares}: {compared(visit[f'{key}_at_hand'])}")
+        return lines
 
 
 @dataclass(frozen=True)
 class BuildReport:
-    """What a run over a database did.
+    """The report of a run over a database.
 
     Attributes
     ----------
     model: the model's file name.
     database: the folder.
     stages: in their order.
-    seconds: of all together.
-    peak_memory: bytes, the most that this process ever held; 0 where the system does not tell.
-    peak_memory_of_workers: bytes, the most that any process held that this one started and that
-        has ended; 0 if there was none.
-    visitor: what the served files mean for a visitor, if they were written.
+    seconds: wall-clock time of all stages together.
+    peak_memory: largest number of bytes that this process has held; 0 where the system does not
+        report it.
+    peak_memory_of_workers: likewise, of a process that this one started and that has ended.
+    visitor: the downloads of a visitor, if the served files were written.
     """
 
     model: str
@@ -69,22 +96,22 @@ class BuildReport:
     visitor: Visitor | None = None
 
     def counts(self, stage: str) -> Mapping[str, Any]:
-        """The figures of a stage; empty if it was no part of this run."""
+        """The counts of a stage; empty if it was not part of this run."""
         return next((s.counts for s in self.stages if s.stage == stage), {})
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the stages have to say, in their order."""
+        """The notes of all stages, in their order."""
         return tuple(note for stage in self.stages for note in stage.notes)
 
 
 def peak_memory(*, of_workers: bool = False) -> int:
-    """Most bytes that this process has held at once, or one of those that it started and that have
-    ended; 0 where the system does not tell."""
+    """Largest number of bytes that this process, or one that it started and that has ended, has
+    held; 0 where the system does not report it."""
     try:
         import resource
     except ImportError:
         return 0
-    who = resource.RUSAGE_CHILDREN if of_workers else resource.RUSAGE_SELF
-    peak = resource.getrusage(who).ru_maxrss
+    kind = resource.RUSAGE_CHILDREN if of_workers else resource.RUSAGE_SELF
+    peak = resource.getrusage(kind).ru_maxrss
     return peak if sys.platform == "darwin" else peak * 1024

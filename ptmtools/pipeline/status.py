@@ -1,4 +1,8 @@
-"""What state a database is in: which stages are done, stale or damaged, and who is at work."""
+"""The state of a database, and the plan of a build.
+
+The state: which stages are done, stale or damaged, and which process is writing. The plan: which
+stages a build would run, and why. Neither runs a stage or writes to the database.
+"""
 
 from __future__ import annotations
 
@@ -8,31 +12,33 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from ptmtools.pipeline.build import chosen_options
 from ptmtools.pipeline.command import naming_command
-from ptmtools.pipeline.stage import Artifacts
-from ptmtools.pipeline.stage import Stage
+from ptmtools.pipeline.records import reasons
+from ptmtools.pipeline.stage import Artifacts, Options, Stage
 from ptmtools.pipeline.stages import STAGES
 from ptmtools.store.folder import DatabaseFolder, read_manifest
 from ptmtools.store.layout import LOCK, STAGING
 from ptmtools.store.lock import holder, is_held
 from ptmtools.store.manifest import Manifest
 from ptmtools.store.transaction import finished_tasks
+from ptmtools.store.writer import admitted
 
 State = Literal["done", "not run", "stale", "damaged"]
 
 
 @dataclass(frozen=True)
 class StageStatus:
-    """What state a stage is in.
+    """The state of a stage.
 
     Attributes
     ----------
     stage: its name.
-    state: "done", "not run", "stale" (what it read has been made anew since) or "damaged" (a file
-        that it wrote is missing or is another).
-    why: what is stale or damaged.
-    counts: the figures of its last run.
-    files, bytes: that it wrote and that are there.
+    state: "done", "not run", "stale" (an input has changed since) or "damaged" (an output is
+        missing or has other contents).
+    why: the changed input or damaged output.
+    counts: those of its last run.
+    files, bytes: of its outputs that exist.
     """
 
     stage: str
@@ -45,17 +51,17 @@ class StageStatus:
 
 @dataclass(frozen=True)
 class DatabaseStatus:
-    """What state a database is in.
+    """The state of a database.
 
     Attributes
     ----------
     database: the folder.
     model: the model's file name; None if nothing has been committed yet.
-    stages: all of them, in their order.
+    stages: all stages, in their order.
     finished: whether all are done.
-    writer: the process that is writing at this moment, or None.
-    interrupted: whether a run was interrupted and left something for the next to clear away.
-    waiting: tasks that it had finished, which the next run takes over.
+    writer: the process that is writing now, or None.
+    interrupted: whether an interrupted run has left files that are not committed.
+    waiting: number of its finished tasks, which the next run takes over.
     """
 
     database: str
@@ -68,8 +74,8 @@ class DatabaseStatus:
 
 
 def database_status(path: str | os.PathLike[str]) -> DatabaseStatus:
-    """Looks at a database. Every file is compared with its hash, but for those that have not been
-    touched since that was last done.
+    """The state of a database. Files that have changed since the last comparison are compared with
+    their recorded hash.
 
     Raises
     ------
@@ -81,10 +87,10 @@ def database_status(path: str | os.PathLike[str]) -> DatabaseStatus:
         manifest = read_manifest(folder)
     begun = (folder / STAGING).is_dir()
     if manifest is None and not begun and not (folder / LOCK).exists():
-        DatabaseFolder.open(folder)  # says what is wrong
+        DatabaseFolder.open(folder)  # raises
     db = DatabaseFolder(folder, manifest or Manifest(""))
     artifacts = Artifacts(db)
-    stages = tuple(_stage(artifacts, stage) for stage in STAGES.values())
+    stages = tuple(_status(artifacts, stage) for stage in STAGES.values())
     db.digests.save()
     held = is_held(folder)
     return DatabaseStatus(
@@ -98,23 +104,95 @@ def database_status(path: str | os.PathLike[str]) -> DatabaseStatus:
     )
 
 
-def _stage(artifacts: Artifacts, stage: Stage[Any]) -> StageStatus:
+def _status(artifacts: Artifacts, stage: Stage[Any]) -> StageStatus:
     db = artifacts.db
     record = db.manifest.stages.get(stage.name)
     if record is None:
-        # Databases of earlier releases lack a stage that changes another's artifact: it changed
-        # nothing.
+        # Databases of earlier releases lack stages that change an artifact; they changed nothing.
         done = stage.changes is not None and stage.changes.name in db.manifest.stages
         return StageStatus(stage.name, "done" if done else "not run", "", {}, 0, 0)
-    sizes = []
-    for name in record.outputs:
-        file = db.path / name
-        if file.is_file():
-            sizes.append(file.stat().st_size)
+    files = [file for name in record.outputs if (file := db.path / name).is_file()]
     state: State = "done"
     why = ""
     if lost := db.damaged(record.outputs):
         state, why = "damaged", f"{lost} is missing or damaged"
     elif earlier := artifacts.outdated(stage):
         state, why = "stale", f"made from an earlier {earlier}"
-    return StageStatus(stage.name, state, why, record.counts, len(sizes), sum(sizes))
+    return StageStatus(
+        stage.name,
+        state,
+        why,
+        record.counts,
+        len(files),
+        sum(file.stat().st_size for file in files),
+    )
+
+
+Plan = Literal["current", "run", "maybe"]
+
+
+@dataclass(frozen=True)
+class StagePlan:
+    """The plan for a stage.
+
+    Attributes
+    ----------
+    stage: its name.
+    plan: "current": it would not run; "run"; "maybe": it would run if a stage before it changes its
+        outputs.
+    reasons: one line each.
+    textures: for the stage of this name, the textures that it would encode, as far as known.
+    """
+
+    stage: str
+    plan: Plan
+    reasons: tuple[str, ...] = ()
+    textures: tuple[str, ...] = ()
+
+
+def plan_build(
+    model: str | os.PathLike[str],
+    db: str | os.PathLike[str],
+    *options: Options,
+    force: bool = False,
+) -> tuple[StagePlan, ...]:
+    """The plan of `build_scene` for each stage, in their order.
+
+    Raises the errors of `build_scene` for a missing model, impossible options, and a folder that is
+    not this model's database.
+    """
+    from ptmtools.scene.ingestion import check_file
+
+    chosen = chosen_options(options)
+    check_file(Path(model))
+    folder = Path(db)
+    manifest = admitted(folder, Path(model).name, force=force)
+    artifacts = Artifacts(DatabaseFolder(folder, manifest), Path(model), planned=True)
+    #: Stages whose outputs may change.
+    changing: set[Stage[Any]] = set()
+    plans = tuple(_plan(artifacts, stage, chosen[stage], changing) for stage in STAGES.values())
+    artifacts.db.digests.save()
+    return plans
+
+
+def _plan(
+    artifacts: Artifacts, stage: Stage[Any], options: Options, changing: set[Stage[Any]]
+) -> StagePlan:
+    """The plan of a stage, after those that it reads; adds it to ``changing`` if it belongs
+    there."""
+    before = artifacts.before(stage)
+    anew = [read.name for read in stage.sources(options) if read in changing]
+    if stage.inputs and anew:  # they may depend on outputs that do not exist yet
+        inputs = dict(before.inputs) if before else {}
+    else:
+        inputs = artifacts.inputs(stage, options)
+    work = stage.work(options, inputs)
+    why = reasons(before, work, artifacts.db, stage.changed)
+    tasks = stage.job.tasks(artifacts, work)
+    plan: Plan = "run" if why else "maybe" if anew else "current"
+    if plan == "maybe":
+        why = (f"if {' or '.join(anew)} makes other files than there are",)
+    known = plan == "run" and stage.job.foresee(artifacts, work)
+    if plan != "current" and not known:
+        changing.add(stage)
+    return StagePlan(stage.name, plan, why, tuple(Path(name).stem for name in tasks))

@@ -1,16 +1,14 @@
-"""The check of a database, of another folder that ptmtools writes, or of a `.ptm` file.
+"""Checks a database, another folder that ptmtools writes, or a `.ptm` file.
 
-The artifacts of the stages: whether each can be read and belongs to the others, and whether the
-manifest counts it right.
+`check_stages` reads the artifacts as the stages do: each must be readable, fit the others, and have
+the counts of the manifest. Files with a wrong hash are reported by `validate_database`; here are
+those that are damaged although their hash is right, after a manifest was repaired by hand or a
+stage was taken from another build.
 
-They are read as the stages read them. A file whose hash is wrong is left to the check of the
-hashes; here are those that are damaged although the hash is right: a manifest repaired by hand, a
-stage taken from another build.
-
-Folders that are no databases: a table of their kinds, each told by the name of its index.
-
-`ptm info` and `ptm validate` look a folder up here, and nothing else branches on a kind: a new one
-is a line in the table."""
+`FOLDERS` are the kinds of folders that are no databases, each recognised by its index file. `ptm
+info` and `ptm validate` look a folder up here, and nothing else branches on a kind: a new one is a
+line in the table.
+"""
 
 from __future__ import annotations
 
@@ -31,8 +29,7 @@ from ptmtools.lazy import Lazy
 from ptmtools.output import validate_database, validate_ptm
 from ptmtools.output.validation.findings import CODES
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.stage import Artifacts
-from ptmtools.pipeline.stage import Stage
+from ptmtools.pipeline.stage import Artifacts, Stage
 from ptmtools.pipeline.stages import APO, CELLS, PVS, STAGES
 from ptmtools.progress import Progress, silent
 from ptmtools.store.folder import DatabaseFolder
@@ -41,82 +38,79 @@ from ptmtools.texture.model import Limits
 from ptmtools.visibility import Pvs, SegmentReport, check_conservative
 
 
-def check_stages(db: DatabaseFolder, astray: Collection[str] = ()) -> tuple[Issue, ...]:
-    """What is wrong with the stages that have run. ``astray`` are files of which that is known,
-    relative to the database: what needs them is passed over."""
-    found = Findings(CODES)
+def check_stages(db: DatabaseFolder, faulty: Collection[str] = ()) -> tuple[Issue, ...]:
+    """The faults of the stages that have run. ``faulty`` are files with known faults, relative to
+    the database: artifacts that need them are not checked."""
+    findings = Findings(CODES)
     for name in db.manifest.stages.keys() - STAGES.keys():
-        found.add("PTM-D650", MANIFEST, f"stages.{name}", "this ptmtools has no such stage")
+        findings.add("PTM-D650", MANIFEST, f"stages.{name}", "this ptmtools has no such stage")
     together = Artifacts(db)
     for stage in STAGES.values():
         if stage.name in db.manifest.stages:
-            _check_stage(stage, db, together, astray, found)
+            _check_stage(stage, together, faulty, findings)
         if not together.is_stored(stage):
-            with suppress(DatabaseError):  # which is that of the stage that it could have changed
+            with suppress(DatabaseError):  # reported for the stage that it could have changed
                 together[stage]
-    return found.issues()
+    return findings.issues()
 
 
 def _check_stage(
-    stage: Stage[Any],
-    db: DatabaseFolder,
-    together: Artifacts,
-    astray: Collection[str],
-    found: Findings,
+    stage: Stage[Any], together: Artifacts, faulty: Collection[str], findings: Findings
 ) -> None:
+    """Checks that the artifact of a stage is readable, fits the others, and has its recorded
+    counts."""
+    db = together.db
     alone = Artifacts(db)
-    if alone.record(stage).recipe != stage.recipe:
-        if stage.artifact:  # what is served stands by itself
+    record = alone.record(stage)
+    if record.recipe != stage.recipe:
+        if stage.artifact:  # served files do not depend on the release that reads them
             message = "made by another release of ptmtools; run build-scene"
-            found.add("PTM-D656", MANIFEST, f"stages.{stage.name}", message)
+            findings.add("PTM-D656", MANIFEST, f"stages.{stage.name}", message)
         return
     try:
         alone.recorded(stage)
     except DatabaseError as fault:
-        found.add("PTM-D650", MANIFEST, f"stages.{stage.name}.parameters", fault.message)
+        findings.add("PTM-D650", MANIFEST, f"stages.{stage.name}.parameters", fault.message)
     if stage.artifact is None or not alone.is_stored(stage):
         return
     try:
-        made = alone[stage]
+        artifact = alone[stage]
     except DatabaseError as fault:
-        _add("PTM-D720", fault, db, astray, found)
+        _add("PTM-D720", fault, db, faulty, findings)
         return
     try:
         together[stage]
     except DatabaseError as fault:
-        _add("PTM-D721", fault, db, astray, found)
-    assert stage.counts
-    recorded = alone.record(stage).counts
-    for name, true in stage.counts(made).items():
-        if name in recorded and recorded[name] != true:
-            message = f"is {recorded[name]!r}, but the stage has {true!r}"
-            found.add("PTM-D659", MANIFEST, f"stages.{stage.name}.counts.{name}", message)
-    if stage.check:
-        for file, place, message in stage.check.load()(alone, made):
-            found.add("PTM-D721", file, place, message)
+        _add("PTM-D721", fault, db, faulty, findings)
+    for name, count in stage.counts(artifact).items():
+        if record.counts.get(name, count) != count:
+            message = f"is {record.counts[name]!r}, but the stage has {count!r}"
+            findings.add("PTM-D659", MANIFEST, f"stages.{stage.name}.counts.{name}", message)
+    for file, place, message in stage.job.missing(alone, artifact):
+        findings.add("PTM-D721", file, place, message)
 
 
 def _add(
-    code: str, fault: DatabaseError, db: DatabaseFolder, astray: Collection[str], found: Findings
+    code: str, fault: DatabaseError, db: DatabaseFolder, faulty: Collection[str], findings: Findings
 ) -> None:
     file = os.path.relpath(fault.file or db.path, db.path).replace(os.sep, "/")
-    if file not in astray:
-        found.add(code, MANIFEST if file == "." else file, "", fault.message)
+    if file not in faulty:
+        findings.add(code, MANIFEST if file == "." else file, "", fault.message)
 
 
 @dataclass(frozen=True)
 class FolderKind:
-    """What can be done with a folder.
+    """A kind of folder.
 
     Attributes
     ----------
-    index: the file in it that says what the others are.
-    about: what it is, a noun.
+    index: the file in it that describes the others.
+    about: a noun for messages.
     again: the command that writes it.
-    codes: what a check can find: code → its severity, and what it means.
-    check: checks a folder; what is wrong stands in the report.
-    describe: of a folder, what ``ptm info`` prints, line by line, and its record as JSON. Raises
-        what reading the index raises.
+    codes: of the check's findings: code → severity and meaning.
+    check: checks a folder.
+    describe: the lines of ``ptm info`` for a folder, and its record as JSON. Raises the errors of
+        reading the index.
     """
 
     index: str
@@ -172,7 +166,7 @@ def validate(
     limits: Limits = _LIMITS,
     workers: int = 0,
 ) -> ValidationReport:
-    """Checks a database, a folder of `FOLDERS` or a `.ptm` file; what is wrong is in the report.
+    """Checks a database, a folder of `FOLDERS` or a `.ptm` file.
 
     ``limits`` and ``workers`` as for `validate_database`.
 
@@ -202,7 +196,7 @@ def validate(
 def shoot_segments(
     db: str | os.PathLike[str], segments: int, progress: Progress = silent
 ) -> SegmentReport:
-    """Holds the PVS of a database against random segments and the triangles that occlude.
+    """Compares the PVS of a database with random segments and the occluding triangles.
 
     Raises
     ------
@@ -213,7 +207,7 @@ def shoot_segments(
 
 
 def structure_of(db: str | os.PathLike[str]) -> tuple[NDArray[np.float64], Cells, Pvs]:
-    """The (T, 3, 3) triangles of a database that occlude, its cells and its PVS.
+    """The (T, 3, 3) occluding triangles of a database, m, its cells and its PVS.
 
     Raises as `shoot_segments`.
     """

@@ -1,23 +1,18 @@
-"""A small building, built once and thrown away: compiles what builds and encoding with default
-options need.
+"""Writes a small building that makes a build with default options call every kernel.
 
-It has what decides which loops run: doors in a row, whose edges meet in one line (near ties), a
-solid that hangs in a room, and an image large enough for the coder to fit weights.
+It contains the cases that decide which loops run: doors in a row, whose edges meet in one line
+(near ties), a solid that hangs in a room, and an image large enough for the coder to fit weights.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ptmtools.pipeline.build import build_scene
-
-#: From above, in squares of a metre. # is solid from floor to ceiling, three metres up, + at half
-#: height.
+#: The plan in squares of a metre: # is solid from floor to ceiling at 3 m, + at half height only.
 PLAN = """
 ##################
 #....#.....#.....#
@@ -26,18 +21,12 @@ PLAN = """
 #....#.....#.....#
 ##################
 """
-#: Of the image, in texels.
+#: Side of the image, in texels.
 SIDE = 256
 
 
-def warm_up() -> None:
-    """Builds it, one thing after the other."""
-    with TemporaryDirectory() as folder:
-        build_scene(write_building(Path(folder)), Path(folder, "database"), workers=1)
-
-
 def write_building(folder: Path) -> Path:
-    """An OBJ file of the `PLAN`, Y up, with its material and image in the same folder."""
+    """Writes an OBJ file of the `PLAN`, Y up, its material and its image; returns the OBJ file."""
     texels = np.random.default_rng(1).integers(0, 32, (SIDE, SIDE, 3))
     texels += np.arange(SIDE)[:, None, None] // 2
     Image.fromarray(texels.astype(np.uint8)).save(folder / "wall.png")
@@ -52,14 +41,14 @@ def write_building(folder: Path) -> Path:
 
 
 def _solid() -> NDArray[np.bool_]:
-    """(x, y, z): which cubes of a metre are solid."""
+    """(x, y, z) whether the cube of a metre is solid."""
     plan = np.array([list(row) for row in PLAN.split()]).T
     walls, slab = plan == "#", plan != ""
     return np.stack([slab, walls, walls | (plan == "+"), walls, slab], axis=1)
 
 
 def _squares(solid: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(n, 4, 3): what separates solid cubes from others, counter-clockwise as seen from these."""
+    """(n, 4, 3) squares between solid and empty cubes, counter-clockwise as seen from the empty."""
     squares = []
     for axis in range(3):
         up, u, v = np.roll(np.eye(3, dtype=np.int64), -axis, axis=0)

@@ -9,7 +9,7 @@ import pytest
 
 from ptmtools.cells.model import Cells
 from ptmtools.pipeline.build import build_scene
-from ptmtools.pipeline.report import StageReport
+from ptmtools.pipeline.records import StageReport
 from ptmtools.pipeline.stages import CELLS
 from ptmtools.scene import IngestOptions
 from tests.e2e.conftest import TWO_ROOMS, Ptm

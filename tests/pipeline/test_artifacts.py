@@ -17,9 +17,9 @@ import pytest
 
 from ptmtools.cli.main import main
 from ptmtools.errors import DatabaseError
-from ptmtools.pipeline.stages.scene import images_of
 from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS
+from ptmtools.pipeline.stages.scene import images_of
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import IMAGE_LIST, arrays_of, sha256

@@ -12,7 +12,7 @@ from PIL import Image
 
 from ptmtools.cli.main import main
 from ptmtools.pipeline import build_scene
-from ptmtools.pipeline.build import Visitor
+from ptmtools.pipeline.report import Visitor
 from ptmtools.pipeline.stages import CELLS, PVS
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.manifest import Manifest, StageRecord

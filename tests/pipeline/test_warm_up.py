@@ -11,9 +11,8 @@ from ptmtools import compiled, machine_code
 from ptmtools.ahead import compile_now
 from ptmtools.cli.main import main
 from ptmtools.errors import InputError
-from ptmtools.pipeline.build import WARM_UP, build_scene
+from ptmtools.pipeline.build import WARM_UP, build_scene, warm_up
 from ptmtools.pipeline.stages import CELLS
-from ptmtools.pipeline.build import warm_up
 from ptmtools.pipeline.warm_up import write_building
 from ptmtools.portal_flow import line_kernels
 

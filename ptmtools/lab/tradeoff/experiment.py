@@ -23,8 +23,7 @@ from ptmtools.pipeline.stages import ACH, CELLS, PVS, TEXTURES
 from ptmtools.progress import Progress, silent
 
 if TYPE_CHECKING:
-    from ptmtools.pipeline.stage import Artifacts
-    from ptmtools.pipeline.stage import Stage
+    from ptmtools.pipeline.stage import Artifacts, Stage
 
 
 @dataclass(frozen=True)

@@ -151,7 +151,7 @@ def own_options(artifacts: Artifacts) -> Own:
 
     Raises DatabaseError PTM-D004 if one has not run, PTM-D002 for options that no stage has.
     """
-    return {stage: artifacts.recorded(stage) for stage in STAGES.values() if not stage.hidden}
+    return {stage: artifacts.recorded(stage) for stage in STAGES.values() if not stage.joined}
 
 
 @contextmanager

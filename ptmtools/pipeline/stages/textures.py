@@ -254,8 +254,7 @@ class TexturesJob(Job):
                 ),
             )
             self.run.settle(self.stage, transaction, record)
-        self.run.commit(self.stage)
-        self.run.report(self.stage, self._why, self._seconds, self._tasks)
+        self.run.end(self.stage, self._why, self._seconds, self._tasks)
 
     def _prepare(self) -> None:
         """Once: keeps what the last run made, and takes over what an interrupted one left."""
@@ -328,7 +327,9 @@ class TexturesJob(Job):
                 return
             chunk = max(1, min(AT_ONCE, len(self._left) // (8 * executor.workers)))
             tasks = (ImageTask(images[i].name, images[i].sha256, str(i), fewer[i]) for i in wanted)
-            for left in executor.each(encoded_on_disk, disk, tasks, releases_lock=True, chunk=chunk):
+            for left in executor.each(
+                encoded_on_disk, disk, tasks, releases_lock=True, chunk=chunk
+            ):
                 files = self._files(self._names[self._left[0]])
                 for name, (file, digest) in zip(files, left, strict=True):
                     transaction.take(name, Path(file), digest)
