@@ -12,8 +12,6 @@ from __future__ import annotations
 import io
 import json
 import math
-import secrets
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
@@ -21,7 +19,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ptmtools.errors import InputError, WorkerError, naming
-from ptmtools.files import write_bytes
 from ptmtools.options import option
 from ptmtools.store.layout import IMAGES, STAGING, sha256
 from ptmtools.texture.model import EncodeOptions
@@ -140,6 +137,9 @@ def shared_disk(
 
     Raises WorkerError PTM-W005 if only some workers see it.
     """
+    import secrets
+    import shutil
+
     if not executor.remote:
         yield None
         return
@@ -159,6 +159,8 @@ def encoded_on_disk(disk: SharedDisk, image: ImageTask) -> list[tuple[str, str]]
 
     Raises what that raises; WorkerError PTM-W005 where the disk cannot be seen.
     """
+    from ptmtools.files import write_bytes
+
     results = encoded_image(disk.options, (image.name, _image(disk, image), image.unresolved))
     files = []
     for number, data in enumerate(results):

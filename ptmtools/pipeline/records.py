@@ -12,12 +12,14 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, fields, is_dataclass
 from types import UnionType
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from ptmtools.errors import PtmError
 from ptmtools.options import option_of
-from ptmtools.store.folder import DatabaseFolder
-from ptmtools.store.manifest import SCHEMA, StageRecord
+
+if TYPE_CHECKING:
+    from ptmtools.store.folder import DatabaseFolder
+    from ptmtools.store.manifest import StageRecord
 
 O = TypeVar("O")
 
@@ -127,6 +129,8 @@ def reasons(
 ) -> tuple[str, ...]:
     """Why a stage with the record ``before`` has to do ``work``; empty if it is current.
     ``changed`` describes the change of its recipe."""
+    from ptmtools.store.manifest import SCHEMA
+
     if before is None:
         earlier = db.manifest.replaced
         if earlier is None:

@@ -19,9 +19,7 @@ from ptmtools.errors import DatabaseError, Rebuild, naming
 from ptmtools.lazy import Lazy
 from ptmtools.pipeline.records import StageReport, options_of, parameters, reasons
 from ptmtools.progress import Progress, silent
-from ptmtools.store.folder import DatabaseFolder, damaged
 from ptmtools.store.layout import MANIFEST, arrays_of
-from ptmtools.store.manifest import StageRecord, damaged_manifest
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -30,6 +28,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ptmtools.parallel import Workers
+    from ptmtools.store.folder import DatabaseFolder
+    from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
     from ptmtools.store.writer import DatabaseWriter
 
@@ -125,6 +125,8 @@ class Stage(Generic[A]):
 
     def work(self, options: Options, inputs: Mapping[str, str]) -> StageRecord:
         """The record of a run with these options and inputs, still without outputs."""
+        from ptmtools.store.manifest import StageRecord
+
         return StageRecord(self.recipe, parameters(options), dict(inputs), {})
 
 
@@ -213,6 +215,8 @@ class Artifacts:
 
     def recorded(self, stage: Stage[Any]) -> Options:
         """The options of a stage's last run; raises PTM-D002 if they are impossible."""
+        from ptmtools.store.manifest import damaged_manifest
+
         record = self.record(stage)
         try:
             return stage.recorded(record)
@@ -267,6 +271,8 @@ class Artifacts:
     @contextmanager
     def reading(self, name: str) -> Iterator[None]:
         """Turns faults in the contents of a file of the database into PTM-D006."""
+        from ptmtools.store.folder import damaged
+
         try:
             yield
         except _FAULTS as fault:

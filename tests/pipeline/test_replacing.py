@@ -270,10 +270,10 @@ def test_nodes_say_which_octree_is_theirs(made: Path) -> None:
 @pytest.mark.parametrize(
     ("damage", "expected"),
     [
-        (lambda db: renumbered(db, lambda k: 1 - k), "its octree texture of 'statue_0"),
+        (lambda db: renumbered(db, lambda k: 1 - k), "its octree texture to 'statue_0"),
         (lambda db: renumbered(db, lambda k: k + 2), "the hints have no octree texture"),
         (lambda db: moved(db, 0.2), "leaves the cube"),
-        (lambda db: moved(db, -0.5, 2.0), "have no texel in it"),
+        (lambda db: moved(db, -0.5, 2.0), "have no texel"),
     ],
     ids=["swapped", "out of range", "cube elsewhere", "cube larger"],
 )

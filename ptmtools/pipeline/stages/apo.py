@@ -25,8 +25,6 @@ from ptmtools.pipeline.stage import Artifacts, Job, Stage
 from ptmtools.pipeline.stages.scene import SCENE
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import OCTREE_LIST, SERVED, arrays_of
-from ptmtools.store.manifest import StageRecord
-from ptmtools.store.transaction import Transaction
 
 if TYPE_CHECKING:
     import numpy as np
@@ -35,6 +33,8 @@ if TYPE_CHECKING:
     from ptmtools.neighbours.apo.replacing import ReplacedObject
     from ptmtools.output.model import OctreeRecord
     from ptmtools.scene.model import Scene
+    from ptmtools.store.manifest import StageRecord
+    from ptmtools.store.transaction import Transaction
 
 _ILLEGAL = re.compile(r"[^A-Za-z0-9_]+")
 _FILE = re.compile(rf"{OCTREE_FOLDER}/[A-Za-z0-9_]+\.bin")

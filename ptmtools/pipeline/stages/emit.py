@@ -18,12 +18,12 @@ from ptmtools.pipeline.stages.scene import image_digests
 from ptmtools.pipeline.stages.textures import TEXTURES, detail_file, header_of, texture_files
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import SERVED
-from ptmtools.store.manifest import StageRecord
-from ptmtools.store.transaction import Transaction
 
 if TYPE_CHECKING:
     from ptmtools.coverage.required_levels import Need
     from ptmtools.output.model import TextureRecord
+    from ptmtools.store.manifest import StageRecord
+    from ptmtools.store.transaction import Transaction
     from ptmtools.texture.detail import Detail
 
 

@@ -19,16 +19,16 @@ from ptmtools.lazy import Lazy
 from ptmtools.pipeline.stage import Artifacts, Job, Stage
 from ptmtools.quantities import count
 from ptmtools.scene.options import IngestOptions
-from ptmtools.store.digests import Digests
 from ptmtools.store.layout import IMAGE_LIST, IMAGES, sha256
-from ptmtools.store.manifest import StageRecord
-from ptmtools.store.transaction import Transaction
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
     from ptmtools.scene.model import Scene, SourceImage
+    from ptmtools.store.digests import Digests
+    from ptmtools.store.manifest import StageRecord
+    from ptmtools.store.transaction import Transaction
 
 
 _IMAGE_NAME = re.compile(r"[A-Za-z0-9_-]+\.[A-Za-z0-9]+")

@@ -20,12 +20,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import takewhile
 from pathlib import Path
-from threading import Event
 from typing import TYPE_CHECKING, Any
 
 from ptmtools.errors import naming
-from ptmtools.files import open_regular
-from ptmtools.parallel import BackgroundLoop, Executor
 from ptmtools.pipeline.encoding import (
     ImageTask,
     TextureOptions,
@@ -40,10 +37,13 @@ from ptmtools.pipeline.stages.pvs import PVS
 from ptmtools.pipeline.stages.scene import SCENE, image_digests, image_rows, images_of
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import IMAGES, SERVED, STAGES_FOLDER, sha256
-from ptmtools.store.manifest import StageRecord
-from ptmtools.store.transaction import Transaction
 
 if TYPE_CHECKING:
+    from threading import Event
+
+    from ptmtools.parallel import BackgroundLoop, Executor
+    from ptmtools.store.manifest import StageRecord
+    from ptmtools.store.transaction import Transaction
     from ptmtools.texture.model import PtmHeader
 
 FOLDER = "textures"
@@ -219,6 +219,8 @@ class TexturesJob(Job):
 
     def begin(self) -> None:
         """See `Job.begin`."""
+        from ptmtools.parallel import BackgroundLoop
+
         self._prepare()
         executor = self.run.workers.background(self.left)
         if executor:
@@ -375,6 +377,7 @@ def notes_on_size(names: Iterable[str], headers: Iterable[PtmHeader], most: int)
 
 def header_of(file: Path) -> PtmHeader:
     """The header of a `.ptm` of ours; raises what `read_header` raises."""
+    from ptmtools.files import open_regular
     from ptmtools.texture.container import HEAD_MAX, read_header
 
     with open_regular(file) as stream, naming(file):
