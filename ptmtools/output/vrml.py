@@ -41,8 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.output.content import Content
-from ptmtools.output.convexity import hull_rows, slack_of
-from ptmtools.output.hull import convex_hull
+from ptmtools.output.convexity import convex_hull, hull_rows, slack_of
 from ptmtools.output.model import TextureRecord
 from ptmtools.output.names import ROOT, VRML_FILES, DefNames, cell_file, cell_name, path_of
 from ptmtools.output.numbers import decimal, row_texts, single

@@ -13,8 +13,7 @@ from ptmtools.arrays import Floats
 from ptmtools.cells import subdivide
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.output import EmitOptions, emit, validate_database
-from ptmtools.output.convexity import hull_rows, portal_polygons
-from ptmtools.output.hull import convex_hull
+from ptmtools.output.convexity import convex_hull, hull_rows, portal_polygons
 from ptmtools.output.numbers import row_texts
 from ptmtools.output.vrml_reader import parse
 from ptmtools.scene import ingest

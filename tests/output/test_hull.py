@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from ptmtools.errors import DatabaseError
-from ptmtools.output.hull import convex_hull
+from ptmtools.output.convexity import convex_hull
 
 
 def side(a, b, c, p) -> int:

@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.diagnostics import Place
+from ptmtools.errors import DatabaseError
+from ptmtools.output.convexity import convex_hull
 from ptmtools.output.emitters import VRML
 from ptmtools.output.names import CELL_FOLDER, HINTS, ROOT
-from ptmtools.output.validation.cells import ReadCell, check_cell, read_cell
 from ptmtools.output.validation.files import ServedDatabase
-from ptmtools.output.validation.findings import check_graph
+from ptmtools.output.validation.findings import check_graph, check_list, check_shares
+from ptmtools.output.validation.space import (
+    MOST_CORNERS,
+    Planes,
+    Points,
+    SolidError,
+    farthest,
+    solid_planes,
+)
 from ptmtools.output.vrml import PATTERN
-from ptmtools.output.vrml_reader import Document, parse
+from ptmtools.output.vrml_reader import Document, Node, parse
 from ptmtools.tolerance import Tolerance
 
 
@@ -156,3 +166,204 @@ def _check_index(cells: Mapping[str, ReadCell], database: ServedDatabase) -> Non
         database.resolve_each(HINTS, "cells", urls)
         for unlisted in sorted({f"{CELL_FOLDER}/{name}" for name in cells} - set(urls)):
             database.at(HINTS, "cells").add("PTM-D741", f"does not name {unlisted}")
+
+
+#: Slack of the sum of the ach values in single precision.
+_ACH_SLACK = 1e-5
+
+
+@dataclass(frozen=True)
+class ReadCell:
+    """The content of a cell file.
+
+    Attributes
+    ----------
+    name: `cellName`.
+    adjacent, visible: URLs as written, relative to the cell's file.
+    ach: (n,) float64.
+    hull: (h, 3) the hull's points.
+    box: (2, 3) least and greatest corner of the hull and all shapes.
+    leaves: the (n, 3) points of each leaf; empty if the cell is a single one.
+    textures: the URL lists of its image textures, each once, in the order of the file.
+    """
+
+    name: str
+    adjacent: tuple[str, ...]
+    visible: tuple[str, ...]
+    ach: NDArray[np.float64]
+    hull: NDArray[np.float64]
+    box: NDArray[np.float64]
+    leaves: tuple[NDArray[np.float64], ...]
+    textures: tuple[tuple[str, ...], ...]
+
+
+def read_cell(document: Document, at: Place) -> ReadCell | None:
+    """The cell of a file; None without exactly one (PTM-D663) or if it lacks fields."""
+    nodes = document.of_type("PTMCell")
+    if len(nodes) != 1:
+        at.add("PTM-D663", f"{len(nodes)} PTMCell nodes, not 1")
+        return None
+    if nodes[0].lacks:
+        return None
+    fields, shapes = nodes[0].fields, document.of_type("Shape")
+    arrays = [fields["hullPoint"], *(s.at("geometry", "coord").get("point", ()) for s in shapes)]
+    points = np.concatenate([array for array in arrays if len(array)] or [np.zeros((1, 3))])
+    leaves = []
+    if "leafPoint" in fields:
+        leaves = np.split(fields["leafPoint"], fields["leafStart"][1:])
+    textures = [s.at("appearance", "texture") for s in shapes]
+    return ReadCell(
+        name=fields["cellName"],
+        adjacent=fields["adjacentUrl"],
+        visible=fields["visibleUrl"],
+        ach=fields["ach"],
+        hull=fields["hullPoint"],
+        box=np.stack([points.min(axis=0), points.max(axis=0)]),
+        leaves=tuple(leaves),
+        textures=tuple(dict.fromkeys(texture["url"] for texture in textures if "url" in texture)),
+    )
+
+
+def check_cell(
+    document: Document, cell: ReadCell, box: NDArray[np.float64], tolerance: Tolerance, at: Place
+) -> None:
+    """Checks everything that needs no other cell.
+
+    ``box`` (2, 3) holds the hulls of all cells. Geometry beyond a face of that box is accepted: an
+    open model is subdivided within its walls, and geometry farther out belongs to the cells at the
+    rim. There the hull of several leaves may lean inwards, so geometry before one of the leaves is
+    accepted too.
+    """
+    (node,) = document.of_type("PTMCell")
+    own, here = at.file.rpartition("/")[2], at.at(f"line {node.line}")
+    hull = _check_hull(node, cell, tolerance, here)
+    leaves = _check_leaves(node, cell, hull, tolerance, here)
+    body, bodies = _without_rim(hull, box, tolerance), None
+    for shape in document.of_type("Shape"):
+        if shape.lacks:
+            continue
+        shape_at = at.at(shape.place)
+        _check_shape(shape, shape_at)
+        points = shape.at("geometry", "coord")["point"]
+        far = farthest(body, points)
+        if (far > tolerance.cluster).any():  # seldom
+            bodies = _leaf_bodies(leaves, box, tolerance) if bodies is None else bodies
+            far = np.min([far, *(farthest(planes, points) for planes in bodies)], axis=0)
+        if (most := far.max(initial=0.0)) > tolerance.cluster:
+            shape_at.add("PTM-D684", f"geometry lies {most:.3g} m outside of the hull")
+    if f"{cell.name}.wrl" != own:
+        here.add("PTM-D698", f"cellName is {cell.name!r}")
+    check_list("adjacentUrl", own, cell.adjacent, here)
+    check_list("visibleUrl", own, cell.visible, here)
+    if len(cell.ach) != len(cell.visible):
+        here.add("PTM-D691", f"{len(cell.ach)} ach values for {len(cell.visible)} visible cells")
+    check_shares(cell.ach, _ACH_SLACK, ("PTM-D692", "PTM-D693"), here)
+
+
+def _check_hull(node: Node, cell: ReadCell, tolerance: Tolerance, at: Place) -> Planes:
+    """The planes of the hull; none if it is invalid."""
+    triangles = _loops(node.fields["hullIndex"], len(cell.hull))
+    if triangles is None or len(triangles) < 4:
+        at.add("PTM-D683", "hullIndex is not a list of triangles over hullPoint")
+    else:
+        try:
+            return solid_planes(cell.hull, triangles.tolist(), tolerance)
+        except SolidError as fault:
+            at.add("PTM-D683", f"the hull {fault}")
+    return np.zeros((0, 4))
+
+
+def _check_leaves(
+    node: Node, cell: ReadCell, hull: Planes, tolerance: Tolerance, at: Place
+) -> tuple[Points, ...]:
+    """The points of the leaves; empty if they are invalid or the cell has only one."""
+    if not cell.leaves:
+        return ()
+    far = farthest(hull, node.fields["leafPoint"]).max(initial=0.0)
+    if far > tolerance.cluster:
+        at.add("PTM-D684", f"a leaf lies {far:.3g} m outside of the hull")
+    sizes, start = [len(leaf) for leaf in cell.leaves], node.fields["leafStart"]
+    divided = len(start) > 1 and np.array_equal(start, np.cumsum([0, *sizes[:-1]]))
+    if divided and min(sizes) >= 4 and max(sizes) <= MOST_CORNERS:
+        return cell.leaves
+    at.add("PTM-D685", "leafStart does not divide leafPoint into leaves")
+    return ()
+
+
+def _leaf_bodies(
+    leaves: Iterable[Points], box: NDArray[np.float64], tolerance: Tolerance
+) -> list[Planes]:
+    """The planes of each leaf that is not flat."""
+    bodies = []
+    for leaf in leaves:
+        with suppress(DatabaseError, SolidError):
+            points, triangles = convex_hull(leaf.astype(np.float32))
+            planes = solid_planes(points.astype(np.float64), triangles.tolist(), tolerance)
+            bodies.append(_without_rim(planes, box, tolerance))
+    return bodies
+
+
+def _without_rim(planes: Planes, box: NDArray[np.float64], tolerance: Tolerance) -> Planes:
+    """The planes without those of the faces of the box."""
+    faces = np.concatenate([-planes[:, 3:] - box[1], -planes[:, 3:] + box[0]], axis=1)
+    outwards = np.concatenate([planes[:, :3], -planes[:, :3]], axis=1) >= tolerance.cosine
+    return planes[~(outwards & (abs(faces) <= tolerance.plane)).any(axis=1)]
+
+
+def _loops(index: NDArray[np.int64], points: int) -> NDArray[np.int64] | None:
+    """(m, 3) triangles of an index field over ``points`` points; None if it is no such list."""
+    if len(index) % 4:
+        return None
+    rows = index.reshape(-1, 4)
+    corners = rows[:, :3]
+    whole = (rows[:, 3] == -1).all() and (corners >= 0).all() and (corners < points).all()
+    return corners if whole else None
+
+
+def _check_shape(shape: Node, at: Place) -> None:
+    geometry, points = shape.at("geometry"), shape.at("geometry", "coord")["point"]
+    if list(geometry).index("coord") > list(geometry).index("coordIndex"):
+        at.add("PTM-D661", "coordIndex stands before coord")
+    triangles = _loops(geometry["coordIndex"], len(points))
+    if triangles is None:
+        at.add("PTM-D680", f"coordIndex is not a list of triangles over {len(points)} points")
+    elif len(triangles) == 0 or (triangles == np.roll(triangles, 1, axis=1)).any():
+        at.add("PTM-D680", "coordIndex has a triangle with two equal corners")
+    count = len(geometry["coordIndex"]) // 4
+    _check_texture(shape, count, at)
+    _check_colours(shape, count, at)
+
+
+def _check_texture(shape: Node, count: int, at: Place) -> None:
+    texture, index = shape.at("appearance", "texture"), shape.at("geometry").get("texCoordIndex")
+    coord = shape.at("geometry", "texCoord")
+    if not texture and not coord and index is None:
+        return
+    if not texture.get("url"):
+        at.add("PTM-D663", "texture coordinates without a texture")
+    if not coord or index is None:
+        at.add("PTM-D663", "a texture without texCoord or texCoordIndex")
+        return
+    points = len(coord["point"])
+    triangles = _loops(index, points)
+    if triangles is None:
+        at.add("PTM-D681", f"texCoordIndex is not a list of triangles over {points} points")
+    elif len(triangles) != count:
+        at.add("PTM-D681", f"texCoordIndex has {len(triangles)} faces of {count}")
+
+
+def _check_colours(shape: Node, count: int, at: Place) -> None:
+    geometry, color = shape.at("geometry"), shape.at("geometry", "color")
+    if color:
+        index = geometry.get("colorIndex", np.zeros(0, np.int64))
+        if geometry.get("colorPerVertex", True):
+            corners = _loops(index, len(color["color"]))
+            complete = corners is not None and len(corners) == count
+        else:
+            in_range = (index >= 0) & (index < len(color["color"]))
+            complete = bool(in_range.all()) and len(index) == count
+        if not complete:
+            at.add("PTM-D682", f"colorIndex does not give a colour to each of {count} faces")
+    values = [*shape.at("appearance", "material").values(), *color.values()]
+    if any(((v < 0) | (v > 1)).any() for v in values):
+        at.add("PTM-D682", "a colour or transparency is outside 0 to 1")
