@@ -1,4 +1,4 @@
-"""Artifacts → VRML97, hints and plans; and back: the check of what stands on disk (paper §6)."""
+"""Artifacts → VRML97, glTF, hints and plans (paper §6), and the check of the files on disk."""
 
 from __future__ import annotations
 

@@ -1,12 +1,11 @@
-"""What all emitters write from: the artifacts, the textures and viewpoints, and what is derived
-from them once for all.
+"""The input of all emitters: artifacts, textures, viewpoints, and the geometry derived from them.
 
-The geometry of a cell as indexed shapes: one per object, material and sidedness.
-
-Positions and texture coordinates are rounded to float32 once for the whole scene and welded by
-equality there, so that a vertex shared by two pieces is one vertex in the file, and a corner
-shared by two cells has the same text in both. Pieces of which two corners become one in that
-rounding have no area left; they are dropped and counted."""
+The geometry of a cell is indexed shapes: one for each object, material and sidedness. Positions
+and texture coordinates are rounded to float32 once for the whole scene and welded by equality, so
+that a vertex shared by two pieces is one vertex in the file, and a corner shared by two cells has
+the same text in both. Pieces of which two corners become one in that rounding have no area left;
+they are dropped and counted.
+"""
 
 from __future__ import annotations
 
@@ -142,22 +141,22 @@ class Geometry:
 def _corner_colors(
     scene: Scene, cells: Cells, piece: NDArray[np.integer]
 ) -> NDArray[np.uint8] | None:
-    """(M, 3, 3) the colours of pieces' corners, each as its triangle of the scene goes on there;
-    None if the scene has none."""
+    """(M, 3, 3) the colours of pieces' corners, interpolated over their source triangles; None if
+    the scene has none."""
     if scene.colors is None:
         return None
     source = cells.triangle_source[piece]
     corners, colors = scene.corners[source], scene.colors[source].astype(np.float64)
     away = cells.vertex[cells.triangle[piece]] - corners[:, :1]
-    found = colors[:, :1] + np.einsum("mkx,mcx->mck", gradients(corners, colors), away)
-    return np.asarray(np.clip(np.rint(found), 0, 255).astype(np.uint8))
+    interpolated = colors[:, :1] + np.einsum("mkx,mcx->mck", gradients(corners, colors), away)
+    return np.asarray(np.clip(np.rint(interpolated), 0, 255).astype(np.uint8))
 
 
 def _indexed(
     corner: NDArray[np.int64], shape: NDArray[np.int64], shapes: int, count: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """What the triangles of each shape use, and where each shape's begins; and the (m, 3) corners
-    as indices into that, counted from the shape's first."""
+    """The rows used by the triangles of each shape, the start of each shape among them, and the
+    (m, 3) corners as indices into them, counted from the shape's first."""
     used, place = np.unique(shape[:, None] * count + corner, return_inverse=True)
     start = np.searchsorted(used, np.arange(shapes + 1) * count)
     return used % max(count, 1), start, place.reshape(-1, 3) - start[shape][:, None]
@@ -186,11 +185,11 @@ class Content:
     Attributes
     ----------
     textures: in the order of the hints; one for every image that a material in use names.
-    viewpoints: the places to start from.
-    progress: is called for every cell.
-    need: how fine textures are needed, where that was measured.
+    viewpoints: where a walk may start.
+    progress: called for every cell.
+    need: the required levels of textures, if measured.
     octrees: the octree textures of objects.
-    workers: threads that may be used.
+    workers: number of threads.
     """
 
     scene: Scene
@@ -219,7 +218,7 @@ class Content:
 
     @cached_property
     def records(self) -> Mapping[int, tuple[int, TextureRecord]]:
-        """Image of the scene → its place in `textures`, and its record there."""
+        """Image of the scene → its index in `textures`, and its record."""
         return {record.image: (place, record) for place, record in enumerate(self.textures)}
 
     @cached_property
@@ -229,18 +228,18 @@ class Content:
 
     @cached_property
     def paint(self) -> NDArray[np.int64]:
-        """(S,) of each shape its texture's place in `textures`; -1 for none."""
+        """(S,) the index of each shape's texture in `textures`; -1 for none."""
         place = [self.records[m.image][0] if m.image >= 0 else -1 for m in self.scene.materials]
         paint: NDArray[np.int64] = np.array(place, dtype=np.int64)[self.geometry.material]
         return paint
 
     @cached_property
     def painted(self) -> list[NDArray[np.int64]]:
-        """Of each cell the places in `textures` that its shapes use, ascending."""
+        """For each cell the indices of its textures in `textures`, ascending."""
         cells = np.split(self.paint, self.geometry.cell_start[1:-1])
         return [np.unique(used[used >= 0]) for used in cells]
 
     @cached_property
     def shares(self) -> list[list[float]]:
-        """Of each cell its ACH as it is written, aligned with its row of the PVS."""
+        """For each cell its ACH as written, aligned with its row of the PVS."""
         return [shares_of(row) for row in np.split(self.ach.value, self.pvs.start[1:-1])]

@@ -1,14 +1,14 @@
-"""First-look bundles: of every texture that a cell sees the coarse levels, in one file a cell.
+"""First-look bundles: for each cell one file with the coarse levels of all visible textures.
 
-A client that enters a cell without textures has as many requests to make as there are textures in
-view, each for little. A bundle brings the levels up to a certain size of all of them in one, most
-valuable first, so that however much of it has come is well spent. It consists of pieces of `.ptm`
-files, and those of one texture are a prefix of its file.
+A client that enters a cell without textures makes as many requests as there are textures in view,
+each for few bytes. A bundle brings the levels up to a certain size of all of them in one request,
+most valuable first, so that any received prefix is well spent. It consists of pieces of `.ptm`
+files; those of one texture are a prefix of its file.
 
-What a level brings is how much less its texture is off with it (`ptmtools.texture.detail`), times
-its share of the view. A level alone may bring little, and much with the next one: of each texture
-those steps are taken whose gain for a byte is the best that is left, the corners of the concave
-hull of its gain over its bytes. Of all textures the best step comes next.
+The gain of a level is the decrease of its texture's error (`ptmtools.texture.detail`), times the
+texture's share of the view. A level alone may gain little, and much with the next one: for each
+texture the steps are the corners of the concave hull of its gain over its bytes. Over all textures
+the step with the most gain per byte comes next.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ class Step(NamedTuple):
 
     Attributes
     ----------
-    level: the one that is then there.
+    level: the finer one.
     start, end: bytes of the `.ptm`.
-    gain: how much less the texture is off, as `Detail.differences`.
+    gain: decrease of the error, as in `Detail.differences`.
     """
 
     level: int
@@ -46,7 +46,7 @@ class Step(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """Bytes of a `.ptm` in a bundle, which bring its texture to that level."""
+    """Bytes of a `.ptm` in a bundle that refine its texture to ``level``."""
 
     texture: int
     level: int
@@ -55,7 +55,7 @@ class Piece(NamedTuple):
 
 
 class FirstLooks:
-    """The bundles of one database, of the textures whose files are at hand."""
+    """The bundles of one database, of the textures that were encoded."""
 
     def __init__(self, content: Content) -> None:
         self._content = content
@@ -63,7 +63,7 @@ class FirstLooks:
         self._steps = [steps_of(record, side) for record in content.textures]
 
     def pieces(self, cell: int) -> list[Piece]:
-        """What is in the bundle of a cell, in that order."""
+        """The pieces of a cell's bundle, in order."""
         share = self._shares(cell)
         steps = [(texture, step) for texture in share for step in self._steps[texture]]
 
@@ -81,12 +81,12 @@ class FirstLooks:
         return pieces
 
     def bundle(self, pieces: Iterable[Piece]) -> bytes:
-        """The bytes of a bundle; raises OSError if a texture is not where it was."""
+        """The bytes of a bundle; raises OSError if a texture has vanished."""
         return b"".join(self._heads[p.texture][p.start : p.end] for p in pieces)
 
     @cached_property
     def _heads(self) -> list[bytes]:
-        """Of each texture the bytes that bundles may have."""
+        """For each texture the prefix of its file that bundles use."""
         heads = []
         for record, steps in zip(self._content.textures, self._steps, strict=True):
             head = b""
@@ -97,12 +97,12 @@ class FirstLooks:
         return heads
 
     def _shares(self, cell: int) -> dict[int, float]:
-        """Texture → its share of the view from a cell, of all that can be seen: as it was measured,
-        else by the areas of the surfaces. None is below what half a pixel has."""
+        """Texture → its share of the view from a cell, for all visible textures: as measured, else
+        by the areas of the surfaces; at least half a pixel's share."""
         content = self._content
         ach, seen = content.ach, content.pvs.row(cell)
         floor = float(ach.floor[cell])
-        found = {t: 0.0 for other in seen.tolist() for t in content.painted[other].tolist()}
+        shares = {t: 0.0 for other in seen.tolist() for t in content.painted[other].tolist()}
         if ach.by_texture:
             rows = ach.entries(cell)
             of_cell = slice(*ach.texture_start[[rows.start, rows.stop]].tolist())
@@ -111,18 +111,18 @@ class FirstLooks:
             )
             for image, value in pairs:
                 if image in content.records:
-                    found[content.records[image][0]] += value
+                    shares[content.records[image][0]] += value
         else:
             for other, value in zip(seen.tolist(), ach.row(cell).tolist(), strict=True):
                 for texture, part in zip(
                     content.painted[other].tolist(), self._parts[other].tolist(), strict=True
                 ):
-                    found[texture] += value * part
-        return {texture: max(value, floor) for texture, value in sorted(found.items())}
+                    shares[texture] += value * part
+        return {texture: max(value, floor) for texture, value in sorted(shares.items())}
 
     @cached_property
     def _parts(self) -> list[NDArray[np.float64]]:
-        """Of each cell, aligned with `Content.painted`, the share of its surfaces that has each
+        """For each cell, aligned with `Content.painted`, the share of its surface area with each
         texture."""
         geometry, parts = self._content.geometry, []
         of_shape, area = self._content.paint, geometry.areas()
@@ -135,11 +135,11 @@ class FirstLooks:
 
 
 def steps_of(record: TextureRecord, side: int) -> list[Step]:
-    """How a texture is refined up to its finest level with no side above ``side``, texels; each
-    step brings less for a byte than the one before. None if its file or detail is not at hand."""
+    """The steps of a texture up to its finest level with no side above ``side`` texels, in order
+    of decreasing gain per byte; none if the texture was not encoded."""
     if not (record.detail and record.stored):
         return []
-    # The mean colour is there before any level: the first one brings nothing.
+    # The mean colour is known before any level, so the first level gains nothing.
     corners = [(-1, 0, 0.0)]
     for n, (level, gain) in enumerate(
         zip(record.levels, accumulate(record.detail.differences), strict=True)
@@ -154,7 +154,7 @@ def steps_of(record: TextureRecord, side: int) -> list[Step]:
 
 
 def _slope(one: tuple[int, int, float], other: tuple[int, int, float]) -> float:
-    """Gain for a byte."""
+    """Gain per byte."""
     return (other[2] - one[2]) / (other[1] - one[1])
 
 

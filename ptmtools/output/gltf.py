@@ -7,35 +7,29 @@ surfaces without are flat (glTF 2.0, section 3.7.2.1). Each shape has positions 
 accessor for the whole cell the files of the sample museum are 13 % smaller, those of the hospital
 5 %, but clients take its bounds for the shape's, and some copy all of it for each.
 
-The accessors of one GLB and the bytes behind them.
-
-One buffer view for each kind of data: positions, texture coordinates, colours, wide indices,
-narrow ones.
-An array that was there before gets no second accessor. Vertices are in the order of their first
-use, so rectangles of all sizes share their six indices, and often their texture coordinates: the
-sample museum's files are 9 % smaller for it.
-
-The GLBs that `emit` writes: JSON and the bytes of one buffer, see `ptmtools.glb`.
-
-A material of the scene as glTF's, with the texture, sampler and image that it needs.
+One buffer view holds each kind of data: positions, texture coordinates, colours, wide indices,
+narrow ones. Equal arrays share an accessor. Vertices are in the order of their first use, so
+rectangles of all sizes share their six indices, and often their texture coordinates: the sample
+museum's files are 9 % smaller for it.
 
 =================================  =======================================================
-glTF                               from
+glTF material                      from the scene
 =================================  =======================================================
 baseColorFactor                    colour and opacity; glTF multiplies linear light, the scene
-                                   what is encoded as sRGB, so the colour is converted
-baseColorTexture                   the fallback image, by URI; nothing where there is none
-metallicFactor 0, roughness 1      nothing known: matt
+                                   values encoded as sRGB, so the colour is converted
+baseColorTexture                   the fallback image, by URI, if there is one
+metallicFactor 0, roughness 1      matt, by default
 doubleSided                        the shape's sidedness
 alphaMode BLEND                    opacity below 1, or a used texel with alpha below 255
 alphaMode MASK, alphaCutoff        such texels of a material that tests them against a cutoff
-extras.ptm, extras.texture         the image's `.ptm`, and its place in the hints' textures
+extras.ptm, extras.texture         the image's `.ptm`, and its index in the hints' textures
 extras.wrapS, extras.wrapT         the sampler's, for clients with textures of their own
 =================================  =======================================================
 
-(Tried: the texture as emissiveTexture
-over black, which shows it texel for texel as VRML does, without KHR_materials_unlit. Clients then
-find no base colour texture to put their own in, and alpha still needs one.)"""
+(Tried: the texture as emissiveTexture over black, which shows it texel for texel as VRML does,
+without KHR_materials_unlit. Clients then have no base colour texture to replace with their own, and
+alpha still needs one.)
+"""
 
 from __future__ import annotations
 
@@ -84,7 +78,7 @@ class BufferWriter:
         self._known: dict[tuple[int, bytes], int] = {}
 
     def positions(self, point: NDArray[np.float32]) -> int:
-        """(n, 3), with the bounds that glTF wants of them."""
+        """(n, 3), with the bounds that glTF requires."""
         bounds = {
             "min": _numbers(point.min(axis=0)),
             "max": _numbers(point.max(axis=0)),
@@ -97,12 +91,12 @@ class BufferWriter:
 
     def colors(self, light: NDArray[np.float64]) -> int:
         """(n, 3) linear light from 0 to 1; 16 bits, as 8 would be too few in the dark."""
-        held = np.full((len(light), 4), 65535, "<u2")
-        held[:, :3] = np.rint(65535 * light)
-        return self._add(_COLOR, held.tobytes(), {"normalized": True})
+        rgba = np.full((len(light), 4), 65535, "<u2")
+        rgba[:, :3] = np.rint(65535 * light)
+        return self._add(_COLOR, rgba.tobytes(), {"normalized": True})
 
     def indices(self, triangle: NDArray[np.int64], vertices: int) -> int:
-        """(m, 3) indices into so many vertices."""
+        """(m, 3) indices into ``vertices`` vertices."""
         kind, form = (_THIN, "<u2") if vertices <= _NARROW else (_WIDE, "<u4")
         return self._add(kind, triangle.astype(form).tobytes(), {})
 
@@ -178,7 +172,7 @@ def pack(document: Mapping[str, Any], binary: bytes) -> bytes:
 def unpack(data: bytes) -> tuple[Any, bytes]:
     """The JSON document of a GLB and its bytes, padding included.
 
-    Raises FileError: PTM-D731 if it is not what `pack` writes.
+    Raises FileError: PTM-D731 if `pack` does not write such a file.
     """
     try:
         chunks = [(kind, body) for kind, _, body in glb_chunks(data)]
@@ -190,7 +184,7 @@ def unpack(data: bytes) -> tuple[Any, bytes]:
         return schemas.parse(chunks[0][1]), b"".join(body for _, body in chunks[1:])
 
 
-#: A sampler's number for each way to go on beyond [0, 1]; the first is the default.
+#: A sampler's number for each behaviour outside [0, 1]; the first is the default.
 WRAPS: dict[Wrap, int] = {"repeat": 10497, "clamp": 33071}
 WHITE = [1.0, 1.0, 1.0, 1.0]
 
@@ -210,7 +204,7 @@ class MaterialWriter:
         textures: Mapping[int, tuple[int, TextureRecord]],
         fallback: bool,
     ) -> None:
-        """``textures``: for every image its place in the hints' list, and its record."""
+        """``textures``: for every image its index in the hints' list, and its record."""
         self._scene = materials
         self._records = textures
         self._fallback = fallback
@@ -228,7 +222,7 @@ class MaterialWriter:
         return place
 
     def members(self) -> dict[str, Any]:
-        """What the document has of "materials", "textures", "images" and "samplers"."""
+        """The document's "materials", "textures", "images" and "samplers"."""
         textures: list[dict[str, Any]] = []
         for image, sampler in self._textures:
             textures.append({"source": image} | ({} if sampler < 0 else {"sampler": sampler}))
@@ -255,15 +249,15 @@ class MaterialWriter:
             if self._fallback and record.fallback is not None:
                 index = self._texture(UP + quote(record.fallback), material)
                 surface["baseColorTexture"] = {"index": index}
-        found: dict[str, Any] = {"name": material.name}
-        found["pbrMetallicRoughness"] = surface | {"metallicFactor": 0}
+        row: dict[str, Any] = {"name": material.name}
+        row["pbrMetallicRoughness"] = surface | {"metallicFactor": 0}
         if cutoff is not None:
-            found |= {"alphaMode": "MASK", "alphaCutoff": cutoff}
+            row |= {"alphaMode": "MASK", "alphaCutoff": cutoff}
         elif blends:
-            found["alphaMode"] = "BLEND"
+            row["alphaMode"] = "BLEND"
         if two_sided:
-            found["doubleSided"] = True
-        return found | ({"extras": extras} if extras else {})
+            row["doubleSided"] = True
+        return row | ({"extras": extras} if extras else {})
 
     def _texture(self, uri: str, material: Material) -> int:
         wraps = (material.wrap_s, material.wrap_t)

@@ -1,8 +1,8 @@
-"""A strict reader of the GLBs that `emit` writes, and of nothing else.
+"""A strict reader of the GLBs that `emit` writes, and of no others.
 
-What glTF allows beyond them is refused: `schemas/glb.schema.json` says what they may have. The
-reader stops at the first thing that is otherwise; every count is held against the bytes that are
-there before an array is made.
+Other features of glTF are refused; `schemas/glb.schema.json` describes the accepted ones. The
+reader stops at the first fault. It compares every count with the available bytes before it
+allocates an array.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _VERTICES, _INDICES, _FLOAT = 34962, 34963, 5126
 
 @dataclass(frozen=True)
 class ReadMaterial:
-    """What a primitive looks like.
+    """The material of a primitive.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class ReadMaterial:
     two_sided, blends: `doubleSided`; whether `alphaMode` is not OPAQUE.
     cutoff: `alphaCutoff` if `alphaMode` is MASK, else None.
     image: URI of the base colour texture, or None.
-    ptm, texture: URI of the `.ptm` and its place in the hints, or None.
+    ptm, texture: URI of the `.ptm` and its index in the hints, or None.
     wrap: numbers of the sampler for s and t.
     """
 
@@ -52,8 +52,8 @@ class ReadPrimitive:
     Attributes
     ----------
     place: of the primitive in the document.
-    object, octree: what its node says: the name of an object, and the place of its octree texture
-        in the hints, or None.
+    object, octree: of its node: the name of the object, and the index of its octree texture in the
+        hints, or None.
     point: (n, 3) float32.
     uv: (n, 2) float32, origin at the upper left, or None.
     color: (n, 3) linear light, or None.
@@ -72,7 +72,7 @@ class ReadPrimitive:
 
 @dataclass(frozen=True)
 class ReadGlb:
-    """A cell as its GLB has it."""
+    """The content of a cell's GLB."""
 
     name: str
     cell: int
@@ -111,7 +111,7 @@ class _Reader:
         if nodes != list(range(len(nodes))) or any(
             len(self._tree.get(name, [])) != len(nodes) for name in ("nodes", "meshes")
         ):
-            _foreign("scene", "has not all nodes, or not a mesh for each")
+            _foreign("scene", "does not have all nodes and a mesh for each")
         primitives: list[ReadPrimitive] = []
         for index in nodes:
             node = self._row("nodes", index)
@@ -126,7 +126,7 @@ class _Reader:
         """An object of one of the document's lists."""
         rows = self._tree.get(name, [])
         if not 0 <= index < len(rows):
-            _foreign(f"{name}[{index}]", "there is no such object")
+            _foreign(f"{name}[{index}]", "does not exist")
         row: dict[str, Any] = rows[index]
         return row
 
@@ -172,7 +172,7 @@ class _Reader:
     def _elements(
         self, index: int, form: str, components: tuple[int, ...], target: int
     ) -> NDArray[Any]:
-        """(count, items) of an accessor that has such elements and a view for such data."""
+        """(count, items) of an accessor; its elements and its view must be of the given kinds."""
         place, accessor = f"accessors[{index}]", self._row("accessors", index)
         view = self._row("bufferViews", accessor["bufferView"])
         component = accessor["componentType"]
@@ -184,25 +184,25 @@ class _Reader:
         if view["target"] != target or view.get("byteStride", size) != size:
             _foreign(place, "its buffer view is for other data")
         try:
-            found = elements(accessor, view, self._data)
+            rows = elements(accessor, view, self._data)
         except ValueError as fault:
             raise FileError("PTM-D733", place, str(fault)) from None
         begin = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
         if begin % unit:
             raise FileError("PTM-D733", place, f"begins at byte {begin}, not a multiple of {unit}")
-        return found
+        return rows
 
     def _check_bounds(self, index: int, point: NDArray[np.float32]) -> None:
         place, accessor = f"accessors[{index}]", self._tree["accessors"][index]
-        for name, held in (("min", point.min(axis=0)), ("max", point.max(axis=0))):
+        for name, actual in (("min", point.min(axis=0)), ("max", point.max(axis=0))):
             if name not in accessor:
                 _foreign(place, f"has no {name}")
             written = np.array(accessor[name], np.float64)
             # In single precision, as they are written.
             with np.errstate(over="ignore"):
-                same = np.array_equal(written.astype(np.float32), held)
+                same = np.array_equal(written.astype(np.float32), actual)
             if not same:
-                message = f"{name} is not that of the data, {held.tolist()}"
+                message = f"{name} is not that of the data, {actual.tolist()}"
                 raise FileError("PTM-D735", place, message)
 
     def _material(self, index: int) -> ReadMaterial:
@@ -215,7 +215,7 @@ class _Reader:
             image = self._row("images", texture["source"])["uri"]
             sampler = self._row("samplers", texture["sampler"]) if "sampler" in texture else {}
             if _wrap(sampler) != wrap:
-                _foreign(f"materials[{index}]", "its sampler wraps otherwise than its extras say")
+                _foreign(f"materials[{index}]", "its sampler and its extras wrap differently")
         return ReadMaterial(
             factor=tuple(factor),
             two_sided=material.get("doubleSided", False),

@@ -1,15 +1,15 @@
-"""The index, `hints.json`: what a client needs before the first step, and no more.
+"""The hints: an index, `hints.json`, a record for each cell, and the statistics of the coverage.
 
-Tried: the level sizes and `gpuBytes` of textures beside the ends of their levels, for 0.4 kB more
-of the museum's 2.3 gzipped, although they follow from the rest; the URLs of each cell instead of
-templates, for 3.6 kB more of willowgarage's 5.5; no boxes, for 3.1 less, but then a client that
-comes to a place without a viewpoint would have to fetch all records to find its cell.
+The index holds only the data that a client needs before its first step, the record of a cell the
+data for that cell and the cells visible from it. The statistics state the accuracy of the coverage
+and its variation by point and view. The files are written in the order in which they refer to each
+other, the index last.
 
-The record of a cell: what a client that is in it needs, of the cell and of what it sees.
-
-The statistics: how far the coverage can be trusted, and how it differs by point and view.
-
-The files of the hints, in the order in which they refer to each other: the index comes last."""
+(Tried for the index: the level sizes and `gpuBytes` of textures beside the ends of their levels,
+0.4 kB more than the museum's 2.3 gzipped, although they follow from the rest; the URLs of each cell
+instead of templates, 3.6 kB more than willowgarage's 5.5; no boxes, 3.1 less, but then a client
+that comes to a place without a viewpoint would have to fetch all records to find its cell.)
+"""
 
 from __future__ import annotations
 
@@ -138,8 +138,8 @@ def _octree(record: OctreeRecord) -> Mapping[str, Any]:
 
 
 def _boxes(content: Content) -> list[Any]:
-    """Of each cell the least and the greatest coordinates of its leaves, rounded outwards: to a
-    thousandth of the building at least, a hundredth at most."""
+    """For each cell the least and the greatest coordinates of its leaves, rounded outwards to
+    between a thousandth and a hundredth of the building."""
     cells = content.cells
     low, high = (
         end.reduceat(cells.leaf_point, cells.leaf_point_start[:-1], axis=0)
@@ -161,12 +161,12 @@ def _rounded_down(values: NDArray[np.float64], decimals: int) -> NDArray[np.floa
 
 
 RECORD_FORMAT = "ptmtools cell"
-#: Significant digits of the need: sampling leaves two.
+#: Significant digits of the need; sampling leaves two.
 NEED_DIGITS = 3
 
 
 class RecordWriter:
-    """Writes the records of one database; what they share is prepared once."""
+    """Writes the records of one database."""
 
     def __init__(self, content: Content) -> None:
         self._content = content
@@ -174,12 +174,12 @@ class RecordWriter:
         self._portals = _portals(content.cells)
 
     def record(self, cell: int, first_look: Sequence[Piece] | None) -> str:
-        """The text of a cell's record; ``first_look`` is its bundle, None if there are none.
+        """The text of a cell's record; ``first_look`` is its bundle; None if the database has none.
 
         Raises DatabaseError PTM-D601.
         """
         content = self._content
-        seen = content.pvs.row(cell).tolist()
+        visible = content.pvs.row(cell).tolist()
         rows = content.ach.entries(cell)
         head: dict[str, object] = {
             "format": RECORD_FORMAT,
@@ -187,10 +187,10 @@ class RecordWriter:
             "cell": cell,
             "name": cell_name(cell),
             "adjacent": self._adjacent[cell].tolist(),
-            "visible": seen,
+            "visible": visible,
             "ach": content.shares[cell],
             "floor": significant(content.ach.floor[cell : cell + 1])[0],
-            "textures": [content.painted[other].tolist() for other in seen],
+            "textures": [content.painted[other].tolist() for other in visible],
         }
         if content.ach.by_texture:
             head["textureShares"] = [self._texture_shares(e) for e in range(rows.start, rows.stop)]
@@ -202,19 +202,19 @@ class RecordWriter:
         return document_text(head, {"leaves": leaves, "portals": self._portals[cell]})
 
     def _need(self, need: Need, cell: int) -> list[list[Any]]:
-        """Of each texture in sight its place, the coarsest level wanted, and shares."""
-        records, seen = self._content.records, self._content.pvs.row(cell).tolist()
-        in_sight = {place for other in seen for place in self._content.painted[other].tolist()}
+        """For each visible texture its index, the coarsest required level, and shares."""
+        records, cells = self._content.records, self._content.pvs.row(cell).tolist()
+        visible = {place for other in cells for place in self._content.painted[other].tolist()}
         rows = []
         for entry in range(*need.start[cell : cell + 2].tolist()):
             place = records[int(need.image[entry])][0]
             shares = need.share[slice(*need.share_start[entry : entry + 2].tolist())]
-            if place in in_sight:
+            if place in visible:
                 rows.append([place, int(need.first[entry]), *significant(shares, NEED_DIGITS)])
         return sorted(rows)
 
     def _texture_shares(self, entry: int) -> list[list[Any]]:
-        """The pairs of a texture, None for what has none, and its share of an entry of the ACH."""
+        """The pairs of a texture, None for untextured surfaces, and its share of an ACH entry."""
         ach, records = self._content.ach, self._content.records
         of_entry = slice(*ach.texture_start[entry : entry + 2].tolist())
         place = [records[i][0] if i in records else None for i in ach.texture[of_entry].tolist()]
@@ -282,7 +282,7 @@ def _cell(content: Content, cell: int) -> dict[str, Any]:
 def hints_files(content: Content) -> Iterator[tuple[str, str | bytes]]:
     """Path, relative to the served folder, and contents of each file.
 
-    Raises DatabaseError: PTM-D601 a number is not finite: for the index, at once.
+    Raises DatabaseError: PTM-D601 a number is not finite; for the index, before the first file.
     """
     return _files(content, index_text(content))
 

@@ -1,11 +1,7 @@
-"""What goes into a database's served files besides the artifacts, and what comes out of them.
+"""Options, records and results of `emit`, `validate_database` and `plot_plan`.
 
-Options and results of `emit`, `validate_database` and `plot_plan`. Positions are world metres, Y
-up (design, "Space"); angles are radians unless a name says otherwise.
-
-What stops a reader of emitted files.
-
-What a floor is called: by the storeys that a model names."""
+Positions are world metres, Y up (design, "Space"); angles are radians unless a name says otherwise.
+"""
 
 from __future__ import annotations
 
@@ -29,13 +25,13 @@ if TYPE_CHECKING:
 
 
 Vector = tuple[float, float, float]
-#: Height of the eyes as a share of somebody's own: 1.6 m of 1.7.
+#: Height of the eyes as a share of the body's: 1.6 m of 1.7.
 EYE = 1.6 / 1.7
 
 
 @dataclass(frozen=True)
 class TextureRecord:
-    """What the emitted files say of one image of the scene.
+    """The texture of one image of the scene, for the emitted files.
 
     Attributes
     ----------
@@ -45,11 +41,11 @@ class TextureRecord:
     width, height, components: of the finest level stored.
     levels: as the header has them, coarsest first.
     sha256: hex digest of the `.ptm`'s bytes.
-    fallback_level: index into `levels` of the one that the fallback image holds; None if there is
-        no image, or if it is the finest.
+    fallback_level: index into `levels` of the level in the fallback image; None without an image,
+        or if it is the finest.
     fallback_bytes: of the fallback image; 0 without.
-    detail: what its levels show; None if that is not known.
-    stored: where the `.ptm` lies on the disk; None if it is not at hand.
+    detail: mean colour and differences of the levels; None if unknown.
+    stored: the `.ptm` on the disk; None if it was not encoded.
     """
 
     image: int
@@ -68,7 +64,7 @@ class TextureRecord:
 
 @dataclass(frozen=True)
 class OctreeRecord:
-    """What the emitted files say of the octree texture of an object (docs/formats/apo.md).
+    """The octree texture of an object, for the emitted files (docs/formats/apo.md).
 
     Attributes
     ----------
@@ -76,7 +72,7 @@ class OctreeRecord:
     file: the stream of texels, relative to the served folder, "apo/NAME.bin".
     low, side: corner and side of the cube, world metres.
     levels: texels of each level, from the root on.
-    ends: for each level, so many first bytes of the file hold it and all before it.
+    ends: the length of the prefix of the file that holds each level and those before it.
     crc32: of the texels of each level.
     """
 
@@ -96,9 +92,8 @@ class GivenViewpoint:
 
     Attributes
     ----------
-    position: world metres; put on the floor below where there is one within reach.
-    yaw: degrees, counter-clockwise seen from above, 0 looks along -Z; None looks where there is
-        most to see.
+    position: world metres; moved to the floor below if one is within reach.
+    yaw: degrees, counter-clockwise seen from above, 0 looks along -Z; None chooses the best view.
     """
 
     position: Vector
@@ -107,7 +102,7 @@ class GivenViewpoint:
 
 @dataclass(frozen=True)
 class Viewpoint:
-    """A place to start from.
+    """A place where a walk may start.
 
     Attributes
     ----------
@@ -115,7 +110,7 @@ class Viewpoint:
     description: for a browser's menu.
     position: of the eye, world metres.
     direction: unit vector.
-    orientation: (x, y, z, angle), the rotation that brings -Z to `direction` with Y kept up.
+    orientation: (x, y, z, angle), the rotation that turns -Z to `direction` and keeps Y up.
     field_of_view: radians, the smaller of the horizontal and the vertical one.
     cell: the cell that contains it.
     """
@@ -207,7 +202,7 @@ class EmitOptions:
     )
 
     def __post_init__(self) -> None:
-        wrong = None
+        fault = ""
         try:
             emitters = chosen_emitters(self.format)
             if not any(emitter.cell_files for emitter in emitters):
@@ -215,25 +210,25 @@ class EmitOptions:
             chosen = {emitter.name for emitter in emitters}
             names = ",".join(name for name in EMITTERS if name in chosen)
             object.__setattr__(self, "format", names)
-        except ValueError as fault:
-            wrong = f"--format: {fault}"
+        except ValueError as error:
+            fault = f"--format: {error}"
         if not 0 < self.field_of_view < math.pi:
-            wrong = (
+            fault = (
                 f"a field of view of {degrees_text(self.field_of_view)}° is not between 0 and 180"
             )
         elif not all(0 <= size < math.inf for size in self.avatar_size or ()):
-            wrong = "the sizes of --avatar-size must be 0 or more"
+            fault = "the sizes of --avatar-size must be 0 or more"
         elif self.viewpoint_count < 0:
-            wrong = f"--viewpoint-count {self.viewpoint_count} is below 0"
+            fault = f"--viewpoint-count {self.viewpoint_count} is below 0"
         elif self.first_look < 0:
-            wrong = f"--first-look {self.first_look} is below 0"
+            fault = f"--first-look {self.first_look} is below 0"
         elif self.need < 0:
-            wrong = f"--need {self.need} is below 0"
-        if wrong:
-            raise InputError("PTM-I603", wrong, remedy="leave the option out for its default")
+            fault = f"--need {self.need} is below 0"
+        if fault:
+            raise InputError("PTM-I603", fault, remedy="leave the option out for its default")
 
     def avatar(self, walker: Walker) -> Vector:
-        """``avatar_size``, if need be that of whoever walks in the cells."""
+        """``avatar_size``, by default that of the walker."""
         eye = round(walker.height * EYE, 6)
         return self.avatar_size or (walker.radius, eye, walker.step)
 
@@ -263,18 +258,18 @@ class Visit:
 
 @dataclass(frozen=True)
 class EmitReport:
-    """What `emit` wrote.
+    """The files that `emit` wrote.
 
     Attributes
     ----------
     files: paths relative to the served folder, in the order of writing.
-    viewpoints: the places to start from.
+    viewpoints: where a walk may start.
     shapes, triangles: written, over all cells; a piece in a boundary counts once per cell.
     collapsed: pieces left out because two corners are one after rounding to float32.
     bytes: of all files together.
     first_look: of these, bytes of first-look bundles.
-    visit: what they mean for a visitor.
-    notes: what there is to say, one line each.
+    visit: the cost of a visit.
+    notes: remarks, one line each.
     """
 
     files: tuple[str, ...]
@@ -323,7 +318,7 @@ class PlotReport:
 
 
 class FileError(Exception):
-    """The first thing in a file that is wrong: a code of `validation`, where, and what."""
+    """The first fault in a file: a code of `validation`, the place, and a message."""
 
     def __init__(self, code: str, place: str, message: str) -> None:
         self.code, self.place, self.message = code, place, message
@@ -332,8 +327,8 @@ class FileError(Exception):
 
 @contextmanager
 def shaped(code: str, place: str = "") -> Iterator[None]:
-    """What is not as its schema says becomes a FileError of this code; ``place`` is that of a
-    fault of the whole document."""
+    """Turns a violation of a schema into a FileError of this code; ``place`` is that of a fault of
+    the whole document."""
     try:
         yield
     except schemas.ShapeError as fault:

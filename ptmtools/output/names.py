@@ -67,11 +67,11 @@ class DefNames:
         """A name for the object ``name``, used nowhere else in the file."""
         plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
         base = _ILLEGAL.sub("_", plain).strip("_")[:_LONGEST] or "shape"
-        wanted = f"{self._prefix}_{base}"
-        unique, count = wanted, self._taken.get(wanted, 1)
+        preferred = f"{self._prefix}_{base}"
+        unique, count = preferred, self._taken.get(preferred, 1)
         while unique in self._taken:
             count += 1
-            unique = f"{wanted}_{count}"
-        self._taken[wanted] = count
+            unique = f"{preferred}_{count}"
+        self._taken[preferred] = count
         self._taken.setdefault(unique, 1)
         return unique

@@ -1,23 +1,20 @@
-"""Float formatting: a float32 as the shortest decimal that reads back to it; where several are as
-short, the nearest.
+"""Numbers as text: float32 in the shortest decimals that read back to it, shares in few digits.
 
-VRML97 readers hold single precision, so nothing beyond it is written. (Tried: "%.9g", 1.6 times
-the bytes.) A number is written plainly ("0.5", "120") or, where that is shorter, as a whole number
-with an exponent ("1e3", "12e-7"). (Rejected: ".5", which VRML97 allows but JSON does not, and which
-not every reader's pattern for a number has; it would save 1 % of a database.)
-
-orjson finds the digits, the same as NumPy's Dragon4 does. It writes "1.0" for 1 and "1000.0" for
-1e3, so the few numbers that it writes otherwise than we do are taken out beforehand and put back
-into its text. Megabytes of text a second, metres with all digits, millimetres, whole metres: 38,
-30, 18; without orjson, the same method (Schubfach) in NumPy 7, 13, 23, in compiled loops 114, 136,
-147, for 370 lines more; NumPy's own conversion 10. So a museum quartered to 984,576 triangles is
-emitted in 2.2 s of processor time instead of 1.2, one of usual size as fast as before (0.20 s).
-
-Numbers in as few digits as they are good for, and the JSON of them.
-
-Geometry has the float32 coordinates of the VRML files and the GLBs, in their shortest decimals: a
+VRML97 readers use single precision, so geometry has no more: float32 coordinates in their shortest
+decimals, the nearest of several equally short ones, in VRML files and hints alike. They are a
 hundred times finer than the distance within which a point lies in a plane (`PLANE_SHARE`), and no
-leaf is flat in them. Shares have `DIGITS` significant digits; sampling leaves two or three."""
+leaf is flat in them. (Tried: "%.9g", 1.6 times the bytes.) A number is written plainly ("0.5",
+"120") or, where that is shorter, as a whole number with an exponent ("1e3", "12e-7"). (Rejected:
+".5", which VRML97 allows but JSON does not, and which not every reader accepts; it would save 1 %
+of a database.) Shares have `DIGITS` significant digits; sampling leaves two or three.
+
+orjson computes the digits, the same as NumPy's Dragon4 does. It writes "1.0" for 1 and "1000.0" for
+1e3, so the few numbers that it writes differently are taken out beforehand and put back into its
+text. Megabytes of text a second, metres with all digits, millimetres, whole metres: 38, 30, 18;
+without orjson, the same method (Schubfach) in NumPy 7, 13, 23, in compiled loops 114, 136, 147, for
+370 lines more; NumPy's own conversion 10. So a museum quartered to 984,576 triangles is emitted in
+2.2 s of processor time instead of 1.2, one of usual size as fast as before (0.20 s).
+"""
 
 from __future__ import annotations
 
@@ -35,22 +32,22 @@ from ptmtools.errors import DatabaseError
 
 #: Whole numbers below this are exact; greater ones may end in zeros as decimals only.
 _EXACT = 1 << 24
-#: A whole number of thousands has a shorter form, and so has what is smaller than this.
+#: A whole number of thousands has a shorter form, and so has a number smaller than this.
 _THOUSAND, _SMALL = 1000, np.float32(0.01)
 _PARTS = re.compile(r"(-?)(\d+)(?:\.(\d+))?(?:e([-+]\d+))?")
 
 
-def single(values: ArrayLike, what: str) -> NDArray[np.float32]:
+def single(values: ArrayLike, name: str) -> NDArray[np.float32]:
     """``values`` rounded to float32, without negative zeros.
 
-    Raises DatabaseError: PTM-D601 if one of them is not finite there; ``what`` says whose they are.
+    Raises DatabaseError: PTM-D601 if one is not finite there; ``name`` says which values.
     """
     with np.errstate(over="ignore"):
         rounded = np.asarray(values, dtype=np.float64).astype(np.float32)
     if not np.isfinite(rounded).all():
         raise DatabaseError(
             "PTM-D601",
-            f"{what}: a number is not finite in single precision",
+            f"{name}: a number is not finite in single precision",
             remedy="check the model for NaN, infinite or huge values",
         )
     return rounded + np.float32(0)
@@ -72,17 +69,17 @@ def row_texts(values: NDArray[np.floating] | NDArray[np.integer]) -> list[str]:
 
 
 def _json(values: NDArray[Any]) -> str:
-    """The JSON of an array, with our form of each number."""
+    """The JSON of an array, each number in its shortest form."""
     size = abs(values)
     other = (size >= _EXACT) | ((size >= _THOUSAND) & (size % _THOUSAND == 0))
     other |= (size < _SMALL) & (size > 0)
-    few = values[other]
+    rare = values[other]
     text = _plain(np.where(other, np.float32(np.nan), values))
     text = text.replace(".0,", ",").replace(".0]", "]")
-    if not len(few):
+    if not len(rare):
         return text
-    ours = map(_shortest, _plain(few)[1:-1].split(","))
-    return "".join(chain(*zip_longest(text.split("null"), ours, fillvalue="")))
+    shortest = map(_shortest, _plain(rare)[1:-1].split(","))
+    return "".join(chain(*zip_longest(text.split("null"), shortest, fillvalue="")))
 
 
 def _plain(values: NDArray[np.generic]) -> str:
@@ -126,8 +123,8 @@ def json_text(value: object) -> str:
 
 
 def document_text(head: dict[str, object], lists: dict[str, list[Any]]) -> str:
-    """An object of JSON, a field a line; of its ``lists`` an entry a line, so that a difference
-    between two databases can be read."""
+    """A JSON object with a field on each line and an entry of ``lists`` on each line, so that a
+    difference between two databases can be read."""
     lines = [f"{json_text(name)}:{json_text(value)}" for name, value in head.items()]
     for name, rows in lists.items():
         text = ",\n".join(map(json_text, rows))
@@ -135,34 +132,34 @@ def document_text(head: dict[str, object], lists: dict[str, list[Any]]) -> str:
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
-def coordinates(values: ArrayLike, what: str) -> Any:
+def coordinates(values: ArrayLike, name: str) -> Any:
     """Lists of numbers, nested as ``values`` are: the shortest that are the same in float32.
 
-    Raises DatabaseError: PTM-D601 if one of them is not finite there; ``what`` says whose they are.
+    Raises DatabaseError: PTM-D601 if one is not finite there; ``name`` says which values.
     """
-    text = orjson.dumps(single(values, what), option=orjson.OPT_SERIALIZE_NUMPY).decode()
+    text = orjson.dumps(single(values, name), option=orjson.OPT_SERIALIZE_NUMPY).decode()
     return json.loads(text.replace(".0,", ",").replace(".0]", "]"))
 
 
 def significant(values: NDArray[np.floating], digits: int = DIGITS) -> list[float | None]:
-    """Numbers with so many significant digits; None for NaN."""
+    """Numbers with ``digits`` significant digits; None for NaN."""
     return [None if v != v else _short(v, digits) for v in values.tolist()]
 
 
 def shares_of(row: NDArray[np.float64]) -> list[float]:
-    """The shares of a cell with `DIGITS` significant digits, but for the greatest, which has so
-    many that they sum to 1 within 1e-9.
+    """The shares of a cell with `DIGITS` significant digits; the greatest has as many as make
+    the sum 1 within 1e-9.
 
-    From the least on, each takes over what the one before it was rounded by, so none is off by more
-    than a unit of its last digit, and what is 0 stays 0.
+    From the least on, each share takes over the rounding error of the one before, so none is off by
+    more than a unit of its last digit, and 0 stays 0.
     """
     order = np.argsort(row, kind="stable").tolist()
     values: list[float] = row.tolist()
     carried = 0.0
     for i in order[:-1]:
-        wanted = values[i] + carried
-        values[i] = _short(wanted)
-        carried = wanted - values[i]
+        exact = values[i] + carried
+        values[i] = _short(exact)
+        carried = exact - values[i]
     if order:
         rest = float(np.sum([values[i] for i in order[:-1]]))
         values[order[-1]] = whole(round(1 - rest, _SUM_DECIMALS))
@@ -174,5 +171,5 @@ def _short(value: float, digits: int = DIGITS) -> float:
 
 
 def whole(value: float) -> float:
-    """An int where that is the same, which JSON writes shorter."""
+    """An int if equal, which JSON writes shorter."""
     return int(value) if value.is_integer() else value

@@ -1,10 +1,9 @@
-"""A floor plan per storey: cells, walls, portals, leaks, what was left out, and how much of the
-view others cover.
+"""A floor plan for each storey: cells, walls, portals, leaks, floor in no cell, the way of a walk,
+and the share of the view that each cell covers.
 
-Everything drawn is a true section at one height, so a plan shows what the stages computed and
-nothing that an artist would add. Without matplotlib the plan cannot be drawn (extra `plot`).
-
-The way of a walk in a floor plan, and where it looks while it stands."""
+All lines are true sections at one height, so a plan shows exactly the results of the stages.
+Drawing a plan needs matplotlib (extra `plot`).
+"""
 
 from __future__ import annotations
 
@@ -46,9 +45,9 @@ from ptmtools.visibility.model import Pvs
 
 #: (n, 3) eyes, metres, and (n, 3) unit vectors in which they look, at equal or similar steps.
 Way = tuple[Floats, Floats]
-#: Of its line, and of the arrows.
+#: Colour of the line and of the arrows.
 WAY = "#1a7f4b"
-#: An eye rests that moves and turns by less than this from one step to the next: metres, radians.
+#: An eye rests if it moves and turns by less than this in one step: metres, radians.
 _STILL = 2e-3
 #: The length of an arrow, metres.
 _ARROW = 0.8
@@ -57,17 +56,17 @@ _ARROW = 0.8
 def draw_way(
     axis: Any, way: Way, floors: Sequence[float], storey: int, shown: Callable[[Floats], Floats]
 ) -> None:
-    """Draws what of a way is in one storey, of those with these ``floors``; ``shown`` brings (…, 2)
-    plan coordinates to paper. An arrow stands for each direction in which a standing eye looks."""
+    """Draws the part of a way in one storey of the ``floors``, with an arrow for each direction of
+    a resting eye; ``shown`` maps (…, 2) plan coordinates to paper."""
     eye, direction = way
-    here: Bools = np.array([storey_of(floors, y) == storey for y in eye[:, 1]], dtype=np.bool_)
-    line = np.where(here[:, None], shown(eye[:, [0, 2]]), np.nan)
+    inside: Bools = np.array([storey_of(floors, y) == storey for y in eye[:, 1]], dtype=np.bool_)
+    line = np.where(inside[:, None], shown(eye[:, [0, 2]]), np.nan)
     axis.plot(line[:, 0], line[:, 1], color=WAY, linewidth=0.9, zorder=6)
     change = np.abs(np.diff(eye, axis=0)).max(axis=1) + np.abs(np.diff(direction, axis=0)).max(
         axis=1
     )
     still = np.append(change < _STILL, False)
-    begins = np.flatnonzero(still & ~np.append(False, still[:-1]) & here)
+    begins = np.flatnonzero(still & ~np.append(False, still[:-1]) & inside)
     start = shown(eye[begins][:, [0, 2]])
     end = shown((eye[begins] + _ARROW * direction[begins])[:, [0, 2]])
     for tail, head in zip(start, end, strict=True):
@@ -80,9 +79,9 @@ _CELL_FILL, _CELL_EDGE = "#eaf0f4", "#a9bac6"
 _UNSEEN = "#f6f7f8"
 _WALL, _SEE_THROUGH, _PORTAL, _CHOSEN = "#1c2733", "#7d8fd8", "#f0562d", "#b0125b"
 _SHADES = "YlGnBu"
-#: The least share that has a shade of its own; smaller ones look like it.
+#: The smallest share with a shade of its own; smaller ones look the same.
 _FAINTEST = 1e-4
-#: The shade of all visible cells while no shares are known.
+#: The shade of all visible cells without ACH.
 _EVEN = 0.005
 #: Cells with a larger share have so dark a shade that their number is white.
 _DARK = 0.02
@@ -114,12 +113,12 @@ def plot_plan(
     ----------
     pvs, ach: may be None while those stages have not run; a chosen cell needs the PVS, and is
         shaded evenly without ACH.
-    way: of a walk, to be drawn as well.
+    way: of a walk.
 
     Raises
     ------
     DatabaseError: PTM-D600 there are no cells.
-    InputError: PTM-I601 there is no such cell, or nothing visible is known yet.
+    InputError: PTM-I601 the cell does not exist, or the PVS has not been computed.
     MissingComponentError: PTM-M600 matplotlib is not installed.
     OutputError: PTM-O001 to PTM-O003, see `ptmtools.files`.
     """
@@ -131,7 +130,9 @@ def plot_plan(
         )
     if options.cell is not None and pvs is None:
         raise InputError(
-            "PTM-I601", "what the cell sees has not been computed yet", remedy="run `ptm pvs` first"
+            "PTM-I601",
+            "the cells visible from it have not been computed yet",
+            remedy="run `ptm pvs` first",
         )
     agg = component(
         "matplotlib.backends.backend_agg", "PTM-M600", "a plan needs matplotlib", "plot"
@@ -290,8 +291,8 @@ class _Plan:
     def _numbers(
         self, axis: Any, sections: list[tuple[int, NDArray[np.float64]]], points: float
     ) -> None:
-        """Each cell's number once, in its largest section, if there is room; ``points`` of paper
-        make a metre."""
+        """Writes each cell's number once, in its largest section, if there is room; ``points`` of
+        paper are a metre."""
         import shapely
         from matplotlib.patheffects import withStroke
 
@@ -352,7 +353,7 @@ class _Plan:
             f"{count(len(self._doors()), 'portal')} between them",
         ]
         if self._pvs is not None:
-            parts.append(f"{100 * self._pvs.volume_at_hand[0]:.1f} % of volume at hand")
+            parts.append(f"{100 * self._pvs.volume_at_hand[0]:.1f} % of the volume stays resident")
         if len(self._floors) > 1:
             parts.append(f"{len(self._floors)} storeys")
         place = {"ha": "left", "va": "center", "color": _INK}
@@ -369,7 +370,7 @@ class _Plan:
         if not self._opaque.all():
             lines.insert(1, (_SEE_THROUGH, "transparent"))
         if self._leaks:
-            lines.append((LEAK, "leak, and cells that see too much by it"))
+            lines.append((LEAK, "leak, and cells that see too much through it"))
         if self._way is not None:
             lines.append((WAY, "walk"))
         if chosen is not None and self._shade is not None:
@@ -399,12 +400,12 @@ def _outlines(
 
     from ptmtools.cells.planar import union
 
-    found: dict[int | None, list[NDArray[np.float64]]] = {}
+    outlines: dict[int | None, list[NDArray[np.float64]]] = {}
     for cell in sorted({cell for cell, _ in sections}):
         leaves = [shapely.Polygon(polygon) for number, polygon in sections if number == cell]
         rim = shapely.boundary(union(np.array(leaves), grid) if len(leaves) > 1 else leaves[0])
-        found[cell] = [shapely.get_coordinates(line) for line in shapely.get_parts(rim)]
-    return found
+        outlines[cell] = [shapely.get_coordinates(line) for line in shapely.get_parts(rim)]
+    return outlines
 
 
 def _round_length(length: float) -> float:

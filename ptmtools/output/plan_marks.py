@@ -1,6 +1,4 @@
-"""What a floor plan hatches: cells where nobody stands, and floor that is in no cell.
-
-Leaks on a floor plan: a ring around each opening, and the cells that see too much through it."""
+"""Marks on a floor plan: hatched view-only cells, hatched floor that is in no cell, and leaks."""
 
 from __future__ import annotations
 
@@ -16,7 +14,7 @@ from ptmtools.visibility.model import Pvs
 
 #: Colour, and pattern as matplotlib names it.
 VIEW_ONLY, LEFT_OUT = ("#8fa3b1", "...."), ("#b5452c", "////")
-#: A floor may be as far below that of its storey, m: floors are not quite level.
+#: A floor may be this far below that of its storey, metres, as floors are not quite level.
 _SLACK = 0.5
 
 Shown = Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -39,11 +37,11 @@ def draw_view_only(
 def draw_left_out(
     axis: Any, cells: Cells, floors: Sequence[float], storey: int, shown: Shown
 ) -> None:
-    """Hatches what of `Cells.left_out` is in one storey, of those with these ``floors``; ``shown``
-    as above."""
+    """Hatches the triangles of `Cells.left_out` in one storey of the ``floors``; ``shown`` as in
+    `draw_view_only`."""
     height = cells.left_out[:, :, 1].mean(axis=1) + _SLACK
-    here = np.array([storey_of(floors, y) == storey for y in height], dtype=bool)
-    _hatch(axis, list(shown(cells.left_out[here][:, :, [0, 2]])), LEFT_OUT, zorder=6)
+    inside = np.array([storey_of(floors, y) == storey for y in height], dtype=bool)
+    _hatch(axis, list(shown(cells.left_out[inside][:, :, [0, 2]])), LEFT_OUT, zorder=6)
 
 
 def _hatch(
@@ -58,34 +56,34 @@ def _hatch(
 
 
 def hatches(cells: Cells) -> list[Any]:
-    """The entries of the legend for what is drawn so."""
+    """The entries of the legend for hatched areas."""
     from matplotlib.patches import Patch
 
-    there = (
+    entries = (
         (VIEW_ONLY, "view-only", not cells.standing.all()),
         (LEFT_OUT, "left out", len(cells.left_out)),
     )
     return [
         Patch(facecolor="none", edgecolor=colour, hatch=pattern, linewidth=0, label=label)
-        for (colour, pattern), label, drawn in there
+        for (colour, pattern), label, drawn in entries
         if drawn
     ]
 
 
 LEAK = "#e09400"
 #: Points: diameter of the ring, and from its middle to the text.
-_RING, _BESIDE = 15.0, 10.0
-#: So many cells are named at a ring.
-_NAMED = 3
+_RING, _TEXT_OFFSET = 15.0, 10.0
+#: Number of cells listed at a ring.
+_LISTED = 3
 
 
 def leaks_by_portal(pvs: Pvs | None) -> dict[int, list[int]]:
-    """Portal → the cells for which it is the leak, those that see most first (see `Pvs.leak`)."""
-    found: dict[int, list[int]] = {}
+    """Portal → the cells for which it is the leak (`Pvs.leak`), the largest PVS first."""
+    leaks: dict[int, list[int]] = {}
     if pvs is not None:
         for cell, _, portal, _ in pvs.leak.tolist():
-            found.setdefault(portal, []).append(cell)
-    return found
+            leaks.setdefault(portal, []).append(cell)
+    return leaks
 
 
 def draw_leaks(
@@ -96,7 +94,8 @@ def draw_leaks(
     storey: int,
     shown: Callable[[NDArray[np.float64]], NDArray[np.float64]],
 ) -> None:
-    """Draws the leaks of one storey, those nearer above its floor than above any other.
+    """Draws a ring around each leak of one storey, with the cells that see too much through it. A
+    leak belongs to the nearest floor below.
 
     Parameters
     ----------
@@ -104,7 +103,7 @@ def draw_leaks(
     """
     from matplotlib.patheffects import withStroke
 
-    for portal, seeing in sorted(leaks.items()):
+    for portal, viewers in sorted(leaks.items()):
         polygon = cells.portal(portal)
         x, y, z = polygon.mean(axis=0)
         if storey_of(floors, y) != storey:
@@ -114,11 +113,11 @@ def draw_leaks(
         place = shown(np.array([x, z]))
         ring = {"marker": "o", "markerfacecolor": "none", "markeredgewidth": 1.8}
         axis.plot(*place, markersize=_RING, markeredgecolor=LEAK, zorder=8, **ring)
-        rest = ", …" if len(seeing) > _NAMED else ""
+        rest = ", …" if len(viewers) > _LISTED else ""
         axis.annotate(
-            ", ".join(map(str, seeing[:_NAMED])) + rest,
+            ", ".join(map(str, viewers[:_LISTED])) + rest,
             place,
-            (_BESIDE, 0),
+            (_TEXT_OFFSET, 0),
             textcoords="offset points",
             fontsize=8,
             weight="bold",

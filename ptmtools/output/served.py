@@ -1,14 +1,13 @@
-"""What is served of a database, as its clients fetch it: the index, records, geometry, textures.
+"""The files of a database as clients of the hints fetch them: index, records, geometry, textures.
 
-Nothing but the served folder is read, so that whatever a client knows is on the link, and a
-published database can be simulated like one just built.
+Only the served folder is read, so that everything a client knows is counted as traffic, and a
+published database can be simulated like a local one. `Locator` finds the cell of an eye: the one
+that has a leaf with the eye behind all its planes.
 
-In which cell an eye is: the one of whose leaves it is behind all planes.
-
-Pieces in a boundary between two cells are in both: which copy is seen from where.
-
-A pixel belongs to the copy of the cell on the viewer's side. That is there as soon as his cell is;
-the other may be behind a wall, where nobody looks for it."""
+Pieces in a boundary between two cells are in both. A pixel belongs to the copy of the cell on the
+viewer's side (`sides`). That copy is loaded as soon as the viewer's cell is; the other may be
+behind a wall.
+"""
 
 from __future__ import annotations
 
@@ -34,8 +33,7 @@ from ptmtools.output.names import HINTS, texture_name
 from ptmtools.scene.colors import to_srgb
 from ptmtools.store.layout import SERVED
 
-#: Metres that an eye may be in front of a plane: leaves that touch then overlap
-#: (docs/formats/hints.md).
+#: Metres by which leaves are enlarged, so that leaves that touch overlap (docs/formats/hints.md).
 SLACK = 1e-3
 
 
@@ -49,24 +47,26 @@ class Locator:
         self._high = np.array([p.max(axis=0) for p in points]) + SLACK
 
     def along(self, eye: Floats) -> Ints:
-        """(F,) the cell of each of (F, 3) eyes along a walk: the one before, if it is there still;
-        -1 for none."""
-        found = np.full(len(eye), -1, np.int64)
+        """(F,) the cell of each of (F, 3) eyes along a walk: the previous one if it still contains
+        the eye; -1 for none."""
+        cells = np.full(len(eye), -1, np.int64)
         cell = -1
         for f, point in enumerate(eye):
-            if cell < 0 or not self._holds(cell, point):
+            if cell < 0 or not self._contains(cell, point):
                 near = ((self._low <= point) & (point <= self._high)).all(axis=1)
-                cell = next((c for c in np.flatnonzero(near).tolist() if self._holds(c, point)), -1)
-            found[f] = cell
-        return found
+                cell = next(
+                    (c for c in np.flatnonzero(near).tolist() if self._contains(c, point)), -1
+                )
+            cells[f] = cell
+        return cells
 
     def outside(self, cell: int, point: Floats) -> Floats:
-        """(n,) metres that (n, 3) points are in front of the plane that each is farthest in front
-        of, in the leaf of a cell in which that is least: 0 or less inside."""
+        """(n,) metres from (n, 3) points to a cell: the largest distance in front of a plane of a
+        leaf, least over the leaves; 0 or less inside."""
         leaves = [(point @ leaf[:, :3].T + leaf[:, 3]).max(axis=1) for leaf in self._planes[cell]]
         return np.asarray(np.min(leaves, axis=0))
 
-    def _holds(self, cell: int, point: Floats) -> bool:
+    def _contains(self, cell: int, point: Floats) -> bool:
         return bool(self.outside(cell, point[None])[0] <= SLACK)
 
 
@@ -83,15 +83,15 @@ def _planes(leaf: Mapping[str, Any]) -> Floats:
 
 
 def sides(corner: Floats, cell: NDArray[np.int32], two_sided: Bools, locator: Locator) -> Ints:
-    """(n, 2) for each triangle the one that is seen in its place from the side that its normal
-    points to, and from the other: itself, or its copy in the cell on that side.
+    """(n, 2) the triangle visible in place of each triangle from the side of its normal, and from
+    the other side: itself, or its copy in the cell on that side.
 
     Parameters
     ----------
     corner, cell, two_sided: (n, 3, 3) metres, (n,), (n,) of the triangles.
     locator: of the cells.
     """
-    found = np.repeat(np.arange(len(corner))[:, None], 2, axis=1)
+    visible = np.repeat(np.arange(len(corner))[:, None], 2, axis=1)
     one, other = _pairs(corner, np.flatnonzero(two_sided))
     apart = cell[one] != cell[other]
     one = np.concatenate([one[apart], np.unique(one[apart])])
@@ -105,11 +105,11 @@ def sides(corner: Floats, cell: NDArray[np.int32], two_sided: Bools, locator: Lo
         for c in np.unique(cell[other]).tolist():
             rows = np.flatnonzero(cell[other] == c)
             outside[rows] = locator.outside(c, point[rows])
-        # The copy whose cell holds the point best comes last, and stays.
+        # The copy in the cell that the point is deepest in comes last and wins.
         order = np.lexsort((-outside, one))
         order = order[outside[order] < SLACK / 2]
-        found[one[order], side] = other[order]
-    return found
+        visible[one[order], side] = other[order]
+    return visible
 
 
 def _pairs(corner: Floats, among: Ints) -> tuple[Ints, Ints]:
@@ -146,7 +146,7 @@ class Surfaces:
     ----------
     corner: (n, 3, 3) float64 world metres. uv: (n, 3, 2) float64, origin at the upper left.
     cell, shape, texture: (n,) int32; the shape counts over all cells, the texture is -1 without.
-    color: (n, 3) what multiplies the texel, encoded as sRGB, 0 to 1; of corners of several colours
+    color: (n, 3) factor of the texel, encoded as sRGB, 0 to 1; of corners of several colours
         their mean.
     two_sided, glass: (n,) seen from both sides; without texture and not opaque.
     clamped: (n, 2) whether u and v stop at the edge of the texture instead of repeating it.
@@ -203,7 +203,7 @@ class Served:
 
     @property
     def cell_count(self) -> int:
-        """How many cells there are."""
+        """The number of cells."""
         return len(self.records)
 
     def file(self, url: str) -> Path:
@@ -211,7 +211,7 @@ class Served:
         return _inside(self.folder, url)
 
     def read(self, url: str) -> bytes:
-        """What is in it. Raises DatabaseError PTM-D005, D006."""
+        """The bytes of a file that the index names. Raises DatabaseError PTM-D005, D006."""
         return _bytes(self.file(url))
 
     def texture_file(self, texture: int) -> Path:
@@ -233,7 +233,7 @@ def read_index(folder: Path) -> Document:
 
 
 def read_served(database: str | os.PathLike[str]) -> Served:
-    """What a database serves; the folder of the database, or the served one itself.
+    """The served folder of a database; ``database`` may also be the served folder itself.
 
     Raises
     ------
@@ -251,13 +251,13 @@ def read_served(database: str | os.PathLike[str]) -> Served:
     if FORM not in index["geometry"]:
         raise DatabaseError(
             "PTM-D606",
-            "has no geometry in glTF, which is what clients of the hints fetch",
+            "has no geometry in glTF, which clients of the hints need",
             file=database,
             remedy="write it with `ptm emit DB --format vrml,gltf`",
         )
     names = [cell["name"] for cell in index["cells"]]
-    found = [_document(_of(folder, index["record"], name), schemas.CELL) for name in names]
-    records = tuple(document for document, _ in found)
+    pairs = [_document(_of(folder, index["record"], name), schemas.CELL) for name in names]
+    records = tuple(document for document, _ in pairs)
     for cell, (name, record) in enumerate(zip(names, records, strict=True)):
         file = _of(folder, index["record"], name)
         _check_record(file, record, cell, len(names), index["textures"])
@@ -279,7 +279,7 @@ def read_served(database: str | os.PathLike[str]) -> Served:
         statistics,
         index_bytes,
         statistics_bytes,
-        np.array([size for _, size in found], dtype=np.int64),
+        np.array([size for _, size in pairs], dtype=np.int64),
         np.array(sizes, dtype=np.int64),
         _surfaces(geometry, locator),
         locator,
@@ -322,7 +322,7 @@ def _document(file: Path, schema: str) -> tuple[Document, int]:
 
 
 def on_link(data: bytes) -> int:
-    """Bytes of a file that a server sends compressed (gzip), as it can all but textures."""
+    """Bytes of a file as a server sends it with gzip, which is of no use for textures."""
     return min(len(data), len(zlib.compress(data, 6)) + _GZIP_MORE)
 
 
@@ -336,15 +336,15 @@ def _check_record(
     used += [t for row in record.get("textureShares", ()) for t, _ in row if t is not None]
     used += [row[0] for row in need]
     rows = {len(record["visible"]), len(record["ach"]), len(record["textures"]), len(shares)}
-    wrong = ""
+    fault = ""
     if len(rows) > 1 or max(others, default=0) >= cells or max(used, default=-1) >= len(textures):
-        wrong = "an index is out of range"
-    elif any(first + len(some) > len(textures[t]["ends"]) for t, first, *some in need):
-        wrong = "needs levels that there are not"
+        fault = "an index is out of range"
+    elif any(first + len(levels) > len(textures[t]["ends"]) for t, first, *levels in need):
+        fault = "needs levels that do not exist"
     elif record["cell"] != cell or record["visible"][:1] != [cell]:
-        wrong = "is not that of its cell"
-    if wrong:
-        raise DatabaseError("PTM-D006", wrong, file=file, remedy=BUILD)
+        fault = "is not that of its cell"
+    if fault:
+        raise DatabaseError("PTM-D006", fault, file=file, remedy=BUILD)
 
 
 def _glb(file: Path, data: bytes, cell: int, textures: int, octrees: int) -> ReadGlb:
@@ -355,9 +355,9 @@ def _glb(file: Path, data: bytes, cell: int, textures: int, octrees: int) -> Rea
             "PTM-D006", fault.message, file=file, place=fault.place, remedy=BUILD
         ) from None
     used = [p.material.texture for p in read.primitives if p.material.texture is not None]
-    around = [p.octree for p in read.primitives if p.octree is not None]
-    wrong = max(used, default=-1) >= textures or max(around, default=-1) >= octrees
-    if read.cell != cell or wrong:
+    octree = [p.octree for p in read.primitives if p.octree is not None]
+    out_of_range = max(used, default=-1) >= textures or max(octree, default=-1) >= octrees
+    if read.cell != cell or out_of_range:
         raise DatabaseError("PTM-D006", "is not that of its cell", file=file, remedy=BUILD)
     return read
 
@@ -373,14 +373,14 @@ def _surfaces(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
     def joined(rows: list[NDArray[Any]], width: int) -> Floats:
         return np.concatenate([np.zeros((0, 3, width)), *rows])
 
-    looks = [p.material for _, p in shapes]
+    materials = [p.material for _, p in shapes]
     texture = [
         -1 if p.uv is None or p.material.texture is None else p.material.texture for _, p in shapes
     ]
     clamp = WRAPS["clamp"]
     corner = joined([p.point.astype(np.float64)[p.triangle] for _, p in shapes], 3)
     cell = spread([cell for cell, _ in shapes], np.int32)
-    two_sided = spread([m.two_sided for m in looks], np.bool_)
+    two_sided = spread([m.two_sided for m in materials], np.bool_)
     mean = joined([_colors(p) for _, p in shapes], 3).mean(axis=1)
     return Surfaces(
         corner=corner,
@@ -388,10 +388,12 @@ def _surfaces(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
         cell=cell,
         shape=np.repeat(np.arange(len(shapes), dtype=np.int32), count),
         texture=spread(texture, np.int32),
-        color=to_srgb(spread([m.factor[:3] for m in looks], np.float64, 3)) * mean,
+        color=to_srgb(spread([m.factor[:3] for m in materials], np.float64, 3)) * mean,
         two_sided=two_sided,
-        glass=spread([m.blends and t < 0 for m, t in zip(looks, texture, strict=True)], np.bool_),
-        clamped=spread([[w == clamp for w in m.wrap] for m in looks], np.bool_, 2),
+        glass=spread(
+            [m.blends and t < 0 for m, t in zip(materials, texture, strict=True)], np.bool_
+        ),
+        clamped=spread([[w == clamp for w in m.wrap] for m in materials], np.bool_, 2),
         seen=sides(corner, cell, two_sided, locator),
         octree=spread([-1 if p.octree is None else p.octree for _, p in shapes], np.int32),
     )

@@ -1,10 +1,10 @@
-"""Places to stand in the rooms of a scene: one in each of the cells with the largest floors, at
-eye height, away from the walls, where there is most to see (`outlook`).
+"""Places to stand in the rooms of a scene: one in each of the cells with the largest floors, at eye
+height, away from the walls, with the best view (`views`).
 
-Where the floors are: the nearest upward-facing surface below a point.
-
-The floor's triangles are listed by the squares of a grid in plan that their boxes touch, so that a
-question looks at the triangles of one square."""
+`Ground` finds the floor below a point: the nearest upward-facing surface. The squares of a grid in
+plan list the floor triangles whose boxes they touch, so that a query looks at the triangles of one
+square.
+"""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Ground:
 
     def below(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n,) height of the nearest floor at or below each of (n, 3) points, or -inf."""
-        found = np.full(len(points), -np.inf)
+        heights = np.full(len(points), -np.inf)
         plan = points[:, [0, 2]]
         over = np.flatnonzero(((self._least <= plan) & (plan <= self._most)).all(axis=1))
         square = self._square(plan[over]) @ [self._side, 1]
@@ -68,8 +68,8 @@ class Ground:
         v = (ab[:, 0] * ap[:, 2] - ab[:, 2] * ap[:, 0]) / det
         height = a[:, 1] + u * ab[:, 1] + v * ac[:, 1]
         hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (height <= points[point, 1])
-        np.maximum.at(found, point[hit], height[hit])
-        return found
+        np.maximum.at(heights, point[hit], height[hit])
+        return heights
 
     def _square(self, plan: NDArray[np.float64]) -> NDArray[np.int64]:
         """(n, 2) row and column of the squares of (n, 2) points within the floors' box."""
@@ -79,8 +79,8 @@ class Ground:
         return np.minimum(np.maximum(square, 0), self._side - 1)
 
 
-#: Leaves in which a place is looked for, the largest first: of one cell, and of all, at least and
-#: for every room that is wanted.
+#: Number of leaves searched for a place, the largest first: of one cell, of all cells at least, and
+#: for every requested room.
 _OF_A_CELL = 3
 _LEAVES = 96
 _PER_ROOM = 4
@@ -88,10 +88,11 @@ _PER_ROOM = 4
 _GRID = 7
 #: Places of a leaf whose views are compared, the freest first.
 _TRIES = 12
-#: A room is as good as the largest to begin in if its floor is at least this share of that one's.
+#: A walk may begin in a room with at least this share of the largest floor.
 _AS_LARGE = 0.5
-#: A browser stands on what is highest around the eye: X_ITE in a square of half that side, turned
-#: with the view. A bench or a step beside the feet would lift the eye, by this or more, metres.
+#: A browser stands on the highest surface around the eye: X_ITE in a square of half that side,
+#: turned with the view. A bench or a step next to the feet would lift the eye, by this or more,
+#: metres.
 _LIFT = 0.01
 _AROUND = np.array(
     [
@@ -104,7 +105,7 @@ _AROUND = np.array(
 
 @dataclass(frozen=True)
 class Place:
-    """Where to stand in a cell.
+    """A place to stand in a cell.
 
     Attributes
     ----------
@@ -112,7 +113,7 @@ class Place:
     position: (3,) of the eye.
     yaw: radians, counter-clockwise from -Z, of the best view.
     worth: of that view.
-    floor: the height of what one stands on.
+    floor: height of the floor below.
     """
 
     cell: int
@@ -124,7 +125,7 @@ class Place:
 
 @dataclass(frozen=True)
 class _Room:
-    """A leaf in which one can stand: its floor's height, and its section at the eye's."""
+    """A standing leaf: the height of its floor, and its section at eye height."""
 
     leaf: int
     floor: float
@@ -134,8 +135,8 @@ class _Room:
 def places(
     cells: Cells, ground: Ground, outlook: Outlook, avatar_size: Vector, count: int
 ) -> list[Place]:
-    """At most ``count``: of the largest rooms of a storey the one with most to see, then those with
-    the largest floors."""
+    """At most ``count`` places: first the best view among the largest rooms of a storey, then the
+    rooms with the largest floors."""
     eye = avatar_size[1]
     rooms = []
     for leaf in largest_leaves(cells, max(_LEAVES, _PER_ROOM * count)):
@@ -143,44 +144,43 @@ def places(
         section = leaf_section(cells, leaf, floor + eye)
         if len(section) >= 3:
             rooms.append(_Room(leaf, floor, section))
-    found: dict[int, Place] = {}
+    by_cell: dict[int, Place] = {}
     begin: list[Place] = []
     least = 0.0
     for room in sorted(rooms, key=lambda room: (-area(room.section), room.leaf)):
         cell, size = int(cells.leaf_cell[room.leaf]), area(room.section)
-        if len(found) >= count and size < least:
+        if len(by_cell) >= count and size < least:
             break
-        if cell not in found:
+        if cell not in by_cell:
             place = _place_in(room, cells, ground, outlook, avatar_size)
             if place is not None:
-                found[cell] = place
+                by_cell[cell] = place
                 least = least or _AS_LARGE * size
                 if size >= least and abs(place.floor - (begin or [place])[0].floor) < eye:
                     begin.append(place)
     first = max(begin, key=lambda place: place.worth, default=None)
-    ordered = sorted(found.values(), key=lambda place: place is not first)
+    ordered = sorted(by_cell.values(), key=lambda place: place is not first)
     return ordered[:count]
 
 
 def largest_leaves(cells: Cells, count: int) -> list[int]:
-    """At most so many leaves in which one can stand, by the volume of their boxes; of a cell the
-    largest few."""
+    """At most ``count`` standing leaves by the volume of their boxes, a few of each cell."""
     boxes = [np.ptp(cells.leaf_points(i), axis=0).prod() for i in range(cells.leaf_count)]
     taken = np.zeros(cells.cell_count, dtype=np.int64)
-    found = []
+    leaves = []
     for leaf in np.argsort(-np.array(boxes), kind="stable").tolist():
         cell = cells.leaf_cell[leaf]
         if cells.leaf_standing[leaf] and taken[cell] < _OF_A_CELL:
             taken[cell] += 1
-            found.append(leaf)
-        if len(found) == count:
+            leaves.append(leaf)
+        if len(leaves) == count:
             break
-    return found
+    return leaves
 
 
 def _floor(cells: Cells, leaf: int, ground: Ground) -> float:
-    """The height of the floor of a leaf, and not of the table in its middle: half of it is no
-    higher."""
+    """The height of the floor of a leaf: the median over a grid, so that a table in its middle does
+    not count."""
     middle = cells.leaf_points(leaf).mean(axis=0)
     section = leaf_section(cells, leaf, float(middle[1]))
     plan = _grid(section) if len(section) >= 3 else middle[None, [0, 2]]
@@ -209,9 +209,9 @@ def _place_in(
     good = (abs(floor - room.floor) <= step) & (cells.locate_leaf(position) == room.leaf)
     left, tried = np.flatnonzero(good), np.zeros(0, dtype=np.int64)
     while len(left) and len(tried) < _TRIES:
-        some, left = left[:_TRIES], left[_TRIES:]
-        level = _level(position[some], floor[some], ground, keep_off)
-        tried = np.append(tried, some[level])[:_TRIES]
+        batch, left = left[:_TRIES], left[_TRIES:]
+        level = _level(position[batch], floor[batch], ground, keep_off)
+        tried = np.append(tried, batch[level])[:_TRIES]
     if len(tried) == 0:
         return None
     view = outlook.best(position[tried], room.floor + eye)
@@ -238,8 +238,8 @@ def _grid(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
     a, b = polygon, np.roll(polygon, -1, axis=0)
     edge, to = b - a, points[:, None] - a
     inside = np.all(edge[:, 0] * to[..., 1] - edge[:, 1] * to[..., 0] > 0, axis=1)
-    kept: NDArray[np.float64] = points[inside]
-    return kept if len(kept) else polygon.mean(axis=0)[None]
+    inner: NDArray[np.float64] = points[inside]
+    return inner if len(inner) else polygon.mean(axis=0)[None]
 
 
 def _distance(points: NDArray[np.float64], segments: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,15 +1,13 @@
-"""Which leaves make up which storey of a building.
+"""The storeys of a building, and horizontal sections of triangles, polygons and leaves.
 
-A storey's floor is a cluster of the leaves' lowest heights, weighted by the area that lies on
-them: heights within a storey gap of one another belong together, the lowest of a cluster first.
-Leaves that hang above (the space over a cupboard, a lintel's slab) begin between the storeys and
-found none; every storey shows all the leaves that its section cuts. What was left out counts too.
+A storey's floor is a cluster of the leaves' lowest heights, weighted by the area of the leaves:
+heights within a storey gap of one another belong together, the lowest of a cluster first. Hanging
+leaves (the space over a cupboard, a lintel's slab) begin between the storeys and form none; every
+storey shows all the leaves that its section cuts. Floor that is in no cell counts too.
 
-Horizontal sections: what a plane y = height cuts out of triangles, polygons and leaves.
-
-Plan coordinates are (x, z). A corner that lies in the cutting plane counts as above it, so a
-section through a floor's own height is that of the walls that stand on it, and no corner is met
-twice."""
+Plan coordinates are (x, z). A corner in the cutting plane counts as above it, so a section through
+a floor's own height is that of the walls that stand on it, and no corner is met twice.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +25,7 @@ def triangle_section(corners: NDArray[np.float64], height: float) -> NDArray[np.
     lone = above.sum(axis=1)
     cut = np.flatnonzero((lone == 1) | (lone == 2))
     corners, above = corners[cut], above[cut]
-    # The corner that is alone on its side; both crossings lie on the edges that meet there.
+    # The only corner on its side of the plane; both crossings lie on its edges.
     apex = np.where(lone[cut] == 1, above.argmax(axis=1), above.argmin(axis=1))
     row = np.arange(len(cut))
     tip = corners[row, apex]
@@ -75,7 +73,7 @@ def area(polygon: NDArray[np.float64]) -> float:
 
 
 def _crossing(a: NDArray[np.float64], b: NDArray[np.float64], height: float) -> NDArray[np.float64]:
-    """(n, 2) where the segments from ``a`` to ``b`` meet the plane; their ends lie on two sides."""
+    """(n, 2) where the segments from ``a`` to ``b``, with ends on both sides, meet the plane."""
     share = (height - a[:, 1]) / (b[:, 1] - a[:, 1])
     return (a + share[:, None] * (b - a))[:, [0, 2]]
 
@@ -118,11 +116,11 @@ def storeys(cells: Cells, height: float, gap: float) -> list[float]:
 
 
 def storey_of(floors: Sequence[float], height: float) -> int:
-    """The storey, of those with these ``floors``, that something is in: the nearest below."""
+    """The storey of a height, given all ``floors``: the nearest one below."""
     return max(0, int(np.searchsorted(floors, height, side="right")) - 1)
 
 
 def cut_height(cells: Cells, floor: float, height: float) -> float:
-    """Where a storey is cut: ``height`` above its floor, or half way up if it is lower."""
+    """The height of a storey's section: ``height`` above its floor, at most half way up."""
     top = float(np.max(cells.leaf_point[:, 1], initial=floor))
     return min(floor + height, (floor + top) / 2)

@@ -1,23 +1,19 @@
-"""The places from which a walk begins (paper §6: "a set of viewpoints from which the navigation
-can start"), and those by which one comes from room to room.
+"""The viewpoints of a database, where a walk may start (paper §6: "a set of viewpoints from which
+the navigation can start").
 
-The user's own, else the model's cameras; then one in each of the largest rooms that have none, see
-`rooms` and `outlook`, in the order of a walk, see `tour`: a browser that knows nothing of cells has
-them in its menu and goes to the next one at a key. A browser in WALK mode drops the viewpoint onto
-the floor, so it is put there beforehand: at the height of the eye above the nearest upward-facing
-surface below.
+They are the user's, else the model's cameras; then one in each of the largest rooms without one
+(`standpoints`, `views`). A browser that ignores cells lists them in its menu and leads from one to
+the next in the order of the file, so the next one should be next door. The shortest ways from the
+first room form a tree (Dijkstra, over leaves and portals); the rooms are in the order of a walk
+around that tree, the shortest branch first, one storey after the other. A browser in WALK mode
+drops the viewpoint onto the floor, so it is put there beforehand: at the height of the eye above
+the nearest upward-facing surface below.
 
 (Tried: an Anchor on every portal, with a transparent polygon to click on. view3dscene 4.2 and
 X_ITE 15 draw nothing of it, to the last pixel; but in X_ITE a drag that begins on it jumps instead
-of walking, and at the museum's first viewpoint that is 42 % of the picture. Readers that know no
+of walking, and at the museum's first viewpoint that is 42 % of the picture. Readers without
 transparency show a wall in every door.)
-
-The order in which rooms are walked through.
-
-A browser that knows nothing of cells leads from viewpoint to viewpoint in the order of the file:
-the next one should be next door. The shortest ways from the first room make a tree (Dijkstra, over
-leaves and portals); rooms follow each other as one meets them walking around it, the branch that
-leads least far first, one storey after the other."""
+"""
 
 from __future__ import annotations
 
@@ -37,15 +33,15 @@ from ptmtools.output.views import Outlook
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import ROUNDING_SHARE
 
-#: A way through an opening that is too low to walk through counts as so many times as long.
+#: Factor of the length of a way through an opening that is too low to walk through.
 _CLIMB = 10.0
 #: A portal with a normal this near to the vertical leads up or down, and has no height.
 _LEVEL = np.cos(np.pi / 4)
 
 
 def walk(cells: Cells, start: int, stops: Sequence[int], tall: float) -> list[int]:
-    """The order in which a walk from the leaf ``start`` meets the leaves ``stops``: indices into
-    it. Those to which nothing leads come last.
+    """The order in which a walk from the leaf ``start`` meets the leaves ``stops``, as indices into
+    ``stops``; unreachable leaves come last.
 
     Parameters
     ----------
@@ -54,11 +50,11 @@ def walk(cells: Cells, start: int, stops: Sequence[int], tall: float) -> list[in
     length, before = _ways(cells, start, tall)
     reach: dict[int, float] = {}
     onwards: dict[int, set[int]] = {}
-    here: dict[int, list[int]] = {}
+    stops_of: dict[int, list[int]] = {}
     for i, stop in enumerate(stops):
         if stop != start and before[stop] < 0:
             continue
-        here.setdefault(stop, []).append(i)
+        stops_of.setdefault(stop, []).append(i)
         leaf, far = stop, length[stop]
         while leaf >= 0:
             reach[leaf] = max(reach.get(leaf, 0.0), far)
@@ -69,7 +65,7 @@ def walk(cells: Cells, start: int, stops: Sequence[int], tall: float) -> list[in
     waiting = [start]
     while waiting:
         leaf = waiting.pop()
-        order += here.get(leaf, [])
+        order += stops_of.get(leaf, [])
         waiting += sorted(onwards.get(leaf, ()), key=lambda leaf: (-reach[leaf], -leaf))
     return order + sorted(set(range(len(stops))) - set(order))
 
@@ -79,13 +75,13 @@ def storey_numbers(floors: Sequence[float], apart: float) -> list[int]:
     is more than ``apart`` metres above the next lower one."""
     order = np.argsort(floors, kind="stable")
     rise = np.diff(np.array(floors)[order], prepend=floors[order[0]] if len(floors) else 0.0)
-    found = np.empty(len(floors), dtype=np.int64)
-    found[order] = np.cumsum(rise > apart)
-    return [int(storey) for storey in found]
+    storeys = np.empty(len(floors), dtype=np.int64)
+    storeys[order] = np.cumsum(rise > apart)
+    return [int(storey) for storey in storeys]
 
 
 def _ways(cells: Cells, start: int, tall: float) -> tuple[list[float], list[int]]:
-    """For each leaf how far it is from ``start``, and the leaf before it on the way, -1 if none."""
+    """For each leaf its distance from ``start``, and the previous leaf on the way, -1 for none."""
     edges: list[list[tuple[int, float]]] = [[] for _ in range(cells.leaf_count)]
     if cells.portal_count:
         middle, door = (
@@ -120,27 +116,27 @@ def _ways(cells: Cells, start: int, tall: float) -> tuple[list[float], list[int]
 _NARROWEST = 1e-2
 #: A floor is within reach if it lies at most this many eye heights below.
 _REACH = 2.0
-#: VRML97 wants the field of view inside (0, π); wider cameras are narrowed to this.
+#: VRML97 requires a field of view inside (0, π); wider cameras are narrowed to this.
 _WIDEST = 3.0
 
 
 def place_viewpoints(
     scene: Scene, cells: Cells, options: EmitOptions, textures: Sequence[TextureRecord] = ()
 ) -> tuple[tuple[Viewpoint, ...], tuple[str, ...]]:
-    """The viewpoints of a database, the first the one to begin at, and notes on those that were
-    left out. They look where ``textures`` are; those that are not given show nothing.
+    """The viewpoints of a database, the default one first, and notes on omitted ones. They face
+    ``textures``; other textures are ignored.
 
     Raises InputError: PTM-I600 if a viewpoint that the user gave lies in no cell.
     """
     ground, outlook = Ground(scene), Outlook(scene, textures)
     notes: list[str] = []
     if options.viewpoints:
-        begun = _given(cells, ground, outlook, options)
+        initial = _given(cells, ground, outlook, options)
     else:
-        begun = _cameras(scene, cells, ground, options, notes)
-    if options.viewpoint_count or not begun:
-        begun = [*begun, *_touring(scene, cells, ground, outlook, options, begun)]
-    return tuple(replace(v, name=f"VP_{i}") for i, v in enumerate(begun)), tuple(notes)
+        initial = _cameras(scene, cells, ground, options, notes)
+    if options.viewpoint_count or not initial:
+        initial = [*initial, *_touring(scene, cells, ground, outlook, options, initial)]
+    return tuple(replace(v, name=f"VP_{i}") for i, v in enumerate(initial)), tuple(notes)
 
 
 def orientation(direction: NDArray[np.float64]) -> tuple[float, float, float, float]:
@@ -165,7 +161,7 @@ def orientation(direction: NDArray[np.float64]) -> tuple[float, float, float, fl
     most = float(abs(v).max())
     if most == 0:
         return (0.0, 1.0, 0.0, 0.0)
-    axis = v / most  # whose square may be less than a float can be
+    axis = v / most  # so that its square does not underflow
     size = float(np.linalg.norm(axis))
     axis, angle = axis / size + 0.0, float(2 * np.arctan2(most * size, w))
     if angle > np.pi:
@@ -181,7 +177,7 @@ def _viewpoint(
     field_of_view: float,
     cell: int,
 ) -> Viewpoint:
-    """Without a name so far."""
+    """A viewpoint without a name."""
     unit = direction / np.linalg.norm(direction) + 0.0
     x, y, z = position.tolist()
     dx, dy, dz = unit.tolist()
@@ -196,20 +192,20 @@ def _heading(yaw: float) -> NDArray[np.float64]:
 def _standing(
     cells: Cells, ground: Ground, position: NDArray[np.float64], options: EmitOptions
 ) -> tuple[NDArray[np.float64], int]:
-    """A place and its cell, -1 if nobody can stand there; on the floor below if one is in reach
-    and one can stand there."""
+    """A place to stand at a position, and its cell, -1 for none; on the floor below if that is
+    within reach."""
     eye = options.avatar(cells.walker)[1]
     floor = float(ground.below(position[None])[0])
     if position[1] - floor <= _REACH * eye:
-        stood = np.array([position[0], floor + eye, position[2]])
-        cell = _cell_to_stand_in(cells, stood)
+        on_floor = np.array([position[0], floor + eye, position[2]])
+        cell = _cell_to_stand_in(cells, on_floor)
         if cell >= 0:
-            return stood, cell
+            return on_floor, cell
     return position, _cell_to_stand_in(cells, position)
 
 
 def _cell_to_stand_in(cells: Cells, position: NDArray[np.float64]) -> int:
-    """The cell of the leaf at a place, -1 if nobody can stand in it."""
+    """The cell of the standing leaf at a position, -1 for none."""
     leaf = int(cells.locate_leaf(position)[0])
     return int(cells.leaf_cell[leaf]) if leaf >= 0 and cells.leaf_standing[leaf] else -1
 
@@ -231,23 +227,23 @@ def _cameras(
 
 def _given(cells: Cells, ground: Ground, outlook: Outlook, options: EmitOptions) -> list[Viewpoint]:
     placed = []
-    for i, wanted in enumerate(options.viewpoints):
-        position, cell = _standing(cells, ground, np.array(wanted.position), options)
+    for i, given in enumerate(options.viewpoints):
+        position, cell = _standing(cells, ground, np.array(given.position), options)
         if cell < 0:
-            x, y, z = wanted.position
-            where, remedy = "not inside any cell", "with the origin at the centre of the floor"
-            if cells.locate_leaf(np.array(wanted.position))[0] >= 0:
-                where = "where nobody can stand"
+            x, y, z = given.position
+            fault, remedy = "not inside any cell", "with the origin at the centre of the floor"
+            if cells.locate_leaf(np.array(given.position))[0] >= 0:
+                fault = "in a cell without a place to stand"
                 remedy = "or divide the model again with this --viewpoint"
             raise InputError(
                 "PTM-I600",
-                f"the viewpoint {x:g},{y:g},{z:g} is {where}",
+                f"the viewpoint {x:g},{y:g},{z:g} is {fault}",
                 remedy=f"give world metres, Y up, {remedy}",
             )
-        if wanted.yaw is None:
+        if given.yaw is None:
             yaw = outlook.best(position[None], float(position[1])).yaw
         else:
-            yaw = float(np.radians(wanted.yaw))
+            yaw = float(np.radians(given.yaw))
         name, field = f"Viewpoint {i + 1}", options.field_of_view
         placed.append(_viewpoint(name, position, _heading(yaw), field, cell))
     return placed
@@ -259,28 +255,28 @@ def _touring(
     ground: Ground,
     outlook: Outlook,
     options: EmitOptions,
-    begun: Sequence[Viewpoint],
+    initial: Sequence[Viewpoint],
 ) -> list[Viewpoint]:
-    """One for each room that has none yet, in the order of a walk from the first."""
-    taken = {v.cell for v in begun}
-    count = max(options.viewpoint_count, not begun)
-    found = places(cells, ground, outlook, options.avatar(cells.walker), count + len(taken))
-    found = [place for place in found if place.cell not in taken][:count]
-    if not found:
-        return [] if begun else [_anywhere(cells, outlook, options)]
-    leaf = cells.locate_leaf(np.array([place.position for place in found])).tolist()
-    start = int(cells.locate_leaf(np.array(begun[0].position))[0]) if begun else leaf[0]
+    """A viewpoint for each room without one, in the order of a walk from the first."""
+    taken = {v.cell for v in initial}
+    count = max(options.viewpoint_count, not initial)
+    rooms = places(cells, ground, outlook, options.avatar(cells.walker), count + len(taken))
+    rooms = [place for place in rooms if place.cell not in taken][:count]
+    if not rooms:
+        return [] if initial else [_anywhere(cells, outlook, options)]
+    leaf = cells.locate_leaf(np.array([place.position for place in rooms])).tolist()
+    start = int(cells.locate_leaf(np.array(initial[0].position))[0]) if initial else leaf[0]
     eye = options.avatar(cells.walker)[1]
     order = walk(cells, start, leaf, eye)
-    storey = storey_numbers([place.floor for place in found], eye)
+    storey = storey_numbers([place.floor for place in rooms], eye)
     first = list(dict.fromkeys(storey[i] for i in order))
     order.sort(key=lambda i: first.index(storey[i]))
-    called = _storey_names(scene, [place.floor for place in found], storey, eye)
+    names = _storey_names(scene, [place.floor for place in rooms], storey, eye)
     number: Counter[str] = Counter()
     views: list[Viewpoint] = []
     for i in order:
-        place, field = found[i], options.field_of_view
-        level = called[i] if len(first) > 1 else ""
+        place, field = rooms[i], options.field_of_view
+        level = names[i] if len(first) > 1 else ""
         number[level] += 1
         name = f"{level}, room {number[level]}" if level else f"Room {number[level]}"
         views.append(_viewpoint(name, place.position, _heading(place.yaw), field, place.cell))
@@ -290,8 +286,8 @@ def _touring(
 def _storey_names(
     scene: Scene, floors: Sequence[float], storey: Sequence[int], gap: float
 ) -> list[str]:
-    """What the storey of each floor is called: by its own height, else by that of the lowest floor
-    there, else by its number."""
+    """The name of each floor's storey: by the floor's height, else by the height of the storey's
+    lowest floor, else by the storey's number."""
     lowest: dict[int, float] = {}
     for floor, number in zip(floors, storey, strict=True):
         lowest[number] = min(floor, lowest.get(number, floor))
@@ -304,7 +300,7 @@ def _storey_names(
 
 
 def _anywhere(cells: Cells, outlook: Outlook, options: EmitOptions) -> Viewpoint:
-    """In the middle of the largest leaf."""
+    """A viewpoint in the middle of the largest leaf."""
     (leaf,) = largest_leaves(cells, 1)
     middle = cells.leaf_points(leaf).mean(axis=0)
     view, cell = outlook.best(middle[None], float(middle[1])), int(cells.leaf_cell[leaf])

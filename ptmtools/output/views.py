@@ -1,26 +1,24 @@
-"""Where to look from a place: where there is most to see, and of views that are worth about as much
-along the longest.
+"""The best view from a place: the direction with the most visible detail of textures, and of about
+equally good ones the longest.
 
-What there is to see is counted by rays (`pictures`). How far one sees is measured all around, in a
-horizontal section of the walls: a direction counts as the mean free distance over a sector about
-it, so that a slit between two walls does not win; one that leaves the model counts as blind.
+`Pictures` measures detail with rays in all directions. Each ray resolves as many texels as it has
+pixels on a screen of 1080 lines, or fewer where a texel is larger than a pixel; a texture that
+repeats, such as a floor tile, counts at most its own number of texels, at its finest visible scale.
+The worth of a view is the sum over textures of the cube root of the visible texels times the
+contrast: four pictures are worth more than one that fills the view, and a plastered wall next to
+nothing. Near surfaces reduce the worth by their share of the view. Transparent surfaces without an
+image are ignored.
+
+`lengths` measures free distance in a horizontal section of the walls, as the mean over a sector
+about a direction, so that a slit between two walls does not win; a direction that leaves the model
+counts as blind.
 
 (Tried: the longest view alone. It is often along a bare wall. Embree rays from the middle of a
-cell, for the longest view: they see down doorways, but the middle of a hall is as often a table.)
-
-How much there is to see from a place, all around: where pictures are.
-
-Rays all around find what shows where. Each resolves as many texels as it has pixels on a screen of
-1080 lines, or fewer where a texel is larger than a pixel; of a texture that repeats, such as a
-tile of a floor, no more count than it has, as finely as it shows. A view is worth the cube root of
-what it shows of a texture, times its contrast, summed up: four pictures
-are worth more than one that fills the view, and a plastered wall next to nothing. It loses as much
-of that as it has of what is near: one wants to stand back. What is transparent and has no image is
-looked through.
-
-(Tried: the texels themselves. The best view of a room is then that of one picture which does not
-fit into it; with square roots it still is in a corridor. Texels counted in each 64th of a texture:
-five times as slow, and hardly another view.)"""
+cell, for the longest view: they see down doorways, but the middle of a hall is as often a table.
+The texels themselves: the best view of a room is then that of one picture which does not fit into
+it; with square roots it still is in a corridor. Texels counted in each 64th of a texture: five
+times as slow, and hardly another view.)
+"""
 
 from __future__ import annotations
 
@@ -43,8 +41,8 @@ DIRECTIONS = 72
 _FINER = 2
 _COLUMNS = _FINER * DIRECTIONS
 _STEP = 2 * np.pi / _COLUMNS
-#: A view has 60° from top to bottom, and 16:9. What lies outside this share of it, in the middle,
-#: does not count: a picture is to be whole.
+#: A view has 60° from top to bottom, and 16:9. Only this share in its middle counts, so that
+#: pictures are in view as a whole.
 _UP = np.tan(np.radians(30))
 _ASPECT = 16 / 9
 _WITHIN = 0.8
@@ -52,17 +50,17 @@ _ACROSS = int(_WITHIN * np.arctan(_ASPECT * _UP) / _STEP)
 _ROWS = int(_WITHIN * 2 * _UP / _STEP)
 #: Pixels of a screen of 1080 lines, for a radian up or across its middle.
 _PIXELS = 540 / _UP
-#: See `_contrast`; and what white is in a texture's detail.
+#: Largest side of the level that `_contrast` uses; white in a texture's detail.
 _SIDE, _WHITE = 64, 255
-#: What is nearer than this is near, metres; at most half of a view.
+#: Nearer surfaces are near, metres; at most half of a view may be.
 _NEAR = 2.0
 
 
 def _contrast(texture: TextureRecord) -> float:
-    """By how much the colours of a texture differ from their surroundings, a sixteenth of the
-    picture wide, as a share of white: what the finest level of at most `_SIDE` texels and the one
-    below it add. What is finer is grain, which plaster and carpet have as much of as a painting;
-    from where one looks at a painting, it is not seen."""
+    """The contrast of a texture at the scale of a sixteenth of its width, as a share of white: the
+    differences of the finest level of at most `_SIDE` texels and the one below it. Finer levels are
+    grain: plaster and carpet have as much of it as a painting, and it is invisible from the usual
+    distance of a painting."""
     if texture.detail is None:
         return 0.0
     small = [n for n, x in enumerate(texture.levels) if min(x.width, x.height) <= _SIDE]
@@ -98,8 +96,8 @@ class Pictures:
         self._tree: Any = None
 
     def worth(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n, DIRECTIONS) of the views from (n, 3) places; 0 where most of what shows is near, or
-        nothing at all."""
+        """(n, DIRECTIONS) worth of the views from (n, 3) places; 0 where most of the view is near
+        or empty."""
         worth = np.zeros((len(places), DIRECTIONS))
         if not (self._detail[self._image] > 0).any():
             return worth
@@ -119,21 +117,21 @@ class Pictures:
         texels = self._density[hit] * far[ray] ** 2 / np.maximum(slant, np.finfo(np.float64).eps)
         pixels = np.minimum(texels, _PIXELS**2)
         place, column = np.divmod(ray // _ROWS, _COLUMNS)
-        shows, which = np.unique(place * len(self._texels) + image, return_inverse=True)
-        each = np.bincount(which * _COLUMNS + column, pixels, len(shows) * _COLUMNS)
-        seen = _sectors(_STEP**2 * each.reshape(-1, _COLUMNS))
-        most = np.zeros(len(shows))
+        pairs, pair = np.unique(place * len(self._texels) + image, return_inverse=True)
+        each = np.bincount(pair * _COLUMNS + column, pixels, len(pairs) * _COLUMNS)
+        visible = _sectors(_STEP**2 * each.reshape(-1, _COLUMNS))
+        most = np.zeros(len(pairs))
         share = np.divide(pixels, texels, out=np.zeros_like(texels), where=texels > 0)
-        np.maximum.at(most, which, share * self._texels[image])
-        place, image = np.divmod(shows, len(self._texels))
-        value = self._detail[image, None] * np.cbrt(np.minimum(seen, most[:, None]))
+        np.maximum.at(most, pair, share * self._texels[image])
+        place, image = np.divmod(pairs, len(self._texels))
+        value = self._detail[image, None] * np.cbrt(np.minimum(visible, most[:, None]))
         np.add.at(worth, place, value)
         return np.where(free >= 0.5, worth * free, 0.0)
 
     def _cast(
         self, origin: NDArray[np.float64], way: NDArray[np.float64]
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Of (k, 3) rays: (k,) the triangle that each hits first, or -1, and (k,) how far, in
+        """(k,) the first triangle that each of (k, 3) rays hits, or -1, and (k,) its distance in
         lengths of ``way``."""
         from embreex.mesh_construction import TriangleMesh
         from embreex.rtcore_scene import EmbreeScene
@@ -141,9 +139,9 @@ class Pictures:
         if self._tree is None:
             self._tree = EmbreeScene(robust=True)
             TriangleMesh(self._tree, self._local)
-        found = self._tree.run(self._normalised(origin), way.astype(np.float32), output=True)
-        far = found["tfar"].astype(np.float64) / self._scale
-        return found["primID"].astype(np.int64), far
+        hits = self._tree.run(self._normalised(origin), way.astype(np.float32), output=True)
+        far = hits["tfar"].astype(np.float64) / self._scale
+        return hits["primID"].astype(np.int64), far
 
     def _normalised(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
         local: NDArray[np.float32] = ((points - self._middle) * self._scale).astype(np.float32)
@@ -157,13 +155,13 @@ def _sectors(columns: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
     return np.asarray((sums[:, 2 * _ACROSS + 1 :] - sums[:, : -2 * _ACROSS - 1])[:, ::_FINER])
 
 
-#: Views worth at least this share of the best are worth about as much.
+#: Views with at least this share of the best worth count as equally good.
 _AS_GOOD = 0.97
-#: How many directions to either side make a sector (±15°).
+#: Directions of a sector to either side (±15°).
 _SECTOR = 3
-#: What angles may be wrong by, in steps from one direction to the next.
+#: Slack of angles, in steps from one direction to the next.
 _LEEWAY = 1e-6
-#: Walls seen from places at a time.
+#: Pairs of a wall and a place at a time.
 _AT_ONCE = 1 << 16
 _YAW = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
 _X, _Z = -np.sin(_YAW), -np.cos(_YAW)
@@ -171,11 +169,11 @@ _X, _Z = -np.sin(_YAW), -np.cos(_YAW)
 
 @dataclass(frozen=True)
 class View:
-    """What is best seen from some places.
+    """The best view from some places.
 
     Attributes
     ----------
-    place: which of them it is seen from.
+    place: index of the place.
     yaw: radians, counter-clockwise from -Z.
     worth: see `Pictures.worth`.
     """
@@ -186,12 +184,12 @@ class View:
 
 
 class Outlook:
-    """What one sees of a scene.
+    """The views of a scene.
 
     Attributes
     ----------
-    walls: (m, 2, 2) segments in plan, the section of the opaque triangles at a height; made once
-        for each: rooms of a storey share one.
+    walls: (m, 2, 2) segments in plan, the section of the opaque triangles at a height; computed
+        once for each height, which the rooms of a storey share.
     """
 
     def __init__(self, scene: Scene, textures: Sequence[TextureRecord]) -> None:
@@ -201,7 +199,7 @@ class Outlook:
         self._pictures = Pictures(scene, textures)
 
     def best(self, places: NDArray[np.float64], height: float) -> View:
-        """From (n, 3) places, about as high as ``height``."""
+        """The best view from (n, 3) places at heights of about ``height``."""
         worth = self._pictures.worth(places)
         good = worth >= _AS_GOOD * worth.max()
         length = np.where(good, lengths(places[:, [0, 2]], self.walls(height)), -1.0)
@@ -212,8 +210,8 @@ class Outlook:
 def lengths(places: NDArray[np.float64], walls: NDArray[np.float64]) -> NDArray[np.float64]:
     """(n, DIRECTIONS) mean free distance of the sector about each direction, metres, from (n, 2)
     places among (m, 2, 2) walls."""
-    some = max(1, _AT_ONCE // max(len(walls), 1))
-    free = np.concatenate([_free(places[i : i + some], walls) for i in range(0, len(places), some)])
+    step = max(1, _AT_ONCE // max(len(walls), 1))
+    free = np.concatenate([_free(places[i : i + step], walls) for i in range(0, len(places), step)])
     sector = np.arange(-_SECTOR, _SECTOR + 1)
     around = (np.arange(DIRECTIONS)[:, None] + sector) % DIRECTIONS
     mean: NDArray[np.float64] = free[:, around].mean(axis=2)
@@ -224,7 +222,7 @@ def _free(places: NDArray[np.float64], walls: NDArray[np.float64]) -> NDArray[np
     """(n, 72) metres to the first wall in each direction; 0 where there is none."""
     along = walls[:, 1] - walls[:, 0]
     ends = walls - places[:, None, None]
-    # Each wall only with the directions that it can stand in.
+    # Each wall is paired only with the directions that it can block.
     angle = np.arctan2(-ends[..., 0], -ends[..., 1]) * (DIRECTIONS / (2 * np.pi))
     turn = angle[..., 1] - angle[..., 0]
     turn -= DIRECTIONS * np.round(turn / DIRECTIONS)

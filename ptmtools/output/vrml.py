@@ -1,8 +1,8 @@
-"""The text of a cell's file: a PTMCell node, then the cell's shapes.
+"""The VRML97 files: a cell file for each cell, and `root.wrl`, where a walk can begin.
 
-PTMCell rides beside ordinary nodes in a PROTO whose body draws nothing, so a browser that knows
-nothing of it still shows the cell. What a shape looks like, and why (seen in view3dscene 4.2 and
-X_ITE 15, the same in both unless said):
+A cell file is a PTMCell node, then the cell's shapes. PTMCell is a PROTO whose body draws nothing,
+so a browser that ignores it still shows the cell. The appearance of a shape, and the reasons (seen
+in view3dscene 4.2 and X_ITE 15, the same in both unless stated):
 
 ================================  ==================================================
 texture                           ImageTexture alone: shown unlit, texel for texel
@@ -23,14 +23,10 @@ colours of corners                Color and colorIndex, in place of the diffuse 
 (Tried: baking the colour into a second image. It is not lossless, and costs a texture. Ambient
 light in the root file instead of a glow: X_ITE shows none.)
 
-Fields of VRML97 as text: strings, and lists of strings, points and indices.
-
-The rows of a list are parted by a comma, or by a line's end after so many of them: one character,
-which VRML97 reads as white space.
-
-The emission pattern: the nodes and fields that the VRML files are made of.
-
-All VRML files of a database: the cells, and `root.wrl`, where a walk can begin."""
+`NODES` and `PROTOS` are the emission pattern: all nodes and fields that the files may have. The
+items of a list are separated by a comma, or by a line's end after several: one character, which
+VRML97 reads as white space.
+"""
 
 from __future__ import annotations
 
@@ -82,8 +78,7 @@ HEADER = "#VRML V2.0 utf8\n"
 #: The version of the pattern, in WorldInfo's first info string.
 PATTERN = 1
 
-#: Node → field → type; for SFNode the node that must stand there. A "?" follows the type of what
-#: may be left out.
+#: Node → field → type; the node's name for SFNode. A "?" marks optional fields.
 NODES: dict[str, dict[str, str]] = {
     "WorldInfo": {"title": "SFString?", "info": "MFString?"},
     "NavigationInfo": {"type": "MFString?", "avatarSize": "MFFloat?", "headlight": "SFBool?"},
@@ -124,8 +119,8 @@ _CELL = {
     "visibleUrl": "MFString",
     "ach": "MFFloat",
 }
-#: What PROTOs declare, whose bodies draw nothing: a cell of one leaf, a cell of several, and the
-#: cell of a viewpoint.
+#: The fields of the PROTOs, whose bodies draw nothing: a cell of one leaf, a cell of several, and
+#: the cell of a viewpoint.
 CELL = ("PTMCell", _CELL)
 CELL_OF_LEAVES = ("PTMCell", _CELL | {"leafPoint": "MFVec3f", "leafStart": "MFInt32"})
 VIEWPOINT_CELL = ("PTMViewpointCell", {"viewpoint": "SFString", "cellUrl": "MFString"})
@@ -142,7 +137,7 @@ def declaration(name: str, fields: Mapping[str, str]) -> str:
     return f"PROTO {name} [\n{''.join(rows)}] {{\n  WorldInfo {{ }}\n}}\n"
 
 
-#: How bright an untextured surface is without light, as a share of its colour.
+#: Brightness of an untextured surface without light, as a share of its colour.
 _GLOW = 0.25
 #: Decimals of a colour of a corner, which is one of 256 levels.
 _DIGITS = 3
@@ -150,7 +145,7 @@ _WHOLE = np.ones(3)
 
 
 class CellWriter:
-    """Writes the cells of one scene; what they share is prepared once.
+    """Writes the cells of one scene.
 
     Raises DatabaseError: PTM-D601 a number is not finite in float32; PTM-D603 a cell is flat.
     """
@@ -175,18 +170,18 @@ class CellWriter:
         self._slack = slack_of(cells)
 
     def cell(self, cell: int) -> tuple[str, NDArray[np.float32]]:
-        """The file of one cell, and the (2, 3) least and greatest corner of all that it holds."""
+        """The file of one cell, and the (2, 3) least and greatest corner of its hull and shapes."""
         g = self._geometry
         hull, triangles = self._hulls[cell]
-        seen = np.arange(self._pvs.start[cell], self._pvs.start[cell + 1])
+        entries = np.arange(self._pvs.start[cell], self._pvs.start[cell + 1])
         leaves = self._leaves[cell]
         lists = {
             "cellName": quoted(cell_name(cell)),
             "hullPoint": field(hull_rows(hull, triangles, self._slack)),
             "hullIndex": loops(triangles, 16),
             "adjacentUrl": self._cells(self._adjacent[cell]),
-            "visibleUrl": self._cells(self._pvs.cell[seen]),
-            "ach": chosen(self._ach, seen, 16),
+            "visibleUrl": self._cells(self._pvs.cell[entries]),
+            "ach": chosen(self._ach, entries, 16),
         }
         if len(leaves) > 1:
             start = np.cumsum([0, *map(len, leaves[:-1])])
@@ -204,8 +199,8 @@ class CellWriter:
         for shape, name in zip(range(first, last), taken, strict=True):
             parts.append(self._shape(shape, name, names, textures))
         used = g.point[g.shape_point[g.point_start[first] : g.point_start[last]]]
-        held = np.concatenate([hull, used])
-        return "".join(parts), np.stack([held.min(axis=0), held.max(axis=0)])
+        points = np.concatenate([hull, used])
+        return "".join(parts), np.stack([points.min(axis=0), points.max(axis=0)])
 
     def _cells(self, cells: NDArray[np.int32]) -> str:
         return listed([self._cell_url[c] for c in cells.tolist()], 8)
@@ -244,8 +239,8 @@ class CellWriter:
     def _texture(
         self, material: Material, names: DefNames, written: dict[tuple[int, str, str], str]
     ) -> str:
-        """The texture of an Appearance; "" where there is none. Each is ``written`` once in a file
-        and then named: some browsers make a texture of every node, whatever its file."""
+        """The texture of an Appearance; "" for none. Each is ``written`` once in a file and then
+        named: some browsers create a texture for every node, even of the same file."""
         if material.image < 0:
             return ""
         key = material.image, material.wrap_s, material.wrap_t
@@ -258,8 +253,8 @@ class CellWriter:
 
 
 def _surface(material: Material, colors: NDArray[np.uint8] | None) -> str:
-    """The material of an Appearance; "" where it is that of no Material node. Of a shape with
-    ``colors`` of its own these take the place of the diffuse colour, and their mean glows."""
+    """The material of an Appearance; "" for a shape without a Material node. The ``colors`` of a
+    shape replace the diffuse colour, and their mean glows."""
     if material.image >= 0 and material.opacity >= 1:
         return ""
     fields = f"diffuseColor {_color(material)}"
@@ -272,8 +267,8 @@ def _surface(material: Material, colors: NDArray[np.uint8] | None) -> str:
 
 
 def _color(material: Material, share: NDArray[np.float64] = _WHOLE) -> str:
-    held = (s * min(max(c, 0.0), 1.0) for c, s in zip(material.color, share, strict=True))
-    return " ".join(map(decimal, held))
+    color = (s * min(max(c, 0.0), 1.0) for c, s in zip(material.color, share, strict=True))
+    return " ".join(map(decimal, color))
 
 
 def _urls(record: TextureRecord, fallback: bool) -> list[str]:
@@ -288,8 +283,8 @@ def _points(points: NDArray[np.float32]) -> str:
 def vrml_files(content: Content) -> Iterator[tuple[str, str]]:
     """Path, relative to the served folder, and text of each file.
 
-    Raises DatabaseError: PTM-D601 a number is not finite in float32; PTM-D603 a cell is flat: at
-    once.
+    Raises DatabaseError: PTM-D601 a number is not finite in float32; PTM-D603 a cell is flat; both
+    before the first file.
     """
     return _files(content, CellWriter(content))
 
@@ -309,9 +304,10 @@ def _root_text(content: Content, boxes: Sequence[NDArray[np.float32]]) -> str:
     """The root file; ``boxes`` are the (2, 3) bounds of every cell's contents."""
     viewpoints, options = content.viewpoints, content.options
     info = [quoted(f"ptm:database {PATTERN}")]
-    entered = [path_of(v.cell, VRML_FILES) for v in viewpoints]
+    cell_urls = [path_of(v.cell, VRML_FILES) for v in viewpoints]
     info += [
-        quoted(f"ptm:viewpoint {v.name} {url}") for v, url in zip(viewpoints, entered, strict=True)
+        quoted(f"ptm:viewpoint {v.name} {url}")
+        for v, url in zip(viewpoints, cell_urls, strict=True)
     ]
     avatar = ", ".join(decimal(x) for x in options.avatar(content.cells.walker))
     parts = [
@@ -331,7 +327,7 @@ def _root_text(content: Content, boxes: Sequence[NDArray[np.float32]]) -> str:
     ]
     parts += [
         f"PTMViewpointCell {{ viewpoint {quoted(v.name)} cellUrl [ {quoted(url)} ] }}\n"
-        for v, url in zip(viewpoints, entered, strict=True)
+        for v, url in zip(viewpoints, cell_urls, strict=True)
     ]
     for cell, (centre, size) in enumerate(zip(*map(row_texts, _centred(boxes)), strict=True)):
         url = quoted(path_of(cell, VRML_FILES))
@@ -342,8 +338,7 @@ def _root_text(content: Content, boxes: Sequence[NDArray[np.float32]]) -> str:
 def _centred(
     boxes: Sequence[NDArray[np.float32]],
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Centres and sizes (n, 3) in float32 that together hold the boxes (n, 2, 3): sizes are rounded
-    up."""
+    """Centres and sizes (n, 3) in float32 of boxes that contain the (n, 2, 3) boxes."""
     low, high = np.moveaxis(np.array(boxes, np.float64), 1, 0)
     centre = single((low + high) / 2, "bounding boxes")
     half = np.maximum(high - centre, centre - low)

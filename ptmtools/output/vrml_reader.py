@@ -1,13 +1,13 @@
-"""A strict reader of the VRML97 that `emit` writes, and of nothing else.
+"""A strict reader of the VRML97 that `emit` writes, and of no other.
 
-Browsers are lenient: view3dscene and X_ITE both pass over indices out of range, colours above 1
-and bytes that are not UTF-8. This reader is the opposite. It knows the nodes and fields of the
-emission pattern with their types, wants multiple values in brackets and truth in capitals, and
-stops at the first thing that it does not know. Number lists, which are nearly all of a file, are
-cut out whole: about 15 MB/s where a token at a time is 2.
+Browsers are lenient: view3dscene and X_ITE both accept indices out of range, colours above 1 and
+bytes that are not UTF-8. This reader accepts only the nodes and fields of the emission pattern with
+their types, requires brackets around multiple values and capitals for truth values, and stops at
+the first fault. Number lists, nearly all of a file, are cut out whole: about 15 MB/s; a token at a
+time, 2.
 
-Nodes nest no deeper than the pattern's types, and no expression below can go back over what it has
-taken ("++", "*+"), so that the time is linear in the length of any file.
+Nodes nest no deeper than the pattern's types, and no expression below backtracks ("++", "*+"), so
+that the time is linear in the length of any file.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ptmtools.output.model import FileError
 from ptmtools.output.vrml import HEADER, NODES, PROTOS, declaration
 
-#: Nodes that may stand for themselves again: what they hold does not grow with the file.
+#: Nodes that USE may repeat: their content does not grow with the file.
 USED = ("ImageTexture",)
 #: Numbers in one value of a numeric type.
 _WIDTH = {"Float": 1, "Int32": 1, "Vec2f": 2, "Vec3f": 3, "Color": 3, "Rotation": 4}
@@ -43,9 +43,9 @@ _PROTOS = [(declaration(*proto).split(), proto) for proto in PROTOS]
 
 @dataclass(frozen=True)
 class Node:
-    """A node: strings and truths are Python's; numbers are arrays, (n, width) for multiple values
-    of vectors and colours; nodes are nodes. `line` is where it begins; `lacks` says which fields of
-    the pattern it lacks, or those in it."""
+    """A node: strings and truth values are Python's; numbers are arrays, (n, width) for multiple
+    values of vectors and colours; nodes are nodes. `line` is its first line; `lacks` lists the
+    missing fields of the node and of the nodes in it."""
 
     type: str
     name: str
@@ -58,7 +58,7 @@ class Node:
         return f"line {self.line}" + (f", {self.name}" if self.name else "")
 
     def at(self, *path: str) -> dict[str, Any]:
-        """The fields of the node in a field, or in a field of that; empty if there is none."""
+        """The fields of the node at a path of fields; empty if there is none."""
         fields = self.fields
         for name in path:
             fields = fields[name].fields if name in fields else {}
@@ -93,7 +93,7 @@ class _Reader:
     def __init__(self, text: str) -> None:
         self._text = text
         self._at = 0
-        self._breaks = [found.start() for found in re.finditer("\n", text)]
+        self._breaks = [match.start() for match in re.finditer("\n", text)]
         self._types = dict(NODES)
         self._names: dict[str, Node | None] = {}
 
@@ -109,20 +109,20 @@ class _Reader:
         return Document(tuple(nodes))
 
     def _proto(self) -> None:
-        # How many words are the same as in a PROTO of the pattern, where the next one begins, and
-        # whether there a field of the pattern is not declared.
+        # For each PROTO of the pattern: the number of equal words, the position of the first
+        # different one, and whether that is a field of the pattern that is not declared.
         alike = [(0, self._at, False)]
         for words, (name, fields) in _PROTOS:
             if name in self._types:
                 continue
-            found = [*islice(_PROTO_WORD.finditer(self._text, self._at), len(words))]
-            pairs = zip(words, found, strict=False)
+            tokens = [*islice(_PROTO_WORD.finditer(self._text, self._at), len(words))]
+            pairs = zip(words, tokens, strict=False)
             same = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1].group(), pairs))
             if same == len(words):
                 self._types[name] = fields
-                self._at = found[-1].end()
+                self._at = tokens[-1].end()
                 return
-            at = found[same].start() if same < len(found) else len(self._text)
+            at = tokens[same].start() if same < len(tokens) else len(self._text)
             alike.append((same, at, 3 <= same < words.index("{") and words[same].isalpha()))
         _, self._at, declares = max(alike)
         word = self._text[self._at : self._at + 12]
@@ -140,24 +140,24 @@ class _Reader:
                 self._fail(f"the DEF name {name} is used twice")
             self._names[name] = None
             type = self._word("a node")
-        known = self._types.get(type)
-        if known is None:
+        pattern = self._types.get(type)
+        if pattern is None:
             self._fail(f"{type} is not a node of the emission pattern")
         line = self._line(self._at)
         self._take("{")
         fields: dict[str, Any] = {}
         while not self._peek("}"):
             field = self._word("a field")
-            if field not in known:
+            if field not in pattern:
                 self._fail(f"{type} has no field {field!r} in the emission pattern")
             if field in fields:
                 self._fail(f"{type} has two fields {field!r}")
-            fields[field] = self._value(known[field].removesuffix("?"))
+            fields[field] = self._value(pattern[field].removesuffix("?"))
         self._take("}")
         lacks = [
             f"{type} lacks {field}"
-            for field, wanted in known.items()
-            if field not in fields and not wanted.endswith("?")
+            for field, kind in pattern.items()
+            if field not in fields and not kind.endswith("?")
         ]
         for value in fields.values():
             lacks += value.lacks if isinstance(value, Node) else ()
@@ -172,7 +172,7 @@ class _Reader:
             used = word == "USE" and type in USED
             node = self._names.get(self._word("a DEF name")) if used else self._node(word)
             if node is None or node.type != type:
-                self._fail(f"no {type} where one belongs")
+                self._fail(f"not a node {type}")
             return node
         if type == "SFBool":
             word = self._word("TRUE or FALSE")
@@ -189,25 +189,25 @@ class _Reader:
     def _single(self, kind: str) -> NDArray[np.float64]:
         values = []
         for _ in range(_WIDTH[kind]):
-            found = _NUMBER.match(self._text, self._skip())
-            if found is None:
+            match = _NUMBER.match(self._text, self._skip())
+            if match is None:
                 self._no_number()
-            self._at = found.end()
-            values.append(float(found.group()))
+            self._at = match.end()
+            values.append(float(match.group()))
         return self._finite(np.array(values), self._at)
 
     def _numbers(self, kind: str) -> NDArray[Any]:
         self._take("[")
         begin = self._at
-        found = _NUMBERS.match(self._text, begin)
-        assert found is not None
-        self._at = found.end()
+        match = _NUMBERS.match(self._text, begin)
+        assert match is not None
+        self._at = match.end()
         if not self._text.startswith("]", self._at):
-            # Back to the start of the word that is no number.
+            # Back to the start of the invalid word.
             while self._at > begin and self._text[self._at - 1] not in " ,\t\n":
                 self._at -= 1
             self._no_number()
-        words = found.group().replace(",", " ").split()
+        words = match.group().replace(",", " ").split()
         whole = kind == "Int32"
         try:
             values = np.array(words, dtype=np.int64 if whole else np.float64)
@@ -222,7 +222,7 @@ class _Reader:
         self._take("]")
         width = _WIDTH[kind]
         if len(values) % width:
-            self._fail(f"{len(values)} numbers make no list of {kind}", begin)
+            self._fail(f"{len(values)} numbers are not a list of {kind}", begin)
         return values.reshape(-1, width) if width > 1 else values
 
     def _bad(self, words: list[str], kind: str) -> str:
@@ -242,36 +242,36 @@ class _Reader:
 
     def _strings(self) -> tuple[str, ...]:
         self._take("[")
-        found = _STRINGS.match(self._text, self._at)
-        assert found is not None
-        self._at = found.end()
+        match = _STRINGS.match(self._text, self._at)
+        assert match is not None
+        self._at = match.end()
         if not self._text.startswith("]", self._at):
             self._fail("no string")
         self._at += 1
-        strings = _STRING.findall(found.group())
-        if "\\" in found.group():
+        strings = _STRING.findall(match.group())
+        if "\\" in match.group():
             strings = [_ESCAPED.sub(r"\1", string) for string in strings]
         return tuple(strings)
 
-    def _word(self, what: str, pattern: re.Pattern[str] = _WORD) -> str:
-        found = pattern.match(self._text, self._skip())
-        if found is None:
-            self._fail(f"{self._text[self._at : self._at + 12]!r} is not {what}")
-        self._at = found.end()
-        return found.group()
+    def _word(self, noun: str, pattern: re.Pattern[str] = _WORD) -> str:
+        match = pattern.match(self._text, self._skip())
+        if match is None:
+            self._fail(f"{self._text[self._at : self._at + 12]!r} is not {noun}")
+        self._at = match.end()
+        return match.group()
 
     def _take(self, sign: str) -> None:
         if not self._peek(sign):
-            self._fail(f"{self._text[self._at : self._at + 12]!r} where {sign!r} belongs")
+            self._fail(f"{self._text[self._at : self._at + 12]!r} instead of {sign!r}")
         self._at += len(sign)
 
     def _peek(self, sign: str) -> bool:
         return self._text.startswith(sign, self._skip())
 
     def _skip(self) -> int:
-        found = _SPACE.match(self._text, self._at)
-        assert found is not None
-        self._at = found.end()
+        match = _SPACE.match(self._text, self._at)
+        assert match is not None
+        self._at = match.end()
         return self._at
 
     def _line(self, at: int) -> int:

@@ -1,4 +1,4 @@
-"""What the textures must satisfy: by themselves, beside their fallback images and the hints."""
+"""The check of textures: each by itself, against its fallback image and its row in the hints."""
 
 from __future__ import annotations
 
@@ -21,24 +21,23 @@ if TYPE_CHECKING:
     Samples = NDArray[Any]
 
 _PNG = b"\x89PNG\r\n\x1a\n"
-#: How far, as a share of them, `differences` of levels may be off: they are rounded, and
-#: summed up in another order here.
-DIFFERENCE_SLACK = 0.01
+#: Relative slack of `differences` of levels, which are rounded, and summed in another order here.
+_DIFFERENCE_SLACK = 0.01
 #: Of the first chunk of a PNG: its length and kind, width and height.
 _IHDR = struct.Struct(">I4sII")
 
 
 @dataclass(frozen=True)
 class ReadTexture:
-    """What the hints may say of a `.ptm`.
+    """The properties of a `.ptm` that the hints repeat.
 
     Attributes
     ----------
     header: of the file.
     sha256: hex digest of its bytes.
-    detail: what its levels show; None if they could not be decoded.
-    fallback_level: the level that has the size of the fallback image; None if there is no image, or
-        no such level.
+    detail: of its levels; None if they could not be decoded.
+    fallback_level: the level with the size of the fallback image; None without an image or such a
+        level.
     """
 
     header: PtmHeader
@@ -50,8 +49,8 @@ class ReadTexture:
 def read_texture(
     data: bytes, digest: str, fallback: bytes | None, limits: Limits, at: Place
 ) -> ReadTexture | None:
-    """A `.ptm` and its fallback image, if it has one; None, and PTM-D710, without a sound head. A
-    PNG that has the size of no level is not decoded."""
+    """A `.ptm` and its fallback image, if it has one; None, with PTM-D710, if the header is
+    damaged. A PNG with the size of no level is not decoded."""
     from ptmtools.texture import decode, read_header
 
     shown = check_ptm(data, limits, at)
@@ -73,19 +72,19 @@ def read_texture(
         if level < len(header.levels) - 1:
             texels = decode(data, level, limits)
         if not _same_image(texels, other):
-            at.add("PTM-D711", f"it differs from {png}", f"level {level}")
+            at.add("PTM-D711", f"differs from {png}", f"level {level}")
     return ReadTexture(header, digest, detail, level)
 
 
 def check_ptm(data: bytes, limits: Limits, at: Place) -> tuple[Detail, Samples] | None:
-    """A `.ptm` by itself, every group of it. Returns what its levels show, and the finest of them,
-    if nothing is wrong."""
+    """Checks every group of a `.ptm`. Returns the detail of its levels and the texels of the
+    finest; None after a fault."""
     from ptmtools.texture.reader import examine
 
     try:
         faults, shown = examine(data, limits)
     except LimitError as limit:
-        # More than is allowed here is no damage; more than the format allows is.
+        # Exceeding the caller's limit is no damage; exceeding the format's is.
         at.add("PTM-D713" if limit.code == "PTM-L103" else "PTM-D710", limit.message)
         return None
     for fault in faults:
@@ -94,11 +93,11 @@ def check_ptm(data: bytes, limits: Limits, at: Place) -> tuple[Detail, Samples] 
 
 
 def read_png(data: bytes, limits: Limits, at: Place) -> Samples | None:
-    """The texels of a PNG, (h, w, c); None, and PTM-D712 or PTM-D713, if it is none."""
+    """The texels of a PNG, (h, w, c); None, with PTM-D712 or PTM-D713, if it cannot be read."""
     from ptmtools.texture import load_image
 
     if _png_size(data) is None:
-        at.add("PTM-D712", "is no PNG")
+        at.add("PTM-D712", "is not a PNG")
         return None
     try:
         return load_image(data, limits).array()
@@ -109,10 +108,10 @@ def read_png(data: bytes, limits: Limits, at: Place) -> Samples | None:
 
 
 def check_record(record: Mapping[str, Any], texture: ReadTexture, at: Place) -> None:
-    """A row of `textures` in `hints.json` beside its `.ptm`."""
+    """Compares a row of `textures` in `hints.json` with its `.ptm`."""
     header = texture.header
     finest = header.levels[-1]
-    faults = _other(
+    faults = _differing(
         record,
         {
             "components": header.components,
@@ -124,23 +123,23 @@ def check_record(record: Mapping[str, Any], texture: ReadTexture, at: Place) -> 
         },
     )
     if texture.detail:
-        faults += _other(record, {"color": list(texture.detail.color)})
-        true = texture.detail.differences
-        told = record.get("differences", true)
-        if len(told) != len(true) or not np.allclose(told, true, DIFFERENCE_SLACK, 0):
-            faults.append("differences is not what the levels of the file differ by")
-    fallback, held = record["fallback"], record["fallbackLevel"]
-    if (fallback is None) != (held is None):
-        faults.append("fallback and fallbackLevel do not go together")
-    elif fallback is not None and texture.fallback_level not in (None, held):
-        faults.append(f"the fallback holds level {texture.fallback_level}, not {held}")
+        faults += _differing(record, {"color": list(texture.detail.color)})
+        actual = texture.detail.differences
+        listed = record.get("differences", actual)
+        if len(listed) != len(actual) or not np.allclose(listed, actual, _DIFFERENCE_SLACK, 0):
+            faults.append("differences are not those of the levels in the file")
+    fallback, level = record["fallback"], record["fallbackLevel"]
+    if (fallback is None) != (level is None):
+        faults.append("only one of fallback and fallbackLevel is null")
+    elif fallback is not None and texture.fallback_level not in (None, level):
+        faults.append(f"the fallback image is level {texture.fallback_level}, not {level}")
     for fault in faults:
         at.add("PTM-D704", fault)
 
 
-def _other(row: Mapping[str, Any], true: Mapping[str, Any]) -> list[str]:
-    """In what a row differs from what the file says."""
-    return [f"{name} is {v} in the file" for name, v in true.items() if row.get(name, v) != v]
+def _differing(row: Mapping[str, Any], actual: Mapping[str, Any]) -> list[str]:
+    """The fields of a row that differ from the file."""
+    return [f"{name} is {v} in the file" for name, v in actual.items() if row.get(name, v) != v]
 
 
 def _png_size(data: bytes) -> tuple[int, int] | None:
