@@ -27,7 +27,7 @@ MUCH = 0.1
 MUCH_UNSEEN = 0.02
 #: What is said where there is nothing to stand on.
 NO_PLACES = Warned(
-    "there is no floor on which the body of --walker fits, so visitors may be anywhere in the cells"
+    "the body of --walker fits on no floor, so visitors may be anywhere in the cells"
 )
 
 
@@ -40,8 +40,8 @@ def of_detail(scene: Scene, detail: Ints) -> list[str]:
     more = ", …" if len(owners) > NAMED else ""
     return [
         f"{len(detail):,} triangles of {count(len(owners), 'object')} ({', '.join(names)}{more}) "
-        "are small, dense and round: detail, which neither divides nor hides; --structural NAME, "
-        "or --no-detail-by-shape, says otherwise"
+        "are small, dense and round and count as detail, which neither divides nor hides; "
+        "--structural NAME or --no-detail-by-shape changes that"
     ]
 
 
@@ -49,12 +49,12 @@ def of_doors(leaves: list[DoorLeaf], opened: Bools, hidden: bool) -> list[str]:
     """What is said of door leaves, of which those ``opened``, (d,), do not block, and are not drawn
     if they are ``hidden``."""
     notes = []
-    drawn = "not drawn" if hidden else "drawn, but never in the way"
+    drawn = "not drawn" if hidden else "drawn, without blocking"
     for which, fate in (
         (opened, f"open: {drawn}; --doors closed shuts all doors"),
         (
             ~opened,
-            "shut: beyond is nothing but the outside, or no place to stand; --detail NAME opens it",
+            "shut: no walkable floor lies beyond; --detail NAME opens it",
         ),
     ):
         chosen = [leaves[i] for i in np.flatnonzero(which)]
@@ -70,7 +70,7 @@ def of_viewpoints(solid: Floats) -> list[str]:
     """What is said of viewpoints that somebody asked for, (n, 3), inside of something."""
     return [
         Warned(
-            f"viewpoint {_triple(point)} is inside a wall or another solid, of which a cell is made"
+            f"viewpoint {_triple(point)} is inside a wall or another solid, which becomes a cell"
         )
         for point in solid
     ]
@@ -87,8 +87,8 @@ def of_no_doors(scene: Scene, leaves: list[DoorLeaf]) -> list[str]:
     names = ", ".join(scene.objects[i] for i in left[:NAMED])
     more = ", …" if len(left) > NAMED else ""
     return [
-        f"called a door, but taken for a wall, being of another size or without room on both "
-        f"sides: {names}{more}; --door NAME says that it is one"
+        "named like a door but treated as a wall, because of its size or of no space on both "
+        f"sides: {names}{more}; --door NAME makes it a door"
     ]
 
 
@@ -97,22 +97,21 @@ def of_unreached(unreached: Unreached, kept: bool, place: float, strict: bool) -
     beside ``place`` m² that are in the cells. Under ``strict`` it is InputError PTM-I305 to leave
     out much."""
     rooms, outside = unreached.rooms, unreached.outside
-    fate = "it is kept as rooms of its own" if kept else "it is left out"
+    fate = "kept as rooms" if kept else "left out"
     notes = [
-        f"{_place(room)} cannot be reached from the start; {fate}; "
+        f"{_place(room)} cannot be reached from the starting point; {fate}; "
         f"--viewpoint {_position(room)} starts there"
         for room in rooms[:NAMED]
     ]
     if rest := rooms[NAMED:]:
         area = sum(room.place for room in rest)
-        fate = "kept as rooms of their own" if kept else "left out"
-        notes.append(f"{count(len(rest), 'more such place')}, {area:.1f} m² in all, are {fate}")
+        notes.append(f"{count(len(rest), 'more such area')}, {area:.1f} m² in total; {fate}")
     if rooms and kept:
-        notes[0] += "; --reach main leaves out all that cannot be reached"
+        notes[0] += "; --reach main leaves out all unreachable areas"
     if outside:
         notes.append(
             Warned(
-                f"{_place(outside)}, under a roof but open to the outside, is left out; "
+                f"{_place(outside)}, roofed but open to the outside, is left out; "
                 f"--viewpoint {_position(outside)} includes it"
             )
         )
@@ -121,7 +120,7 @@ def of_unreached(unreached: Unreached, kept: bool, place: float, strict: bool) -
         ways = {"--reach all": sum(room.place for room in rooms), **ways}
     left = sum(ways.values())
     if left > MUCH * (left + place):
-        much = f"{left / (left + place):.0%} of all that one can stand on is left out"
+        much = f"{left / (left + place):.0%} of the walkable floor is left out"
         remedy = f"{' and '.join(ways)} {'keep' if len(ways) > 1 else 'keeps'} it"
         if strict:
             raise InputError("PTM-I305", much, remedy=f"{remedy}; or build without --strict")
@@ -134,14 +133,14 @@ def of_leaves(cells: Cells, reached: Bools) -> list[str]:
     notes = []
     if dropped := int(np.count_nonzero(~reached)):
         leaves = f"{dropped} of {len(reached)} leaves (convex pieces of space)"
-        notes.append(f"{leaves} cannot be reached from inside and were dropped")
+        notes.append(f"{leaves} cannot be reached from inside; dropped")
     unseen = cells.leaf_cell < 0
     if unseen.any():
         volume, leaves = cells.leaf_volumes(), count(int(unseen.sum()), "leaf", "leaves")
         share = volume[unseen].sum() / volume.sum()
         note = (
-            f"{leaves} ({share:.1%} of the volume) cannot be seen from where one can stand; "
-            "dropped, as --standing anywhere would not"
+            f"{leaves} ({share:.1%} of the volume) cannot be seen from walkable floor; dropped "
+            "(--standing anywhere keeps them)"
         )
         notes.append(Warned(note) if share > MUCH_UNSEEN else note)
     return notes
@@ -152,7 +151,7 @@ def of_triangles(scene: Scene, pieces: Pieces, owner: NDArray[np.int32]) -> list
     nowhere = np.ones(len(scene.triangles), dtype=bool)
     nowhere[pieces.source[np.any(owner >= 0, axis=1)]] = False
     lost = int(np.count_nonzero(nowhere))
-    return [f"{lost} triangles lie outside all cells, where nobody can see them"] * (lost > 0)
+    return [f"{lost} triangles lie outside all cells and are never visible"] * (lost > 0)
 
 
 def of_undecided(undecided: Mapping[str, int]) -> list[str]:
@@ -173,7 +172,7 @@ def of_undecided(undecided: Mapping[str, int]) -> list[str]:
 
 
 def _place(room: CutOff) -> str:
-    return f"{room.place:.1f} m² to stand on around {_position(room)}"
+    return f"{room.place:.1f} m² of floor around {_position(room)}"
 
 
 def _position(room: CutOff) -> str:

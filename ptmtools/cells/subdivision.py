@@ -71,7 +71,7 @@ def check_seen(scene: Scene, cells: Cells) -> None:
         )
     raise InputError(
         "PTM-I304",
-        "nothing of the model is seen from inside: no face around its cells is turned towards "
+        "nothing of the model is visible from inside: no face around its cells is turned towards "
         "them or has a back",
         remedy="give --two-sided to draw every face from both sides, or turn the normals",
     )
@@ -181,7 +181,7 @@ def _check(scene: Scene, options: SubdivideOptions) -> None:
     if len(scene.triangles) < 2:
         raise InputError(
             "PTM-I303",
-            "a single triangle makes no room",
+            "a single triangle is not a room",
             remedy="give a model with floors and walls",
         )
     names = (*scene.objects, *(material.name for material in scene.materials))

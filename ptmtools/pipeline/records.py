@@ -140,7 +140,7 @@ def reasons(
     if before.recipe != work.recipe:
         change = f": {changed}" if changed and before.recipe < work.recipe else ""
         lines.append(
-            f"this ptmtools computes it differently (recipe {before.recipe} before){change}"
+            f"this release computes it differently (recipe {before.recipe} before){change}"
         )
     for name in dict.fromkeys((*before.parameters, *work.parameters)):
         old, new = before.parameters.get(name), work.parameters.get(name)

@@ -12,8 +12,8 @@ from ptmtools.pipeline.stages import EMIT, SCENE
 from ptmtools.quantities import size
 from ptmtools.store.manifest import Manifest
 
-#: A download of at least this many times the bytes of the model is called heavier.
-HEAVIER = 1.05
+#: Downloads of at least this many times the bytes of the model are marked as larger.
+LARGER = 1.05
 
 
 @dataclass(frozen=True)
@@ -53,21 +53,21 @@ class Visitor:
         lines = []
         if self.model is not None and self.images is not None:
             whole = self.model + self.images
-            parts = f" ({size(self.model)}, and {size(self.images)} of image files)"
-            lines.append(f"the model as it was: {size(whole)}{parts if self.images else ''}")
+            parts = f" (model files {size(self.model)}, image files {size(self.images)})"
+            lines.append(f"source model: {size(whole)}{parts if self.images else ''}")
 
         def compared(count: int) -> str:
-            heavier = whole and count > HEAVIER * whole
-            return size(count) + (", heavier than the model" if heavier else "")
+            larger = whole and count > LARGER * whole
+            return size(count) + (", more than the source model" if larger else "")
 
         if visit["browser"] is not None:
-            lines.append(f"a VRML browser fetches {compared(visit['browser'])}")
+            lines.append(f"a VRML browser downloads {compared(visit['browser'])}")
         lines.append(f"the first room is complete after {compared(visit['first_room'])}")
         for key, when in (("mean", "on average"), ("most", "at most")):
             shares = f"{visit[f'{key}_volume']:.1%} of the volume"
             if visit[f"{key}_texels"] is not None:
                 shares += f" and {visit[f'{key}_texels']:.1%} of the texels"
-            lines.append(f"at hand {when} {shares}: {compared(visit[f'{key}_at_hand'])}")
+            lines.append(f"resident {when}: {shares}, {compared(visit[f'{key}_at_hand'])}")
         return lines
 
 

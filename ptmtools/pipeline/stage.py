@@ -412,7 +412,7 @@ class Job:
                     remedy=Rebuild("run {} first"),
                 )
         if run.rebuild:
-            return work, ("a rebuild was asked for",)
+            return work, ("--rebuild was given",)
         return work, reasons(run.before(stage), work, run.db, stage.changed)
 
     def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:

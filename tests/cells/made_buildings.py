@@ -34,7 +34,11 @@ BEFORE_THE_HOUSE = (-3, 2.5, 1.6)
 
 ROOMS = {
     "one room": Made(
-        carved([A]), {"a": IN_A}, gone=(BEFORE_THE_HOUSE, (5.1, 2, 1)), options={}, said=("1 hall",)
+        carved([A]),
+        {"a": IN_A},
+        gone=(BEFORE_THE_HOUSE, (5.1, 2, 1)),
+        options={},
+        said=("single hall",),
     ),
     "two rooms with a doorway": Made(TWO_ROOMS, BOTH, sees=("a b",), options={}),
     "two rooms, 20 m apart: two buildings": Made(

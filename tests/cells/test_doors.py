@@ -157,7 +157,7 @@ def test_a_door_parts_no_building(name: str, hole: Hole, door: Faces, leaves: in
     assert cells.closed
     assert together(cells, A, B)
     assert see(cells, A, B)
-    assert not any("cannot be reached from the start" in note for note in cells.notes)
+    assert not any("cannot be reached from the starting point" in note for note in cells.notes)
     assert len(said(cells)) == 1
     assert set(cells.triangle_source[cells.emitted(made.two_sided)[0]]) >= set(cells.opened)
     shut = subdivide(made, SubdivideOptions(doors="closed"))
@@ -311,7 +311,7 @@ def test_what_is_called_door_and_is_none_is_told_if_something_cannot_be_reached(
 ) -> None:
     hole: Hole = (0, low, -0.5, 0.5)
     cells = subdivide(scene(rooms(hole), hobbit_door=leaf(4.05, hole)))
-    notes = [note for note in cells.notes if note.startswith("called a door")]
+    notes = [note for note in cells.notes if note.startswith("named like a door")]
     assert ["hobbit_door; --door NAME" in note for note in notes] == [True] * told
     assert together(cells, A, B) != told
 
@@ -325,7 +325,7 @@ def test_a_viewpoint_inside_a_wall_is_told() -> None:
     made = scene(rooms(), solid((2, 0, 0.5), (2.6, 3, 1.1)), inner_door=leaf(4.05))
     for point, told in (((2.3, 1.5, 0.8), True), (A, False)):
         cells = subdivide(made, SubdivideOptions(viewpoints=(point,)))
-        notes = [note for note in cells.notes if note.endswith("of which a cell is made")]
+        notes = [note for note in cells.notes if note.endswith("which becomes a cell")]
         assert [isinstance(note, Warned) for note in notes] == [True] * told
 
 
@@ -593,7 +593,7 @@ def test_another_building_is_one_too() -> None:
     cells = subdivide(made)
     assert cells.closed
     assert together(cells, (41.0, 1.0, 1.2), (47.0, 1.0, 1.2))
-    (told,) = [note for note in cells.notes if "cannot be reached from the start" in note]
+    (told,) = [note for note in cells.notes if "cannot be reached from the starting point" in note]
     assert float(told.split(" ")[0]) == pytest.approx(2 * 3.5 * 3.5, abs=0.5)
     # Nobody is in the leaf of the door only.
     assert cells.leaf_count == 1 + 3

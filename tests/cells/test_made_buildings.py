@@ -41,7 +41,7 @@ def test_what_comes_of_it(name: str, tmp_path: Path) -> None:
     assert cells.closed == made.closed
     notes = [*map(line, scene.notes), *cells.notes]
     assert [word for word in made.said if not any(word in note for note in notes)] == []
-    cut_off = [note for note in notes if "to stand on around" in note]
+    cut_off = [note for note in notes if "of floor around" in note]
     assert len(cut_off) == made.cut_off, cut_off
 
     where = {eye: made.in_world(scene, [at]) for eye, at in made.eyes.items()}

@@ -98,7 +98,7 @@ def test_a_larger_body_has_fewer_places() -> None:
     "walker", [(0.0, 0.5, 1.7), (0.25, 1.7, 1.7), (0.25, 0.0, 1.7), (0.25, 0.5)]
 )
 def test_nobody_is_like_that(walker: tuple[float, float, float]) -> None:
-    with pytest.raises(InputError, match="nobody"):
+    with pytest.raises(InputError, match="radius, step and height"):
         SubdivideOptions(walker=walker)
 
 
@@ -131,7 +131,7 @@ def test_what_the_flood_does_not_reach(
     cells = subdivide(scene)
     assert cells.closed
     assert located(cells, HALL, point) == [True, kept]
-    said = [note for note in cells.notes if "to stand on" in note]
+    said = [note for note in cells.notes if "of floor around" in note]
     assert len(said) == kept
     main = subdivide(scene, SubdivideOptions(reach="main"))
     assert located(main, HALL, point) == [True, False]
@@ -179,7 +179,7 @@ def test_a_house_that_is_open_beside_a_closed_one_is_told(quads, room_faces) -> 
     assert located(both, HALL, (35, 1, 0)) == [True, True]
     assert areas(cells.left_out).sum() == pytest.approx(9.5 * 7.5, abs=1), "and half the doorway"
     # It is a third of all.
-    assert any(note.startswith("33% of all that one can stand on") for note in cells.notes)
+    assert any(note.startswith("33% of the walkable floor") for note in cells.notes)
     with pytest.raises(InputError, match=r"--viewpoint.*without --strict.*PTM-I305"):
         subdivide(quads(hall + house), SubdivideOptions(strict=True))
 
@@ -196,7 +196,7 @@ def test_a_house_on_the_ground_is_a_part_of_all_places(quads, room_faces) -> Non
     assert cells.closed
     (told,) = [note for note in cells.notes if "open to the outside" in note]
     assert 5 < float(told.split(" ")[0]) < 12
-    assert not any("of all that one can stand on" in note for note in cells.notes)
+    assert not any("of the walkable floor" in note for note in cells.notes)
 
 
 def test_a_floor_of_many_facets_is_a_place(quads, room_faces) -> None:
@@ -206,7 +206,7 @@ def test_a_floor_of_many_facets_is_a_place(quads, room_faces) -> None:
     gravel[..., 1] += 0.003 * np.random.default_rng(1).random(gravel.shape[:2])
     cells = subdivide(scene_of(np.concatenate([quads(rooms).corners, gravel])))
     assert located(cells, HALL, (32, 1, 0)) == [True, True]
-    (said,) = [note for note in cells.notes if "to stand on" in note]
+    (said,) = [note for note in cells.notes if "of floor around" in note]
     assert float(said.split(" ")[0]) == pytest.approx(3.5 * 3.5, abs=0.5)
 
 
@@ -215,7 +215,7 @@ def test_the_ground_costs_nothing_however_large(quads, room_faces) -> None:
     rooms = room_faces((0, 0, -4), (20, 4, 4)) + room_faces((30, 0, -2), (34, 4, 2))
     cells = subdivide(quads([*rooms, ground]))
     assert located(cells, HALL, (32, 1, 0)) == [True, True]
-    (said,) = [note for note in cells.notes if "to stand on" in note]
+    (said,) = [note for note in cells.notes if "of floor around" in note]
     assert float(said.split(" ")[0]) == pytest.approx(3.5 * 3.5, abs=0.3)
 
 
@@ -227,7 +227,7 @@ def test_the_outside_of_a_closed_building_is_not_kept(quads, room_faces) -> None
     cells = subdivide(scene)
     assert cells.closed
     assert located(cells, HALL, (10, 6, 0), (30, 1, 0)) == [True, False, False]
-    assert not any("to stand on" in note for note in cells.notes)
+    assert not any("of floor around" in note for note in cells.notes)
 
 
 def test_many_rooms_are_counted_after_the_largest(quads, room_faces) -> None:
@@ -235,8 +235,8 @@ def test_many_rooms_are_counted_after_the_largest(quads, room_faces) -> None:
     for i in range(5):
         faces += room_faces((30 + 10 * i, 0, -1 - i), (34 + 10 * i, 4, 1 + i))
     cells = subdivide(quads(faces))
-    said = [note for note in cells.notes if "to stand on" in note]
+    said = [note for note in cells.notes if "of floor around" in note]
     assert len(said) == 3
     size = [float(note.split(" ")[0]) for note in said]
     assert size == pytest.approx([33.25, 26.25, 19.25], abs=0.06)
-    assert any("2 more such places" in note for note in cells.notes)
+    assert any("2 more such areas" in note for note in cells.notes)

@@ -75,7 +75,7 @@ def test_what_nobody_sees_is_dropped_and_counted(attic: Scene) -> None:
     assert not cells.leaf_standing[dropped]
     assert cells.leaf_cell[dropped] == -1
     assert cells.locate(np.array([[11, 5, 0]])).tolist() == [-1]
-    assert any("cannot be seen from where one can stand" in note for note in cells.notes)
+    assert any("cannot be seen from walkable floor" in note for note in cells.notes)
     assert not (cells.triangle_cell.max(axis=1) < 0).any()
     pvs = compute_pvs(cells)
     assert pvs.cell_count == cells.cell_count
@@ -107,7 +107,7 @@ def test_without_floors_one_may_be_anywhere_and_is_told(quads, room_faces, viewp
     assert cells.leaf_standing.all()
     assert (cells.leaf_cell >= 0).all()
     assert not len(cells.eye_floor)
-    (said,) = [note for note in cells.notes if "no floor on which" in note]
+    (said,) = [note for note in cells.notes if "fits on no floor" in note]
     assert isinstance(said, Warned)
 
 

@@ -75,5 +75,5 @@ def test_figures_of_a_damaged_manifest(stage: str, value: object) -> None:
         *("textures", "raw_bytes", "ptm_bytes", "files", "bytes", "viewpoints"),
     )
     assert isinstance(STAGES[stage].summarize(dict.fromkeys(names, value)), str)
-    assert STAGES[stage].summarize({}) == "figures that make no sense"
+    assert STAGES[stage].summarize({}) == "invalid counts"
     assert isinstance(STAGES[stage].summarize(dict.fromkeys(names, 10**400)), str)

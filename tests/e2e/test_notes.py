@@ -92,7 +92,7 @@ def test_an_empty_world_is_an_error_and_leaves_no_database(ptm: Ptm, tmp_path: P
     done = ptm("build-scene", path)
     assert done.status == 3
     assert "warning: the model seems to be inside out: " in done.out
-    assert done.err.startswith(f"ptm: {path}: nothing of the model is seen from inside: ")
+    assert done.err.startswith(f"ptm: {path}: nothing of the model is visible from inside: ")
     assert "--two-sided" in done.err
     assert done.err.endswith("[PTM-I304]\n")
     assert not (tmp_path / "out.db" / "manifest.json").exists()

@@ -156,8 +156,8 @@ def test_the_first_build_says_what_is_rebuilt_and_why(
     assert main(build) == 0
     said = capsys.readouterr().out
     for before in (SCENE.recipe - 1, PVS.recipe - 1, 4):
-        assert f"because this ptmtools computes it differently (recipe {before}" in said
-    assert "the hints say what each level of a texture adds" in said
+        assert f"because this release computes it differently (recipe {before}" in said
+    assert "the hints hold the effect of each texture level" in said
     assert "because format: vrml → vrml,gltf" in said
     names = ("manifest.json", "www/hints.json", "www/hints/c0000.json", "www/gltf/c0000.glb")
     assert all((db / name).read_bytes() == (built / name).read_bytes() for name in names)

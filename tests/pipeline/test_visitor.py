@@ -34,32 +34,32 @@ VISIT = {
 
 def test_what_is_heavier_than_the_model_is_said_to_be() -> None:
     assert Visitor(500_000, 1_500_000, VISIT).lines() == [
-        "the model as it was: 2.0 MB (500.0 kB, and 1.5 MB of image files)",
-        "a VRML browser fetches 4.0 MB, heavier than the model",
+        "source model: 2.0 MB (model files 500.0 kB, image files 1.5 MB)",
+        "a VRML browser downloads 4.0 MB, more than the source model",
         "the first room is complete after 1.0 MB",
-        "at hand on average 25.0% of the volume and 30.0% of the texels: 1.5 MB",
-        "at hand at most 50.0% of the volume and 100.0% of the texels: 2.5 MB, heavier than the "
-        "model",
+        "resident on average: 25.0% of the volume and 30.0% of the texels, 1.5 MB",
+        "resident at most: 50.0% of the volume and 100.0% of the texels, 2.5 MB, more than the "
+        "source model",
     ]
 
 
 def test_images_inside_the_model_are_not_counted_apart() -> None:
-    assert Visitor(1_500_000, 0, VISIT).lines()[0] == "the model as it was: 1.5 MB"
+    assert Visitor(1_500_000, 0, VISIT).lines()[0] == "source model: 1.5 MB"
 
 
 @pytest.mark.parametrize(("model", "heavier"), [(3_960_000, False), (3_700_000, True)])
 def test_a_few_percent_are_not_heavier(model: int, heavier: bool) -> None:
     browser = Visitor(model, 0, VISIT).lines()[1]
-    assert browser.startswith("a VRML browser fetches 4.0 MB")
-    assert browser.endswith("heavier than the model") is heavier
+    assert browser.startswith("a VRML browser downloads 4.0 MB")
+    assert browser.endswith("more than the source model") is heavier
 
 
 def test_what_is_not_known_is_left_out() -> None:
     bare = {**VISIT, "browser": None, "mean_texels": None, "most_texels": None}
     assert Visitor(None, None, bare).lines() == [
         "the first room is complete after 1.0 MB",
-        "at hand on average 25.0% of the volume: 1.5 MB",
-        "at hand at most 50.0% of the volume: 2.5 MB",
+        "resident on average: 25.0% of the volume, 1.5 MB",
+        "resident at most: 50.0% of the volume, 2.5 MB",
     ]
 
 
@@ -110,7 +110,8 @@ def test_culling_gains_little_where_most_of_the_volume_is_at_hand(
     assert any("gains little" in note for note in PVS.notes(pvs, PvsOptions())) is little
     assert PVS.counts is not None
     said = PVS.summarize(PVS.counts(pvs))
-    assert said == f"{pvs.volume_at_hand[0]:.1%} of the volume at hand on average, 100.0% at most"
+    share = f"{pvs.volume_at_hand[0]:.1%}"
+    assert said == f"{share} of the volume stays resident on average, 100.0% at most"
 
 
 def test_only_what_is_served_means_something(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""How much of the view each visible cell covers: average coverage hints (paper §5)."""
+"""The stage of average coverage hints (paper §5)."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ def _notes(ach: Ach, options: AchOptions) -> Iterator[str]:
         if short:
             yield (
                 f"{short:,} cells did not reach the tolerance of {options.tolerance:g} "
-                f"with {options.points:,} sample points (`--samples`); their `uncertain` says how "
-                "close they came"
+                f"with {options.points:,} sample points (`--samples`); their `uncertain` is the "
+                "remaining error"
             )
 
 

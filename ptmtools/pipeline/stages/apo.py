@@ -179,10 +179,10 @@ def _reads(options: ReplaceOptions) -> tuple[Stage[Any], ...]:
 
 def _summary(n: Mapping[str, Any]) -> str:
     if not n["octrees"]:
-        return "no object is replaced"
+        return "no object replaced"
     return (
         f"{count(n['octrees'], 'object')} of {count(n['source'], 'triangle')} → {n['faces']:,}, "
-        f"off by about {n['deviation']:.2g} m; "
+        f"error about {n['deviation']:.2g} m; "
         f"{count(n['texels'], 'texel')} of octrees, {size(n['bytes'])}"
     )
 
@@ -192,7 +192,7 @@ APO: Stage[Scene] = Stage(
     about="Replace objects by simplified meshes with octree textures.",
     recipe=3,
     options=ReplaceOptions,
-    changed="meshes of many small holes, handles or parts become as simple as others",
+    changed="meshes with many small holes, handles or parts are simplified as far as others",
     reads=_reads,
     changes=SCENE,
     artifact=Lazy("ptmtools.scene.model:Scene"),

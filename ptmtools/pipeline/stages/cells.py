@@ -1,4 +1,4 @@
-"""The scene is cut into convex leaves, portals, and the cells that leaves make up (paper §3)."""
+"""The stage that cuts the scene into convex leaves, cells of leaves, and portals (paper §3)."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ CELLS: Stage[Cells] = Stage(
     recipe=6,
     options=SubdivideOptions,
     reads=(APO,),
-    changed="a cell is a place where one can stand, or what is seen from there",
+    changed="cells are walkable space, or space visible from it",
     artifact=Lazy("ptmtools.cells.model:Cells"),
     compute=Lazy("ptmtools.cells:subdivide"),
     counts=_counts,

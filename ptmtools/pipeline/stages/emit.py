@@ -112,8 +112,8 @@ def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
 
 def _summary(n: Mapping[str, Any]) -> str:
     of = ""
-    if "owners" in n:  # not in databases of former versions
-        of = f" from {n['visible']:,} of the model (uncut they would be {n['owners']:,})"
+    if "owners" in n:  # missing in databases of earlier releases
+        of = f" from {n['visible']:,} of the model ({n['owners']:,} without cuts)"
     looks = n.get("first_look")
     looked = f" ({size(looks)} of first-look bundles)" if looks else ""
     return (
@@ -126,10 +126,9 @@ EMIT: Stage[None] = Stage(
     name="emit",
     about="Write the served files: cells and hints.",
     recipe=9,
-    changed="the hints say what each level of a texture adds, its mean colour, and what a texel "
-    "takes on a GPU, and how fine each is needed in each cell; --first-look writes a bundle of "
-    "coarse levels for each cell; "
-    "viewpoints look where pictures are; hulls with slivers and portals with short edges are "
+    changed="the hints hold the effect of each texture level, mean colours, GPU sizes of texels, "
+    "and the resolution needed in each cell; --first-look writes a bundle of coarse levels for "
+    "each cell; viewpoints face pictures; hulls with slivers and portals with short edges are "
     "convex in float32 and in float64",
     options=EmitOptions,
     reads=(APO, CELLS, PVS, ACH, TEXTURES),

@@ -1,4 +1,4 @@
-"""Which cells may see each other: potentially visible sets (paper §3)."""
+"""The stage of potentially visible sets (paper §3)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ptmtools.cells.model import Cells
     from ptmtools.visibility.model import Pvs
 
-#: Above this share of the building's volume at hand on average, culling by cells does not pay.
+#: Mean share of the building's volume that stays resident above which culling does not pay.
 CULLING_GAINS_LITTLE = 0.7
 
 
@@ -36,21 +36,21 @@ def _counts(pvs: Pvs) -> Mapping[str, Any]:
 
 def _notes(pvs: Pvs, _: PvsOptions) -> Iterator[str]:
     share = pvs.volume_at_hand[0]
-    # Of a single cell, the cells stage has said it.
+    # The cells stage warns about a single cell.
     if share > CULLING_GAINS_LITTLE and pvs.cell_count > 1:
         yield Warned(
-            f"culling by visibility gains little here: on average {share:.0%} of the volume is at "
-            "hand, as in a single hall"
+            f"visibility culling gains little here: on average {share:.0%} of the volume stays "
+            "resident, as in a single hall"
         )
     if not pvs.conservative:
         yield Warned(
-            "these visible sets hold only what random lines happened to hit: a client that loads "
-            "by them will show holes (build with `--pvs full` or `--pvs fast` before you publish)"
+            "the visible sets are incomplete (--pvs sampled), so clients will show holes; build "
+            "with `--pvs full` or `--pvs fast` before you publish"
         )
     if pvs.fallbacks:
         yield (
-            f"the search was cut short at {pvs.fallbacks:,} portals; "
-            "their sets are larger than necessary, never smaller"
+            f"the search reached its budget at {pvs.fallbacks:,} portals; their sets are larger "
+            "than necessary, never smaller (--pvs-budget)"
         )
 
 
@@ -60,7 +60,7 @@ def _fits_cells(pvs: Pvs, cells: Cells) -> str:
 
 PVS: Stage[Pvs] = Stage(
     name="pvs",
-    about="Find which cells may see each other.",
+    about="Compute which cells can see each other.",
     recipe=4,
     options=PvsOptions,
     reads=(CELLS,),
@@ -69,7 +69,8 @@ PVS: Stage[Pvs] = Stage(
     counts=_counts,
     notes=_notes,
     summary=lambda n: (
-        f"{n['mean_volume']:.1%} of the volume at hand on average, {n['most_volume']:.1%} at most"
+        f"{n['mean_volume']:.1%} of the volume stays resident on average, {n['most_volume']:.1%} "
+        "at most"
     ),
     fits={CELLS: _fits_cells},
 )

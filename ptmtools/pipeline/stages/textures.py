@@ -180,8 +180,8 @@ def notes_on_trim(
             texels = sum(w * h for w, h in sizes)
             saved = finest.length * texels // (finest.width * finest.height)
             yield (
-                f"--trim leaves out {count(len(sizes), 'level')} of {name} that no eye resolves: "
-                f"{finest.width} x {finest.height} of {width} x {height}, about {size(saved)} less"
+                f"--trim leaves out {count(len(sizes), 'level')} of {name}: {finest.width} x "
+                f"{finest.height} of {width} x {height}, about {size(saved)} less"
             )
 
 
@@ -369,8 +369,8 @@ def notes_on_size(names: Iterable[str], headers: Iterable[PtmHeader], most: int)
     if below:
         _, name, finest, (width, height, more) = min(below, key=lambda each: each[:2])
         yield (
-            f"--max-side {most} leaves {count(len(below), 'texture')} smaller still, since each "
-            f"level is half the next: {name} has {finest.width} x {finest.height}; "
+            f"--max-side {most} keeps less than that of {count(len(below), 'texture')}, because "
+            f"sides halve from level to level: {name} has {finest.width} x {finest.height}; "
             f"{width} x {height} would add about {size(more)}"
         )
 
@@ -397,7 +397,7 @@ TEXTURES: Stage[None] = Stage(
     name="textures",
     about="Encode the model's images as progressive textures.",
     recipe=4,
-    changed="what each level adds, and the mean colour of each texture, are kept for the hints",
+    changed="the effect of each level and the mean colour of each texture are recorded",
     options=TextureOptions,
     reads=lambda options: (SCENE, APO, CELLS, PVS) if options.trim else (SCENE,),
     inputs=_inputs,
