@@ -1,11 +1,9 @@
-"""What a check of files finds, who gathers it, and the report.
+"""Diagnostics: the findings of a check of files, its report, and notes and warnings on results.
 
-What there is to say of a result: lines for people, of two ranks.
-
-A warning is a note that may cost an afternoon if it is overlooked: a guess that could as well have
-gone the other way, a model on its side, images that are missing. Warnings are few; they are shown
-as soon as they are known, before the stages that take long. All others are counted, and listed
-when asked for."""
+A warning is a note whose oversight may be expensive: a guess with a likely alternative, a model on
+its side, missing images. Warnings are few; they are shown as soon as they are known, before the
+long stages. Other notes are counted, and listed on request.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +29,7 @@ class Issue:
     file: relative to the database, or the path that was given.
     place: where in the file, "" for all of it.
     message: one line.
-    count: faults that it stands for, see `ptmtools.output.validation`.
+    count: number of faults that the issue stands for.
     """
 
     code: str
@@ -54,7 +52,7 @@ class ValidationReport:
     issues: errors and warnings, by file, the worst of each first.
     files: how many files were read.
     bytes: how many bytes they hold.
-    notes: what else there is to say, one line each.
+    notes: remarks, one line each.
     """
 
     issues: tuple[Issue, ...]
@@ -87,20 +85,20 @@ class ValidationReport:
 
 
 class Findings:
-    """Gathers issues. The first few of one code in a file are kept one by one, the others counted.
+    """Gathers issues: the first few of one code in a file one by one, the others as a count.
 
-    Messages come from files that may hold anything: they are made printable, and cut.
+    Messages may quote damaged files, so they are made printable and cut.
     """
 
     #: Issues of one code kept one by one, per file.
     MOST = 5
 
     def __init__(self, codes: Mapping[str, tuple[Severity, str]]) -> None:
-        """``codes``: code → its severity, and what it means."""
+        """``codes``: code → its severity and meaning."""
         self._codes = codes
         self._issues: dict[tuple[str, str], list[Issue]] = {}
         self._more: Counter[tuple[str, str]] = Counter()
-        #: Of the codes found, which others may have.
+        #: Severities of the issues, some of which have codes of other checks.
         self._severity: dict[str, Severity] = {}
 
     def add(self, code: str, file: str, place: str, message: str) -> None:
@@ -109,11 +107,11 @@ class Findings:
         self.take([Issue(code, severity, one_line(file), one_line(place), one_line(message))])
 
     def at(self, file: str, place: str = "") -> Place:
-        """Who adds what is found there."""
+        """A place in a file, to add issues."""
         return Place(self, file, place)
 
     def take(self, issues: Iterable[Issue]) -> None:
-        """Issues that others found."""
+        """Adds issues of another check."""
         for issue in issues:
             key = (issue.file, issue.code)
             self._severity[issue.code] = issue.severity
@@ -125,33 +123,33 @@ class Findings:
 
     def issues(self) -> tuple[Issue, ...]:
         """All of them, see `worst_first`."""
-        found = [issue for kept in self._issues.values() for issue in kept]
+        issues = [issue for kept in self._issues.values() for issue in kept]
         for (file, code), more in self._more.items():
             message = f"{more} more of these"
-            found.append(Issue(code, self._severity[code], file, "", message, more))
-        return worst_first(found)
+            issues.append(Issue(code, self._severity[code], file, "", message, more))
+        return worst_first(issues)
 
 
 @dataclass(frozen=True)
 class Place:
-    """A place in a file, relative to the database, or all of the file; and who is told of it."""
+    """A place in a file, named relative to the database; "" is the whole file."""
 
-    found: Findings
+    findings: Findings
     file: str
     place: str = ""
 
     def add(self, code: str, message: str, place: str = "") -> None:
-        """One issue, here or at another place in the file."""
-        self.found.add(code, self.file, place or self.place, message)
+        """Adds an issue here, or at another place in the file."""
+        self.findings.add(code, self.file, place or self.place, message)
 
     def at(self, place: str) -> Place:
         """Another place in the file."""
-        return Place(self.found, self.file, place)
+        return Place(self.findings, self.file, place)
 
 
 def worst_first(issues: Iterable[Issue]) -> tuple[Issue, ...]:
-    """By file; of each the errors before the warnings, by code: what is wrong with a file as a
-    whole has the lowest ones."""
+    """Sorts issues by file, errors before warnings, and code; faults of a whole file have the
+    lowest codes."""
     return tuple(sorted(issues, key=lambda i: (i.file, i.severity != "error", i.code, i.count > 1)))
 
 
@@ -168,5 +166,5 @@ class Warned(str):
 
 
 def warnings_in(notes: Iterable[str]) -> tuple[str, ...]:
-    """Those of some notes that are warnings, as plain text."""
+    """The warnings among notes, as plain text."""
     return tuple(str(note) for note in notes if isinstance(note, Warned))

@@ -1,4 +1,4 @@
-"""The check of a folder with an octree texture, and what `ptm info` says of one."""
+"""The check of a folder with an octree texture, and its description for `ptm info`."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from ptmtools.neighbours.apo.octree import fault_of
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Limits
 
-#: Code → (severity, what it means). docs/formats/apo.md repeats this table.
+#: Code → (severity, meaning). docs/formats/apo.md repeats this table.
 CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D850": ("error", "a file of an octree texture is missing, or cannot be read"),
     "PTM-D851": ("error", "apo.json does not match its schema, or contradicts itself"),
     "PTM-D852": ("error", "a stream of texels is damaged, or longer than its levels"),
-    "PTM-D853": ("error", "the texels are no octree, breadth first"),
-    "PTM-D854": ("error", "the simplified mesh is damaged, or not that of apo.json"),
+    "PTM-D853": ("error", "the texels do not form a breadth-first octree"),
+    "PTM-D854": ("error", "the simplified mesh is damaged, or does not match apo.json"),
     "PTM-D855": ("error", "the simplified mesh leads out of the cube of the octree"),
     "PTM-D856": ("warning", "a file that `ptm apo` did not write"),
 }
@@ -43,36 +43,36 @@ _NAMES = (INDEX, NORMALS, COLORS, MESH, OBJ)
 
 
 def check_folder(folder: Path, limits: Limits) -> ValidationReport:
-    """Checks all that can be checked without the source."""
+    """Checks everything that needs no source model."""
     findings = Findings(CODES)
     try:
-        there = sorted(os.listdir(folder))
+        present = sorted(os.listdir(folder))
     except OSError as fault:
         raise InputError(
             "PTM-I844", f"cannot be read ({fault.strerror or fault})", file=folder
         ) from None
-    for name in there:
+    for name in present:
         if name not in _NAMES:
             findings.add("PTM-D856", name, "", "is not part of an octree texture")
-    sizes = {name: _size(folder, name, findings) for name in there if name in _NAMES}
-    held = {name: bytes_ for name, bytes_ in sizes.items() if bytes_ is not None}
+    sizes = {name: _size(folder, name, findings) for name in present if name in _NAMES}
+    readable = {name: size for name, size in sizes.items() if size is not None}
     try:
         index = read_index(folder)
     except PtmError as fault:
         findings.add("PTM-D851", INDEX, fault.place or "", fault.message)
     else:
-        wanted = [NORMALS, MESH, OBJ, *([COLORS] if index.colors else [])]
-        for name in wanted:
-            if name not in there:
+        required = [NORMALS, MESH, OBJ, *([COLORS] if index.colors else [])]
+        for name in required:
+            if name not in present:
                 findings.add("PTM-D850", name, "", "is missing")
-        _check_octree(folder, index, held, findings)
-        if MESH in held:
-            _check_mesh(folder, index, held[MESH], findings)
-    return ValidationReport(findings.issues(), len(held), sum(held.values()))
+        _check_octree(folder, index, readable, findings)
+        if MESH in readable:
+            _check_mesh(folder, index, readable[MESH], findings)
+    return ValidationReport(findings.issues(), len(readable), sum(readable.values()))
 
 
 def _size(folder: Path, name: str, findings: Findings) -> int | None:
-    """Bytes of a file, if it is one."""
+    """The bytes of a regular file; None, with an issue, if it cannot be read."""
     try:
         with open_below(folder, name) as file:
             return os.fstat(file.fileno()).st_size
@@ -81,36 +81,36 @@ def _size(folder: Path, name: str, findings: Findings) -> int | None:
         return None
 
 
-def _check_octree(folder: Path, index: Index, held: Mapping[str, int], findings: Findings) -> None:
+def _check_octree(folder: Path, index: Index, sizes: Mapping[str, int], findings: Findings) -> None:
     for stream in (index.normals, index.colors):
-        if stream and held.get(stream.file, 0) > stream.ends[-1]:
-            findings.add("PTM-D852", stream.file, "", "goes on behind the last level")
-    if NORMALS not in held or (index.colors and COLORS not in held):
+        if stream and sizes.get(stream.file, 0) > stream.ends[-1]:
+            findings.add("PTM-D852", stream.file, "", "continues after the last level")
+    if NORMALS not in sizes or (index.colors and COLORS not in sizes):
         return
     try:
         octree = read_octree(folder)
-    except PtmError as fault:
-        findings.add("PTM-D852", Path(fault.file or NORMALS).name, fault.place or "", fault.message)
+    except PtmError as error:
+        findings.add("PTM-D852", Path(error.file or NORMALS).name, error.place or "", error.message)
         return
-    if wrong := fault_of(octree):
-        findings.add("PTM-D853", NORMALS, *wrong)
+    if fault := fault_of(octree):
+        findings.add("PTM-D853", NORMALS, *fault)
 
 
 def _check_mesh(folder: Path, index: Index, size: int, findings: Findings) -> None:
     if size != index.mesh["bytes"]:
-        findings.add("PTM-D854", MESH, "", "is not the file that apo.json describes")
+        findings.add("PTM-D854", MESH, "", "has another length or checksum than in apo.json")
         return
     try:
         data = mesh_bytes(folder)
         if zlib.crc32(data) != index.mesh["crc32"]:
-            findings.add("PTM-D854", MESH, "", "is not the file that apo.json describes")
+            findings.add("PTM-D854", MESH, "", "has another length or checksum than in apo.json")
             return
         mesh = mesh_of(data)
     except PtmError as fault:
         findings.add("PTM-D854", MESH, "", fault.message)
         return
     if len(mesh.triangles) != index.mesh["faces"]:
-        findings.add("PTM-D854", MESH, "", "has not as many faces as apo.json says")
+        findings.add("PTM-D854", MESH, "", "has another number of faces than in apo.json")
     q = (mesh.points - index.low) / index.side
     if outside := int(((q < 0) | (q >= 1)).any(axis=1).sum()):
         findings.add("PTM-D855", MESH, "", f"{count(outside, 'point')} outside of the cube")
@@ -121,7 +121,7 @@ def _about(deviation: float | None) -> str:
 
 
 def describe(folder: Path) -> tuple[tuple[str, ...], Mapping[str, Any]]:
-    """What `ptm info` prints of an octree texture, and its record."""
+    """The lines of `ptm info` for an octree texture, and its record as JSON."""
     index = read_index(folder)
     document, streams = index.document, [s for s in (index.normals, index.colors) if s]
     source, mesh = document["source"], index.mesh

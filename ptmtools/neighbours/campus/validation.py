@@ -37,9 +37,12 @@ from ptmtools.tolerance import UNIT_SHARE
 #: Code → severity, meaning.
 CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D820": ("error", "the index of a campus is missing or cannot be read"),
-    "PTM-D821": ("error", "the index of a campus is not as its schema says, or of another one"),
+    "PTM-D821": (
+        "error",
+        "the index of a campus does not match its schema, or has another schema number",
+    ),
     "PTM-D822": ("error", "a file that the index lists is missing or cannot be read"),
-    "PTM-D823": ("error", "a file is not as long as the index says, or has another checksum"),
+    "PTM-D823": ("error", "a file has another length or checksum than the index lists"),
     "PTM-D824": ("warning", "a file that the index does not list"),
     "PTM-D825": ("error", "two objects, or two files, of the same name"),
     "PTM-D826": ("error", "a mesh cannot be read"),
@@ -51,14 +54,16 @@ CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D832": ("error", "a viewpoint lies in the box of its object, or has no unit direction"),
     "PTM-D833": ("error", "a box is empty, or the barycentre lies outside of it"),
     "PTM-D834": ("error", "a lightmap is used by two objects, or by none"),
-    "PTM-D835": ("error", "the meshes of an object are not as many as they should be, or a finer "
-                 "one has fewer faces"),
+    "PTM-D835": (
+        "error",
+        "an object has too few or too many meshes, or a finer one has fewer faces",
+    ),
     "PTM-D836": ("warning", "a texture that no material uses"),
-}  # fmt: skip
+}
 
 
 def check_campus(folder: Path, limits: Limits) -> ValidationReport:
-    """Checks a campus; what is wrong is in the report."""
+    """Checks a campus; all faults are in the report."""
     check = _Check(folder, limits)
     data = check.bytes_of(INDEX, "PTM-D820", LONGEST)
     if data is not None:
@@ -67,7 +72,7 @@ def check_campus(folder: Path, limits: Limits) -> ValidationReport:
 
 
 class _Check:
-    """Goes through one folder."""
+    """One validation of one folder."""
 
     def __init__(self, folder: Path, limits: Limits) -> None:
         self._folder, self._limits = folder, limits
@@ -75,13 +80,13 @@ class _Check:
         self.files = self.bytes = 0
 
     def bytes_of(self, name: str, code: str, most: int) -> bytes | None:
-        """The bytes of a file, of which not many more than ``most`` are read."""
+        """The bytes of a file, at most ``most`` + 1 of them."""
         try:
             with open_below(self._folder, name) as stream:
                 data = stream.read(most + 1)
         except (OSError, ValueError) as fault:
-            why = getattr(fault, "strerror", None) or str(fault)
-            self.findings.add(code, name, "", f"cannot be read ({why})")
+            reason = getattr(fault, "strerror", None) or str(fault)
+            self.findings.add(code, name, "", f"cannot be read ({reason})")
             return None
         self.files += 1
         self.bytes += len(data)
@@ -97,7 +102,7 @@ class _Check:
         campus = Campus.from_document(document)
         self._names(campus)
         self._sums(campus, document)
-        self._textures_there(campus)
+        self._textures(campus)
         for place, each in enumerate(campus.objects):
             self._object(campus, f"objects[{place}]", each)
         for texture in campus.textures:
@@ -108,67 +113,61 @@ class _Check:
         at = self.findings.at(INDEX)
         listed = [m.file for o in campus.objects for m in o.meshes]
         listed += [t.file for t in campus.textures]
-        for what, names in (
-            ("objects", [o.name for o in campus.objects]),
-            ("files", listed),
-        ):
+        for kind, names in (("objects", [o.name for o in campus.objects]), ("files", listed)):
             seen: set[str] = set()
             for name in names:
                 if name.lower() in seen:
-                    at.add("PTM-D825", f"two {what} are called {name}", what)
+                    at.add("PTM-D825", f"two {kind} are named {name}", kind)
                 seen.add(name.lower())
         for place, t in enumerate(campus.textures):
             if t.file != texture_file(t.base, t.size, t.channel):
-                at.add("PTM-D825", f"{t.file} is not called after its base", f"textures[{place}]")
+                at.add("PTM-D825", f"{t.file} is not named after its base", f"textures[{place}]")
 
     def _sums(self, campus: Campus, document: Mapping[str, Any]) -> None:
         at = self.findings.at(INDEX)
         if document["start"] != campus.start:
             at.add("PTM-D831", f"{document['start']} is not {campus.start}", "start")
-        wanted = json.loads(json.dumps([vars(preset) for preset in campus.presets]))
-        for place, (said, right) in enumerate(zip(document["presets"], wanted, strict=False)):
-            for name, value in right.items():
-                if said[name] != value:
-                    at.add("PTM-D831", f"{said[name]} is not {value}", f"presets[{place}].{name}")
-        if len(document["presets"]) != len(wanted):
-            at.add("PTM-D831", f"{len(wanted)} presets expected", "presets")
+        expected = json.loads(json.dumps([vars(preset) for preset in campus.presets]))
+        for i, (listed, preset) in enumerate(zip(document["presets"], expected, strict=False)):
+            for name, value in preset.items():
+                if listed[name] != value:
+                    at.add("PTM-D831", f"{listed[name]} is not {value}", f"presets[{i}].{name}")
+        if len(document["presets"]) != len(expected):
+            at.add("PTM-D831", f"{len(expected)} presets expected", "presets")
 
-    def _textures_there(self, campus: Campus) -> None:
+    def _textures(self, campus: Campus) -> None:
         at = self.findings.at(INDEX)
-        there = {(t.base, t.size, t.channel) for t in campus.textures}
+        present = {(t.base, t.size, t.channel) for t in campus.textures}
         used: set[tuple[str, int, str]] = set()
         for place, material in enumerate(campus.materials):
-            where = f"materials[{place}]"
+            material_at = at.at(f"materials[{place}]")
             if (material.base is None) != (not material.channels):
-                at.add("PTM-D829", "a base without channels, or channels without a base", where)
+                material_at.add("PTM-D829", "a base without channels, or channels without a base")
             if (material.cutoff is None) != (material.alpha != "mask"):
-                at.add("PTM-D829", "a cutoff without a mask, or a mask without one", where)
+                material_at.add("PTM-D829", "a cutoff without a mask, or a mask without one")
             base = material.base or ""
             for channel in material.channels if base else ():
                 for side in SIZES:
                     used.add((base, side, channel))
-                    if (base, side, channel) not in there:
+                    if (base, side, channel) not in present:
                         file = texture_file(base, side, channel)
-                        at.add("PTM-D829", f"{file} is not listed", where)
+                        material_at.add("PTM-D829", f"{file} is not listed")
         owners: dict[str, str] = {}
         for place, each in enumerate(campus.objects):
-            where = f"objects[{place}].lightmap"
+            object_at = at.at(f"objects[{place}].lightmap")
             if (each.lightmap is None) != (campus.lightmaps == "none"):
-                at.add("PTM-D829", f"lightmaps are said to be {campus.lightmaps}", where)
+                object_at.add("PTM-D829", f"differs from lightmaps, {campus.lightmaps}")
             if each.lightmap is None:
                 continue
             if each.lightmap in owners:
-                at.add("PTM-D834", f"that of {owners[each.lightmap]}, too", where)
+                object_at.add("PTM-D834", f"{owners[each.lightmap]} has the same")
             owners[each.lightmap] = each.name
             for side in LIGHT_SIZES:
                 used.add((each.lightmap, side, LIGHT))
-                if (each.lightmap, side, LIGHT) not in there:
-                    at.add(
-                        "PTM-D829",
-                        f"{texture_file(each.lightmap, side, LIGHT)} is not listed",
-                        where,
-                    )
-        for base, side, channel in sorted(there - used):
+                if (each.lightmap, side, LIGHT) not in present:
+                    file = texture_file(each.lightmap, side, LIGHT)
+                    object_at.add("PTM-D829", f"{file} is not listed")
+        for base, side, channel in sorted(present - used):
             code = "PTM-D834" if channel == LIGHT else "PTM-D836"
             at.add(code, f"{texture_file(base, side, channel)} is not used", "textures")
 
@@ -178,43 +177,43 @@ class _Check:
         middle = np.array(each.barycentre)
         if not ((low <= middle) & (middle <= high)).all():
             at.add("PTM-D833", "the barycentre is not in the box", f"{where}.barycentre")
-        eye, along = map(np.array, each.viewpoint)
+        eye, direction = map(np.array, each.viewpoint)
         if ((low <= eye) & (eye <= high)).all():
             at.add("PTM-D832", "lies in the box", f"{where}.viewpoint.position")
-        if abs(math.hypot(*along) - 1) > UNIT_SHARE:
-            at.add("PTM-D832", "is no unit vector", f"{where}.viewpoint.direction")
+        if abs(math.hypot(*direction) - 1) > UNIT_SHARE:
+            at.add("PTM-D832", "is not a unit vector", f"{where}.viewpoint.direction")
         if beyond := [m for m in each.materials if m >= len(campus.materials)]:
-            at.add("PTM-D830", f"there is no material {beyond[0]}", f"{where}.materials")
+            at.add("PTM-D830", f"material {beyond[0]} does not exist", f"{where}.materials")
             return
         if len(each.meshes) != campus.lods:
             at.add("PTM-D835", f"{campus.lods} meshes expected", f"{where}.meshes")
         faces = [mesh.faces for mesh in each.meshes]
         if faces != sorted(faces):
             at.add("PTM-D835", "a finer mesh has fewer faces", f"{where}.meshes")
-        held: list[tuple[Primitive, ...]] = []
+        meshes: list[tuple[Primitive, ...]] = []
         for lod, mesh in enumerate(each.meshes):
             if mesh.file != mesh_file(each.name, lod):
-                at.add("PTM-D825", f"{mesh.file} is not called after its object", f"{where}.meshes")
+                at.add("PTM-D825", f"{mesh.file} is not named after its object", f"{where}.meshes")
             primitives = self._mesh(campus, each, mesh, finest=lod == len(each.meshes) - 1)
             if primitives is not None:
-                held.append(primitives)
-        if len(held) == len(each.meshes):
-            point = np.concatenate([p.point for primitives in held for p in primitives])
+                meshes.append(primitives)
+        if len(meshes) == len(each.meshes):
+            point = np.concatenate([p.point for primitives in meshes for p in primitives])
             box = (*point.min(axis=0).tolist(), *point.max(axis=0).tolist())
             if box != each.box:
-                at.add("PTM-D827", "the bounds of its meshes are others", f"{where}.box")
+                at.add("PTM-D827", "is not that of the meshes", f"{where}.box")
 
     def _recorded(self, file: MeshFile | TextureFile) -> bytes | None:
-        """The bytes of a listed file, if they are those that were written."""
+        """The bytes of a listed file; None, with an issue, if it has other bytes than recorded."""
         data = self.bytes_of(file.file, "PTM-D822", file.bytes)
         if data is None:
             return None
         if len(data) != file.bytes:
-            longer = "more than " if len(data) > file.bytes else f"{len(data)} bytes, not "
-            self.findings.add("PTM-D823", file.file, "", f"{longer}{file.bytes} bytes")
+            length = "more than" if len(data) > file.bytes else f"{len(data)} bytes, not"
+            self.findings.add("PTM-D823", file.file, "", f"{length} {file.bytes} bytes")
             return None
         if zlib.crc32(data) != file.crc32:
-            self.findings.add("PTM-D823", file.file, "", "its CRC-32 is not the recorded one")
+            self.findings.add("PTM-D823", file.file, "", "the CRC-32 is not the recorded one")
             return None
         return data
 
@@ -227,26 +226,29 @@ class _Check:
         try:
             primitives = read_mesh(data)
         except ValueError as fault:
-            self.findings.add(
-                "PTM-D826", mesh.file, "", str(fault.args[0] if fault.args else fault)
-            )
+            message = str(fault.args[0] if fault.args else fault)
+            self.findings.add("PTM-D826", mesh.file, "", message)
             return None
         at = self.findings.at(mesh.file)
         if (faces := sum(len(p.triangle) for p in primitives)) != mesh.faces:
             at.add("PTM-D827", f"{faces} faces, not {mesh.faces}")
         numbers = [p.material for p in primitives]
         if not set(numbers) <= set(each.materials) or (finest and numbers != list(each.materials)):
-            at.add("PTM-D827", "other materials than those of its object")
+            at.add("PTM-D827", "the materials are not those of its object")
             return primitives
         for part in primitives:
-            where = f"material {part.material}"
+            part_at = at.at(f"material {part.material}")
             if (part.uv is None) != (campus.materials[part.material].base is None):
-                at.add("PTM-D827", "textures without coordinates, or coordinates for none", where)
+                part_at.add(
+                    "PTM-D827", "textures without coordinates, or coordinates without textures"
+                )
             lit = finest and each.lightmap is not None
             if (part.light is not None) != lit:
-                at.add("PTM-D827", "a lightmap without coordinates, or coordinates for none", where)
+                part_at.add(
+                    "PTM-D827", "a lightmap without coordinates, or coordinates without one"
+                )
             elif part.light is not None and not ((part.light >= 0) & (part.light <= 1)).all():
-                at.add("PTM-D827", "coordinates beyond the lightmap", where)
+                part_at.add("PTM-D827", "coordinates outside of the lightmap")
         return primitives
 
     def _image(self, texture: TextureFile) -> None:
@@ -256,8 +258,9 @@ class _Check:
         data = self._recorded(texture)
         if data is None:
             return
+        at = self.findings.at(texture.file)
         if not data.startswith(b"\xff\xd8\xff"):
-            self.findings.add("PTM-D828", texture.file, "", "is no JPEG")
+            at.add("PTM-D828", "is not a JPEG")
             return
         try:
             with pillow_faults():
@@ -267,17 +270,15 @@ class _Check:
         except LimitError:
             raise
         except PtmError as fault:
-            self.findings.add("PTM-D828", texture.file, "", fault.message)
+            at.add("PTM-D828", fault.message)
             return
         if image.size != (texture.size, texture.size):
             width, height = image.size
-            self.findings.add(
-                "PTM-D828", texture.file, "", f"{width} x {height}, not {texture.size}²"
-            )
+            at.add("PTM-D828", f"{width} x {height}, not {texture.size}²")
 
     def _unlisted(self, known: set[str]) -> None:
-        for place, _, files in os.walk(self._folder):
+        for folder, _, files in os.walk(self._folder):
             for file in sorted(files):
-                name = (Path(place) / file).relative_to(self._folder).as_posix()
+                name = (Path(folder) / file).relative_to(self._folder).as_posix()
                 if name not in known:
                     self.findings.add("PTM-D824", name, "", "is not listed")

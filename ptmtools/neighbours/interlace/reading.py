@@ -1,10 +1,10 @@
-"""An interlaced image back from its folder: the manifest, the files, the joined image.
+"""The files of an interlaced image: read and joined, described, and checked.
 
-A folder may come from a stranger. The manifest is read by its schema and must not contradict
-itself; a file is opened only under the name that its number gives, if it is a regular file of the
-size recorded; sizes are held against the limit before memory is taken for them.
-
-The check of an interlaced image: every byte is read, and every file decoded."""
+A folder may come from an untrusted source. The manifest must match its schema and be consistent; a
+file is opened only under the name that follows from its number, if it is a regular file of the
+recorded size; sizes are compared with the limit before memory is allocated. The check reads every
+byte and decodes every file.
+"""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ from ptmtools.texture.model import Limits
 _LIMITS = Limits()
 #: A manifest of 33 files has 7 kB; more fields may be added.
 _MANIFEST_MOST = 1 << 20
-#: A file may have so many bytes for each byte of its texels, and so many besides.
-_BYTES, _BYTES_BESIDES = 8, 1 << 20
+#: Most bytes of a file: for each byte of its texels, and in addition.
+_BYTES, _BYTES_MORE = 8, 1 << 20
 _AGAIN = "write it again with `ptm interlace`"
 
 
@@ -39,8 +39,8 @@ def read_manifest(folder: str | os.PathLike[str]) -> Interlaced:
 
     Raises
     ------
-    InputError: PTM-I820 no interlaced image there; PTM-I821 not as its schema says; PTM-I822 of
-        another schema number; PTM-I823 it contradicts itself; PTM-I824 it cannot be read.
+    InputError: PTM-I820 no interlaced image; PTM-I821 not valid against the schema; PTM-I822
+        another schema number; PTM-I823 inconsistent; PTM-I824 it cannot be read.
     LimitError: PTM-L822 too large for a manifest.
     """
     file = Path(folder) / INDEX
@@ -48,7 +48,7 @@ def read_manifest(folder: str | os.PathLike[str]) -> Interlaced:
         exists = Path(folder).is_dir()
         raise InputError(
             "PTM-I820",
-            f"holds no interlaced image: there is no {INDEX} in it" if exists else "is no folder",
+            f"is not an interlaced image: it has no {INDEX}" if exists else "is not a folder",
             file=folder,
             remedy="name a folder that `ptm interlace` wrote",
         )
@@ -81,32 +81,33 @@ def _document(data: bytes) -> dict[str, Any]:
 
 
 def _check_chain(interlaced: Interlaced) -> None:
-    """Raise InputError PTM-I823 unless names, axes and sizes of files are those of one image."""
+    """Raises InputError PTM-I823 unless names, axes and sizes of the files belong to one image."""
 
     def require(holds: bool, message: str, place: str = "") -> None:
         if not holds:
             raise InputError("PTM-I823", message, place=place or None, remedy=_AGAIN)
 
     for side in (interlaced.width, interlaced.height):
-        require(side & (side - 1) == 0, f"a side of {side} is no power of two")
+        require(side & (side - 1) == 0, f"a side of {side} is not a power of two")
     container = CONTAINERS[interlaced.container]
-    require(interlaced.lossless == container.lossless, "lossless is not what the container is")
-    held = interlaced.components in container.components and interlaced.kind in container.kinds
-    require(held, f"{interlaced.container} does not hold such samples")
+    require(interlaced.lossless == container.lossless, "lossless does not match the container")
+    supported = interlaced.components in container.components
+    supported &= interlaced.kind in container.kinds
+    require(supported, f"{interlaced.container} does not support such samples")
     parts = interlaced.parts
     axes = [part.axis for part in parts[1:] if part.axis]
     require(parts[0].axis is None, "the first file has an axis", "files[0]")
     require(len(axes) == len(parts) - 1, "a file after the first has no axis")
-    known = sizes_of(interlaced.width, interlaced.height, axes)
-    require(min(known[0][0]) > 0, "there are more files than sides that can be halved")
-    for number, (part, (own, joined)) in enumerate(zip(parts, known, strict=True)):
+    sizes = sizes_of(interlaced.width, interlaced.height, axes)
+    require(min(sizes[0][0]) > 0, "there are more files than sides that can be halved")
+    for number, (part, (own, joined)) in enumerate(zip(parts, sizes, strict=True)):
         place = f"files[{number}]"
         name = f"{number + 1}.{interlaced.container}"
-        require(part.name == name, f"is called {part.name}, not {name}", place)
+        require(part.name == name, f"is named {part.name}, not {name}", place)
         require(
             (part.width, part.height) == own and part.joined == joined,
-            f"must be {own[0]} x {own[1]} and make {joined[0]} x {joined[1]} texels, by the axes "
-            "and the size of the whole",
+            f"must have {own[0]} x {own[1]} texels, joined {joined[0]} x {joined[1]}, by the axes "
+            "and the size of the image",
             place,
         )
 
@@ -114,12 +115,11 @@ def _check_chain(interlaced: Interlaced) -> None:
 def deinterlace(
     folder: str | os.PathLike[str], step: int | None = None, limits: Limits = _LIMITS
 ) -> Texels:
-    """The (h, w, c) image that the first ``step`` files make, by default all of them; only those
-    are read.
+    """The (h, w, c) image of the first ``step`` files, by default all; only those are read.
 
     Raises
     ------
-    InputError: what `read_manifest` and `read_part` raise; PTM-I827 there is no such step.
+    InputError: as `read_manifest` and `read_part`; PTM-I827 the step does not exist.
     LimitError: PTM-L821 more texels than ``limits`` allow.
     """
     interlaced = read_manifest(folder)
@@ -128,7 +128,7 @@ def deinterlace(
     if not 1 <= step <= most:
         raise InputError(
             "PTM-I827",
-            f"there is no step {step}: it has {count(most, 'file')}",
+            f"step {step} does not exist: it has {count(most, 'file')}",
             file=folder,
             remedy=f"--step is a number from 1 to {most}",
         )
@@ -143,7 +143,7 @@ def deinterlace(
 def check_joined(
     interlaced: Interlaced, step: int, limits: Limits, folder: str | os.PathLike[str]
 ) -> None:
-    """Raise LimitError PTM-L821 if the image after a step is beyond the limit."""
+    """Raises LimitError PTM-L821 if the image after a step exceeds the limit."""
     width, height = interlaced.parts[step - 1].joined
     if width * height * interlaced.texel_bytes > limits.decoded_bytes:
         raise LimitError(
@@ -160,27 +160,27 @@ def read_part(folder: Path, interlaced: Interlaced, part: Part) -> Texels:
 
     Raises
     ------
-    InputError: PTM-I824 it is missing, no regular file or not readable; PTM-I825 it is not the
-        file that the manifest describes; PTM-I826 it is no such image.
-    LimitError: PTM-L823 its size is beyond all reason.
+    InputError: PTM-I824 it is missing, not a regular file or unreadable; PTM-I825 it has another
+        length or checksum; PTM-I826 it is not the image that the manifest describes.
+    LimitError: PTM-L823 it is too large for its texels.
     """
     return part_texels(folder / part.name, part_bytes(folder, interlaced, part), interlaced, part)
 
 
 def part_bytes(folder: Path, interlaced: Interlaced, part: Part) -> bytes:
-    """The bytes of a file, which are those recorded; raises as `read_part`."""
+    """The bytes of a file, compared with length and checksum; raises as `read_part`."""
     texels = part.width * part.height * interlaced.texel_bytes
-    most = _BYTES * texels + _BYTES_BESIDES
-    what = f"{part.width} x {part.height} texels"
-    data = _bytes_of(folder, part.name, most, "PTM-L823", what)
-    wrong = None
+    most = _BYTES * texels + _BYTES_MORE
+    content = f"{part.width} x {part.height} texels"
+    data = _bytes_of(folder, part.name, most, "PTM-L823", content)
+    fault = ""
     if len(data) != part.bytes:
-        wrong = f"has {len(data)} bytes instead of {part.bytes}"
+        fault = f"has {len(data)} bytes instead of {part.bytes}"
     elif zlib.crc32(data) != part.crc32:
-        wrong = "has another checksum than recorded"
-    if wrong:
+        fault = "has another checksum than recorded"
+    if fault:
         raise InputError(
-            "PTM-I825", wrong, file=folder / part.name, remedy=f"download it again, or {_AGAIN}"
+            "PTM-I825", fault, file=folder / part.name, remedy=f"download it again, or {_AGAIN}"
         )
     return data
 
@@ -194,9 +194,9 @@ def part_texels(file: Path, data: bytes, interlaced: Interlaced, part: Part) -> 
     try:
         if not data.startswith(container.magic):
             raise ValueError(f"not a {interlaced.container}")
-        # What is larger is refused before it is decoded; WebP counts four bytes a texel.
-        held = part.width * part.height * max(4, interlaced.texel_bytes)
-        picture = load_image(data, Limits(decoded_bytes=held))
+        # Larger images are refused before decoding; WebP counts four bytes a texel.
+        most = part.width * part.height * max(4, interlaced.texel_bytes)
+        picture = load_image(data, Limits(decoded_bytes=most))
         if picture.texels.shape[:2] != shape[:2]:
             height, width = picture.texels.shape[:2]
             raise ValueError(f"{width} x {height} instead of {part.width} x {part.height} texels")
@@ -213,7 +213,7 @@ def part_texels(file: Path, data: bytes, interlaced: Interlaced, part: Part) -> 
         ) from None
 
 
-def _bytes_of(folder: Path, name: str, most: int, code: str, what: str) -> bytes:
+def _bytes_of(folder: Path, name: str, most: int, code: str, content: str) -> bytes:
     """The bytes of a regular file; raises InputError PTM-I824, LimitError with that code."""
     file = folder / name
     try:
@@ -221,7 +221,7 @@ def _bytes_of(folder: Path, name: str, most: int, code: str, what: str) -> bytes
             length = os.fstat(stream.fileno()).st_size
             if length > most:
                 raise LimitError(
-                    code, f"has {length} bytes, too many for {what}", file=file, remedy=_AGAIN
+                    code, f"has {length} bytes, too many for {content}", file=file, remedy=_AGAIN
                 )
             return stream.read(most)
     except FileNotFoundError:
@@ -233,12 +233,12 @@ def _bytes_of(folder: Path, name: str, most: int, code: str, what: str) -> bytes
             "PTM-I824",
             f"cannot be read ({fault.strerror or fault})",
             file=file,
-            remedy="check what it is, and its permissions",
+            remedy="check its type and permissions",
         ) from None
 
 
 def describe(folder: Path) -> tuple[tuple[str, ...], Mapping[str, Any]]:
-    """What ``ptm info`` prints of a folder, and its record; raises as `read_manifest`."""
+    """The lines of ``ptm info`` for a folder, and its record as JSON; raises as `read_manifest`."""
     interlaced = read_manifest(folder)
     width, height = interlaced.original
     scaled = (
@@ -265,18 +265,21 @@ def describe(folder: Path) -> tuple[tuple[str, ...], Mapping[str, Any]]:
 
 
 CODES: Mapping[str, tuple[Severity, str]] = {
-    "PTM-D800": ("error", "interlace.json cannot be read, or is not as its schema says"),
+    "PTM-D800": ("error", "interlace.json cannot be read, or does not match its schema"),
     "PTM-D801": ("error", "interlace.json has another schema number"),
     "PTM-D802": ("error", "interlace.json contradicts itself: names, axes or sizes of the files"),
     "PTM-D803": ("error", "a file of an interlaced image is missing or cannot be read"),
     "PTM-D804": ("error", "a file of an interlaced image has another size or checksum"),
-    "PTM-D805": ("error", "a file of an interlaced image is not the image that is described"),
+    "PTM-D805": (
+        "error",
+        "a file of an interlaced image is not the image that interlace.json describes",
+    ),
     "PTM-D806": ("warning", "a file in the folder of an interlaced image that it does not name"),
     "PTM-D807": ("warning", "files too large for --limit: only their checksums were compared"),
-    "PTM-D808": ("warning", "an image is split otherwise than its minimum asks for"),
+    "PTM-D808": ("warning", "an image is split differently than its minimum requires"),
 }
-#: What reading raises → what the check finds.
-_FOUND = {
+#: Code of an error in reading → code of the finding.
+_FINDING = {
     "PTM-I821": "PTM-D800",
     "PTM-I822": "PTM-D801",
     "PTM-I823": "PTM-D802",
@@ -289,9 +292,9 @@ _FOUND = {
 
 
 def validate_interlaced(folder: Path, limits: Limits = _LIMITS) -> ValidationReport:
-    """Checks a folder of `ptm interlace`; what is wrong stands in the report.
+    """Checks a folder of `ptm interlace`; all faults are in the report.
 
-    ``limits``: for the whole image; beyond them checksums are compared, and nothing is decoded.
+    ``limits``: for the whole image; beyond them only checksums are compared.
     Raises InputError PTM-I820 if there is no interlaced image.
     """
     findings = Findings(CODES)
@@ -302,7 +305,7 @@ def validate_interlaced(folder: Path, limits: Limits = _LIMITS) -> ValidationRep
     except InputError as fault:
         if fault.code == "PTM-I820":
             raise
-        code = "PTM-D800" if fault.code == "PTM-I824" else _FOUND[fault.code]
+        code = "PTM-D800" if fault.code == "PTM-I824" else _FINDING[fault.code]
         findings.add(code, INDEX, fault.place or "", fault.message)
         return ValidationReport(findings.issues(), files, 0)
     _check_split(interlaced, findings.at(INDEX))
@@ -316,30 +319,30 @@ def validate_interlaced(folder: Path, limits: Limits = _LIMITS) -> ValidationRep
         length = _check_part(folder, interlaced, part, decoded, findings.at(part.name))
         size += length
         files += length > 0
-    named = {INDEX, *(part.name for part in interlaced.parts)}
-    for name in sorted(set(os.listdir(folder)) - named):
+    listed = {INDEX, *(part.name for part in interlaced.parts)}
+    for name in sorted(set(os.listdir(folder)) - listed):
         findings.add("PTM-D806", name, "", "is not named in interlace.json")
     return ValidationReport(findings.issues(), files, size)
 
 
 def _check_split(interlaced: Interlaced, at: Place) -> None:
-    wanted = axes_of(interlaced.width, interlaced.height, interlaced.min)
-    if tuple(part.axis for part in interlaced.parts[1:]) != wanted:
+    axes = axes_of(interlaced.width, interlaced.height, interlaced.min)
+    if tuple(part.axis for part in interlaced.parts[1:]) != axes:
         at.add(
             "PTM-D808",
-            f"a minimum of {interlaced.min} asks for {count(len(wanted) + 1, 'file')}, columns and "
-            "rows in turn",
+            f"a minimum of {interlaced.min} requires {count(len(axes) + 1, 'file')}, alternating "
+            "columns and rows",
             "files",
         )
 
 
 def _check_part(folder: Path, interlaced: Interlaced, part: Part, decoded: bool, at: Place) -> int:
-    """Checks one file; how many bytes were read."""
+    """Checks one file; returns the number of bytes read."""
     data = b""
     try:
         data = part_bytes(folder, interlaced, part)
         if decoded:
             part_texels(folder / part.name, data, interlaced, part)
     except InputError as fault:
-        at.add(_FOUND[fault.code], fault.message)
+        at.add(_FINDING[fault.code], fault.message)
     return len(data)

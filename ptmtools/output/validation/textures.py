@@ -67,7 +67,7 @@ def read_texture(
         message = f"{png} is {size[0]} x {size[1]}, which is not the size of any level"
         at.add("PTM-D711", message)
         return ReadTexture(header, digest, detail)
-    other = read_png(fallback, limits, at.found.at(png))
+    other = read_png(fallback, limits, at.findings.at(png))
     if level is not None and texels is not None and other is not None:
         if level < len(header.levels) - 1:
             texels = decode(data, level, limits)
