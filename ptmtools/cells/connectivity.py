@@ -8,7 +8,8 @@ Triangles by the distinct positions of their corners, and which of them lie side
 Model files repeat a vertex for each texture coordinate, object or face that has it; what touches is
 told by position, to the last bit. Rows are compared by a hash of 64 bits and then by themselves:
 `numpy.unique` over the rows of 15 million corners takes ten times as long, and sorts them by value,
-which tears neighbours apart."""
+which tears neighbours apart.
+"""
 
 from __future__ import annotations
 

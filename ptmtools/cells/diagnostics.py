@@ -1,5 +1,6 @@
 """What the subdivision has to say of detail and doors that it recognised, and of what it did not
-reach."""
+reach.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 """A root box divided into convex leaves by what of a model may split it, and flooded.
 
-The leaves that are reached, as cells: geometry, portals, and where somebody can stand."""
+The leaves that are reached, as cells: geometry, portals, and where somebody can stand.
+"""
 
 from __future__ import annotations
 

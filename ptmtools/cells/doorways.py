@@ -6,7 +6,8 @@ below it is floor, and on both sides somebody has room to stand. A panel in a wa
 one between two pillars no wall above, a cupboard door no wall beside it, a shutter no floor below,
 and behind the back of a niche or a door on a wall is no room.
 
-Triangles in groups, each in a box along its own axes: across what is flat in it, along, up."""
+Triangles in groups, each in a box along its own axes: across what is flat in it, along, up.
+"""
 
 from __future__ import annotations
 

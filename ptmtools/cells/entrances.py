@@ -13,7 +13,8 @@ How a model looks to somebody who stands in it, before it is divided: whether it
 what is taken for a door.
 
 Division decides this exactly (`reach`), and takes its time. Here sight lines are cast from points
-at the height of eyes over the floors of rooms, and those are counted that leave the model."""
+at the height of eyes over the floors of rooms, and those are counted that leave the model.
+"""
 
 from __future__ import annotations
 

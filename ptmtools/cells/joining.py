@@ -17,7 +17,8 @@ Triangles that go through GEOS are those of several owners; all others cost a fe
 Triangles that continue each other: one plane, one look, one texture map.
 
 Cutting such triangles makes corners on the edges between them that nothing but the cut accounts
-for; where triangles are joined these go as well."""
+for; where triangles are joined these go as well.
+"""
 
 from __future__ import annotations
 

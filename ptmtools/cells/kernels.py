@@ -2,7 +2,8 @@
 
 Compiled descent of whole triangles through a BSP tree (see `ownership`).
 
-Compiled test of points for being above floors (`eyes`)."""
+Compiled test of points for being above floors (`eyes`).
+"""
 
 from __future__ import annotations
 

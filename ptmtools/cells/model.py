@@ -10,7 +10,8 @@ Where the eyes of somebody who walks can be.
 
 The **eye region** is reached space over a place (`places`), within the body of whoever stands there
 and up to `Walker.reach` above the floor. What is seen, and how much of the view it covers, is asked
-from there only: from a wall's hollow or above a ceiling nobody looks."""
+from there only: from a wall's hollow or above a ceiling nobody looks.
+"""
 
 from __future__ import annotations
 

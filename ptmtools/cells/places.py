@@ -24,7 +24,8 @@ Polygons are united and cut on the grid of `planar`.
 Which leaves somebody can stand in: those that meet the eye region (`eyes`).
 
 Ceilings that hang lower than eyes may be are not asked for, so what is just above one counts as
-well. It costs a little and hides nothing."""
+well. It costs a little and hides nothing.
+"""
 
 from __future__ import annotations
 

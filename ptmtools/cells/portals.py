@@ -21,7 +21,8 @@ Which leaves somebody can reach, and whether the model is closed.
 The flood starts from the viewpoints, else from the largest leaf that has floor below it, is not
 the inside of a solid and does not touch the root box, and runs through the portals. The model is
 closed if it never meets the root box; what it does not reach is a solid, a sealed void or the
-outside (design, "Reachable")."""
+outside (design, "Reachable").
+"""
 
 from __future__ import annotations
 

@@ -16,7 +16,8 @@ the edge of a slab. A sofa of 50,000 triangles has none of that, but each of its
 asked whether it does. So what is small, dense and round is taken for detail, as if `--detail` named
 it: connected pieces first, then whole objects, for a plant is a thousand pieces.
 
-To err is safe: what is taken for detail hides nothing, so the visible sets can only grow."""
+To err is safe: what is taken for detail hides nothing, so the visible sets can only grow.
+"""
 
 from __future__ import annotations
 

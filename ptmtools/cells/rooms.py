@@ -53,7 +53,8 @@ Leaves become cells: each for itself, or grouped into rooms where parting gains 
 A room of several leaves is one cell, unless keeping some of them apart saves its viewers more than
 `SubdivideOptions.gain` of what they fetch: a corridor along many doors is worth parting, a hall is
 not. Cells never reach through a door (`rooms`), even if both sides see the same: what is behind a
-door covers little of the view, and the coverage hints can say so only of another cell."""
+door covers little of the view, and the coverage hints can say so only of another cell.
+"""
 
 from __future__ import annotations
 

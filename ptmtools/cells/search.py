@@ -11,7 +11,8 @@ and what is in one has nothing to do with the others.
 Planes in bins of similar normal and offset, so that each finds all that are near it.
 
 There are `_GRIDS` grids of bins, and a plane is looked up in the one in which it lies furthest from
-the edges of its bin: its neighbours to a tenth of the step are there, wherever it lies."""
+the edges of its bin: its neighbours to a tenth of the step are there, wherever it lies.
+"""
 
 from __future__ import annotations
 

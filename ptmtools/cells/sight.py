@@ -9,7 +9,8 @@ The lines are the same for every portal in its own frame, and the same seen from
 after quarter turns of that frame. So they depend neither on the order of the portals and of their
 corners nor on where the building stands and how it is turned, be it on its head.
 
-Which leaves see each other at most: the portal flow over the leaves of a subdivision."""
+Which leaves see each other at most: the portal flow over the leaves of a subdivision.
+"""
 
 from __future__ import annotations
 

@@ -23,7 +23,8 @@ recognised by what it does: no opening is left beside it. Such a split costs one
 portal. A polygon that leaves an opening, however small, is none.
 
 No area is too small: a chain of solids is as open as its narrowest end, and in the museum of 50
-rooms, with caps of 0.02 m² and more only, all of the 992 leaves stay that 365 are with all caps."""
+rooms, with caps of 0.02 m² and more only, all of the 992 leaves stay that 365 are with all caps.
+"""
 
 from __future__ import annotations
 

@@ -21,7 +21,8 @@ walls is another building, with a door or a window open. Rays from the middle of
 
 Where a solid touches another, two faces lie in one plane, and which of them a ray meets is chance.
 So it is cast at all triangles moved a little to their fronts, and to their backs: where what it
-meets faces one way in the one and the other way in the other, it tells nothing."""
+meets faces one way in the one and the other way in the other, it tells nothing.
+"""
 
 from __future__ import annotations
 

@@ -13,7 +13,8 @@
    other leaves is a cell, or the leaves of a room are (`grouping`).
 5. Pieces of the geometry with the same owners are joined again (`joining`).
 
-A world in which nothing is seen is a mistake in the model, and not a result."""
+A world in which nothing is seen is a mistake in the model, and not a result.
+"""
 
 from __future__ import annotations
 

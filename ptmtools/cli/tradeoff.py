@@ -24,8 +24,8 @@ from ptmtools.coverage.options import MAX_SAMPLES
 from ptmtools.files import write_bytes
 from ptmtools.lab.path.making import path_through
 from ptmtools.lab.path.options import PathOptions
-from ptmtools.lab.tradeoff import report as sentences
-from ptmtools.lab.tradeoff.experiment import EXPERIMENTS, Subject, Trade, run
+from ptmtools.lab.tradeoff import EXPERIMENTS, report as sentences
+from ptmtools.lab.tradeoff.experiment import Subject, Trade, run
 from ptmtools.lab.tradeoff.knobs import KNOBS
 from ptmtools.lab.tradeoff.report import as_csv, picture, require, table
 from ptmtools.lab.tradeoff.walk import WalkOptions, WalkTrade, try_settings

@@ -1,4 +1,4 @@
-"""Average Coverage Hints: how much of what is seen from a cell belongs to which cell (paper §5).
+"""Average Coverage Hints: the share of each visible cell in the views from a cell (paper §5).
 
 For every cell, K points spread uniformly over its volume; at each, six square views of 90°; in
 each pixel, the cell of the surface that shows. ``ACH_j`` is the number of pixels of cell j over
@@ -7,11 +7,12 @@ that of all cells of the PVS, so a row sums to 1.
 The paper takes 8 points and large views. The points decide (docs/design/coverage.md), so by default
 there are hundreds of them, with views of a few pixels.
 
-The paper draws "all the objects of its PVS". Here what else shows is found too, since only so can a
-pixel fall on a cell outside the PVS, which would be an error of the PVS or a crack in the model.
-Such pixels are looked up again, left out of the hints and reported as missed mass (`tally`).
+The paper draws "all the objects of its PVS". Here all objects are drawn, so that a pixel can show a
+cell outside the PVS, which is an error of the PVS or a crack in the model. Such pixels are looked
+up again, left out of the hints and reported as missed mass (`tally`).
 
-Which backend draws the item buffers."""
+`choose` picks the backend that draws the item buffers.
+"""
 
 from __future__ import annotations
 

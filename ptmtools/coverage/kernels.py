@@ -1,6 +1,6 @@
-"""Compiled distances of points from triangles, and crossings of rays with them (`solids`).
-
-Compiled rays through pixel centres, and the tally of whom the pixels belong to."""
+"""Compiled loops of the sampling: distances of points from triangles, crossings of rays with them
+(`solids`), rays through pixel centres, and the tally of the cells that own the pixels (`tally`).
+"""
 
 from __future__ import annotations
 

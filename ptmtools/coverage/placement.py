@@ -1,4 +1,4 @@
-"""Where the sample points of a cell lie: spread over its volume.
+"""Placement of the sample points of a cell, spread over its volume.
 
 The paper takes "samples per cell whose COPs are uniformly distributed inside the cell" (§5).
 Position matters far more than resolution (docs/design/coverage.md), so there is a choice of how:
@@ -18,18 +18,17 @@ Position matters far more than resolution (docs/design/coverage.md), so there is
 All come with a shift of their views' pixels by less than half a pixel, spread as evenly: with the
 same few pixel centres at every point no number of points would be enough.
 
-A cell is a union of disjoint convex leaves. Points are where eyes can be: in those of its leaves in
-which somebody can stand, and there in the eye region (`ptmtools.cells.model`). They depend on
+A cell is a union of disjoint convex leaves. Points lie where eyes can be: in its standing leaves,
+and there in the eye region (`ptmtools.cells.model`). They depend on
 nothing but its shape and the seed: not on other cells, the unit, the number of workers or the
 version of a library.
 
-A scrambled Sobol' sequence: points that fill the unit cube evenly, at any number of them.
-
-Direction numbers are those of Joe and Kuo (2008), "Constructing Sobol sequences with better
-two-dimensional projections"; scrambling is Owen's nested uniform one (1995): every digit is turned
-over or not by a hash of the digits before it, so each point alone is uniform and aligned blocks of
-the sequence stay nets. Only integers are used, so the points are the same on every machine and
-for every version of every library."""
+The Sobol' sequence. Direction numbers are those of Joe and Kuo (2008), "Constructing Sobol
+sequences with better two-dimensional projections"; scrambling is Owen's nested uniform one (1995):
+every digit is turned over or not by a hash of the digits before it, so each point alone is uniform
+and aligned blocks of the sequence stay nets. Only integers are used, so the points are the same on
+every machine and for every version of every library.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""How fine each texture is needed in the views from a cell: its share of them by level of detail.
+"""Required levels of textures: the share of a cell's views by level of detail, and the levels that
+no eye resolves.
 
 From sample points of the cell, as those of the coverage hints (in the eye region, at eye height and
 up to the ceiling), rays are cast over the whole sphere, weighted by solid angle. Where one meets a
@@ -10,17 +11,16 @@ upright picture, so directions are alike. Of the two levels that are then blende
 Tried: the band of ±30° that a level view of 60° shows, instead of the sphere. It leaves out the
 floor at one's feet, which wants the finest level, and with it a share that `ach` counts.
 
-Which levels of a texture no eye resolves: those that a picture is never drawn from.
-
-A pixel's *footprint* on a surface is what it covers there, in texels. Graphics cards draw from the
-levels ⌊λ⌋ and ⌊λ⌋ + 1, counted from the finest, 0, with λ = log2(Pmax / N), where Pmax and Pmin are
-the lengths of the footprint across and down a pixel, the larger and the smaller one, and N the
-least of ⌈Pmax / Pmin⌉ and 16 (EXT_texture_filter_anisotropic; 1 where the filter is isotropic). So
-Pmax / N is at least Pmin / 2 and at least Pmax / 16, and from below:
+Levels that no eye resolves are never drawn from. A pixel's *footprint* on a surface is the area
+that it covers there, in texels. Graphics cards draw from the levels ⌊λ⌋ and ⌊λ⌋ + 1, counted from
+the finest, 0, with λ = log2(Pmax / N), where Pmax and Pmin are the lengths of the footprint across
+and down a pixel, the larger and the smaller one, and N the least of ⌈Pmax / Pmin⌉ and 16
+(EXT_texture_filter_anisotropic; 1 where the filter is isotropic). So Pmax / N is at least Pmin / 2
+and at least Pmax / 16, and from below:
 
 - at a distance r from the eye, φ off the middle of the picture, a pixel covers r·p·cos²φ or more of
   a surface in any direction, where p is a pixel's size at distance 1; φ is largest in a corner;
-- r is at least the distance from a piece of the surface to the eyes of those who may see it: the
+- r is at least the distance from a piece of the surface to the eyes that may see it: the
   eye region (`ptmtools.cells.model`) of the cells that see its owner, by boxes;
 - a metre on the surface is at least σ2 texels and, in one direction, σ1, the singular values of the
   texels' gradient; Pmax is at least σ1 / √2 times the metres that a pixel covers.
@@ -29,7 +29,8 @@ That is within 2.3 octaves of λ itself where an eye gets as near as the boxes s
 
 (Tried: the pixel in the middle of the picture, and λ = log2(Pmin). The corners of a picture have
 smaller pixels, 0.42 of it in both directions, and where a footprint is not quite square N is 2:
-eyes that were drawn at random in a room needed levels that were trimmed.)"""
+eyes that were drawn at random in a room needed levels that were trimmed.)
+"""
 
 from __future__ import annotations
 

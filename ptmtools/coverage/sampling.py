@@ -1,6 +1,5 @@
-"""The hints of one cell: at which points, at how many, and what comes of it.
-
-From counts at sample points to hints, and how far they can be trusted.
+"""The hints of one cell: the choice and number of its sample points, and the estimate with its
+error.
 
 A hint is a ratio, the pixels of one cell over all pixels, both summed over the sample points. Its
 standard error comes from eight groups of points, by the linearised ratio (Cochran, *Sampling
@@ -10,7 +9,8 @@ by a factor of about two; of eight single points it is too small at times.
 
 The error of a whole row is its total variation, half the sum of absolute differences. The distance
 of each group's own hints from the mean says how that is distributed: a mean of R groups is closer
-to the truth than a group to the mean by the square root of R - 1."""
+to the truth than a group to the mean by the square root of R - 1.
+"""
 
 from __future__ import annotations
 

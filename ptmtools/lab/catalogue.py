@@ -5,7 +5,8 @@ Which of it a client may use at a moment depends on what has arrived; that is th
 Texture memory: what levels take, and which of them it should hold.
 
 A texture of which column k is resident holds levels 0 to k − 1: column 0 is nothing. GPUs have no
-texels of three bytes, so RGB counts four; the paper counts three."""
+texels of three bytes, so RGB counts four; the paper counts three.
+"""
 
 from __future__ import annotations
 

@@ -11,9 +11,10 @@ Bandwidth is bytes over the time during which any were arriving, both forgotten 
 such time: so a pause, in which nothing was asked for, neither lowers the estimate nor ages it, and
 parallel requests are not counted against each other. What arrives between two looks is taken to
 arrive evenly, and fades from where it arrives, so that the estimate does not depend on how often
-one looks. Latency is the mean of the last few, of
-requests whose response did not have to wait for those of others: on `h2` the others tell nothing of
-the network. (A client sees it: another response ended as this one began.)"""
+one looks. Latency is the mean of the last few, of requests whose response did not have to wait for
+those of others: on `h2` the others tell nothing of the network. (A client sees it: another response
+ended as this one began.)
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 """A measure over time, a panel for each link and memory; needs matplotlib (extra ``plot``).
 
-Frames of a run as pictures, and the paper's Figure 3: what arrives before one's eyes."""
+Frames of a run as pictures, and the paper's Figure 3: what arrives before one's eyes.
+"""
 
 from __future__ import annotations
 

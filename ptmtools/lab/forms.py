@@ -16,7 +16,8 @@ next step replaces the one before it.
 
 Files are requests of their own. Manifests are not on the link: axes follow from the paper's rules,
 and sizes could stand in the index. That the old image, the file and the new one are in texture
-memory together while they are joined is not counted."""
+memory together while they are joined is not counted.
+"""
 
 from __future__ import annotations
 

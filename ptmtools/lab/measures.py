@@ -1,7 +1,8 @@
 """What a run was worth to the walker, and what it cost, as a few numbers.
 
 FLIP of a few frames of a run: the difference from the full picture as people see it when they
-flip between the two (Andersson et al. 2020), 0 to 1; needs flip-evaluator (extra ``measures``)."""
+flip between the two (Andersson et al. 2020), 0 to 1; needs flip-evaluator (extra ``measures``).
+"""
 
 from __future__ import annotations
 

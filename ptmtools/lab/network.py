@@ -23,7 +23,8 @@ Loss: at a share p of lost packets, goodput is 1 − p of the bandwidth, and wit
 the request or the head of its response is itself lost, and the first byte comes one latency later.
 The draws are those of a seeded generator, one a request.
 
-A range of bytes that a client has asked for, as `Link` keeps it."""
+A range of bytes that a client has asked for, as `Link` keeps it.
+"""
 
 from __future__ import annotations
 

@@ -5,7 +5,8 @@ evenly. Both are the same JSON document, whose schema is published (docs/design/
 
 How a walk was walked in a browser, so that a simulated client can walk it in the same way: when
 each frame was and for how long it kept the page busy, how old the item buffer was in it, how fine
-the screen, how large the files, and what the page had asked for before its first frame."""
+the screen, how large the files, and what the page had asked for before its first frame.
+"""
 
 from __future__ import annotations
 

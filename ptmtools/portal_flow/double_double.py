@@ -1,21 +1,18 @@
-"""Whether a line can pass a sequence of portals, in double-double arithmetic.
-
-Decides what the flow, in doubles, cannot tell (`near_ties`). Portals are made truly plane first, by
-moving their vertices along one axis, and drawn in by `Tolerance.noise`: the last digits of
-coordinates are noise, and in a building that is turned the edges of doors that meet in a line no
-longer do, by 1e-16 of its extent.
+"""Decides near ties of the portal flow: whether a line can pass a sequence of portals, in
+double-double arithmetic. Portals are made exactly plane first, by moving their vertices along one
+axis, and drawn in by `Tolerance.noise`: the last digits of coordinates are noise, and in a building
+that is turned the edges of doors that meet in a line no longer do, by 1e-16 of its extent.
 
 Tried and dropped: integers of any length for what double-double cannot tell, which were asked for
 one sequence in a hundred and changed no set of any model (docs/design/visibility.md).
-
-Searches whose near ties are decided in double-double arithmetic.
 
 A near tie is a sequence of portals that a search rejected by less than the rounding of its
 arithmetic allows to be sure of (`clipping_kernels`). Another search that lets all near ties pass
 tells what depends on them, mostly nothing. Those on which something depends are put to
 `SequenceTest`. Where a line can pass one, the search is done again with that let through, as often
 as this brings up new ones. Where there are too many, or a budget ends, all are let through: looser,
-and conservative as ever."""
+and conservative as ever.
+"""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""Which portals a straight line may cross after which: conservative portal-sequence flow (§3).
+"""Conservative portal-sequence flow: the portals that a straight line may cross after each (§3).
 
 The method is Teller & Séquin's (SIGGRAPH 1991) in the depth-first form of Quake's ``vis``. A line
-that leaves a leaf crosses a sequence of portals. The search keeps, for each sequence, what is
-left of the *source* portal and of the portal *passed* last; the planes that separate the two
-bound every line through both, so the next portal is clipped by them, and in turn what lies
-between the next portal and the passed one clips the source. An empty polygon ends the sequence.
+that leaves a leaf crosses a sequence of portals. The search keeps, for each sequence, the rest of
+the *source* portal and of the portal *passed* last; the planes that separate the two bound every
+line through both, so the next portal is clipped by them, and in turn what lies between the next
+portal and the passed one clips the source. An empty polygon ends the sequence.
 
 Over the textbook:
 
@@ -18,7 +18,7 @@ Over the textbook:
 * A search that grows long shoots one line at each portal that is still possible. What a line
   crosses is seen without a search; what is left to refute is little, even in an open hall.
 * What is rejected by less than the rounding of the arithmetic is decided again in double-double
-  (`near_ties`).
+  (`double_double`).
 * Each source portal has a budget of operations, not of seconds. When it is spent, open branches
   are not followed; what their separators leave of the possible set counts as seen.
 
@@ -30,9 +30,8 @@ Tried and dropped (e1m1: 9.6 s, 163.7 portals seen on average): a first round wi
 to tighten the start of the second (9.8 s); counting q as seen by p because q's way back was not
 shown to miss p's (7.4 s, but 164.8 portals); shooting the lines first instead of late (12.9 s).
 
-The searches of the portal flow as tasks for an executor.
-
-`Searching` is what they share; each borrows storage of its own from it."""
+The searches are tasks of an executor. They share `Searching`; each borrows its storage from it.
+"""
 
 from __future__ import annotations
 

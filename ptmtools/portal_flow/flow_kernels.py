@@ -6,7 +6,8 @@ way back. Rows of bits are little-endian words over directed portals. Of the slo
 (see `clipping_kernels`) frame f of the depth-first search owns 2f (what is left of the source) and
 2f + 1 (what is left of the portal passed last).
 
-The pre-pass of the portal flow: planes and floods (see `flow`)."""
+The pre-pass bounds each portal by planes and floods.
+"""
 
 from __future__ import annotations
 

@@ -1,14 +1,17 @@
-"""Compiled walk of straight lines from leaf to leaf through the portals (see `sight`).
+"""Compiled straight lines from leaf to leaf through the portals, and the bits of portals that see
+each other.
 
 Rounding can make a line that runs along an edge miss both portals beside it; it then ends there,
 which only shortens it.
 
-Matrices of bits, (2K, W) little-endian words over directed portals: row p is what p sees.
+Matrices of bits are (2K, W) little-endian words over directed portals: row p holds the portals that
+p sees.
 
 The way back through portal q is ``q ^ 1``; p sees q if and only if the way back from q sees that
 from p.
 
-A few straight lines, compiled: what they cross need not be searched for."""
+A few lines before the search (`glance`) find portals that need no search.
+"""
 
 from __future__ import annotations
 

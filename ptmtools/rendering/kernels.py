@@ -1,10 +1,10 @@
 """Compiled sampling of textures, and the sums of errors by level (see `tables`).
 
-What is called for every pixel becomes part of its caller: to hand over all arrays of the records
-takes half as long again.
+Functions that run for every pixel are inlined: a call with all arrays of the records takes half as
+long again.
 
-Compiled colours of pixels, by the levels that are there; sampled as `kernels` samples for its
-errors."""
+`shade` computes colours of pixels by the loaded levels, with the same sampling as the errors.
+"""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
-"""What the pixels of a camera show: the first surface along each ray, by Embree.
+"""Camera rays: the first surface along each, by Embree, and the boxes and hulls in the frustum.
 
 One-sided surfaces are passed through from behind, and glass always: it shows what is behind it.
-
-What a camera takes in: boxes and hulls that reach into its frustum."""
+"""
 
 from __future__ import annotations
 

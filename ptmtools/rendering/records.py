@@ -1,6 +1,4 @@
-"""What the kernels work on: textures, triangles, and what a camera sees of them.
-
-The surfaces as kernels take them."""
+"""Records of the kernels: textures, triangles, and the surfaces that a camera sees."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Quadrics: sums of squared distances that a vertex has to what it stands for.
+"""Quadrics: sums of squared distances of a vertex from the faces and edges that it replaces.
 
 Garland & Heckbert 1997: of the planes of the faces that met in a vertex, weighted by area, and of
 the lines of kept edges. Hoppe 1999 adds, for every wedge, how far its attributes are from those
@@ -13,8 +13,7 @@ g·d + r is what a face has there: its value for d and s is Σ w (g·d + r - s)�
 
 Texture coordinates count as the distance by which the texture moves on the face, so that a shift
 of the bricks by a centimetre is as dear as a shift of the wall.
-
-Compiled arithmetic of quadrics; `quadrics` says what their rows hold, and is the reference."""
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fewer faces for the same surface: edges collapse, the one that changes it least first.
+"""Simplifies a surface by edge collapses, in ascending order of their error.
 
 After Garland & Heckbert, "Surface simplification using quadric error metrics", 1997, with the
 attributes of Hoppe, "New quadric metric for simplifying meshes with appearance attributes", 1999.
@@ -18,11 +18,11 @@ beside ours:
 - Penalties in place of a line's freedom (seams as steep quadrics, as for borders in 1997): texture
   coordinates are then no longer exact.
 
-The same by pymeshlab, the tool of the paper on octree textures, for comparison and on request.
-
-pymeshlab is GPL-3 and needs libGL: it is imported in one function, and only here. It knows plain
-meshes only, and neither a face's source nor an error: the source goes through it as a quality of
-faces, which collapses keep."""
+pymeshlab, the tool of the paper on octree textures, serves for comparison and on request. It is
+GPL-3 and needs libGL: it is imported in one function, and only here. It knows plain meshes only,
+and neither a face's source nor an error: the source goes through it as a quality of faces, which
+collapses keep.
+"""
 
 from __future__ import annotations
 

@@ -3,11 +3,11 @@
 The corners at a vertex are a linked list, so that two lists become one at once, and memory is
 linear. Corners of faces that are gone stay in it until `prune`.
 
-Compiled heap of edges, the cheapest first; equal ones go by their vertices.
-
-An entry is ``cost[i]``, the vertices ``ends[i]`` (the lower first), the sum of their versions when
-it was made, and the ways that were tried in vain. It is stale when a vertex has another version by
-now: it stays until it comes up, or until room is wanted."""
+The heap of edges has the cheapest first; ties go by their vertices. An entry is ``cost[i]``, the
+vertices ``ends[i]`` (the lower first), the sum of their versions when it was made, and the ways
+that were tried in vain. It is stale when a vertex has another version by now: it stays until it
+comes up, or until room is wanted.
+"""
 
 from __future__ import annotations
 

@@ -1,17 +1,17 @@
-"""What no collapse that keeps the topology can take away: handles and parts.
+"""Handles, parts and small holes: the faces that no collapse can remove.
 
-A part is what hangs together by edges; where faces only touch in a vertex, there are several. A
+A part is a set of faces connected by edges; faces that only touch in a vertex are several. A
 closed surface of V vertices, E edges and F faces, in c parts with g handles, has V - E + F =
 2 c - 2 g. As every face has three edges, each of two faces, F = 2 (V - 2 c) + 4 g: a handle holds
 four faces, however small it is, and so does a closed part; one with a border holds one. Marching
 cubes of what a scanner saw leave thousands of either.
 
-Small holes, filled where there are too many.
-
-A hole that shares its three corners with no other holds five faces, however small it is: six, as
-three vertices do in a closed surface, without its own. Scanners leave thousands where they could
-not see. Those are filled that are smaller than the faces that will be left, and far smaller than
-the part that they are in, so that no sheet is closed by its own outline."""
+Small holes are filled where they are too many. A hole that shares its three corners with no other
+holds five faces, however small it is: six, as three vertices do in a closed surface, without its
+own. Scanners leave thousands where they could not see. Those are filled that are smaller than the
+faces that will be left, and far smaller than the part that they are in, so that no sheet is closed
+by its own outline.
+"""
 
 from __future__ import annotations
 

@@ -3,10 +3,10 @@
 Everything a client needs to know about byte ranges is in the first few hundred bytes, under a CRC
 of its own. Specified in ``docs/formats/ptm.md``.
 
-The description of a `.ptm`: tagged values between head and groups.
-
-Each is a tag of four ASCII letters, a length (4 bytes, little endian) and so many bytes. Unknown
-tags are passed over, so that later versions may add some."""
+The description of a `.ptm` is a list of tagged values between head and groups. Each is a tag of
+four ASCII letters, a length (4 bytes, little endian) and its bytes. Readers skip unknown tags, so
+that later versions may add some.
+"""
 
 from __future__ import annotations
 

@@ -1,21 +1,21 @@
-"""What a level shows that the one below it does not, and the colour that is left without any.
+"""Detail of each level: its difference from the level below, and the mean colour.
 
-Each texel of level n differs from the texel of level n-1 that covers its 2×2 block (an odd last
-row or column, which has no block, from the texel beside it) by a root mean square over its colour
+Each texel of level n differs from the texel of level n-1 that covers its 2×2 block (an odd last row
+or column, which has no block, from the texel beside it) by a root mean square over its colour
 components; of these the mean over the texels is taken, as the error of a picture is the mean over
-its pixels. Who has level k is off by Σ differences[n], n > k, at most, but for odd sides: of the
-museum's textures with two levels missing by 0.7 of it, with six by half.
+its pixels. A client that has level k is off by Σ differences[n], n > k, at most, but for odd sides:
+of the museum's textures with two levels missing by 0.7 of it, with six by half.
 
 (Tried: the root mean square over the texels, too, whose squares do add up. A few strong edges carry
 it, and clients that go by it show worse pictures, see `ptmtools.lab.policies.shares`. Enlarging
 bilinearly makes no difference to them.)
 
-The encoder has both levels at hand, a tile at a time, and the sums are taken there: 15 ms for a
+The encoder holds both levels, a tile at a time, and takes the sums: 15 ms for a
 texture of 2048² RGB that takes 200 to 400 to encode, 0.18 s for the museum's 31 (3.1 s).
 
-The inner loops of `detail`: between (h, w, c) samples and those of (h >> 1, w >> 1, c) enlarged,
-of each texel the root of the sum of squared differences over the first ``colours`` components,
-summed up over the texels."""
+The inner loops compare (h, w, c) samples with (h >> 1, w >> 1, c) enlarged ones: for each texel the
+root of the sum of squared differences over the first ``colours`` components, summed over texels.
+"""
 
 from __future__ import annotations
 

@@ -1,11 +1,12 @@
-"""An image becomes a `.ptm` (paper §4).
+"""Encodes an image as a `.ptm` (paper §4).
 
 Memory: the levels below the finest, a third of the image, and a row of tiles. The finest level is
 never copied as a whole, so that an image larger than memory can be encoded from a file that is
 mapped or read by rows. Levels are written coarse to fine as they are coded; the head, which says
 where they are, is written last into the space left for it.
 
-Which options are possible, and which levels they keep."""
+The options decide the levels that the file keeps.
+"""
 
 from __future__ import annotations
 

@@ -15,12 +15,11 @@ differ by more than 2^26 (float32; never for float16); it is then off by a few u
 last place, the same on every machine. The mean over a NaN, or over both infinities, is the quiet
 NaN 0x7E00 or 0x7FC00000.
 
-How a level is cut into tiles (``docs/formats/ptm.md``).
-
-A level with a side of more than twice the tile's is cut into as many whole tiles as go into it
-each way; the last of a row or column takes what is left over, so that none is a sliver. Tiles
-begin at multiples of their side, which is even, so a tile refines a rectangle of the level below
-that no other tile refines."""
+Tiles (``docs/formats/ptm.md``): a level with a side of more than twice the tile's is cut into as
+many whole tiles as go into it each way; the last of a row or column takes what is left over, so
+that none is a sliver. Tiles begin at multiples of their side, which is even, so a tile refines a
+rectangle of the level below that no other tile refines.
+"""
 
 from __future__ import annotations
 

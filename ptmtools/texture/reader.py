@@ -1,9 +1,10 @@
-"""A `.ptm` becomes levels again, coarse to fine, reading no more of the file than it needs.
+"""Reads the levels of a `.ptm`, coarse to fine, and no more of the file than they need.
 
 Of a tiled level only the tiles that are asked for are read and decoded, and of the levels below it
 only what lies under those: a window of a level costs about its own size, whatever the level's.
 
-A whole `.ptm` in one call: `decode`, `check` and `examine`, around `PtmReader`."""
+`decode`, `check` and `examine` take a whole `.ptm` in one call.
+"""
 
 from __future__ import annotations
 

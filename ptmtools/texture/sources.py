@@ -1,6 +1,6 @@
-"""Where the bytes of a `.ptm` come from: a path, bytes, an open file, or whatever reads ranges.
-
-An image to encode: an array, or whatever gives its rows when asked."""
+"""Sources of bytes and of texels: a path, bytes, an open file or a range reader for a `.ptm`; an
+array or a row reader for an image to encode.
+"""
 
 from __future__ import annotations
 

@@ -1,21 +1,18 @@
-"""Cells become potentially visible sets (paper §3): the portal flow over leaves, lifted to cells.
+"""Potentially visible sets of cells (paper §3): the portal flow over leaves, lifted to cells.
 
 A viewer anywhere in a cell sees at most the cells of its row. The flow, its argument and its
 budget are in `flow`.
 
-Visibility by random lines alone: quick, and never more than there is to see.
+Sampled sets come from random lines alone: leaves that a straight line crosses on its way through
+the portals see each other, all others count as hidden. So these sets are a lower bound, not
+conservative: a client that loads by them shows holes. They serve for comparison. Lines are walked
+as in `cells.sight`, which spreads them evenly; random ones, as many as wanted, show more.
 
-What a straight line crosses on its way through the portals sees each other; what no line happened
-to show counts as hidden. So the sets are a lower bound, not conservative: a client that loads by
-them shows holes. They serve to compare with. Lines are walked as in `cells.sight`, which spreads
-them evenly; random ones, as many as wanted, show more.
-
-Openings that show more than they should: where visibility leaks.
-
-A cell that sees several times as many cells as most do sees them through something: a window onto
-a courtyard, which is as it should be, or a gap under a wall that somebody forgot to close. Among
-the openings between cells through which it sees at least half of what it sees, the smallest is
-named."""
+Leaks are openings that show more than they should. A cell that sees several times as many cells as
+most do sees them through something: a window onto a courtyard, which is as intended, or an
+unintended gap under a wall. Among the openings between cells through which it sees at least half of
+what it sees, the smallest is named.
+"""
 
 from __future__ import annotations
 

@@ -8,7 +8,8 @@ links, pictures and measures.
 
 Its lightmaps are left out: the other clients have no light. What it may take is graphics memory
 for meshes and textures, that of the others is for textures alone. What is counted of levels of
-textures, or of cells, has no meaning here, and is NaN."""
+textures, or of cells, has no meaning here, and is NaN.
+"""
 
 from __future__ import annotations
 

@@ -6,7 +6,8 @@ clients' do (docs/design/walkthrough.md); images as they lie. In graphics memory
 bytes of its vertices and indices, a texture or lightmap four bytes a texel and a third for its mip
 levels, whatever its channel.
 
-The meshes of a campus as surfaces, and its textures with their mip levels."""
+The meshes of a campus as surfaces, and its textures with their mip levels.
+"""
 
 from __future__ import annotations
 

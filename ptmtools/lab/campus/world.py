@@ -16,7 +16,8 @@ fine one; and where it covers more, the pixel belongs to what is behind it and i
 of that. Nothing is there where nothing is hit: black, as in pictures of other clients.
 
 Where the full picture shows something and neither mesh does, or the other way round, meshes differ
-from the full picture's: that part of the error is in every run (`Tables.least`)."""
+from the full picture's: that part of the error is in every run (`Tables.least`).
+"""
 
 from __future__ import annotations
 

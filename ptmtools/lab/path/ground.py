@@ -16,7 +16,8 @@ the foot is on the one that is there, which a ray straight down tells, and of th
 
 An eye never goes through a surface. A body does where there is no other way: what the subdivision
 takes for detail, such as a chair, does not keep the walker from a room beyond. Such steps are
-dear."""
+dear.
+"""
 
 from __future__ import annotations
 

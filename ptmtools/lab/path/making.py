@@ -5,7 +5,8 @@ Where a walk begins: at a viewpoint, as a visitor's does.
 Places in leaves and portals, where eyes may be anywhere and there is no floor to go by: from the
 middle of each leaf to that of each portal, as near to the height of eyes as they go.
 
-A walk through what a database was built from."""
+A walk through what a database was built from.
+"""
 
 from __future__ import annotations
 

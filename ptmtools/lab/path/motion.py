@@ -11,7 +11,8 @@ long as the eye stays where eyes can be, nothing comes between neighbours, and t
 nothing that they did not touch before. What cannot move stays, so the way is at any moment one that
 can be walked. Fixed are the ends of legs and where a room is visited in passing.
 
-Tried and rejected: pulling the way tight like a string. It is shorter, and grazes each corner."""
+Tried and rejected: pulling the way tight like a string. It is shorter, and grazes each corner.
+"""
 
 from __future__ import annotations
 

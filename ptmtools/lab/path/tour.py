@@ -11,7 +11,8 @@ what the ray covers. So a painting of a megabyte counts for more than plaster of
 covers all walls. No ray counts for more than a screen can show.
 
 What was looked at is remembered by image and by where it hangs, in boxes of about a metre, so that
-the next stop is at another picture, of the same image or of another."""
+the next stop is at another picture, of the same image or of another.
+"""
 
 from __future__ import annotations
 

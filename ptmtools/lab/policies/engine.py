@@ -12,7 +12,8 @@ compresses on its way. The first cell's geometry does not wait for its record: a
 grey is worth 5 % of the error of 150 s at half a megabit a second, and nothing at 56 kbit/s.
 
 The item buffer that a client has at hand: one that it drew some frames ago, or, in a browser,
-the last that could be read back by then. It shows the geometry that was there as it was drawn."""
+the last that could be read back by then. It shows the geometry that was there as it was drawn.
+"""
 
 from __future__ import annotations
 

@@ -30,7 +30,8 @@ counts a fifth: any weight from a twentieth to one does about as well.
 `Screen`, with what lies around by distance and by need, half and half. Distance is right about what
 one may walk up to, need about what one sees from where one can stand, and how fine; together they
 take 3 % off either alone at half a megabit a second (benchmarks/RESULTS.md). Without need
-in the records, distance alone."""
+in the records, distance alone.
+"""
 
 from __future__ import annotations
 

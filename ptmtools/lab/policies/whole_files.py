@@ -23,7 +23,8 @@ given up. Where no image needs another step, nothing is asked for.
 Read in: the width of a ring (`RING`); of what is equal in all of that the nearest image comes
 first. Texture memory, which the paper has only as "one step less", is filled with steps in that
 same order, and a step that finds no room is not loaded either; what is left holds what is there
-besides, as seen last."""
+besides, as seen last.
+"""
 
 from __future__ import annotations
 

@@ -1,1 +1,24 @@
-"""What every stage's knobs buy: cost against error on the user's own scene."""
+"""The price of every stage's options: cost against error on the user's own scene.
+
+`EXPERIMENTS` is the table of experiments, under the names of their stages. To add one: an
+`Experiment`, a function that prepares it, and a line here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from ptmtools.lazy import Lazy
+from ptmtools.pipeline.stages import ACH, CELLS, PVS, TEXTURES
+
+if TYPE_CHECKING:
+    from ptmtools.lab.tradeoff.experiment import Experiment, Subject
+
+#: Stage → the function that prepares its experiment, in the order of the stages.
+EXPERIMENTS: dict[str, Lazy[Callable[[Subject], Experiment]]] = {
+    CELLS.name: Lazy("ptmtools.lab.tradeoff.stages:prepare_cells"),
+    PVS.name: Lazy("ptmtools.lab.tradeoff.stages:prepare_visibility"),
+    ACH.name: Lazy("ptmtools.lab.tradeoff.stages:prepare_coverage"),
+    TEXTURES.name: Lazy("ptmtools.lab.tradeoff.stages:prepare_textures"),
+}

@@ -1,13 +1,10 @@
-"""What a stage's knobs buy: cost against error on the user's own scene.
+"""Cost against error: the price and the effect of a stage's options on the user's own scene.
 
-A stage has an `Experiment`: which settings of its knobs are worth trying, what each costs, and
-how far its result is from a reference that does not depend on the knobs. What to make of that is
-the same for all: which settings no other beats (the Pareto front), how the error falls with the
-work (a fitted power), and which is the cheapest for a wanted error.
-
-The experiments, as a table under the names of their stages.
-
-To add one: a module with an `Experiment` and a function that prepares it, and a line here."""
+An `Experiment` of a stage lists the settings of its options that are worth a trial, runs each, and
+measures how far the result is from a reference that does not depend on the options. The evaluation
+is the same for all: the Pareto front of the settings, the fall of the error with the work (a fitted
+power), and the cheapest setting for a wanted error.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +15,6 @@ from dataclasses import dataclass, field
 from statistics import linear_regression
 from typing import TYPE_CHECKING, Any, Protocol
 
-from ptmtools.lazy import Lazy
-from ptmtools.pipeline.stages import ACH, CELLS, PVS, TEXTURES
 from ptmtools.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -192,12 +187,3 @@ class Subject:
         """The options of a stage's last run, or its defaults."""
         run = self.artifacts.before(stage)
         return self.artifacts.recorded(stage) if run else stage.options()
-
-
-#: Stage → the function that prepares its experiment, in the order of the stages.
-EXPERIMENTS: dict[str, Lazy[Callable[[Subject], Experiment]]] = {
-    CELLS.name: Lazy("ptmtools.lab.tradeoff.stages:prepare_cells"),
-    PVS.name: Lazy("ptmtools.lab.tradeoff.stages:prepare_visibility"),
-    ACH.name: Lazy("ptmtools.lab.tradeoff.stages:prepare"),
-    TEXTURES.name: Lazy("ptmtools.lab.tradeoff.stages:prepare_textures"),
-}

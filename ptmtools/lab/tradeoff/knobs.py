@@ -3,7 +3,8 @@
 A database built again with another option, in a folder of its own.
 
 What a setting costs is what all stages after the scene then take: those that the option concerns
-run again, and the others took what they take with the database's own options."""
+run again, and the others took what they take with the database's own options.
+"""
 
 from __future__ import annotations
 

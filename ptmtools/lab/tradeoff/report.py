@@ -2,7 +2,8 @@
 
 Error against cost, a panel for every stage; needs matplotlib (extra ``plot``).
 
-What knobs are worth to a walker, in words; the table of all settings below."""
+What knobs are worth to a walker, in words; the table of all settings below.
+"""
 
 from __future__ import annotations
 

@@ -1,25 +1,24 @@
-"""What the knobs of the subdivision buy.
+"""The experiments of the stages: settings that are worth a trial, and their errors.
 
-There is no right subdivision to compare with; what matters is that a client needs little of the
-building in memory. The error of a setting is the share of the building's volume that is potentially
+Subdivision.
+
+No subdivision is the right one to compare with; a good one needs little of the building in a
+client's memory. The error of a setting is the share of the building's volume that is potentially
 visible from a viewer's cell, on average over all places where the viewer may be.
 
-What the knobs of the coverage hints buy (see `experiment`).
+Coverage hints. The error of a setting is the total variation between its hints of a cell and those
+of a reference: more points than any setting, of an independent scramble, with rays. Some cells
+stand for all.
 
-The error of a setting is the total variation between its hints of a cell and those of a reference:
-more points than any setting, of an independent scramble, with rays. Some cells stand for all.
-
-What the profiles of the textures buy.
-
-All of them give the pixels back as exactly as was asked for (the profile raw always to the bit), so
-what matters is few bytes. The error of a setting is the bytes of all levels over those of the
+Textures. All profiles return the pixels as exactly as asked (the profile raw always to the bit), so
+few bytes are the aim. The error of a setting is the bytes of all levels over those of the
 uncompressed finest level.
 
-What the knobs of the visibility buy.
-
-The reference is the full search with a budget that hardly any portal exhausts. The error of a
-setting is its number of wrong pairs of cells over that of the right ones: pairs too many, or with
-sampled lines also missing ones, which is worse: a client that loads by such a set shows holes."""
+Visibility. The reference is the full search with a budget that hardly any portal exhausts. The
+error of a setting is its number of wrong pairs of cells over that of the right ones: pairs too
+many, or with sampled lines also missing ones, which is worse: a client that loads by such a set
+shows holes.
+"""
 
 from __future__ import annotations
 
@@ -111,7 +110,7 @@ GRID = (
 )
 
 
-def prepare(subject: Subject) -> CoverageTrade:
+def prepare_coverage(subject: Subject) -> CoverageTrade:
     """See `EXPERIMENTS`. Of the options what settings choose is left open."""
     options = replace(subject.options(ACH), samples=None, face=None, placement=None, tolerance=None)
     artifacts = subject.artifacts

@@ -9,7 +9,8 @@ The simplified mesh as a GLB of one primitive, and as an OBJ; and the GLB back.
 An octree texture back from its folder, or from the beginning of its stream.
 
 A folder may come from a stranger: the index is read by its schema and must not contradict itself,
-and sizes are held against what addresses allow before memory is taken for them."""
+and sizes are held against what addresses allow before memory is taken for them.
+"""
 
 from __future__ import annotations
 

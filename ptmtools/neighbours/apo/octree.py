@@ -20,7 +20,8 @@ The Morton code of a node interleaves the bits of its place: three bits a level,
 root's level first. In the order of codes siblings lie side by side, and so do all that is below a
 node: a range of sorted codes is a subtree.
 
-The nodes of an octree as texels, and back (docs/formats/apo.md; paper 2, §3.2)."""
+The nodes of an octree as texels, and back (docs/formats/apo.md; paper 2, §3.2).
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 """Options for the replacement of objects by octree textures; see
-`ptmtools.neighbours.apo.replacing`."""
+`ptmtools.neighbours.apo.replacing`.
+"""
 
 from __future__ import annotations
 

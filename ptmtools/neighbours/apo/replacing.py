@@ -12,7 +12,8 @@ What becomes of a scene when objects of it are replaced by meshes of fewer trian
 Each new triangle stands for one of the object's own, whose material and sides it has, and in whose
 place it comes: so what is decided by the order of the triangles stays as it was. The tolerances
 stay too. They are those of the model's coordinates, and a simplified mesh does not leave the box of
-its object."""
+its object.
+"""
 
 from __future__ import annotations
 

@@ -13,7 +13,8 @@ are farther apart, what lies between is not seen.
 From points of the simplified mesh to those of the source that they stand for (paper 2, §3.1).
 
 Rays go both ways along the normal; the nearest hit that faces the same way counts. A surface that
-faces away is the other side of something thin, or the far side of a hole, and is passed through."""
+faces away is the other side of something thin, or the far side of a hole, and is passed through.
+"""
 
 from __future__ import annotations
 

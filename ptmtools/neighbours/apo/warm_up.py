@@ -1,5 +1,6 @@
 """A small statue, made light and thrown away: compiles what octree textures and the simplification
-of plain and of painted meshes need."""
+of plain and of painted meshes need.
+"""
 
 from __future__ import annotations
 

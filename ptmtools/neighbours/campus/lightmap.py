@@ -21,7 +21,8 @@ object has it, and the others, which are seen from afar and loaded first, carry 
 them: at each vertex the value with which linear interpolation over the faces is nearest to the
 light at many points of them, in the least squares (Kavan, Bargteil and Sloan 2011). A value taken
 at the vertex itself would often lie in a corner, and blacken all of its faces. (Not done: an atlas
-for each mesh, which is three more files for an object of which a few hundred faces are seen.)"""
+for each mesh, which is three more files for an object of which a few hundred faces are seen.)
+"""
 
 from __future__ import annotations
 

@@ -12,7 +12,8 @@ two sides are close, more points are asked.
 (Tried: the lighter side of each face by itself, by 16 rays from its middle. Rays that end on
 something far away count nearly as if they escaped, so a hall of 20 m is lighter within than a court
 of 3 m, and a face whose middle lies behind a drainpipe has the other side than the wall around
-it.)"""
+it.)
+"""
 
 from __future__ import annotations
 

@@ -12,7 +12,8 @@ errors do not add up.
 (Tried: leaving out plane parts narrower than 1.5 times the error that have something larger behind
 them within it, and strips half as wide. The sample campus of 40 buildings then has 203,405 coarse
 faces instead of 471,454, but along its walk the picture is off by 3.57 instead of 2.75, with the
-preset Medium and no lightmaps: bars and sills are what one sees of a facade from afar.)"""
+preset Medium and no lightmaps: bars and sills are what one sees of a facade from afar.)
+"""
 
 from __future__ import annotations
 

@@ -13,7 +13,8 @@ How far an object is from a viewpoint, approximately (the paper's III, figure 4)
 
 From the barycentre of the object a segment leads to the viewpoint; the distance is from where it
 leaves the object's bounding box to the viewpoint, and 0 for a viewpoint in the box. It is never
-less than the distance to the box itself, and never more than that to the barycentre."""
+less than the distance to the box itself, and never more than that to the barycentre.
+"""
 
 from __future__ import annotations
 

@@ -13,7 +13,8 @@ half as light as a floor however high it stands, since half of its rays end on t
 Embree computes in float32. Its tree is built around the middle of the scene, and rays begin as far
 above a surface as the scene's tolerance for planes.
 
-Points spread over surfaces, the same every time."""
+Points spread over surfaces, the same every time.
+"""
 
 from __future__ import annotations
 

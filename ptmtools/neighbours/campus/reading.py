@@ -2,7 +2,8 @@
 
 What a campus weighs: by level of detail, by size and channel of textures, beside the paper's.
 
-What `ptm info` says of a campus."""
+What `ptm info` says of a campus.
+"""
 
 from __future__ import annotations
 

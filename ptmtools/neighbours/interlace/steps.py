@@ -17,7 +17,8 @@ a bilinear one, rings less than Lanczos, and needs only the four operations, whi
 alike everywhere: the same bytes on every machine.
 
 Colours are weighted by alpha, so that what a transparent texel holds does not bleed out of it.
-Samples count as they are stored: gamma is not undone, as GPUs do not either."""
+Samples count as they are stored: gamma is not undone, as GPUs do not either.
+"""
 
 from __future__ import annotations
 

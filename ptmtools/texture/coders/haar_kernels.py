@@ -9,7 +9,8 @@ The arithmetic is exact in 32-bit integers; the format is specified in ``docs/fo
 
 Allocating scratch arrays inside the pass was rejected: it added half to the time to compile it.
 
-Rows of blocks: from texels to Haar differences, and back to rows of texels."""
+Rows of texels become rows of Haar differences, and back.
+"""
 
 from __future__ import annotations
 

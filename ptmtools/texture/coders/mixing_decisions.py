@@ -6,18 +6,16 @@ contexts, each trained on its own error, their mean refined by an adaptive proba
 All of it in integers. The arithmetic coder is PAQ's carryless one with 32 bits and probabilities
 of 16.
 
-Compiled loop for noise: all blocks that have the parent as their mean are equally likely.
+For noise (`code_even`) all blocks that have the parent as their mean are equally likely. A model
+that adapts pays for the attempt to learn; without anything to learn, counting is shorter. The
+number of ways to complete a block gives the exact probability of each bit of its texels, in
+integers.
 
-A model that adapts pays for what it tries to learn; where there is nothing to learn, counting is
-shorter. The number of ways to complete a block gives the exact probability of each bit of its
-texels, in integers.
-
-Weighted recursive least squares, in batches: the texel predictor's weights.
-
-For each of the positions of a texel in its block, a linear model of the features f of a sample
-predicts its target y. The normal equations A = Σ ω f fᵀ, b = Σ ω f y forget 1/32 of the past with
-every batch of 16 samples and are solved anew after each, later after every other. The target is
-kept as the last of the 24 features: A and b are one matrix.
+The texel predictor's weights come from weighted recursive least squares, in batches. For each of
+the positions of a texel in its block, a linear model of the features f of a sample predicts its
+target y. The normal equations A = Σ ω f fᵀ, b = Σ ω f y forget 1/32 of the past with every batch of
+16 samples and are solved anew after each, later after every other. The target is kept as the last
+of the 24 features: A and b are one matrix.
 
 Why the bits cannot differ between machines: A holds integers below 2^53 in float64, sums and
 products of which are exact in any order. The elimination rounds, in a fixed order of operations
@@ -27,7 +25,8 @@ whether a processor is set to flush them. The weights are then rounded to multip
 all predictions made with them are integers.
 
 Rejected: a Cholesky factor (square roots, not smaller); updating A with every sample (twice the
-time: each row of A is loaded and stored sixteen times as often)."""
+time: each row of A is loaded and stored sixteen times as often).
+"""
 
 from __future__ import annotations
 

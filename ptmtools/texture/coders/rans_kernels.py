@@ -5,7 +5,8 @@ rANS (Duda, "Asymmetric numeral systems", arXiv:1311.2540), four states that tak
 a row of symbols at a time, whose tables are all known before; so four chains of table look-ups are
 under way at once.
 
-Compiled loops over frequency tables: normalised, chosen, written and read, and looked up in."""
+Frequency tables are normalised, chosen, written, read and looked up here, too.
+"""
 
 from __future__ import annotations
 

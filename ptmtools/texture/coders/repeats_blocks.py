@@ -1,11 +1,11 @@
-"""Blocks and texels that were seen before: where they are looked for, and which of them it is.
+"""Blocks and texels of the repeats coder: repeated ones, by the place of an earlier one, and new
+ones, as Haar differences, samples and remainders of a sum.
 
 A texel is one number of 32 bits; numbers are of 64, sums modulo 2^32. A block is its four texels
 p q r s.
 
-One symbol in either direction, by a table that is known only once the one before is.
-
-Blocks and texels that were not seen before: Haar differences, samples, remainders of a sum."""
+`symbol` codes one symbol in either direction, by a table that depends on the symbol before.
+"""
 
 from __future__ import annotations
 

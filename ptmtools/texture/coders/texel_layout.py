@@ -1,26 +1,23 @@
-"""What encoder and decoder of the texel coder agree on without sending it.
+"""Numbers of the texel coder that encoder and decoder share without sending them: the neighbours
+that predict a texel, the built-in weights and the built-in tables. They are part of the format.
 
-Which neighbours a texel is predicted from, the built-in weights and the built-in tables. The
-numbers are part of the format.
+An encoder may fit the predictors' weights to one group, the same on every machine: least squares
+over a sample of block rows, one system of ten to twelve unknowns for each plane and each of p, q,
+r, s. Each sample is divided by the spread of its neighbours first, so that smooth and rough parts,
+dark and bright ones weigh the same: the cost is bits, the logarithm of an error. The normal
+equations are sums of whole numbers and solved exactly (`group.fitted`).
 
-Weights of the texel coder's predictors, fitted to one group, the same on every machine.
-
-Least squares over a sample of block rows, one system of ten to twelve unknowns for each plane and
-each of p, q, r, s. Each sample is divided by the spread of its neighbours first, so that smooth and
-rough parts, dark and bright ones have the same say: what counts is bits, the logarithm of an error.
-The normal equations are sums of whole numbers and solved exactly (`coders.equations`).
-
-Beside the fitted weights stand those that continue drawn and computed images exactly (the texel
+The candidates include the weights that continue drawn and computed images exactly (the texel
 above, the one to the left, the plane through both): a depth map of 512² texels takes 44 kB with
 them, 98 kB without. On photographs they never win.
 
-Numbers in place of the values of a plane, where only some values occur.
-
-Each component of a group is numbered by itself. Mostly a value is its own number. Where all values
-lie on a lattice (8 bits widened to 16, halves widened to singles, constant alpha) they are counted
-along it; where they are few (palettes, 8 bits taken through a transfer function to floats) the
-sorted list of them is sent. Where most values have low bits that are 0 (singles that were halves or
-came from a Radiance file, and their means) it is said of each whether they are."""
+Where only some values occur in a plane, numbers replace them. Each component of a group is numbered
+by itself. Mostly a value is its own number. Where all values lie on a lattice (8 bits widened to
+16, halves widened to singles, constant alpha) they are counted along it; where they are few
+(palettes, 8 bits taken through a transfer function to floats) the sorted list of them is sent.
+Where most values have low bits that are 0 (singles that were halves or came from a Radiance file,
+and their means) a bit tells of each whether they are.
+"""
 
 from __future__ import annotations
 

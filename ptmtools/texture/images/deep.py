@@ -6,8 +6,9 @@ second byte of each. So a 16-bit PNG is unpacked twice, once for each half, in c
 without another library: 29 MB/s, where imagecodecs (libpng) reaches 50 and pypng, in pure Python,
 1.7.
 
-TIFF as it is written: one page, one strip for every few rows, deflated (TIFF 6.0; Adobe's
-technical note on deflate, compression 8). Pillow writes only some kinds of samples."""
+TIFFs are written as one page, one strip for every few rows, deflated (TIFF 6.0; Adobe's
+technical note on deflate, compression 8). Pillow writes only some kinds of samples.
+"""
 
 from __future__ import annotations
 

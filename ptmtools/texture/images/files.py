@@ -1,6 +1,8 @@
-"""Which reader an image file gets, by its first bytes.
+"""Reads and writes image files.
 
-Texels into image files; the suffix decides which, and only what is exact is written."""
+The first bytes of a file choose its reader. The suffix chooses the writer, and a format that cannot
+hold the texels exactly is refused.
+"""
 
 from __future__ import annotations
 

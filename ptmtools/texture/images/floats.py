@@ -1,15 +1,16 @@
-"""Radiance pictures (.hdr): RGB floats that share an exponent, four bytes a texel.
+"""Images of floats: Radiance, OpenEXR and numpy.
 
-The file format is that of Greg Ward, "The RADIANCE Picture File Format": text lines, an empty one,
+Radiance pictures (.hdr) have RGB floats that share an exponent, four bytes a texel. The format is
+that of Greg Ward, "The RADIANCE Picture File Format": text lines, an empty one,
 the size, then scanlines; each is plain, or begins with 2, 2 and its length and has the four bytes
 of its texels apart, run-length coded. A component is mantissa · 2^(exponent - 136), which a
 float32 holds exactly. (Some readers add half a unit to the mantissa. This one does not, like most:
 it would make 0 of no value and the means of levels no better.) EXPOSURE and COLORCORR lines are
 not applied.
 
-OpenEXR files, through the library of that name (an optional component).
-
-numpy's `.npy`, of which the head is judged before any memory is taken for the texels."""
+OpenEXR files need the library of that name, an optional component. The head of a `.npy` is checked
+before memory is taken for the texels.
+"""
 
 from __future__ import annotations
 

@@ -1,12 +1,12 @@
-"""Image files opened by Pillow, each with the one plug-in that its first bytes name.
+"""Opens image files by Pillow, each with the one plug-in that its first bytes name, and reads those
+of 8 bits a component or less.
 
 `PIL.Image.open` would import all plug-ins for it, and refuses by a number of texels that is a
-variable of the whole process; what is refused here follows from `ptmtools.texture.Limits`.
-
-Images of 8 bits a component or less, through Pillow.
+variable of the whole process; the limits here come from `ptmtools.texture.Limits`.
 
 Pillow keeps RGB in four bytes a texel. A second copy, as numpy wants it, is made a strip at a time
-only, so that an image of 16,384² RGB takes 1.3 times its raw size."""
+only, so that an image of 16,384² RGB takes 1.3 times its raw size.
+"""
 
 from __future__ import annotations
 

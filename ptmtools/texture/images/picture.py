@@ -1,6 +1,6 @@
-"""An image as it was read: its rows, and what its file says of them.
+"""An image as read, its rows and description, and the size that its file declares.
 
-What an image file declares of its size, read before a decoder takes memory or time for it.
+The declared size is checked before a decoder takes memory or time.
 
 Pillow's plug-ins give the size of most formats before they unpack anything. The exceptions:
 
@@ -9,7 +9,8 @@ Pillow's plug-ins give the size of most formats before they unpack anything. The
   9649, sections 2.5 to 2.7).
 - JPEG: every scan of a progressive file goes over the whole image, and may take a few bytes to say
   nothing (ITU T.81, B.2.1): a file of 1 MB can hold days of them.
-- TIFF: a tile has a size of its own, and a buffer is taken for it (TIFF 6.0, section 15)."""
+- TIFF: a tile has a size of its own, and a buffer is taken for it (TIFF 6.0, section 15).
+"""
 
 from __future__ import annotations
 
