@@ -53,15 +53,15 @@ class Cluster(Executor):
 
     Raises
     ------
-    MissingComponentError: PTM-M700 Dask is not installed.
-    WorkerError: PTM-W001 the scheduler cannot be reached, PTM-W002 it has no workers, PTM-W003
-        they have other software than this process.
+    MissingComponentError: PTM-M100 Dask is not installed.
+    WorkerError: PTM-W001 the scheduler cannot be reached or has no workers, PTM-W003 they have
+        other software than this process.
     """
 
     remote = True
 
     def __init__(self, address: str, workers: int = 0) -> None:
-        component("distributed", "PTM-M700", "a cluster needs Dask", "cluster")
+        component("distributed", "PTM-M100", "a cluster needs Dask", "cluster")
         from distributed import Client
 
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # raised below instead
@@ -191,7 +191,7 @@ class Cluster(Executor):
             self._client.wait_for_workers(1, timeout=PATIENCE)
         except TimeoutError as fault:
             raise WorkerError(
-                "PTM-W002",
+                "PTM-W001",
                 "the scheduler has no workers",
                 file=self.address,
                 remedy=f"start some: dask worker {self.address}",

@@ -7,20 +7,42 @@ long stages. Other notes are counted, and listed on request.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+#: A word with a digit in it, such as a size or the name of a file.
+_NUMBERED = re.compile(r"\S*\d\S*")
 #: Characters of a place or message.
 _LONGEST = 300
 
 Severity = Literal["error", "warning"]
 
+#: The meaning of PTM-D713, in databases and in folders.
+TOO_LARGE: tuple[Severity, str] = (
+    "warning",
+    "a file is too large for --limit: only its checksum was checked",
+)
+#: Findings in the folders of `ptm interlace`, `ptm apo` and `ptm campus`: code → severity and
+#: meaning. docs/formats/codes.md repeats this table.
+FOLDER_CODES: dict[str, tuple[Severity, str]] = {
+    "PTM-D713": TOO_LARGE,
+    "PTM-D800": (
+        "error",
+        "the index cannot be read, does not match its schema or contradicts itself",
+    ),
+    "PTM-D803": ("error", "a file that the index lists is missing or cannot be read"),
+    "PTM-D804": ("error", "a file is damaged, or not the file that the index describes"),
+    "PTM-D806": ("warning", "a file or a texture that the index does not use"),
+    "PTM-D808": ("warning", "an image is split otherwise than its minimum asks for"),
+}
+
 
 @dataclass(frozen=True)
 class Issue:
-    """One finding of a validation; the codes stand in docs/formats/database.md.
+    """One finding of a validation; the codes stand in docs/formats/codes.md.
 
     Attributes
     ----------
@@ -85,18 +107,20 @@ class ValidationReport:
 
 
 class Findings:
-    """Gathers issues: the first few of one code in a file one by one, the others as a count.
+    """Gathers issues: the first few alike in a file one by one, the others as a count. Issues are
+    alike if they have one code and, numbers aside, one message.
 
     Messages may quote damaged files, so they are made printable and cut.
     """
 
-    #: Issues of one code kept one by one, per file.
-    MOST = 5
+    #: Issues of one message kept one by one, per file; and issues of one code.
+    MOST, MOST_OF_CODE = 5, 20
 
     def __init__(self, codes: Mapping[str, tuple[Severity, str]]) -> None:
         """``codes``: code → its severity and meaning."""
         self._codes = codes
         self._issues: dict[tuple[str, str], list[Issue]] = {}
+        self._alike: Counter[tuple[str, str, str]] = Counter()
         self._more: Counter[tuple[str, str]] = Counter()
         #: Severities of the issues, some of which have codes of other checks.
         self._severity: dict[str, Severity] = {}
@@ -116,7 +140,13 @@ class Findings:
             key = (issue.file, issue.code)
             self._severity[issue.code] = issue.severity
             kept = self._issues.setdefault(key, [])
-            if len(kept) < self.MOST and issue.count == 1:
+            alike = (*key, _NUMBERED.sub("", issue.message))
+            if (
+                issue.count == 1
+                and self._alike[alike] < self.MOST
+                and len(kept) < self.MOST_OF_CODE
+            ):
+                self._alike[alike] += 1
                 kept.append(issue)
             else:
                 self._more[key] += issue.count

@@ -1,7 +1,8 @@
 """The error tree: every failure that a user can cause, with a stable code and an exit status.
 
 The command prints one line, ``ptm: FILE: PLACE: what is wrong: remedy [CODE]``, and exits with
-the status of the error's class. Codes never change their meaning; new ones are appended.
+the status of the error's class. Codes never change their meaning. A code stands for a kind of
+failure that a program or a page of the docs tells apart; the message names the case.
 
 ========  ======================================================================
 status    meaning
@@ -45,7 +46,7 @@ class PtmError(Exception):
 
     Parameters
     ----------
-    code: stable identifier such as ``"PTM-I001"``.
+    code: stable identifier such as ``"PTM-I101"``.
     message: what is wrong, one line, no trailing full stop.
     file: the file in question, if there is one.
     place: where in the file ("line 12", "level 3", "byte 40"), if known.

@@ -46,7 +46,7 @@ def read_trace(path: str | PathLike[str]) -> Trace:
     Raises
     ------
     InputError: PTM-I710 it is no trace: not as the schema says, or nothing ever gets through.
-    LimitError: PTM-L710 it is larger than `LARGEST`.
+    LimitError: PTM-L204 it is larger than `LARGEST`.
     OSError: it cannot be read.
     """
     with open_regular(path) as file:
@@ -54,7 +54,7 @@ def read_trace(path: str | PathLike[str]) -> Trace:
     with naming(path):
         if len(data) > LARGEST << 20:
             raise LimitError(
-                "PTM-L710", f"more than {LARGEST} MiB", remedy="give a shorter trace: it repeats"
+                "PTM-L204", f"more than {LARGEST} MiB", remedy="give a shorter trace: it repeats"
             )
         try:
             if str(path).lower().endswith(".csv"):
@@ -129,7 +129,7 @@ class Conditions:
         the sum of the latencies.
     seed: of the random losses.
 
-    Raises InputError PTM-I711 for an invalid value.
+    Raises InputError PTM-I111 for an invalid value.
     """
 
     bandwidth: float | None = None
@@ -154,5 +154,5 @@ class Conditions:
             wrong = f"{self.connections} connections"
         if wrong:
             raise InputError(
-                "PTM-I711", f"no link has {wrong}", remedy="leave it out for its default"
+                "PTM-I111", f"no link has {wrong}", remedy="leave it out for its default"
             )

@@ -90,9 +90,9 @@ def open_executor(workers: int = 0, scheduler: str | None = None) -> Executor:
 
     Raises
     ------
-    MissingComponentError: PTM-M700 Dask is not installed.
-    WorkerError: PTM-W001 the scheduler cannot be reached, PTM-W002 it has no workers, PTM-W003
-        they have other software than this process.
+    MissingComponentError: PTM-M100 Dask is not installed.
+    WorkerError: PTM-W001 the scheduler cannot be reached or has no workers, PTM-W003 they have
+        other software than this process.
     """
     if scheduler is not None:
         from ptmtools.cluster import Cluster

@@ -36,7 +36,7 @@ def count(number: int, one: str, many: str | None = None) -> str:
 def parse_bandwidth(text: str) -> int | None:
     """bit/s in ``56k``, ``4M``, ``9600`` (powers of ten); None for ``inf``, no limit.
 
-    Raises InputError PTM-I712 for anything else, and for less than 1 bit/s.
+    Raises InputError PTM-I111 for anything else, and for less than 1 bit/s.
     """
     if text.strip() == "inf":
         return None
@@ -47,7 +47,7 @@ def parse_bandwidth(text: str) -> int | None:
 
 
 def parse_duration(text: str) -> float:
-    """Seconds in ``100ms``, ``0.1s``, ``0.1``; InputError PTM-I712 for anything else."""
+    """Seconds in ``100ms``, ``0.1s``, ``0.1``; InputError PTM-I111 for anything else."""
     seconds = _quantity(text, _SECONDS)
     if seconds is None:
         raise _refused(text, "duration", "seconds or milliseconds, such as 0.1 or 100ms")
@@ -73,7 +73,7 @@ class MemorySize:
 def parse_memory(text: str) -> MemorySize:
     """What ``4MiB`` (2²² B), ``4MB`` (4·10⁶ B), ``4096``, ``10%`` or ``inf`` stands for.
 
-    Raises InputError PTM-I712 for anything else, and for nothing at all.
+    Raises InputError PTM-I111 for anything else, and for nothing at all.
     """
     text = text.strip()
     if text == "inf":
@@ -95,4 +95,4 @@ def _quantity(text: str, units: Mapping[str, int | Fraction]) -> Fraction | None
 
 
 def _refused(text: str, what: str, remedy: str) -> InputError:
-    return InputError("PTM-I712", f"{text[:40]!r} is no {what}", remedy=f"give {remedy}")
+    return InputError("PTM-I111", f"{text[:40]!r} is no {what}", remedy=f"give {remedy}")

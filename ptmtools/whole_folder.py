@@ -40,7 +40,7 @@ class FolderForm:
         """Whether a folder may be written: nothing is there, or nothing in it, or with ``force``
         one of this form.
 
-        Raises OutputError: PTM-O001 it is there already; PTM-O820 it is something else; PTM-O821 it
+        Raises OutputError: PTM-O001 it is there already; PTM-O010 it is something else, or
         holds other files too; PTM-O002 it cannot be looked into.
         """
         with writing(folder):
@@ -50,7 +50,7 @@ class FolderForm:
                 return
             if not target.is_dir() or not self._is_ours(target / self.index):
                 raise OutputError(
-                    "PTM-O820",
+                    "PTM-O010",
                     f"is not a folder that `{self.command}` wrote, and was not changed",
                     file=folder,
                     remedy="name another with -o; --force does not replace it either",
@@ -58,7 +58,7 @@ class FolderForm:
             strange = next((n for n, plain in _paths(target) if not (plain and self.owns(n))), None)
             if strange is not None:
                 raise OutputError(
-                    "PTM-O821",
+                    "PTM-O010",
                     f"holds {strange[:80]}, which `{self.command}` did not write; nothing was "
                     "changed",
                     file=folder,

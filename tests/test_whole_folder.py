@@ -71,11 +71,11 @@ def test_what_is_not_ours_stays(folder: Path) -> None:
     for strange in ("mine.txt", "empty/"):
         path = folder / strange
         path.mkdir() if strange.endswith("/") else path.write_text("mine")
-        with pytest.raises(OutputError, match="PTM-O821"):
+        with pytest.raises(OutputError, match="PTM-O010"):
             FORM.write(folder, files(b"after"), force=True)
         path.rmdir() if strange.endswith("/") else path.unlink()
     (folder / "index.json").write_text('{"format": "another"}')
-    with pytest.raises(OutputError, match="PTM-O820"):
+    with pytest.raises(OutputError, match="PTM-O010"):
         FORM.write(folder, files(b"after"), force=True)
     assert held(folder) == b"before"
 

@@ -466,7 +466,7 @@ class Messages:
         )
         images = {0: messages.NamedImage("wall.png", "/a")}
         findings = Findings(self._model)
-        findings.note("PTM-N224", "left out", "/b")
+        findings.note("PTM-N215", "left out", "/b")
         self._answer = messages.pack_source(source, images, findings, str(self._scratch))
         self._arrays = (self._scratch / "source.npz").read_bytes()
         self._messages = messages

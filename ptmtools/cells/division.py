@@ -107,7 +107,7 @@ def divide(
 
     Raises
     ------
-    InputError: PTM-I301 if a viewpoint lies outside the box.
+    InputError: PTM-I111 if a viewpoint lies outside the box.
     """
     with counting() as undecided:
         space = _divided(building, root, progress, inside)
@@ -183,7 +183,7 @@ def _viewpoint_leaves(tree: Tree, box: Floats, options: SubdivideOptions) -> tup
     if len(outside):
         x, y, z = places[outside[0]]
         raise InputError(
-            "PTM-I301",
+            "PTM-I111",
             f"viewpoint {x:g},{y:g},{z:g} lies outside the model, which spans "
             + " to ".join(",".join(f"{c:.2f}" for c in corner) for corner in box),
             remedy="viewpoints are in metres, Y up, with the middle of the floor at 0,0,0",

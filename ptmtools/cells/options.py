@@ -51,7 +51,7 @@ GIANT = 1e9
 class SubdivideOptions:
     """Options of `ptmtools.cells.subdivide`.
 
-    Raises InputError PTM-I300 for values out of range.
+    Raises InputError PTM-I111 for values out of range.
     """
 
     heading: ClassVar[str] = "Cells"
@@ -166,4 +166,4 @@ class SubdivideOptions:
             (self.max_leaves >= 1, f"at most {self.max_leaves} leaves is too few", "try 500"),
         ):
             if not sound:
-                raise InputError("PTM-I300", fault, remedy=remedy)
+                raise InputError("PTM-I111", fault, remedy=remedy)

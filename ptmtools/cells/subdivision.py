@@ -116,9 +116,9 @@ def subdivide(
 
     Raises
     ------
-    InputError: PTM-I300 if an option is out of range, PTM-I301 if a viewpoint lies in no leaf,
-        PTM-I302 if a name pattern matches nothing, PTM-I303 if the scene is a single triangle,
-        PTM-I304 if nothing of it would be seen, PTM-I305 if much is left out and must not be.
+    InputError: PTM-I111 if an option is out of range or a viewpoint lies in no leaf, PTM-I302
+        if a name pattern matches nothing, PTM-I247 if the scene is a single triangle, PTM-I304 if
+        nothing of it would be seen, PTM-I305 if much is left out and must not be.
     """
     options = options or SubdivideOptions()
     _check(scene, options)
@@ -181,7 +181,7 @@ def _subdivided(
 def _check(scene: Scene, options: SubdivideOptions) -> None:
     if len(scene.triangles) < 2:
         raise InputError(
-            "PTM-I303",
+            "PTM-I247",
             "a single triangle is not a room",
             remedy="give a model with floors and walls",
         )

@@ -41,7 +41,7 @@ def expanded(names: Iterable[str], suffixes: Sequence[str]) -> list[str]:
     """The files of patterns, which are expanded as by a shell (``**`` is any folder) unless a file
     has that very name; of folders, their files with one of the ``suffixes``; other names unchanged.
 
-    Raises InputError PTM-I128 for a folder without such files.
+    Raises InputError PTM-I120 for a folder without such files.
     """
     files: list[str] = []
     for name in names:
@@ -53,7 +53,7 @@ def expanded(names: Iterable[str], suffixes: Sequence[str]) -> list[str]:
             )
             if not inside:
                 raise InputError(
-                    "PTM-I128",
+                    "PTM-I120",
                     "is a folder without such files",
                     file=name,
                     remedy=f"their names end with {', '.join(suffixes)}",
@@ -144,7 +144,7 @@ def jobs_for(
     one of ``suffixes``. Sources whose results would have the same name become one job with a
     fault.
 
-    Raises click.UsageError; InputError PTM-I128.
+    Raises click.UsageError; InputError PTM-I120.
     """
     sources = expanded(given, inside)
     if output == "":
@@ -231,7 +231,7 @@ def _apart(targets: dict[str, Path], folder: Path | None) -> list[Job]:
         if len({os.path.realpath(name) for name in names}) > 1:
             both = "both" if len(names) == 2 else "all"
             fault = OutputError(
-                "PTM-O103",
+                "PTM-O101",
                 f"{', '.join(names[:-1])} and {names[-1]} would {both} be written to this file",
                 file=target,
                 remedy="name one of them alone, or write them into different folders",

@@ -24,14 +24,14 @@ from ptmtools.cli.parameters import (
     take,
     with_console,
 )
-from ptmtools.diagnostics import ValidationReport
+from ptmtools.diagnostics import FOLDER_CODES, ValidationReport
 from ptmtools.errors import CheckError
 from ptmtools.output import PlotOptions
 from ptmtools.output.validation.findings import NOT_BUILT, SEEN_BY_BUILD
 from ptmtools.pipeline import Artifacts, shoot_segments, validate as check
 from ptmtools.pipeline.command import build_command, open_database
 from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS
-from ptmtools.pipeline.validation import FOLDERS, kind_of
+from ptmtools.pipeline.validation import kind_of
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Limits
 from ptmtools.visibility import SegmentReport
@@ -44,9 +44,7 @@ def _print_codes(context: click.Context, option: click.Option, asked: bool) -> N
     if asked:
         from ptmtools.output.validation.findings import CODES
 
-        tables = (CODES, *(kind.codes.load() for kind in FOLDERS.values()))
-        every = {code: entry for table in tables for code, entry in table.items()}
-        for code, (severity, meaning) in sorted(every.items()):
+        for code, (severity, meaning) in sorted({**CODES, **FOLDER_CODES}.items()):
             click.echo(f"{code}  {severity:<7}  {meaning}")
         context.exit()
 

@@ -184,7 +184,7 @@ def describe(fault: BaseException) -> tuple[int, str]:
         case OSError(errno=int()):
             return (
                 3,
-                f"{_file_of(fault)}{fault.strerror}; check the path and its permissions [PTM-I099]",
+                f"{_file_of(fault)}{fault.strerror}; check the path and its permissions [PTM-I122]",
             )
         case SystemExit():
             return fault.code if isinstance(fault.code, int) else INTERNAL, ""

@@ -382,7 +382,7 @@ def _new_walks(db: str, seeds: tuple[int, ...]) -> dict[str, Walk]:
     """New walks through a database, by name."""
     if (Path(db) / HINTS).exists():
         raise InputError(
-            "PTM-I702",
+            "PTM-I701",
             "is a served folder, which does not record the walkable floor",
             file=db,
             remedy="give a walk with --walk FILE, or the database that the folder belongs to",

@@ -108,9 +108,9 @@ def octree_line(folder: str, record: dict[str, Any]) -> str:
 
 
 def check_picture(output: str, *, force: bool) -> None:
-    """Raises OutputError: PTM-O102 it is not a PNG; PTM-O001, O002 it cannot be written."""
+    """Raises OutputError: PTM-O101 it is not a PNG; PTM-O001, O002 it cannot be written."""
     if Path(output).suffix.lower() != ".png":
-        raise OutputError("PTM-O102", "is not a PNG", file=output, remedy="name it .png")
+        raise OutputError("PTM-O101", "is not a PNG", file=output, remedy="name it .png")
     check_writable(output, force=force)
 
 

@@ -82,7 +82,7 @@ def compute_ach(
     few edge pixels. Where a backend draws `in_processes`, cells are tasks of their own; otherwise
     this process draws them all.
 
-    Raises `InputError` PTM-I501 if the three inputs do not belong together, and
+    Raises `InputError` PTM-I400 if the three inputs do not belong together, and
     `MissingComponentError` PTM-M500 if the gl backend is asked for and there is no OpenGL.
     """
     _check(scene, cells, pvs)
@@ -136,7 +136,7 @@ def _gathered(cells: list[CellHints], sampler: Sampler) -> Ach:
 
 
 def _check(scene: Scene, cells: Cells, pvs: Pvs) -> None:
-    """Raises `InputError` PTM-I501 unless the three belong together."""
+    """Raises `InputError` PTM-I400 unless the three belong together."""
     source = cells.triangle_source
     if pvs.cell_count != cells.cell_count:
         wrong = f"the PVS has {pvs.cell_count} cells, the subdivision {cells.cell_count}"
@@ -144,4 +144,4 @@ def _check(scene: Scene, cells: Cells, pvs: Pvs) -> None:
         wrong = f"the subdivision cuts triangle {int(source.max())} of {len(scene.triangles)}"
     else:
         return
-    raise InputError("PTM-I501", wrong, remedy="compute both from the same scene again")
+    raise InputError("PTM-I400", wrong, remedy="compute both from the same scene again")

@@ -80,7 +80,7 @@ class AchOptions:
     )
 
     def __post_init__(self) -> None:
-        """Raises `InputError` PTM-I500 for a value out of range."""
+        """Raises `InputError` PTM-I111 for a value out of range."""
         for name, choice, known in (
             ("preset", self.preset, PRESETS),
             ("backend", self.backend, CHOICES),
@@ -140,4 +140,4 @@ class AchOptions:
 
 
 def _refused(problem: str, remedy: str) -> InputError:
-    return InputError("PTM-I500", problem, remedy=remedy)
+    return InputError("PTM-I111", problem, remedy=remedy)

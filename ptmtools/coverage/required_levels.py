@@ -99,7 +99,7 @@ def compute_need(
     """The need of all cells, from ``points`` sample points each; ``sizes`` of the images that have
     a texture. Equal input gives equal results.
 
-    Raises InputError PTM-I500 for a number of points that makes no sense.
+    Raises InputError PTM-I111 for a number of points that makes no sense.
     """
     options = AchOptions(
         samples=points, face=FACE, backend="embree", weighting="solid-angle", placement="sobol"

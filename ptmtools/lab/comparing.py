@@ -26,8 +26,8 @@ from ptmtools.quantities import MemorySize, parse_bandwidth, parse_duration, par
 class SimulateOptions:
     """Options of `play`.
 
-    Raises InputError: PTM-I701 a policy shows relief without ``lit``, or a campus with it; PTM-I711
-    an impossible link; PTM-I712 an unreadable quantity.
+    Raises InputError: PTM-I701 a policy shows relief without ``lit``, or a campus with it; PTM-I111
+    an impossible link or an unreadable quantity.
     """
 
     heading: ClassVar[str] = "Clients and link"
@@ -96,12 +96,12 @@ class SimulateOptions:
 
     @property
     def memories(self) -> list[MemorySize]:
-        """In the order given; raises InputError PTM-I712."""
+        """In the order given; raises InputError PTM-I111."""
         return [parse_memory(part) for part in _parts(self.memory)]
 
     def links(self, trace: Trace | None = None) -> list[Conditions]:
         """A link for each bandwidth, however it is written, all as the trace says; raises
-        InputError PTM-I711, I712."""
+        InputError PTM-I111."""
         latency = parse_duration(self.latency)
         bandwidths = dict.fromkeys(parse_bandwidth(part) for part in _parts(self.bandwidth))
         return [
@@ -183,9 +183,8 @@ def play(
     Raises
     ------
     KeyError: a policy is of a campus, and a walk has none.
-    InputError: PTM-I701 a policy's hints, or the textures in its form, are not there; PTM-I711,
-        PTM-I712.
-    MissingComponentError: PTM-M702 with ``flip``, without flip-evaluator.
+    InputError: PTM-I701 a policy's hints, or the textures in its form, are not there; PTM-I111.
+    MissingComponentError: PTM-M100 with ``flip``, without flip-evaluator.
     """
     own = [policy.configured(policy_options) for policy in options.policies]
     policies: list[Declared | CampusPolicy] = [*own, *options.campus_policies]

@@ -34,7 +34,7 @@ _SKY, _AMBIENT = (0.16 * 255, 0.17 * 255, 0.19 * 255), 0.25
 
 @dataclass(frozen=True)
 class ViewOptions:
-    """Options of `draw_view`. Raises InputError PTM-I860 for values out of range."""
+    """Options of `draw_view`. Raises InputError PTM-I111 for values out of range."""
 
     heading: ClassVar[str] = "View"
 
@@ -97,7 +97,7 @@ class Eye:
 
 
 def eye_of(served: Served, options: ViewOptions) -> Eye:
-    """The eye that the options name. Raises InputError PTM-I860 if there is no such viewpoint."""
+    """The eye that the options name. Raises InputError PTM-I111 if there is no such viewpoint."""
     angle = FIELD_OF_VIEW
     if options.eye:
         position = np.array(options.eye[:3], dtype=np.float64)
@@ -107,7 +107,7 @@ def eye_of(served: Served, options: ViewOptions) -> Eye:
         rows, number = served.index["viewpoints"], options.viewpoint or 0
         if not 0 <= number < len(rows):
             raise InputError(
-                "PTM-I860",
+                "PTM-I111",
                 f"has no viewpoint {number}",
                 file=served.folder,
                 remedy=f"give 0 to {len(rows) - 1}, or --eye" if rows else "give --eye",
@@ -131,7 +131,7 @@ def draw_view(
 
     Raises
     ------
-    InputError: PTM-I860 there is no such viewpoint.
+    InputError: PTM-I111 there is no such viewpoint.
     DatabaseError, LimitError: those of `read_pyramids` and `read_octrees`.
     """
     from ptmtools.lab.relief.octrees import read_octrees
@@ -194,4 +194,4 @@ def _shade_plain(sight: Sight, triangles: Triangles, shown: Floats) -> None:
 
 
 def _refused(problem: str, remedy: str | None = None) -> InputError:
-    return InputError("PTM-I860", problem, remedy=remedy)
+    return InputError("PTM-I111", problem, remedy=remedy)

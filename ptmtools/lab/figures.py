@@ -34,14 +34,14 @@ COLORS = ("#1b6ca8", "#d1603d", "#5a9367", "#8d6a9f", "#b08d2e", "#5b6770", "#c2
 
 
 def require() -> None:
-    """Raises `MissingComponentError` PTM-M701 without matplotlib."""
-    component("matplotlib.figure", "PTM-M701", "matplotlib is missing", "plot")
+    """Raises `MissingComponentError` PTM-M100 without matplotlib."""
+    component("matplotlib.figure", "PTM-M100", "matplotlib is missing", "plot")
 
 
 def picture(played: Sequence[Played], measure: str = "e") -> bytes:
     """A PNG of one of `MEASURES`, on the first walk; what the viewpoint stands through is shaded.
 
-    Raises `MissingComponentError` PTM-M701 without matplotlib.
+    Raises `MissingComponentError` PTM-M100 without matplotlib.
     """
     require()
     from matplotlib.backends.backend_agg import FigureCanvasAgg

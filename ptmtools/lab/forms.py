@@ -121,7 +121,7 @@ def interlaced_columns(served: Served, paper: bool) -> Columns:
 def shows(served: Served, own: Pyramids, progress: Progress) -> Shows:
     """See `Form.shows`: of each column the image that its files make, and its mip levels.
 
-    Raises DatabaseError: as `columns`, and of the files. LimitError: PTM-L821, L823.
+    Raises DatabaseError: as `columns`, and of the files. LimitError: PTM-L104, L204.
     """
     count = len(served.index["textures"])
     chains: list[list[NDArray[np.uint8]]] = []
@@ -208,5 +208,5 @@ def _manifest(served: Served, texture: int) -> tuple[Path, Interlaced]:
 
 
 def _damaged(fault: InputError | LimitError) -> DatabaseError:
-    code = "PTM-D005" if fault.code in ("PTM-I820", "PTM-I824") else "PTM-D006"
+    code = "PTM-D005" if fault.code in ("PTM-I120", "PTM-I122") else "PTM-D006"
     return DatabaseError(code, fault.message, file=fault.file, place=fault.place, remedy=_AGAIN)

@@ -134,8 +134,8 @@ _SAMPLES = 3
 
 
 def require() -> None:
-    """Raises `MissingComponentError` PTM-M702 without flip-evaluator."""
-    component("flip_evaluator", "PTM-M702", "flip-evaluator is missing", "measures")
+    """Raises `MissingComponentError` PTM-M100 without flip-evaluator."""
+    component("flip_evaluator", "PTM-M100", "flip-evaluator is missing", "measures")
 
 
 class Flip:

@@ -77,7 +77,7 @@ class Browser:
     age: (n,) s of the item buffer that was at hand, -1 for none.
     sent: when a request that is made goes out. taken: when what has come is taken.
 
-    Raises InputError PTM-I807 for what no browser says.
+    Raises InputError PTM-I801 for what no browser says.
     """
 
     begun: float
@@ -100,16 +100,16 @@ class Browser:
         elif len(self.geometry_bytes) != cells or not -1 <= least <= most < cells:
             wrong = f"a cell that is none of {cells}"
         if wrong:
-            raise InputError("PTM-I807", f"the recording of a browser has {wrong}")
+            raise InputError("PTM-I801", f"the recording of a browser has {wrong}")
 
 
 def browser_of(recorded: Mapping[str, Any], time: Floats) -> Browser:
     """What a document of a walk with samples at (n,) seconds says, as its schema has it; raises
-    InputError PTM-I807."""
+    InputError PTM-I801."""
     samples = len(time)
     if len(recorded["frames"]) != samples:
         raise InputError(
-            "PTM-I807", f"the recording of a browser has {len(recorded['frames'])} frames, "
+            "PTM-I801", f"the recording of a browser has {len(recorded['frames'])} frames, "
             f"and {samples} samples",
         )  # fmt: skip
     frames = np.array(recorded["frames"], dtype=np.float64).reshape(-1, 3)
@@ -172,9 +172,9 @@ class Walk:
 
     Raises
     ------
-    InputError: PTM-I802 a number is not finite, or the arrays do not fit together; PTM-I803 fewer
-        than two samples; PTM-I804 times do not increase from 0; PTM-I805 a direction is no unit
-        vector (up to 1e-3 it is put right); PTM-I806 field of view or aspect are out of range.
+    InputError: PTM-I801 a number is not finite, the arrays do not fit together, there are fewer
+        than two samples, times do not increase from 0, a direction is no unit vector (up to 1e-3 it
+        is put right), or field of view or aspect are out of range.
     """
 
     time: Floats
@@ -187,25 +187,25 @@ class Walk:
     def __post_init__(self) -> None:
         count = len(self.time)
         if self.eye.shape != (count, 3) or self.direction.shape != (count, 3):
-            raise InputError("PTM-I802", "times, eyes and directions do not fit together")
+            raise InputError("PTM-I801", "times, eyes and directions do not fit together")
         rows = np.column_stack([self.time, self.eye, self.direction])
-        _refuse(~np.isfinite(rows).all(axis=1), "PTM-I802", "a number is not finite")
+        _refuse(~np.isfinite(rows).all(axis=1), "PTM-I801", "a number is not finite")
         if count < 2:
-            raise InputError("PTM-I803", f"a walk of {count} samples", remedy="record at least two")
+            raise InputError("PTM-I801", f"a walk of {count} samples", remedy="record at least two")
         early = np.diff(self.time, prepend=-1.0) <= 0
         early[0] = self.time[0] != 0
-        _refuse(early, "PTM-I804", "times do not increase from 0")
+        _refuse(early, "PTM-I801", "times do not increase from 0")
         length = np.linalg.norm(self.direction, axis=1)
-        _refuse(abs(length - 1) > _NEARLY, "PTM-I805", "the direction is no unit vector")
+        _refuse(abs(length - 1) > _NEARLY, "PTM-I801", "the direction is no unit vector")
         whole = np.where(abs(length - 1) > _UNIT, length, 1.0)
         object.__setattr__(self, "direction", self.direction / whole[:, None])
         if not 0 < self.field_of_view < math.pi:
             raise InputError(
-                "PTM-I806",
+                "PTM-I801",
                 f"a field of view of {self.field_of_view:g} is not between 0 and pi radians",
             )
         if not 0 < self.aspect < math.inf:
-            raise InputError("PTM-I806", f"an aspect of {self.aspect:g} is not above 0")
+            raise InputError("PTM-I801", f"an aspect of {self.aspect:g} is not above 0")
 
     @property
     def duration(self) -> float:
@@ -251,19 +251,18 @@ def walk_text(walk: Walk) -> str:
 def read_walk(path: str | os.PathLike[str]) -> Walk:
     """The walk in a file.
 
-    Raises InputError: PTM-I800 the file cannot be read; PTM-I801 it is no walk; PTM-I802 it has
-    another schema number, or is not as the schema says; PTM-I803 to PTM-I806 as `Walk`, PTM-I807 as
-    `Browser`. LimitError PTM-L800: it is larger than any walk.
+    Raises InputError: PTM-I122 the file cannot be read; PTM-I801 it is no walk, does not match its
+    schema, or as `Walk` and `Browser`. LimitError PTM-L204: it is larger than any walk.
     """
     try:
         with open_regular(Path(path)) as stream:
             data = stream.read(LARGEST + 1)
     except (OSError, ValueError) as fault:
         reason = getattr(fault, "strerror", None) or fault
-        raise InputError("PTM-I800", f"cannot be read ({reason})", file=path) from fault
+        raise InputError("PTM-I122", f"cannot be read ({reason})", file=path) from fault
     with naming(path):
         if len(data) > LARGEST:
-            raise LimitError("PTM-L800", f"more than {LARGEST >> 20} MiB, which is no walk")
+            raise LimitError("PTM-L204", f"more than {LARGEST >> 20} MiB, which is no walk")
         return parse_walk(data)
 
 
@@ -277,14 +276,14 @@ def parse_walk(data: bytes) -> Walk:
         raise _no_walk(f'its format is not "{FORMAT}"')
     if document.get("schema") != SCHEMA:
         raise InputError(
-            "PTM-I802",
+            "PTM-I801",
             f"a walk of schema {json.dumps(document.get('schema'))[:40]}, not {SCHEMA}",
             remedy="record it anew, or update ptmtools",
         )
     try:
         schemas.check(document, schemas.WALK)
     except schemas.ShapeError as fault:
-        raise InputError("PTM-I802", fault.message, place=fault.place) from None
+        raise InputError("PTM-I801", fault.message, place=fault.place) from None
     rows = np.array(document["samples"], dtype=np.float64).reshape(-1, 7)
     view = float(document["fieldOfView"]), float(document["aspect"])
     told = document.get("browser")

@@ -178,12 +178,12 @@ def prepare(
     Raises
     ------
     InputError: PTM-I700 the walk does not lead through this database.
-    LimitError: PTM-L700 it is too long.
+    LimitError: PTM-L400 it is too long.
     DatabaseError, LimitError: those of `read_pyramids`.
     """
     if walk.duration * rate > MOST_FRAMES:
         raise LimitError(
-            "PTM-L700",
+            "PTM-L400",
             f"a walk of {walk.duration:g} s has more than {MOST_FRAMES:,} frames",
             remedy="give a shorter one",
         )
@@ -282,7 +282,7 @@ def relief_of(
 
     Raises
     ------
-    InputError: PTM-I703 the other database has other textures.
+    InputError: PTM-I700 the other database has other textures.
     DatabaseError: those of `read_octrees` and `read_pyramids`.
     """
     from ptmtools.lab.relief.octrees import no_octrees, read_octrees
@@ -295,7 +295,7 @@ def relief_of(
         names = [[row["file"] for row in of.index["textures"]] for of in (served, against)]
         if names[0] != names[1]:
             raise InputError(
-                "PTM-I703",
+                "PTM-I700",
                 "has other textures than what is walked through",
                 file=against.folder,
                 remedy="give a database of the same model, with --against",

@@ -176,7 +176,7 @@ def convex_hull(points: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArr
     Returns (points, triangles): the (h, 3) vertices of the hull in lexical order, and (f, 3)
     indices into them, counter-clockwise seen from outside, in lexical order.
 
-    Raises DatabaseError: PTM-D603 if the points lie in one plane.
+    Raises DatabaseError: PTM-D601 if the points lie in one plane.
     """
     distinct = np.unique(points, axis=0)
     if len(distinct) >= _MANY:
@@ -230,7 +230,7 @@ def _tetrahedron(points: list[_Whole]) -> list[_Face]:
         d, side = next(((i, s) for i, s in sides if s), (None, 0))
     if c is None or d is None:
         raise DatabaseError(
-            "PTM-D603",
+            "PTM-D601",
             "a cell is flat after rounding to single precision",
             remedy="give the model's unit with --unit, or make fewer and larger cells",
         )

@@ -194,12 +194,12 @@ def emit(
 
     Raises
     ------
-    DatabaseError: PTM-D600 there are no cells; PTM-D601 a number is not finite in float32;
-        PTM-D602 an image has no record; PTM-D603 a cell is flat in float32; PTM-D604 the
-        artifacts do not belong together.
-    InputError: PTM-I600 a given viewpoint lies in no cell.
+    DatabaseError: PTM-D600 there are no cells; PTM-D601 in float32, a number is not finite or a
+        cell is flat; PTM-D004 an image has no record; PTM-D008 the artifacts do not belong
+        together.
+    InputError: PTM-I111 a given viewpoint lies in no cell.
     OutputError: PTM-O001 to PTM-O003, PTM-O005, see `ptmtools.files`.
-    LimitError: PTM-L600 a cell is longer than a GLB can be.
+    LimitError: PTM-L400 a cell is longer than a GLB can be.
     """
     folder = Path(out)
     _check(scene, cells, pvs, ach, textures)
@@ -255,14 +255,14 @@ def _check(
         fault = "pvs and ach have rows of different lengths"
     if fault:
         raise DatabaseError(
-            "PTM-D604",
+            "PTM-D008",
             f"the stages do not belong together: {fault}",
             remedy="run the stages again, from `cells` on",
         )
     used = {scene.materials[m].image for m in np.unique(scene.triangle_material[source]).tolist()}
     for image in sorted(used - {-1} - {texture.image for texture in textures}):
         raise DatabaseError(
-            "PTM-D602",
+            "PTM-D004",
             f"the texture {scene.images[image].name!r} was not encoded",
             remedy="run the stage `textures` again",
         )

@@ -155,14 +155,14 @@ _AROUND = 34
 def pack(document: Mapping[str, Any], binary: bytes) -> bytes:
     """A GLB of a JSON document and the bytes of its only buffer, which may be empty.
 
-    Raises LimitError: PTM-L600 it is longer than a GLB can be, 4 GiB.
+    Raises LimitError: PTM-L400 it is longer than a GLB can be, 4 GiB.
     """
     text = json.dumps(document, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode(
         "utf-8", "replace"
     )
     if (length := len(text) + len(binary) + _AROUND) > _LARGEST:
         raise LimitError(
-            "PTM-L600",
+            "PTM-L400",
             f"a cell takes {length:,} bytes as GLB, more than the format can hold",
             remedy="make smaller cells, or leave gltf out of --format",
         )
@@ -276,7 +276,7 @@ def _wrap(s: Wrap, t: Wrap) -> dict[str, int]:
 def gltf_files(content: Content) -> Iterator[tuple[str, bytes]]:
     """Path, relative to the served folder, and bytes of every GLB.
 
-    Raises LimitError: PTM-L600 a cell is longer than a GLB can be.
+    Raises LimitError: PTM-L400 a cell is longer than a GLB can be.
     """
     count = content.cells.cell_count
     for cell in range(count):

@@ -82,15 +82,13 @@ class ReadGlb:
 def read_glb(data: bytes) -> ReadGlb:
     """The cell of a GLB.
 
-    Raises FileError: PTM-D731 no GLB; PTM-D732 not in the emission pattern; PTM-D733 an accessor
-    out of its bytes; PTM-D734 indices; PTM-D735 numbers.
+    Raises FileError PTM-D731: no GLB, or not in the emission pattern.
     """
     document, binary = unpack(data)
     try:
         schemas.check(document, schemas.GLB)
     except schemas.ShapeError as fault:
-        code = "PTM-D735" if fault.message.endswith(schemas.NOT_FINITE) else "PTM-D732"
-        raise FileError(code, fault.place or "document", fault.message) from None
+        raise FileError("PTM-D731", fault.place or "document", fault.message) from None
     return _Reader(document, binary).cell()
 
 
@@ -102,7 +100,7 @@ class _Reader:
             _foreign("buffers", f"{len(buffers)} buffers for {len(binary)} bytes")
         length = buffers[0]["byteLength"] if buffers else 0
         if not 0 <= len(binary) - length < 4:
-            raise FileError("PTM-D733", "buffers[0]", f"{length} bytes of {len(binary)}")
+            raise FileError("PTM-D731", "buffers[0]", f"{length} bytes of {len(binary)}")
         self._data = binary[:length]
 
     def cell(self) -> ReadGlb:
@@ -145,7 +143,7 @@ class _Reader:
         index = self._elements(primitive["indices"], "SCALAR", (5123, 5125), _INDICES).ravel()
         if len(index) % 3 or int(index.max()) >= len(point):
             message = f"{len(index)} indices up to {index.max()} into {len(point)} vertices"
-            raise FileError("PTM-D734", place, message)
+            raise FileError("PTM-D731", place, message)
         triangle = index.astype(np.int64).reshape(-1, 3)
         material = self._material(primitive["material"])
         octree = node.get("extras", {}).get("octree")
@@ -166,7 +164,7 @@ class _Reader:
     def _vertices(self, index: int, form: str) -> NDArray[np.float32]:
         rows = self._elements(index, form, (_FLOAT,), _VERTICES)
         if not np.isfinite(rows).all():
-            raise FileError("PTM-D735", f"accessors[{index}]", "a number is not finite")
+            raise FileError("PTM-D731", f"accessors[{index}]", "a number is not finite")
         return rows.astype(np.float32)
 
     def _elements(
@@ -186,10 +184,10 @@ class _Reader:
         try:
             rows = elements(accessor, view, self._data)
         except ValueError as fault:
-            raise FileError("PTM-D733", place, str(fault)) from None
+            raise FileError("PTM-D731", place, str(fault)) from None
         begin = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
         if begin % unit:
-            raise FileError("PTM-D733", place, f"begins at byte {begin}, not a multiple of {unit}")
+            raise FileError("PTM-D731", place, f"begins at byte {begin}, not a multiple of {unit}")
         return rows
 
     def _check_bounds(self, index: int, point: NDArray[np.float32]) -> None:
@@ -203,7 +201,7 @@ class _Reader:
                 same = np.array_equal(written.astype(np.float32), actual)
             if not same:
                 message = f"{name} is not that of the data, {actual.tolist()}"
-                raise FileError("PTM-D735", place, message)
+                raise FileError("PTM-D731", place, message)
 
     def _material(self, index: int) -> ReadMaterial:
         material = self._row("materials", index)
@@ -235,4 +233,4 @@ def _wrap(sampler: dict[str, Any]) -> tuple[int, int]:
 
 
 def _foreign(place: str, message: str) -> NoReturn:
-    raise FileError("PTM-D732", place, message)
+    raise FileError("PTM-D731", place, message)

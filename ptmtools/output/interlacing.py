@@ -42,13 +42,13 @@ def interlaced_files(content: Content) -> Iterator[tuple[str, str | bytes]]:
 
     Raises
     ------
-    DatabaseError: PTM-D602 a texture was not encoded.
+    DatabaseError: PTM-D004 a texture was not encoded.
     InputError, LimitError: what reading a `.ptm` and `interlace` raise.
     """
     for record in content.textures:
         if record.stored is None:
             raise DatabaseError(
-                "PTM-D602",
+                "PTM-D004",
                 f"the texture {record.file!r} was not encoded",
                 remedy="run the stage `textures` again",
             )
@@ -88,7 +88,7 @@ def check_files(database: ServedDatabase) -> Mapping[str, int]:
     template = hints.index.get("textureSets", {}).get(INTERLACE.name)
     if template is None:
         database.at(HINTS, "textureSets").add(
-            "PTM-D741", f"does not name {INTERLACE.name}, whose files exist"
+            "PTM-D700", f"does not name {INTERLACE.name}, whose files exist"
         )
         return {}
     rows = hints.index["textures"]
@@ -100,7 +100,7 @@ def check_files(database: ServedDatabase) -> Mapping[str, int]:
     folder = f"{INTERLACE_FOLDER}/"
     sets = {p for p in database.files if p.startswith(folder) and p.endswith(f"/{INDEX}")}
     for path in sorted(sets - set(indices)):
-        database.at(path).add("PTM-D744", "belongs to no texture")
+        database.at(path).add("PTM-D710", "belongs to no texture")
     return {}
 
 
@@ -119,7 +119,7 @@ def _check_set(
     if not fault and texture and not report.issues:
         fault = _other_texels(database, folder, interlaced, images[-1] or "")
     if fault:
-        database.at(f"{folder}{INDEX}").add("PTM-D744", fault)
+        database.at(f"{folder}{INDEX}").add("PTM-D710", fault)
 
 
 def _other_texels(

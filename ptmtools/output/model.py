@@ -138,7 +138,7 @@ def _numbers(viewpoints: Sequence[GivenViewpoint]) -> list[tuple[float, ...]]:
 
 @dataclass(frozen=True)
 class EmitOptions:
-    """Options of `emit`. Raises InputError PTM-I603 for values out of range."""
+    """Options of `emit`. Raises InputError PTM-I111 for values out of range."""
 
     heading: ClassVar[str] = "Served files"
 
@@ -225,7 +225,7 @@ class EmitOptions:
         elif self.need < 0:
             fault = f"--need {self.need} is below 0"
         if fault:
-            raise InputError("PTM-I603", fault, remedy="leave the option out for its default")
+            raise InputError("PTM-I111", fault, remedy="leave the option out for its default")
 
     def avatar(self, walker: Walker) -> Vector:
         """``avatar_size``, by default that of the walker."""

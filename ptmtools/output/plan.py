@@ -118,24 +118,24 @@ def plot_plan(
     Raises
     ------
     DatabaseError: PTM-D600 there are no cells.
-    InputError: PTM-I601 the cell does not exist, or the PVS has not been computed.
-    MissingComponentError: PTM-M600 matplotlib is not installed.
+    InputError: PTM-I111 the cell does not exist, or the PVS has not been computed.
+    MissingComponentError: PTM-M100 matplotlib is not installed.
     OutputError: PTM-O001 to PTM-O003, see `ptmtools.files`.
     """
     if options.cell is not None and not 0 <= options.cell < cells.cell_count:
         raise InputError(
-            "PTM-I601",
+            "PTM-I111",
             f"there is no cell {options.cell}",
             remedy=f"cells are numbered 0 to {cells.cell_count - 1}",
         )
     if options.cell is not None and pvs is None:
         raise InputError(
-            "PTM-I601",
+            "PTM-I111",
             "the cells visible from it have not been computed yet",
             remedy="run `ptm pvs` first",
         )
     agg = component(
-        "matplotlib.backends.backend_agg", "PTM-M600", "a plan needs matplotlib", "plot"
+        "matplotlib.backends.backend_agg", "PTM-M100", "a plan needs matplotlib", "plot"
     )
     if cells.cell_count == 0:
         raise DatabaseError(

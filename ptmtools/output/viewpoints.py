@@ -126,7 +126,7 @@ def place_viewpoints(
     """The viewpoints of a database, the default one first, and notes on omitted ones. They face
     ``textures``; other textures are ignored.
 
-    Raises InputError: PTM-I600 if a viewpoint that the user gave lies in no cell.
+    Raises InputError: PTM-I111 if a viewpoint that the user gave lies in no cell.
     """
     ground, outlook = Ground(scene), Outlook(scene, textures)
     notes: list[str] = []
@@ -236,7 +236,7 @@ def _given(cells: Cells, ground: Ground, outlook: Outlook, options: EmitOptions)
                 fault = "in a cell without a place to stand"
                 remedy = "or divide the model again with this --viewpoint"
             raise InputError(
-                "PTM-I600",
+                "PTM-I111",
                 f"the viewpoint {x:g},{y:g},{z:g} is {fault}",
                 remedy=f"give world metres, Y up, {remedy}",
             )

@@ -147,7 +147,7 @@ _WHOLE = np.ones(3)
 class CellWriter:
     """Writes the cells of one scene.
 
-    Raises DatabaseError: PTM-D601 a number is not finite in float32; PTM-D603 a cell is flat.
+    Raises DatabaseError: PTM-D601 in float32, a number is not finite or a cell is flat.
     """
 
     def __init__(self, content: Content) -> None:
@@ -283,8 +283,8 @@ def _points(points: NDArray[np.float32]) -> str:
 def vrml_files(content: Content) -> Iterator[tuple[str, str]]:
     """Path, relative to the served folder, and text of each file.
 
-    Raises DatabaseError: PTM-D601 a number is not finite in float32; PTM-D603 a cell is flat; both
-    before the first file.
+    Raises DatabaseError: PTM-D601 in float32, a number is not finite or a cell is flat; before
+    the first file.
     """
     return _files(content, CellWriter(content))
 

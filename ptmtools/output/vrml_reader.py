@@ -78,14 +78,12 @@ class Document:
 def parse(data: bytes) -> Document:
     """Reads a file.
 
-    Raises FileError: at the first thing that is not as in the emission pattern: PTM-D660 for bytes
-    that are not UTF-8, PTM-D662 for a number that is not finite, PTM-D663 for a PROTO of other
-    fields, PTM-D661 for all else.
+    Raises FileError PTM-D661 at the first thing that is not as in the emission pattern.
     """
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as fault:
-        raise FileError("PTM-D660", f"byte {fault.start}", "not UTF-8") from fault
+        raise FileError("PTM-D661", f"byte {fault.start}", "not UTF-8") from fault
     return _Reader(text).document()
 
 
@@ -128,7 +126,7 @@ class _Reader:
         word = self._text[self._at : self._at + 12]
         if declares:
             self._fail(
-                f"{word!r}: the PROTO does not declare the pattern's fields", code="PTM-D663"
+                f"{word!r}: the PROTO does not declare the pattern's fields", code="PTM-D661"
             )
         self._fail(f"{word!r} is in no PROTO of the emission pattern, or the PROTO stands twice")
 
@@ -232,12 +230,12 @@ class _Reader:
     def _finite(self, values: NDArray[Any], at: int) -> NDArray[Any]:
         with np.errstate(over="ignore"):
             if not np.isfinite(values.astype(np.float32)).all():
-                self._fail("a number is not finite", at, "PTM-D662")
+                self._fail("a number is not finite", at, "PTM-D661")
         return values
 
     def _no_number(self) -> NoReturn:
         if _NOT_FINITE.match(self._text, self._at):
-            self._fail("a number is not finite", code="PTM-D662")
+            self._fail("a number is not finite", code="PTM-D661")
         self._fail(f"{self._text[self._at : self._at + 12]!r} is not a number")
 
     def _strings(self) -> tuple[str, ...]:

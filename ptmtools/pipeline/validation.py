@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells import Cells, structural_triangles
-from ptmtools.diagnostics import Findings, Issue, Severity, ValidationReport, worst_first
+from ptmtools.diagnostics import Findings, Issue, ValidationReport, worst_first
 from ptmtools.errors import DatabaseError
 from ptmtools.lazy import Lazy
 from ptmtools.output import validate_database, validate_ptm
@@ -81,13 +81,13 @@ def _check_stage(
     try:
         together[stage]
     except DatabaseError as fault:
-        _add("PTM-D721", fault, db, faulty, findings)
+        _add("PTM-D720", fault, db, faulty, findings)
     for name, count in stage.counts(artifact).items():
         if record.counts.get(name, count) != count:
             message = f"is {record.counts[name]!r}, but the stage has {count!r}"
-            findings.add("PTM-D659", MANIFEST, f"stages.{stage.name}.counts.{name}", message)
+            findings.add("PTM-D699", MANIFEST, f"stages.{stage.name}.counts.{name}", message)
     for file, place, message in stage.job.missing(alone, artifact):
-        findings.add("PTM-D721", file, place, message)
+        findings.add("PTM-D720", file, place, message)
 
 
 def _add(
@@ -107,7 +107,6 @@ class FolderKind:
     index: the file in it that describes the others.
     about: a noun for messages.
     again: the command that writes it.
-    codes: of the check's findings: code → severity and meaning.
     check: checks a folder.
     describe: the lines of ``ptm info`` for a folder, and its record as JSON. Raises the errors of
         reading the index.
@@ -116,7 +115,6 @@ class FolderKind:
     index: str
     about: str
     again: str
-    codes: Lazy[Mapping[str, tuple[Severity, str]]]
     check: Lazy[Callable[[Path, Limits], ValidationReport]]
     describe: Lazy[Callable[[Path], tuple[tuple[str, ...], Mapping[str, Any]]]]
 
@@ -126,7 +124,6 @@ _LIST = (
         index="interlace.json",
         about="interlaced image",
         again="ptm interlace IMAGE",
-        codes=Lazy("ptmtools.neighbours.interlace.reading:CODES"),
         check=Lazy("ptmtools.neighbours.interlace.reading:validate_interlaced"),
         describe=Lazy("ptmtools.neighbours.interlace.reading:describe"),
     ),
@@ -134,7 +131,6 @@ _LIST = (
         index="apo.json",
         about="octree texture",
         again="ptm apo MESH",
-        codes=Lazy("ptmtools.neighbours.apo.checking:CODES"),
         check=Lazy("ptmtools.neighbours.apo.checking:check_folder"),
         describe=Lazy("ptmtools.neighbours.apo.checking:describe"),
     ),
@@ -142,7 +138,6 @@ _LIST = (
         index="campus.json",
         about="campus",
         again="ptm campus MODEL",
-        codes=Lazy("ptmtools.neighbours.campus.validation:CODES"),
         check=Lazy("ptmtools.neighbours.campus.validation:check_campus"),
         describe=Lazy("ptmtools.neighbours.campus.reading:describe_campus"),
     ),
@@ -173,7 +168,7 @@ def validate(
     Raises
     ------
     DatabaseError: PTM-D001 no database there; PTM-D003 schema of another version.
-    InputError: PTM-I602 the file cannot be read.
+    InputError: PTM-I122 the file cannot be read.
     """
     file = Path(target)
     if not file.is_dir() and (file.exists() or file.suffix == ".ptm"):

@@ -120,8 +120,8 @@ def portal_flow(
         make a search be repeated until three budgets are spent.
     executor: does the searches; see `searching`. The result is the same for any.
 
-    Raises InputError PTM-I400 (arrays that do not fit together), PTM-I401 (a coordinate
-    that is not finite); LimitError PTM-L400 (more portals than fit into memory).
+    Raises InputError PTM-I400 (arrays that do not fit together, or a coordinate that is not
+    finite); LimitError PTM-L400 (more portals than fit into memory).
     """
     bound = upper_bound(portals, executor)
     known, cut = bound.sees, bound.cut.repeat(2)
@@ -206,7 +206,7 @@ def _prepass(g: Geometry, executor: Executor) -> Bits:
 
 
 def check(portals: Portals) -> None:
-    """Raises PTM-I400 or PTM-I401 unless the arrays fit together and are finite."""
+    """Raises PTM-I400 unless the arrays fit together and are finite."""
     k, start, leaf = len(portals.leaf), portals.start, portals.leaf
     wrong = ""
     if leaf.shape != (k, 2) or portals.normal.shape != (k, 3) or start.shape != (k + 1,):
@@ -221,7 +221,7 @@ def check(portals: Portals) -> None:
         raise InputError("PTM-I400", wrong, remedy="build the cells again")
     if not (np.isfinite(portals.point).all() and np.isfinite(portals.normal).all()):
         raise InputError(
-            "PTM-I401", "a portal has a coordinate that is not finite", remedy="repair the model"
+            "PTM-I400", "a portal has a coordinate that is not finite", remedy="repair the model"
         )
 
 

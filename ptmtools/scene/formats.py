@@ -32,11 +32,11 @@ from ptmtools.scene.source import MAX_VERTICES, Source, SourceMaterial, too_many
 def convert(path: Path, scratch: Path) -> list[tuple[Path, str]]:
     """Writes the meshes of a model as OBJ files into ``scratch``; returns these with their labels.
 
-    Raises InputError PTM-I254 if pymeshlab cannot read the model, MissingComponentError PTM-M200.
+    Raises InputError PTM-I254 if pymeshlab cannot read the model, MissingComponentError PTM-M100.
     """
     if fault := _absence():
         raise MissingComponentError(
-            "PTM-M200",
+            "PTM-M100",
             f"pymeshlab is unavailable ({fault})",
             remedy="pip install pymeshlab; apt install libopengl0 libgl1; or convert to GLB",
         )
@@ -120,7 +120,7 @@ def read_other(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES
             ) from None
         source = _read_meshlab(path, findings, max_triangles)
         findings.note(
-            "PTM-N230", f"read by pymeshlab because trimesh failed ({type(error).__name__})"
+            "PTM-N208", f"read by pymeshlab because trimesh failed ({type(error).__name__})"
         )
     if len(source.triangles) > max_triangles:
         raise too_many_triangles(max_triangles, path)
@@ -132,7 +132,7 @@ def _textured_ply(path: Path, findings: Findings) -> bool:
         head = stream.read(_HEADER).split(b"end_header")[0].lower()
     textured = b"texturefile" in head
     if textured and b" red" in head:
-        findings.note("PTM-N223", "colours of vertices dropped in favour of textures")
+        findings.note("PTM-N215", "colours of vertices dropped in favour of textures")
     return textured
 
 
@@ -148,7 +148,7 @@ def _read_trimesh(path: Path, findings: Findings) -> Source:
         faces = np.asarray(getattr(mesh, "faces", np.zeros((0, 3))), dtype=np.int64)
         points = np.asarray(mesh.vertices, dtype=np.float64)
         if len(faces) and not 0 <= faces.min() <= faces.max() < len(points):
-            raise InputError("PTM-I246", "a face refers to a missing vertex", file=path)
+            raise InputError("PTM-I245", "a face refers to a missing vertex", file=path)
         colors, uv = _colors(mesh, faces, findings), np.zeros((len(faces), 3, 2))
         rows.add(np.asarray(matrix)[None], points, faces, uv, 0, colors, len(rows.names))
         rows.names.append(path.stem if len(scene.geometry) == 1 else str(geometry))
@@ -169,7 +169,7 @@ def _colors(mesh: Any, faces: NDArray[np.int64], findings: Findings) -> NDArray[
     colors = mesh.visual.vertex_colors if kind == "vertex" else mesh.visual.face_colors
     rows = np.asarray(colors, dtype=np.uint8)
     if (rows[:, 3:] < 255).any():
-        findings.note("PTM-N223", "opacities of vertices and faces dropped")
+        findings.note("PTM-N215", "opacities of vertices and faces dropped")
     return rows[faces, :3] if kind == "vertex" else np.repeat(rows[:, None, :3], 3, axis=1)
 
 

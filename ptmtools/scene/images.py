@@ -60,7 +60,7 @@ _Bits = NDArray[np.uint8]
 class VerifiedBytes:
     """Reads an image again and compares it with its digest.
 
-    Raises InputError PTM-I252 if the file is missing, cannot be read, or has changed.
+    Raises InputError PTM-I122 if the file is missing, cannot be read, or has changed.
     """
 
     read: Callable[[], bytes]
@@ -77,7 +77,7 @@ class VerifiedBytes:
             fault = "has changed since the model was read"
         if fault:
             remedy = "restore it, or build again"
-            raise InputError("PTM-I252", fault, file=self.label, remedy=remedy)
+            raise InputError("PTM-I122", fault, file=self.label, remedy=remedy)
         return data
 
 
@@ -132,7 +132,7 @@ class ImageStore:
     def examine(self, textures: Iterable[Texture], workers: int, progress: Progress) -> None:
         """Decodes the images of these textures with ``workers`` threads, before they are added.
 
-        Raises LimitError PTM-L104, PTM-L106, as the other methods do.
+        Raises LimitError PTM-L104, as the other methods do.
         """
         pending: dict[Callable[[], bytes], Texture] = {}
         for texture in textures:
@@ -224,7 +224,7 @@ class ImageStore:
 def _examine(texture: Texture, limit: int, channel: str | None = None) -> _ImageRecord:
     """Reads and decodes an image; ``channel`` as in `_holes`.
 
-    Raises LimitError PTM-L104, PTM-L106.
+    Raises LimitError PTM-L104.
     """
     from ptmtools.texture.images.opening import pillow_faults
 
@@ -256,7 +256,7 @@ def integers(data: bytes, limit: int) -> tuple[NDArray[Any], Description]:
     """(h, w, c) texels of 8 or 16 bits and the description of an image, to derive another from it.
 
     ``limit`` as in `ImageStore`. Raises InputError if the image cannot be decoded or has other
-    samples, LimitError PTM-L104, PTM-L106.
+    samples, LimitError PTM-L104.
     """
     from ptmtools.texture.images.files import load_image
 
@@ -273,7 +273,7 @@ def is_plain(data: bytes, name: str, limit: int) -> bool:
     """Whether an image can replace a plain one of this name without another change to the scene: it
     can be decoded, has no alpha channel, and its format has the suffix of the name.
 
-    ``limit`` as in `ImageStore`. Raises LimitError PTM-L104, PTM-L106.
+    ``limit`` as in `ImageStore`. Raises LimitError PTM-L104.
     """
     try:
         with _unwarned():
@@ -294,11 +294,11 @@ def _unwarned() -> Iterator[None]:
 
 
 def _decode(data: bytes, limit: int) -> Image.Image:
-    """Raises InputError if the image cannot be decoded, LimitError PTM-L104, PTM-L106."""
+    """Raises InputError if the image cannot be decoded, LimitError PTM-L104."""
     from ptmtools.texture.images.opening import load, opened, pillow_faults
 
     if not data:
-        raise InputError("PTM-I124", "empty file")
+        raise InputError("PTM-I125", "empty file")
     limits = Limits(limit)
     with pillow_faults():
         image = opened(cast("BinaryIO", io.BytesIO(data)), limits)
@@ -402,7 +402,7 @@ def _resized(opacity: NDArray[np.uint8], width: int, height: int) -> NDArray[np.
 def merge_masks(source: Source, used: Ints, store: ImageStore, findings: Findings) -> Source:
     """The source with the masks of the ``used`` materials merged into their images.
 
-    Raises LimitError PTM-L104, PTM-L106.
+    Raises LimitError PTM-L104.
     """
     materials = list(source.materials)
     for index in used.tolist():
@@ -430,5 +430,5 @@ def _merge_mask(material: SourceMaterial, store: ImageStore, findings: Findings)
             store.mark_as_input(part)
     if store.has_alpha(merged) is None:  # the store has recorded the miss
         return replace(without, see_through=True)
-    findings.note("PTM-N217", f"{mask.what}: baked into an image as its alpha", mask.place)
+    findings.note("PTM-N215", f"{mask.what}: baked into an image as its alpha", mask.place)
     return replace(without, texture=merged)

@@ -66,9 +66,9 @@ def ingest(
     ------
     InputError: the file is absent, empty, damaged, of an unknown format, or has no usable face;
         with ``strict`` also for misses (`Findings`).
-    LimitError: PTM-L200 more vertices than int32 can number, PTM-L201 an impossible extent,
-        PTM-L202 and PTM-L204 a line or a material library that is too long, PTM-L203 more
-        triangles and PTM-L104 an image of more texels than ``options`` allow, PTM-L106.
+    LimitError: PTM-L203 more vertices than int32 can number, or more triangles than ``options``
+        allow; PTM-L204 an impossible extent, a line or a material library that is too long;
+        PTM-L104 an image of more texels than ``options`` allow.
     MissingComponentError: a format needs a library that is not installed.
     """
     model = Path(path)
@@ -78,7 +78,7 @@ def ingest(
     source = _read(model, findings, progress, options.max_triangles)
     if len(source.points) > MAX_VERTICES or len(source.triangles) > MAX_VERTICES:
         raise LimitError(
-            "PTM-L200",
+            "PTM-L203",
             f"more than {MAX_VERTICES} vertices or faces",
             file=model,
             remedy="split the model",
@@ -87,7 +87,7 @@ def ingest(
     kept = keep_faces(source.points, source.triangles)
     if not len(kept.triangles):
         raise InputError(
-            "PTM-I248",
+            "PTM-I247",
             f"none of the {len(source.triangles)} faces has an area "
             f"({kept.degenerate} degenerate, {kept.not_finite} with non-finite coordinates)",
             file=model,
@@ -149,7 +149,7 @@ def ingest(
     if tolerance.plane > PLANE_SHARE * tolerance.extent:
         step, plane = 1000 * source.step * space.metres, 1000 * tolerance.plane
         findings.note(
-            "PTM-N237",
+            "PTM-N201",
             f"compressed: coordinates are rounded to {step:.2g} mm, so points within {plane:.2g} "
             "mm of a plane count as in it",
         )
@@ -182,16 +182,16 @@ def check_file(model: Path) -> None:
     try:
         with open_regular(model) as stream:
             if not stream.read(1):
-                raise InputError("PTM-I242", "empty file", file=model)
+                raise InputError("PTM-I243", "empty file", file=model)
     except (FileNotFoundError, NotADirectoryError, ValueError):  # also a NUL byte in the name
-        raise InputError("PTM-I240", "no such file", file=model) from None
+        raise InputError("PTM-I120", "no such file", file=model) from None
     except OSError as error:
         if os.path.isdir(model):  # also one that may not be read
             remedy = "name the model file in it"
-            raise InputError("PTM-I241", "is a directory", file=model, remedy=remedy) from None
+            raise InputError("PTM-I122", "is a directory", file=model, remedy=remedy) from None
         if reason := _NO_FILE.get(error.errno or 0):
-            raise InputError("PTM-I240", reason, file=model) from None
-        raise InputError("PTM-I256", error.strerror or str(error), file=model) from None
+            raise InputError("PTM-I120", reason, file=model) from None
+        raise InputError("PTM-I122", error.strerror or str(error), file=model) from None
 
 
 def _read(model: Path, findings: Findings, progress: Progress, max_triangles: int) -> Source:
@@ -210,7 +210,7 @@ def _read(model: Path, findings: Findings, progress: Progress, max_triangles: in
         return read_other(model, findings, max_triangles)
     except OSError as error:
         raise InputError(
-            "PTM-I256", error.strerror or str(error), file=error.filename or model
+            "PTM-I122", error.strerror or str(error), file=error.filename or model
         ) from None
 
 
@@ -221,11 +221,11 @@ def _note_faces(kept: KeptFaces, source: Source, findings: Findings) -> None:
     others = "duplicate faces of another material dropped, the first kept"
     pairs = "pairs of coincident faces with opposite winding; each is visible from its own side"
     for record, code, message, count in (
-        (findings.miss, "PTM-N209", "degenerate faces dropped", kept.degenerate),
+        (findings.miss, "PTM-N214", "degenerate faces dropped", kept.degenerate),
         (findings.miss, "PTM-N210", "faces with non-finite coordinates dropped", kept.not_finite),
         (findings.note, "PTM-N211", "duplicate faces dropped", len(dropped) - other),
-        (findings.note, "PTM-N212", others, other),
-        (findings.note, "PTM-N213", pairs, int(kept.paired.sum()) // 2),
+        (findings.note, "PTM-N211", others, other),
+        (findings.note, "PTM-N211", pairs, int(kept.paired.sum()) // 2),
     ):
         if count:
             record(code, message, "", count)
@@ -245,7 +245,7 @@ def _coordinates(source: Source, kept: KeptFaces, findings: Findings) -> NDArray
     unusable |= (np.abs(uv) > LARGEST).any(axis=(1, 2))
     if unusable.any():
         message = f"texture coordinates not finite or beyond {LARGEST:,.0f} replaced by 0"
-        findings.note("PTM-N228", message, "", int(unusable.sum()))
+        findings.note("PTM-N211", message, "", int(unusable.sum()))
         uv[unusable] = 0.0
     return uv
 
@@ -288,7 +288,7 @@ def _material(
         if holes is not None and not (transparent or material.ignores_alpha):
             transparent = uses_holes(holes, uv, *wraps)
     if material.opacity == 0:
-        findings.note("PTM-N231", f"material {material.name} is invisible (opacity 0)")
+        findings.note("PTM-N211", f"material {material.name} is invisible (opacity 0)")
     return Material(
         name=material.name,
         color=material.color or (PLAIN if image < 0 else WHITE),

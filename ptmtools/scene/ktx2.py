@@ -42,16 +42,16 @@ class TranscodedBytes:
 def transcoded(data: bytes) -> bytes:
     """A PNG of the first image of a KTX2 file.
 
-    Raises InputError PTM-I258, and MissingComponentError PTM-M204 without opengl-basisu.
+    Raises InputError PTM-I125, and MissingComponentError PTM-M100 without opengl-basisu.
     """
     if len(data) < _SIZE_AT + _SIZE.size:
-        raise InputError("PTM-I258", "truncated KTX2 image")
+        raise InputError("PTM-I125", "truncated KTX2 image")
     width, height = _SIZE.unpack_from(data, _SIZE_AT)
     if not (0 < width <= _LARGEST_SIDE and 0 < height <= _LARGEST_SIDE):
-        raise InputError("PTM-I258", f"{width} x {height} texels in a KTX2 image")
+        raise InputError("PTM-I125", f"{width} x {height} texels in a KTX2 image")
     if find_spec("opengl_basisu") is None:
         raise MissingComponentError(
-            "PTM-M204",
+            "PTM-M100",
             "opengl-basisu is needed for KTX2 textures",
             remedy="pip install 'ptmtools[basisu]', or "
             "run `npx @gltf-transform/cli ktxdecompress IN.glb OUT.glb`",
@@ -62,7 +62,7 @@ def transcoded(data: bytes) -> bytes:
         try:
             run_in_sandbox(__name__, "the transcoder", ktx2, ktx2, png)
         except InputError as error:
-            raise InputError("PTM-I258", error.message) from None
+            raise InputError("PTM-I125", error.message) from None
         return png.read_bytes()
 
 

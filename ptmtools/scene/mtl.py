@@ -149,7 +149,7 @@ def read_mtl(path: Path, findings: Findings) -> dict[str, MtlMaterial]:
             current = MtlMaterial(path)
             if materials.setdefault(rest, current) is not current:
                 findings.note(
-                    "PTM-N218", f"material {rest} defined again; the first definition used", place
+                    "PTM-N208", f"material {rest} defined again; the first definition used", place
                 )
         elif current is not None:
             try:

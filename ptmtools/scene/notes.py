@@ -1,6 +1,6 @@
 """The notes of an ingest: their collection, their text, and which of them are warnings.
 
-docs/guide/cli.md lists the codes.
+docs/formats/codes.md lists the codes.
 """
 
 from __future__ import annotations
@@ -28,7 +28,6 @@ WARNINGS = (
     "PTM-N207",
     "PTM-N210",
     "PTM-N253",
-    "PTM-N259",
     "PTM-N244",
 )
 #: The second best up axis: not a warning, but printed without ``-v``.

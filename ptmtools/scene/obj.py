@@ -140,7 +140,7 @@ def _texture(
     transform, colors = (statement.scale, statement.offset), material.map_kd
     if transform != ((1.0, 1.0), (0.0, 0.0)):
         if key == "map_Kd":
-            findings.note("PTM-N216", f"{what}: -s and -o baked into its faces", place)
+            findings.note("PTM-N215", f"{what}: -s and -o baked into its faces", place)
         elif colors is None or transform != (colors.scale, colors.offset):
             findings.note("PTM-N215", f"{what}: ignored -s -o", place)
     wrap: Wrap = "clamp" if statement.clamp else "repeat"
@@ -201,14 +201,14 @@ def read_obj(
     """Reads an OBJ file with its materials.
 
     Raises InputError with the line of an invalid statement, and for a file without faces;
-    LimitError for more vertices than int32 can number (PTM-L200), a line longer than `LONGEST_LINE`
-    (PTM-L202), more than ``max_triangles`` (PTM-L203, before polygons are cut), and the errors of
+    LimitError for more vertices than int32 can number (PTM-L203), a line longer than `LONGEST_LINE`
+    (PTM-L204), more than ``max_triangles`` (PTM-L203, before polygons are cut), and the errors of
     `read_mtl`.
     """
     statements = _read_statements(path, findings, progress, max_triangles)
     for key, lines in statements.unknown.items():
         kind = _NOT_DRAWN.get(key, "unknown statement")
-        findings.note("PTM-N219", f"{key}: {kind}, skipped", f"{path.name}:{lines[0]}", len(lines))
+        findings.note("PTM-N215", f"{key}: {kind}, skipped", f"{path.name}:{lines[0]}", len(lines))
     if not statements.face_line:
         unknown = next(iter(statements.unknown.values()), None)
         garbage = None if statements.points else unknown
@@ -233,7 +233,7 @@ def read_obj(
         if len(invalid):
             face = int(np.searchsorted(start, invalid[0], side="right")) - 1
             raise InputError(
-                "PTM-I246",
+                "PTM-I245",
                 f"{item} {corner[invalid[0]] + 1} of {count} does not exist",
                 file=path,
                 place=f"line {line[face]}",
@@ -243,7 +243,7 @@ def read_obj(
     cut = triangulate(points[corner_point], start)
     if cut.tangled:
         findings.note(
-            "PTM-N221",
+            "PTM-N211",
             "polygons with crossing edges or too many corners cut into fans of triangles",
             path.name,
             cut.tangled,
@@ -304,7 +304,7 @@ def _rest(line: str, key: str) -> str:
 
 def _logical_lines(stream: TextIO, path: Path) -> Iterator[tuple[int, str]]:
     """The lines with their numbers from 1, joined with those that follow a final backslash. Raises
-    LimitError PTM-L202."""
+    LimitError PTM-L204."""
     number = 0
     while line := stream.readline(LONGEST_LINE + 1):
         number += 1
@@ -319,7 +319,7 @@ def _logical_lines(stream: TextIO, path: Path) -> Iterator[tuple[int, str]]:
             line = " ".join(parts)
         if length > LONGEST_LINE:
             raise LimitError(
-                "PTM-L202",
+                "PTM-L204",
                 f"longer than {LONGEST_LINE} characters",
                 file=path,
                 place=f"line {first}",
@@ -404,11 +404,11 @@ def _read_statements(
                 ) from None
     if len(points) // 3 > MAX_VERTICES:
         raise LimitError(
-            "PTM-L200", f"more than {MAX_VERTICES} vertices", file=path, remedy="split the model"
+            "PTM-L203", f"more than {MAX_VERTICES} vertices", file=path, remedy="split the model"
         )
     if short:
         findings.miss(
-            "PTM-N220", "faces of fewer than three corners", f"{path.name}:{short[0]}", len(short)
+            "PTM-N214", "faces of fewer than three corners", f"{path.name}:{short[0]}", len(short)
         )
     progress(size, size, "reading")
     return statements

@@ -21,7 +21,7 @@ SUFFIXES = (*OWN, *TRIMESH, *MESHLAB, *IFC, *USD)
 class IngestOptions:
     """Options of `ptmtools.scene.ingest`.
 
-    Raises InputError: PTM-I250 unknown unit, PTM-I251 unknown up axis, PTM-I257 limit below 1.
+    Raises InputError: PTM-I111 an unknown unit or up axis, or a limit below 1.
     """
 
     heading: ClassVar[str] = "Model"
@@ -55,10 +55,10 @@ class IngestOptions:
 
     def __post_init__(self) -> None:
         if self.up not in (None, "y", "z"):
-            raise InputError("PTM-I251", f"unknown up axis {self.up!r}", remedy="give y or z")
+            raise InputError("PTM-I111", f"unknown up axis {self.up!r}", remedy="give y or z")
         if self.limit < 1 or self.max_triangles < 1:
             raise InputError(
-                "PTM-I257",
+                "PTM-I111",
                 "a limit is below 1",
                 remedy="give --limit and --max-triangles of 1 or more",
             )

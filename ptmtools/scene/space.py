@@ -50,7 +50,7 @@ def parse_unit(unit: str | float) -> float:
         metres = math.nan
     if not (math.isfinite(metres) and metres > 0):
         raise InputError(
-            "PTM-I250",
+            "PTM-I111",
             f"unknown unit {unit!r}",
             remedy=f"give {', '.join(UNITS)} or the metres in one unit",
         )
@@ -77,13 +77,13 @@ def settle(
     """The space of a model of (T, 3) triangles over (V, 3) finite points: as declared by the user,
     else as declared by the format, else as guessed.
 
-    Raises LimitError PTM-L201 if the extent of the model is impossible.
+    Raises LimitError PTM-L204 if the extent of the model is impossible.
     """
     low = points.min(axis=0)
     with np.errstate(over="ignore"):
         side = points.max(axis=0) - low
     if not np.isfinite(side).all():
-        raise LimitError("PTM-L201", "coordinates are too large for float64", file=model)
+        raise LimitError("PTM-L204", "coordinates are too large for float64", file=model)
     metres, up = by_user.metres or by_format.metres, by_user.up or by_format.up
     if by_user.metres is None or by_user.up is None:
         measured = evidence(points, triangles, named)
@@ -100,7 +100,7 @@ def settle(
     extent = float(side.max()) * metres
     if not SMALLEST_EXTENT <= extent <= LARGEST_EXTENT:
         raise LimitError(
-            "PTM-L201",
+            "PTM-L204",
             f"the extent of the scene would be {extent:.3g} m",
             file=model,
             remedy=f"give a --unit that makes it {SMALLEST_EXTENT:g} to {LARGEST_EXTENT:g} m",

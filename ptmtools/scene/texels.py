@@ -192,7 +192,7 @@ def drop_alpha(
 
     ``used`` are numbers of materials, and ``faces`` the rows of ``uv``, (T, 3, 2), of each. VRML
     always applies the alpha of textures, so it requires such an image; a material that blends the
-    same image keeps the original. Raises LimitError PTM-L104, PTM-L106.
+    same image keeps the original. Raises LimitError PTM-L104.
     """
     materials = list(source.materials)
     ignoring: list[tuple[int, Texture, str]] = []

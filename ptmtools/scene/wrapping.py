@@ -85,7 +85,7 @@ def bake_mirrors(
                 materials[index] = replace(materials[index], texture=plain)
                 continue
         materials[index], uv[rows] = replace(materials[index], texture=baked), coords
-        findings.note("PTM-N222", f"{texture.what}: mirrored repetition baked in", texture.place)
+        findings.note("PTM-N215", f"{texture.what}: mirrored repetition baked in", texture.place)
     return replace(source, materials=tuple(materials)), uv
 
 

@@ -61,18 +61,18 @@ from ptmtools.tolerance import FILE_SHARE
 def by_meshlab(mesh: Mesh, surface: Surface, faces: int) -> Simplified:
     """A plain mesh with about so many faces; its error is not known (NaN).
 
-    Raises InputError PTM-I290 for a mesh with materials, texture coordinates or colours, and
-    MissingComponentError PTM-M290 where pymeshlab cannot be used.
+    Raises InputError PTM-I111 for a mesh with materials, texture coordinates or colours, and
+    MissingComponentError PTM-M100 where pymeshlab cannot be used.
     """
     if not mesh.is_plain:
         raise InputError(
-            "PTM-I290",
+            "PTM-I111",
             "pymeshlab simplifies meshes without materials, textures and colours only",
             remedy="choose the method quadric",
         )
     if fault := _absence():
         raise MissingComponentError(
-            "PTM-M290",
+            "PTM-M100",
             f"pymeshlab cannot be used ({fault})",
             remedy="pip install pymeshlab; apt install libopengl0 libgl1; or choose the method "
             "quadric",

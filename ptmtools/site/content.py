@@ -142,10 +142,10 @@ def site_of(
 
     Raises
     ------
-    DatabaseError: PTM-D001 to D003 no database, or one of another version; PTM-D901 its
-        hints are of an earlier release; PTM-D004 it is not finished; PTM-D005, D006 a file is
-        missing or damaged; PTM-D606 it has no geometry in glTF.
-    InputError: PTM-I900 the installed page is incomplete; and as `web_texture`.
+    DatabaseError: PTM-D001 to D003 no database, or one of another version or earlier release;
+        PTM-D004 it is not finished; PTM-D005, D006 a file is missing or damaged; PTM-D606 it has
+        no geometry in glTF.
+    InputError: PTM-I122 the installed page is incomplete; and as `web_texture`.
     LimitError: as `web_texture`.
     """
     options = options or SiteOptions()
@@ -220,7 +220,7 @@ class _Builder:
             self._progress(number, len(rows), "textures")
             if _NEEDED - row.keys():
                 raise DatabaseError(
-                    "PTM-D901",
+                    "PTM-D003",
                     "was built by an earlier release: its hints lack fields that the page needs",
                     file=self._folder.path,
                     remedy=Rebuild("run {}"),
@@ -267,7 +267,7 @@ class _Builder:
         """The files of VRML, under the names that they have in the database."""
         if "vrml" not in self._served.index["geometry"]:
             raise DatabaseError(
-                "PTM-D900",
+                "PTM-D606",
                 "has no VRML files",
                 file=self._folder.path,
                 remedy="write them with `ptm emit DB --format vrml,gltf`",
@@ -308,24 +308,24 @@ class _Builder:
 
 
 def _picture_file(file: str) -> tuple[str, str, bytes]:
-    """Media type, suffix and bytes of a picture; raises InputError PTM-I901 if it is none."""
+    """Media type, suffix and bytes of a picture; raises InputError PTM-I125 if it is none."""
     try:
         with open_regular(file) as stream:
             data = stream.read()
     except OSError as fault:
         reason = f"cannot be read ({fault.strerror or fault})"
-        raise InputError("PTM-I901", reason, file=file) from None
+        raise InputError("PTM-I125", reason, file=file) from None
     for begin, media, suffix in _MAGIC:
         if re.match(begin, data, re.DOTALL):
             return media, suffix, data
     remedy = "give a JPEG, PNG or WebP"
-    raise InputError("PTM-I901", "is no picture that browsers show", file=file, remedy=remedy)
+    raise InputError("PTM-I125", "is no picture that browsers show", file=file, remedy=remedy)
 
 
 def program_files() -> dict[str, Entry]:
     """The scripts and the decoder, by their names in `PAGE`, in a folder named by their contents.
 
-    Raises InputError: PTM-I900 one is missing.
+    Raises InputError: PTM-I122 one is missing.
     """
     data = {name: _built(name) for name in PROGRAM}
     digest = sha256(b"".join(data[name] for name in sorted(data)))[:DIGITS]
@@ -340,7 +340,7 @@ def _built(name: str) -> bytes:
         return (PAGE / name).read_bytes()
     except OSError as fault:
         raise InputError(
-            "PTM-I900",
+            "PTM-I122",
             f"a file of the page cannot be read ({fault.strerror or fault})",
             file=PAGE / name,
             remedy="install ptmtools again",
@@ -355,7 +355,7 @@ def page(settings: Mapping[str, Any], script: str, preload: Sequence[str]) -> En
     settings: the JSON that its script reads (docs/guide/publish.md).
     script: URL of its script. preload: URLs of the files that it fetches first.
 
-    Raises InputError: PTM-I900 the template is missing.
+    Raises InputError: PTM-I122 the template is missing.
     """
     # Workers take the module out of the cache.
     links = [f'<link rel="modulepreload" href="{settings["worker"]}">']

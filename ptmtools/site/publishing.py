@@ -81,7 +81,7 @@ def publish(
 
     Raises
     ------
-    OutputError: PTM-O001 a file is in the way; PTM-O900 the folder is not empty and no site;
+    OutputError: PTM-O001 a file is in the way; PTM-O010 the folder is not empty and no site;
         PTM-O002, O003, O005 it cannot be written.
     DatabaseError: PTM-D005, D006 a file of the database is missing or damaged.
     """
@@ -124,7 +124,7 @@ def _checked(root: Path, force: bool) -> dict[str, str]:
     listed = _read_list(root)
     if listed is None and not force:
         raise OutputError(
-            "PTM-O900",
+            "PTM-O010",
             "the folder is not empty and not a site that `ptm publish` wrote",
             file=root,
             remedy="name another folder with -o, or give --force to write into it",

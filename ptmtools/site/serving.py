@@ -35,7 +35,7 @@ _KEPT = 75
 class ServeOptions:
     """Options of `ptm serve`.
 
-    Raises InputError: PTM-I711 an impossible link; PTM-I712 an unreadable quantity.
+    Raises InputError: PTM-I111 an impossible link or an unreadable quantity.
     """
 
     heading: ClassVar[str] = "Server"
@@ -101,7 +101,7 @@ def running(app: ASGIApp, *, host: str = "127.0.0.1", port: int = 0) -> Iterator
     ----------
     host, port: to listen on; port 0 for any free one.
 
-    Raises InputError: PTM-I920 the port is taken; PTM-I921 the address does not exist or is not
+    Raises InputError: PTM-I920 the port is taken, or the address does not exist or is not
     permitted.
     """
     import uvicorn
@@ -132,9 +132,9 @@ def running(app: ASGIApp, *, host: str = "127.0.0.1", port: int = 0) -> Iterator
 
 
 def require() -> None:
-    """Raises `MissingComponentError` PTM-M920 without Starlette or uvicorn."""
+    """Raises `MissingComponentError` PTM-M100 without Starlette or uvicorn."""
     for module in ("starlette", "uvicorn"):
-        component(module, "PTM-M920", f"{module} is not installed; `ptm serve` needs it", "viewer")
+        component(module, "PTM-M100", f"{module} is not installed; `ptm serve` needs it", "viewer")
 
 
 def url_of(listener: socket.socket) -> str:
@@ -145,7 +145,7 @@ def url_of(listener: socket.socket) -> str:
 
 
 def _listening(host: str, port: int) -> socket.socket:
-    """A socket that listens; raises InputError PTM-I920, I921."""
+    """A socket that listens; raises InputError PTM-I920."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         return socket.create_server((host, port), family=family)
@@ -163,7 +163,7 @@ def _refused(place: str, fault: Exception) -> InputError:
         )
     reason = getattr(fault, "strerror", None) or fault
     return InputError(
-        "PTM-I921",
+        "PTM-I920",
         f"cannot be listened on ({reason})",
         file=place,
         remedy="give an address of this machine with --host, and a port from 1024 to 65535",

@@ -42,7 +42,7 @@ class Throttle:
     bandwidth: bit/s of all responses together, or None for no limit.
     latency: s from a request to the first byte of its response.
 
-    Raises InputError PTM-I711 for an impossible value.
+    Raises InputError PTM-I111 for an impossible value.
     """
 
     bandwidth: float | None = None

@@ -55,7 +55,7 @@ class DatabaseWriter(DatabaseFolder):
         Raises
         ------
         OutputError: PTM-O001 if a file is in the way; PTM-O010 if the folder is not empty and not
-            ours; PTM-O011 if it holds another model; PTM-O002 if it cannot be written.
+            ours, or holds another model; PTM-O002 if it cannot be written.
         DatabaseError: PTM-D002, PTM-D003 (without ``force``), PTM-D007.
         """
         folder = Path(path)
@@ -113,7 +113,7 @@ def admitted(folder: Path, model: str, *, force: bool) -> Manifest:
         return manifest
     if manifest and not force:
         raise OutputError(
-            "PTM-O011",
+            "PTM-O010",
             f"holds the database of another model, {manifest.model}",
             file=folder,
             remedy="name another folder with -o, or give --force to replace it",

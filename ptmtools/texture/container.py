@@ -88,9 +88,9 @@ def read_header(data: bytes) -> PtmHeader:
 
     Raises
     ------
-    InputError: PTM-I101 not a PTM file (or HP's format of that suffix, PTM-I102), PTM-I103 cut
+    InputError: PTM-I101 not a PTM file (or HP's format of that suffix), PTM-I103 cut
         inside the head, PTM-I104 another version or profile, PTM-I105 damaged head.
-    LimitError: PTM-L101 sizes beyond what the format allows.
+    LimitError: PTM-L104 sizes beyond what the format allows.
     """
     _check_magic(data)
     if len(data) < _FIXED.size:
@@ -127,7 +127,7 @@ def read_header(data: bytes) -> PtmHeader:
         )
     if max(width, height) > MAX_SIDE:
         raise LimitError(
-            "PTM-L101",
+            "PTM-L104",
             f"says it is {width} x {height} texels; the format allows {MAX_SIDE} a side",
             remedy=_ENCODE_AGAIN,
         )
@@ -203,7 +203,7 @@ def _check_magic(data: bytes) -> None:
         raise InputError("PTM-I101", "is empty", remedy="download or encode it again")
     if data.startswith(b"PTM_1"):
         raise InputError(
-            "PTM-I102",
+            "PTM-I101",
             "is a Polynomial Texture Map (HP's format, also .ptm), not a progressive texture map",
             remedy="convert it to PNG with a viewer for that format and encode the PNG",
         )
@@ -251,7 +251,7 @@ def pack_description(description: Description) -> bytes:
 
 
 def parse_description(data: bytes) -> Description:
-    """The inverse of `pack_description`. Raises InputError PTM-I113 for impossible values."""
+    """The inverse of `pack_description`. Raises InputError PTM-I105 for impossible values."""
     values = list(_values(data))
     tags = dict(values)
     if len(tags) < len(values):
@@ -310,7 +310,7 @@ def _values(data: bytes) -> Iterator[tuple[bytes, bytes]]:
 
 def _impossible(what: str) -> InputError:
     return InputError(
-        "PTM-I113",
+        "PTM-I105",
         f"the description cannot be read: {what}",
         place="description",
         remedy="the file is damaged or was not written by a conforming encoder; encode it again",

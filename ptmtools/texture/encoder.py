@@ -148,8 +148,8 @@ def encode(
 
     Raises
     ------
-    InputError: PTM-I110 another shape or type, PTM-I111 impossible options.
-    LimitError: PTM-L102 a side above 65,536 texels.
+    InputError: PTM-I126 another shape or type, PTM-I111 impossible options.
+    LimitError: PTM-L104 a side above 65,536 texels.
     """
     buffer = io.BytesIO()
     encode_to(buffer, image, options, description=description, threads=threads)
@@ -168,11 +168,11 @@ def encode_to(
 
     The rows of ``image`` are read twice from top to bottom, a few at a time.
 
-    Raises also OutputError PTM-O004 if the file is open for appending.
+    Raises also OutputError PTM-O002 if the file is open for appending.
     """
     if "a" in str(getattr(file, "mode", "")):
         raise OutputError(
-            "PTM-O004",
+            "PTM-O002",
             "is open for appending, but its head is written last",
             file=str(getattr(file, "name", "")) or None,
             remedy="open it for writing",
@@ -182,7 +182,7 @@ def encode_to(
     described = pack_description(description)
     if len(described) > DESCRIPTION_MAX:
         raise LimitError(
-            "PTM-L105",
+            "PTM-L104",
             f"its colour profile has {len(described):,} bytes; {DESCRIPTION_MAX:,} can be kept",
             remedy="leave it out",
         )

@@ -56,7 +56,7 @@ def open(source: Source, *, limits: Limits = _LIMITS, threads: int = 1) -> PtmRe
 
     Raises
     ------
-    InputError: PTM-I120 to PTM-I122 for a path; those of `read_header`.
+    InputError: PTM-I120, PTM-I122 for a path; those of `read_header`.
     LimitError: those of `read_header`.
     """
     ranges = ranges_of(source)
@@ -110,7 +110,7 @@ class PtmReader:
         return self._end if size is None else size
 
     def description(self) -> Description:
-        """Colour and orientation. Raises InputError PTM-I107, PTM-I108, PTM-I113."""
+        """Colour and orientation. Raises InputError PTM-I103, PTM-I108, PTM-I105."""
         offset, length, crc32 = self.header.description
         with naming(self._ranges.name):
             return parse_description(self._checked(offset, length, crc32, "description"))
@@ -120,7 +120,7 @@ class PtmReader:
 
         Raises
         ------
-        InputError: PTM-I106 no such level, PTM-I107 the level is not whole in the file (the
+        InputError: PTM-I111 no such level, PTM-I103 the level is not whole in the file (the
             message names the last one that is), PTM-I108 wrong checksum, PTM-I112 a group that no
             encoder writes.
         LimitError: PTM-L103 the level is larger than the limits allow.
@@ -138,7 +138,7 @@ class PtmReader:
     def window(self, number: int, x: int, y: int, width: int, height: int) -> Samples:
         """The texels (height, width, c) of a level from column ``x`` and row ``y`` on.
 
-        Raises as `level`; InputError PTM-I106 also where the window leaves the level. The limit is
+        Raises as `level`; InputError PTM-I111 also where the window leaves the level. The limit is
         that of the window.
         """
         with naming(self._ranges.name):
@@ -192,7 +192,7 @@ class PtmReader:
             number = max(0, whole - 1)
         if not 0 <= number < len(header.levels):
             raise InputError(
-                "PTM-I106",
+                "PTM-I111",
                 f"there is no level {number}",
                 place=f"level {number}",
                 remedy=f"it has levels 0 to {len(header.levels) - 1}",
@@ -201,7 +201,7 @@ class PtmReader:
         box = window or level.box
         if not (0 <= box.x0 < box.x1 <= level.width and 0 <= box.y0 < box.y1 <= level.height):
             raise InputError(
-                "PTM-I106",
+                "PTM-I111",
                 f"columns {box.x0} to {box.x1} and rows {box.y0} to {box.y1} are not within it",
                 place=f"level {number}",
                 remedy=f"it is {level.width} x {level.height} texels",
@@ -336,7 +336,7 @@ class PtmReader:
         if whole is not None:
             remedy = f"the last whole level is {whole - 1}" if whole else "no level is complete"
         return InputError(
-            "PTM-I107", f"is cut{of}, inside or before this", place=place, remedy=remedy
+            "PTM-I103", f"is cut{of}, inside or before this", place=place, remedy=remedy
         )
 
 

@@ -50,7 +50,7 @@ def ranges_of(source: Source) -> Ranges:
 
     Raises
     ------
-    InputError: PTM-I120 no such file, PTM-I121 a folder, PTM-I122 not readable.
+    InputError: PTM-I120 no such file; PTM-I122 a folder, or not readable.
     TypeError: for what is none of the kinds of `Source`; text files are not.
     """
     if isinstance(source, bytes | bytearray | memoryview):
@@ -119,7 +119,7 @@ def open_file(path: str | os.PathLike[str]) -> BinaryIO:
         raise InputError("PTM-I120", "there is no such file", file=path) from None
     except IsADirectoryError:
         raise InputError(
-            "PTM-I121", "is a folder, not a file", file=path, remedy="name a file in it"
+            "PTM-I122", "is a folder, not a file", file=path, remedy="name a file in it"
         ) from None
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         reason = getattr(error, "strerror", None) or error
@@ -147,12 +147,12 @@ class Rows(Protocol):
 
 
 class ImageRows:
-    """The image as (h, w, c) rows of a native dtype. Raises InputError PTM-I110."""
+    """The image as (h, w, c) rows of a native dtype. Raises InputError PTM-I126."""
 
     def __init__(self, image: Rows) -> None:
         if not (hasattr(image, "shape") and hasattr(image, "dtype")):
             raise InputError(
-                "PTM-I110",
+                "PTM-I126",
                 f"{type(image).__name__} is not an array",
                 remedy="use numpy.asarray(image)",
             )
@@ -162,14 +162,14 @@ class ImageRows:
         self.height, self.width, self.components = (*shape, 1)[:3] if fits else (0, 0, 0)
         if not fits or self.components > MAX_COMPONENTS:
             raise InputError(
-                "PTM-I110",
+                "PTM-I126",
                 f"an array of shape {shape} and type {dtype} is not an image",
                 remedy="it must be (height, width) or (height, width, 1 to 4) of "
                 f"{', '.join(KINDS)}, and not empty",
             )
         if max(self.width, self.height) > MAX_SIDE:
             raise LimitError(
-                "PTM-L102",
+                "PTM-L104",
                 f"the image is {self.width} x {self.height} texels; the format allows {MAX_SIDE} "
                 "a side",
                 remedy="scale it down",

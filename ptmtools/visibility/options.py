@@ -11,7 +11,7 @@ from ptmtools.options import option
 
 @dataclass(frozen=True)
 class PvsOptions:
-    """Options of `compute_pvs`. Raises InputError PTM-I402 for values out of range."""
+    """Options of `compute_pvs`. Raises InputError PTM-I111 for values out of range."""
 
     heading: ClassVar[str] = "Visibility"
 
@@ -43,13 +43,13 @@ class PvsOptions:
     def __post_init__(self) -> None:
         if self.budget < 0:
             raise InputError(
-                "PTM-I402",
+                "PTM-I111",
                 f"budget {self.budget} is out of range",
                 remedy="give a budget of at least 0",
             )
         if self.method not in ("full", "fast", "sampled") or self.lines < 1:
             raise InputError(
-                "PTM-I402",
+                "PTM-I111",
                 f"visibility cannot be computed by method {self.method!r} with {self.lines} lines",
                 remedy="choose full, fast or sampled, and at least one line",
             )

@@ -101,15 +101,15 @@ def check_conservative(
     structural: (T, 3, 3) the triangles that occlude, metres: those from which the cells were made.
     segments: how many to try; fewer are if too few ends fall into cells.
 
-    Deterministic for a seed. Raises InputError PTM-I403 if the triangles are not (T, 3, 3) or not
+    Deterministic for a seed. Raises InputError PTM-I400 if the triangles are not (T, 3, 3) or not
     finite, or if cells and PVS are not of the same subdivision.
     """
     structural = np.asarray(structural, dtype=np.float64)
     if structural.shape[1:] != (3, 3) or not np.isfinite(structural).all():
-        raise InputError("PTM-I403", "the triangles are not finite corners of shape (T, 3, 3)")
+        raise InputError("PTM-I400", "the triangles are not finite corners of shape (T, 3, 3)")
     if pvs.cell_count != cells.cell_count:
         raise InputError(
-            "PTM-I403",
+            "PTM-I400",
             f"the PVS has {pvs.cell_count} cells, the subdivision {cells.cell_count}",
             remedy="compute the PVS again",
         )

@@ -317,7 +317,7 @@ def test_what_is_called_door_and_is_none_is_told_if_something_cannot_be_reached(
 
 
 def test_a_viewpoint_that_is_no_number_is_outside() -> None:
-    with pytest.raises(InputError, match="PTM-I301"):
+    with pytest.raises(InputError, match="PTM-I111"):
         subdivide(scene(rooms()), SubdivideOptions(viewpoints=((float("nan"), 1.0, 1.0),)))
 
 

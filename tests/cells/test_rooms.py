@@ -228,7 +228,7 @@ def test_any_number_of_lines_comes_in_eights(
 
 @pytest.mark.parametrize("gain", [-0.1, 1.1, float("nan")])
 def test_a_gain_that_is_no_share_is_refused(halved: Callable[[float], Scene], gain: float) -> None:
-    with pytest.raises(InputError, match="PTM-I300"):
+    with pytest.raises(InputError, match="PTM-I111"):
         subdivide(halved(1.0), SubdivideOptions(gain=gain))
 
 

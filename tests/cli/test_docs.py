@@ -13,6 +13,8 @@ import click
 import pytest
 
 from ptmtools.cli.main import ptm
+from ptmtools.diagnostics import FOLDER_CODES
+from ptmtools.output.validation.findings import CODES
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = sorted(ROOT.glob("docs/**/*.md"))
@@ -35,7 +37,7 @@ SOURCES = {".py", ".js", ".mjs", ".c", ".h", ".json", ".md"}
 #: Code in a line, and a line of code.
 CODE = re.compile(r"`([^`\n]+)`|^ {4,}(\S.*)$", re.MULTILINE)
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*")
-#: "PTM-L101", and what may follow: ", L102", " and I255", " to N213".
+#: "PTM-L104", and what may follow: ", L102", " and I255", " to N213".
 FIRST = re.compile(r"PTM-([A-Z])(\d{3})\b")
 NEXT = re.compile(r"(,? and |, | to )(?:PTM-)?([A-Z]?)(\d{3})\b")
 
@@ -69,14 +71,33 @@ def all_codes() -> set[str]:
 
 def test_every_code_is_documented() -> None:
     named, between = documented()
-    #: An example, in the docstring of what holds a code.
-    assert sorted(all_codes() - named - between - {"PTM-I001"}) == []
+    assert sorted(all_codes() - named - between) == []
 
 
 def test_every_documented_code_exists() -> None:
     named, _ = documented()
     strict = {code.replace("-N", "-I") for code in all_codes()}
     assert sorted(named - all_codes() - strict) == []
+
+
+def test_retired_codes_are_not_used() -> None:
+    text = (ROOT / "docs/formats/codes.md").read_text("utf-8")
+    rows = re.findall(
+        r"^\| (PTM-[A-Z]\d{3}) \| (.*) \|$", text.partition("## Retired codes")[2], re.M
+    )
+    kept = [code for code, _ in rows]
+    retired = [f"PTM-{code}" for _, codes in rows for code in codes.split(", ")]
+    assert len({*kept, *retired}) == len(kept) + len(retired) > 200
+    assert sorted(all_codes() & {*retired}) == []
+    assert sorted({*kept} - all_codes()) == []
+
+
+def test_findings_are_documented() -> None:
+    text = (ROOT / "docs/formats/codes.md").read_text("utf-8")
+    rows = re.findall(r"^\| (PTM-D\d+) \| (\w+) \| (.*) \|$", text, re.M)
+    tables = CODES, FOLDER_CODES
+    assert rows == [(code, *table[code]) for table in tables for code in sorted(table)]
+    assert all(CODES[code] == FOLDER_CODES[code] for code in CODES.keys() & FOLDER_CODES.keys())
 
 
 def anchors(page: Path) -> set[str]:

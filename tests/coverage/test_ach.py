@@ -253,15 +253,15 @@ def test_clearance_keeps_points_off_the_walls(room_row):
     ],
 )
 def test_options_that_make_no_sense(wrong):
-    with pytest.raises(InputError, match="PTM-I500"):
+    with pytest.raises(InputError, match="PTM-I111"):
         AchOptions(**wrong)
 
 
 def test_inputs_that_do_not_belong_together(room_row):
     scene, cells = room_row(2)
-    with pytest.raises(InputError, match="PTM-I501"):
+    with pytest.raises(InputError, match="PTM-I400"):
         compute_ach(scene, cells, all_visible(3))
-    with pytest.raises(InputError, match="PTM-I501"):
+    with pytest.raises(InputError, match="PTM-I400"):
         compute_ach(room_row(1)[0], cells, all_visible(2))
 
 

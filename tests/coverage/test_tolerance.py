@@ -125,7 +125,7 @@ def test_the_note_counts_the_cells_that_fell_short(room_row):
 
 def test_a_tolerance_needs_eight_points():
     """One for each of the independent sequences."""
-    with pytest.raises(InputError, match="PTM-I500"):
+    with pytest.raises(InputError, match="PTM-I111"):
         AchOptions(tolerance=0.1, samples=7)
     AchOptions(tolerance=0.1, samples=8)
 

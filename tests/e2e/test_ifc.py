@@ -98,4 +98,4 @@ def test_a_fault_is_one_line(ptm: Ptm, ifc: Path, tmp_path: Path) -> None:
     done = ptm("cells", cut, "-o", tmp_path / "cut.db")
     assert done.status == 3
     assert done.err.count("\n") == 1
-    assert "PTM-I267" in done.err
+    assert "PTM-I266" in done.err

@@ -245,7 +245,7 @@ def test_files_at_fault(three: Any, files: Path, tmp_path: Path) -> None:
     faults = {name: (fault, level) for name, fault, level in found["say"]}
     assert faults["flipped"] == ("PTM-I108", last - 1)
     assert faults["head"] == ("PTM-I101", -1)
-    assert faults["cut"] == ("PTM-I107", last - 1)
+    assert faults["cut"] == ("PTM-I103", last - 1)
     assert "404" in faults["none"][0]
     assert found["left"] == 0
     ranges = [(begin, end) for path, begin, end in visit.ranges if "flipped" in path]

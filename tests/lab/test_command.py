@@ -70,8 +70,8 @@ def test_what_is_there_is_kept(
 @pytest.mark.parametrize(
     ("words", "status", "code"),
     [
-        (["--speed", "0"], 3, "PTM-I810"),
-        (["--duration", "1e9"], 3, "PTM-I810"),
+        (["--speed", "0"], 3, "PTM-I111"),
+        (["--duration", "1e9"], 3, "PTM-I111"),
         (["--rate", "x"], 2, "PTM-U001"),
     ],
 )

@@ -349,7 +349,7 @@ def test_loss_slows_the_link_and_delays_some() -> None:
     ],
 )
 def test_links_that_cannot_be(options: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError, match=rf"no link has {message}.*\[PTM-I711\]"):
+    with pytest.raises(InputError, match=rf"no link has {message}.*\[PTM-I111\]"):
         Conditions(**options)
 
 

@@ -270,7 +270,7 @@ def test_a_child(subject: Subjects) -> None:
     check(made, scene, cells, options)
     assert made.walk.eye[:, 1].min() == pytest.approx(floor + 1.1, abs=1e-3)
     for eye in (0.4, 2.3):
-        with pytest.raises(InputError, match="PTM-I810"):
+        with pytest.raises(InputError, match="PTM-I111"):
             make_path(scene, cells, PathOptions(eye=eye))
 
 
@@ -331,7 +331,7 @@ def test_a_single_bare_room(room_row: RoomRow, duration: float | None, samples: 
 def test_nobody_can_walk(room_row: RoomRow) -> None:
     scene, cells = room_row(2)
     above = np.array([[[0, 9, 0], [1, 9, 0], [0, 9, 1]]], dtype=np.float64)
-    with pytest.raises(InputError, match="PTM-I811"):
+    with pytest.raises(InputError, match="PTM-I247"):
         make_path(scene, replace(cells, eye_floor=above))
 
 
@@ -350,7 +350,7 @@ def test_nobody_can_walk(room_row: RoomRow) -> None:
     ],
 )
 def test_options_out_of_range(name: str, value: float) -> None:
-    with pytest.raises(InputError, match="PTM-I810"):
+    with pytest.raises(InputError, match="PTM-I111"):
         PathOptions(**{name: value})  # type: ignore[arg-type]
 
 

@@ -59,16 +59,16 @@ def test_what_waits() -> None:
 @pytest.mark.parametrize(
     ("changes", "code"),
     [
-        ({"lines": 0}, "PTM-I802"),
-        ({"begun": -1}, "PTM-I802"),
-        ({"files": [[0, "page", 0]]}, "PTM-I802"),
-        ({"files": [["0", "page", 0, 1]]}, "PTM-I802"),
-        ({"files": [[0, "page", 0, -1]]}, "PTM-I802"),
-        ({"frames": []}, "PTM-I807"),
-        ({"files": [[0, "poster", 0, 1]]}, "PTM-I807"),
-        ({"files": [[0, "record", 2, 1]]}, "PTM-I807"),
-        ({"geometryBytes": [1]}, "PTM-I807"),
-        ({"frames": [[2, -1, 0]] * 3}, "PTM-I807"),
+        ({"lines": 0}, "PTM-I801"),
+        ({"begun": -1}, "PTM-I801"),
+        ({"files": [[0, "page", 0]]}, "PTM-I801"),
+        ({"files": [["0", "page", 0, 1]]}, "PTM-I801"),
+        ({"files": [[0, "page", 0, -1]]}, "PTM-I801"),
+        ({"frames": []}, "PTM-I801"),
+        ({"files": [[0, "poster", 0, 1]]}, "PTM-I801"),
+        ({"files": [[0, "record", 2, 1]]}, "PTM-I801"),
+        ({"geometryBytes": [1]}, "PTM-I801"),
+        ({"frames": [[2, -1, 0]] * 3}, "PTM-I801"),
     ],
 )
 def test_what_is_refused(changes: dict[str, Any], code: str) -> None:

@@ -435,7 +435,7 @@ def test_other_textures_are_no_comparison(made: Path, two_rooms: Path) -> None:
     served = read_served(made / "light.db")
     other = read_served(two_rooms)
     renamed = replace(other, index={**other.index, "textures": other.index["textures"][:1]})
-    with pytest.raises(InputError, match=r"other textures.*PTM-I703"):
+    with pytest.raises(InputError, match=r"other textures.*PTM-I700"):
         relief_of(served, read_pyramids(served), renamed)
 
 

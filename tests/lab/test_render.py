@@ -84,7 +84,7 @@ def test_where_the_eye_is(two_rooms: Path) -> None:
 def test_impossible_views(options: dict[str, object], two_rooms: Path) -> None:
     with pytest.raises(InputError) as caught:
         eye_of(read_served(two_rooms), ViewOptions(**options))  # type: ignore[arg-type]
-    assert caught.value.code == "PTM-I860"
+    assert caught.value.code == "PTM-I111"
 
 
 def test_failures_have_one_line_each(
@@ -92,9 +92,9 @@ def test_failures_have_one_line_each(
 ) -> None:
     view = tmp_path / "view.png"
     for arguments, code in (
-        ([two_rooms, "-o", tmp_path / "view.jpg"], "PTM-O102"),
+        ([two_rooms, "-o", tmp_path / "view.jpg"], "PTM-O101"),
         ([two_rooms, "-o", tmp_path / "no" / "view.png"], "PTM-O002"),
-        ([two_rooms, "-o", view, "--viewpoint", "99"], "PTM-I860"),
+        ([two_rooms, "-o", view, "--viewpoint", "99"], "PTM-I111"),
         ([two_rooms, "-o", view, "--azimuth", "9"], "PTM-U001"),
         ([tmp_path, "-o", view], "PTM-D001"),
         ([tmp_path / "absent", "-o", view], "PTM-D001"),

@@ -76,7 +76,7 @@ def test_a_record_that_says_what_is_not(copy: Path, change: Change) -> None:
 def test_a_walk_without_end(copy: Path) -> None:
     eye, ahead = np.zeros((2, 3)), np.array([[1.0, 0, 0]] * 2)
     walk = Walk(np.array([0.0, 1e300]), eye, ahead, 1.0, 1.5)
-    with pytest.raises(LimitError, match="PTM-L700"):
+    with pytest.raises(LimitError, match="PTM-L400"):
         prepare(read_served(copy), walk)
 
 

@@ -112,14 +112,14 @@ def test_the_same_twice_is_run_once(world: World) -> None:
     ("words", "code"),
     [
         (["--policy", "paper,psychic"], "PTM-U001"),
-        (["--bandwidth", "56x"], "PTM-I712"),
-        (["--memory", "0"], "PTM-I712"),
-        (["--latency", "soon"], "PTM-I712"),
-        (["--overhead", "-1"], "PTM-I711"),
+        (["--bandwidth", "56x"], "PTM-I111"),
+        (["--memory", "0"], "PTM-I111"),
+        (["--latency", "soon"], "PTM-I111"),
+        (["--overhead", "-1"], "PTM-I111"),
         (["--policy", "ach-texture"], "PTM-I701"),
         (["--policy", "gpuii"], "PTM-I701"),
-        (["--walk", "nowhere.json"], "PTM-I800"),
-        (["--trace", "nowhere.json"], "PTM-I099"),
+        (["--walk", "nowhere.json"], "PTM-I122"),
+        (["--trace", "nowhere.json"], "PTM-I122"),
         (["--csv", "nowhere/frames.csv"], "PTM-O002"),
         (["--walk", "walk.json", "--seed", "2"], "PTM-U001"),
         (["--csv", "both", "--plot", "./both"], "PTM-U001"),
@@ -136,7 +136,7 @@ def test_a_served_folder_needs_a_walk(ptm: Ptm, two_rooms: Path, walk_file: Path
     bare = ptm("simulate", two_rooms / "www")
     assert bare.status == 3
     assert "--walk" in bare.err
-    assert "[PTM-I702]" in bare.err
+    assert "[PTM-I701]" in bare.err
     words = ["--policy", "ach", "--bandwidth", "4M", "--memory", "inf", "--json"]
     with_walk = [
         json.loads(ptm("simulate", folder, "--walk", walk_file, *words).out)["runs"]
@@ -219,5 +219,5 @@ def test_the_parameters_of_the_paper(two_rooms: Path, walk_file: Path, ptm: Ptm)
     assert second["overruns"] == 0
     assert ptm(*words, *given).out.startswith("policy paper with --delta-t 0 --delta-t-static 0 ")
     assert "[PTM-U001]" in ptm(*words, "--policy", "best", "--delta-t", "1").err
-    assert "[PTM-I715]" in ptm(*words, "--static-after", "-1").err
-    assert "[PTM-I712]" in ptm(*words, "--static-memory", "much").err
+    assert "[PTM-I111]" in ptm(*words, "--static-after", "-1").err
+    assert "[PTM-I111]" in ptm(*words, "--static-memory", "much").err

@@ -85,5 +85,5 @@ def test_what_is_no_trace(tmp_path: Path, name: str, content: object, message: s
 
 def test_a_trace_that_is_too_large(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(trace, "LARGEST", 0)
-    with pytest.raises(LimitError, match=r"more than 0 MiB.*\[PTM-L710\]"):
+    with pytest.raises(LimitError, match=r"more than 0 MiB.*\[PTM-L204\]"):
         read_trace(written(tmp_path / "t.json", STEPS))

@@ -6,11 +6,76 @@ import gzip
 import json
 import re
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from ptmtools.diagnostics import Issue
+
 Damage = Callable[[Path], object]
+
+#: Kinds of findings that share a code: kind → the code, and a pattern of their messages.
+KINDS = {
+    "special_file": ("D657", r"is a (pipe|device|socket)|is a broken link|is a link to a folder"),
+    "utf8": ("D661", "not UTF-8"),
+    "not_finite": ("D661", "is not finite"),
+    "lacks": ("D661", "lacks|does not (declare|begin)|not one|nodes, not 1|without a texture"),
+    "coord_index": ("D661", r"^coordIndex"),
+    "tex_coord_index": ("D661", r"^texCoordIndex"),
+    "colour": ("D661", "colour"),
+    "leads_out": ("D671", "leads out|is no relative URL"),
+    "no_file": ("D671", "no such file"),
+    "malformed_url": ("D671", "percent-encoded"),
+    "twice": ("D671", r"is named \d+ times"),
+    "hull": ("D683", "^(the hull|hullIndex)"),
+    "outside_hull": ("D683", "outside of the hull"),
+    "leaf_start": ("D683", "leafStart"),
+    "leaves": ("D683", "^(is not (convex|closed)|lies in)"),
+    "own_first": ("D690", "does not begin with"),
+    "adjacency": ("D690", "is adjacent to it"),
+    "visibility": ("D690", "sees it"),
+    "hidden_neighbour": ("D690", "is adjacent, but not visible"),
+    "order": ("D690", "twice or out of order|itself$"),
+    "ach_range": ("D692", "outside 0 to 1"),
+    "ach_length": ("D692", "ach values for"),
+    "ach_sum": ("D692", "the ach values sum to"),
+    "record_ach": ("D692", "aligned with visible|the ach values sum to"),
+    "statistics": ("D692", "aligned with ach|the shares of|has a share"),
+    "index": ("D700", "record|textures|leaves|in the index|names no form|does not name"),
+    "needs": ("D700", "ascend|has only|increase|sum to more"),
+    "octree_row": ("D700", "ascending|more than an octree|not aligned"),
+    "cell_name": ("D699", "^cellName"),
+    "root": ("D699", "viewpoint|bounding box|is listed twice|is not inlined"),
+    "portals": ("D699", "portal|in a face|flat|than its polygon|the adjacent cells"),
+    "viewpoint_place": ("D699", "(in|lie in) cell|of the root file"),
+    "first_look": ("D704", "bundle|bytes of the textures|does not refine"),
+    "glb_texture": ("D704", r"texture -?\d+( is opaque|$)"),
+    "fallback_differs": ("D710", "differs from|is not the size of any level"),
+    "fallback_unreadable": ("D710", "is not a PNG|cannot be read"),
+    "octree_length": ("D710", "the last level"),
+    "octree_level": ("D710", "is damaged|before it is whole"),
+    "octree_order": ("D710", "texels instead of|first child"),
+    "octree_unnamed": ("D677", "no other file names it"),
+    "other_schema": ("D656", "this ptmtools reads"),
+    "glb_accessor": ("D731", "end|index or a size|bytes of|multiple"),
+    "glb_indices": ("D731", r"indices up to"),
+    "glb_numbers": ("D731", "is not finite|is not that of the data"),
+}
+
+
+def is_planted(issue: Issue, kind: str) -> bool:
+    """Whether a finding is of a kind of `KINDS`, or has the code that is named instead."""
+    code, pattern = KINDS.get(kind, (kind, ""))
+    repeats = issue.message.endswith("more of these")
+    return issue.code == f"PTM-{code}" and (repeats or bool(re.search(pattern, issue.message)))
+
+
+def expect(issues: Sequence[Issue], expected: str) -> None:
+    """The kinds and codes named in ``expected`` are reported, and nothing else."""
+    kinds = expected.split()
+    shown = "\n".join(map(str, issues))
+    assert all(any(is_planted(issue, kind) for issue in issues) for kind in kinds), shown
+    assert all(any(is_planted(issue, kind) for kind in kinds) for issue in issues), shown
 
 
 def rewritten(name: str, change: Callable[[bytes], bytes]) -> Damage:

@@ -266,9 +266,9 @@ def test_geometry_beyond_the_root_box_of_a_cell_of_two_leaves(
         emit(scene, replace(whole, vertex=vertex), pvs, ach, (), out, EmitOptions())
         return {i.code for i in validate_database(tmp_path / name).issues}
 
-    assert "PTM-D684" not in issues((0, 0, -2), "as it was")
-    assert "PTM-D684" not in issues((2, 6, -2), "above the higher leaf")
-    assert "PTM-D684" in issues((10, 3, -2), "above and beyond the lower leaf")
+    assert "PTM-D683" not in issues((0, 0, -2), "as it was")
+    assert "PTM-D683" not in issues((2, 6, -2), "above the higher leaf")
+    assert "PTM-D683" in issues((10, 3, -2), "above and beyond the lower leaf")
 
 
 def test_viewpoints_stand_on_the_floor(artifacts, finished: Path) -> None:
@@ -310,15 +310,15 @@ def test_faults_before_anything_is_written(artifacts, tmp_path: Path) -> None:
     vertex[3, 1] = np.nan
     for fault, changes in (
         ("PTM-D600", {"cells": nothing}),
-        ("PTM-D604", {"pvs": replace(pvs, start=pvs.start[:-1])}),
-        ("PTM-D604", {"ach": replace(ach, start=ach.start * 2)}),
-        (r"'b\.png'.*PTM-D602", {"textures": records()[:1]}),
+        ("PTM-D008", {"pvs": replace(pvs, start=pvs.start[:-1])}),
+        ("PTM-D008", {"ach": replace(ach, start=ach.start * 2)}),
+        (r"'b\.png'.*PTM-D004", {"textures": records()[:1]}),
         ("PTM-D601", {"cells": replace(cells, vertex=vertex)}),
         ("PTM-D601", {"cells": replace(cells, vertex=cells.vertex * 1e40)}),
     ):
         with pytest.raises(DatabaseError, match=fault):
             write(artifacts, out, **changes)
-    with pytest.raises(InputError, match="PTM-I600"):
+    with pytest.raises(InputError, match="PTM-I111"):
         write(artifacts, out, EmitOptions(viewpoints=(GivenViewpoint((50, 1, 0)),)))
     assert not out.exists()
 

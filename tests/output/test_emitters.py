@@ -86,14 +86,14 @@ def test_the_command_knows_it(capsys: pytest.CaptureFixture[str], tmp_path: Path
 
 @pytest.mark.usefixtures("toy")
 def test_a_form_without_cells_cannot_stand_alone() -> None:
-    with pytest.raises(InputError, match=r"add vrml or gltf.*PTM-I603"):
+    with pytest.raises(InputError, match=r"add vrml or gltf.*PTM-I111"):
         EmitOptions(format="toy")
 
 
 def test_names_in_any_order() -> None:
     assert EmitOptions(format="gltf,vrml,gltf").format == "vrml,gltf"
     for wrong in ("usd", "", "vrml,", "vrml, gltf"):
-        with pytest.raises(InputError, match="PTM-I603"):
+        with pytest.raises(InputError, match="PTM-I111"):
             EmitOptions(format=wrong)
 
 

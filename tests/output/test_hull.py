@@ -70,7 +70,7 @@ def test_any_points(points: list[tuple[float, float, float]]) -> None:
     a = array[0]
     flat = all(side(a, b, c, p) == 0 for b in array for c in array for p in array)
     if flat:
-        with pytest.raises(DatabaseError, match="PTM-D603"):
+        with pytest.raises(DatabaseError, match="PTM-D601"):
             convex_hull(array)
     else:
         check(array)
@@ -101,5 +101,5 @@ def test_flat_points_are_refused() -> None:
         np.array([[0, 0, 0], [1, 1, 1], [2, 2, 2], [3, 3, 3]]),
         np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [3, 4, 0]]),
     ):
-        with pytest.raises(DatabaseError, match="PTM-D603"):
+        with pytest.raises(DatabaseError, match="PTM-D601"):
             convex_hull(flat.astype(np.float32))

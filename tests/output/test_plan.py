@@ -110,7 +110,7 @@ def test_shades_follow_the_coverage(artifacts, tmp_path: Path) -> None:
 def test_before_the_later_stages(artifacts, tmp_path: Path) -> None:
     draw(artifacts, tmp_path / "a.png", pvs=None, ach=None)
     draw(artifacts, tmp_path / "b.png", PlotOptions(cell=0, width=6, dpi=60), ach=None)
-    with pytest.raises(InputError, match="PTM-I601"):
+    with pytest.raises(InputError, match="PTM-I111"):
         draw(artifacts, tmp_path / "c.png", PlotOptions(cell=0), pvs=None, ach=None)
     assert not (tmp_path / "c.png").exists()
 
@@ -118,13 +118,13 @@ def test_before_the_later_stages(artifacts, tmp_path: Path) -> None:
 def test_faults(artifacts, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     a = artifacts
     for cell in (-1, 3):
-        with pytest.raises(InputError, match="PTM-I601"):
+        with pytest.raises(InputError, match="PTM-I111"):
             draw(a, tmp_path / "a.png", PlotOptions(cell=cell))
     (tmp_path / "a.png").write_text("mine")
     with pytest.raises(OutputError, match="PTM-O001"):
         plot_plan(a.scene, a.cells, a.pvs, a.ach, tmp_path / "a.png", SMALL)
     monkeypatch.setitem(sys.modules, "matplotlib.backends.backend_agg", None)
-    with pytest.raises(MissingComponentError, match=r"pip install 'ptmtools\[plot\]'.*PTM-M600"):
+    with pytest.raises(MissingComponentError, match=r"pip install 'ptmtools\[plot\]'.*PTM-M100"):
         draw(a, tmp_path / "b.png")
 
 

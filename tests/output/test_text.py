@@ -206,8 +206,8 @@ def test_points_read_back(points: list[tuple[float, float, float]]) -> None:
 @pytest.mark.parametrize(
     ("body", "kind", "place"),
     [
-        ("Viewpoint { position 1 nan 2 }", "PTM-D662", "line 2"),
-        ("Viewpoint { position 1 1e39 2 }", "PTM-D662", "line 2"),
+        ("Viewpoint { position 1 nan 2 }", "PTM-D661", "line 2"),
+        ("Viewpoint { position 1 1e39 2 }", "PTM-D661", "line 2"),
         ("\nShape { geometry IndexedFaceSet { coordIndex [ 0, 1.5 ] } }", "PTM-D661", "line 3"),
         (
             "Shape { geometry IndexedFaceSet { coordIndex [ 9999999999 ] } }",
@@ -226,9 +226,9 @@ def test_points_read_back(points: list[tuple[float, float, float]]) -> None:
         ("PROTO P [ field SFFoo a 1 ] { WorldInfo { } }", "PTM-D661", "line 2"),
         ("PROTO P [ exposedField SFBool a TRUE ] { WorldInfo { } }", "PTM-D661", "line 2"),
         ("PROTO P [ ] { Shape { } }", "PTM-D661", "line 2"),
-        ("PROTO PTMViewpointCell [ field\n SFInt32 a 1 ] { WorldInfo { } }", "PTM-D663", "line 3"),
-        ("PROTO PTMCell [ ] { WorldInfo { } }", "PTM-D663", "line 2"),
-        (declaration(*CELL).replace("ach ", "acht "), "PTM-D663", "line 8"),
+        ("PROTO PTMViewpointCell [ field\n SFInt32 a 1 ] { WorldInfo { } }", "PTM-D661", "line 3"),
+        ("PROTO PTMCell [ ] { WorldInfo { } }", "PTM-D661", "line 2"),
+        (declaration(*CELL).replace("ach ", "acht "), "PTM-D661", "line 8"),
         (declaration(*CELL).replace("World", "Word"), "PTM-D661", "line 10"),
         (declaration(*CELL).rstrip("}\n"), "PTM-D661", "line 11"),
         (declaration(*CELL) + declaration(*CELL_OF_LEAVES), "PTM-D661", "line 12"),
@@ -270,7 +270,7 @@ def test_the_header_and_the_encoding() -> None:
         (b"", "PTM-D661"),
         (b"#VRML V1.0 ascii\n", "PTM-D661"),
         (b"\xef\xbb\xbf#VRML V2.0 utf8\n", "PTM-D661"),
-        (document("# \u00e4").replace(b"\xc3", b""), "PTM-D660"),
+        (document("# \u00e4").replace(b"\xc3", b""), "PTM-D661"),
     ):
         with pytest.raises(FileError) as fault:
             parse(data)

@@ -73,7 +73,7 @@ def test_only_so_many(room_row) -> None:
     assert [v.name for v in views] == ["VP_0", "VP_1"]
     (view,), _ = place_viewpoints(scene, cells, EmitOptions(viewpoint_count=0))
     assert view == views[0]
-    with pytest.raises(InputError, match="PTM-I603"):
+    with pytest.raises(InputError, match="PTM-I111"):
         EmitOptions(viewpoint_count=-1)
 
 
@@ -293,7 +293,7 @@ def test_given_ones(room_row) -> None:
     np.testing.assert_allclose(c.direction, (0, 0, -1), atol=1e-12)
     assert [v.cell for v in (a, b, c)] == [0, 1, 2]
     outside = EmitOptions(viewpoints=(GivenViewpoint((1.0, 1.0, 9.0)),))
-    with pytest.raises(InputError, match="PTM-I600"):
+    with pytest.raises(InputError, match="PTM-I111"):
         place_viewpoints(scene, cells, outside)
 
 

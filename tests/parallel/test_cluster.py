@@ -21,7 +21,7 @@ from ptmtools.parallel import open_executor
 
 def test_without_dask(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(MissingComponentError, match=r"pip install 'ptmtools\[cluster\]'.*PTM-M700"):
+    with pytest.raises(MissingComponentError, match=r"pip install 'ptmtools\[cluster\]'.*PTM-M100"):
         open_executor(scheduler="tcp://127.0.0.1:1")
 
 
@@ -55,7 +55,7 @@ def test_dying_workers(require, monkeypatch):
     monkeypatch.setattr(module, "PATIENCE", 0.5)
     settings = {"host": "127.0.0.1", "dashboard_address": ":0", "silence_logs": logging.CRITICAL}
     with LocalCluster(n_workers=0, **settings) as machines:
-        with pytest.raises(WorkerError, match="PTM-W002"):
+        with pytest.raises(WorkerError, match="PTM-W001"):
             open_executor(scheduler=machines.scheduler_address)
         monkeypatch.undo()
         machines.scale(2)

@@ -243,7 +243,7 @@ def test_ingests_without_a_miss(folder: Path, few: Any) -> None:
     scene = ingest(folder / "campus.obj", IngestOptions(unit="m", up="y"))
     # OBJ keeps colours and opacities apart, here they become one image; and it names no unit,
     # which must be said: streets have no rooms to guess it by.
-    assert {note.code for note in scene.notes} == {"PTM-N217"}
+    assert {note.code for note in scene.notes} == {"PTM-N215"}
     assert len(scene.triangles) == len(few.corners)
     assert np.abs(scene.space.origin).max() < 1e-3  # the way is in the world's metres
     names = {material.name for material in scene.materials if material.transparent}

@@ -15,7 +15,7 @@ from tests.scene.features.registry import Feature, all_features
 
 FEATURES = all_features()
 #: Codes of what is done by the way, and says nothing of the feature.
-BY_THE_WAY = {"PTM-N226", "PTM-N227", "PTM-N232", "PTM-N234", "PTM-N237", "PTM-N240"}
+BY_THE_WAY = {"PTM-N201", "PTM-N227", "PTM-N232", "PTM-N234"}
 
 
 #: What a format or a feature needs: module, and how to get it.

@@ -93,7 +93,7 @@ def test_collada(put: Put, pymeshlab: None) -> None:
 
 def test_without_pymeshlab(put: Put, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pymeshlab", None)
-    with pytest.raises(MissingComponentError, match=r"pip install pymeshlab.*PTM-M200"):
+    with pytest.raises(MissingComponentError, match=r"pip install pymeshlab.*PTM-M100"):
         ingest(put("a.dae", DAE))
 
 

@@ -23,6 +23,11 @@ def codes(scene: Scene) -> set[str]:
     return {note.code for note in scene.notes}
 
 
+def says(scene: Scene, words: str) -> bool:
+    """Whether a note about a part that is ignored or converted has these words."""
+    return any(words in note.message for note in scene.notes if note.code == "PTM-N215")
+
+
 def with_material(doc: Gltf, material: dict[str, Any], **primitive: Any) -> Gltf:
     doc.tree.setdefault("materials", []).append(material)
     doc.place(doc.quad(material=len(doc.tree["materials"]) - 1, **primitive))
@@ -95,7 +100,7 @@ def test_materials(put: Put, side: bool) -> None:
     assert made.color == pytest.approx((0.735357, 0.0, 1.0), abs=1e-6)
     assert (made.opacity, made.transparent) == (0.25, True)
     assert scene.two_sided.tolist() == [side, side]
-    assert "PTM-N226" in codes(scene)
+    assert says(scene, "colour factor converted")
 
 
 @pytest.mark.parametrize(
@@ -186,7 +191,7 @@ def test_wrapping(put: Put, sampler: Any, wraps: tuple[str, str], noted: bool) -
     material = with_image(doc, png(noise(1)), sampler)
     scene = ingest(put("a.glb", with_material(doc, material).glb()))
     assert (scene.materials[0].wrap_s, scene.materials[0].wrap_t) == wraps
-    assert ("PTM-N222" in codes(scene)) is noted
+    assert says(scene, "mirrored repeat is baked") is noted
 
 
 def test_the_bytes_of_images_are_kept(put: Put, tmp_path: Path) -> None:
@@ -197,10 +202,10 @@ def test_the_bytes_of_images_are_kept(put: Put, tmp_path: Path) -> None:
     assert image.name == "Brick_1.png"
     assert image.load() == data
     path.write_bytes(path.read_bytes().replace(data[40:44], b"!!!!"))
-    with pytest.raises(InputError, match="PTM-I252"):
+    with pytest.raises(InputError, match="PTM-I122"):
         image.load()
     path.unlink()
-    with pytest.raises(InputError, match="PTM-I252"):
+    with pytest.raises(InputError, match="PTM-I122"):
         image.load()
 
 
@@ -241,7 +246,7 @@ def test_second_set_of_coordinates_normalised_and_transformed(put: Put) -> None:
     quad["attributes"]["TEXCOORD_1"] = doc.add(second, normalized=True)
     doc.place(quad)
     scene = ingest(put("a.glb", doc.glb()))
-    assert "PTM-N216" in codes(scene)
+    assert says(scene, "KHR_texture_transform is baked")
     # (s, t) → scaled (2s, t) → turned (t, -2s) → moved (t + 1/4, -2s), then upside down.
     given = [(0, 0), (1, 0), (1, 1)]
     assert np.allclose(scene.uv[0], [(t + 0.25, 1 + 2 * s) for s, t in given])
@@ -289,7 +294,7 @@ def test_strips_and_no_indices(put: Put) -> None:
         )[:, 2]
         > 0
     ).all()
-    assert "PTM-N219" in codes(scene)
+    assert says(scene, "points or lines")
 
 
 def test_cameras_and_what_hangs_below_them(put: Put) -> None:
@@ -315,7 +320,7 @@ def test_cameras_and_what_hangs_below_them(put: Put) -> None:
     assert np.allclose(first.direction, [0, 0, -1])
     assert first.field_of_view == 1.0
     assert np.allclose(second.direction, [-1, 0, 0])
-    assert "PTM-N225" in codes(scene)
+    assert says(scene, "has no perspective")
 
 
 def test_space_may_be_given(put: Put) -> None:
@@ -348,7 +353,7 @@ DAMAGED: dict[str, tuple[str, bytes]] = {
         broken(lambda d: d.tree["accessors"][0].update(count=100)),
     ),
     "too many vertices": (
-        "PTM-L200",
+        "PTM-L203",
         broken(lambda d: d.tree["accessors"][0].update(count=10**12)),
     ),
     "index out of range": ("PTM-I249", broken(lambda d: d.tree["accessors"][2].update(count=5))),
@@ -359,7 +364,7 @@ DAMAGED: dict[str, tuple[str, bytes]] = {
     "a matrix of 3": ("PTM-I249", broken(lambda d: d.tree["nodes"][0].update(matrix=[1, 2, 3]))),
     "sparse": ("PTM-I249", broken(lambda d: d.tree["accessors"][0].update(sparse={"count": 1}))),
     "unknown": (
-        "PTM-I255",
+        "PTM-I243",
         broken(lambda d: d.tree.update(extensionsRequired=["EXT_texture_avif"])),
     ),
     "no instances": (

@@ -128,5 +128,5 @@ def test_lines_not_understood_and_names_defined_twice(put: Callable[..., Path]) 
         ("PTM-N214", "a.mtl:2"),
         ("PTM-N214", "a.mtl:3"),
         ("PTM-N214", "a.mtl:4"),
-        ("PTM-N218", "a.mtl:5"),
+        ("PTM-N208", "a.mtl:5"),
     ]

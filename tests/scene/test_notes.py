@@ -36,7 +36,7 @@ def test_warnings_are_the_gravest_first_and_one_of_each_kind() -> None:
 
 
 def test_the_docs_list_the_same_warnings() -> None:
-    text = (ROOT / "docs/guide/cli.md").read_text("utf-8")
+    text = (ROOT / "docs/formats/codes.md").read_text("utf-8")
     table = text[text.index("| warnings | of |") : text.index("| notes | of |")]
     found = set()
     for row in re.findall(r"^\| PTM-([^|]*)\|", table, re.MULTILINE):

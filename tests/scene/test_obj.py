@@ -105,9 +105,9 @@ def test_what_is_skipped_is_counted(put: Callable[..., Path]) -> None:
     read_obj(path, findings)
     said = {(n.code, n.place): n.count for n in findings.notes}
     assert said == {
-        ("PTM-N219", "a.obj:11"): 2,
-        ("PTM-N219", "a.obj:13"): 1,
-        ("PTM-N220", "a.obj:14"): 1,
+        ("PTM-N215", "a.obj:11"): 2,
+        ("PTM-N215", "a.obj:13"): 1,
+        ("PTM-N214", "a.obj:14"): 1,
     }
 
 
@@ -121,8 +121,8 @@ def test_what_is_skipped_is_counted(put: Callable[..., Path]) -> None:
         (QUAD + "f 1 2 x\n", "line 9", "PTM-I245"),
         (QUAD + "f 0 1 2\n", "line 9", "PTM-I245"),
         (QUAD + "f -1 -2 -5\n", "line 9", "PTM-I245"),
-        (QUAD + "f 1 2 3\n\nf 1 2 5\n", "line 11", "PTM-I246"),
-        (QUAD + "f 1/1 2/2 3/5\n", "line 9", "PTM-I246"),
+        (QUAD + "f 1 2 3\n\nf 1 2 5\n", "line 11", "PTM-I245"),
+        (QUAD + "f 1/1 2/2 3/5\n", "line 9", "PTM-I245"),
         (QUAD + "f 1 2 99999999999999999999\n", "line 9", "PTM-I245"),
         (QUAD + "\0\0\0\0\n", "line 9", "PTM-I245"),
         (QUAD, None, "PTM-I247"),

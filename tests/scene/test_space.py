@@ -27,7 +27,7 @@ def test_units(given: str | float, metres: float) -> None:
 
 @pytest.mark.parametrize("given", ["parsec", "", "0", "-1", "nan", "inf", 0.0])
 def test_units_that_are_none(given: str | float) -> None:
-    with pytest.raises(InputError, match="PTM-I250"):
+    with pytest.raises(InputError, match="PTM-I111"):
         parse_unit(given)
 
 

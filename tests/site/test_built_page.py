@@ -42,4 +42,4 @@ def test_an_incomplete_installation(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     monkeypatch.setattr(content, "PAGE", tmp_path)
     with pytest.raises(InputError, match="install ptmtools again") as raised:
         program_files()
-    assert raised.value.code == "PTM-I900"
+    assert raised.value.code == "PTM-I122"

@@ -125,7 +125,7 @@ def test_the_vrml_files_have_the_same(database: Path, tmp_path: Path, ptm: Any) 
     data = bytearray(glb.read_bytes())
     data[at : at + 2] = b"\0\0"
     glb.write_bytes(data)
-    assert "PTM-D739" in {issue.code for issue in validate_database(database).errors}
+    assert "PTM-D730" in {issue.code for issue in validate_database(database).errors}
 
 
 def test_the_page_shows_them(visit: Callable[..., Any], colored: Site) -> None:

@@ -129,7 +129,7 @@ def test_what_is_not_ours_stays(site: Site, other: Site, tmp_path: Path) -> None
     (tmp_path / "CNAME").write_text("museum.example")
     with pytest.raises(OutputError) as raised:
         publish(site, tmp_path)
-    assert raised.value.code == "PTM-O900"
+    assert raised.value.code == "PTM-O010"
     assert files_below(tmp_path) == {"CNAME": b"museum.example"}
     publish(site, tmp_path, force=True)
     (tmp_path / "data" / "own.txt").write_text("mine")
@@ -184,7 +184,7 @@ def test_a_list_that_lies(site: Site, tmp_path: Path) -> None:
         (folder / LIST).write_bytes(damage)
         with pytest.raises(OutputError) as raised:
             publish(site, folder)
-        assert raised.value.code == "PTM-O900"
+        assert raised.value.code == "PTM-O010"
 
 
 def test_a_texture_that_was_damaged(two_rooms: Path, tmp_path: Path) -> None:
@@ -225,4 +225,4 @@ def test_the_command(ptm: Ptm, two_rooms: Path, tmp_path: Path) -> None:
     assert done.err.count("\n") == 1
     assert "PTM-D001" in done.err
     done = ptm("publish", two_rooms, "-o", two_rooms)
-    assert (done.status, "PTM-O900" in done.err) == (4, True)
+    assert (done.status, "PTM-O010" in done.err) == (4, True)

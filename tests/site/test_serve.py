@@ -155,7 +155,7 @@ def test_addresses_that_cannot_be(
 ) -> None:
     status, said = failing(capsys, folder, *(options or ("--host", "a" * 70)))
     assert status == 3
-    assert "[PTM-I921]" in said
+    assert "[PTM-I920]" in said
 
 
 @pytest.mark.parametrize("module", ["starlette", "uvicorn"])
@@ -169,15 +169,15 @@ def test_without_the_extra(
     status, said = failing(capsys, folder)
     assert status == 6
     assert f"{module} is not installed" in said
-    assert "pip install 'ptmtools[viewer]' [PTM-M920]" in said
+    assert "pip install 'ptmtools[viewer]' [PTM-M100]" in said
 
 
 @pytest.mark.parametrize(
     ("options", "status", "code"),
     [
-        (("--bandwidth", "0"), 3, "PTM-I712"),
-        (("--bandwidth", "fast"), 3, "PTM-I712"),
-        (("--latency", "-1"), 3, "PTM-I712"),
+        (("--bandwidth", "0"), 3, "PTM-I111"),
+        (("--bandwidth", "fast"), 3, "PTM-I111"),
+        (("--latency", "-1"), 3, "PTM-I111"),
         (("--port", "x"), 2, "PTM-U001"),
         (("--cors", "museum.db"), 2, "PTM-U001"),
         (("--cors", "https://a\r\nSet-Cookie: b"), 2, "PTM-U001"),

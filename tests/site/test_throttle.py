@@ -134,5 +134,5 @@ def test_there_is_always_a_byte() -> None:
 
 @pytest.mark.parametrize("wrong", [(0, 0.0), (-1, 0.0), (math.inf, 0.0), (1, -1.0), (1, math.nan)])
 def test_links_that_cannot_be(wrong: tuple[float, float]) -> None:
-    with pytest.raises(InputError, match="PTM-I711"):
+    with pytest.raises(InputError, match="PTM-I111"):
         Throttle(*wrong)

@@ -76,7 +76,7 @@ def test_force_guards_what_is_not_ours(tmp_path: Path) -> None:
     write(foreign, {"www/a": b"1"})
     assert (foreign / "mine.txt").read_text() == "mine"
 
-    with pytest.raises(OutputError, match="PTM-O011"):
+    with pytest.raises(OutputError, match="PTM-O010"):
         DatabaseWriter.open_for_model(foreign, "other.obj")
     write(foreign, {"www/b": b"1"}, "pvs", model="other.obj")
     assert set(files_below(foreign)) == {MANIFEST, "www/b", "mine.txt"}

@@ -257,7 +257,7 @@ def test_webp_is_refused_before_it_is_opened() -> None:
 
 def test_scans_of_a_jpeg_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     assert load_image(scans(declared.MOST_SCANS - 9)).texels.shape == (16, 16, 3)
-    with pytest.raises(LimitError, match="PTM-L106"):
+    with pytest.raises(LimitError, match="PTM-L104"):
         load_image(scans(declared.MOST_SCANS - 8))
     # Those in a thumbnail, or in any other segment, are none.
     data = saved("JPEG")

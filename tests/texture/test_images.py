@@ -185,23 +185,23 @@ REFUSED = {
         saved(
             Image.fromarray(GREY), "GIF", save_all=True, append_images=[Image.fromarray(255 - GREY)]
         ),
-        "PTM-I127",
+        "PTM-I126",
     ),
     "animated PNG": (
         saved(Image.fromarray(RGB), save_all=True, append_images=[Image.fromarray(255 - RGB)]),
-        "PTM-I127",
+        "PTM-I126",
     ),
     "TIFF of two pages": (
         saved(
             Image.fromarray(RGB), "TIFF", save_all=True, append_images=[Image.fromarray(255 - RGB)]
         ),
-        "PTM-I127",
+        "PTM-I126",
     ),
-    "empty": (b"", "PTM-I123"),
-    "text": (b"o model\nv 0 0 0\n", "PTM-I124"),
-    "a format not read": (saved(Image.fromarray(RGB), "ICO"), "PTM-I124"),
-    "a .ptm": (encode(RGB), "PTM-I124"),
-    "HP's .ptm": (b"PTM_1.2\nPTM_FORMAT_RGB\n", "PTM-I102"),
+    "empty": (b"", "PTM-I125"),
+    "text": (b"o model\nv 0 0 0\n", "PTM-I125"),
+    "a format not read": (saved(Image.fromarray(RGB), "ICO"), "PTM-I125"),
+    "a .ptm": (encode(RGB), "PTM-I125"),
+    "HP's .ptm": (b"PTM_1.2\nPTM_FORMAT_RGB\n", "PTM-I101"),
     "truncated PNG": (saved(Image.fromarray(RGB))[:-60], "PTM-I125"),
     "truncated JPEG": (saved(Image.fromarray(RGB).resize((99, 99)), "JPEG")[:-400], "PTM-I125"),
     "truncated BMP": (saved(Image.fromarray(RGB), "BMP")[:-60], "PTM-I125"),
@@ -252,7 +252,7 @@ def test_paths_that_lead_nowhere(tmp_path: Path) -> None:
     for read in (read_image, read_ptm):
         with pytest.raises(InputError, match="PTM-I120"):
             read(tmp_path / "absent.png")
-        with pytest.raises(InputError, match="PTM-I121"):
+        with pytest.raises(InputError, match="PTM-I122"):
             read(tmp_path)
         with pytest.raises(InputError, match="PTM-I122"):
             read(f"{tmp_path}/\0")
@@ -272,7 +272,7 @@ def test_read_ptm_names_the_file(tmp_path: Path) -> None:
     np.testing.assert_array_equal(decode(read_ptm(file)), RGB)
     for data, code in (
         (b"", "PTM-I101"),
-        (b"PTM_1.1\n", "PTM-I102"),
+        (b"PTM_1.1\n", "PTM-I101"),
         (encode(RGB)[:50], "PTM-I103"),
     ):
         file.write_bytes(data)

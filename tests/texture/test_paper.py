@@ -59,7 +59,7 @@ def test_floats_are_refused() -> None:
 
 def test_without_imagecodecs_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "imagecodecs", None)
-    with pytest.raises(MissingComponentError, match=r"ptmtools\[codecs\].*PTM-M102"):
+    with pytest.raises(MissingComponentError, match=r"ptmtools\[codecs\].*PTM-M100"):
         paper.encode_base(np.zeros((1, 1, 1), np.uint8))
 
 

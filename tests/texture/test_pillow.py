@@ -263,14 +263,14 @@ def test_a_file_cut_short(truncated: bool, monkeypatch: pytest.MonkeyPatch) -> N
         np.testing.assert_array_equal(found[:44, :70][::2, ::2], LEVELS[-2])
         np.testing.assert_array_equal(found[44], found[43])
     else:
-        with pytest.raises(OSError, match="PTM-I107"):
+        with pytest.raises(OSError, match="PTM-I103"):
             image.load()
     image = opened(data)
     image.reduce = 1
     np.testing.assert_array_equal(np.asarray(image), LEVELS[-2])
     with pytest.raises(OSError, match="PTM-I103"):
         Image.open(io.BytesIO(data[:60]))
-    with pytest.raises(OSError, match="PTM-I107"):
+    with pytest.raises(OSError, match="PTM-I103"):
         opened(DATA[: HEADER.levels[0].offset]).load()
 
 

@@ -90,5 +90,5 @@ def test_all_of_it_survives_storage(leaky):
 
 @pytest.mark.parametrize("options", [{"method": "exact"}, {"lines": 0}])
 def test_options_out_of_range(options):
-    with pytest.raises(InputError, match="PTM-I402"):
+    with pytest.raises(InputError, match="PTM-I111"):
         PvsOptions(**options)

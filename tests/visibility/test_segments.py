@@ -113,7 +113,7 @@ def test_what_does_not_belong_together_is_an_error(room_row):
         (structural * np.nan, pvs),
         (structural, other),
     ):
-        with pytest.raises(InputError, match="PTM-I403"):
+        with pytest.raises(InputError, match="PTM-I400"):
             check_conservative(triangles, cells, sets, 10)
 
 

@@ -224,7 +224,7 @@ def test_huge_sizes_are_refused_before_memory_is_taken(tmp_path: Path) -> None:
     ]
     found = decode_all(tmp_path, huge)
     assert found == [by_python(file) for file in huge]
-    assert {one.error for one in found} == {None, "PTM-L101", "PTM-I105"}
+    assert {one.error for one in found} == {None, "PTM-L104", "PTM-I105"}
 
 
 def test_memory_stays_within_the_limit(tmp_path: Path) -> None:

@@ -40,8 +40,8 @@ QUALITIES = {quality.name.lower().replace(" ", "-"): Choice(quality) for quality
 class CampusWalkOptions:
     """Options of a walk through a campus.
 
-    Raises InputError: PTM-I711 an impossible link; PTM-I712 an unreadable quantity; PTM-I713
-    another value out of range.
+    Raises InputError PTM-I111: an impossible link, an unreadable quantity or another value out of
+    range.
     """
 
     heading: ClassVar[str] = "Client and link"
@@ -89,7 +89,7 @@ class CampusWalkOptions:
         ):
             if not sound:
                 raise InputError(
-                    "PTM-I713",
+                    "PTM-I111",
                     f"{name} of {getattr(self, name)} is out of range",
                     remedy=f"give --{name} {wanted}",
                 )

@@ -123,15 +123,20 @@ def read_stock(folder: str | os.PathLike[str], only: str = "*") -> Stock:
 
     Raises
     ------
-    InputError: PTM-I714 a file is missing, or not that of the index, or no object has such a name;
-        PTM-I832, I833 the index cannot be read, or is damaged.
-    LimitError: PTM-L831 the index is too long.
+    InputError: PTM-I122 the index or a file is missing or cannot be read, or a file is not that of
+        the index; PTM-I302 no object has such a name; PTM-I821 the index is damaged.
+    LimitError: PTM-L204 the index is too long.
     """
     folder = Path(folder)
     campus = read_campus(folder)
     kept = tuple(each for each in campus.objects if fnmatchcase(each.name, only))
     if not kept:
-        raise refused(folder / INDEX, f"has no object {only}", "give names that it has")
+        raise InputError(
+            "PTM-I302",
+            f"has no object {only}",
+            file=folder / INDEX,
+            remedy="give names that it has",
+        )
     campus = replace(campus, objects=kept)
     index = _bytes(folder, INDEX, LONGEST)
     rows = [(on_link(index), len(index), 0, 0)]
@@ -164,7 +169,7 @@ def file_bytes(folder: Path, name: str, listed: tuple[int, int] | None = None) -
     """The bytes of a file of a campus, of which the index lists size and CRC-32. Its schema has no
     names that lead out of the folder.
 
-    Raises InputError PTM-I714.
+    Raises InputError PTM-I122.
     """
     data = _bytes(folder, name, LONGEST if listed is None else listed[0])
     if listed is not None and (len(data), zlib.crc32(data)) != listed:
@@ -224,9 +229,9 @@ def _require_textures(folder: Path, stock: Stock) -> None:
             raise refused(folder / INDEX, f"does not list {fault.args[0]}") from None
 
 
-def refused(file: Path, what: str, remedy: str = _AGAIN) -> InputError:
-    """PTM-I714."""
-    return InputError("PTM-I714", what, file=file, remedy=remedy)
+def refused(file: Path, what: str) -> InputError:
+    """PTM-I122."""
+    return InputError("PTM-I122", what, file=file, remedy=_AGAIN)
 
 
 def read_surfaces(folder: Path, stock: Stock, level: int) -> Surfaces:
@@ -235,7 +240,7 @@ def read_surfaces(folder: Path, stock: Stock, level: int) -> Surfaces:
     ``cell`` is the object, ``texture`` the number in `Stock.bases`. Light in the colours of
     vertices is left out, and with it, where there is some, the colours of the model.
 
-    Raises InputError PTM-I714.
+    Raises InputError PTM-I122.
     """
     campus = stock.campus
     rows: list[tuple[int, Primitive]] = []
@@ -284,7 +289,7 @@ def read_surfaces(folder: Path, stock: Stock, level: int) -> Surfaces:
 def read_textures(folder: Path, stock: Stock, size: int) -> Pyramids:
     """The colours of all bases in one size, and their mip levels, made as `generateMipmap` does.
 
-    Raises InputError PTM-I714.
+    Raises InputError PTM-I122.
     """
     deepest = size.bit_length()
     count = len(stock.bases)

@@ -213,14 +213,14 @@ def prepare_campus(
 
     Raises
     ------
-    InputError: PTM-I701 the walk was recorded in a browser; PTM-I714, I832, I833 the campus is
+    InputError: PTM-I701 the walk was recorded in a browser; PTM-I122, I821 the campus is
         incomplete or damaged, or has no such object.
-    LimitError: PTM-L700 the walk is too long; PTM-L831 the index is.
+    LimitError: PTM-L400 the walk is too long; PTM-L204 the index is.
     DatabaseError, LimitError: those of `read_pyramids`.
     """
     if walk.duration * rate > MOST_FRAMES:
         raise LimitError(
-            "PTM-L700",
+            "PTM-L400",
             f"a walk of {walk.duration:g} s has more than {MOST_FRAMES:,} frames",
             remedy="give a shorter one",
         )

@@ -131,7 +131,7 @@ def make_path(
     """A walk through all rooms of a building, from one of its ``viewpoints`` on, nearest next, with
     stops before pictures; the same for the same seed.
 
-    Raises InputError: PTM-I810 eyes cannot be as high as asked for; PTM-I811 nobody can walk there.
+    Raises InputError: PTM-I111 eyes cannot be as high as asked for; PTM-I247 nobody can walk there.
     """
     random = np.random.default_rng(options.seed)
     eye_height = options.eye_height(cells.walker)
@@ -144,7 +144,7 @@ def make_path(
     middles = middles_of(ground, standing)
     if not middles:
         raise InputError(
-            "PTM-I811",
+            "PTM-I247",
             "there is no way for a walker",
             remedy="build the cells with a smaller --walker, or with --standing anywhere",
         )

@@ -17,7 +17,7 @@ DAY = 86_400.0
 
 @dataclass(frozen=True)
 class PathOptions:
-    """Options of `path_through`. Raises InputError PTM-I810 for values out of range."""
+    """Options of `path_through`. Raises InputError PTM-I111 for values out of range."""
 
     heading: ClassVar[str] = "Walk"
 
@@ -70,7 +70,7 @@ class PathOptions:
     def eye_height(self, walker: Walker) -> float:
         """Height of the eyes above the floor, metres, for the visitor of the cells.
 
-        Raises InputError PTM-I810 if it is not above a step, or too high for the visitor.
+        Raises InputError PTM-I111 if it is not above a step, or too high for the visitor.
         """
         eye = EmitOptions().avatar(walker)[1] if self.eye is None else self.eye
         if not walker.step < eye <= walker.reach:
@@ -82,4 +82,4 @@ class PathOptions:
 
 
 def _out_of_range(what: str) -> InputError:
-    return InputError("PTM-I810", what, remedy="leave the option out for its default")
+    return InputError("PTM-I111", what, remedy="leave the option out for its default")

@@ -53,7 +53,7 @@ LEVEL, NEXT, VISIBLE, CURRENT = 1.0, 2.0, 3.0, 4.0
 class PaperOptions:
     """The parameters of §6.2 that the user sets.
 
-    Raises InputError: PTM-I712 an unreadable amount of memory; PTM-I715 another value out of range.
+    Raises InputError: PTM-I111 an unreadable amount of memory or another value out of range.
     """
 
     heading: ClassVar[str] = "Policy paper"
@@ -79,7 +79,7 @@ class PaperOptions:
         for name in ("delta_t", "delta_t_static", "static_after"):
             if not 0 <= getattr(self, name) < math.inf:
                 raise InputError(
-                    "PTM-I715",
+                    "PTM-I111",
                     f"--{name.replace('_', '-')} {getattr(self, name):g} is out of range",
                     remedy="give 0 or more, finite",
                 )

@@ -77,14 +77,14 @@ COLORS = ("#1b6ca8", "#d1603d", "#5a9367", "#8d6a9f", "#b08d2e", "#5b6770", "#c2
 
 
 def require() -> None:
-    """Raises `MissingComponentError` PTM-M600 without matplotlib."""
-    component("matplotlib.figure", "PTM-M600", "matplotlib is missing", "plot")
+    """Raises `MissingComponentError` PTM-M100 without matplotlib."""
+    component("matplotlib.figure", "PTM-M100", "matplotlib is missing", "plot")
 
 
 def picture(trades: Sequence[Trade]) -> bytes:
     """A PNG: every trial, families joined, settings that no other beats named.
 
-    Raises `MissingComponentError` PTM-M600 without matplotlib.
+    Raises `MissingComponentError` PTM-M100 without matplotlib.
     """
     require()
     from matplotlib.backends.backend_agg import FigureCanvasAgg

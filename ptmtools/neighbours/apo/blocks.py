@@ -105,7 +105,7 @@ def build(work: Work, executor: Executor, progress: Progress = silent) -> tuple[
     """The levels of the octree, from the root on, and the share of the samples that no ray found
     the source from, whose normals are the simplified mesh's own.
 
-    Raises LimitError PTM-L840: too many texels.
+    Raises LimitError PTM-L400: too many texels.
     """
     work, blocks = divided(work)
     results, held = [], 0

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ptmtools.diagnostics import Findings, Severity, ValidationReport
+from ptmtools.diagnostics import FOLDER_CODES, Findings, ValidationReport
 from ptmtools.errors import InputError, PtmError
 from ptmtools.files import open_below
 from ptmtools.neighbours.apo.files import (
@@ -29,42 +29,32 @@ from ptmtools.neighbours.apo.octree import fault_of
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Limits
 
-#: Code → (severity, meaning). docs/formats/apo.md repeats this table.
-CODES: dict[str, tuple[Severity, str]] = {
-    "PTM-D850": ("error", "a file of an octree texture is missing, or cannot be read"),
-    "PTM-D851": ("error", "apo.json does not match its schema, or contradicts itself"),
-    "PTM-D852": ("error", "a stream of texels is damaged, or longer than its levels"),
-    "PTM-D853": ("error", "the texels do not form a breadth-first octree"),
-    "PTM-D854": ("error", "the simplified mesh is damaged, or does not match apo.json"),
-    "PTM-D855": ("error", "the simplified mesh leads out of the cube of the octree"),
-    "PTM-D856": ("warning", "a file that `ptm apo` did not write"),
-}
 _NAMES = (INDEX, NORMALS, COLORS, MESH, OBJ)
 
 
 def check_folder(folder: Path, limits: Limits) -> ValidationReport:
     """Checks everything that needs no source model."""
-    findings = Findings(CODES)
+    findings = Findings(FOLDER_CODES)
     try:
         present = sorted(os.listdir(folder))
     except OSError as fault:
         raise InputError(
-            "PTM-I844", f"cannot be read ({fault.strerror or fault})", file=folder
+            "PTM-I122", f"cannot be read ({fault.strerror or fault})", file=folder
         ) from None
     for name in present:
         if name not in _NAMES:
-            findings.add("PTM-D856", name, "", "is not part of an octree texture")
+            findings.add("PTM-D806", name, "", "is not part of an octree texture")
     sizes = {name: _size(folder, name, findings) for name in present if name in _NAMES}
     readable = {name: size for name, size in sizes.items() if size is not None}
     try:
         index = read_index(folder)
     except PtmError as fault:
-        findings.add("PTM-D851", INDEX, fault.place or "", fault.message)
+        findings.add("PTM-D800", INDEX, fault.place or "", fault.message)
     else:
         required = [NORMALS, MESH, OBJ, *([COLORS] if index.colors else [])]
         for name in required:
             if name not in present:
-                findings.add("PTM-D850", name, "", "is missing")
+                findings.add("PTM-D803", name, "", "is missing")
         _check_octree(folder, index, readable, findings)
         if MESH in readable:
             _check_mesh(folder, index, readable[MESH], findings)
@@ -77,43 +67,43 @@ def _size(folder: Path, name: str, findings: Findings) -> int | None:
         with open_below(folder, name) as file:
             return os.fstat(file.fileno()).st_size
     except OSError as fault:
-        findings.add("PTM-D850", name, "", f"cannot be read ({fault.strerror or fault})")
+        findings.add("PTM-D803", name, "", f"cannot be read ({fault.strerror or fault})")
         return None
 
 
 def _check_octree(folder: Path, index: Index, sizes: Mapping[str, int], findings: Findings) -> None:
     for stream in (index.normals, index.colors):
         if stream and sizes.get(stream.file, 0) > stream.ends[-1]:
-            findings.add("PTM-D852", stream.file, "", "continues after the last level")
+            findings.add("PTM-D804", stream.file, "", "continues after the last level")
     if NORMALS not in sizes or (index.colors and COLORS not in sizes):
         return
     try:
         octree = read_octree(folder)
     except PtmError as error:
-        findings.add("PTM-D852", Path(error.file or NORMALS).name, error.place or "", error.message)
+        findings.add("PTM-D804", Path(error.file or NORMALS).name, error.place or "", error.message)
         return
     if fault := fault_of(octree):
-        findings.add("PTM-D853", NORMALS, *fault)
+        findings.add("PTM-D804", NORMALS, *fault)
 
 
 def _check_mesh(folder: Path, index: Index, size: int, findings: Findings) -> None:
     if size != index.mesh["bytes"]:
-        findings.add("PTM-D854", MESH, "", "has another length or checksum than in apo.json")
+        findings.add("PTM-D804", MESH, "", "has another length or checksum than in apo.json")
         return
     try:
         data = mesh_bytes(folder)
         if zlib.crc32(data) != index.mesh["crc32"]:
-            findings.add("PTM-D854", MESH, "", "has another length or checksum than in apo.json")
+            findings.add("PTM-D804", MESH, "", "has another length or checksum than in apo.json")
             return
         mesh = mesh_of(data)
     except PtmError as fault:
-        findings.add("PTM-D854", MESH, "", fault.message)
+        findings.add("PTM-D804", MESH, "", fault.message)
         return
     if len(mesh.triangles) != index.mesh["faces"]:
-        findings.add("PTM-D854", MESH, "", "has another number of faces than in apo.json")
+        findings.add("PTM-D804", MESH, "", "has another number of faces than in apo.json")
     q = (mesh.points - index.low) / index.side
     if outside := int(((q < 0) | (q >= 1)).any(axis=1).sum()):
-        findings.add("PTM-D855", MESH, "", f"{count(outside, 'point')} outside of the cube")
+        findings.add("PTM-D804", MESH, "", f"{count(outside, 'point')} outside of the cube")
 
 
 def _about(deviation: float | None) -> str:

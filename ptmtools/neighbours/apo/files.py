@@ -61,7 +61,7 @@ def obj_of(mesh: Simple) -> bytes:
 def mesh_of(data: bytes) -> Simple:
     """The mesh of a GLB that `glb_of` wrote.
 
-    Raises InputError PTM-I846: it is not such a GLB.
+    Raises InputError PTM-I821: it is not such a GLB.
     """
     try:
         chunks = {kind: body for kind, _, body in glb_chunks(data)}
@@ -81,7 +81,7 @@ def mesh_of(data: bytes) -> Simple:
             raise ValueError("an index is out of range, or a number not finite")
     except (ValueError, LookupError, TypeError, OverflowError) as fault:
         raise InputError(
-            "PTM-I846",
+            "PTM-I821",
             f"is no GLB of a simplified mesh ({fault.args[-1] if fault.args else 'damaged'})",
             remedy="write it again with `ptm apo`",
         ) from None
@@ -204,15 +204,15 @@ def read_index(folder: str | os.PathLike[str]) -> Index:
 
     Raises
     ------
-    InputError: PTM-I841 no octree texture there; PTM-I842 not as its schema says, or of another
-        number; PTM-I843 it contradicts itself; PTM-I844 it cannot be read.
-    LimitError: PTM-L840 more texels than there are addresses; PTM-L841 too large for an index.
+    InputError: PTM-I120 no octree texture there; PTM-I821 not as its schema says, of another
+        number, or it contradicts itself; PTM-I122 it cannot be read.
+    LimitError: PTM-L400 more texels than there are addresses; PTM-L204 too large for an index.
     """
     file = Path(folder) / INDEX
     if not os.path.lexists(file):
         exists = Path(folder).is_dir()
         raise InputError(
-            "PTM-I841",
+            "PTM-I120",
             f"holds no octree texture: there is no {INDEX} in it" if exists else "is no folder",
             file=folder,
             remedy="name a folder that `ptm apo` wrote",
@@ -234,12 +234,12 @@ def _index(data: bytes) -> Index:
         schemas.check(document, schemas.APO)
     except schemas.ShapeError as fault:
         raise InputError(
-            "PTM-I842", fault.message, place=fault.place or None, remedy=_AGAIN
+            "PTM-I821", fault.message, place=fault.place or None, remedy=_AGAIN
         ) from None
     start: Ints = np.concatenate([[0], np.cumsum(document["levels"], dtype=np.float64)])
     if start[-1] > 1 << ADDRESS_BITS:
         raise LimitError(
-            "PTM-L840",
+            "PTM-L400",
             f"has {start[-1]:.4g} texels, more than the {1 << ADDRESS_BITS:,} that addresses can "
             "tell apart",
             remedy=_AGAIN,
@@ -276,7 +276,7 @@ def _check(index: Index) -> None:
     if index.mesh["file"] != MESH:
         wrong = f"the mesh is called {str(index.mesh['file'])[:40]!r} instead of {MESH!r}"
     if wrong:
-        raise InputError("PTM-I843", wrong, remedy=_AGAIN)
+        raise InputError("PTM-I821", wrong, remedy=_AGAIN)
 
 
 def read_octree(folder: str | os.PathLike[str], levels: int | None = None) -> Octree:
@@ -284,14 +284,14 @@ def read_octree(folder: str | os.PathLike[str], levels: int | None = None) -> Oc
 
     Raises
     ------
-    InputError, LimitError: those of `read_index`; PTM-I840 there are not so many levels; PTM-I845 a
+    InputError, LimitError: those of `read_index`; PTM-I111 there are not so many levels; PTM-I821 a
         stream is damaged.
     """
     index = read_index(folder)
     wanted = index.levels if levels is None else levels
     if not 1 <= wanted <= index.levels:
         raise InputError(
-            "PTM-I840",
+            "PTM-I111",
             f"there is no octree of {wanted} levels",
             file=folder,
             remedy=f"give 1 to {index.levels}",
@@ -312,7 +312,7 @@ def _texels(
 def inflated(data: bytes, start: Ints, stream: Stream) -> NDArray[np.uint8]:
     """(n, 4) texels of the first levels, of the beginning of a stream.
 
-    Raises InputError PTM-I845: it is damaged, or too short.
+    Raises InputError PTM-I821: it is damaged, or too short.
     """
     inflate, parts, at = zlib.decompressobj(), [], 0
     for k, end in enumerate(stream.ends[: len(start) - 1]):
@@ -323,7 +323,7 @@ def inflated(data: bytes, start: Ints, stream: Stream) -> NDArray[np.uint8]:
             part = b""
         if end > len(data) or len(part) != size or zlib.crc32(part) != stream.crc32[k]:
             what = "ends before it is whole" if end > len(data) else "is damaged"
-            raise InputError("PTM-I845", what, place=f"level {k}", remedy=_AGAIN)
+            raise InputError("PTM-I821", what, place=f"level {k}", remedy=_AGAIN)
         parts.append(part)
         at = end
     return np.frombuffer(b"".join(parts), np.uint8).reshape(-1, 4)
@@ -332,14 +332,14 @@ def inflated(data: bytes, start: Ints, stream: Stream) -> NDArray[np.uint8]:
 def read_mesh(folder: str | os.PathLike[str]) -> Simple:
     """The simplified mesh of an octree texture.
 
-    Raises InputError: PTM-I844 it cannot be read; PTM-I846 it is damaged. LimitError PTM-L841.
+    Raises InputError: PTM-I122 it cannot be read; PTM-I821 it is damaged. LimitError PTM-L204.
     """
     with naming(Path(folder) / MESH):
         return mesh_of(mesh_bytes(folder))
 
 
 def mesh_bytes(folder: str | os.PathLike[str]) -> bytes:
-    """The mesh's file. Raises InputError PTM-I844, LimitError PTM-L841."""
+    """The mesh's file. Raises InputError PTM-I122, LimitError PTM-L204."""
     return _bytes_of(folder, MESH, _MESH_MOST)
 
 
@@ -351,8 +351,8 @@ def _bytes_of(folder: str | os.PathLike[str], name: str, most: int, *, whole: bo
             data = stream.read(most + whole)
     except OSError as fault:
         raise InputError(
-            "PTM-I844", f"cannot be read ({fault.strerror or fault})", file=file, remedy=_AGAIN
+            "PTM-I122", f"cannot be read ({fault.strerror or fault})", file=file, remedy=_AGAIN
         ) from None
     if len(data) > most:
-        raise LimitError("PTM-L841", f"has more than {most:,} bytes", file=file, remedy=_AGAIN)
+        raise LimitError("PTM-L204", f"has more than {most:,} bytes", file=file, remedy=_AGAIN)
     return data

@@ -76,8 +76,8 @@ def make_apo(
 
     Raises
     ------
-    LimitError: PTM-L840 the octree has too many texels.
-    MissingComponentError: PTM-M290 ``method`` asks for pymeshlab, which cannot be loaded.
+    LimitError: PTM-L400 the octree has too many texels.
+    MissingComponentError: PTM-M100 ``method`` asks for pymeshlab, which cannot be loaded.
     """
     points, triangles = welded(scene.points, scene.triangles)
     triangles, kept = once(triangles)
@@ -111,7 +111,7 @@ def octree_around(
     """The octree of the normals of (T, 3) triangles between (P, 3) points, each of which is there
     once, around what was made of them; and the share of its samples that no ray found them from.
 
-    Raises LimitError PTM-L840: it has too many texels.
+    Raises LimitError PTM-L400: it has too many texels.
     """
     cube = cube_around(np.concatenate([points, mesh.points]))
     source = Source(

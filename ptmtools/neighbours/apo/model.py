@@ -18,7 +18,7 @@ ADDRESS_BITS = 24
 
 @dataclass(frozen=True)
 class ApoOptions:
-    """Options of `make_apo`. Raises InputError PTM-I840 for values out of range."""
+    """Options of `make_apo`. Raises InputError PTM-I111 for values out of range."""
 
     heading: ClassVar[str] = "Octree texture"
 

@@ -255,10 +255,10 @@ def normal_bytes(normal: Singles) -> NDArray[np.uint8]:
 
 
 def check_count(texels: int) -> None:
-    """Raises LimitError PTM-L840 if so many texels have no addresses."""
+    """Raises LimitError PTM-L400 if so many texels have no addresses."""
     if texels > 1 << ADDRESS_BITS:
         raise LimitError(
-            "PTM-L840",
+            "PTM-L400",
             f"the octree has {texels:,} texels, more than the {1 << ADDRESS_BITS:,} that addresses "
             f"of {ADDRESS_BITS} bits can tell apart",
             remedy="give a greater --error, a smaller --depth or a smaller --density",
@@ -268,7 +268,7 @@ def check_count(texels: int) -> None:
 def octree_of(levels: list[Level], cube: Cube) -> Octree:
     """The octree texture of levels, from the root on.
 
-    Raises LimitError PTM-L840: too many texels.
+    Raises LimitError PTM-L400: too many texels.
     """
     inner = [level.children > 0 for level in levels]
     counts = [len(level.code) + int(some.sum()) for level, some in zip(levels, inner, strict=True)]

@@ -23,12 +23,12 @@ RANGES: dict[str, tuple[float, float]] = {
 
 
 def check_range(name: str, value: float, prefix: str = "") -> None:
-    """Raises InputError PTM-I840 for a value that is out of range; the command line calls the
+    """Raises InputError PTM-I111 for a value that is out of range; the command line calls the
     option ``prefix`` and its name."""
     least, most = RANGES[name]
     if not least <= value <= most:
         raise InputError(
-            "PTM-I840",
+            "PTM-I111",
             f"--{prefix}{name.replace('_', '-')} {value:g} is not possible",
             remedy=f"give {least:g} to {most:g}",
         )
@@ -38,7 +38,7 @@ def check_range(name: str, value: float, prefix: str = "") -> None:
 class ReplaceOptions:
     """Objects to replace by a simplified mesh and an octree texture, and their accuracy.
 
-    Raises InputError PTM-I840 for values out of range, or without an object.
+    Raises InputError PTM-I111 for values out of range, or without an object.
     """
 
     heading: ClassVar[str] = "Octree textures"
@@ -67,7 +67,7 @@ class ReplaceOptions:
             check_range(name, getattr(self, f"apo_{name}"), "apo-")
             if not self.apo and getattr(self, f"apo_{name}") != getattr(type(self), f"apo_{name}"):
                 raise InputError(
-                    "PTM-I840",
+                    "PTM-I111",
                     f"--apo-{name} does nothing without --apo",
                     remedy="name the objects with --apo",
                 )

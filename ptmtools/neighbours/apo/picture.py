@@ -23,7 +23,7 @@ WIDEST = 4096
 
 @dataclass(frozen=True)
 class RenderOptions:
-    """Options of `render`. Raises InputError PTM-I860 for values out of range."""
+    """Options of `render`. Raises InputError PTM-I111 for values out of range."""
 
     heading: ClassVar[str] = "Picture of an octree texture"
 
@@ -78,12 +78,12 @@ def render(
     """A picture of the simplified mesh of (P, 3) points and (T, 3) triangles, in its own units;
     ``normals`` (P, 3) are its own (else `corner_normals`), which show where no level is there.
 
-    Raises InputError PTM-I860 for options out of range, PTM-I861 for a mesh without extent, and
+    Raises InputError PTM-I111 for options out of range, PTM-I247 for a mesh without extent, and
     MissingComponentError PTM-M500 where OpenGL is asked for and absent.
     """
     options = options or RenderOptions()
     if not len(points) or not np.ptp(points, axis=0).any():
-        raise InputError("PTM-I861", "a mesh without extent, of which there is no picture")
+        raise InputError("PTM-I247", "a mesh without extent, of which there is no picture")
     view = view_of(
         points,
         options.azimuth,
@@ -146,7 +146,7 @@ def _own(points: Floats, triangles: NDArray[np.integer], normals: Floats | None)
 
 
 def _check(options: RenderOptions) -> None:
-    """Raises InputError PTM-I860 for what is out of range."""
+    """Raises InputError PTM-I111 for what is out of range."""
     ranges = {
         "levels": (0, 64, options.levels if options.levels is not None else 1),
         "azimuth": (-360, 360, options.azimuth),
@@ -159,6 +159,6 @@ def _check(options: RenderOptions) -> None:
     for name, (least, most, value) in ranges.items():
         if not least <= value <= most:
             raise InputError(
-                "PTM-I860",
+                "PTM-I111",
                 f"{name.replace('_', ' ')} {value:g} is not between {least:g} and {most:g}",
             )

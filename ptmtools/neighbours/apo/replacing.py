@@ -191,7 +191,7 @@ def replaced(
 ) -> Replaced:
     """A scene whose objects of certain names are replaced.
 
-    Objects of one name are replaced one by one. Raises LimitError PTM-L840: an octree has too many
+    Objects of one name are replaced one by one. Raises LimitError PTM-L400: an octree has too many
     texels.
     """
     notes: list[str] = [

@@ -56,9 +56,9 @@ class Atlas:
 def unwrap(points: Floats, triangles: NDArray[np.integer[Any]]) -> Atlas:
     """An atlas of (T, 3) triangles over (V, 3) points.
 
-    Raises MissingComponentError: PTM-M830 xatlas is not installed.
+    Raises MissingComponentError: PTM-M100 xatlas is not installed.
     """
-    xatlas = component("xatlas", "PTM-M830", "baking lightmaps needs xatlas", "campus")
+    xatlas = component("xatlas", "PTM-M100", "baking lightmaps needs xatlas", "campus")
     # Far from the origin single precision has no texels, and xatlas drops faces that it takes for
     # empty, whatever the unit.
     near = points - points.mean(axis=0)

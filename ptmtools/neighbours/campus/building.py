@@ -71,15 +71,15 @@ def make_campus(
 
     Raises
     ------
-    InputError: what ingest raises; PTM-I831 no lightmaps in the model.
-    LimitError: PTM-L830 too many objects.
-    OutputError: PTM-O001, O002, O003, O820, O821 of the folder.
-    MissingComponentError: PTM-M830 lightmaps are to be baked, and xatlas is not installed.
+    InputError: what ingest raises; PTM-I701 no lightmaps in the model.
+    LimitError: PTM-L400 too many objects.
+    OutputError: PTM-O001, O002, O003, O010 of the folder.
+    MissingComponentError: PTM-M100 lightmaps are to be baked, and xatlas is not installed.
     """
     executor, path = executor or Executor(), Path(model)
     FORM.check(folder, force=force)
     if options.lightmaps != "none":
-        component("xatlas", "PTM-M830", "lightmaps need xatlas", "campus")
+        component("xatlas", "PTM-M100", "lightmaps need xatlas", "campus")
     clock = _Clock()
     scene = ingest(path, reading, progress, workers=executor.workers)
     masks, notes = model_masks(path, scene, reading)

@@ -46,7 +46,7 @@ class Part:
 def parts_of(scene: Scene, small: float) -> tuple[Part, ...]:
     """The objects of a scene, in the order of the model; ``small`` as in `CampusOptions`.
 
-    Raises LimitError: PTM-L830 there are more than `MAX_OBJECTS`.
+    Raises LimitError: PTM-L400 there are more than `MAX_OBJECTS`.
     """
     count = len(scene.objects)
     box = _boxes(scene.corners, scene.triangle_object, count)
@@ -61,7 +61,7 @@ def parts_of(scene: Scene, small: float) -> tuple[Part, ...]:
     kept, of_object = np.unique(group, return_inverse=True)
     if len(kept) > MAX_OBJECTS:
         raise LimitError(
-            "PTM-L830",
+            "PTM-L400",
             f"{len(kept):,} objects, more than {MAX_OBJECTS:,}",
             remedy="join more of them with --small, or divide the model",
         )

@@ -14,7 +14,7 @@ MAX_LODS, MAX_SAMPLES = 8, 4096
 
 @dataclass(frozen=True)
 class CampusOptions:
-    """Options of `make_campus`. Raises InputError PTM-I830 for values out of range."""
+    """Options of `make_campus`. Raises InputError PTM-I111 for values out of range."""
 
     heading: ClassVar[str] = "Campus"
 
@@ -64,7 +64,7 @@ class CampusOptions:
         ):
             if not sound:
                 raise InputError(
-                    "PTM-I830",
+                    "PTM-I111",
                     f"{name} of {getattr(self, name)} is out of range",
                     remedy=f"give --{name} {wanted}",
                 )

@@ -36,9 +36,9 @@ def read_campus(folder: str | os.PathLike[str]) -> Campus:
 
     Raises
     ------
-    InputError: PTM-I832 it cannot be read, PTM-I833 it is not as its schema says, or an object has
+    InputError: PTM-I122 it cannot be read, PTM-I821 it is not as its schema says, or an object has
         fewer or more meshes than the campus has levels.
-    LimitError: PTM-L831 it is too long.
+    LimitError: PTM-L204 it is too long.
     """
     file = Path(folder) / INDEX
     try:
@@ -47,7 +47,7 @@ def read_campus(folder: str | os.PathLike[str]) -> Campus:
     except (OSError, ValueError) as fault:
         why = getattr(fault, "strerror", None) or str(fault)
         raise InputError(
-            "PTM-I832",
+            "PTM-I122",
             f"cannot be read ({why})",
             file=file,
             remedy="name a folder that `ptm campus` wrote",
@@ -58,7 +58,7 @@ def read_campus(folder: str | os.PathLike[str]) -> Campus:
 def parse_campus(data: bytes, file: Path) -> Campus:
     """The campus that the bytes of an index describe; raises as `read_campus`."""
     if len(data) > LONGEST:
-        raise LimitError("PTM-L831", "is too long for the index of a campus", file=file)
+        raise LimitError("PTM-L204", "is too long for the index of a campus", file=file)
     try:
         campus = Campus.from_document(schemas.read(data, schemas.CAMPUS))
     except schemas.ShapeError as fault:
@@ -72,7 +72,7 @@ def parse_campus(data: bytes, file: Path) -> Campus:
 
 def _wrong(file: Path, place: str | None, what: str) -> InputError:
     remedy = "write it again with `ptm campus`"
-    return InputError("PTM-I833", what, file=file, place=place, remedy=remedy)
+    return InputError("PTM-I821", what, file=file, place=place, remedy=remedy)
 
 
 #: Average sizes of the paper's table 1, KB (of 1024 bytes), by side.

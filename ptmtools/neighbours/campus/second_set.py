@@ -62,7 +62,7 @@ class ModelLight:
 def model_light(model: Path, options: IngestOptions) -> ModelLight:
     """The lightmaps of a model, for the faces of its scene.
 
-    Raises InputError: PTM-I831 it has none, or its format cannot, or one that it names is missing;
+    Raises InputError: PTM-I701 it has none, or its format cannot, or one that it names is missing;
     what reading and decoding raise.
     """
     read = None
@@ -70,7 +70,7 @@ def model_light(model: Path, options: IngestOptions) -> ModelLight:
         read = _again(model, options, lambda entry: entry.get("occlusionTexture"))
     if read is None:
         raise InputError(
-            "PTM-I831",
+            "PTM-I701",
             "has no lightmaps",
             file=model,
             remedy="give --lightmaps bake, or a glTF with occlusionTexture",
@@ -106,7 +106,7 @@ def _missing(model: Path, material: str, number: int, read: _Read) -> InputError
     lost = [k for k, (asked, m) in enumerate(textures) if asked and m.texture is None]
     fault = read.missing[min(lost.index(number), len(read.missing) - 1)]
     return InputError(
-        "PTM-I831",
+        "PTM-I701",
         f"the lightmap of material {material}, {fault}",
         file=model,
         remedy="put it where the model says (or give --allow-outside, where it lies elsewhere), or "
@@ -115,7 +115,7 @@ def _missing(model: Path, material: str, number: int, read: _Read) -> InputError
 
 
 def _red(texture: Texture, material: str, options: IngestOptions) -> NDArray[np.uint8]:
-    """(h, w) of a lightmap. Raises what decoding raises, and InputError PTM-I256."""
+    """(h, w) of a lightmap. Raises what decoding raises, and InputError PTM-I122."""
     try:
         image = decoded_lightmap(texture.read(), options.limit << 20, texture.label)
     except InputError as fault:
@@ -125,7 +125,7 @@ def _red(texture: Texture, material: str, options: IngestOptions) -> NDArray[np.
         ) from None
     except OSError as fault:
         what = fault.strerror or str(fault)
-        raise InputError("PTM-I256", what, file=fault.filename or texture.label) from None
+        raise InputError("PTM-I122", what, file=fault.filename or texture.label) from None
     return np.asarray(image.getchannel("R"))
 
 

@@ -53,17 +53,17 @@ class Container:
 def check_held(name: str, width: int, height: int, components: int, kind: str) -> None:
     """Raise what keeps a container from holding an image.
 
-    InputError: PTM-I828 its samples. LimitError: PTM-L820 its sides.
+    InputError: PTM-I126 its samples. LimitError: PTM-L400 its sides.
     """
     container = CONTAINERS[name]
     what = {1: "grey", 2: "grey and alpha", 3: "RGB", 4: "RGB and alpha"}[components]
     if components not in container.components or kind not in container.kinds:
         raise InputError(
-            "PTM-I828", f"{what} of {kind} does not fit into {name}", remedy=container.remedy
+            "PTM-I126", f"{what} of {kind} does not fit into {name}", remedy=container.remedy
         )
     if max(width, height) > container.side:
         raise LimitError(
-            "PTM-L820",
+            "PTM-L400",
             f"a file would be {width} x {height} texels; {name} holds {container.side} a side",
             remedy="use --format png",
         )

@@ -17,7 +17,7 @@ from typing import Any, cast
 import numpy as np
 
 from ptmtools import schemas
-from ptmtools.diagnostics import Findings, Place, Severity, ValidationReport
+from ptmtools.diagnostics import FOLDER_CODES, Findings, Place, ValidationReport
 from ptmtools.errors import InputError, LimitError, PtmError, naming
 from ptmtools.files import open_below
 from ptmtools.neighbours.interlace.containers import CONTAINERS, Texels
@@ -39,20 +39,20 @@ def read_manifest(folder: str | os.PathLike[str]) -> Interlaced:
 
     Raises
     ------
-    InputError: PTM-I820 no interlaced image; PTM-I821 not valid against the schema; PTM-I822
-        another schema number; PTM-I823 inconsistent; PTM-I824 it cannot be read.
-    LimitError: PTM-L822 too large for a manifest.
+    InputError: PTM-I120 no interlaced image; PTM-I821 not valid against the schema, of another
+        schema number, or inconsistent; PTM-I122 it cannot be read.
+    LimitError: PTM-L204 too large for a manifest.
     """
     file = Path(folder) / INDEX
     if not os.path.lexists(file):
         exists = Path(folder).is_dir()
         raise InputError(
-            "PTM-I820",
+            "PTM-I120",
             f"is not an interlaced image: it has no {INDEX}" if exists else "is not a folder",
             file=folder,
             remedy="name a folder that `ptm interlace` wrote",
         )
-    data = _bytes_of(Path(folder), INDEX, _MANIFEST_MOST, "PTM-L822", "a manifest")
+    data = _bytes_of(Path(folder), INDEX, _MANIFEST_MOST, "a manifest")
     with naming(file):
         interlaced = Interlaced.of(_document(data))
         _check_chain(interlaced)
@@ -65,7 +65,7 @@ def _document(data: bytes) -> dict[str, Any]:
         number = document.get("schema") if isinstance(document, dict) else None
         if type(number) is int and number != 1:
             raise InputError(
-                "PTM-I822",
+                "PTM-I821",
                 f"has the schema number {str(number)[:20]}; this program knows 1",
                 remedy="update ptmtools, or write the folder again",
             )
@@ -81,11 +81,11 @@ def _document(data: bytes) -> dict[str, Any]:
 
 
 def _check_chain(interlaced: Interlaced) -> None:
-    """Raises InputError PTM-I823 unless names, axes and sizes of the files belong to one image."""
+    """Raises InputError PTM-I821 unless names, axes and sizes of the files belong to one image."""
 
     def require(holds: bool, message: str, place: str = "") -> None:
         if not holds:
-            raise InputError("PTM-I823", message, place=place or None, remedy=_AGAIN)
+            raise InputError("PTM-I821", message, place=place or None, remedy=_AGAIN)
 
     for side in (interlaced.width, interlaced.height):
         require(side & (side - 1) == 0, f"a side of {side} is not a power of two")
@@ -119,15 +119,15 @@ def deinterlace(
 
     Raises
     ------
-    InputError: as `read_manifest` and `read_part`; PTM-I827 the step does not exist.
-    LimitError: PTM-L821 more texels than ``limits`` allow.
+    InputError: as `read_manifest` and `read_part`; PTM-I111 the step does not exist.
+    LimitError: PTM-L104 more texels than ``limits`` allow.
     """
     interlaced = read_manifest(folder)
     most = len(interlaced.parts)
     step = most if step is None else step
     if not 1 <= step <= most:
         raise InputError(
-            "PTM-I827",
+            "PTM-I111",
             f"step {step} does not exist: it has {count(most, 'file')}",
             file=folder,
             remedy=f"--step is a number from 1 to {most}",
@@ -143,11 +143,11 @@ def deinterlace(
 def check_joined(
     interlaced: Interlaced, step: int, limits: Limits, folder: str | os.PathLike[str]
 ) -> None:
-    """Raises LimitError PTM-L821 if the image after a step exceeds the limit."""
+    """Raises LimitError PTM-L104 if the image after a step exceeds the limit."""
     width, height = interlaced.parts[step - 1].joined
     if width * height * interlaced.texel_bytes > limits.decoded_bytes:
         raise LimitError(
-            "PTM-L821",
+            "PTM-L104",
             f"is {width} x {height} texels of {count(interlaced.texel_bytes, 'byte')}, more than "
             f"the limit of {limits.decoded_bytes} bytes",
             file=folder,
@@ -160,9 +160,9 @@ def read_part(folder: Path, interlaced: Interlaced, part: Part) -> Texels:
 
     Raises
     ------
-    InputError: PTM-I824 it is missing, not a regular file or unreadable; PTM-I825 it has another
-        length or checksum; PTM-I826 it is not the image that the manifest describes.
-    LimitError: PTM-L823 it is too large for its texels.
+    InputError: PTM-I122 it is missing, not a regular file or unreadable; PTM-I821 it has another
+        length or checksum, or is not the image that the manifest describes.
+    LimitError: PTM-L204 it is too large for its texels.
     """
     return part_texels(folder / part.name, part_bytes(folder, interlaced, part), interlaced, part)
 
@@ -172,7 +172,7 @@ def part_bytes(folder: Path, interlaced: Interlaced, part: Part) -> bytes:
     texels = part.width * part.height * interlaced.texel_bytes
     most = _BYTES * texels + _BYTES_MORE
     content = f"{part.width} x {part.height} texels"
-    data = _bytes_of(folder, part.name, most, "PTM-L823", content)
+    data = _bytes_of(folder, part.name, most, content)
     fault = ""
     if len(data) != part.bytes:
         fault = f"has {len(data)} bytes instead of {part.bytes}"
@@ -180,13 +180,13 @@ def part_bytes(folder: Path, interlaced: Interlaced, part: Part) -> bytes:
         fault = "has another checksum than recorded"
     if fault:
         raise InputError(
-            "PTM-I825", fault, file=folder / part.name, remedy=f"download it again, or {_AGAIN}"
+            "PTM-I821", fault, file=folder / part.name, remedy=f"download it again, or {_AGAIN}"
         )
     return data
 
 
 def part_texels(file: Path, data: bytes, interlaced: Interlaced, part: Part) -> Texels:
-    """The texels in the bytes of a file; raises InputError PTM-I826."""
+    """The texels in the bytes of a file; raises InputError PTM-I821."""
     from ptmtools.texture.images import load_image
 
     container = CONTAINERS[interlaced.container]
@@ -206,31 +206,34 @@ def part_texels(file: Path, data: bytes, interlaced: Interlaced, part: Part) -> 
     except (ValueError, PtmError) as fault:
         reason = fault.message if isinstance(fault, PtmError) else str(fault)
         raise InputError(
-            "PTM-I826",
+            "PTM-I821",
             f"is not the image that the manifest describes ({reason})",
             file=file,
             remedy=_AGAIN,
         ) from None
 
 
-def _bytes_of(folder: Path, name: str, most: int, code: str, content: str) -> bytes:
-    """The bytes of a regular file; raises InputError PTM-I824, LimitError with that code."""
+def _bytes_of(folder: Path, name: str, most: int, content: str) -> bytes:
+    """The bytes of a regular file; raises InputError PTM-I122, LimitError PTM-L204."""
     file = folder / name
     try:
         with open_below(folder, name) as stream:
             length = os.fstat(stream.fileno()).st_size
             if length > most:
                 raise LimitError(
-                    code, f"has {length} bytes, too many for {content}", file=file, remedy=_AGAIN
+                    "PTM-L204",
+                    f"has {length} bytes, too many for {content}",
+                    file=file,
+                    remedy=_AGAIN,
                 )
             return stream.read(most)
     except FileNotFoundError:
         raise InputError(
-            "PTM-I824", "is missing", file=file, remedy=f"download it again, or {_AGAIN}"
+            "PTM-I122", "is missing", file=file, remedy=f"download it again, or {_AGAIN}"
         ) from None
     except OSError as fault:
         raise InputError(
-            "PTM-I824",
+            "PTM-I122",
             f"cannot be read ({fault.strerror or fault})",
             file=file,
             remedy="check its type and permissions",
@@ -264,56 +267,28 @@ def describe(folder: Path) -> tuple[tuple[str, ...], Mapping[str, Any]]:
     return tuple(lines), interlaced.document()
 
 
-CODES: Mapping[str, tuple[Severity, str]] = {
-    "PTM-D800": ("error", "interlace.json cannot be read, or does not match its schema"),
-    "PTM-D801": ("error", "interlace.json has another schema number"),
-    "PTM-D802": ("error", "interlace.json contradicts itself: names, axes or sizes of the files"),
-    "PTM-D803": ("error", "a file of an interlaced image is missing or cannot be read"),
-    "PTM-D804": ("error", "a file of an interlaced image has another size or checksum"),
-    "PTM-D805": (
-        "error",
-        "a file of an interlaced image is not the image that interlace.json describes",
-    ),
-    "PTM-D806": ("warning", "a file in the folder of an interlaced image that it does not name"),
-    "PTM-D807": ("warning", "files too large for --limit: only their checksums were compared"),
-    "PTM-D808": ("warning", "an image is split differently than its minimum requires"),
-}
-#: Code of an error in reading → code of the finding.
-_FINDING = {
-    "PTM-I821": "PTM-D800",
-    "PTM-I822": "PTM-D801",
-    "PTM-I823": "PTM-D802",
-    "PTM-I824": "PTM-D803",
-    "PTM-I825": "PTM-D804",
-    "PTM-I826": "PTM-D805",
-    "PTM-L822": "PTM-D800",
-    "PTM-L823": "PTM-D804",
-}
-
-
 def validate_interlaced(folder: Path, limits: Limits = _LIMITS) -> ValidationReport:
     """Checks a folder of `ptm interlace`; all faults are in the report.
 
     ``limits``: for the whole image; beyond them only checksums are compared.
-    Raises InputError PTM-I820 if there is no interlaced image.
+    Raises InputError PTM-I120 if there is no interlaced image.
     """
-    findings = Findings(CODES)
+    findings = Findings(FOLDER_CODES)
     files = 1
     try:
         size = os.lstat(folder / INDEX).st_size
         interlaced = read_manifest(folder)
     except InputError as fault:
-        if fault.code == "PTM-I820":
+        if fault.code == "PTM-I120":
             raise
-        code = "PTM-D800" if fault.code == "PTM-I824" else _FINDING[fault.code]
-        findings.add(code, INDEX, fault.place or "", fault.message)
+        findings.add("PTM-D800", INDEX, fault.place or "", fault.message)
         return ValidationReport(findings.issues(), files, 0)
     _check_split(interlaced, findings.at(INDEX))
     decoded = True
     try:
         check_joined(interlaced, len(interlaced.parts), limits, folder)
     except LimitError as fault:
-        findings.add("PTM-D807", INDEX, "", fault.message)
+        findings.add("PTM-D713", INDEX, "", fault.message)
         decoded = False
     for part in interlaced.parts:
         length = _check_part(folder, interlaced, part, decoded, findings.at(part.name))
@@ -344,5 +319,5 @@ def _check_part(folder: Path, interlaced: Interlaced, part: Part, decoded: bool,
         if decoded:
             part_texels(folder / part.name, data, interlaced, part)
     except InputError as fault:
-        at.add(_FINDING[fault.code], fault.message)
+        at.add("PTM-D803" if fault.code == "PTM-I122" else "PTM-D804", fault.message)
     return len(data)

@@ -66,8 +66,8 @@ def interlace(
 
     Raises
     ------
-    InputError: PTM-I827 an option out of range; PTM-I828 samples that the container does not hold.
-    LimitError: PTM-L820 a side that it does not hold; PTM-L104 more than ``limits`` allow, scaled.
+    InputError: PTM-I111 an option out of range; PTM-I126 samples that the container does not hold.
+    LimitError: PTM-L400 a side that it does not hold; PTM-L104 more than ``limits`` allow, scaled.
     """
     _check_options(options)
     notes = []
@@ -126,11 +126,11 @@ def _check_options(options: InterlaceOptions) -> None:
     for name, value, most in (("min", options.min, MAX_SIDE), ("quality", options.quality, 100)):
         if not 1 <= value <= most:
             raise InputError(
-                "PTM-I827", f"--{name} {value} is not possible", remedy=f"give 1 to {most}"
+                "PTM-I111", f"--{name} {value} is not possible", remedy=f"give 1 to {most}"
             )
     if options.format not in CONTAINERS:
         raise InputError(
-            "PTM-I827",
+            "PTM-I111",
             f"--format {options.format[:20]} is not known",
             remedy=f"give one of {', '.join(CONTAINERS)}",
         )

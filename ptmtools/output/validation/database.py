@@ -102,12 +102,12 @@ def validate_database(
     limits: of files and textures that take more memory only the hash is checked (PTM-D713).
     workers: threads; 0 is one for each processor. The report is the same.
 
-    Raises DatabaseError: PTM-D605 if there is no such folder. All other faults are in the report.
+    Raises DatabaseError: PTM-D001 if there is no such folder. All other faults are in the report.
     """
     folder = Path(db)
     if not folder.is_dir():
         raise DatabaseError(
-            "PTM-D605", "no such folder", file=folder, remedy="give a database or a .ptm file"
+            "PTM-D001", "no such folder", file=folder, remedy="give a database or a .ptm file"
         )
     check = _Check(folder, limits)
     # Damaged files may hold any number; overflows only make comparisons fail.
@@ -119,7 +119,7 @@ def validate_database(
 def validate_ptm(path: str | os.PathLike[str], *, limits: Limits = _LIMITS) -> ValidationReport:
     """Checks a single `.ptm`.
 
-    Raises InputError: PTM-I602 if it cannot be read. All other faults are in the report.
+    Raises InputError: PTM-I122 if it cannot be read. All other faults are in the report.
     """
     file, findings = Path(path), Findings(CODES)
     at = findings.at(os.fspath(path))
@@ -131,7 +131,7 @@ def validate_ptm(path: str | os.PathLike[str], *, limits: Limits = _LIMITS) -> V
         data = file.read_bytes()
     except OSError as fault:
         raise InputError(
-            "PTM-I602",
+            "PTM-I122",
             f"cannot be read ({fault.strerror or fault})",
             file=file,
             remedy="check the name and the permissions",
@@ -291,10 +291,8 @@ class _Check:
         self._check_counts(_TEXTURES, _texture_counts(self._sizes, database))
         self._check_counts(_EMIT, counts)
         for path in sorted(ours - database.named):
-            if path.startswith(f"{TEXTURE_FOLDER}/"):
+            if path.startswith((f"{TEXTURE_FOLDER}/", f"{OCTREE_FOLDER}/")):
                 database.at(path).add("PTM-D677", "no other file names it")
-            elif path.startswith(f"{OCTREE_FOLDER}/"):
-                database.at(path).add("PTM-D864", "no other file names it")
 
     def _read_manifest(self) -> None:
         try:
@@ -373,7 +371,7 @@ class _Check:
         for name, actual in {"files": len(sizes), "bytes": sum(sizes), **counts}.items():
             if record["counts"].get(name, actual) != actual:
                 message = f"is {record['counts'][name]!r}, but the files have {actual}"
-                self._manifest.at(f"stages.{stage}.counts.{name}").add("PTM-D659", message)
+                self._manifest.at(f"stages.{stage}.counts.{name}").add("PTM-D699", message)
 
 
 def _texture_counts(sizes: Mapping[str, int], database: ServedDatabase) -> dict[str, int]:

@@ -16,7 +16,6 @@ from urllib.parse import unquote_to_bytes
 
 from ptmtools.diagnostics import Findings, Issue, Place
 from ptmtools.files import open_regular
-from ptmtools.output.names import CELL_FOLDER
 from ptmtools.output.validation.textures import ReadTexture
 from ptmtools.store.layout import SERVED
 from ptmtools.texture.model import Limits
@@ -67,7 +66,7 @@ def served_files(folder: Path, findings: Findings) -> list[str]:
             elif os.path.isfile(entry):
                 files.append(path)
             else:
-                at.add("PTM-D658", f"is {_kind(entry)}")
+                at.add("PTM-D657", f"is {_kind(entry)}")
     return sorted(files)
 
 
@@ -172,7 +171,7 @@ class ServedDatabase:
         self.named: set[str] = set()
         self._findings = findings
         self._folded = {file.casefold(): file for file in sorted(self.files)}
-        self._known: dict[tuple[str, str], tuple[str, str, str]] = {}
+        self._known: dict[tuple[str, str], tuple[str, str]] = {}
 
     def take(self, path: str, issues: Iterable[Issue]) -> None:
         """Adds the issues of a folder in the served one that was checked by itself."""
@@ -196,9 +195,9 @@ class ServedDatabase:
         key = (posixpath.dirname(path), url)
         if key not in self._known:
             self._known[key] = self._resolved(*key)
-        file, code, message = self._known[key]
-        if code:
-            self.at(path, url).add(code, message)
+        file, fault = self._known[key]
+        if fault:
+            self.at(path, url).add("PTM-D671", fault)
             return None
         self.named.add(file)
         return file
@@ -208,24 +207,24 @@ class ServedDatabase:
         files = [self.resolve(path, url) for url in urls]
         for file, count in Counter(files).items():
             if file is not None and count > 1:
-                self.at(path, place).add("PTM-D674", f"{file} is named {count} times")
+                self.at(path, place).add("PTM-D671", f"{file} is named {count} times")
         return files
 
-    def _resolved(self, base: str, url: str) -> tuple[str, str, str]:
-        """(path, "", "") or ("", code, message)."""
+    def _resolved(self, base: str, url: str) -> tuple[str, str]:
+        """(path, "") or ("", fault)."""
         if _ABSOLUTE.match(url):
-            return "", "PTM-D670", "is no relative URL"
+            return "", "is no relative URL"
         if not _PATH.fullmatch(url):
-            return "", "PTM-D673", "is empty or has characters that must be percent-encoded"
+            return "", "is empty or has characters that must be percent-encoded"
         try:
             plain = unquote_to_bytes(url).decode()
         except UnicodeDecodeError:
-            return "", "PTM-D673", "is not percent-encoded UTF-8"
+            return "", "is not percent-encoded UTF-8"
         path = posixpath.normpath(posixpath.join(base, plain))
         if path.startswith(("../", "/")) or path in ("..", ".") or "\\" in path:
-            return "", "PTM-D670", "leads out of the served folder"
+            return "", "leads out of the served folder"
         if path in self.files:
-            return path, "", ""
-        code = "PTM-D672" if path.startswith(f"{CELL_FOLDER}/") else "PTM-D671"
+            return path, ""
         other = self._folded.get(path.casefold())
-        return "", code, f"no such file, but there is {other}" if other else "no such file"
+        message = f"no such file, but there is {other}" if other else "no such file"
+        return "", message

@@ -58,7 +58,7 @@ def check_files(database: ServedDatabase) -> Mapping[str, int]:
             continue
         if not cell.name == stem == cell_name(cell.cell):
             message = f"is named {cell.name!r}, cell {cell.cell}"
-            database.at(path, "scene").add("PTM-D732", message)
+            database.at(path, "scene").add("PTM-D731", message)
         for material in dict.fromkeys(primitive.material for primitive in cell.primitives):
             for url in (material.image, material.ptm):
                 if url is not None:
@@ -73,14 +73,14 @@ def _check_texture(material: ReadMaterial, textures: list[Any], at: Place) -> No
     place = material.texture
     assert place is not None
     if not 0 <= place < len(textures):
-        at.add("PTM-D736", f"the hints have no texture {place}")
+        at.add("PTM-D704", f"the hints have no texture {place}")
         return
     record = textures[place]
     urls = [url and UP + url for url in (record["file"], record["fallback"])]
     if [material.ptm, material.image] != urls:
-        at.add("PTM-D736", f"{material.ptm} and {material.image} are not texture {place}")
+        at.add("PTM-D704", f"{material.ptm} and {material.image} are not texture {place}")
     elif material.blends and material.factor[3] == 1 and record["components"] in (1, 3):
-        at.add("PTM-D736", f"the material blends, but texture {place} is opaque")
+        at.add("PTM-D704", f"the material blends, but texture {place} is opaque")
 
 
 def _stems(files: Collection[str], folder: str, suffix: str) -> set[str]:
@@ -99,10 +99,10 @@ def check_octrees(hints: ReadHints, database: ServedDatabase) -> None:
     for i, (row, file) in enumerate(zip(rows, files, strict=True)):
         at = database.at(HINTS, f"octrees[{i}]")
         if fault := _row_fault(row):
-            at.add("PTM-D860", fault)
+            at.add("PTM-D700", fault)
             continue
         if shapes_of is not None and not shapes_of[i]:
-            at.add("PTM-D866", f"no GLB has {row['object']!r}")
+            at.add("PTM-D677", f"no GLB has {row['object']!r}")
         if file:
             head = database.head(file, row["ends"][-1] + 1)
             octree = _read(row, head, database.at(file))
@@ -110,11 +110,11 @@ def check_octrees(hints: ReadHints, database: ServedDatabase) -> None:
             for path, shape in shapes_of[i] if shapes_of else ():
                 q = _place(row, shape)
                 if fault := _shape_fault(row, q, shape):
-                    database.at(path, shape.place).add("PTM-D865", fault)
+                    database.at(path, shape.place).add("PTM-D704", fault)
                 else:
                     inside.append(q)
             if octree is not None and (bare := _bare(octree, np.concatenate(inside))) > _MOST_BARE:
-                at.add("PTM-D865", f"{bare:.0%} of the points of {row['object']!r} have no texel")
+                at.add("PTM-D704", f"{bare:.0%} of the points of {row['object']!r} have no texel")
 
 
 def _shapes(database: ServedDatabase, count: int) -> list[Shapes] | None:
@@ -127,7 +127,7 @@ def _shapes(database: ServedDatabase, count: int) -> list[Shapes] | None:
                 continue
             if shape.octree >= count:
                 message = f"the hints have no octree texture {shape.octree}"
-                database.at(path, shape.place).add("PTM-D865", message)
+                database.at(path, shape.place).add("PTM-D704", message)
             else:
                 shapes[shape.octree].append((path, shape))
     return shapes if glbs else None
@@ -156,16 +156,16 @@ def _read(row: Mapping[str, Any], data: bytes, at: Place) -> Octree | None:
     start = np.concatenate([[0], np.cumsum(row["levels"], dtype=np.int64)])
     if len(data) != row["ends"][-1]:
         less = len(data) < row["ends"][-1]
-        at.add("PTM-D861", f"ends {'before' if less else 'after'} the last level")
+        at.add("PTM-D710", f"ends {'before' if less else 'after'} the last level")
     try:
         texels = inflated(data, start, Stream(row["file"], row["ends"], row["crc32"]))
     except InputError as error:
-        at.add("PTM-D862", error.message, error.place or "")
+        at.add("PTM-D710", error.message, error.place or "")
         return None
     octree = Octree(texels, start, np.array(row["cube"]["low"]), row["cube"]["side"])
     if fault := fault_of(octree):
         place, message = fault
-        at.add("PTM-D863", message, place)
+        at.add("PTM-D710", message, place)
         return None
     return octree
 

@@ -37,11 +37,11 @@ def _check_first_looks(hints: ReadHints, database: ServedDatabase) -> None:
     for i, record in hints.known():
         at = database.at(hints.paths[i], "firstLook")
         if (template is None) != ("firstLook" not in record):
-            at.add("PTM-D742", "only one of the index and the record names a bundle")
+            at.add("PTM-D704", "only one of the index and the record names a bundle")
             continue
         pieces = _pieces(record, ends)
         if pieces is None:
-            at.add("PTM-D742", "a pair does not refine a visible texture")
+            at.add("PTM-D704", "a pair does not refine a visible texture")
         elif pieces and (path := database.resolve(HINTS, urls[i])):
             bundles[path] = pieces
     lengths: dict[int, int] = {}
@@ -53,7 +53,7 @@ def _check_first_looks(hints: ReadHints, database: ServedDatabase) -> None:
         expected = b"".join(heads.get(t, b"")[start:end] for t, start, end in pieces)
         if database.head(path, len(expected) + 1) != expected:
             message = "does not consist of the bytes of the textures that its record lists"
-            database.at(path).add("PTM-D742", message)
+            database.at(path).add("PTM-D704", message)
 
 
 def _pieces(record: Row, ends: Sequence[Sequence[int]]) -> list[_Piece] | None:
@@ -108,7 +108,7 @@ _LISTS = ("cells", "textures")
 def read_file(path: str, data: bytes) -> Row | int | None:
     """The index, a record or the statistics; the length of a bundle; None of other files.
 
-    Raises FileError: PTM-D740 of another schema; PTM-D700 not valid against the schema.
+    Raises FileError: PTM-D656 of another schema; PTM-D700 not valid against the schema.
     """
     if path == HINTS:
         index = _read(data, schemas.HINTS)
@@ -128,7 +128,7 @@ def _read(data: bytes, name: str) -> Row:
     number = document.get("schema") if isinstance(document, dict) else None
     if type(number) is int and number != SCHEMA:
         message = f"is {number}, this ptmtools reads {SCHEMA}; `ptm build-scene` writes it anew"
-        raise FileError("PTM-D740", "schema", message)
+        raise FileError("PTM-D656", "schema", message)
     with shaped("PTM-D700"):
         schemas.check(document, name)
     hints: Row = document
@@ -156,7 +156,7 @@ def gather(database: ServedDatabase) -> ReadHints | None:
         counts = [f"{len(rows[name])} {name}" for rows in (statistics, index) for name in _LISTS]
         if counts[:2] != counts[2:]:
             message = f"of {' and '.join(counts[:2])}, not {' and '.join(counts[2:])}"
-            database.at(STATISTICS).add("PTM-D741", message)
+            database.at(STATISTICS).add("PTM-D700", message)
             statistics = None
     images: list[Images] = []
     files = database.resolve_each(HINTS, "textures", [row["file"] for row in textures])
@@ -179,9 +179,9 @@ def check_files(database: ServedDatabase) -> Mapping[str, int]:
     for i, record in known.items():
         _check_record(record, i, places[i])
         if fault := need_fault(record, levels):
-            places[i].add("PTM-D743", fault, "need")
+            places[i].add("PTM-D700", fault, "need")
         if not _contains(hints.index["cells"][i]["box"], record["leaves"]):
-            at.add("PTM-D741", "does not contain the leaves of the cell", f"cells[{i}].box")
+            at.add("PTM-D700", "does not contain the leaves of the cell", f"cells[{i}].box")
     adjacent, visible = (
         {i: record[name] for i, record in known.items()} for name in ("adjacent", "visible")
     )
@@ -197,19 +197,19 @@ def check_files(database: ServedDatabase) -> Mapping[str, int]:
     for i, view in enumerate(hints.index["viewpoints"]):
         if not hints.index["cells"][view["cell"]].get("standing", True):
             message = f"lies in cell {view['cell']}, which has no place to stand"
-            at.add("PTM-D706", message, f"viewpoints[{i}]")
+            at.add("PTM-D699", message, f"viewpoints[{i}]")
         if abs(math.hypot(*view["direction"]) - 1) > 1 - PARALLEL_COSINE:
-            at.add("PTM-D706", "is no unit vector", f"viewpoints[{i}].direction")
+            at.add("PTM-D699", "is no unit vector", f"viewpoints[{i}].direction")
     return {}
 
 
 def _record_fault(record: Any, i: int, cells: Sequence[Row], textures: int) -> FileError | None:
     """The reason why the content of a file is no record of the cell ``i``; None if it is one."""
     if not isinstance(record, dict) or record["format"] != FORMAT:
-        return FileError("PTM-D741", "", "is not a record of a cell")
+        return FileError("PTM-D700", "", "is not a record of a cell")
     for name, expected in (("cell", i), ("name", cells[i]["name"])):
         if record[name] != expected:
-            return FileError("PTM-D741", name, f"is {record[name]!r}, in the index {expected!r}")
+            return FileError("PTM-D700", name, f"is {record[name]!r}, in the index {expected!r}")
     try:
         for name in ("adjacent", "visible"):
             _in_range(record[name], len(cells), name)
@@ -241,13 +241,13 @@ def _check_record(record: Row, i: int, at: Place) -> None:
     for textures in record["textures"]:
         check_list("textures", None, textures, at)
     ach = np.array(record["ach"], dtype=np.float64)
-    check_shares(ach, _ACH_SLACK, ("PTM-D702", "PTM-D702"), at)
+    check_shares(ach, _ACH_SLACK, at)
     for name in ("ach", "textures", "textureShares"):
         if len(record.get(name, ach)) != len(record["visible"]):
-            at.add("PTM-D702", f"{name} is not aligned with visible")
+            at.add("PTM-D692", f"{name} is not aligned with visible")
     for shares, share in zip(record.get("textureShares", ()), ach, strict=False):
         if abs(sum(part for _, part in shares) - share) > _STATISTICS_SLACK:
-            at.add("PTM-D707", "the shares of textures do not sum to those of their cells")
+            at.add("PTM-D692", "the shares of textures do not sum to those of their cells")
             break
 
 
@@ -263,7 +263,7 @@ def _check_own_textures(
     for i, record in records.items():
         for other, textures in zip(record["visible"], record["textures"], strict=False):
             if own.get(other, textures) != textures:
-                places[i].add("PTM-D741", f"are not the textures of cell {other}", "textures")
+                places[i].add("PTM-D700", f"are not the textures of cell {other}", "textures")
 
 
 def _check_textures(hints: ReadHints, used: set[int], database: ServedDatabase) -> None:
@@ -286,7 +286,7 @@ def _check_statistics(hints: ReadHints, database: ServedDatabase) -> None:
     for i, (row, record) in enumerate(zip(rows, hints.records, strict=False)):
         at = database.at(STATISTICS, f"cells[{i}]")
         if record is not None and (fault := _statistics_fault(row, record["ach"])):
-            at.add("PTM-D707", fault)
+            at.add("PTM-D692", fault)
         if row["missed"] > _MISSED:
             share = f"{row['missed']:.3g} of the pixels"
             at.add("PTM-D703", f"{share} fell on cells outside the PVS")
@@ -312,10 +312,10 @@ def _check_forms(hints: ReadHints, database: ServedDatabase) -> None:
     their files."""
     at, geometry = database.at(HINTS, "geometry"), hints.index["geometry"]
     if not geometry:
-        at.add("PTM-D741", "names no form")
+        at.add("PTM-D700", "names no form")
     present = {form for form in EMITTERS if _is_present(form, len(hints.records), database)}
     for form in sorted(present - set(geometry)):
-        at.add("PTM-D741", f"does not name {form}, whose files exist")
+        at.add("PTM-D700", f"does not name {form}, whose files exist")
     for form in sorted(set(geometry) - present):
         database.resolve_each(HINTS, "geometry", hints.urls(form) or ())
 

@@ -49,7 +49,7 @@ def check_space(
         try:
             planes = solid_planes(points, leaf["faces"], tolerance)
         except SolidError as fault:
-            place.add("PTM-D709", str(fault))
+            place.add("PTM-D683", str(fault))
             planes = None
         leaves.append(_Leaf(cell, place, points, planes))
     _check_apart(leaves, tolerance)
@@ -62,7 +62,7 @@ def check_space(
         inside = _inside(bodies[view["cell"]], np.array([view["position"]], np.float64), tolerance)
         if bodies[view["cell"]] and not inside:
             message = f"does not lie in cell {view['cell']}"
-            at.add("PTM-D706", message, f"viewpoints[{i}].position")
+            at.add("PTM-D699", message, f"viewpoints[{i}].position")
 
 
 def _check_apart(leaves: Sequence[_Leaf], tolerance: Tolerance) -> None:
@@ -79,7 +79,7 @@ def _check_apart(leaves: Sequence[_Leaf], tolerance: Tolerance) -> None:
         within = near[farthest(leaf.planes, middles[near]) < -tolerance.rounding]
         for other in within[within != k].tolist():
             leaf_place = f"{leaf.place.file}: {leaf.place.place}"
-            leaves[other].place.add("PTM-D709", f"lies in {leaf_place}")
+            leaves[other].place.add("PTM-D683", f"lies in {leaf_place}")
 
 
 def _check_portals(
@@ -94,7 +94,7 @@ def _check_portals(
             continue
         neighbours = {portal["neighbour"] for portal in record["portals"]}
         if neighbours != set(record["adjacent"]):
-            places[i].add("PTM-D705", "do not lead to exactly the adjacent cells", "portals")
+            places[i].add("PTM-D699", "do not lead to exactly the adjacent cells", "portals")
         for k, portal in enumerate(record["portals"]):
             polygon = tuple(map(tuple, portal["polygon"]))
             openings[i][(portal["neighbour"], polygon, portal["area"])] += 1
@@ -102,13 +102,13 @@ def _check_portals(
             if i < portal["neighbour"] and (
                 fault := _portal_fault(portal, bodies[i], bodies[portal["neighbour"]], tolerance)
             ):
-                places[i].add("PTM-D705", fault, f"portals[{k}]")
+                places[i].add("PTM-D699", fault, f"portals[{k}]")
     for i, of_cell in enumerate(openings):
         for (neighbour, polygon, area), count in of_cell.items():
             reverse = openings[neighbour][(i, polygon[::-1], area)]
             if records[neighbour] is not None and reverse != count:
                 message = f"a portal to cell {neighbour} is not in its record in reverse"
-                places[i].add("PTM-D705", message, "portals")
+                places[i].add("PTM-D699", message, "portals")
 
 
 def _portal_fault(

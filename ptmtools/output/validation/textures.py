@@ -65,14 +65,14 @@ def read_texture(
     level = next((n for n, v in enumerate(header.levels) if (v.width, v.height) == size), None)
     if size is not None and level is None:
         message = f"{png} is {size[0]} x {size[1]}, which is not the size of any level"
-        at.add("PTM-D711", message)
+        at.add("PTM-D710", message)
         return ReadTexture(header, digest, detail)
     other = read_png(fallback, limits, at.findings.at(png))
     if level is not None and texels is not None and other is not None:
         if level < len(header.levels) - 1:
             texels = decode(data, level, limits)
         if not _same_image(texels, other):
-            at.add("PTM-D711", f"differs from {png}", f"level {level}")
+            at.add("PTM-D710", f"differs from {png}", f"level {level}")
     return ReadTexture(header, digest, detail, level)
 
 
@@ -93,16 +93,16 @@ def check_ptm(data: bytes, limits: Limits, at: Place) -> tuple[Detail, Samples] 
 
 
 def read_png(data: bytes, limits: Limits, at: Place) -> Samples | None:
-    """The texels of a PNG, (h, w, c); None, with PTM-D712 or PTM-D713, if it cannot be read."""
+    """The texels of a PNG, (h, w, c); None, with PTM-D710 or PTM-D713, if it cannot be read."""
     from ptmtools.texture import load_image
 
     if _png_size(data) is None:
-        at.add("PTM-D712", "is not a PNG")
+        at.add("PTM-D710", "is not a PNG")
         return None
     try:
         return load_image(data, limits).array()
     except PtmError as fault:
-        code = "PTM-D713" if isinstance(fault, LimitError) else "PTM-D712"
+        code = "PTM-D713" if isinstance(fault, LimitError) else "PTM-D710"
         at.add(code, f"cannot be read ({fault.message})")
         return None
 

@@ -44,10 +44,10 @@ class ReadRoot:
 
 
 def read_root(document: Document, at: Place) -> ReadRoot:
-    """The content of the root file; missing parts are left out, with PTM-D663."""
+    """The content of the root file; missing parts are left out, with PTM-D661."""
     for type in ("WorldInfo", "NavigationInfo"):
         if len(document.of_type(type)) != 1:
-            at.add("PTM-D663", f"not one {type}")
+            at.add("PTM-D661", f"not one {type}")
     names = {node.name for node in document.of_type("Viewpoint")}
     viewpoints: dict[str, str] = {}
     for node in document.of_type("PTMViewpointCell"):
@@ -62,7 +62,7 @@ def read_root(document: Document, at: Place) -> ReadRoot:
     for node in document.of_type("WorldInfo"):
         here, info = at.at(f"line {node.line}"), node.fields.get("info", ())
         if info[:1] != (f"ptm:database {PATTERN}",):
-            here.add("PTM-D663", "info does not begin with the pattern")
+            here.add("PTM-D661", "info does not begin with the pattern")
         if {line for line in info if line.startswith("ptm:viewpoint ")} != expected:
             here.add("PTM-D699", "the viewpoints in info are not those of PTMViewpointCell")
     inlines: dict[str, NDArray[np.float64] | None] = {}
@@ -71,7 +71,7 @@ def read_root(document: Document, at: Place) -> ReadRoot:
             continue
         here, urls = at.at(f"line {node.line}"), node.fields["url"]
         if len(urls) != 1:
-            here.add("PTM-D663", "an Inline without a URL")
+            here.add("PTM-D661", "an Inline without a URL")
         elif urls[0] in inlines:
             here.add("PTM-D699", f"{urls[0]} is listed twice")
         elif node.lacks:
@@ -106,7 +106,7 @@ def check_files(database: ServedDatabase) -> Mapping[str, int]:
     for path, document in documents.items():
         for node in document.nodes:
             for lack in node.lacks:
-                database.at(path, node.place).add("PTM-D663", lack)
+                database.at(path, node.place).add("PTM-D661", lack)
     cells = _check_cells(documents, database)
     if ROOT in documents:
         _check_root(documents[ROOT], cells, database)
@@ -165,7 +165,7 @@ def _check_index(cells: Mapping[str, ReadCell], database: ServedDatabase) -> Non
     if urls is not None:
         database.resolve_each(HINTS, "cells", urls)
         for unlisted in sorted({f"{CELL_FOLDER}/{name}" for name in cells} - set(urls)):
-            database.at(HINTS, "cells").add("PTM-D741", f"does not name {unlisted}")
+            database.at(HINTS, "cells").add("PTM-D700", f"does not name {unlisted}")
 
 
 #: Slack of the sum of the ach values in single precision.
@@ -198,10 +198,10 @@ class ReadCell:
 
 
 def read_cell(document: Document, at: Place) -> ReadCell | None:
-    """The cell of a file; None without exactly one (PTM-D663) or if it lacks fields."""
+    """The cell of a file; None without exactly one (PTM-D661) or if it lacks fields."""
     nodes = document.of_type("PTMCell")
     if len(nodes) != 1:
-        at.add("PTM-D663", f"{len(nodes)} PTMCell nodes, not 1")
+        at.add("PTM-D661", f"{len(nodes)} PTMCell nodes, not 1")
         return None
     if nodes[0].lacks:
         return None
@@ -250,14 +250,14 @@ def check_cell(
             bodies = _leaf_bodies(leaves, box, tolerance) if bodies is None else bodies
             far = np.min([far, *(farthest(planes, points) for planes in bodies)], axis=0)
         if (most := far.max(initial=0.0)) > tolerance.cluster:
-            shape_at.add("PTM-D684", f"geometry lies {most:.3g} m outside of the hull")
+            shape_at.add("PTM-D683", f"geometry lies {most:.3g} m outside of the hull")
     if f"{cell.name}.wrl" != own:
-        here.add("PTM-D698", f"cellName is {cell.name!r}")
+        here.add("PTM-D699", f"cellName is {cell.name!r}")
     check_list("adjacentUrl", own, cell.adjacent, here)
     check_list("visibleUrl", own, cell.visible, here)
     if len(cell.ach) != len(cell.visible):
-        here.add("PTM-D691", f"{len(cell.ach)} ach values for {len(cell.visible)} visible cells")
-    check_shares(cell.ach, _ACH_SLACK, ("PTM-D692", "PTM-D693"), here)
+        here.add("PTM-D692", f"{len(cell.ach)} ach values for {len(cell.visible)} visible cells")
+    check_shares(cell.ach, _ACH_SLACK, here)
 
 
 def _check_hull(node: Node, cell: ReadCell, tolerance: Tolerance, at: Place) -> Planes:
@@ -281,12 +281,12 @@ def _check_leaves(
         return ()
     far = farthest(hull, node.fields["leafPoint"]).max(initial=0.0)
     if far > tolerance.cluster:
-        at.add("PTM-D684", f"a leaf lies {far:.3g} m outside of the hull")
+        at.add("PTM-D683", f"a leaf lies {far:.3g} m outside of the hull")
     sizes, start = [len(leaf) for leaf in cell.leaves], node.fields["leafStart"]
     divided = len(start) > 1 and np.array_equal(start, np.cumsum([0, *sizes[:-1]]))
     if divided and min(sizes) >= 4 and max(sizes) <= MOST_CORNERS:
         return cell.leaves
-    at.add("PTM-D685", "leafStart does not divide leafPoint into leaves")
+    at.add("PTM-D683", "leafStart does not divide leafPoint into leaves")
     return ()
 
 
@@ -326,9 +326,9 @@ def _check_shape(shape: Node, at: Place) -> None:
         at.add("PTM-D661", "coordIndex stands before coord")
     triangles = _loops(geometry["coordIndex"], len(points))
     if triangles is None:
-        at.add("PTM-D680", f"coordIndex is not a list of triangles over {len(points)} points")
+        at.add("PTM-D661", f"coordIndex is not a list of triangles over {len(points)} points")
     elif len(triangles) == 0 or (triangles == np.roll(triangles, 1, axis=1)).any():
-        at.add("PTM-D680", "coordIndex has a triangle with two equal corners")
+        at.add("PTM-D661", "coordIndex has a triangle with two equal corners")
     count = len(geometry["coordIndex"]) // 4
     _check_texture(shape, count, at)
     _check_colours(shape, count, at)
@@ -340,16 +340,16 @@ def _check_texture(shape: Node, count: int, at: Place) -> None:
     if not texture and not coord and index is None:
         return
     if not texture.get("url"):
-        at.add("PTM-D663", "texture coordinates without a texture")
+        at.add("PTM-D661", "texture coordinates without a texture")
     if not coord or index is None:
-        at.add("PTM-D663", "a texture without texCoord or texCoordIndex")
+        at.add("PTM-D661", "a texture without texCoord or texCoordIndex")
         return
     points = len(coord["point"])
     triangles = _loops(index, points)
     if triangles is None:
-        at.add("PTM-D681", f"texCoordIndex is not a list of triangles over {points} points")
+        at.add("PTM-D661", f"texCoordIndex is not a list of triangles over {points} points")
     elif len(triangles) != count:
-        at.add("PTM-D681", f"texCoordIndex has {len(triangles)} faces of {count}")
+        at.add("PTM-D661", f"texCoordIndex has {len(triangles)} faces of {count}")
 
 
 def _check_colours(shape: Node, count: int, at: Place) -> None:
@@ -363,7 +363,7 @@ def _check_colours(shape: Node, count: int, at: Place) -> None:
             in_range = (index >= 0) & (index < len(color["color"]))
             complete = bool(in_range.all()) and len(index) == count
         if not complete:
-            at.add("PTM-D682", f"colorIndex does not give a colour to each of {count} faces")
+            at.add("PTM-D661", f"colorIndex does not give a colour to each of {count} faces")
     values = [*shape.at("appearance", "material").values(), *color.values()]
     if any(((v < 0) | (v > 1)).any() for v in values):
-        at.add("PTM-D682", "a colour or transparency is outside 0 to 1")
+        at.add("PTM-D661", "a colour or transparency is outside 0 to 1")

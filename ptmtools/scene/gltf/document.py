@@ -66,7 +66,7 @@ class Document:
 
     def view(self, index: int) -> tuple[Buffer, int, int]:
         """Buffer, start and length of a buffer view; ValueError if it leaves the buffer or is
-        damaged, LimitError PTM-L205."""
+        damaged, LimitError PTM-L204."""
         view = self.tree["bufferViews"][natural(index)]
         extensions = view.get("extensions", {})
         compressed = next((extensions[name] for name in EXTENSIONS if name in extensions), None)
@@ -85,7 +85,7 @@ class Document:
         self._left -= size
         if self._left < 0:
             raise LimitError(
-                "PTM-L205",
+                "PTM-L204",
                 f"decompresses to {size >> 20:,} MiB, and more than can be meant with what is "
                 "decompressed before",
                 file=self.path,
@@ -109,7 +109,7 @@ class Document:
         """(count, items) the numbers of an accessor (section 3.6.2), of which a sparse one has some
         others than its buffer view, or than 0.
 
-        Raises ValueError, LookupError or TypeError if it is damaged, LimitError PTM-L205.
+        Raises ValueError, LookupError or TypeError if it is damaged, LimitError PTM-L204.
         """
         accessor = self.tree["accessors"][natural(index)]
         try:
@@ -322,7 +322,7 @@ def support_of(name: str) -> str:
 def check_extensions(tree: dict[str, object], findings: Findings) -> None:
     """Notes what is not carried over.
 
-    Raises InputError PTM-I255 for an extension that the model cannot do without and that is not
+    Raises InputError PTM-I243 for an extension that the model cannot do without and that is not
     read.
     """
     required, used = tree.get("extensionsRequired", []), tree.get("extensionsUsed", [])
@@ -331,11 +331,11 @@ def check_extensions(tree: dict[str, object], findings: Findings) -> None:
     for name in sorted({str(name) for name in required} - KNOWN.keys()):
         remedy = _REMEDIES.get(name, _ANY)
         raise InputError(
-            "PTM-I255",
+            "PTM-I243",
             f"needs the glTF extension {name}, which is not read",
             file=findings.model,
             remedy=remedy if remedy == _ANY else f"run `{remedy}`",
         )
     for name in sorted({str(name) for name in used}):
         if KNOWN.get(name, "noted") == "noted":
-            findings.note("PTM-N224", f"{name} is not carried over")
+            findings.note("PTM-N215", f"{name} is not carried over")

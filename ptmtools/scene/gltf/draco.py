@@ -79,14 +79,14 @@ def decode_primitives(document: Document, views: Iterable[int]) -> dict[int, Dec
     """The primitives that these buffer views hold.
 
     Raises ValueError for a view that leaves its buffer, InputError PTM-I254 for what cannot be
-    decoded, MissingComponentError PTM-M203 without DracoPy.
+    decoded, MissingComponentError PTM-M100 without DracoPy.
     """
     wanted = sorted(set(views))
     if not wanted:
         return {}
     if find_spec("DracoPy") is None:
         raise MissingComponentError(
-            "PTM-M203",
+            "PTM-M100",
             "DracoPy is needed for meshes compressed with Draco",
             file=document.path,
             remedy="pip install DracoPy",

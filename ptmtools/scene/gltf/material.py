@@ -93,7 +93,7 @@ class MaterialReader:
             use = self._texture_of(entry)
         r, g, b, a = (_share(value) for value in factor)
         if (r, g, b) != (1.0, 1.0, 1.0):
-            self._findings.note("PTM-N226", f"{name}: colour factor converted to sRGB", place)
+            self._findings.note("PTM-N215", f"{name}: colour factor converted to sRGB", place)
         light = np.array([r, g, b], dtype=np.float64)
         red, green, blue = (1.0, 1.0, 1.0) if colored else to_srgb(light).tolist()
         mode = entry.get("alphaMode", "OPAQUE")
@@ -102,7 +102,7 @@ class MaterialReader:
         opacity = {"BLEND": a, "MASK": float(a >= cutoff)}.get(mode, 1.0)
         see_through = mode in ("MASK", "BLEND")
         if extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0) > 0:
-            self._findings.note("PTM-N224", f"{name}: transmits light, never occludes", place)
+            self._findings.note("PTM-N215", f"{name}: transmits light, never occludes", place)
             see_through = True
 
         texture, coords, matrix = None, "TEXCOORD_0", np.eye(2, 3)
@@ -113,7 +113,7 @@ class MaterialReader:
             coords = f"TEXCOORD_{moved.get('texCoord', use.get('texCoord', 0))}"
             if moved:
                 self._findings.note(
-                    "PTM-N216", f"{name}: KHR_texture_transform is baked into its faces", place
+                    "PTM-N215", f"{name}: KHR_texture_transform is baked into its faces", place
                 )
         self._materials.append(
             SourceMaterial(

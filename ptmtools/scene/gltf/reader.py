@@ -60,7 +60,7 @@ def world_matrices(tree: dict[str, Any], findings: Findings) -> dict[int, Floats
         entry = nodes[node]
         visibility = entry.get("extensions", {}).get("KHR_node_visibility", {})
         if visibility.get("visible", True) is False:
-            findings.note("PTM-N224", "not visible, and so is what hangs on it", f"node {node}")
+            findings.note("PTM-N215", "not visible, and so is what hangs on it", f"node {node}")
             continue
         with np.errstate(all="ignore"):
             world[node] = above @ _local_matrix(entry)
@@ -155,7 +155,7 @@ def cameras(
         yfov = given.get("perspective", {}).get("yfov", 0.0)
         usable = np.isfinite(position).all() and math.isfinite(length) and length > 0
         if not (usable and 0 < yfov < math.pi):
-            findings.note("PTM-N225", f"camera {name} has no perspective, skipped", f"node {node}")
+            findings.note("PTM-N215", f"camera {name} has no perspective, skipped", f"node {node}")
             continue
         x, y, z = position.tolist()
         dx, dy, dz = (direction / length).tolist()
@@ -212,9 +212,9 @@ def read_gltf(
     ``texture_of`` says so (`MaterialReader`).
 
     Raises InputError where it is damaged or needs what is not supported; LimitError for more
-    vertices than int32 can number (PTM-L200) or more than ``max_triangles`` (PTM-L203), each as
+    vertices than int32 can number or more than ``max_triangles`` (PTM-L203), each as
     often as a node shows it, before anything is made of them, and for more that is compressed than
-    can be meant (PTM-L205).
+    can be meant (PTM-L204).
     """
     try:
         document = open_document(path, findings.folder)
@@ -281,21 +281,21 @@ def _draws(document: Document, node: int, findings: Findings) -> Iterator[_Draw]
     mesh = tree["meshes"][entry["mesh"]]
     name = str(entry.get("name") or mesh.get("name") or f"node {node}")
     if "skin" in entry:
-        findings.note("PTM-N224", "skin: shown in its rest pose", f"node {node}")
+        findings.note("PTM-N215", "skin: shown in its rest pose", f"node {node}")
     times = instance_count(document, node)
     for k, primitive in enumerate(mesh["primitives"]):
         place = f"mesh {entry['mesh']}, primitive {k}"
         mode = primitive.get("mode", _TRIANGLES)
         if mode not in (_TRIANGLES, _STRIP, _FAN):
-            findings.note("PTM-N219", f"primitive of mode {mode} (points or lines), skipped", place)
+            findings.note("PTM-N215", f"primitive of mode {mode} (points or lines), skipped", place)
             continue
         if primitive.get("targets"):
-            findings.note("PTM-N224", "morph targets are not carried over", place)
+            findings.note("PTM-N215", "morph targets are not carried over", place)
         yield _Draw(node, name, primitive, place, times)
 
 
 def _limited(document: Document, draws: Iterable[_Draw], max_triangles: int) -> Iterator[_Draw]:
-    """The same, as long as they are not too many. Raises LimitError PTM-L200, PTM-L203."""
+    """The same, as long as they are not too many. Raises LimitError PTM-L203."""
     most = min(MAX_VERTICES, _VERTICES_A_TRIANGLE * max_triangles)
     vertices = triangles = 0
     for draw in draws:
@@ -312,7 +312,7 @@ def _limited(document: Document, draws: Iterable[_Draw], max_triangles: int) -> 
             raise too_many_triangles(max_triangles, document.path)
         if vertices > most:
             raise LimitError(
-                "PTM-L200",
+                "PTM-L203",
                 f"more than {most} vertices, counting shared ones once for each primitive",
                 file=document.path,
                 remedy="raise the limit (--max-triangles), or split the model",
@@ -407,7 +407,7 @@ def _mesh(values: _Values, draw: _Draw, paint: MaterialUse, findings: Findings) 
     if raw is not None:
         colors = encoded(raw[:, :3] * paint.light)[triangles]
     if raw is not None and paint.see_through and not (raw[:, 3:] == 1).all():
-        findings.note("PTM-N223", "opacities of vertices are not carried over", draw.place)
+        findings.note("PTM-N215", "opacities of vertices are not carried over", draw.place)
     return _Mesh(points, triangles, uv[triangles], colors)
 
 

@@ -139,9 +139,9 @@ def read_products(file: Any, findings: Findings, max_triangles: int) -> Source:
     """
     unit, metres = length_unit(file)
     if metres is None:
-        findings.note("PTM-N241", "the file says no unit of length")
+        findings.note("PTM-N201", "the file says no unit of length")
     elif metres != 1:
-        findings.note("PTM-N240", f"lengths are in {unit} ({metres:g} m), and read as metres")
+        findings.note("PTM-N201", f"lengths are in {unit} ({metres:g} m), and read as metres")
     products = _shown(file, findings)
     shapes = _shapes(file, products, max_triangles, findings.model) if products else []
     _note_products(products, shapes, findings)
@@ -191,11 +191,11 @@ def _shown(file: Any, findings: Findings) -> list[Any]:
         if not drawn(product.is_a):
             hidden[product.is_a()] += 1
         elif not _has_body(product):
-            findings.note("PTM-N243", f"{product.is_a()}: has no surface, only lines")
+            findings.note("PTM-N215", f"{product.is_a()}: has no surface, only lines")
         else:
             shown.append(product)
     for name, count in hidden.items():
-        findings.note("PTM-N242", f"{name}: not drawn", "", count)
+        findings.note("PTM-N215", f"{name}: not drawn", "", count)
     return shown
 
 
@@ -266,7 +266,7 @@ def _note_products(products: list[Any], shapes: list[Shape], findings: Findings)
             findings.miss("PTM-N253", message, f"GlobalId {guid}")
         elif why:
             message = f"{called(product)}: a part of its geometry cannot be made{why}"
-            findings.miss("PTM-N259", message, f"GlobalId {guid}")
+            findings.miss("PTM-N253", message, f"GlobalId {guid}")
 
 
 def _errors() -> Iterator[tuple[str, str]]:
@@ -280,14 +280,14 @@ def _errors() -> Iterator[tuple[str, str]]:
 
 
 def _open(path: str, findings: Findings) -> Any:
-    """Raises InputError PTM-I269 for an unknown schema, PTM-I254 for what is none."""
+    """Raises InputError PTM-I243 for an unknown schema, PTM-I254 for what is none."""
     import ifcopenshell as library
 
     try:
         file = library.open(path)
     except library.SchemaError as error:
         raise InputError(
-            "PTM-I269", one_line(error), remedy="export it as IFC2X3, IFC4 or IFC4X3_ADD2"
+            "PTM-I243", one_line(error), remedy="export it as IFC2X3, IFC4 or IFC4X3_ADD2"
         ) from None
     except library.Error as error:
         wrong = [what for _, what in _errors()]

@@ -207,7 +207,7 @@ def note_lost(file: Any, findings: Findings) -> None:
         except RuntimeError:  # no class of this schema
             continue
         if count:
-            findings.note("PTM-N245", what, "", count)
+            findings.note("PTM-N215", what, "", count)
 
 
 def _shade(color: tuple[float, float, float] | None) -> str:

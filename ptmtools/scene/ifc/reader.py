@@ -47,12 +47,12 @@ def read_ifc(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) 
 
     Raises
     ------
-    InputError: PTM-I266 no STEP file, PTM-I267 not all of one, PTM-I268 an archive without one,
-        PTM-I269 of a schema that is not known, PTM-I247 nothing to draw, and PTM-I254 for what
+    InputError: PTM-I266 no STEP file, not all of one, or an archive without one,
+        PTM-I243 of a schema that is not known, PTM-I247 nothing to draw, and PTM-I254 for what
         IfcOpenShell cannot read.
-    LimitError: PTM-L203 more than ``max_triangles``, PTM-L260 an archive that unpacks to more than
+    LimitError: PTM-L203 more than ``max_triangles``, PTM-L204 an archive that unpacks to more than
         1 GiB.
-    MissingComponentError: PTM-M201 IfcOpenShell is not installed.
+    MissingComponentError: PTM-M100 IfcOpenShell is not installed.
     """
     with naming(path), tempfile.TemporaryDirectory() as scratch:
         file = path.absolute()
@@ -61,7 +61,7 @@ def read_ifc(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) 
         _check(file)
         if not find_spec("ifcopenshell"):
             raise MissingComponentError(
-                "PTM-M201",
+                "PTM-M100",
                 "IFC is read through ifcopenshell",
                 file=path,
                 remedy="pip install 'ptmtools[ifc]'",
@@ -87,7 +87,7 @@ def _check(file: Path) -> None:
         stream.seek(max(0, end - _MARGIN))
         if not _ENDS.search(stream.read()):
             raise InputError(
-                "PTM-I267",
+                "PTM-I266",
                 "is not whole (a STEP file ends with END-ISO-10303-21)",
                 remedy="copy or export it again",
             )
@@ -100,7 +100,7 @@ def _unpacked(path: Path, folder: Path) -> Path:
             names = [n for n in archive.namelist() if PurePosixPath(n).suffix.lower() == ".ifc"]
             if len(names) != 1:
                 raise InputError(
-                    "PTM-I268",
+                    "PTM-I266",
                     f"holds {len(names) or 'no'} IFC files instead of one",
                     remedy="unpack it, and give the .ifc file",
                 )
@@ -110,7 +110,7 @@ def _unpacked(path: Path, folder: Path) -> Path:
             return file
     except _DAMAGED as error:
         raise InputError(
-            "PTM-I268", f"is no archive that can be unpacked ({error})", remedy="pack it again"
+            "PTM-I266", f"is no archive that can be unpacked ({error})", remedy="pack it again"
         ) from None
 
 
@@ -120,7 +120,7 @@ def _copy(packed: IO[bytes], unpacked: IO[bytes]) -> None:
         size += len(chunk)
         if size > _LARGEST << 30:
             raise LimitError(
-                "PTM-L260",
+                "PTM-L204",
                 f"unpacks to more than {_LARGEST} GiB",
                 remedy="unpack it, and give the .ifc file",
             )

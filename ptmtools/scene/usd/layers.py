@@ -35,7 +35,7 @@ def open_stage(path: Path, findings: Findings) -> tuple[Any, list[str]]:
 
     Raises InputError PTM-I254 for a layer that the library cannot read, and PTM-I205 for one
     outside of the model's folder. Layers that are not there are missed (PTM-N203), as are other
-    faults of the composition (PTM-N260).
+    faults of the composition (PTM-N214).
     """
     layer = _layer(os.fspath(path), path)
     context = Ar.GetResolver().CreateDefaultContextForAsset(os.fspath(path))
@@ -161,5 +161,5 @@ def _note_faults(
             missed[name] = None
         else:
             text = text.replace(f"{findings.folder.root}{os.sep}", "")
-            findings.miss("PTM-N260", text[:_LONGEST])
+            findings.miss("PTM-N214", text[:_LONGEST])
     return missed

@@ -92,13 +92,13 @@ class MaterialReader:
         name, place = material.GetPrim().GetName(), str(material.GetPath())
         shader, *_ = material.ComputeSurfaceSource()
         if not shader or shader.GetIdAttr().Get(TIME) != "UsdPreviewSurface":
-            self._findings.miss("PTM-N263", f"{name}: has no UsdPreviewSurface, not read", place)
+            self._findings.miss("PTM-N214", f"{name}: has no UsdPreviewSurface, not read", place)
             return Surface(name)
         opacity, see_through, from_image = self._opacity(shader, name, place)
         value, source, output = _followed(shader.GetInput("diffuseColor"))
         if source is None:
             color = tint(_numbers(value, _DIFFUSE))
-            self._findings.note("PTM-N226", f"{name}: colour factor converted to sRGB", place)
+            self._findings.note("PTM-N215", f"{name}: colour factor converted to sRGB", place)
             return Surface(name, color, opacity, see_through or from_image is not None)
         kind = str(source.GetIdAttr().Get(TIME))
         if kind.startswith("UsdPrimvarReader_float"):
@@ -106,13 +106,13 @@ class MaterialReader:
             see_through |= from_image is not None
             return Surface(name, (1.0, 1.0, 1.0), opacity, see_through, painted=painted)
         if kind != "UsdUVTexture":
-            self._findings.miss("PTM-N263", f"{name}: colours of {kind} are not read", place)
+            self._findings.miss("PTM-N214", f"{name}: colours of {kind} are not read", place)
             return Surface(name, None, opacity, see_through or from_image is not None)
         file = _followed(source.GetInput("file"))[0]
         if from_image is not None and from_image != (_path_of(file), "a"):
             what = f"{name}: its opacity is an image of its own"
             self._findings.note(
-                "PTM-N217", f"{what}, which makes it transparent and is not written", place
+                "PTM-N215", f"{what}, which makes it transparent and is not written", place
             )
             see_through = True
         if output not in ("rgb", "rgba"):
@@ -158,7 +158,7 @@ class MaterialReader:
             self._findings.miss("PTM-N204", f"{name}: its texture names no image", place)
             return None
         if "<UDIM>" in path:
-            self._findings.miss("PTM-N264", f"{path}: tiles of UDIM are not carried over", place)
+            self._findings.miss("PTM-N214", f"{path}: tiles of UDIM are not carried over", place)
             return None
         scale = _numbers(_followed(texture.GetInput("scale"))[0], _ONES)
         bias = _numbers(_followed(texture.GetInput("bias"))[0], _ZEROS)
@@ -202,7 +202,7 @@ class MaterialReader:
     def _wrap(self, texture: Any, key: str, path: str, place: str) -> SourceWrap:
         mode = str(_followed(texture.GetInput(key))[0] or "useMetadata")
         if mode not in _WRAPS:  # without metadata it is black, too
-            self._findings.note("PTM-N222", f"{path}: black beyond its edge becomes clamp", place)
+            self._findings.note("PTM-N215", f"{path}: black beyond its edge becomes clamp", place)
         return _WRAPS.get(mode, "clamp")
 
     def _coords(self, texture: Any, name: str, place: str) -> tuple[str, Floats]:
@@ -216,7 +216,7 @@ class MaterialReader:
             source = _followed(source.GetInput("in"))[1]
         if moved:
             self._findings.note(
-                "PTM-N216", f"{name}: UsdTransform2d is baked into its faces", place
+                "PTM-N215", f"{name}: UsdTransform2d is baked into its faces", place
             )
         if source is None or source.GetIdAttr().Get(TIME) != "UsdPrimvarReader_float2":
             return "", matrix[:2]
@@ -372,12 +372,12 @@ class Painter:
             place = str(prim.GetPath())
             found: Any = None, None
             if values is None or values.shape[2] != 3:
-                self._findings.miss("PTM-N265", f"{name}: does not fit the mesh, ignored", place)
+                self._findings.miss("PTM-N214", f"{name}: does not fit the mesh, ignored", place)
             elif primvar.GetInterpolation() == UsdGeom.Tokens.constant:
-                self._findings.note("PTM-N226", f"{name}: colour factor converted to sRGB")
+                self._findings.note("PTM-N215", f"{name}: colour factor converted to sRGB")
                 found = tint(values[0, 0]), None
             else:
-                self._findings.note("PTM-N226", f"{name}: colour factor converted to sRGB")
+                self._findings.note("PTM-N215", f"{name}: colour factor converted to sRGB")
                 found = (1.0, 1.0, 1.0), encoded(values)
             self._colors[known] = found
         found = self._colors[known]
@@ -412,7 +412,7 @@ class Painter:
                 values = at_corners(primvar, shape)
                 if values is None or values.shape[2] != 2:
                     what = f"{surface.coords}: does not fit the mesh, ignored"
-                    self._findings.miss("PTM-N265", what, place)
+                    self._findings.miss("PTM-N214", what, place)
                     values = None
             if values is None:
                 values = np.zeros((len(shape.face), 3, 2))

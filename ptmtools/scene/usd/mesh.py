@@ -100,7 +100,7 @@ def _faces(prim: Any) -> tuple[Floats, Ints, Ints]:
 
 
 def cut(prim: Any, findings: Findings, model: Path) -> Shape:
-    """Cuts what `is_cut`. Raises InputError PTM-I246 or PTM-I270 where its arrays do not fit
+    """Cuts what `is_cut`. Raises InputError PTM-I245 or PTM-I254 where its arrays do not fit
     together."""
     place = str(prim.GetPath())
     points, counts, vertex = _faces(prim)
@@ -108,11 +108,11 @@ def cut(prim: Any, findings: Findings, model: Path) -> Shape:
         raise unfit(model, place, f"its faces have {counts.sum()} corners of {len(vertex)}")
     if len(vertex) and not 0 <= vertex.min() <= vertex.max() < len(points):
         raise InputError(
-            "PTM-I246", "a face names a point that does not exist", file=model, place=place
+            "PTM-I245", "a face names a point that does not exist", file=model, place=place
         )
     kept = counts >= 3
     if short := int((~kept).sum()):
-        findings.miss("PTM-N220", "faces of fewer than three corners", place, short)
+        findings.miss("PTM-N214", "faces of fewer than three corners", place, short)
     if prim.IsA(UsdGeom.Mesh):
         holes = array(UsdGeom.Mesh(prim).GetHoleIndicesAttr().Get(TIME), np.int64)
         kept[holes[(holes >= 0) & (holes < len(counts))]] = False
@@ -123,7 +123,7 @@ def cut(prim: Any, findings: Findings, model: Path) -> Shape:
     made = triangulate(points[vertex[corner]], start)
     if made.tangled:
         findings.note(
-            "PTM-N221",
+            "PTM-N211",
             "polygons with crossing edges, or too many corners, were cut into fans of triangles",
             place,
             made.tangled,
@@ -145,9 +145,9 @@ def cut(prim: Any, findings: Findings, model: Path) -> Shape:
 
 
 def unfit(model: Path, place: str, what: str) -> InputError:
-    """The error for arrays that do not fit together, PTM-I270."""
+    """The error for arrays that do not fit together, PTM-I254."""
     return InputError(
-        "PTM-I270", what, file=model, place=place, remedy="the file may be damaged, export it again"
+        "PTM-I254", what, file=model, place=place, remedy="the file may be damaged, export it again"
     )
 
 
@@ -182,13 +182,13 @@ def _note(prim: Any, mesh: Any, findings: Findings) -> None:
     """Says once for each mesh what of it is not shown."""
     scheme = mesh.GetSubdivisionSchemeAttr().Get(TIME)
     if scheme not in (None, UsdGeom.Tokens.none):
-        findings.note("PTM-N261", f"surfaces to be subdivided ({scheme}) are drawn as their cages")
+        findings.note("PTM-N215", f"surfaces to be subdivided ({scheme}) are drawn as their cages")
     if prim.HasAttribute("primvars:skel:jointIndices"):
-        findings.note("PTM-N224", "skins are shown in their rest pose")
+        findings.note("PTM-N215", "skins are shown in their rest pose")
     if prim.HasRelationship("skel:blendShapeTargets"):
-        findings.note("PTM-N224", "blend shapes are not carried over")
+        findings.note("PTM-N215", "blend shapes are not carried over")
     if any(
         attribute.ValueMightBeTimeVarying()
         for attribute in (mesh.GetPointsAttr(), mesh.GetFaceVertexIndicesAttr())
     ):
-        findings.note("PTM-N224", "meshes that change are shown as they are at first")
+        findings.note("PTM-N215", "meshes that change are shown as they are at first")

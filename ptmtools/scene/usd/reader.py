@@ -30,14 +30,14 @@ _MOST_FILES = 100_000
 def read_usd(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) -> Source:
     """Read a USD model.
 
-    Raises InputError where it is damaged (PTM-I246, PTM-I254, PTM-I270), has no mesh (PTM-I247), or
+    Raises InputError where it is damaged (PTM-I245, PTM-I254), has no mesh (PTM-I247), or
     is composed of files outside its folder (PTM-I205); LimitError PTM-L203 for more than
     ``max_triangles``, as often as they are shown, before anything is made of them; and
-    MissingComponentError PTM-M202.
+    MissingComponentError PTM-M100.
     """
     if find_spec("pxr") is None:
         raise MissingComponentError(
-            "PTM-M202",
+            "PTM-M100",
             "usd-core is needed for this format, and is not installed",
             remedy="pip install 'ptmtools[usd]'",
         )

@@ -98,7 +98,7 @@ class Traversal:
         self.cameras: list[tuple[str, Floats, Any]] = []
 
     def group(self) -> Group:
-        """All that is drawn, and notes of what is not. Raises InputError PTM-I270."""
+        """All that is drawn, and notes of what is not. Raises InputError PTM-I254."""
         found = self._below(self._stage.GetPseudoRoot(), None)
         for (missed, code, message), count in self._left_out.items():
             (self._findings.miss if missed else self._findings.note)(code, message, "", count)
@@ -142,7 +142,8 @@ class Traversal:
                 else:
                     surface = not prim.IsA(UsdGeom.Curves) and not prim.IsA(UsdGeom.Points)
                     kind = str(prim.GetTypeName())
-                    self._left_out[surface, "PTM-N219", f"{kind}: not drawn"] += 1
+                    code = "PTM-N214" if surface else "PTM-N215"
+                    self._left_out[surface, code, f"{kind}: not drawn"] += 1
             elif prim.IsA(UsdGeom.Camera) and prototype is None:
                 self.cameras.append((*self._place(prim, None), prim))
             if (
@@ -150,13 +151,13 @@ class Traversal:
                 and UsdGeom.Xformable(prim).TransformMightBeTimeVarying()
             ):
                 moved = "what moves is shown where it is at first"
-                self._left_out[False, "PTM-N224", moved] += 1
+                self._left_out[False, "PTM-N215", moved] += 1
             stack += [(child, purpose) for child in reversed(below)]
         return group
 
     def _leave_out(self, why: str, count: int) -> None:
         if count:
-            self._left_out[False, "PTM-N262", f"surfaces {why} are not drawn"] += count
+            self._left_out[False, "PTM-N215", f"surfaces {why} are not drawn"] += count
 
     def _place(self, prim: Any, prototype: Any | None) -> tuple[str, Floats]:
         """The name and the (4, 4) of a prim: below a prototype, or in the world."""
@@ -187,7 +188,7 @@ class Traversal:
         mask = instancer.ComputeMaskAtTime(TIME)
         shown = np.array(mask, dtype=bool) if mask else np.ones(len(index), dtype=bool)
         if hidden := int((~shown).sum()):
-            self._left_out[False, "PTM-N262", "instances that are invisible are not drawn"] += (
+            self._left_out[False, "PTM-N215", "instances that are invisible are not drawn"] += (
                 hidden
             )
         found: list[tuple[Group, Floats]] = []
@@ -208,7 +209,7 @@ class Traversal:
             if prim:
                 self._prototypes[path] = self._below(prim, prim)
         if self._prototypes[path] is None:
-            self._left_out[True, "PTM-N260", f"{path}: no such prototype"] += 1
+            self._left_out[True, "PTM-N214", f"{path}: no such prototype"] += 1
         return self._prototypes[path]
 
 
@@ -291,7 +292,7 @@ def _cameras(found: list[tuple[str, Floats, Any]], findings: Findings) -> tuple[
         if flat or not (
             usable and math.isfinite(height / (distance or 1)) and height > 0 < distance
         ):
-            findings.note("PTM-N225", f"camera {name} has no perspective, skipped", name)
+            findings.note("PTM-N215", f"camera {name} has no perspective, skipped", name)
             continue
         x, y, z = position.tolist()
         dx, dy, dz = (direction / length).tolist()

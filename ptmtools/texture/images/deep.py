@@ -119,7 +119,7 @@ def is_deep(tags: Tags) -> bool:
 def read_tiff(file: BinaryIO, tags: Tags, limits: Limits) -> Picture:
     """A TIFF of samples that 8 bits do not hold.
 
-    Raises InputError PTM-I126, PTM-I127, LimitError PTM-L104, MissingComponentError PTM-M100.
+    Raises InputError PTM-I126, LimitError PTM-L104, MissingComponentError PTM-M100.
     """
     width, height, components = tags[_WIDTH], tags[_HEIGHT], tags.get(_SAMPLES, 1)
     bits, formats = tags.get(_BITS, (1,)), tags.get(_FORMAT, (1,))
@@ -214,7 +214,7 @@ def save_tiff(file: IO[bytes], texels: NDArray[Any], description: Description) -
 
     The second of two components and the fourth of four are alpha, not premultiplied.
 
-    Raises OutputError PTM-O102 for what does not fit into 4 GiB.
+    Raises OutputError PTM-O101 for what does not fit into 4 GiB.
     """
     height, width, components = texels.shape
     row = texels[:1].nbytes
@@ -232,7 +232,7 @@ def save_tiff(file: IO[bytes], texels: NDArray[Any], description: Description) -
     icc = description.icc or b""
     if end + len(icc) + 8 * len(offsets) + 1024 > 1 << 32:
         raise OutputError(
-            "PTM-O102", "a .tif holds no more than 4 GiB", remedy="name the output .npy"
+            "PTM-O101", "a .tif holds no more than 4 GiB", remedy="name the output .npy"
         )
     sample_format = 3 if texels.dtype.kind == "f" else 1
     tags: list[tuple[int, int, list[int] | bytes]] = [

@@ -55,11 +55,11 @@ def load_image(source: str | os.PathLike[str] | bytes, limits: Limits = _LIMITS)
 
     Raises
     ------
-    InputError: PTM-I120 no such file, PTM-I121 a folder, PTM-I122 not readable, PTM-I123 empty,
-        PTM-I124 not an image, PTM-I125 damaged or truncated, PTM-I126 samples or a colour model
-        that cannot be held exactly, PTM-I127 several frames.
+    InputError: PTM-I120 no such file; PTM-I122 a folder, or not readable; PTM-I125 empty, not an
+        image, damaged or truncated; PTM-I126 samples or a colour model that cannot be held
+        exactly, or several frames.
     LimitError: PTM-L104 more texels than are read.
-    MissingComponentError: PTM-M100, PTM-M101 a library that is not installed is needed.
+    MissingComponentError: PTM-M100 a library that is not installed is needed.
     """
     if isinstance(source, bytes):
         return _load(cast("BinaryIO", io.BytesIO(source)), None, limits)
@@ -103,7 +103,7 @@ def _check_depth(picture: Picture) -> None:
 def read_ptm(path: str | os.PathLike[str]) -> bytes:
     """The bytes of a `.ptm`, of which the head has been found good.
 
-    Raises InputError: PTM-I120 to PTM-I122 as `load_image`; what `read_header` raises.
+    Raises InputError: PTM-I120, PTM-I122 as `load_image`; what `read_header` raises.
     """
     with open_file(path) as file:
         data = file.read()
@@ -126,11 +126,11 @@ def _opened(file: BinaryIO, path: str | None, limits: Limits) -> Picture | Calla
     """An image; of one of 8 bits, which Pillow has opened and found good, what unpacks it."""
     first = file.read(HEAD_MAX)
     if not first:
-        raise InputError("PTM-I123", "is empty", remedy="download or export it again")
+        raise InputError("PTM-I125", "is empty", remedy="download or export it again")
     if first.startswith((MAGIC, b"PTM_1")):
         read_header(first)  # says so if it is HP's format
         raise InputError(
-            "PTM-I124",
+            "PTM-I125",
             "is a progressive texture map already, not an image",
             remedy="use ptm decode to get an image from it",
         )
@@ -205,9 +205,9 @@ def write_image(
 
     Raises
     ------
-    OutputError: PTM-O101 another suffix, PTM-O102 a format that does not hold these samples, and
+    OutputError: PTM-O101 another suffix, or a format that does not hold these samples, and
         those of `ptmtools.files.write_with`.
-    MissingComponentError: PTM-M101 OpenEXR is not installed.
+    MissingComponentError: PTM-M100 OpenEXR is not installed.
     """
     from ptmtools.files import refuse_existing, write_with
 

@@ -94,7 +94,7 @@ def floats(texels: NDArray[np.uint8]) -> NDArray[np.float32]:
 def save_radiance(file: IO[bytes], texels: NDArray[Any], description: Description) -> None:
     """(h, w, 3) floats as a Radiance picture, scanlines plain, without the description.
 
-    Raises OutputError PTM-O102 unless it holds every one of them exactly.
+    Raises OutputError PTM-O101 unless it holds every one of them exactly.
     """
     height, width, components = texels.shape
     mantissas = np.zeros((height, width, 4), np.uint8)
@@ -109,7 +109,7 @@ def save_radiance(file: IO[bytes], texels: NDArray[Any], description: Descriptio
     held = floats(mantissas)
     if components != 3 or held.tobytes() != texels.astype(np.float32).tobytes():
         raise OutputError(
-            "PTM-O102",
+            "PTM-O101",
             "a .hdr does not hold these texels exactly",
             remedy="name the output .npy, .tif or .exr",
         )
@@ -156,7 +156,7 @@ _CHANNELS = {1: ["Y"], 2: ["Y", "A"], 3: ["R", "G", "B"], 4: ["R", "G", "B", "A"
 def read_exr(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
     """An OpenEXR file of one part, its data window; (h, w, c) of float16 or float32.
 
-    Raises InputError PTM-I125 to PTM-I127, LimitError PTM-L104, MissingComponentError PTM-M101.
+    Raises InputError PTM-I125, PTM-I126, LimitError PTM-L104, MissingComponentError PTM-M100.
     """
     library = _library()
     if path is None:
@@ -194,7 +194,7 @@ def read_exr(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
 def save_openexr(file: IO[bytes], texels: NDArray[Any], description: Description) -> None:
     """(h, w, c) float16 or float32 as an OpenEXR file, ZIP-compressed, without the description.
 
-    Raises MissingComponentError PTM-M101, OutputError PTM-O102.
+    Raises MissingComponentError PTM-M100, OutputError PTM-O101.
     """
     if texels.dtype.kind != "f":
         raise not_held("exr", texels, ".png, .npy or .tif")
@@ -220,7 +220,7 @@ def _from_memory(file: BinaryIO, limits: Limits) -> Picture:
 
 
 def _library() -> Any:
-    return component("OpenEXR", "PTM-M101", "OpenEXR files need OpenEXR", "exr")
+    return component("OpenEXR", "PTM-M100", "OpenEXR files need OpenEXR", "exr")
 
 
 NPY_MAGIC = b"\x93NUMPY"

@@ -70,7 +70,7 @@ _HIGH_COLOUR = re.compile(r"BGRA?;(5|1[56])Z?")
 def opened(file: BinaryIO, limits: Limits) -> ImageFile:
     """An image whose header is read, and no texel yet; its size is still to be checked.
 
-    Raises what Pillow raises; LimitError PTM-L104, PTM-L106 where opening or loading would take
+    Raises what Pillow raises; LimitError PTM-L104 where opening or loading would take
     what its size does not tell.
     """
     check_file(file, limits)
@@ -144,7 +144,7 @@ def pillow_faults() -> Iterator[None]:
         raise
     except SyntaxError:  # what a plug-in says of a file that is none of its own
         raise InputError(
-            "PTM-I124", "is not an image of a supported format", remedy=f"it must be {READABLE}"
+            "PTM-I125", "is not an image of a supported format", remedy=f"it must be {READABLE}"
         ) from None
     except (DecompressionBombError, MemoryError) as error:
         raise LimitError(
@@ -236,7 +236,7 @@ def stripped(
 
 
 def one_frame(image: ImageFile) -> None:
-    """Raise InputError PTM-I127 for an image of several."""
+    """Raise InputError PTM-I126 for an image of several."""
     # Not how many: the pages of a TIFF may be made to be costly to count.
     if getattr(image, "is_animated", False):
         raise several("several frames or pages")

@@ -146,7 +146,7 @@ def damaged_image(what: object) -> InputError:
 
 def several(what: str, remedy: str = "export the one you want as PNG") -> InputError:
     """The error for a file of more than one image."""
-    return InputError("PTM-I127", f"holds {what}; a texture is one image", remedy=remedy)
+    return InputError("PTM-I126", f"holds {what}; a texture is one image", remedy=remedy)
 
 
 def unsupported(what: str) -> InputError:
@@ -162,7 +162,7 @@ def unsupported(what: str) -> InputError:
 def not_held(suffix: str, texels: Samples, others: str) -> OutputError:
     """The error for an image format without such samples; ``others`` have them."""
     return OutputError(
-        "PTM-O102",
+        "PTM-O101",
         f"a .{suffix} does not hold {texels.dtype} samples",
         remedy=f"name the output {others}",
     )
@@ -213,7 +213,7 @@ def check_webp(head: bytes, limits: Limits) -> None:
 
 
 def check_jpeg(data: bytes) -> None:
-    """Raise LimitError PTM-L106 for a JPEG of more than `MOST_SCANS` scans."""
+    """Raise LimitError PTM-L104 for a JPEG of more than `MOST_SCANS` scans."""
     scans = at = 0
     while marker := _MARKER.search(data, at):
         kind, at = marker[1][0], marker.end()
@@ -222,7 +222,7 @@ def check_jpeg(data: bytes) -> None:
         scans += kind == _SCAN
         if scans > MOST_SCANS:
             raise LimitError(
-                "PTM-L106",
+                "PTM-L104",
                 f"is a JPEG of more than {MOST_SCANS} scans",
                 remedy="save it again, or as PNG",
             )

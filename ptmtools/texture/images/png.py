@@ -35,7 +35,7 @@ def png_bytes(image: NDArray[Any], description: Description = _PLAIN) -> bytes:
 
 
 def save_png(file: IO[bytes], image: NDArray[Any], description: Description = _PLAIN) -> None:
-    """As `png_bytes`, into an open file. Raises OutputError PTM-O102 for floats."""
+    """As `png_bytes`, into an open file. Raises OutputError PTM-O101 for floats."""
     if image.dtype.kind == "f":
         raise not_held("png", image, ".npy, .tif or .exr")
     (_save_deep if image.dtype.itemsize > 1 else _save_shallow)(file, image, description)

@@ -6,7 +6,7 @@ libjpeg-turbo writes it; edge texels are stored. Predictor 7, and 4 for 16 bits,
 3.1 does not decode what it has written with predictors 5, 6 and 7.
 
 The bytes depend on the libjpeg-turbo in use; what they decode to does not. Integers only, and
-always exact. All functions raise MissingComponentError (PTM-M102) where imagecodecs is not
+always exact. All functions raise MissingComponentError (PTM-M100) where imagecodecs is not
 installed, and InputError (PTM-I111) for floats.
 """
 
@@ -118,7 +118,7 @@ def _codecs(dtype: np.dtype[Any]) -> Any:
             f"profile paper has no samples of type {dtype.name}",
             remedy="use another profile; this one is for integers of 8 and 16 bits",
         )
-    return component("imagecodecs", "PTM-M102", "profile paper needs imagecodecs", "codecs")
+    return component("imagecodecs", "PTM-M100", "profile paper needs imagecodecs", "codecs")
 
 
 def _edges(level: Samples) -> tuple[Samples, Samples]:

@@ -141,7 +141,7 @@ def test_no_campus_there(
 ) -> None:
     asked = ["--walk", str(walk_file), "--policy", "campus-low", "--campus", str(two_rooms)]
     assert main(["simulate", str(two_rooms), *asked]) == 3
-    assert "PTM-I832" in capsys.readouterr().err
+    assert "PTM-I122" in capsys.readouterr().err
 
 
 def test_a_recorded_walk(rooms: Path, world: World) -> None:

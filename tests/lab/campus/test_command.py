@@ -61,9 +61,9 @@ def test_one_frame_and_more_near_than_there_are(
 @pytest.mark.parametrize(
     ("asked", "code"),
     [
-        (["--memory", "10%"], "PTM-I713"),
-        (["--bandwidth", "fast"], "PTM-I712"),
-        (["--only", "Castle"], "PTM-I714"),
+        (["--memory", "10%"], "PTM-I111"),
+        (["--bandwidth", "fast"], "PTM-I111"),
+        (["--only", "Castle"], "PTM-I302"),
         (["--protocol", "h3"], ""),
         (["--preset", "best"], ""),
     ],
@@ -77,4 +77,4 @@ def test_refused(
 
 def test_no_campus(walk: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["walk-campus", str(tmp_path), "--walk", walk]) == 3
-    assert "PTM-I832" in capsys.readouterr().err
+    assert "PTM-I122" in capsys.readouterr().err

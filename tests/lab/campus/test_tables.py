@@ -262,7 +262,7 @@ def test_a_campus_that_is_not_whole(folder: Path, tmp_path: Path) -> None:
                        (unlisted, "does not list textures/")):  # fmt: skip
         with pytest.raises(InputError, match=what) as fault:
             read_stock(made)
-        assert fault.value.code == "PTM-I714"
+        assert fault.value.code == "PTM-I122"
 
 
 def test_materials_that_no_object_has_need_no_textures(folder: Path, tmp_path: Path) -> None:
@@ -282,4 +282,4 @@ def test_materials_that_no_object_has_need_no_textures(folder: Path, tmp_path: P
 def test_options_out_of_range(wrong: dict[str, object]) -> None:
     with pytest.raises(InputError) as fault:
         CampusWalkOptions(**wrong)  # type: ignore[arg-type]
-    assert fault.value.code == "PTM-I713"
+    assert fault.value.code == "PTM-I111"

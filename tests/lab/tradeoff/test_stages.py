@@ -134,7 +134,7 @@ def test_a_plot_without_matplotlib_is_refused_before_anything_runs(
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     assert main(["tradeoff", str(db), "--plot", str(tmp_path / "t.png")]) == 6
-    assert "PTM-M600" in capsys.readouterr().err
+    assert "PTM-M100" in capsys.readouterr().err
 
 
 def test_a_database_without_a_stage_says_which(tmp_path, capsys) -> None:

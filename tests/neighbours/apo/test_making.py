@@ -242,7 +242,7 @@ def test_needles_have_no_more_samples_than_others() -> None:
 
 def test_too_many_texels_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("ptmtools.neighbours.apo.octree.ADDRESS_BITS", 10)
-    with pytest.raises(LimitError, match=r"PTM-L840"):
+    with pytest.raises(LimitError, match=r"PTM-L400"):
         made(*sphere(5, 0.05))
 
 
@@ -258,7 +258,7 @@ def test_too_many_texels_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_options_out_of_range(wrong: dict[str, float]) -> None:
-    with pytest.raises(InputError, match="PTM-I840"):
+    with pytest.raises(InputError, match="PTM-I111"):
         ApoOptions(**wrong)  # type: ignore[arg-type]
 
 

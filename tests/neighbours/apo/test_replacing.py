@@ -243,7 +243,7 @@ def test_a_replacement_that_is_none(rooms: Scene, made: Replaced, name: str, cha
 
 def test_too_many_texels_are_refused(rooms: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("ptmtools.neighbours.apo.octree.ADDRESS_BITS", 8)
-    with pytest.raises(LimitError, match=r"statue_01: .*--apo-error.*--apo-depth.*PTM-L840"):
+    with pytest.raises(LimitError, match=r"statue_01: .*--apo-error.*--apo-depth.*PTM-L400"):
         replaced(rooms, OPTIONS, Executor())
 
 
@@ -251,7 +251,7 @@ def test_too_many_texels_are_refused(rooms: Scene, monkeypatch: pytest.MonkeyPat
     "wrong", [{"apo_faces": 3}, {"apo_error": -1}, {"apo_depth": 21}, {"apo_density": 0}]
 )
 def test_options_out_of_range(wrong: dict[str, float]) -> None:
-    with pytest.raises(InputError, match=r"--apo-(faces|error|depth|density) .*PTM-I840"):
+    with pytest.raises(InputError, match=r"--apo-(faces|error|depth|density) .*PTM-I111"):
         ReplaceOptions(**wrong)  # type: ignore[arg-type]
 
 

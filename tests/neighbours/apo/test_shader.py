@@ -165,13 +165,13 @@ def test_without_opengl_rays_draw(monkeypatch: pytest.MonkeyPatch) -> None:
     "wrong", [{"width": 0}, {"height": 10**5}, {"elevation": 91.0}, {"azimuth": float("nan")}]
 )
 def test_options_out_of_range(wrong: dict[str, float]) -> None:
-    with pytest.raises(InputError, match="PTM-I860"):
+    with pytest.raises(InputError, match="PTM-I111"):
         render(ball(2), *mesh(), RenderOptions(**wrong))
 
 
 def test_a_mesh_without_extent() -> None:
     for points in (np.zeros((0, 3)), np.ones((3, 3))):
-        with pytest.raises(InputError, match="PTM-I861"):
+        with pytest.raises(InputError, match="PTM-I247"):
             render(ball(2), points, np.zeros((0, 3), dtype=np.int32))
 
 

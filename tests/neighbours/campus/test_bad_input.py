@@ -58,30 +58,30 @@ def too_large_an_image(folder: Path) -> list[str]:
 GOOD = text("t.obj", TRIANGLE)
 #: Words → code.
 BAD: list[tuple[str, Callable[[Path], list[str]]]] = [
-    ("PTM-I240", absent),
-    ("PTM-I241", lambda folder: [str(folder)]),
-    ("PTM-I242", text("e.obj", "")),
-    ("PTM-I830", text("t.obj", TRIANGLE, "--lods", "0")),
-    ("PTM-I830", text("t.obj", TRIANGLE, "--lods", "99")),
-    ("PTM-I830", text("t.obj", TRIANGLE, "--ratio", "0")),
-    ("PTM-I830", text("t.obj", TRIANGLE, "--ratio", "nan")),
-    ("PTM-I830", text("t.obj", TRIANGLE, "--faces", "0")),
-    ("PTM-I830", text("t.obj", TRIANGLE, "--error", "-1")),
-    ("PTM-I830", text("t.obj", TRIANGLE, "--small", "-1")),
-    ("PTM-I830", text("t.obj", TRIANGLE, "--samples", "0")),
-    ("PTM-I830", text("t.obj", TRIANGLE, "--samples", "999999")),
-    ("PTM-I830", text("t.obj", TRIANGLE, "--reach", "0")),
-    ("PTM-I830", text("t.obj", TRIANGLE, "--quality", "100")),
-    ("PTM-I250", text("t.obj", TRIANGLE, "--unit", "ells")),
-    ("PTM-I831", text("t.obj", TRIANGLE, "--lightmaps", "model")),
-    ("PTM-I831", without_light),
+    ("PTM-I120", absent),
+    ("PTM-I122", lambda folder: [str(folder)]),
+    ("PTM-I243", text("e.obj", "")),
+    ("PTM-I111", text("t.obj", TRIANGLE, "--lods", "0")),
+    ("PTM-I111", text("t.obj", TRIANGLE, "--lods", "99")),
+    ("PTM-I111", text("t.obj", TRIANGLE, "--ratio", "0")),
+    ("PTM-I111", text("t.obj", TRIANGLE, "--ratio", "nan")),
+    ("PTM-I111", text("t.obj", TRIANGLE, "--faces", "0")),
+    ("PTM-I111", text("t.obj", TRIANGLE, "--error", "-1")),
+    ("PTM-I111", text("t.obj", TRIANGLE, "--small", "-1")),
+    ("PTM-I111", text("t.obj", TRIANGLE, "--samples", "0")),
+    ("PTM-I111", text("t.obj", TRIANGLE, "--samples", "999999")),
+    ("PTM-I111", text("t.obj", TRIANGLE, "--reach", "0")),
+    ("PTM-I111", text("t.obj", TRIANGLE, "--quality", "100")),
+    ("PTM-I111", text("t.obj", TRIANGLE, "--unit", "ells")),
+    ("PTM-I701", text("t.obj", TRIANGLE, "--lightmaps", "model")),
+    ("PTM-I701", without_light),
     ("PTM-I125", damaged_light),
     ("PTM-I247", text("v.obj", "v 0 0 0\n")),
-    ("PTM-I248", text("d.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")),
+    ("PTM-I247", text("d.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")),
     ("PTM-L203", text("t.obj", TRIANGLE * 2, "--max-triangles", "1")),
     ("PTM-L104", too_large_an_image),
-    ("PTM-O820", a_file_is_there),
-    ("PTM-O820", another_folder_is_there),
+    ("PTM-O010", a_file_is_there),
+    ("PTM-O010", another_folder_is_there),
 ]  # fmt: skip
 
 
@@ -112,13 +112,13 @@ def test_clicks_own(words: list[str], tmp_path: Path, capsys: pytest.CaptureFixt
 @pytest.mark.parametrize(
     ("code", "data"),
     [
-        ("PTM-I833", b""),
-        ("PTM-I833", b"{"),
-        ("PTM-I833", b"[]"),
-        ("PTM-I833", b'{"format": "ptmtools campus", "schema": 1}'),
-        ("PTM-I833", json.dumps({"format": "ptmtools campus", "schema": 2}).encode()),
-        ("PTM-I833", b'{"a": 1, "a": 2}'),
-        ("PTM-I832", None),
+        ("PTM-I821", b""),
+        ("PTM-I821", b"{"),
+        ("PTM-I821", b"[]"),
+        ("PTM-I821", b'{"format": "ptmtools campus", "schema": 1}'),
+        ("PTM-I821", json.dumps({"format": "ptmtools campus", "schema": 2}).encode()),
+        ("PTM-I821", b'{"a": 1, "a": 2}'),
+        ("PTM-I122", None),
     ],
 )
 def test_an_index_that_is_none(code: str, data: bytes | None, tmp_path: Path) -> None:
@@ -131,5 +131,5 @@ def test_an_index_that_is_none(code: str, data: bytes | None, tmp_path: Path) ->
 def test_an_index_without_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("ptmtools.neighbours.campus.reading.LONGEST", 100)
     (tmp_path / "campus.json").write_bytes(b" " * 101)
-    with pytest.raises(PtmError, match="PTM-L831"):
+    with pytest.raises(PtmError, match="PTM-L204"):
         read_campus(tmp_path)

@@ -141,13 +141,13 @@ def test_what_is_not_ours_is_never_replaced(model: Path, tmp_path: Path) -> None
     folder = tmp_path / "c"
     make_campus(model, folder, NONE, METRES)
     (folder / "thesis.odt").write_text("years of work")
-    with pytest.raises(OutputError, match="PTM-O821") as fault:
+    with pytest.raises(OutputError, match="PTM-O010") as fault:
         make_campus(model, folder, NONE, METRES, force=True)
     assert "thesis.odt" in str(fault.value)
     other = tmp_path / "other"
     other.mkdir()
     (other / "campus.json").write_text("{}")
-    with pytest.raises(OutputError, match="PTM-O820"):
+    with pytest.raises(OutputError, match="PTM-O010"):
         make_campus(model, other, NONE, METRES, force=True)
     assert (other / "campus.json").read_text() == "{}"
 
@@ -202,7 +202,7 @@ def test_lightmaps_of_the_model(tmp_path: Path) -> None:
 def test_a_model_without_lightmaps_says_so(model: Path, tmp_path: Path) -> None:
     plain = write_gltf(tmp_path, light=False)
     for each in (model, plain):
-        with pytest.raises(InputError, match="PTM-I831"):
+        with pytest.raises(InputError, match="PTM-I701"):
             make_campus(each, tmp_path / "c", CampusOptions(lightmaps="model"))
     assert not (tmp_path / "c").exists()
 
@@ -228,7 +228,7 @@ def test_a_mask_with_other_coordinates_is_left_out(tmp_path: Path) -> None:
 
 def test_without_xatlas(model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "xatlas", None)
-    with pytest.raises(MissingComponentError, match=r"PTM-M830") as fault:
+    with pytest.raises(MissingComponentError, match=r"PTM-M100") as fault:
         make_campus(model, tmp_path / "c", CampusOptions(), METRES)
     assert "pip install" in str(fault.value)
     make_campus(model, tmp_path / "c", NONE, METRES)

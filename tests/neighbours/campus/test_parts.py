@@ -68,7 +68,7 @@ def test_one_object_that_is_all_is_spoken_of() -> None:
 
 def test_too_many_objects(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("ptmtools.neighbours.campus.objects.MAX_OBJECTS", 9)
-    with pytest.raises(LimitError, match="PTM-L830"):
+    with pytest.raises(LimitError, match="PTM-L400"):
         parts_of(scene_of(boxes(10, 1, 5)), 0)
 
 

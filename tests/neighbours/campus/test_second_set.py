@@ -71,7 +71,7 @@ def test_a_lightmap_that_is_missing_is_named(tmp_path: Path, both: bool) -> None
     with pytest.raises(InputError) as fault:
         make_campus(model, tmp_path / "c", CampusOptions(lightmaps="model"))
     file, material = ("light.png", "stone") if both else ("other.png", "wood")
-    for text in (str(model), file, material, "not found", "--lightmaps bake", "PTM-I831"):
+    for text in (str(model), file, material, "not found", "--lightmaps bake", "PTM-I701"):
         assert text in str(fault.value)
 
 

@@ -61,7 +61,7 @@ def orange(scene: Scene) -> None:
     assert np.allclose(scene.materials[0].color, (1.0, 0.735357, 0.0), atol=1e-6)
 
 
-@feature("glTF", "colours of materials", "carried over", orange, "PTM-N226")
+@feature("glTF", "colours of materials", "carried over", orange, "PTM-N215")
 def _(put: Put) -> str:
     """Linear light of a half is 0.735 in sRGB (IEC 61966-2-1)."""
     doc = Gltf()
@@ -100,7 +100,7 @@ def multiplied(scene: Scene) -> None:
     assert scene.materials[0].color == (1, 1, 1)
 
 
-@feature("glTF", "colours of vertices", "carried over", multiplied, "PTM-N226")
+@feature("glTF", "colours of vertices", "carried over", multiplied, "PTM-N215")
 def _colours_times_a_factor(put: Put) -> str:
     doc = Gltf()
     doc.tree["materials"] = [{"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1]}}]
@@ -157,7 +157,7 @@ def invisible(scene: Scene) -> None:
     assert not scene.opaque.any()
 
 
-@feature("glTF", "alpha cutoff", "carried over", invisible, "PTM-N231")
+@feature("glTF", "alpha cutoff", "carried over", invisible, "PTM-N211")
 def _below_the_cutoff(put: Put) -> str:
     """The factor's alpha alone is less than the cutoff."""
     doc = Gltf()
@@ -167,7 +167,7 @@ def _below_the_cutoff(put: Put) -> str:
     return glb(put, doc)
 
 
-@feature("glTF", "moved and scaled textures", "baked", twice, "PTM-N216")
+@feature("glTF", "moved and scaled textures", "baked", twice, "PTM-N215")
 def _(put: Put) -> str:
     doc = Gltf()
     use = {"extensions": {"KHR_texture_transform": {"scale": [2, 1]}}}
@@ -181,7 +181,7 @@ def turned(scene: Scene) -> None:
     assert quarters == [BLUE, RED, WHITE, GREEN]
 
 
-@feature("glTF", "moved and scaled textures", "baked", turned, "PTM-N216")
+@feature("glTF", "moved and scaled textures", "baked", turned, "PTM-N215")
 def _turned_texture(put: Put) -> str:
     """u' = cos·u + sin·v + offset, v' = −sin·u + cos·v + offset (KHR_texture_transform)."""
     doc = Gltf()
@@ -191,7 +191,7 @@ def _turned_texture(put: Put) -> str:
     return glb(put, doc)
 
 
-@feature("glTF", "clamped textures", "carried over", clamped, "PTM-N216")
+@feature("glTF", "clamped textures", "carried over", clamped, "PTM-N215")
 def _(put: Put) -> str:
     doc = Gltf()
     use = {"extensions": {"KHR_texture_transform": {"scale": [2, 1]}}}
@@ -211,7 +211,7 @@ def repeating(doc: Gltf, scale: list[float]) -> dict[str, Any]:
     return material
 
 
-@feature("glTF", "mirrored textures", "baked", mirrored, "PTM-N222", "PTM-N216")
+@feature("glTF", "mirrored textures", "baked", mirrored, "PTM-N215", "PTM-N215")
 def _(put: Put) -> str:
     """Three repetitions across and two down: the image beside its mirror images."""
     doc = Gltf()
@@ -227,7 +227,7 @@ def folded(scene: Scene) -> None:
     assert quarters == [GREEN, RED, WHITE, BLUE]
 
 
-@feature("glTF", "mirrored textures", "baked", folded, "PTM-N222", "PTM-N216")
+@feature("glTF", "mirrored textures", "baked", folded, "PTM-N215", "PTM-N215")
 def _mirrored_within_a_repetition(put: Put) -> str:
     """The second one: the coordinates are mirrored, and the image stays."""
     doc = Gltf()
@@ -468,7 +468,7 @@ def through(scene: Scene) -> None:
     assert not scene.opaque.any()
 
 
-@feature("glTF", "transmission", "noted", through, "PTM-N224")
+@feature("glTF", "transmission", "noted", through, "PTM-N215")
 def _(put: Put) -> str:
     doc = Gltf()
     glass = {"KHR_materials_transmission": {"transmissionFactor": 0.9}}
@@ -491,14 +491,14 @@ def _strip(put: Put) -> str:
     return glb(put, doc)
 
 
-@feature("glTF", "points and lines", "noted", the_quad, "PTM-N219")
+@feature("glTF", "points and lines", "noted", the_quad, "PTM-N215")
 def _(put: Put) -> str:
     doc = Gltf()
     doc.place(doc.quad(), doc.quad() | {"mode": 1})
     return glb(put, doc)
 
 
-@feature("glTF", "hidden nodes", "noted", the_quad, "PTM-N224")
+@feature("glTF", "hidden nodes", "noted", the_quad, "PTM-N215")
 def _(put: Put) -> str:
     doc = Gltf.wall()
     hidden = {"extensions": {"KHR_node_visibility": {"visible": False}}, "children": [2]}
@@ -507,7 +507,7 @@ def _(put: Put) -> str:
     return glb(put, doc)
 
 
-@feature("glTF", "skins and morph targets", "noted", the_quad, "PTM-N224")
+@feature("glTF", "skins and morph targets", "noted", the_quad, "PTM-N215")
 def _(put: Put) -> str:
     doc = Gltf()
     target = doc.add(np.zeros((4, 3), np.float32))
@@ -528,14 +528,14 @@ def asked(text: str) -> None:
     assert "needs the glTF extension EXT_texture_avif, which is not read; run `npx" in text
 
 
-@feature("glTF", "unknown required extension", "refused", asked, "PTM-I255")
+@feature("glTF", "unknown required extension", "refused", asked, "PTM-I243")
 def _(put: Put) -> str:
     doc = Gltf.wall()
     doc.tree["extensionsRequired"] = ["EXT_texture_avif"]
     return glb(put, doc)
 
 
-@feature("glTF", "unknown optional extension", "noted", the_quad, "PTM-N224")
+@feature("glTF", "unknown optional extension", "noted", the_quad, "PTM-N215")
 def _(put: Put) -> str:
     doc = Gltf.wall()
     doc.tree["extensionsUsed"] = ["MSFT_lod"]

@@ -69,7 +69,7 @@ def one_wall(scene: Scene) -> None:
     assert scene.objects == ("IfcWall W",)
 
 
-@feature("IFC", "hidden nodes", "noted", one_wall, "PTM-N242")
+@feature("IFC", "hidden nodes", "noted", one_wall, "PTM-N215")
 def _(put: Put) -> str:
     """A space, which is no thing."""
     made = building()

@@ -76,7 +76,7 @@ def _(put: Put) -> str:
     return obj(put, "map_Kd four.png", four_png=png(np.dstack([FOUR, ALPHA])))
 
 
-@feature("OBJ", "images of opacities", "baked", cut_out, "PTM-N217")
+@feature("OBJ", "images of opacities", "baked", cut_out, "PTM-N215")
 def _(put: Put) -> str:
     return obj(put, "map_Kd four.png\nmap_d mask.png", four_png=png(FOUR), mask_png=png(ALPHA))
 
@@ -87,17 +87,17 @@ def stencil(scene: Scene) -> None:
     assert [shown(scene, u, 0.8) for u in (0.2, 0.8)] == [[255, 0], [255, 255]]
 
 
-@feature("OBJ", "images of opacities", "baked", stencil, "PTM-N217")
+@feature("OBJ", "images of opacities", "baked", stencil, "PTM-N215")
 def _mask_alone(put: Put) -> str:
     return obj(put, "Kd 1 0.5 0\nmap_d mask.png", mask_png=png(ALPHA))
 
 
-@feature("OBJ", "moved and scaled textures", "baked", twice, "PTM-N216")
+@feature("OBJ", "moved and scaled textures", "baked", twice, "PTM-N215")
 def _(put: Put) -> str:
     return obj(put, "map_Kd -s 2 1 1 four.png", four_png=png(FOUR))
 
 
-@feature("OBJ", "clamped textures", "carried over", clamped, "PTM-N216")
+@feature("OBJ", "clamped textures", "carried over", clamped, "PTM-N215")
 def _(put: Put) -> str:
     return obj(put, "map_Kd -clamp on -s 2 1 1 four.png", four_png=png(FOUR))
 
@@ -136,7 +136,7 @@ def _several_libraries(put: Put) -> str:
     return "a.obj"
 
 
-@feature("OBJ", "points and lines", "noted", the_quad, "PTM-N219")
+@feature("OBJ", "points and lines", "noted", the_quad, "PTM-N215")
 def _(put: Put) -> str:
     return obj(put, lines=f"l 1 2\np 1\n{FACE}")
 

@@ -49,14 +49,14 @@ def _(put: Put) -> str:
     return written(put, on, four=FOUR)
 
 
-@feature("USD", "colours of materials", "carried over", tinted, "PTM-N226")
+@feature("USD", "colours of materials", "carried over", tinted, "PTM-N215")
 def _(put: Put) -> str:
     on = made().stage()
     made().bind(made().mesh(on), made().material(on, "/World/m", diffuseColor=(1, LIGHT, 0)))
     return written(put, on)
 
 
-@feature("USD", "colours of vertices", "carried over", vertex_colors, "PTM-N226")
+@feature("USD", "colours of vertices", "carried over", vertex_colors, "PTM-N215")
 def _(put: Put) -> str:
     on = made().stage()
     corners = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, 0)]
@@ -64,7 +64,7 @@ def _(put: Put) -> str:
     return written(put, on)
 
 
-@feature("USD", "opacity", "carried over", half, "PTM-N226")
+@feature("USD", "opacity", "carried over", half, "PTM-N215")
 def _(put: Put) -> str:
     on = made().stage()
     made().bind(made().mesh(on), made().material(on, "/World/m", opacity=0.5))
@@ -101,7 +101,7 @@ def _(put: Put) -> str:
     return written(put, on, four=np.dstack([FOUR, ALPHA]))
 
 
-@feature("USD", "moved and scaled textures", "baked", twice, "PTM-N216")
+@feature("USD", "moved and scaled textures", "baked", twice, "PTM-N215")
 def _(put: Put) -> str:
     on = made().stage()
     coords = made().reader(on, "/World/m/st", "st")
@@ -128,7 +128,7 @@ def _(put: Put) -> str:
     return written(put, on, four=FOUR)
 
 
-@feature("USD", "mirrored textures", "baked", mirrored, "PTM-N222")
+@feature("USD", "mirrored textures", "baked", mirrored, "PTM-N215")
 def _(put: Put) -> str:
     on = made().stage()
     repeating(on, 2.5, 2, "mirror")
@@ -172,7 +172,7 @@ def _(put: Put) -> str:
     return written(put, on)
 
 
-@feature("USD", "hidden nodes", "noted", the_quad, "PTM-N262")
+@feature("USD", "hidden nodes", "noted", the_quad, "PTM-N215")
 def _(put: Put) -> str:
     on = made().stage()
     made().mesh(on)
@@ -180,7 +180,7 @@ def _(put: Put) -> str:
     return written(put, on)
 
 
-@feature("USD", "points and lines", "noted", the_quad, "PTM-N219")
+@feature("USD", "points and lines", "noted", the_quad, "PTM-N215")
 def _(put: Put) -> str:
     from pxr import UsdGeom
 

@@ -81,13 +81,13 @@ def test_a_step_is_told_and_bounded(put: Put) -> None:
     fine, coarse = (ingest(put("a.glb", blocks(scale).glb())) for scale in (0.001, 1.0))
     assert fine.tolerance.step == pytest.approx(0.1e-3)  # a cluster's share of 10 cm
     assert coarse.tolerance.step == COARSEST
-    (message,) = [note.message for note in coarse.notes if note.code == "PTM-N237"]
+    (message,) = [note.message for note in coarse.notes if note.code == "PTM-N201"]
     assert message.startswith(
         "compressed: coordinates are rounded to 1e+03 mm, so points within 15 mm "
     )
     float_ = ingest(put("a.glb", Gltf.wall().glb()))
     assert float_.tolerance.step == 0
-    assert "PTM-N237" not in {note.code for note in float_.notes}
+    assert "PTM-N201" not in {note.code for note in float_.notes}
 
 
 def test_a_coarse_mesh_beside_a_small_one_that_is_turned(put: Put) -> None:

@@ -232,7 +232,7 @@ def test_what_unpacks_to_more_than_can_be_meant(put: Put, monkeypatch: pytest.Mo
         monkeypatch.setattr(module, "_DECODED", 1 << 20)
         made = module.Document(made.path, tree, [module.Buffer(data, None)])
         if refused:
-            with pytest.raises(LimitError, match=r"4 MiB.*PTM-L205"):
+            with pytest.raises(LimitError, match=r"4 MiB.*PTM-L204"):
                 made.view(0)
         else:
             buffer, start, length = made.view(0)

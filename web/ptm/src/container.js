@@ -50,9 +50,9 @@ const KINDS = ["8-bit", "16-bit", "half float", "float"];
 /**
  * The header of a file, from its first `HEAD_MAX` bytes or more (fewer if the file is shorter).
  *
- * Throws PtmError: PTM-I101 not such a file, PTM-I102 a Polynomial Texture Map, PTM-I103 cut inside
+ * Throws PtmError: PTM-I101 not such a file, or a Polynomial Texture Map, PTM-I103 cut inside
  * the head, PTM-I104 a version, profile or kind of sample that this decoder does not read, PTM-I105
- * damaged, PTM-L101 larger than the format allows. Its memory does not grow with the sizes in the head.
+ * damaged, PTM-L104 larger than the format allows. Its memory does not grow with the sizes in the head.
  *
  * @param {Uint8Array} bytes
  * @returns {Header}
@@ -85,7 +85,7 @@ export function readHeader(bytes) {
   const width = view.getUint32(12, true);
   const height = view.getUint32(16, true);
   if (Math.max(width, height) > MAX_SIDE) {
-    throw new PtmError("PTM-L101", `${width} x ${height} texels; the format allows ${MAX_SIDE}`);
+    throw new PtmError("PTM-L104", `${width} x ${height} texels; the format allows ${MAX_SIDE}`);
   }
   const components = bytes[20];
   const trimmed = bytes[22];
@@ -169,7 +169,7 @@ function checkMagic(bytes) {
     return;
   }
   if ([0x50, 0x54, 0x4d, 0x5f, 0x31].every((byte, i) => bytes[i] === byte)) {
-    throw new PtmError("PTM-I102", "a Polynomial Texture Map, not a progressive texture map");
+    throw new PtmError("PTM-I101", "a Polynomial Texture Map, not a progressive texture map");
   }
   throw new PtmError("PTM-I101", "not a progressive texture map");
 }

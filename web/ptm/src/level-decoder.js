@@ -82,7 +82,7 @@ export class LevelDecoder {
    * The next level from its group, all of its bytes. An error leaves the decoder unchanged, so that
    * correct bytes may follow.
    *
-   * Throws PtmError: PTM-I106 no further level, PTM-I107 too few bytes, PTM-I108 a wrong
+   * Throws PtmError: PTM-I111 no further level, PTM-I103 too few bytes, PTM-I108 a wrong
    * checksum, PTM-I112 bytes that no encoder writes, PTM-L103 beyond the limit of memory.
    *
    * @param {Uint8Array} data
@@ -91,7 +91,7 @@ export class LevelDecoder {
   refine(data) {
     const number = this.level + 1;
     const level = this.header.levels[number];
-    if (!level) throw new PtmError("PTM-I106", `there is no level ${number}`);
+    if (!level) throw new PtmError("PTM-I111", `there is no level ${number}`);
     const needed = memoryNeeded(this.header, number);
     if (needed > this.memory) {
       throw new PtmError(
@@ -100,7 +100,7 @@ export class LevelDecoder {
       );
     }
     if (data.length < level.length) {
-      throw new PtmError("PTM-I107", `level ${number} has ${data.length} of ${level.length} bytes`);
+      throw new PtmError("PTM-I103", `level ${number} has ${data.length} of ${level.length} bytes`);
     }
     const group = data.subarray(0, level.length);
     const { components } = this.header;

@@ -70,7 +70,7 @@ export class Ptm {
    */
   rangeOf(level) {
     const group = this.levels[level];
-    if (!group) throw new PtmError("PTM-I106", `there is no level ${level}`);
+    if (!group) throw new PtmError("PTM-I111", `there is no level ${level}`);
     return { offset: group.offset, length: group.length };
   }
 
@@ -91,7 +91,7 @@ export class Ptm {
         const data = await this.#range(level.offset, level.length, signal);
         if (data.length < level.length) {
           if (to === undefined) return;
-          throw new PtmError("PTM-I107", `level ${to} is not whole; the last that is: ${number - 1}`);
+          throw new PtmError("PTM-I103", `level ${to} is not whole; the last that is: ${number - 1}`);
         }
         yield await decoder.refine(data, { signal });
       }
