@@ -40,8 +40,8 @@ from ptmtools.visibility import SegmentReport
 SHOWN = 20
 
 
-def _print_codes(context: click.Context, option: click.Option, asked: bool) -> None:
-    if asked:
+def _print_codes(context: click.Context, option: click.Option, given: bool) -> None:
+    if given:
         from ptmtools.output.validation.findings import CODES
 
         for code, (severity, meaning) in sorted({**CODES, **FOLDER_CODES}.items()):

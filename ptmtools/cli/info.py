@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from ptmtools.scene.inspection import Guess, Inspection
 
 #: Shown for a stage whose record has another recipe.
-_OLD = "made by another release of ptmtools"
+_OLD = "computed by another release of ptmtools"
 #: Objects, images and doors that are listed without ``-v``.
 _SHOWN = 5
 

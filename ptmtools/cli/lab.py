@@ -51,6 +51,7 @@ trace_option = option(
     "--trace",
     "trace_file",
     type=click.Path(),
+    heading="Walk and reference",
     metavar="FILE",
     help="Changes of the link over time, JSON or CSV.",
 )
@@ -97,15 +98,15 @@ def path_command(
         )
 
 
-def _path_document(made: WalkPath) -> dict[str, Any]:
+def _path_document(path: WalkPath) -> dict[str, Any]:
     return {
-        "rooms": made.rooms,
-        "visited": list(made.visited),
-        "unreachable": list(made.unreachable),
-        "stops": made.stops,
-        "length": round(made.walk.length, 3),
-        "duration": made.walk.duration,
-        "samples": len(made.walk.time),
+        "rooms": path.rooms,
+        "visited": list(path.visited),
+        "unreachable": list(path.unreachable),
+        "stops": path.stops,
+        "length": round(path.walk.length, 3),
+        "duration": path.walk.duration,
+        "samples": len(path.walk.time),
     }
 
 
@@ -114,6 +115,7 @@ def _path_document(made: WalkPath) -> dict[str, Any]:
 @option(
     "--walk",
     "walk_file",
+    heading="Walk and reference",
     type=click.Path(),
     required=True,
     metavar="FILE",
@@ -121,6 +123,7 @@ def _path_document(made: WalkPath) -> dict[str, Any]:
 )
 @option(
     "--db",
+    heading="Walk and reference",
     type=click.Path(),
     help="Database of the same model, whose full picture is the reference instead of that of the "
     "campus.",
@@ -128,12 +131,14 @@ def _path_document(made: WalkPath) -> dict[str, Any]:
 @options_of(CampusWalkOptions)
 @option(
     "--every",
+    heading="Walk and reference",
     type=click.IntRange(0),
     default=5,
     help="Measure the picture of every Nth frame, of five per second; 0 for none.",
 )
 @option(
     "--only",
+    heading="Walk and reference",
     default="*",
     metavar="NAMES",
     help="Keep only these objects (names, with * and ?).",
@@ -183,6 +188,7 @@ def walk_campus(
 @option(
     "--walk",
     "walk_files",
+    heading="Walk and reference",
     type=click.Path(),
     multiple=True,
     metavar="FILE",
@@ -191,6 +197,7 @@ def walk_campus(
 @option(
     "--seed",
     "seeds",
+    heading="Walk and reference",
     type=click.IntRange(0),
     multiple=True,
     help="Seed of the new walk without --walk; 1 by default. Repeatable.",
@@ -198,6 +205,7 @@ def walk_campus(
 @options_of(SimulateOptions, PaperOptions)
 @option(
     "--against",
+    heading="Walk and reference",
     type=click.Path(),
     metavar="DB",
     help="Another database of the same model, such as one without --max-error, whose full picture "
@@ -205,6 +213,7 @@ def walk_campus(
 )
 @option(
     "--campus",
+    heading="Walk and reference",
     type=click.Path(),
     metavar="DIR",
     help="Campus of the same model, which `ptm campus` wrote, for the policies campus-….",
@@ -212,22 +221,30 @@ def walk_campus(
 @trace_option
 @option(
     "--flip",
+    heading="Output",
     is_flag=True,
     help="Also measure FLIP, the perceived difference, of 12 frames of each run; takes seconds per "
     "run.",
 )
 @option(
-    "--csv", "csv_file", type=click.Path(), metavar="FILE", help="Also write all frames as CSV."
+    "--csv",
+    "csv_file",
+    heading="Output",
+    type=click.Path(),
+    metavar="FILE",
+    help="Also write all frames as CSV.",
 )
 @option(
     "--plot",
     "plot_file",
+    heading="Output",
     type=click.Path(),
     metavar="FILE",
     help="Also plot --measure over time, as a PNG.",
 )
 @option(
     "--measure",
+    heading="Output",
     type=click.Choice(list(figures.MEASURES)),
     default="e",
     help="Measure to plot.",
@@ -235,12 +252,14 @@ def walk_campus(
 @option(
     "--frames",
     "frames_folder",
+    heading="Output",
     type=click.Path(),
     metavar="DIR",
     help="Also draw frames of the first policy, bandwidth, memory and walk, as PNGs.",
 )
 @option(
     "--every",
+    heading="Output",
     type=click.FloatRange(0, min_open=True),
     default=10.0,
     metavar="SECONDS",
@@ -249,6 +268,7 @@ def walk_campus(
 @option(
     "--strip",
     "strip_file",
+    heading="Output",
     type=click.Path(),
     metavar="FILE",
     help="Also draw the pictures at the start of the walk after 10, 35 and 80 s, and the full "
@@ -322,9 +342,7 @@ def simulate(
             )
             for name, walk in walks.items()
         }
-        played = play(
-            worlds, options, trace, progress, flip=flip, campuses=campuses, policy_options=[paper]
-        )
+        played = play(worlds, options, trace, progress, flip=flip, campuses=campuses, paper=paper)
     if csv_file:
         write_bytes(csv_file, as_csv(played).encode(), force=force)
     if plot_file:
@@ -336,7 +354,7 @@ def simulate(
         for name, data in figures.frames(first, played[0].run, every):
             write_bytes(frames_to / name, data, force=force)
     if strip_file:
-        write_bytes(strip_file, figures.strip(first, played[0], [paper]), force=force)
+        write_bytes(strip_file, figures.strip(first, played[0], paper), force=force)
     if as_json:
         own = paper if with_paper else None
         console.json(document(db, played, worlds, lit=options.lit, against=against, paper=own))
@@ -350,12 +368,12 @@ def simulate(
 def _check_campus(options: SimulateOptions, campus: str | None, *, drawn: bool) -> None:
     """Raises UsageError if policies of a campus and ``--campus`` do not go together, or if there is
     no client of a database whose frames can be drawn."""
-    asked = [policy.name for policy in options.campus_policies]
-    if asked and not campus:
+    names = [policy.name for policy in options.campus_policies]
+    if names and not campus:
         raise click.UsageError(
-            f"policy {asked[0]} needs --campus, a folder that `ptm campus` wrote"
+            f"policy {names[0]} needs --campus, a folder that `ptm campus` wrote"
         )
-    if campus and not asked:
+    if campus and not names:
         raise click.UsageError(
             "--campus is for policies such as campus-medium; add one to --policy"
         )

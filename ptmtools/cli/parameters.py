@@ -30,6 +30,8 @@ Decorator = Callable[[Function], Function]
 
 #: The heading of options that belong to no options class; it comes last.
 GENERAL = "General"
+#: Values of an option that its help explains; more are listed under a heading.
+INLINE_VALUES = 5
 _ALL = "ptmtools.cli.help_all"
 _ADDRESS = re.compile(r"\w+://.+:\d+")
 _METAVARS = {"integer": "N", "integer range": "N", "float": "X", "float range": "X"}
@@ -44,10 +46,13 @@ class Option(click.Option):
         heading: str = GENERAL,
         basic: bool = True,
         shown_default: str | None = None,
+        values: Sequence[tuple[str, str]] = (),
         **settings: Any,
     ) -> None:
         super().__init__(*arguments, **settings)
         self.heading, self.basic = heading, basic
+        #: (name, description) of values that are listed under a heading of their own.
+        self.values = values
         self._shown_default = shown_default
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
@@ -103,6 +108,9 @@ class Command(click.Command):
             else:
                 omitted += 1
         sections[GENERAL] = sections.pop(GENERAL, [])
+        for each in self.params:
+            if isinstance(each, Option) and each.values:
+                sections[f"Values of {each.opts[0]}"] = list(each.values)
         width = min(30, max(len(names) for rows in sections.values() for names, _ in rows))
         for heading, rows in sections.items():
             with formatter.section(heading):
@@ -112,8 +120,8 @@ class Command(click.Command):
             formatter.write_text(f"--help-all shows {omitted} more options.")
 
 
-def _print_all_help(context: click.Context, parameter: click.Parameter, asked: bool) -> None:
-    if asked:
+def _print_all_help(context: click.Context, parameter: click.Parameter, given: bool) -> None:
+    if given:
         context.meta[_ALL] = True
         click.echo(context.get_help())
         context.exit()
@@ -160,9 +168,9 @@ class Named(click.ParamType):  # type: ignore[type-arg]  # generic only in newer
         return str(value)
 
     @property
-    def explained(self) -> str:
-        """The names, each with its description."""
-        return ", ".join(f"{name} ({declared.about})" for name, declared in self.table.items())
+    def explained(self) -> list[tuple[str, str]]:
+        """(name, description) of each value."""
+        return [(name, declared.about) for name, declared in self.table.items()]
 
 
 class Degrees(click.ParamType):  # type: ignore[type-arg]  # generic only in newer Clicks
@@ -207,7 +215,8 @@ def options_of(*classes: type, layered: bool = False, hidden: bool = False) -> D
             name, about = option_name(field), option_of(field)
             if name in options:
                 continue
-            settings = {"heading": heading, "basic": about.basic or not layered, "hidden": hidden}
+            settings: dict[str, Any] = {"heading": heading, "hidden": hidden}
+            settings["basic"] = about.basic or not layered
             options[name] = _option(field, hints[field.name], **settings)
             if about.deprecated:
                 deprecated[name] = default_of(field), about.deprecated
@@ -283,7 +292,11 @@ def _typed(about: Declared, hint: Any) -> dict[str, Any]:
     if about.choices is not None:
         named = Named(about.choices, several=about.several)
         metavar = "NAME[,NAME]" if about.several else f"[{'|'.join(about.choices)}]"
-        return {"type": named, "help": f"{about.help}: {named.explained}.", "metavar": metavar}
+        settings = {"type": named, "metavar": metavar}
+        if len(named.explained) > INLINE_VALUES:
+            return {**settings, "help": f"{about.help}; see below.", "values": named.explained}
+        values = ", ".join(f"{name} ({text})" for name, text in named.explained)
+        return {**settings, "help": f"{about.help}: {values}."}
     if about.degrees:
         return {"type": Degrees()}
     if about.numbers:
@@ -336,7 +349,7 @@ def force_option(text: str = "Replace existing files.") -> Decorator:
 
 
 #: ``-j``, as ``workers``; 0 is one for each processor.
-jobs_option = option(
+jobs_option: Decorator = option(
     "-j",
     "--jobs",
     "workers",

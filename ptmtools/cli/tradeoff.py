@@ -46,6 +46,7 @@ DURATION, QUICK = 60.0, 30.0
 @option(
     "--stage",
     "stages",
+    heading="Experiments",
     type=click.Choice([WALK, *EXPERIMENTS]),
     multiple=True,
     help=f"Run only this experiment: the effect of settings on a walk ({WALK}), or the accuracy of "
@@ -54,6 +55,7 @@ DURATION, QUICK = 60.0, 30.0
 @option(
     "--walk",
     "walk_file",
+    heading="Experiments",
     type=click.Path(),
     metavar="FILE",
     help=f"Walk that `ptm path` wrote. Default: a new one of {DURATION:.0f} s, with --quick of "
@@ -63,25 +65,34 @@ DURATION, QUICK = 60.0, 30.0
 @option(
     "--knob",
     "knobs",
+    heading="Experiments",
     type=click.Choice([knob.option.removeprefix("--") for knob in KNOBS]),
     multiple=True,
     help="Try only this option on the walk, also with its slow values. Repeatable. Default: all.",
 )
-@option("--quick", is_flag=True, help="Try one value of each option, on a shorter walk.")
+@option(
+    "--quick",
+    heading="Experiments",
+    is_flag=True,
+    help="Try one value of each option, on a shorter walk.",
+)
 @option(
     "--error",
     "wanted",
+    heading="Experiments",
     type=click.FloatRange(0, min_open=True),
     help="Also name the cheapest setting of each stage within this error.",
 )
 @option(
     "--cells-tried",
+    heading="Experiments",
     type=click.IntRange(1),
     default=16,
     help="Cells in which coverage hints are tested, a sample of all.",
 )
 @option(
     "--reference",
+    heading="Experiments",
     type=click.IntRange(LEAST_POINTS, MAX_SAMPLES),
     default=MAX_SAMPLES,
     metavar="POINTS",
@@ -89,11 +100,17 @@ DURATION, QUICK = 60.0, 30.0
     "points are tried.",
 )
 @option(
-    "--csv", "csv_file", type=click.Path(), metavar="FILE", help="Also write all trials as CSV."
+    "--csv",
+    "csv_file",
+    heading="Output",
+    type=click.Path(),
+    metavar="FILE",
+    help="Also write all trials as CSV.",
 )
 @option(
     "--plot",
     "plot_file",
+    heading="Output",
     type=click.Path(),
     metavar="FILE",
     help="Also plot error against cost, as a PNG.",

@@ -13,6 +13,7 @@ from ptmtools.lab.campus.world import CampusWorld
 from ptmtools.lab.forms import FORMS, PTM
 from ptmtools.lab.measures import STANDS, Flip, Measures, measure
 from ptmtools.lab.policies import POLICIES, Declared
+from ptmtools.lab.policies.paper import PaperOptions
 from ptmtools.lab.simulation import Run, simulate
 from ptmtools.lab.world import World
 from ptmtools.link import Conditions, Trace
@@ -170,7 +171,7 @@ def play(
     *,
     flip: bool = False,
     campuses: Mapping[str, CampusWorld] = MappingProxyType({}),
-    policy_options: Sequence[object] = (),
+    paper: PaperOptions | None = None,
 ) -> list[Played]:
     """All runs: by link, memory, policy, walk; those of a campus after the others.
 
@@ -178,7 +179,7 @@ def play(
     ----------
     flip: also measure that, of clients of the database.
     campuses: each walk through a campus, where a policy is of one.
-    policy_options: options of single policies, such as `PaperOptions`.
+    paper: options of the policy `paper`.
 
     Raises
     ------
@@ -186,7 +187,7 @@ def play(
     InputError: PTM-I701 a policy's hints, or the textures in its form, are not there; PTM-I111.
     MissingComponentError: PTM-M100 with ``flip``, without flip-evaluator.
     """
-    own = [policy.configured(policy_options) for policy in options.policies]
+    own = [policy.configured(paper or PaperOptions()) for policy in options.policies]
     policies: list[Declared | CampusPolicy] = [*own, *options.campus_policies]
     cases = [
         (link, memory, policy, name)

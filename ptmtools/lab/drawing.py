@@ -19,6 +19,7 @@ from ptmtools.errors import InputError
 from ptmtools.options import option
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress, silent
+from ptmtools.rendering.light import as_bytes
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.rendering.records import Sight, Triangles, own_levels, triangles_of
 
@@ -171,8 +172,7 @@ def draw_view(
         _shade_plain(sight, triangles, shown)
     shown[sight.triangle < 0] = _SKY
     each = (options.height, samples, options.width, samples, 3)
-    colors = shown.reshape(each).mean(axis=(1, 3))
-    return np.rint(np.clip(colors, 0, 255)).astype(np.uint8)
+    return as_bytes(shown.reshape(each).mean(axis=(1, 3)))
 
 
 def _vertical(degrees: float, options: ViewOptions) -> float:

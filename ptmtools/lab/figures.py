@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats
 from ptmtools.lab.comparing import Played
 from ptmtools.lab.policies import POLICIES
+from ptmtools.lab.policies.paper import PaperOptions
 from ptmtools.lab.renderer import Renderer
 from ptmtools.lab.report import link_text
 from ptmtools.lab.simulation import Run, simulate
@@ -99,11 +100,11 @@ def frames(world: World, run: Run, every: float) -> Iterator[tuple[str, bytes]]:
         yield f"{world.time[f]:07.1f}.png", png(as_bytes(colors))
 
 
-def strip(world: World, played: Played, policy_options: Sequence[object] = ()) -> bytes:
+def strip(world: World, played: Played, paper: PaperOptions | None = None) -> bytes:
     """A PNG: what the client of a run shows after `INSTANTS` to who stands where the walk begins,
     and the full picture."""
     of = played.run
-    policy = POLICIES[of.policy].configured(policy_options)
+    policy = POLICIES[of.policy].configured(paper or PaperOptions())
     world = world.in_form(policy.form)
     stays = world.standing(INSTANTS[-1])
     run = simulate(stays, policy, of.conditions, of.budget)

@@ -5,7 +5,7 @@ To add one: a module with a `Client`, or a policy of the `engine`, and a line he
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import partial
@@ -52,17 +52,16 @@ class Declared:
     name: str
     about: str
     knows: Knows
-    client: Callable[[World, Link, int], Client]
+    client: Callable[..., Client]
     needs: tuple[str, str] | None = None
     form: str = PTM
     options: PaperOptions | None = None
 
-    def configured(self, options: Sequence[object]) -> Declared:
-        """The policy with that of the ``options`` that is of the class of its own."""
-        for each in options:
-            if isinstance(each, PaperOptions) and self.options:
-                return replace(self, options=each, client=partial(self.client, options=each))
-        return self
+    def configured(self, options: PaperOptions) -> Declared:
+        """The policy with other options, if it has some."""
+        if self.options is None:
+            return self
+        return replace(self, options=options, client=partial(self.client, options=options))
 
     def limits(self, world: World, budget: int) -> Ints:
         """(F,) bytes of texture memory that a client with a budget may use in each frame."""
@@ -86,89 +85,89 @@ def _same(policy: Policy, *, statistics: bool = False) -> Callable[[World, Link,
 _LIST = (
     Declared(
         "paper",
-        "Marvie & Bouatouch, §6.1 and §6.2, as written",
+        "client of Marvie & Bouatouch, §6.1 and §6.2",
         Knows.CAMERA,
         PaperClient,
         options=PaperOptions(),
     ),
-    Declared("lru", "files in the order met, and a cache", Knows.CAMERA, LruClient),
+    Declared("lru", "whole files in order of use, with a cache", Knows.CAMERA, LruClient),
     Declared(
         "gpuii",
-        "interlaced images by rings around the camera, Englert et al., §3.3",
+        "client of Englert et al., §3.3: interlaced images by rings around the camera",
         Knows.CAMERA,
         GpuiiClient,
         form="interlaced",
     ),
     Declared(
         "ach",
-        "the paper's weights, average coverage, in the common engine",
+        "average coverage hints, in the common engine",
         Knows.CAMERA,
         _same(coverage.Weighted(coverage.coverage_shares)),
     ),
     Declared(
         "ach-views",
-        "the same by the six views",
+        "coverage hints of the six views",
         Knows.CAMERA,
         _same(coverage.Weighted(coverage.by_views), statistics=True),
     ),
     Declared(
         "ach-texture",
-        "the same by texture, of hints with `--per-texture`",
+        "coverage hints of textures (`ptm ach --per-texture`)",
         Knows.CAMERA,
         _same(coverage.Weighted(coverage.by_texture)),
         needs=("textureShares", "measure it with `ptm ach DB --per-texture`, then `ptm emit DB`"),
     ),
     Declared(
         "distance",
-        "the nearest first",
+        "nearest cells first",
         Knows.CAMERA,
         _same(coverage.Weighted(coverage.distance_shares)),
     ),
     Declared(
         "bbox",
-        "projected boxes, without occlusion",
+        "screen area of boxes, without occlusion",
         Knows.CAMERA,
         _same(coverage.Weighted(coverage.by_box)),
     ),
-    Declared("screen", "what an item buffer shows", Knows.SCREEN, _same(Screen())),
+    Declared("screen", "pixels of an item buffer", Knows.SCREEN, _same(Screen())),
     Declared(
         "screen+distance",
-        "screen, and what is near",
+        "screen, and near cells",
         Knows.SCREEN,
         _same(Screen(around.by_distance)),
     ),
     Declared(
         "screen+ach",
-        "screen, and what covers the view on average",
+        "screen, and average coverage hints",
         Knows.SCREEN,
         _same(Screen(around.by_coverage)),
     ),
     Declared(
         "screen+need",
-        "screen, and what is needed from the cell",
+        "screen, and the resolution needed in the cell",
         Knows.SCREEN,
         _same(Screen(around.by_need)),
         needs=("need", "measure it with `ptm emit DB --need 16`"),
     ),
-    Declared("best", "the viewer's: screen, need and distance", Knows.SCREEN, _same(BEST)),
+    Declared("best", "policy of the page: screen, need and distance", Knows.SCREEN, _same(BEST)),
     Declared(
         "apo",
-        "octree textures level by level, Lacoste et al., §4.2; all else as best",
+        "client of Lacoste et al., §4.2: octree textures level by level; textures as best",
         Knows.SCREEN,
         ApoClient,
         form="octree",
     ),
     Declared(
         "best+apo",
-        "best, with octree textures by the same measure",
+        "best, also for octree textures",
         Knows.SCREEN,
         _same(BEST),
         form="octree",
     ),
-    Declared("oracle", "knows the walk, and is greedy", Knows.FUTURE, _engine(Oracle)),
+    Declared("oracle", "knows the walk; greedy", Knows.FUTURE, _engine(Oracle)),
     Declared(
         "oracle-exchange",
-        "the same, less greedy",
+        "knows the walk; also exchanges levels in memory",
         Knows.FUTURE,
         _engine(partial(Oracle, exchanging=True)),
     ),
