@@ -1,8 +1,9 @@
 """The table of forms in which a database is served: the names and files of each.
 
-A form is one frozen value. `emission.WRITERS` has the function that writes it,
-`validation.database.CHECKERS` the functions that read and check its files; nothing else branches on
-a name. A new form is a line in each table and a file with the functions.
+A form is one frozen value. `emission.WRITERS` has the function that writes it, and
+`validation.database.CHECKERS` those that read and check its files; nothing else branches on a name.
+The tables are apart because the options and all writers need the names, and writers and checks need
+the options.
 """
 
 from __future__ import annotations

@@ -78,6 +78,21 @@ def test_a_toy_emitter(
 
 
 @pytest.mark.usefixtures("toy")
+def test_an_emitter_without_a_check(
+    artifacts, tmp_path: Path, put_textures, seal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Only the hashes of its files are checked."""
+    monkeypatch.delitem(CHECKERS, TOY.name)
+    a, db = artifacts, tmp_path / "db"
+    records = put_textures(db / "www")
+    emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", EmitOptions(format="vrml,toy"))
+    seal(db)
+    assert validate_database(db).issues == ()
+    (db / "www/toy.txt").write_text("no cells\n")
+    assert {issue.code for issue in validate_database(db).issues} == {"PTM-D652"}
+
+
+@pytest.mark.usefixtures("toy")
 def test_the_command_knows_it(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert main(["emit", str(tmp_path), "--format", "vrml,toy"]) == 5, "no database there"
     assert main(["emit", str(tmp_path), "--format", "vrml,toys"]) == 2

@@ -58,7 +58,7 @@ class Checker:
     check: Lazy[Callable[[ServedDatabase], Mapping[str, int]]]
 
 
-#: Name of an emitter → the check of its files.
+#: Name of an emitter → the check of its files; of others only the hashes are checked.
 CHECKERS = {
     "vrml": Checker(
         Lazy("ptmtools.output.validation.vrml:read_file"),
@@ -230,9 +230,9 @@ class FileReader:
             fallback = self._neighbour(f"{stem}.png")
             reading.content = read_texture(data, digest, fallback, self.limits, at)
             reading.intact &= reading.content is not None
-        elif emitter:
+        elif emitter and (checker := CHECKERS.get(emitter.name)):
             try:
-                reading.content = CHECKERS[emitter.name].read.load()(path, data)
+                reading.content = checker.read.load()(path, data)
             except FileError as fault:
                 at.add(fault.code, fault.message, fault.place)
             reading.intact &= reading.content is not None
@@ -287,7 +287,8 @@ class _Check:
         database.hints = gather(database)
         counts: dict[str, int] = {}
         for emitter in present:
-            counts |= CHECKERS[emitter.name].check.load()(database)
+            if checker := CHECKERS.get(emitter.name):
+                counts |= checker.check.load()(database)
         self._check_counts(_TEXTURES, _texture_counts(self._sizes, database))
         self._check_counts(_EMIT, counts)
         for path in sorted(ours - database.named):
