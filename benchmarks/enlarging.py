@@ -20,7 +20,7 @@ import orjson
 from numpy.typing import NDArray
 
 from ptmtools.arrays import areas, normals
-from ptmtools.cells.connectivity import distinct
+from ptmtools.cells.search import distinct
 from ptmtools.scene import Scene, ingest
 
 Floats = NDArray[np.float64]

@@ -9,9 +9,9 @@ plane. Every plane with a fragment may split the node; the choice maximises
 node's cross-section that the wall covers, *balance* the smaller over the larger number of
 fragments on the two sides, *splits* the share of the other fragments that the plane cuts. Nodes
 are split in the order of the wall area that their best plane brings, so that a limit on the number
-of leaves keeps the best splits. Where no wall is left, the reveals of a thick wall may still split
-(`reveals`), then the leaves of doors (`door_planes`), and last of all what closes the node's whole
-cross-section (`caps`).
+of leaves keeps the best splits. Where no wall is left, the reveals of a thick wall may still split,
+then the leaves of doors, and last the caps that close the node's whole cross-section
+(`split_planes`).
 
 A split that would leave a side thinner than a leaf may be is refused: no leaf is flat after
 rounding to float32. Where it would leave a side thinner than the cluster distance (a picture on a
@@ -47,9 +47,9 @@ BALANCE_WEIGHT = 0.3
 SPLIT_WEIGHT = 0.2
 #: A fragment smaller than this share of `SubdivideOptions.wall_area` no longer splits.
 FRAGMENT_SHARE = 0.01
-#: Up to so many fragments of a node are asked by their corners, more by their boxes first.
+#: Up to this many fragments of a node are tested by their corners, more by their boxes first.
 _FEW = 64
-#: What may split a node, in this order.
+#: Sources of splits, in this order.
 _WALLS, _REVEALS, _DOORS, _CAPS = range(4)
 
 
@@ -57,11 +57,11 @@ _WALLS, _REVEALS, _DOORS, _CAPS = range(4)
 class Tree:
     """A BSP tree over the root box, with every leaf, reachable or not."""
 
-    walls: tuple[WallPlane, ...]  # the nodes' planes, and what lies in them
+    walls: tuple[WallPlane, ...]  # the nodes' planes, and the polygons in them
     children: NDArray[np.int32]  # (N, 2) as in `Cells.node_child`
     leaves: tuple[Polyhedron, ...]  # face tags are node indices
-    unsplit: int = 0  # leaves that hold walls that the limit left in one piece
-    # What caps split, and doors.
+    unsplit: int = 0  # leaves with walls that the limit on leaves kept from splitting
+    # The bodies that caps and doors split, by node.
     capped: Mapping[int, Polyhedron] = field(default_factory=dict)
 
     @cached_property
@@ -72,7 +72,7 @@ class Tree:
 
 @dataclass(frozen=True)
 class _Fragment:
-    """What a node holds of one wall plane."""
+    """The part of one wall plane inside a node."""
 
     wall: WallPlane
     shape: Geometry
@@ -83,8 +83,8 @@ class _Fragment:
 
 
 class _Task(NamedTuple):
-    """A node that waits for its split, and what its fragments are of: walls, reveals, doors or
-    caps. No two have one ``priority``."""
+    """A node that waits for its split, and the source of its fragments: walls, reveals, doors or
+    caps. Priorities are distinct."""
 
     priority: tuple[bool, int, int, int]
     body: Polyhedron
@@ -168,7 +168,7 @@ def build_tree(
                 for i, f in enumerate(task.fragments)
                 if ahead[i] and i != task.best
             ]
-            # A part of what a door or a cap closed may have others, so it is asked again.
+            # A part of a node that a door or a cap split may have further reveals and doors.
             if task.source > _REVEALS:
                 push(body, [], (node, side), _REVEALS)
             else:
@@ -186,18 +186,18 @@ def build_tree(
 def _sections(
     body: Polyhedron, walls: list[WallPlane], tolerance: Tolerance, whole: bool = False
 ) -> list[_Fragment]:
-    """The fragments of walls inside a body; those that close its ``whole`` section count as all of
-    it, whatever its last digits."""
+    """The fragments of walls inside a body; those that close its ``whole`` section have exactly the
+    area of the section."""
     cuts = [(w, w.walls, section(body, w.frame.plane, tolerance.rounding)) for w in walls]
-    found = _fragments(cuts, tolerance)
-    return [replace(f, area=f.section_area) for f in found] if whole else found
+    fragments = _fragments(cuts, tolerance)
+    return [replace(f, area=f.section_area) for f in fragments] if whole else fragments
 
 
 def _fragments(
     shapes: list[tuple[WallPlane, Geometry, Floats]], tolerance: Tolerance
 ) -> list[_Fragment]:
-    """Wall polygons (wall, shape, outline of the node in the wall's plane) clipped to a node; what
-    has no more area than the rounding of its outline is none."""
+    """Wall polygons (wall, shape, outline of the node in the wall's plane) clipped to a node,
+    without those of no more area than the rounding of the outline."""
     shapes = [(wall, shape, outline) for wall, shape, outline in shapes if len(outline) >= 3]
     if not shapes:
         return []
@@ -220,7 +220,7 @@ def _fragments(
 
 
 class _Extents:
-    """Which fragments reach in front of planes: boxes decide, corners where boxes do not."""
+    """Tests which fragments reach in front of planes, by boxes, then by corners where needed."""
 
     def __init__(self, fragments: list[_Fragment]) -> None:
         self._points = np.concatenate([f.points for f in fragments])
@@ -230,21 +230,21 @@ class _Extents:
         self._middle, self._half = (low + high) / 2, (high - low) / 2
 
     def ahead(self, plane: Floats, tolerance: Tolerance) -> Bools:
-        """(n,) which fragments have a point farther in front than lies in the (4,) plane."""
+        """(n,) which fragments have a point in front of the (4,) plane by more than tolerance."""
         if len(self._middle) <= _FEW:
             distance = self._points @ plane[:3] + plane[3]
             return np.asarray(np.maximum.reduceat(distance, self._start[:-1]) > tolerance.plane)
         middle = self._middle @ plane[:3] + (plane[3] - tolerance.plane)
         half = self._half @ np.abs(plane[:3]) + tolerance.rounding
-        found: Bools = middle > half
-        unsure = np.flatnonzero(~found & (middle > -half))
+        result: Bools = middle > half
+        unsure = np.flatnonzero(~result & (middle > -half))
         if len(unsure):
             count = self._start[unsure + 1] - self._start[unsure]
             points = self._points[ranges(self._start[unsure], count)]
             distance = points @ plane[:3] + plane[3]
             farthest = np.maximum.reduceat(distance, np.cumsum(count) - count)
-            found[unsure] = farthest > tolerance.plane
-        return found
+            result[unsure] = farthest > tolerance.plane
+        return result
 
 
 def _best_split(

@@ -1,6 +1,4 @@
-"""What the subdivision has to say of detail and doors that it recognised, and of what it did not
-reach.
-"""
+"""Notes of the subdivision: recognised detail and doors, unreachable space, and losses."""
 
 from __future__ import annotations
 
@@ -10,65 +8,60 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.cells.division import Unreached, UnreachedRoom
 from ptmtools.cells.doors import DoorLeaf
 from ptmtools.cells.model import Cells
 from ptmtools.cells.ownership import Pieces
-from ptmtools.cells.roles import called, says_door
-from ptmtools.cells.unreachable import CutOff, Unreached
+from ptmtools.cells.roles import is_door_name, triangles_named
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
 from ptmtools.quantities import count
 from ptmtools.scene.model import Scene
 
-#: So many objects, or places, are named.
+#: Number of objects, or places, that a note names.
 NAMED = 3
-#: A greater share of all places is much to leave out.
+#: A note becomes a warning above this share of the walkable floor, left out,
 MUCH = 0.1
-#: And of the volume, of what nobody sees.
+#: and above this share of the volume, unseen.
 MUCH_UNSEEN = 0.02
-#: What is said where there is nothing to stand on.
+#: The note on a model without walkable floor.
 NO_PLACES = Warned(
     "the body of --walker fits on no floor, so visitors may be anywhere in the cells"
 )
 
 
-def of_detail(scene: Scene, detail: Ints) -> list[str]:
-    """What is said of triangles that were taken for detail because of their shape."""
+def detail_notes(scene: Scene, detail: Ints) -> list[str]:
+    """The note on (d,) triangles that count as detail because of their shape."""
     if not len(detail):
         return []
     owners, size = np.unique(scene.triangle_object[detail], return_counts=True)
-    names = [scene.objects[i] for i in owners[np.argsort(-size, kind="stable")][:NAMED]]
-    more = ", …" if len(owners) > NAMED else ""
+    names = _listed([scene.objects[i] for i in owners[np.argsort(-size, kind="stable")]])
     return [
-        f"{len(detail):,} triangles of {count(len(owners), 'object')} ({', '.join(names)}{more}) "
-        "are small, dense and round and count as detail, which neither divides nor hides; "
-        "--structural NAME or --no-detail-by-shape changes that"
+        f"{len(detail):,} triangles of {count(len(owners), 'object')} ({names}) are small, dense "
+        "and round and count as detail, which neither divides nor hides; --structural NAME or "
+        "--no-detail-by-shape changes that"
     ]
 
 
-def of_doors(leaves: list[DoorLeaf], opened: Bools, hidden: bool) -> list[str]:
-    """What is said of door leaves, of which those ``opened``, (d,), do not block, and are not drawn
-    if they are ``hidden``."""
+def door_notes(leaves: list[DoorLeaf], opened: Bools, hidden: bool) -> list[str]:
+    """Notes on door leaves; those ``opened``, (d,), do not block, and are not drawn if
+    ``hidden``."""
     notes = []
     drawn = "not drawn" if hidden else "drawn, without blocking"
-    for which, fate in (
+    for which, state in (
         (opened, f"open: {drawn}; --doors closed shuts all doors"),
-        (
-            ~opened,
-            "shut: no walkable floor lies beyond; --detail NAME opens it",
-        ),
+        (~opened, "shut: no walkable floor lies beyond; --detail NAME opens it"),
     ):
         chosen = [leaves[i] for i in np.flatnonzero(which)]
         if chosen:
-            named = ", ".join(f"{leaf.name} at {_triple(leaf.middle)}" for leaf in chosen[:NAMED])
-            more = ", …" if len(chosen) > NAMED else ""
+            names = _listed([f"{leaf.name} at {_triple(leaf.middle)}" for leaf in chosen])
             leaf = count(len(chosen), "door leaf", "door leaves")
-            notes.append(f"{leaf} ({named}{more}) {'is' if len(chosen) == 1 else 'are'} {fate}")
+            notes.append(f"{leaf} ({names}) {'is' if len(chosen) == 1 else 'are'} {state}")
     return notes
 
 
-def of_viewpoints(solid: Floats) -> list[str]:
-    """What is said of viewpoints that somebody asked for, (n, 3), inside of something."""
+def viewpoint_notes(solid: Floats) -> list[str]:
+    """Warnings of requested viewpoints, (n, 3), that lie inside a solid."""
     return [
         Warned(
             f"viewpoint {_triple(point)} is inside a wall or another solid, which becomes a cell"
@@ -77,26 +70,28 @@ def of_viewpoints(solid: Floats) -> list[str]:
     ]
 
 
-def of_no_doors(scene: Scene, leaves: list[DoorLeaf]) -> list[str]:
-    """What is said, where something cannot be reached, of objects and materials that are called
-    doors, though no leaf of a door has any of their triangles."""
-    so_called = called(scene, says_door)
+def unrecognised_door_notes(scene: Scene, leaves: list[DoorLeaf]) -> list[str]:
+    """The note, where space is unreachable, on objects and materials that have a door's name, but
+    no triangle in a door leaf."""
+    named = triangles_named(scene, is_door_name)
     taken = np.concatenate([np.zeros(0, dtype=np.int64), *(leaf.triangles for leaf in leaves)])
-    left = np.setdiff1d(scene.triangle_object[so_called], scene.triangle_object[taken])
+    left = np.setdiff1d(scene.triangle_object[named], scene.triangle_object[taken])
     if not len(left):
         return []
-    names = ", ".join(scene.objects[i] for i in left[:NAMED])
-    more = ", …" if len(left) > NAMED else ""
     return [
         "named like a door but treated as a wall, because of its size or of no space on both "
-        f"sides: {names}{more}; --door NAME makes it a door"
+        f"sides: {_listed([scene.objects[i] for i in left])}; --door NAME makes it a door"
     ]
 
 
-def of_unreached(unreached: Unreached, kept: bool, place: float, strict: bool) -> list[str]:
-    """What is said of places that the flood did not come to, whose rooms are ``kept`` or left out,
-    beside ``place`` m² that are in the cells. Under ``strict`` it is InputError PTM-I305 to leave
-    out much."""
+def unreached_notes(unreached: Unreached, kept: bool, place: float, strict: bool) -> list[str]:
+    """Notes on unreachable rooms, ``kept`` or left out; ``place``: m² of walkable floor in the
+    cells.
+
+    Raises
+    ------
+    InputError: PTM-I305 if more than `MUCH` is left out under ``strict``.
+    """
     rooms, outside = unreached.rooms, unreached.outside
     fate = "kept as rooms" if kept else "left out"
     notes = [
@@ -129,8 +124,8 @@ def of_unreached(unreached: Unreached, kept: bool, place: float, strict: bool) -
     return notes
 
 
-def of_leaves(cells: Cells, reached: Bools) -> list[str]:
-    """What is said of leaves that are in no cell, of the (n,) that there were."""
+def leaf_notes(cells: Cells, reached: Bools) -> list[str]:
+    """Notes on leaves in no cell; ``reached``: (n,) of all leaves of the tree."""
     notes = []
     if dropped := int(np.count_nonzero(~reached)):
         leaves = f"{dropped} of {len(reached)} leaves (convex pieces of space)"
@@ -147,16 +142,16 @@ def of_leaves(cells: Cells, reached: Bools) -> list[str]:
     return notes
 
 
-def of_triangles(scene: Scene, pieces: Pieces, owner: NDArray[np.int32]) -> list[str]:
-    """What is said of triangles of which no cell has a piece."""
+def triangle_notes(scene: Scene, pieces: Pieces, owner: NDArray[np.int32]) -> list[str]:
+    """The note on triangles without a piece in any cell."""
     nowhere = np.ones(len(scene.triangles), dtype=bool)
     nowhere[pieces.source[np.any(owner >= 0, axis=1)]] = False
     lost = int(np.count_nonzero(nowhere))
     return [f"{lost} triangles lie outside all cells and are never visible"] * (lost > 0)
 
 
-def of_undecided(undecided: Mapping[str, int]) -> list[str]:
-    """Operations on polygons in a plane that ended in a safe answer, by name (`planar`)."""
+def undecided_notes(undecided: Mapping[str, int]) -> list[str]:
+    """Notes on operations on polygons that ended in a safe answer, by name (`planar`)."""
     dull = undecided.get("triangles", 0)
     notes = [
         f"{count(dull, 'flat surface')} could not be divided into fewer triangles, and "
@@ -172,11 +167,16 @@ def of_undecided(undecided: Mapping[str, int]) -> list[str]:
     return notes
 
 
-def _place(room: CutOff) -> str:
+def _listed(names: list[str]) -> str:
+    """The first `NAMED` names."""
+    return ", ".join([*names[:NAMED], *["…"] * (len(names) > NAMED)])
+
+
+def _place(room: UnreachedRoom) -> str:
     return f"{room.place:.1f} m² of floor around {_position(room)}"
 
 
-def _position(room: CutOff) -> str:
+def _position(room: UnreachedRoom) -> str:
     return _triple(room.eye)
 
 

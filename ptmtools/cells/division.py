@@ -1,25 +1,27 @@
-"""A root box divided into convex leaves by what of a model may split it, and flooded.
+"""Division of a root box into convex leaves, their portals, and the space that a flood reaches.
 
-The leaves that are reached, as cells: geometry, portals, and where somebody can stand.
+Leaves that are connected through portals, but not with the start, are a group. A group with
+walkable floor is an *unreachable room*: behind a closed door, in another building, upstairs. A
+group without floor is a solid, the hollow of a wall or a shaft, and so is one whose walls face
+away. A group that touches the root box of a closed model is the outside. Floor under a roof and
+between walls there belongs to another building with a door or a window open; the flood cannot
+separate the two, so a note reports it.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.arrays import Bools, Floats, Ints, summed
 from ptmtools.cells.bsp import Tree, build_tree
-from ptmtools.cells.diagnostics import NO_PLACES, of_viewpoints
-from ptmtools.cells.entrances import Doors, open_doors
-from ptmtools.cells.model import OUTSIDE, Cells, sunk
+from ptmtools.cells.model import descend
+from ptmtools.cells.open_doors import Doors, open_doors
 from ptmtools.cells.options import SubdivideOptions, Walker
-from ptmtools.cells.ownership import Pieces
-from ptmtools.cells.places import Floors, detail_of, eye_region, find_places, meets
+from ptmtools.cells.places import Floors, detail_of, find_places, spread
 from ptmtools.cells.planar import counting
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.portals import (
@@ -31,6 +33,7 @@ from ptmtools.cells.portals import (
     portals_rejoined,
     rejoined,
 )
+from ptmtools.cells.search import connected
 from ptmtools.cells.split_planes import Reveals
 from ptmtools.cells.structure import (
     LOOKS,
@@ -41,22 +44,28 @@ from ptmtools.cells.structure import (
     find_walls,
     spread_over,
 )
-from ptmtools.cells.unreachable import Standing, Unreached, floor_of, groups, unreached
 from ptmtools.errors import InputError
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
-from ptmtools.tolerance import Tolerance
+from ptmtools.tolerance import Tolerance, ranked
+
+#: A group of leaves with less walkable floor than this, m², is dropped without a note,
+LEAST_PLACE = 0.05
+#: and outside, where bus shelters are, with less than this.
+LEAST_INSIDE = 2.0
+#: Number of points from which those that look at the walls are chosen.
+_CHOICE = 256
 
 
 @dataclass(frozen=True)
 class Building:
-    """What is subdivided, and what may split it."""
+    """The structure of a scene, and the planes that may split it."""
 
     structure: Structure
     walls: list[WallPlane]
     reveals: Reveals
     floors: Floors  # from their fronts
-    footing: Floors  # from either side: in space that is reached, one may stand on both
+    footing: Floors  # from either side: reached space may be walkable on both
     doors: Doors
     options: SubdivideOptions
 
@@ -64,33 +73,42 @@ class Building:
     def of(scene: Scene, options: SubdivideOptions) -> Building:
         tolerance = scene.tolerance.for_walls(options.wall_thickness)
         opaque = Opaque.of(scene, options)
-        structure = Structure.made(opaque, tolerance)
-        doors, structure = Doors.found(scene, opaque, structure, options)
+        structure = Structure.of_opaque(opaque, tolerance)
+        doors, structure = Doors.recognise(scene, opaque, structure, options)
         walls = find_walls(structure, options.wall_area)
         reveals = Reveals(structure, options.wall_thickness)
         detail = detail_of(scene, structure, options)
-        floors = Floors.of(scene, detail)
-        footing = floors
+        floors = footing = Floors.of(scene, detail)
         if not scene.two_sided.all():
             footing = Floors.of(scene, detail, backs=True)
         return Building(structure, walls, reveals, floors, footing, doors, options)
 
+    @property
+    def walker(self) -> Walker:
+        return Walker(*self.options.walker)
+
+    def with_glass(self) -> Surroundings:
+        """The surroundings in which glass counts as a wall."""
+        structure = self.structure
+        walls = np.concatenate([structure.corners, self.doors.glass])
+        return Surroundings(walls, structure.tolerance)
+
 
 @dataclass(frozen=True)
 class Space:
-    """One subdivision of one root box, of which ``box``, (2, 3), is the bounding box."""
+    """A divided root box; ``box``: (2, 3) its bounding box."""
 
     box: Floats
     tree: Tree
     portals: list[Portal]
-    reached: Bools  # (L,) which leaves somebody can reach
-    closed: bool  # whether they do not touch the root box; nobody knows of one that is clipped
+    reached: Bools  # (L,) which leaves are reachable
+    closed: bool  # whether these do not touch the root box; meaningless for a clipped one
     doors: Bools  # (d,) which door leaves are open
-    # Where the flood did not come to; reached all the same if asked for.
+    # Unreachable rooms; their leaves are in ``reached`` under `--reach all`.
     beyond: Unreached = field(default_factory=lambda: Unreached([]))
     # `Cells.left_out`
     left_out: Floats = field(default_factory=lambda: np.zeros((0, 3, 3)))
-    place: float = 0.0  # m² to stand on in all that is reached, known if something is left out
+    place: float = 0.0  # m² of walkable floor in ``reached``, if some floor is left out
     # Operations in a plane that ended in a safe answer, by name (`planar.counting`).
     undecided: Counter[str] = field(default_factory=Counter)
 
@@ -122,7 +140,7 @@ def _divided(building: Building, root: Polyhedron, progress: Progress, inside: b
     portals = find_portals(tree, structure.tolerance)
     outer = at_box(tree)
     start = _viewpoint_leaves(tree, box, options)
-    start = start or largest_leaf(tree, outer <= inside, structure, Walker(*options.walker))
+    start = start or largest_leaf(tree, outer <= inside, structure, building.walker)
     reached = flood(len(tree.leaves), portals, start)
     closed = bool(start) and not bool(np.any(reached & outer))
     shut = np.zeros(len(building.doors.leaves), dtype=bool)
@@ -135,36 +153,35 @@ def _divided(building: Building, root: Polyhedron, progress: Progress, inside: b
 
 
 def _complete(building: Building, space: Space, outer: Bools) -> Space:
-    """With doors open, and what the flood did not come to. ``outer``: (L,) the leaves at the box
-    around a closed model, which proves to be open if a door leads into rooms that are."""
+    """The space with its doors open and its unreachable rooms. ``outer``: (L,) the leaves at the
+    box around a closed model, which proves to be open if a door leads into open rooms."""
     structure, options = building.structure, building.options
     tree, portals, reached, doors = space.tree, space.portals, space.reached, space.doors
-    surfaces = building.floors, structure, Walker(*options.walker)
-    beyond = unreached(tree, portals, reached, outer, *surfaces, building.doors.glass)
+    beyond = unreached(tree, portals, reached, outer, building)
     if options.doors != "closed":
-        within = beyond.or_kept(reached)
+        within = beyond.added_to(reached)
         outside = flood(len(tree.leaves), portals, tuple(np.flatnonzero(outer).tolist()))
         if building.doors.lead_to_open_rooms(structure, tree, within, outside):
             return replace(space, closed=False)
-        way = open_doors(building.doors, structure, tree, portals, within, outer)
-        if way:
-            doors, tree, portals = way.doors, way.tree, way.portals
+        opened = open_doors(building.doors, structure, tree, portals, within, outer)
+        if opened:
+            doors, tree, portals = opened.doors, opened.tree, opened.portals
             seeds = tuple(np.flatnonzero(reached).tolist())
             reached = flood(len(tree.leaves), portals, seeds)
             beyond = beyond.without(reached, portals)
     if options.reach == "all":
-        reached = beyond.or_kept(reached)
+        reached = beyond.added_to(reached)
     space = replace(space, tree=tree, portals=portals, reached=reached, doors=doors, beyond=beyond)
     rooms = [] if options.reach == "all" else beyond.rooms
     if (rooms or beyond.outside) and reached.any():
-        left_out = floor_of(rooms, beyond.outside, tree, *surfaces, building.doors.glass)
-        place = float(Standing.of(tree, reached, *surfaces).place.sum())
+        left_out = floor_of(rooms, beyond.outside, tree, building)
+        place = float(Standing.of(tree, reached, building).place.sum())
         space = replace(space, left_out=left_out, place=place)
     return space
 
 
 def _rejoined(space: Space, tolerance: Tolerance) -> Space:
-    """With the leaves together that caps and doors split for nothing."""
+    """The space without the splits by caps and doors that separate nothing."""
     tree, portals = space.tree, space.portals
     if not tree.capped:
         return space
@@ -188,7 +205,7 @@ def _viewpoint_leaves(tree: Tree, box: Floats, options: SubdivideOptions) -> tup
             + " to ".join(",".join(f"{c:.2f}" for c in corner) for corner in box),
             remedy="viewpoints are in metres, Y up, with the middle of the floor at 0,0,0",
         )
-    return tuple(dict.fromkeys((-2 - sunk(tree.planes, tree.children, places)).tolist()))
+    return tuple(dict.fromkeys((-2 - descend(tree.planes, tree.children, places)).tolist()))
 
 
 def bounds(corners: Floats) -> tuple[Floats, Floats]:
@@ -197,114 +214,157 @@ def bounds(corners: Floats) -> tuple[Floats, Floats]:
     return points.min(axis=0), points.max(axis=0)
 
 
-def assembled(
-    scene: Scene,
-    building: Building,
-    space: Space,
-    pieces: Pieces,
-    owner: NDArray[np.int32],
-    notes: list[str],
-) -> Cells:
-    """Cells that are single leaves, with the pieces of the geometry as they were cut."""
-    tree = space.tree
-    keep = space.reached
-    rename = kept_names(keep)
-    bodies = [tree.leaves[i] for i in np.flatnonzero(keep)]
-    standing, eye_floor = _standing(building, bodies, space.doors)
-    if not standing.any():
-        standing[:], eye_floor = True, eye_floor[:0]
-        notes = [*notes, NO_PLACES]
-    asked, cameras = (
-        np.array(points, dtype=np.float64).reshape(-1, 3)
-        for points in (building.options.viewpoints, [camera.position for camera in scene.cameras])
-    )
-    leaf = _leaf_at(space, rename, asked)
-    notes = [*notes, *of_viewpoints(_buried(building, asked, eye_floor))]
-    # From where somebody wants to look, somebody looks.
-    leaf = np.append(leaf, _leaf_at(space, rename, cameras))
-    standing[leaf[leaf >= 0]] = True
-    portals = [portal for portal in space.portals if keep[[*portal.leaves]].all()]
-    ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
-    children = tree.children.copy()
-    is_leaf = children <= -2
-    leaf = rename[-2 - children[is_leaf]]
-    children[is_leaf] = np.where(leaf >= 0, -2 - leaf, OUTSIDE)
+@dataclass(frozen=True)
+class UnreachedRoom:
+    """A group of leaves with walkable floor that the flood did not reach."""
 
-    owned = np.any(owner >= 0, axis=1)
-    corners = scene.corners[pieces.source]
-    corners[pieces.cut] = pieces.corner[..., :3]
-    vertex = corners[owned].reshape(-1, 3)
+    leaves: Ints  # of the tree, ascending
+    place: float  # m² of walkable floor
+    eye: tuple[float, float, float]  # a viewpoint in it, metres
 
-    point_start = _starts(len(b.points) for b in bodies)
-    loops = [loop + point_start[i] for i, b in enumerate(bodies) for loop in b.faces]
-    return Cells(
-        node_plane=tree.planes,
-        node_child=children,
-        root_box=space.box,
-        leaf_cell=np.arange(len(bodies), dtype=np.int32),
-        leaf_standing=standing,
-        leaf_point=np.concatenate([b.points for b in bodies]),
-        leaf_point_start=point_start,
-        face_index=np.concatenate(loops).astype(np.int32),
-        face_start=_starts(map(len, loops)),
-        leaf_face_start=_starts(len(b.faces) for b in bodies),
-        portal_leaf=rename[ends],
-        portal_plane=tree.planes[[portal.node for portal in portals]].reshape(-1, 4),
-        portal_point=np.concatenate([np.zeros((0, 3)), *(portal.polygon for portal in portals)]),
-        portal_start=_starts(len(portal.polygon) for portal in portals),
-        portal_area=np.array([portal.area for portal in portals]),
-        vertex=vertex,
-        vertex_uv=np.zeros((len(vertex), 2)),
-        triangle=np.arange(len(vertex), dtype=np.int32).reshape(-1, 3),
-        triangle_source=pieces.source[owned].astype(np.int32),
-        triangle_cell=owner[owned],
-        tolerance=scene.tolerance,
-        eye_floor=eye_floor,
-        left_out=space.left_out,
-        walker=Walker(*building.options.walker),
-        closed=space.closed,
-        notes=tuple(notes),
-    )
+    @staticmethod
+    def of(leaves: Ints, standing: Standing) -> UnreachedRoom:
+        """The room of (n,) leaves and the bodies that stand in them."""
+        points = standing.points
+        away = ((points - points.mean(axis=0)) ** 2).sum(axis=1)
+        x, y, z = points[np.argmin(away)].tolist()
+        return UnreachedRoom(leaves, float(standing.place.sum()), (x, y, z))
 
 
-def kept_names(keep: Bools) -> NDArray[np.int32]:
-    """(L,) the new names of the leaves that are kept, -1 for the others."""
-    return np.where(keep, np.cumsum(keep) - 1, -1).astype(np.int32)
+@dataclass(frozen=True)
+class Standing:
+    """Bodies that stand in some leaves, spread over all walkable floor."""
+
+    points: Floats  # (n, 3) the middles of the bodies, metres
+    place: Floats  # (n,) m² of floor that each represents
+    leaf: Ints  # (n,) the leaf of each
+
+    @staticmethod
+    def of(tree: Tree, leaves: Bools, building: Building) -> Standing:
+        """Bodies in these (L,) leaves."""
+        points, place = spread(_floor_about(tree, leaves, building))
+        points = points + [0.0, building.walker.middle, 0.0]
+        inside, leaf = _within(tree, leaves, points)
+        return Standing(points, place, leaf).only(inside)
+
+    def joined(self, other: Standing) -> Standing:
+        """These bodies, then the others."""
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        return Standing(*map(np.concatenate, pairs))
+
+    def only(self, rows: Bools | Ints) -> Standing:
+        """The bodies of some rows."""
+        return Standing(self.points[rows], self.place[rows], self.leaf[rows])
 
 
-def _standing(building: Building, bodies: list[Polyhedron], opened: Bools) -> tuple[Bools, Floats]:
-    """(L,) in which leaves somebody can stand, and `Cells.eye_floor`; ``opened``: (d,) doors."""
-    walker, tolerance = Walker(*building.options.walker), building.structure.tolerance
-    if building.options.standing == "anywhere":
-        return np.ones(len(bodies), dtype=np.bool_), np.zeros((0, 3, 3))
-    boxes = np.array([bounds(body.points) for body in bodies]).reshape(-1, 2, 3)
-    in_the_way = ~np.append(opened, False)[building.doors.of]
-    structure = replace(building.structure, corners=building.structure.corners[in_the_way])
-    places = find_places(building.footing, structure, walker, boxes)
-    eyes = eye_region(places, walker, tolerance)
-    return meets(eyes, bodies, walker, tolerance), eyes.triangles(tolerance)
+@dataclass(frozen=True)
+class Unreached:
+    """Walkable space that the flood did not reach."""
+
+    rooms: list[UnreachedRoom]  # the largest first
+    outside: UnreachedRoom | None = None  # in a building, but outside the closed model
+
+    def without(self, reached: Bools, portals: list[Portal]) -> Unreached:
+        """The rest once the flood reaches the (L,) leaves ``reached`` through more ``portals``;
+        rooms that these connect are one."""
+        group = groups(len(reached), portals)
+        connected_rooms: dict[int, list[UnreachedRoom]] = {}
+        for room in self.rooms:
+            if not reached[room.leaves[0]]:
+                connected_rooms.setdefault(int(group[room.leaves[0]]), []).append(room)
+        rooms = [
+            UnreachedRoom(
+                np.flatnonzero(group == name), sum(room.place for room in parts), parts[0].eye
+            )
+            for name, parts in connected_rooms.items()
+        ]
+        return Unreached(sorted(rooms, key=lambda room: -room.place), self.outside)
+
+    def added_to(self, reached: Bools) -> Bools:
+        """(L,) the ``reached`` leaves, (L,), and those of unreachable rooms."""
+        result = reached.copy()
+        for room in self.rooms:
+            result[room.leaves] = True
+        return result
 
 
-def _leaf_at(space: Space, rename: NDArray[np.int32], points: Floats) -> NDArray[np.int32]:
-    """(n,) the leaf, renamed, that each of (n, 3) points is in, or -1."""
-    leaf = rename[-2 - sunk(space.tree.planes, space.tree.children, points)]
-    inside = ((points >= space.box[0]) & (points <= space.box[1])).all(axis=1)
-    return np.where(inside, leaf, -1).astype(np.int32)
-
-
-def _buried(building: Building, points: Floats, eye_floor: Floats) -> Floats:
-    """Those of (n, 3) points that are inside of something solid, if those who stand on the
-    ``eye_floor`` are not: of a model whose rooms face away nothing can be said."""
-    structure = building.structure
-    if not (len(points) and len(eye_floor)):
-        return points[:0]
+def unreached(
+    tree: Tree, portals: list[Portal], reached: Bools, outer: Bools, building: Building
+) -> Unreached:
+    """Walkable space outside the (L,) ``reached`` leaves; groups with one of the (L,) ``outer``
+    leaves are the outside."""
+    group, structure = groups(len(tree.leaves), portals), building.structure
+    outside = np.isin(group, group[outer]) & ~reached
+    waiting = ~reached & ~outside & ~np.isin(group, group[reached])
+    if not ((waiting | outside).any() and len(structure.corners)):
+        return Unreached([])
+    standing = Standing.of(tree, waiting, building)
     around = Surroundings(structure.corners, structure.tolerance)
-    body = eye_floor.mean(axis=1) + [0.0, Walker(*building.options.walker).middle, 0.0]
-    if around.solid(spread_over(body, LOOKS)):
-        return points[:0]
-    return points[[around.solid(point[None]) for point in points]]
+    # Apart, since the ground may be so large that few samples on it are in a building.
+    sheltered = Standing.of(tree, outside & ~outer, building)
+    sheltered = sheltered.joined(Standing.of(tree, outside & outer, building))
+    if len(sheltered.leaf):
+        sheltered = sheltered.only(building.with_glass().inside(sheltered.points))
+    outside_room = None
+    if sheltered.place.sum() >= LEAST_INSIDE:
+        outside_room = UnreachedRoom.of(np.unique(sheltered.leaf), sheltered)
+    # In a model whose room faces point outwards, solids cannot be recognised.
+    volumes = np.array([body.volume for body in tree.leaves]) * reached
+    middles = np.array([tree.leaves[i].points.mean(axis=0) for i in ranked(volumes)[:LOOKS]])
+    recognisable = not around.solid(middles)
+    rooms = []
+    for room in _rooms(group, standing.only(waiting[standing.leaf])):
+        points = spread_over(room.points, _CHOICE)
+        indoors = points[around.inside(points)]  # outside, walls without a back face away
+        points = spread_over(indoors if len(indoors) else points, LOOKS)
+        if not (recognisable and around.solid(points)):
+            rooms.append(UnreachedRoom.of(np.flatnonzero(group == group[room.leaf[0]]), room))
+    return Unreached(rooms, outside_room)
 
 
-def _starts(lengths: Iterable[int]) -> Ints:
-    """(n + 1,) where the rows of a CSR begin."""
-    return np.cumsum([0, *lengths], dtype=np.int64)
+def floor_of(
+    rooms: list[UnreachedRoom], outside: UnreachedRoom | None, tree: Tree, building: Building
+) -> Floats:
+    """(n, 3, 3) walkable triangles of floor, metres, whose middles are in any of these rooms or, in
+    a building, in ``outside``."""
+    leaves = np.zeros(len(tree.leaves), dtype=bool)
+    for room in [*rooms, *([outside] if outside else [])]:
+        leaves[room.leaves] = True
+    floor = _floor_about(tree, leaves, building)
+    middle = floor.mean(axis=1) + [0.0, building.walker.middle, 0.0]
+    kept, leaf = _within(tree, leaves, middle)
+    if outside:
+        kept &= ~np.isin(leaf, outside.leaves) | building.with_glass().inside(middle)
+    return floor[kept]
+
+
+def _floor_about(tree: Tree, leaves: Bools, building: Building) -> Floats:
+    """(n, 3, 3) walkable triangles of floor in the boxes around (L,) leaves."""
+    boxes = [bounds(tree.leaves[leaf].points) for leaf in np.flatnonzero(leaves)]
+    places = find_places(
+        building.floors, building.structure, building.walker, np.array(boxes).reshape(-1, 2, 3)
+    )
+    return places.triangles(building.structure.tolerance)
+
+
+def _within(tree: Tree, leaves: Bools, points: Floats) -> tuple[Bools, Ints]:
+    """(n,) whether each of (n, 3) points is in one of the (L,) leaves, and (n,) its leaf."""
+    low, high = bounds(np.concatenate([body.points for body in tree.leaves]))
+    leaf = np.asarray(-2 - descend(tree.planes, tree.children, points))
+    return ((points >= low) & (points <= high)).all(axis=1) & leaves[leaf], leaf
+
+
+def _rooms(group: Ints, standing: Standing) -> Iterator[Standing]:
+    """The bodies in each group of leaves with enough floor, the largest first."""
+    of = group[standing.leaf]
+    order = np.argsort(of, kind="stable")
+    start = np.searchsorted(of[order], np.arange(len(group) + 1))
+    area = summed(of, standing.place, len(group))
+    for name in ranked(area)[: np.count_nonzero(area >= LEAST_PLACE)]:
+        yield standing.only(order[start[name] : start[name + 1]])
+
+
+def groups(leaves: int, portals: list[Portal]) -> Ints:
+    """(leaves,) the least leaf to which portals connect each."""
+    ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
+    return connected(leaves, np.concatenate(ends.T), np.concatenate(ends[:, ::-1].T))

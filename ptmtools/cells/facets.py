@@ -1,10 +1,10 @@
-"""Facets: flat regions of the structure, in as few triangles as their outlines need.
+"""Facets: flat regions of a welded mesh, in as few triangles as their outlines need.
 
-A wall may come as two triangles or as a hundred thousand: what splits space and what blocks is the
-same. Triangles that share edges and lie in one plane, well within the distance at which two planes
+A wall may come as two triangles or as a hundred thousand; it splits and blocks the same space.
+Triangles that share edges and lie in one plane, well within the distance at which two planes
 are one, are gathered into regions; a region of many triangles is replaced by as few as its outline
-allows. No corner moves, and corners are left out only where an outline runs on straight, so
-that a crack that opens beside one is far narrower than a hairline, which is no opening.
+allows. No corner moves, and corners are left out only where an outline runs on straight, so that
+a crack beside one is far narrower than a hairline, which is no opening.
 
 A region stays as it is unless three quarters of its triangles can be saved: the walls of most
 models are two triangles, and keep them.
@@ -19,20 +19,66 @@ import shapely
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, cross, normals, summed
-from ptmtools.cells.connectivity import Welded, across_edges, distinct
 from ptmtools.cells.planar import bounded, count, divided, simplified
+from ptmtools.cells.search import distinct
 from ptmtools.tolerance import Tolerance, ranked
+
+
+@dataclass(frozen=True)
+class Welded:
+    """The distinct triangles among some: neither repeated, whatever their winding, nor flat."""
+
+    point: Floats  # (V, 3) distinct positions
+    triangle: NDArray[np.int32]  # (n, 3) rows of them
+    source: Ints  # (n,) the first of the original triangles equal to each, ascending
+
+    @staticmethod
+    def of(points: Floats, triangles: NDArray[np.integer]) -> Welded:
+        """The mesh of (T, 3) triangles over (V, 3) points."""
+        first, row = distinct(points)
+        renamed = row[triangles]
+        low, middle, high = np.sort(renamed, axis=1).T
+        whole = np.flatnonzero((low < middle) & (middle < high))
+        once, _ = distinct(np.stack([low, middle, high], axis=1)[whole])
+        source = whole[once]
+        return Welded(points[first], renamed[source].astype(np.int32), source)
+
+    @property
+    def corners(self) -> Floats:
+        """(n, 3, 3) metres."""
+        return self.point[self.triangle]
+
+
+def across_edges(triangle: NDArray[np.integer], turned: Bools) -> NDArray[np.int32]:
+    """(n, 3) the triangle beyond the edge from corner k to corner k + 1 of (n, 3) triangles, or -1
+    where there is none or several, or it has the edge in the same direction. Triangles ``turned``
+    count as wound the other way."""
+    count = len(triangle)
+    one, other = triangle.astype(np.int64), np.roll(triangle, -1, axis=1).astype(np.int64)
+    low, high = np.minimum(one, other).ravel(), np.maximum(one, other).ravel()
+    upward = ((one < other) ^ turned[:, None]).ravel()
+    key = low * (int(high.max(initial=0)) + 1) + high
+    order = np.argsort(key, kind="stable")
+    begin = np.flatnonzero(np.append(True, key[order[1:]] != key[order[:-1]])[: len(order)])
+    pairs = begin[np.diff(np.append(begin, len(order))) == 2]
+    a, b = order[pairs], order[pairs + 1]
+    facing = upward[a] != upward[b]
+    a, b = a[facing], b[facing]
+    beyond = np.full(3 * count, -1, dtype=np.int32)
+    beyond[a], beyond[b] = b // 3, a // 3
+    return beyond.reshape(-1, 3)
+
 
 #: A corner lies in the plane of a region if it is within this share of the on-plane distance.
 _FLAT_SHARE = 1 / 4
-#: A corner may be left out of an outline that it stands off by at most this share of it: more than
-#: coordinates in single precision do.
+#: A corner may be left out if its distance from the outline is at most this share of it: more than
+#: the rounding of single precision.
 _STRAIGHT_SHARE = 1 / 32
 #: Regions of fewer triangles are left alone, and those of which less than this share is saved.
 _MANY = 16
 _SAVED = 3 / 4
-#: Of the two normals of a plane the one that points this way is taken: no wall lies in the
-#: direction, so that rounding never decides.
+#: Normals of planes are turned to this side: no wall lies in the direction, so that rounding never
+#: decides.
 UPWARD = np.array([0.5772156649, 0.8346268417, 0.2614972128])
 
 
@@ -75,8 +121,8 @@ class Facets:
         return Facets(mesh, beyond, turned, region, double / 2, weight / 2, mean, whole)
 
     def fewer(self, which: Bools, tolerance: Tolerance) -> tuple[Floats, Ints]:
-        """The same surface in fewer triangles, (m, 3, 3), and (m,) for each the first triangle of
-        the mesh that it is of or is, ascending; of the (n,) triangles ``which``."""
+        """The surface of the triangles ``which``, (n,), in fewer triangles, (m, 3, 3), and (m,) the
+        triangle of the mesh that each is, or the first of its region, ascending."""
         size = np.bincount(self.region, which, len(self.area))
         rim = which[:, None] & (self.beyond < 0)
         inner = ~rim & which[:, None]
@@ -112,8 +158,8 @@ class Facets:
         self, chosen: Ints, area: Floats, outline: Bools, tolerance: Tolerance
     ) -> tuple[Floats, Ints]:
         """Triangles (m, 3, 3) of the chosen regions, whose ``area`` these (n, 3) edges outline, and
-        (m,) which of them each is of; none of a region whose outline bounds another area,
-        or has no triangulation."""
+        (m,) the region of each; none of a region whose outline bounds another area or has no
+        triangulation."""
         if not len(chosen):
             return np.zeros((0, 3, 3)), np.zeros(0, dtype=np.int64)
         at, k = np.nonzero(outline)
@@ -144,8 +190,8 @@ class Facets:
         edges, ``flat`` and in ``space``, (e, 2, …), of the regions ``of``; and (m,) the region of
         each. None of a region with a corner where no edge ends: two of its edges cross."""
         known = np.column_stack([np.repeat(of, 2).astype(np.float64), flat.reshape(-1, 2)])
-        asked = np.column_stack([np.repeat(which, 3).astype(np.float64), rings.reshape(-1, 2)])
-        first, row = distinct(np.concatenate([known, asked]))
+        corners = np.column_stack([np.repeat(which, 3).astype(np.float64), rings.reshape(-1, 2)])
+        first, row = distinct(np.concatenate([known, corners]))
         origin = first[row[len(known) :]]
         fresh = (origin >= len(known)).reshape(-1, 3).any(axis=1)
         crossed = np.unique(which[fresh])

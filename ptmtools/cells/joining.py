@@ -28,7 +28,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, areas, cross, normals, ranges
-from ptmtools.cells.connectivity import connected, distinct, first_alike, welded
 from ptmtools.cells.outlines import (
     Edges,
     bent_corners,
@@ -39,6 +38,7 @@ from ptmtools.cells.outlines import (
 )
 from ptmtools.cells.ownership import Pieces
 from ptmtools.cells.planar import triangulated
+from ptmtools.cells.search import connected, distinct, first_alike, welded
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import Tolerance
 
@@ -125,8 +125,8 @@ def _continues(
             x = ((bb * to_a - ab * to_b) * scale)[:, None]
             y = ((aa * to_b - ab * to_a) * scale)[:, None]
             flat &= np.linalg.norm(to - x * a - y * b, axis=1) <= tolerance.file
-            said = uv[one, 0] + x * (uv[one, 1] - uv[one, 0]) + y * (uv[one, 2] - uv[one, 0])
-            same &= np.abs(said - uv[other, k]).max(axis=1) <= _UV
+            expected = uv[one, 0] + x * (uv[one, 1] - uv[one, 0]) + y * (uv[one, 2] - uv[one, 0])
+            same &= np.abs(expected - uv[other, k]).max(axis=1) <= _UV
     return flat, same
 
 
@@ -176,16 +176,16 @@ def joined(scene: Scene, pieces: Pieces, owner: NDArray[np.int32], tolerance: To
     parted = np.bincount(pieces.source, owned, count) > 0
     single, parted = single & parted, parted & ~single
     corner = first_alike(scene.points)[scene.triangles]
-    beside = single & _sharing_edges(corner, parted)
-    whole = np.flatnonzero(single & ~beside)
+    adjacent = single & _sharing_edges(corner, parted)
+    whole = np.flatnonzero(single & ~adjacent)
     taken = owned & parted[pieces.source]
-    uncut = np.tile(np.eye(3), (int(beside.sum()), 1, 1))
+    uncut = np.tile(np.eye(3), (int(adjacent.sum()), 1, 1))
     # What has several owners is cut.
     parts = pieces.corner[np.searchsorted(pieces.cut, np.flatnonzero(taken))]
     cut = _Cut(
-        np.concatenate([np.dstack([scene.corners[beside], uncut]), parts]),
-        np.concatenate([np.flatnonzero(beside), pieces.source[taken]]),
-        np.concatenate([owner[first[beside]], owner[taken]]),
+        np.concatenate([np.dstack([scene.corners[adjacent], uncut]), parts]),
+        np.concatenate([np.flatnonzero(adjacent), pieces.source[taken]]),
+        np.concatenate([owner[first[adjacent]], owner[taken]]),
     )
     ready = _Parts(scene.corners[whole], scene.uv[whole], whole, owner[first[whole]])
     return _mesh(
@@ -332,10 +332,10 @@ class _Network:
         row = row[ranges(start[order], size[order])]
         named, polygon = np.unique(union[order], return_inverse=True)
         start = np.append(0, np.cumsum(size[order]))
-        found, of = triangulated(flat[row, 0], start, polygon.reshape(-1))
+        corners_of, of = triangulated(flat[row, 0], start, polygon.reshape(-1))
         simple = np.bincount(polygon.reshape(-1), area[order] > 0) == 1
-        found, of = found[simple[of]], of[simple[of]]
-        return row[found], named[of]
+        corners_of, of = corners_of[simple[of]], of[simple[of]]
+        return row[corners_of], named[of]
 
     def _first_starts(self, union: Ints, key: Ints) -> Ints:
         """The first edges that start in corners of unions; ``key``: union · points + corner."""

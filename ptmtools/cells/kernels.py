@@ -1,8 +1,5 @@
-"""Compiled growth of flat regions over a mesh, and of what hangs together (see `facets`).
-
-Compiled descent of whole triangles through a BSP tree (see `ownership`).
-
-Compiled test of points for being above floors (`eyes`).
+"""Compiled loops: growth of flat regions and connected pieces over a mesh (`facets`, `roles`),
+descent of whole triangles through a BSP tree (`ownership`), points above floors (`model`).
 """
 
 from __future__ import annotations
@@ -25,19 +22,19 @@ def grow_regions(
     region: Ints,
     queue: Ints,
 ) -> int:
-    """Grows flat regions and returns how many there are.
+    """Grows flat regions and returns their number.
 
-    A region begins with a seed and takes in what lies beyond its edges as long as the corner that
-    is new lies in its plane, the mean of what it consists of so far.
+    A region begins with a seed and takes in triangles beyond its edges whose new corner lies in its
+    plane, the mean of its triangles so far.
 
     Parameters
     ----------
-    point, triangle, beyond: (V, 3), (n, 3) and (n, 3), as `Welded` and `across_edges` have them.
+    point, triangle, beyond: (V, 3), (n, 3) and (n, 3), as in `Welded` and `across_edges`.
     normal: (n, 3) normals, twice as long as the triangles are large; those of one plane point to
         one side.
     seeds: (n,) the triangles in the order in which they may begin a region.
-    slack: metres from the plane at which a corner still lies in it.
-    region: (n,) -1, where the number of each one's region is left.
+    slack: metres from the plane within which a corner lies in it.
+    region: (n,) -1; receives the region of each triangle.
     queue: (n,) storage.
     """
     count = 0
@@ -88,9 +85,9 @@ def grow_regions(
 
 
 @kernel
-def hang_together(triangle: NDArray[np.int32], parent: Ints) -> None:
-    """Joins the corners of each of (n, 3) triangles in ``parent``, (V,) at first each its own, in
-    which each point then names, over others or at once, the least that it hangs together with."""
+def connect_corners(triangle: NDArray[np.int32], parent: Ints) -> None:
+    """Joins the corners of each of (n, 3) triangles in ``parent``, (V,), at first each its own;
+    afterwards each point names the least point to which triangles connect it."""
     for t in range(len(triangle)):
         for k in range(1, 3):
             a, b = triangle[t, 0], triangle[t, k]
@@ -104,7 +101,7 @@ def hang_together(triangle: NDArray[np.int32], parent: Ints) -> None:
                 parent[b] = a
             else:
                 parent[a] = b
-    for v in range(len(parent)):  # whoever it names has a lower number, and is done
+    for v in range(len(parent)):  # the parent has a lower number, and is final
         parent[v] = parent[parent[v]]
 
 
@@ -122,12 +119,12 @@ def sink(
 
     Parameters
     ----------
-    plane, child: (N, 4), (N, 2), the tree, as `Cells.node_plane` and `Cells.node_child` have it.
-    corner, facing: (n, 3, 3) triangles, and (n, 3) the side that each goes to where it lies in a
+    plane, child: (N, 4), (N, 2), the tree, as `Cells.node_plane` and `Cells.node_child`.
+    corner, facing: (n, 3, 3) triangles, and (n, 3) the side to which each goes where it lies in a
         plane.
-    slack: metres from a plane at which a corner lies in it.
-    at: (n,) where each begins, and where it is left: a node that cuts it, or leaf i as -2 - i.
-    lying: (n,) set for those that lie in the plane of a node on the way.
+    slack: metres from a plane within which a corner lies in it.
+    at: (n,) the node where each begins; receives the node that cuts it, or leaf i as -2 - i.
+    lying: (n,) set for triangles in the plane of a node on the way.
     """
     for i in range(len(at)):
         node = at[i]
@@ -149,19 +146,19 @@ def sink(
 
 @plain_kernel
 def above_floor(
-    points: Floats, floor: Floats, first: Ints, end: Ints, reach: float, found: Bools
+    points: Floats, floor: Floats, first: Ints, end: Ints, reach: float, inside: Bools
 ) -> None:
-    """Sets ``found`` (n,) for those of the (n, 3) points that are over one of the (m, 3, 3)
-    triangles and at most ``reach`` above it; each triangle is held against the points from its
+    """Sets ``inside`` (n,) for those of the (n, 3) points that are over one of the (m, 3, 3)
+    triangles and at most ``reach`` above it; each triangle is compared with the points from its
     ``first`` to its ``end`` (m,)."""
     for t in range(len(floor)):
         a, b, c = floor[t, 0], floor[t, 1], floor[t, 2]
         low, high = min(a[1], b[1], c[1]), max(a[1], b[1], c[1]) + reach
         for i in range(first[t], end[t]):
             p = points[i]
-            if found[i] or not low <= p[1] <= high:
+            if inside[i] or not low <= p[1] <= high:
                 continue
-            # Of an edge and the edge the other way round exactly opposite.
+            # Exactly opposite for an edge and its reverse.
             u = (b[0] - p[0]) * (c[2] - p[2]) - (b[2] - p[2]) * (c[0] - p[0])
             v = (c[0] - p[0]) * (a[2] - p[2]) - (c[2] - p[2]) * (a[0] - p[0])
             w = (a[0] - p[0]) * (b[2] - p[2]) - (a[2] - p[2]) * (b[0] - p[0])
@@ -169,4 +166,4 @@ def above_floor(
                 whole = u + v + w
                 if whole != 0:
                     over = p[1] - (u * a[1] + v * b[1] + w * c[1]) / whole
-                    found[i] = 0 <= over <= reach
+                    inside[i] = 0 <= over <= reach

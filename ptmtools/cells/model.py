@@ -1,16 +1,14 @@
 """Convex cells, the BSP tree that locates them, their portals, and the geometry cut to them.
 
-A *leaf* is a convex polyhedron, a leaf of the BSP tree that somebody can reach; a *cell* is a
-union of leaves, one each or as many as make up a room (`leaf_cell`). Index -1 means "no cell":
-solids, the outside of a closed model, what nobody can reach or see.
+A *leaf* is a convex polyhedron, a reachable leaf of the BSP tree; a *cell* is a union of leaves:
+one, or all that make up a room (`leaf_cell`). Index -1 means "no cell": solids, the outside of a
+closed model, unreachable or invisible space.
 
 Lists of varying length are CSR: row i of ``x`` is ``x[x_start[i]:x_start[i + 1]]``.
 
-Where the eyes of somebody who walks can be.
-
-The **eye region** is reached space over a place (`places`), within the body of whoever stands there
-and up to `Walker.reach` above the floor. What is seen, and how much of the view it covers, is asked
-from there only: from a wall's hollow or above a ceiling nobody looks.
+The **eye region** is reached space over walkable floor (`places`), within the body of a visitor
+there and up to `Walker.reach` above the floor. Visibility and coverage are computed from there
+only: no eye is in a wall's hollow or above a ceiling.
 """
 
 from __future__ import annotations
@@ -30,8 +28,8 @@ from ptmtools.tolerance import Tolerance
 
 
 class EyeRegion:
-    """An eye region as a set of points: above (n, 3, 3) triangles, metres, as far as a walker's
-    eyes reach; everywhere if there are none."""
+    """An eye region as a set of points: above (n, 3, 3) triangles, metres, up to a walker's eyes;
+    everywhere without triangles."""
 
     def __init__(self, floor: Floats, walker: Walker) -> None:
         self._floor, self._reach = floor, walker.reach
@@ -43,12 +41,12 @@ class EyeRegion:
         return not len(self._floor)
 
     def about(self, low: Floats, high: Floats) -> bool:
-        """Whether any floor of it is near the box between two corners."""
+        """Whether any of its floor is near the box between two corners."""
         return len(self._nearby.meeting(low - [0, self._reach, 0], high)) > 0
 
     def clipped(self, low: Floats, high: Floats) -> tuple[Floats, Floats]:
-        """What of the box between two corners eyes can be in, as a box; as it is if it is flat or
-        they can be nowhere in it."""
+        """The part of the box between two corners where eyes can be, as a box; unchanged if that
+        part is flat or empty."""
         corners = self._floor[self._nearby.meeting(low - [0, self._reach, 0], high)].reshape(-1, 3)
         if not len(corners):
             return low, high
@@ -57,7 +55,7 @@ class EyeRegion:
         return (bottom, top) if (bottom < top).all() else (low, high)
 
     def contains(self, points: Floats) -> Bools:
-        """(n,) whether it contains each of the (n, 3) points."""
+        """(n,) whether the region contains each of the (n, 3) points."""
         from ptmtools.cells.kernels import above_floor
 
         inside = np.full(len(points), self.everywhere)
@@ -74,7 +72,7 @@ class EyeRegion:
         return inside
 
 
-#: A child of a BSP node that is no node: ``OUTSIDE``, or leaf i as ``-2 - i``.
+#: The child of a BSP node without a leaf; leaf i is ``-2 - i``.
 OUTSIDE = -1
 
 
@@ -88,9 +86,9 @@ class Cells:
     node_child: (N, 2) int32, (front, back): a node index >= 0, `OUTSIDE`, or leaf i as -2 - i.
         Node 0 is the root; a tree without nodes has the single leaf 0.
     root_box: (2, 3) least and greatest corner of the box that was subdivided.
-    leaf_cell: (L,) int32 the cell of each leaf; -1 of one that can be reached, but not be seen
-        from where one can stand.
-    leaf_standing: (L,) bool whether somebody can stand in it, or his head be there.
+    leaf_cell: (L,) int32 the cell of each leaf; -1 of a reachable one that no standing viewer can
+        see.
+    leaf_standing: (L,) bool whether the leaf meets the eye region.
     leaf_point, leaf_point_start: (P, 3) vertices of the leaves; (L + 1,) CSR over leaves.
     face_index, face_start, leaf_face_start: faces as loops of indices into `leaf_point`,
         counter-clockwise seen from outside the leaf; `face_start` (F + 1,) is CSR over faces into
@@ -100,25 +98,24 @@ class Cells:
         `portal_leaf[:, 1]`.
     portal_point, portal_start: (Q, 3) convex polygons, counter-clockwise seen against the normal
         (from the side of `portal_leaf[:, 1]`); (K + 1,) CSR over portals.
-    portal_area: (K,) m² truly open, before the convex hull was taken.
+    portal_area: (K,) m² truly open, of the shape before its convex hull.
     vertex: (W, 3) positions of the geometry cut to the cells.
     vertex_uv: (W, 2) texture coordinates of those vertices, exact at the cuts.
     triangle: (M, 3) int32 into `vertex`, counter-clockwise seen from the front.
-    triangle_source: (M,) int32 index of the scene's triangle that it is a piece of.
+    triangle_source: (M,) int32 index of the scene's triangle of which each is a piece.
     triangle_cell: (M, 2) int32 the cell on its front and on its back. Equal where the piece lies
         inside a cell; different only where it lies in a boundary; -1 where that side is no cell.
         A pixel of the item buffer counts for the viewer's side.
-    visible: how many of the scene's triangles some cell emits.
-    owners: how many cells emit each of these, in all: as many triangles as there would be if
-        cutting made none.
+    visible: number of the scene's triangles that some cell emits.
+    owners: sum, over these, of the number of cells that emit each: the number of emitted triangles
+        if cutting added none.
     eye_floor: (E, 3, 3) triangles above which eyes can be, see `EyeRegion`; none if they may be
         anywhere.
-    left_out: (Z, 3, 3) triangles of floor on which one can stand, but in no cell: it cannot be
-        reached, and was not to be kept.
-    walker: who walks.
-    tolerance: that of the scene.
-    closed: whether the flood of the reachable never met the root box.
-    notes: what the subdivision has to say, one line each ("open above: …").
+    left_out: (Z, 3, 3) walkable triangles of floor in no cell: unreachable and not kept.
+    walker: size of the visitor.
+    tolerance: tolerance of the scene.
+    closed: whether the flood never met the root box.
+    notes: notes of the subdivision, one line each ("open above: …").
     opened: (n,) int32 the scene's triangles, ascending, of door leaves that do not block.
     """
 
@@ -162,10 +159,10 @@ class Cells:
 
     @property
     def standing(self) -> NDArray[np.bool_]:
-        """(C,) in which cells somebody can stand; of the others one has the view only."""
-        found = np.zeros(self.cell_count, dtype=np.bool_)
-        found[self.leaf_cell[self.leaf_standing & (self.leaf_cell >= 0)]] = True
-        return found
+        """(C,) which cells have a standing leaf; the others are only seen."""
+        result = np.zeros(self.cell_count, dtype=np.bool_)
+        result[self.leaf_cell[self.leaf_standing & (self.leaf_cell >= 0)]] = True
+        return result
 
     @property
     def eyes(self) -> EyeRegion:
@@ -174,7 +171,7 @@ class Cells:
 
     @property
     def portal_cell(self) -> NDArray[np.int32]:
-        """(K, 2) the cells that each portal joins, equal within one; -1 where there is none."""
+        """(K, 2) the cells that each portal joins, equal within one; -1 for no cell."""
         return self.leaf_cell[self.portal_leaf].reshape(-1, 2)
 
     @property
@@ -190,8 +187,8 @@ class Cells:
         return self.leaf_point[self.leaf_point_start[leaf] : self.leaf_point_start[leaf + 1]]
 
     def tetrahedra(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """(n, 4, 3) tetrahedra that fill the leaves, from the middle of each one's vertices to fans
-        over its faces, and (n,) the leaf of each, ascending."""
+        """(n, 4, 3) tetrahedra that fill the leaves, from the middle of their vertices to fans over
+        their faces, and (n,) the leaf of each, ascending."""
         points = np.diff(self.leaf_point_start)
         if not len(points):
             return np.zeros((0, 4, 3)), np.zeros(0, np.int64)
@@ -207,7 +204,7 @@ class Cells:
         return np.bincount(leaf, volumes(corners), self.leaf_count).astype(np.float64)
 
     def cell_volumes(self, *, standing: bool = False) -> NDArray[np.float64]:
-        """(C,) m³, of leaves in which somebody can stand if asked for these."""
+        """(C,) m³, of all leaves, or of the ``standing`` ones only."""
         counts = self.leaf_cell >= 0
         counts &= self.leaf_standing | (not standing)
         volume = self.leaf_volumes()[counts]
@@ -222,13 +219,13 @@ class Cells:
         return np.split(both[:, 1].astype(np.int32), cut) if self.cell_count else []
 
     def locate_leaf(self, points: NDArray[np.float64]) -> NDArray[np.int32]:
-        """(n,) leaf that contains each of the (n, 3) points, or -1; a point in a plane counts to
-        its back."""
+        """(n,) leaf that contains each of the (n, 3) points, or -1; a point in a plane is behind
+        it."""
         points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
         inside = np.all((points >= self.root_box[0]) & (points <= self.root_box[1]), axis=1)
         at = np.full(len(points), OUTSIDE, dtype=np.int64)
         if self.leaf_count:
-            at[inside] = sunk(self.node_plane, self.node_child, points[inside])
+            at[inside] = descend(self.node_plane, self.node_child, points[inside])
         return np.where(at <= -2, -2 - at, -1).astype(np.int32)
 
     def locate(self, points: NDArray[np.float64]) -> NDArray[np.int32]:
@@ -239,11 +236,11 @@ class Cells:
         return np.where(leaf >= 0, self.leaf_cell[leaf], -1).astype(np.int32)
 
     def emitted(self, two_sided: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-        """Which cell emits which piece: ``two_sided`` is the scene's (T,) flag.
+        """The pieces that each cell emits; ``two_sided`` is the scene's (T,) flag.
 
         Returns (triangle, cell), both (n,), ordered by cell, then triangle. A piece belongs to
         the cell that it faces; a two-sided piece lying in a boundary to the cells on both sides
-        (design, "Ownership"). One-sided pieces whose front is no cell are nobody's.
+        (design, "Ownership"). One-sided pieces whose front is no cell have no owner.
         """
         front, back = self.triangle_cell[:, 0], self.triangle_cell[:, 1]
         behind = (back != front) & two_sided[self.triangle_source]
@@ -267,8 +264,8 @@ class Cells:
     def from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> Cells:
         """Inverse of `to_arrays`.
 
-        Raises KeyError, TypeError or ValueError for what no subdivision has. `triangle_source` is
-        compared with nothing: the scene is not at hand.
+        Raises KeyError, TypeError or ValueError for invalid arrays. `triangle_source` is not
+        checked against the scene.
         """
         stored = Stored(arrays)
         about = json.loads(stored.array("about", np.uint8, None).tobytes().decode())
@@ -293,14 +290,14 @@ class Cells:
         leaf_point_start = stored.starts("leaf_point_start", leaves, len(leaf_point))
         leaf_face_start = stored.starts("leaf_face_start", leaves, len(face_start) - 1)
         portal_start = stored.starts("portal_start", portals, len(portal_point))
-        for what, start, least in (
+        for name, start, least in (
             ("face", face_start, 3),
             ("leaf", leaf_point_start, 4),
             ("leaf", leaf_face_start, 4),
             ("portal", portal_start, 3),
         ):
             if (np.diff(start) < least).any():
-                raise ValueError(f"a {what} is flat")
+                raise ValueError(f"a {name} is flat")
         return Cells(
             node_plane=node_plane,
             node_child=node_child,
@@ -334,11 +331,11 @@ class Cells:
         )
 
 
-def sunk(
+def descend(
     planes: NDArray[np.float64], children: NDArray[np.int32], points: NDArray[np.float64]
 ) -> NDArray[np.int64]:
-    """(n,) where points end in a BSP tree, as `Cells.node_child` has it: `OUTSIDE`, or leaf i as
-    -2 - i; a point in a plane counts to its back."""
+    """(n,) the ends of points in a BSP tree, as in `Cells.node_child`: `OUTSIDE`, or leaf i as
+    -2 - i; a point in a plane is behind it."""
     at = np.full(len(points), 0 if len(planes) else -2, dtype=np.int64)
     active = np.flatnonzero(at >= 0)
     while len(active):

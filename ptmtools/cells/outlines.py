@@ -1,9 +1,9 @@
-"""What is left of many polygons when those side by side are united: the outlines of the union.
+"""Outlines of unions of adjacent polygons.
 
 Polygons are given by the numbers of their corners, so that uniting them is bookkeeping, not
-geometry: an edge between two of them runs once each way and cancels, and what remains are loops.
-That needs edges that meet in corners on both sides, which `split_at_corners` sees to. Rejected:
-unions by GEOS, which move corners by rounding, so that unions side by side no longer meet.
+geometry: an edge between two of them runs once each way and cancels, and the rest are loops. That
+needs edges that meet in corners on both sides, which `split_at_corners` provides. Rejected: unions
+by GEOS, which move corners by rounding, so that unions side by side no longer meet.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints, ranges
-from ptmtools.cells.connectivity import connected
+from ptmtools.cells.search import connected
 
-#: So many pairs of an edge and a corner are looked at together.
+#: Number of pairs of an edge and a corner that are compared at a time.
 _CHUNK = 1 << 21
 
 
@@ -23,9 +23,9 @@ _CHUNK = 1 << 21
 class Edges:
     """Directed edges of polygons, which lie to their left."""
 
-    start: Ints  # (n,) corner that each leaves
-    end: Ints  # (n,) corner that it leads to
-    polygon: Ints  # (n,) whose it is
+    start: Ints  # (n,) corner where each begins
+    end: Ints  # (n,) corner where it ends
+    polygon: Ints  # (n,) the polygon of each
 
     def take(self, rows: Ints | Bools) -> Edges:
         return Edges(self.start[rows], self.end[rows], self.polygon[rows])
@@ -46,8 +46,8 @@ def split_at_corners(
     ``line`` gathers edges that may overlap: those along one straight line, or more. A corner lies
     on an edge if it is within ``reach`` metres.
 
-    Returns the parts, (m,) the edge that each is a part of, ascending and then along the edge, and
-    (m,) where on that edge it starts, from 0 to 1.
+    Returns the parts, (m,) the edge of each, ascending and then along the edge, and (m,) the start
+    of each on that edge, from 0 to 1.
     """
     edge, corner, place = _on_edges(points, edges, line, reach)
     count = len(edges.start)
@@ -63,14 +63,14 @@ def split_at_corners(
 
 
 def _on_edges(points: Floats, edges: Edges, line: Ints, reach: float) -> tuple[Ints, Ints, Floats]:
-    """Pairs of an edge and a corner of another of its line that lies on it, and where, 0 to 1."""
+    """Pairs of an edge and a corner of its line on it, and the place on the edge, 0 to 1."""
     ends = np.stack([points[edges.start], points[edges.end]])
     low, high = ends.min(axis=0) - reach, ends.max(axis=0) + reach
     both = np.stack([np.tile(line, 2), np.append(edges.start, edges.end)], axis=1)
     both = both[np.lexsort((both[:, 1], both[:, 0]))]
     both = both[np.append(True, (np.diff(both, axis=0) != 0).any(axis=1))[: len(both)]]
-    # Asked along the axis on which fewest corners are in question: nearly all edges run along one
-    # axis, and have no extent on the others.
+    # Searched along the axis with the fewest candidates: nearly all edges run along one axis, and
+    # have no extent on the others.
     corners, first, count = [], [], []
     for axis in range(3):
         at = both[:, 0] + 1j * points[both[:, 1], axis]  # complex numbers sort by line, then place
@@ -84,7 +84,7 @@ def _on_edges(points: Floats, edges: Edges, line: Ints, reach: float) -> tuple[I
     from_, many = np.array(first)[axis, row], np.array(count)[axis, row]
     of_axis = np.array(corners)
     chunk = (np.cumsum(many) - many) // _CHUNK
-    found = []
+    parts = []
     for part in np.split(row, np.flatnonzero(np.diff(chunk)) + 1):
         edge = np.repeat(part, many[part])
         corner = of_axis[axis[edge], ranges(from_[part], many[part])]
@@ -94,24 +94,21 @@ def _on_edges(points: Floats, edges: Edges, line: Ints, reach: float) -> tuple[I
         place = np.einsum("ij,ij->i", ahead, way) / np.einsum("ij,ij->i", way, way)
         off = ahead - place[:, None] * way
         on = (place > 0) & (place < 1) & (np.einsum("ij,ij->i", off, off) <= reach**2)
-        found.append((edge[on], corner[on], place[on]))
-    edge, corner, place = (np.concatenate(column) for column in zip(*found, strict=True))
+        parts.append((edge[on], corner[on], place[on]))
+    edge, corner, place = (np.concatenate(column) for column in zip(*parts, strict=True))
     return edge, corner, place
 
 
 def united(edges: Edges, kind: Ints) -> tuple[Edges, Ints]:
-    """What remains of edges when polygons of one ``kind``, (polygons,), are united; and (polygons,)
-    the first polygon of the union that each is in: those of a kind that hang together by edges.
-
-    The edges that remain belong to the unions, each called by its first polygon.
-    """
+    """The edges that remain when polygons of one ``kind``, (polygons,), that share edges are
+    united; and (polygons,) the first polygon of the union of each, which names the union."""
     number, way = edges.numbered()
     of = kind[edges.polygon]
     order = np.lexsort((number, of))
     change = np.ones(len(order), dtype=np.bool_)
     change[1:] = (np.diff(of[order]) != 0) | (np.diff(number[order]) != 0)
     first = np.flatnonzero(change)
-    # One each way. Where polygons overlap it may be any number; such edges remain.
+    # Pairs of opposite edges cancel; overlapping polygons may have any number, which remain.
     first = first[np.diff(np.append(first, len(order))) == 2]
     one, other = order[first], order[first + 1]
     opposite = way[one] != way[other]
@@ -125,7 +122,7 @@ def united(edges: Edges, kind: Ints) -> tuple[Edges, Ints]:
 
 
 def straight_corners(points: Floats, edges: Edges, reach: float) -> Ints:
-    """The corners, ascending, at which all edges run along one straight line and none ends."""
+    """The corners, ascending, at which all edges continue along one straight line."""
     number, _ = edges.numbered()
     _, one = np.unique(number, return_index=True)
     start, end = edges.start[one], edges.end[one]
@@ -139,7 +136,7 @@ def straight_corners(points: Floats, edges: Edges, reach: float) -> Ints:
 
 def bent_corners(point: Floats, start: Ints, gone: Bools, reach: float) -> Ints:
     """Of rings, (n, 3) corners and their CSR, the rows that are ``gone`` but farther than ``reach``
-    from the edge that takes their place: many small bends make a large one."""
+    from the edge in their place: many small bends make a large one."""
     row = np.arange(len(point))
     ring = np.repeat(np.arange(len(start) - 1), np.diff(start))
     kept = np.where(gone, -1, row)
@@ -167,14 +164,14 @@ def _between(point: Floats, before: Floats, after: Floats, reach: float) -> Bool
 
 
 def loops(flat: Floats, edges: Edges) -> tuple[Ints, Ints]:
-    """Rows of edges in the order of the loops that they make, and the CSR of these; no loop comes
-    to a corner twice. ``flat``: (n, 2, 2) the ends of each edge in the plane of its polygon."""
+    """Rows of edges in the order of the loops that they form, and the CSR of these; no loop visits
+    a corner twice. ``flat``: (n, 2, 2) the ends of each edge in the plane of its polygon."""
     wide = int(max(edges.start.max(initial=0), edges.end.max(initial=0))) + 1
     leaving = edges.polygon * wide + edges.start
     order = np.argsort(leaving, kind="stable")
     first = np.searchsorted(leaving[order], edges.polygon * wide + edges.end)
     last = np.searchsorted(leaving[order], edges.polygon * wide + edges.end, "right")
-    # Of several edges that go on, the one that leaves least of the plane on the left.
+    # Of several next edges, the one with the smallest part of the plane on its left.
     edge = np.repeat(np.arange(len(order)), last - first)
     after = order[ranges(first, last - first)]
     way = flat[:, 1] - flat[:, 0]
@@ -189,8 +186,8 @@ def loops(flat: Floats, edges: Edges) -> tuple[Ints, Ints]:
 
 
 def _cycles(follows: Ints, start: Ints) -> tuple[Ints, Ints]:
-    """The cycles of (n,) rows each of which is followed by another, and their CSR. A cycle that
-    comes to a corner twice is two: a hole that touches the outline there."""
+    """The cycles of (n,) rows, each followed by another, and their CSR. A cycle that visits a
+    corner twice is split in two: a hole that touches the outline there."""
     row, ends, seen = [], [0], bytearray(len(follows))
     after, corner = follows.tolist(), start.tolist()
     for at in range(len(after)):

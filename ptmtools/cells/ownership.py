@@ -1,4 +1,4 @@
-"""Cutting the geometry along the cell boundaries, and who owns each piece.
+"""Cutting of the geometry along the boundaries of leaves, and the owners of each piece.
 
 Every triangle sinks through the BSP tree and is cut where it crosses a plane, so that each piece
 belongs to one leaf; texture coordinates at the cuts follow from barycentric coordinates of the
@@ -7,11 +7,10 @@ the one behind it. It therefore sinks twice, once siding with its front and once
 (design, "Ownership": true positions decide, not the plane that a cluster was snapped to).
 
 Most triangles end in one leaf, or in the two on both sides of a plane, in one piece: a compiled
-loop takes them there (`ownership_kernels`). Of those that are cut a whole tree node is treated at
-once in numpy, pieces as arrays; crossing points are computed from the endpoint in front to the
-endpoint behind, so that two triangles sharing an edge are cut in the same point to the last bit.
-Pieces outside the root box belong to the leaf that the planes alone assign: nothing of the model is
-lost to a clipped box.
+loop takes them there (`kernels`). The others are cut in numpy, all pieces at a tree node at once;
+crossing points are computed from the endpoint in front to the endpoint behind, so that two
+triangles sharing an edge are cut in the same point to the last bit. Pieces outside the root box
+belong to the leaf that the planes alone assign, so a clipped box loses no geometry.
 """
 
 from __future__ import annotations
@@ -29,23 +28,23 @@ from ptmtools.tolerance import Tolerance
 
 @dataclass(frozen=True)
 class Pieces:
-    """Triangles cut to the leaves, in the order of the scene's triangles that they are of."""
+    """Triangles cut to the leaves, in the order of the scene's triangles."""
 
     source: Ints  # (M,) index of the scene's triangle
     leaf: Ints  # (M, 2) leaf of the tree on the front and on the back
-    cut: Ints  # (K,) which pieces are not whole triangles, ascending
+    cut: Ints  # (K,) the pieces that are not whole triangles, ascending
     corner: Floats  # (K, 3, 6) their positions, and barycentric coordinates in the source triangle
 
 
 @dataclass(frozen=True)
 class _Batch:
-    """Pieces on their way down."""
+    """Pieces on their way down the tree."""
 
     corner: Floats  # as in `Pieces`
     source: Ints
     front: Ints  # (n,) the leaf on their front, once that is known
     lying: Bools  # (n,) whether they lay in some plane on the way
-    at: Ints  # (n,) where they are: a node, or leaf i as -2 - i
+    at: Ints  # (n,) the current node, or leaf i as -2 - i
 
     def take(self, rows: Ints | Bools) -> _Batch:
         return _Batch(*(array[rows] for array in vars(self).values()))
@@ -64,7 +63,7 @@ def cut_to_leaves(scene: Scene, tree: Tree, tolerance: Tolerance) -> Pieces:
     front = np.where(at < 0, -2 - at, -1)
     cut = _cut(tree, _batch(corners, at >= 0, front, lying, at), facing, tolerance)
     cut = replace(cut, front=-2 - cut.at)
-    # What lies in a plane sinks again, siding with its back.
+    # Pieces in a plane sink again, siding with their backs.
     back = at.copy()
     twice = np.flatnonzero(lying & (at < 0))
     back[twice], _ = _settled(tree, corners[twice], -facing[twice], tolerance)
@@ -89,7 +88,7 @@ def cut_to_leaves(scene: Scene, tree: Tree, tolerance: Tolerance) -> Pieces:
 
 
 def _batch(corners: Floats, which: Bools, front: Ints, lying: Bools, at: Ints) -> _Batch:
-    """Those of all triangles that are about to be cut."""
+    """The triangles that are to be cut."""
     rows = np.flatnonzero(which)
     shares = np.broadcast_to(np.eye(3), (len(rows), 3, 3))
     corner = np.concatenate([corners[rows], shares], axis=2)
@@ -99,9 +98,9 @@ def _batch(corners: Floats, which: Bools, front: Ints, lying: Bools, at: Ints) -
 def _settled(
     tree: Tree, corners: Floats, facing: Floats, tolerance: Tolerance
 ) -> tuple[Ints, Bools]:
-    """(n,) how far (n, 3, 3) triangles sink in one piece, to a node that cuts them or to leaf i as
-    -2 - i, and (n,) whether they lie in the plane of a node on the way; such a one goes to the side
-    that ``facing``, (n, 3), points to."""
+    """(n,) the node that first cuts each of (n, 3, 3) triangles, or its leaf i as -2 - i, and (n,)
+    whether it lies in the plane of a node on the way; it then goes to the side to which ``facing``,
+    (n, 3), points."""
     from ptmtools.cells.kernels import sink
 
     at = np.full(len(corners), 0 if len(tree.planes) else -2)
@@ -111,8 +110,8 @@ def _settled(
 
 
 def _cut(tree: Tree, batch: _Batch, facing: Floats, tolerance: Tolerance) -> _Batch:
-    """Cuts pieces at the nodes where they are, and on down to the leaves; what lies in a plane goes
-    to the side that ``facing`` (one direction per scene triangle) points to."""
+    """Cuts pieces at their nodes, and on down to the leaves; pieces in a plane go to the side to
+    which ``facing`` (one direction per scene triangle) points."""
     arrived = [batch.take(batch.at < 0)]
     order = np.argsort(batch.at, kind="stable")
     start = np.searchsorted(batch.at[order], np.arange(len(tree.planes) + 1))
@@ -131,9 +130,9 @@ def _cut(tree: Tree, batch: _Batch, facing: Floats, tolerance: Tolerance) -> _Ba
 
 
 def _parted(here: _Batch, plane: Floats, facing: Floats, tolerance: Tolerance) -> list[_Batch]:
-    """What of some pieces is in front of a (4,) plane, and what is behind it."""
+    """The parts of pieces in front of a (4,) plane, and behind it."""
     x, y, z = (here.corner[..., k] for k in range(3))
-    distance = x * plane[0] + y * plane[1] + z * plane[2] + plane[3]  # to the bit as `sink` has it
+    distance = x * plane[0] + y * plane[1] + z * plane[2] + plane[3]  # the same bits as in `sink`
     ahead = distance > tolerance.plane
     behind = distance < -tolerance.plane
     some_ahead, some_behind = ahead.any(axis=1), behind.any(axis=1)
@@ -156,7 +155,7 @@ def _parted(here: _Batch, plane: Floats, facing: Floats, tolerance: Tolerance) -
 def _split(
     batch: _Batch, distance: Floats, sign: NDArray[np.int8]
 ) -> tuple[list[_Batch], list[_Batch]]:
-    """Cut pieces with corners strictly on both sides; returns what is in front and behind."""
+    """Cuts pieces with corners strictly on both sides; returns the parts in front and behind."""
     front: list[_Batch] = []
     back: list[_Batch] = []
     touching = (sign == 0).any(axis=1)
@@ -192,12 +191,10 @@ def _turned(
 
 
 def _crossing(batch: _Batch, distance: Floats, i: int, j: int) -> Floats:
-    """(n, 6) where edges from corner i to corner j cross, always reckoned from the front end."""
+    """(n, 6) the crossings of edges from corner i to corner j, computed from the front end."""
     swap = (distance[:, i] < distance[:, j])[:, None]
-    d_front, d_back = (
-        np.maximum(distance[:, i], distance[:, j]),
-        np.minimum(distance[:, i], distance[:, j]),
-    )
+    d_front = np.maximum(distance[:, i], distance[:, j])
+    d_back = np.minimum(distance[:, i], distance[:, j])
     ahead = np.where(swap, batch.corner[:, j], batch.corner[:, i])
     behind = np.where(swap, batch.corner[:, i], batch.corner[:, j])
     crossing: Floats = ahead + (d_front / (d_front - d_back))[:, None] * (behind - ahead)

@@ -36,8 +36,7 @@ import numpy as np
 import shapely
 
 from ptmtools.arrays import Bools, Floats, Ints, areas, normals, ranges
-from ptmtools.cells.connectivity import Welded
-from ptmtools.cells.facets import Facets
+from ptmtools.cells.facets import Facets, Welded
 from ptmtools.cells.options import SubdivideOptions, Walker
 from ptmtools.cells.planar import (
     Geometry,
@@ -50,7 +49,7 @@ from ptmtools.cells.planar import (
 )
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.portals import FLOOR_COSINE
-from ptmtools.cells.roles import Designated, recognised
+from ptmtools.cells.roles import Designated, detail_by_shape
 from ptmtools.cells.search import ByHeight
 from ptmtools.cells.structure import Structure
 from ptmtools.scene.model import Scene
@@ -86,7 +85,7 @@ def clear_of(
 
     The regions are (r,) polygons in ``plan``, whose heights are a·x + b·z + c by (r, 3) ``slope``.
     """
-    left, whose, region = [plan[:0]], [np.zeros(0, dtype=np.int64)], np.arange(len(plan))
+    left, owner, region = [plan[:0]], [np.zeros(0, dtype=np.int64)], np.arange(len(plan))
     by_height = ByHeight(corners[:, :, 1].min(axis=1), corners[:, :, 1].max(axis=1))
     while len(region):
         row, near = _about(corners, by_height, plan, slope, band, radius)
@@ -97,10 +96,10 @@ def clear_of(
         free = _less(plan, slope, corners[near[some]], row[some], band, radius, tolerance)
         kept = ~crowded & ~shapely.is_empty(free)
         left.append(free[kept])
-        whose.append(region[kept])
+        owner.append(region[kept])
         plan, half = halves(plan[crowded], tolerance.grid)
         slope, region = slope[crowded][half], region[crowded][half]
-    return np.concatenate(left), np.concatenate(whose)
+    return np.concatenate(left), np.concatenate(owner)
 
 
 def _about(
@@ -114,10 +113,10 @@ def _about(
     """(p,) and (p,): pairs of a region of floor and a triangle, (n, 3, 3), as high above it as a
     ``band``, whose box in plan is no more than a radius away."""
     least, most = heights(plan, slope)
-    beside = radius * np.linalg.norm(slope[:, :2], axis=1)  # the slope goes on beyond the region
-    least, most = least - beside, most + beside
+    margin = radius * np.linalg.norm(slope[:, :2], axis=1)  # the slope goes on beyond the region
+    least, most = least - margin, most + margin
     storey = np.floor(least / (_STOREY * (band[1] - band[0])))
-    rows, found = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+    rows, hits = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
     # Storey by storey, so that a floor is held against what is as high only.
     for name in np.unique(storey):
         here = np.flatnonzero(storey == name)
@@ -129,8 +128,8 @@ def _about(
         height = above(corners[near], slope[row])
         meets = (height.min(axis=1) <= band[1]) & (height.max(axis=1) >= band[0])
         rows.append(row[meets])
-        found.append(near[meets])
-    return np.concatenate(rows), np.concatenate(found)
+        hits.append(near[meets])
+    return np.concatenate(rows), np.concatenate(hits)
 
 
 def _less(
@@ -164,10 +163,10 @@ def _less(
         each, shadow = shadows(corners[at][:, :, PLAN], height, band, at)
         # A radius away is not near, but for rounding.
         near = shapely.dwithin(shadow, left[row[each]], (1 - 1e-6) * radius)
-        shadow, whose = _merged(shadow[near], row[each[near]], radius, tolerance)
+        shadow, target = _merged(shadow[near], row[each[near]], radius, tolerance)
         # One by one: GEOS 3.14 buffers many lines at once with holes where they meet.
         wide = buffer(shadow, radius, quad_segs=QUARTER)
-        names, taken = united_by(whose, wide, tolerance.grid)
+        names, taken = united_by(target, wide, tolerance.grid)
         left[names] = difference(left[names], taken, tolerance.grid)
         first, end = end, int(_GROWTH * end) + 1
     return left
@@ -215,12 +214,12 @@ def heights(plan: Geometry, slope: Floats) -> tuple[Floats, Floats]:
 def above(corners: Floats, slope: Floats) -> Floats:
     """(n, k) heights of the corners of shapes, (n, k, 3), above the slope of each, (n, 3)."""
     plan = np.einsum("ncx,nx->nc", corners[:, :, PLAN], slope[:, :2])
-    found: Floats = corners[:, :, 1] - plan - slope[:, 2:]
-    return found
+    result: Floats = corners[:, :, 1] - plan - slope[:, 2:]
+    return result
 
 
 def shadows(
-    plan: Floats, height: Floats, band: tuple[float, float], whose: Ints
+    plan: Floats, height: Floats, band: tuple[float, float], owner: Ints
 ) -> tuple[Ints, Geometry]:
     """What of convex things is in a band of heights, in plan: their names, ascending, and shapes.
     They are given by polygons or edges, (n, k, 2) in plan and (n, k) high, and (n,) names."""
@@ -233,8 +232,8 @@ def shadows(
         valid.append(crosses)
     every, which = np.concatenate(points, axis=1), np.concatenate(valid, axis=1)
     row, _ = np.nonzero(which)
-    order = np.argsort(whose[row], kind="stable")
-    names, group = np.unique(whose[row][order], return_inverse=True)
+    order = np.argsort(owner[row], kind="stable")
+    names, group = np.unique(owner[row][order], return_inverse=True)
     clouds = shapely.multipoints(every[which][order], indices=group.reshape(-1))
     return names, np.asarray(shapely.convex_hull(clouds))
 
@@ -246,12 +245,12 @@ def tiled(shapes: Geometry, margin: float, grid: float) -> tuple[Geometry, Geome
     x0, y0, x1, y1 = shapely.bounds(shapes).reshape(-1, 4).T
     own = shapely.box(x0 - margin, y0 - margin, x1 + margin, y1 + margin)
     which = np.arange(len(shapes))
-    found: list[tuple[Geometry, Geometry, Ints]] = []
+    tiles: list[tuple[Geometry, Geometry, Ints]] = []
     while True:
         large = (shapely.get_num_coordinates(shapes) > CORNERS) & (_length(own) > _NARROW * margin)
-        found.append((own[~large], shapes[~large], which[~large]))
+        tiles.append((own[~large], shapes[~large], which[~large]))
         if not large.any():
-            boxes, pieces, names = zip(*found, strict=True)
+            boxes, pieces, names = zip(*tiles, strict=True)
             return np.concatenate(boxes), np.concatenate(pieces), np.concatenate(names)
         own, half = halves(own[large], grid)
         x0, y0, x1, y1 = shapely.bounds(own).T
@@ -320,14 +319,14 @@ class Floors:
 
 def detail_of(scene: Scene, structure: Structure, options: SubdivideOptions) -> Bools:
     """(T,) which triangles are detail, of glass as well."""
-    said = Designated.of(scene, options)
-    detail = said.detail.copy()
+    roles = Designated.of(scene, options)
+    detail = roles.detail.copy()
     detail[structure.detail] = True
-    glass = np.flatnonzero(~(scene.opaque | detail | said.structural))
+    glass = np.flatnonzero(~(scene.opaque | detail | roles.structural))
     if options.detail_by_shape and len(glass):
         mesh = Welded.of(scene.points, scene.triangles[glass])
         source, facets = glass[mesh.source], Facets.of(mesh, scene.tolerance)
-        detail[source] = recognised(facets, scene.triangle_object[source], options.wall_area)
+        detail[source] = detail_by_shape(facets, scene.triangle_object[source], options.wall_area)
     return detail
 
 
@@ -350,11 +349,11 @@ def find_places(floors: Floors, structure: Structure, walker: Walker, boxes: Flo
     names, plan = united_by(region, pieces, tolerance.grid, more=True)
     slope = _slopes(floors)[names]
     body = (walker.step, walker.height)
-    plan, whose = clear_of(structure.corners, plan, slope, body, walker.radius, tolerance)
+    plan, source = clear_of(structure.corners, plan, slope, body, walker.radius, tolerance)
     # A foot is on the uppermost of surfaces one step apart: not on the underside of a slab.
     foot = (2 * tolerance.plane, walker.step)
-    plan, which = clear_of(floors.corners, plan, slope[whose], foot, 0.0, tolerance)
-    names, plan = united_by(whose[which], plan, tolerance.grid, more=True)
+    plan, which = clear_of(floors.corners, plan, slope[source], foot, 0.0, tolerance)
+    names, plan = united_by(source[which], plan, tolerance.grid, more=True)
     # Less corners on straight edges, and with the rest in an order that does not depend on the way.
     plan = straightened(shapely.normalize(plan), tolerance.grid)
     return Places(plan, slope[names])
@@ -389,18 +388,18 @@ def _triangles(free: Geometry, slope: Floats, grid: float) -> Floats:
     parts, region = shapely.get_parts(free, return_index=True)
     flat = shapely.get_dimensions(parts) == 2
     parts, region = parts[flat], region[flat]
-    found, of = [np.zeros((0, 3, 2))], [np.zeros(0, dtype=np.int64)]
+    corners, of = [np.zeros((0, 3, 2))], [np.zeros(0, dtype=np.int64)]
     while len(parts):
         # Of many corners, or none that GEOS can divide: cut in two, and tried again.
         large = shapely.get_num_coordinates(parts) > CORNERS
         triangles = delaunay(np.where(large, shapely.Polygon(), parts))
         pieces, part = shapely.get_parts(triangles, return_index=True)
-        found.append(shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3])
+        corners.append(shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3])
         of.append(region[part])
         left = shapely.is_empty(triangles)
         parts, which = halves(parts[left], grid)
         region = region[left][which]
-    plan, slope = np.concatenate(found), slope[np.concatenate(of)]
+    plan, slope = np.concatenate(corners), slope[np.concatenate(of)]
     height = np.einsum("ncx,nx->nc", plan, slope[:, :2]) + slope[:, 2:]
     return np.stack([plan[..., 0], height, plan[..., 1]], axis=2)
 
@@ -426,7 +425,7 @@ def meets(
     eyes: Places, bodies: Sequence[Polyhedron], walker: Walker, tolerance: Tolerance
 ) -> Bools:
     """(L,) which of the leaves meet an eye region."""
-    found = np.zeros(len(bodies), dtype=np.bool_)
+    result = np.zeros(len(bodies), dtype=np.bool_)
     band = 2 * tolerance.plane, walker.reach
     low = np.array([body.points.min(axis=0) for body in bodies]).reshape(-1, 3)
     high = np.array([body.points.max(axis=0) for body in bodies]).reshape(-1, 3)
@@ -444,5 +443,5 @@ def meets(
         height = above(edge, eyes.slope[floor[some]][pair])
         names, shadow = shadows(edge[:, :, PLAN], height, band, pair)
         touches = shapely.intersects(shadow, eyes.plan[floor[some]][names])
-        found[leaf[some][names[touches]]] = True
-    return found
+        result[leaf[some][names[touches]]] = True
+    return result

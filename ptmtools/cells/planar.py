@@ -45,8 +45,7 @@ import numpy as np
 import shapely
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.cells.connectivity import connected, distinct, first_alike
-from ptmtools.cells.search import along_a_curve
+from ptmtools.cells.search import along_a_curve, connected, distinct, first_alike
 from ptmtools.tolerance import GRID_SHARE, ROUNDING_SHARE, Tolerance
 
 #: A shapely geometry, or an array of them.
@@ -67,10 +66,10 @@ _undecided: ContextVar[Counter[str] | None] = ContextVar("undecided", default=No
 def counting() -> Iterator[Counter[str]]:
     """Counts the operations that end in a safe answer, by name (``"union"``, …), until the context
     ends; contexts inside it count for themselves."""
-    found: Counter[str] = Counter()
-    token = _undecided.set(found)
+    counts: Counter[str] = Counter()
+    token = _undecided.set(counts)
     try:
-        yield found
+        yield counts
     finally:
         _undecided.reset(token)
 
@@ -204,10 +203,10 @@ def divided(shapes: Geometry) -> tuple[Floats, Ints]:
     of a polygon that GEOS cannot divide so, such as some whose holes touch; it is counted."""
     parts, of = shapely.get_parts(delaunay(shapes), return_index=True)
     triangle = shapely.get_coordinates(parts).reshape(-1, 4, 2)[:, :3]
-    corner, whose = shapely.get_coordinates(shapes, return_index=True)
+    corner, owner = shapely.get_coordinates(shapes, return_index=True)
     rows = np.column_stack(
         [
-            np.append(whose, np.repeat(of, 3)).astype(np.float64),
+            np.append(owner, np.repeat(of, 3)).astype(np.float64),
             np.concatenate([corner, triangle.reshape(-1, 2)]),
         ]
     )
@@ -297,12 +296,12 @@ def _each(
         sides = ([each[part] for each in operands] for part in (slice(half), slice(half, None)))
         return np.concatenate([_each(name, operation, side, again, instead) for side in sides])
     single = [each.reshape(-1)[0] for each in operands]
-    found = _first(again, single)
-    if found is None:
+    value = _first(again, single)
+    if value is None:
         count([name] if name else [])
-        found = instead(*single)
+        value = instead(*single)
     array = np.empty(operands[0].shape, object)
-    array[...] = found
+    array[...] = value
     return array[()]
 
 
@@ -380,16 +379,16 @@ def triangulated(corner: Floats, start: Ints, polygon: Ints) -> tuple[Ints, Ints
     count = int(polygon.max(initial=-1)) + 1
     corners = np.bincount(polygon, size, count).astype(np.int64)
     rings = np.bincount(polygon, minlength=count)
-    whose = np.repeat(polygon, size)
-    ready = (corners == 3)[whose]
+    owner = np.repeat(polygon, size)
+    ready = (corners == 3)[owner]
     rows, others = np.flatnonzero(ready), np.flatnonzero(~ready)
-    found, of = _delaunay(corner[others], np.repeat(np.arange(len(size)), size)[others], polygon)
+    index, of = _delaunay(corner[others], np.repeat(np.arange(len(size)), size)[others], polygon)
     # A corner in which two rings touch is one corner; the joint takes the place of a bridge.
-    same = first_alike(np.column_stack([whose[others], corner[others]]))
-    found = same[found]
-    touching = np.bincount(whose[others][same != np.arange(len(same))], minlength=count)
-    triangle = np.concatenate([rows.reshape(-1, 3), others[found]])
-    of = np.concatenate([whose[rows[::3]], of])
+    same = first_alike(np.column_stack([owner[others], corner[others]]))
+    index = same[index]
+    touching = np.bincount(owner[others][same != np.arange(len(same))], minlength=count)
+    triangle = np.concatenate([rows.reshape(-1, 3), others[index]])
+    of = np.concatenate([owner[rows[::3]], of])
     a, b, c = corner[triangle].transpose(1, 0, 2)
     (ux, uy), (vx, vy) = (b - a).T, (c - a).T
     twice = ux * vy - uy * vx
@@ -414,6 +413,6 @@ def _delaunay(corner: Floats, ring: Ints, polygon: Ints) -> tuple[Ints, Ints]:
     triangles, of = divided(shapes[sound])
     points, of = triangles.reshape(-1, 2), sound[of]
     # Which corner of its polygon a point is: they are the same to the last bit.
-    whose = np.concatenate([place[ring], np.repeat(of, 3)])
-    same = first_alike(np.column_stack([whose, np.concatenate([corner, points])]))
+    shape = np.concatenate([place[ring], np.repeat(of, 3)])
+    same = first_alike(np.column_stack([shape, np.concatenate([corner, points])]))
     return same[len(corner) :].reshape(-1, 3), owner[of]

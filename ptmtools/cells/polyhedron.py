@@ -26,7 +26,7 @@ class Polyhedron:
 
     points: Floats  # (n, 3) vertices
     faces: tuple[Ints, ...]  # loops of indices into them, counter-clockwise seen from outside
-    tags: tuple[int, ...]  # for each face the BSP node whose plane it lies in, or `BOX_FACE`
+    tags: tuple[int, ...]  # for each face the BSP node of its plane, or `BOX_FACE`
 
     @staticmethod
     def box(low: Floats, high: Floats) -> Polyhedron:
@@ -134,7 +134,7 @@ def section(body: Polyhedron, plane: Floats, rounding: float) -> Floats:
 
 
 def clip_polygon(polygon: Floats, plane: Floats, rounding: float) -> Floats:
-    """The part of a convex (n, 3) polygon in front of a plane; (0, 3) where nothing is left."""
+    """The part of a convex (n, 3) polygon in front of a plane; (0, 3) if it is empty."""
     distance = polygon @ plane[:3] + plane[3]
     if np.all(distance >= -rounding):
         return polygon

@@ -1,27 +1,22 @@
-"""Portals: the part of the boundary between two leaves that no wall covers.
+"""Portals, the parts of the boundaries between leaves that no wall covers, and their flood.
 
 For every BSP plane the opening is the plane's cross-section less everything opaque that lies in
-it. Cracks, parts of the opening narrower than the hairline tolerance, are no openings; whatever is
-wider is kept, down to the square millimetre. The faces that leaves in front of the plane
-and leaves behind it have in that plane are intersected pairwise and with the opening; each
-connected piece is a portal, replaced by its convex hull where it is not convex. A portal is never
-shrunk: what is missing from a PVS is a bug, what is too much is a cost.
-
-Taking back what caps parted in vain.
-
-A cap (`caps`) is worth a leaf where something behind it cannot be reached. Elsewhere, where both
-its sides are reached some other way or neither is, it would only add leaves, mostly slivers of
-some centimetres: the gallery would have half as many again (43 instead of 29), willowgarage an
-eighth (852 instead of 753). So all caps are tried, and after the flood
-those that cut nothing off are taken back. What is rejoined is reached as a whole or not at all,
-and the flood need not be run again.
-
-Which leaves somebody can reach, and whether the model is closed.
+it. Cracks, parts of the opening narrower than the hairline tolerance, are no openings; wider parts
+are kept, down to the square millimetre. The faces that leaves in front of the plane and leaves
+behind it have in that plane are intersected pairwise and with the opening; each connected piece is
+a portal, replaced by its convex hull where it is not convex. A portal is never shrunk: a cell
+missing from a PVS is a bug, an extra one is a cost.
 
 The flood starts from the viewpoints, else from the largest leaf that has floor below it, is not
 the inside of a solid and does not touch the root box, and runs through the portals. The model is
-closed if it never meets the root box; what it does not reach is a solid, a sealed void or the
-outside (design, "Reachable").
+closed if it never meets the root box; the space that it does not reach is a solid, a sealed void or
+the outside (design, "Reachable").
+
+A cap (`split_planes`) is worth a leaf where the space behind it is unreachable. Elsewhere, where
+both its sides are reached some other way or neither is, it would only add leaves, mostly slivers of
+some centimetres: the gallery would have half as many again (43 instead of 29), willowgarage an
+eighth (852 instead of 753). So all caps are tried, and after the flood those that separate nothing
+are removed. A rejoined leaf is reached as a whole or not at all, so the flood need not run again.
 """
 
 from __future__ import annotations
@@ -45,16 +40,16 @@ from ptmtools.tolerance import Tolerance, ranked
 
 @dataclass(frozen=True)
 class Rejoined:
-    """A tree without caps that cut nothing off, and what became of the leaves and nodes before."""
+    """A tree without caps that separate nothing, and the new numbers of its leaves and nodes."""
 
     tree: Tree
-    leaf: Ints  # (L,) which leaf each is or is part of; ascending but for parts
-    node: Ints  # (N,) which node each is, or -1
+    leaf: Ints  # (L,) the new leaf that each is or is part of; ascending but for parts
+    node: Ints  # (N,) the new node that each is, or -1
 
 
 def rejoined(tree: Tree, group: Ints) -> Rejoined:
-    """The tree less the caps that cut nothing off; ``group``: (L,) for leaves that are kept any of
-    those that hang together, -1 for others."""
+    """The tree without the caps that separate nothing; ``group``: (L,) the connected group of each
+    leaf that is kept, -1 for others."""
     bodies, children = list(tree.leaves), tree.children.copy()
     part_of = np.arange(len(bodies))
     kept = np.ones(len(children), dtype=bool)
@@ -89,17 +84,16 @@ def _renamed(body: Polyhedron, renumber: Ints) -> Polyhedron:
 class Portal(NamedTuple):
     """An opening between two leaves of a `Tree`."""
 
-    node: int  # whose plane it lies in
+    node: int  # the node in whose plane it lies
     leaves: tuple[int, int]  # behind and in front of the plane
     polygon: Floats  # (n, 3) convex, counter-clockwise seen against the normal
-    area: float  # m² open, before its hull was taken
+    area: float  # m² open, of the piece before its hull
 
 
 def find_portals(
     tree: Tree, tolerance: Tolerance, nodes: Iterable[int] | None = None
 ) -> list[Portal]:
-    """All openings between the leaves of a tree, in the order of its nodes, or of these ``nodes``
-    if they are given."""
+    """All openings between the leaves of a tree, in the order of its nodes, or of ``nodes``."""
     faces = _faces_by_node(tree)
     nodes = range(len(faces)) if nodes is None else nodes
     return [portal for node in nodes for portal in _openings(node, *faces[node], tree, tolerance)]
@@ -108,8 +102,8 @@ def find_portals(
 def portals_rejoined(
     portals: list[Portal], before: Tree, joint: Rejoined, tolerance: Tolerance
 ) -> list[Portal]:
-    """`find_portals` of a rejoined tree, with the ``portals`` of the tree ``before`` in every plane
-    in which no leaf has changed."""
+    """`find_portals` of a rejoined tree; planes in which no leaf changed keep the ``portals`` of
+    the tree ``before``."""
     leaf, node = joint.leaf.tolist(), joint.node.tolist()
     changed = np.flatnonzero(np.bincount(joint.leaf)[joint.leaf] > 1)
     stale = {tag for whole in changed for tag in before.leaves[whole].tags if tag >= 0}
@@ -129,15 +123,15 @@ _Face = tuple[int, Floats]
 
 def _faces_by_node(tree: Tree) -> list[tuple[list[_Face], list[_Face]]]:
     """For every node the faces (leaf, points) in its plane: of leaves in front, and behind."""
-    found: list[tuple[list[_Face], list[_Face]]] = [([], []) for _ in tree.planes]
+    result: list[tuple[list[_Face], list[_Face]]] = [([], []) for _ in tree.planes]
     for leaf, body in enumerate(tree.leaves):
         centre = body.points.mean(axis=0)
         for loop, tag in zip(body.faces, body.tags, strict=True):
             if tag >= 0:
                 plane = tree.planes[tag]
                 side = 0 if centre @ plane[:3] + plane[3] > 0 else 1
-                found[tag][side].append((leaf, body.points[loop]))
-    return found
+                result[tag][side].append((leaf, body.points[loop]))
+    return result
 
 
 def _openings(
@@ -178,19 +172,19 @@ def _wider_than(part: Geometry, width: float) -> bool:
     return not shapely.is_empty(buffer(part, -width / 2, join_style="mitre"))
 
 
-#: A surface whose normal leans less than this from the vertical can be stood on (cosine of 45°).
+#: A surface whose normal leans less than this from the vertical is walkable (cosine of 45°).
 FLOOR_COSINE = 0.7
-#: The largest floor triangles, this many, stand for the whole floor.
+#: The largest floor triangles, this many, represent the whole floor.
 FLOOR_SAMPLES = 400
 #: Surfaces nearer to one another than head room, metres, or this share of the model's height, are
 #: the two sides of a slab, or furniture.
 HEAD_ROOM, SLAB_SHARE = 1.5, 1 / 3
-#: A model is open above if less than this share of its floor has something over it.
+#: A model is open above if less than this share of its floor has a surface above it.
 ROOFED = 0.5
 
 
 def flood(leaves: int, portals: list[Portal], start: tuple[int, ...]) -> Bools:
-    """(L,) which of so many leaves are reached through the portals from the leaves ``start``."""
+    """(L,) which of L = ``leaves`` are reached through the portals from the leaves ``start``."""
     ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
     reached, count = np.zeros(leaves, dtype=bool), 0
     reached[list(start)] = True
@@ -207,11 +201,10 @@ def at_box(tree: Tree) -> Bools:
 def largest_leaf(
     tree: Tree, allowed: Bools, structure: Structure, walker: Walker
 ) -> tuple[int, ...]:
-    """The largest of the (L,) allowed leaves that has floor below its middle, or if none has the
-    largest, as a tuple of one; () if none is allowed. Leaves too thin for a walker, such as the
-    hollow of a wall, are none unless all are. Where faces are turned out of solids, leaves whose
-    walls and floor face into them come first, and the inside of the ground or of a thick wall is
-    none of them."""
+    """The largest of the (L,) allowed leaves that has floor below its middle, else the largest, as
+    a tuple of one; () if none is allowed. Leaves too thin for a walker, such as the hollow of a
+    wall, count only if all are. Where faces are turned out of solids, leaves whose walls and floor
+    face into them come first, which excludes the inside of the ground or of a thick wall."""
     corners = structure.corners
     roomy = np.array([body.width >= 2 * walker.radius for body in tree.leaves])
     leaves = np.flatnonzero(allowed & roomy if roomy.any() else allowed)
@@ -229,10 +222,10 @@ def largest_leaf(
 
 
 def roofed_share(corners: Floats, floor_area: float) -> float:
-    """Share of the floor, by area, that has something over it (1 without any floor).
+    """Share of the floor, by area, that has a surface above it (1 without any floor).
 
-    Floor is every level triangle of at least a tenth of ``floor_area`` m²; a ceiling is floor that
-    nothing covers, so of the triangles over one another at a place only the lowest is floor.
+    Floor is every level triangle of at least a tenth of ``floor_area`` m²; of triangles above one
+    another only the lowest is floor, the others are ceilings.
     """
     normal = normals(corners)
     area = np.linalg.norm(normal, axis=1) / 2
@@ -241,13 +234,13 @@ def roofed_share(corners: Floats, floor_area: float) -> float:
     order = floor[ranked(area[floor])][:FLOOR_SAMPLES]
     height = float(np.ptp(corners[:, :, 1])) if len(corners) else 0.0
     apart = min(HEAD_ROOM, SLAB_SHARE * height)
-    stood_on = corners[level]
-    low, high = stood_on.min(axis=1), stood_on.max(axis=1)
+    walkable = corners[level]
+    low, high = walkable.min(axis=1), walkable.max(axis=1)
     covered = total = 0.0
     for triangle in order:
         eye = corners[triangle].mean(axis=0)
         around = (low <= eye) & (eye <= high)
-        heights = _plumb(eye, stood_on[around[:, 0] & around[:, 2]])
+        heights = _plumb(eye, walkable[around[:, 0] & around[:, 2]])
         if not np.any(heights < -apart):
             total += area[triangle]
             covered += area[triangle] * bool(np.any(heights > apart))
@@ -255,8 +248,8 @@ def roofed_share(corners: Floats, floor_area: float) -> float:
 
 
 def _outwards(corners: Floats) -> bool:
-    """Whether (T, 3, 3) triangles face out of what they enclose, by volume: those of solids do,
-    those of walls without thickness face into the rooms."""
+    """Whether (T, 3, 3) triangles face out of the enclosed volume: those of solids do, those of
+    walls without thickness face into the rooms."""
     if not len(corners):
         return False
     a, b, c = (corners - corners.mean(axis=(0, 1))).transpose(1, 0, 2)
@@ -264,7 +257,7 @@ def _outwards(corners: Floats) -> bool:
 
 
 def _plumb(eye: Floats, corners: Floats) -> Floats:
-    """Heights above ``eye`` (metres) at which a plumb line meets triangles that can be stood on."""
+    """Heights above ``eye`` (metres) at which a plumb line meets walkable triangles."""
     flat = corners[:, :, [0, 2]] - eye[[0, 2]]
     turn = flat[:, [1, 2, 0]]
     side = flat[:, :, 0] * turn[:, :, 1] - flat[:, :, 1] * turn[:, :, 0]

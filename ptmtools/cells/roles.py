@@ -1,22 +1,20 @@
-"""Which triangles may bound a leaf, and which are of doors, by the names of their objects and
-materials, and by the classes of their objects.
+"""Roles of triangles: structural, detail or door, by the names and classes of objects and by shape.
 
-A class counts as an option that names the object, `--structural`, `--detail` or `--door`. Where
-the user names a triangle in any of these, its class says nothing. There is one difference: what is
-structural by its class is never detail and never a door leaf, but divides the building only as far
-as its area says, like everything else. (Tried: whatever its area, as with `--structural`. Then each
-tread and riser of a stair does: an office building of 8 storeys with a stair of 18 steps in each
-had 836 leaves instead of 353, 2,170 portals instead of 506, 19.4 % of the volume at hand instead of
-15.3, and visibility took 23 s instead of 0.2.)
+The class of an object acts like an option that names the object, `--structural`, `--detail` or
+`--door`; where the user names a triangle in any of these, its class is ignored. One thing differs:
+a triangle that is structural by class is never detail and never a door leaf, but divides the
+building only if its area suffices. (Tried: whatever its area, as with `--structural`. Then each
+tread and riser of a stair divides: an office building of 8 storeys with a stair of 18 steps in each
+had 836 leaves instead of 353, 2,170 portals instead of 506, 19.4 % of the volume resident instead
+of 15.3, and visibility took 23 s instead of 0.2.)
 
-Detail recognised by its shape: furniture, statues, plants, which can neither split nor block.
+Detail by shape is furniture, statues and plants, which can neither split nor block. Surfaces that
+divide a building and hide are flat: a polygon in one plane with others, a jamb, the edge of a slab.
+A sofa of 50,000 triangles has no such surface, but each of its triangles would be tried. So small,
+dense and round groups of triangles are detail, as if `--detail` named them: connected pieces first,
+then whole objects, since a plant is a thousand pieces.
 
-What divides a building and what hides is flat: a polygon that lies in a plane with others, a jamb,
-the edge of a slab. A sofa of 50,000 triangles has none of that, but each of its triangles would be
-asked whether it does. So what is small, dense and round is taken for detail, as if `--detail` named
-it: connected pieces first, then whole objects, for a plant is a thousand pieces.
-
-To err is safe: what is taken for detail hides nothing, so the visible sets can only grow.
+Errors are safe: detail hides nothing, so the visible sets can only grow.
 """
 
 from __future__ import annotations
@@ -31,22 +29,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, summed
-from ptmtools.cells.connectivity import Welded
-from ptmtools.cells.facets import Facets
+from ptmtools.cells.facets import Facets, Welded
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.scene.model import Scene
 
-#: What a door is called: a word of a name, in lower case.
+#: Words for a door, in lower case.
 _DOOR = re.compile(
     r"doors?|port[ea]s?|puertas?|tür(en)?|tuer(en)?|deur(en)?|dörr(ar)?|døre?r?|drzwi|dv[eě]ře|ajtó|"
     r"двер[ьи]"
 )
-#: Words like Haustür, where what is before it says which door it is, and like doorleaf.
+#: Compounds that end in such a word, like Haustür, or begin with it, like doorleaf.
 _COMPOUND = re.compile(
     r".*(doors?|tür|tuer|deur|dörr|dør)|"
     r"(door|tür|tuer|deur|dörr|dør)(leaf|panel|slab|wing|blatt|flügel|fluegel|blad)"
 )
-#: Words that only end like one, and what a thing is whose name says that it is at a door.
+#: Words that only end like one, and parts of a doorway that are no leaf.
 _NO_DOOR = re.compile(
     r"(out|in)doors?|way|frame|jamb|lintel|casing|handle|knob|mat|walls?|wand|mur[ao]?|pared|"
     r"pare[td]e|muur|vägg|væg|ściana|стена|rahmen|zarge|griff|cadre|dormant|marco|telaio|kozijn|karm"
@@ -58,48 +55,48 @@ _HUMP = re.compile(r"(?<=[^\W\d_A-ZÀ-ÖØ-Þ])(?=[A-ZÀ-ÖØ-Þ])|(?<=[A-Z])(?=
 
 @dataclass(frozen=True)
 class Designated:
-    """Which triangles are said to be what; none is both structural and something else."""
+    """The roles of T triangles; none is both structural and something else."""
 
-    forced: Bools  # (T,) which divide the building whatever their area
-    structural: Bools  # (T,) these and others
+    forced: Bools  # (T,) whether it divides the building whatever its area
+    structural: Bools  # (T,) forced, or structural by class
     detail: Bools  # (T,)
     door: Bools  # (T,)
 
     @staticmethod
     def of(scene: Scene, options: SubdivideOptions) -> Designated:
-        """As the user says, and else as the classes of objects do."""
+        """The roles that the options name, and otherwise those of the objects' classes."""
         forced, detail, door = (
             named(scene, patterns)
             for patterns in (options.structural, options.detail, options.door)
         )
         structural = forced
         if scene.kinds:
-            untold = ~(forced | detail | door)
+            free = ~(forced | detail | door)
             kind = np.array(scene.kinds)[scene.triangle_object]
-            structural = structural | (untold & (kind == "structural"))
-            detail = detail | (untold & (kind == "detail"))
-            door = door | (untold & (kind == "door"))
+            structural = structural | (free & (kind == "structural"))
+            detail = detail | (free & (kind == "detail"))
+            door = door | (free & (kind == "door"))
         return Designated(forced, structural, detail & ~structural, door & ~structural)
 
 
 def named(scene: Scene, patterns: Sequence[str]) -> Bools:
-    """(T,) which triangles have an object or a material of such a name."""
-    return called(scene, lambda name: matches(name, patterns))
+    """(T,) which triangles have an object or a material whose name matches a pattern."""
+    return triangles_named(scene, lambda name: matches(name, patterns))
 
 
-def called(scene: Scene, says: Callable[[str], bool]) -> Bools:
-    """(T,) which triangles have an object or a material whose name says something."""
-    objects = np.array([says(name) for name in scene.objects], dtype=bool)
-    materials = np.array([says(material.name) for material in scene.materials], dtype=bool)
+def triangles_named(scene: Scene, test: Callable[[str], bool]) -> Bools:
+    """(T,) which triangles have an object or a material whose name passes a test."""
+    objects = np.array([test(name) for name in scene.objects], dtype=bool)
+    materials = np.array([test(material.name) for material in scene.materials], dtype=bool)
     return np.asarray(objects[scene.triangle_object] | materials[scene.triangle_material])
 
 
 def matches(name: str, patterns: Sequence[str]) -> bool:
-    """Whether one of the patterns, with * and ?, is a name's."""
+    """Whether a name matches one of the patterns, with * and ?."""
     return any(fnmatchcase(name, pattern) for pattern in patterns)
 
 
-def says_door(name: str) -> bool:
+def is_door_name(name: str) -> bool:
     """Whether a name is that of a door: `door_leaf_03`, `IfcDoor`, `Haustür`, but not `doorway`,
     `door_frame` or `outdoor_wall`."""
     composed = unicodedata.normalize("NFC", name)
@@ -111,7 +108,7 @@ def says_door(name: str) -> bool:
 
 #: Detail fits into a box of this side, metres: the longest sofas and shelves.
 LARGEST = 3.0
-#: It is dense: it has at least so many triangles,
+#: It is dense: it has at least this many triangles,
 DENSE = 256
 #: and compact: neither a sheet nor a rod. Its box's shortest side over its longest.
 COMPACT = 0.1
@@ -125,7 +122,7 @@ FLAT = 2 / 3
 
 @dataclass(frozen=True)
 class Groups:
-    """Triangles in groups, and what their shape is."""
+    """The shapes of g groups of triangles."""
 
     size: Ints  # (g,) triangles
     box: Floats  # (g, 3) sides of their bounding boxes, ascending, metres
@@ -135,7 +132,7 @@ class Groups:
 
     @staticmethod
     def of(group: Ints, facets: Facets, wall_area: float) -> Groups:
-        """``group``: (n,) of each triangle, from 0."""
+        """``group``: (n,) the group of each triangle, from 0."""
         count = int(group.max(initial=-1)) + 1
         order = np.argsort(group, kind="stable")
         size = np.bincount(group, minlength=count)
@@ -155,30 +152,29 @@ class Groups:
         )
 
     def detail(self, wall_area: float) -> Bools:
-        """(g,) which of them are detail."""
+        """(g,) which groups are detail."""
         dense = self.size >= DENSE
         small = (self.box[:, 2] <= LARGEST) & (self.box[:, 0] >= COMPACT * self.box[:, 2])
         curved = self.flat <= FLAT * self.area
         curved &= self.flattest <= LARGEST_FLAT_SHARE * wall_area
-        found: Bools = dense & small & curved
-        return found
+        result: Bools = dense & small & curved
+        return result
 
 
-def recognised(facets: Facets, object_of: NDArray[np.integer], wall_area: float) -> Bools:
-    """(n,) which triangles of a mesh are detail by their shape; ``object_of``: (n,) the object of
-    each."""
+def detail_by_shape(facets: Facets, object_of: NDArray[np.integer], wall_area: float) -> Bools:
+    """(n,) which triangles of a mesh are detail by shape; ``object_of``: (n,) their objects."""
     if not len(object_of):
         return np.zeros(0, dtype=bool)
-    found = np.zeros(len(object_of), dtype=bool)
+    result = np.zeros(len(object_of), dtype=bool)
     for group in (connected_pieces(facets.mesh), np.unique(object_of, return_inverse=True)[1]):
-        found |= Groups.of(group, facets, wall_area).detail(wall_area)[group]
-    return found
+        result |= Groups.of(group, facets, wall_area).detail(wall_area)[group]
+    return result
 
 
 def connected_pieces(mesh: Welded) -> Ints:
-    """(n,) the piece of each triangle: those that share corners, directly or over others."""
-    from ptmtools.cells.kernels import hang_together
+    """(n,) the connected piece of each triangle; pieces share no corners."""
+    from ptmtools.cells.kernels import connect_corners
 
     parent = np.arange(len(mesh.point))
-    hang_together(mesh.triangle, parent)
+    connect_corners(mesh.triangle, parent)
     return np.unique(parent[mesh.triangle[:, 0]], return_inverse=True)[1].reshape(-1)

@@ -59,6 +59,8 @@ door covers little of the view, and the coverage hints can say so only of anothe
 from __future__ import annotations
 
 import heapq
+from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -67,7 +69,6 @@ import shapely
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, areas
-from ptmtools.cells.connectivity import Groups
 from ptmtools.cells.model import Cells
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.sight import from_places, sampled_sight
@@ -75,6 +76,74 @@ from ptmtools.diagnostics import Warned
 
 if TYPE_CHECKING:
     Plan = Any
+
+
+class Groups(ABC):
+    """Groups of leaves, each called by one of its leaves, at first of one leaf each.
+
+    Attributes
+    ----------
+    near: for each group those beside it, each with the portals between the two.
+    """
+
+    def __init__(self, count: int, pairs: NDArray[np.integer]) -> None:
+        """``pairs``: (K, 2) the leaves on both sides of each portal."""
+        self.near: list[dict[int, list[int]]] = [{} for _ in range(count)]
+        self._parent = np.arange(count)
+        for k, (a, b) in enumerate(pairs.tolist()):
+            if a != b:
+                self.near[a].setdefault(b, []).append(k)
+                self.near[b][a] = self.near[a][b]
+
+    @abstractmethod
+    def cost(self, a: int, b: int) -> float:
+        """What joining two groups side by side costs, the lower one first; rounded, so that last
+        digits put nothing in order."""
+
+    def join(self, a: int, b: int) -> list[tuple[int, int]]:
+        """Adds b to a; returns the pairs that are new or may cost less than before."""
+        self._parent[b] = a
+        changed, self.near[b] = self.near[b], {}
+        del changed[a], self.near[a][b]
+        for c, portals in changed.items():
+            del self.near[c][b]
+            both = [*self.near[a].get(c, ()), *portals]
+            self.near[a][c] = self.near[c][a] = both
+        return [(a, c) for c in changed]
+
+    def grown(self, joins: Callable[[float], bool]) -> Ints:
+        """(L,) the group of each leaf, once all pairs are joined whose cost ``joins``; equally
+        cheap ones in the order of their names."""
+        waiting: list[tuple[float, int, int]] = []
+        latest: dict[tuple[int, int], float] = {}
+
+        def put(a: int, b: int) -> None:
+            pair = (min(a, b), max(a, b))
+            latest[pair] = self.cost(*pair)
+            heapq.heappush(waiting, (latest[pair], *pair))
+
+        for a, near in enumerate(self.near):
+            for b in near:
+                if a < b:
+                    put(a, b)
+        while waiting and joins(waiting[0][0]):
+            cost, a, b = heapq.heappop(waiting)
+            if b not in self.near[a] or cost != latest[a, b]:
+                continue
+            if cost != self.cost(a, b):  # one of them has grown meanwhile
+                put(a, b)
+                continue
+            for pair in self.join(a, b):
+                put(*pair)
+        return self.ends()
+
+    def ends(self) -> Ints:
+        """(L,) the group of each leaf."""
+        result = self._parent
+        while not np.array_equal(result, result[result]):
+            result = result[result]
+        return result
+
 
 #: An opening joins two regions if it is at least this share of the narrower one's cross-section.
 OPEN = 0.7
@@ -102,20 +171,20 @@ def room_of_leaf(cells: Cells, rank: Ints) -> Ints:
 def _adopted(room: Ints, held: Bools, openings: dict[tuple[int, int], float]) -> Ints:
     """(L,) rooms, those that are not ``held``, (L,), divided among the rooms around them: from
     these on, the largest opening first."""
-    beside: list[list[tuple[float, int]]] = [[] for _ in room]
+    adjacent: list[list[tuple[float, int]]] = [[] for _ in room]
     for (a, b), area in openings.items():
-        beside[a].append((-float(f"{area:.{DIGITS}g}"), b))
-        beside[b].append((-float(f"{area:.{DIGITS}g}"), a))
-    waiting = [(area, b, int(room[a])) for a in np.flatnonzero(held) for area, b in beside[a]]
+        adjacent[a].append((-float(f"{area:.{DIGITS}g}"), b))
+        adjacent[b].append((-float(f"{area:.{DIGITS}g}"), a))
+    waiting = [(area, b, int(room[a])) for a in np.flatnonzero(held) for area, b in adjacent[a]]
     heapq.heapify(waiting)
-    found, left = room.copy(), ~held
+    result, left = room.copy(), ~held
     while waiting:
         _, leaf, name = heapq.heappop(waiting)
         if left[leaf]:
-            found[leaf], left[leaf] = name, False
-            for area, b in beside[leaf]:
+            result[leaf], left[leaf] = name, False
+            for area, b in adjacent[leaf]:
                 heapq.heappush(waiting, (area, b, name))
-    return found
+    return result
 
 
 class _Regions(Groups):
@@ -192,9 +261,9 @@ def _section(volume: float, plan: Plan) -> float:
 
 def _touching(cells: Cells, near: float) -> list[list[int]]:
     """For every portal those that it meets, within ``near`` metres, ascending."""
-    found: list[list[int]] = [[] for _ in range(cells.portal_count)]
-    if not found:
-        return found
+    result: list[list[int]] = [[] for _ in range(cells.portal_count)]
+    if not result:
+        return result
     start = cells.portal_start[:-1]
     last = np.diff(cells.portal_start) - 1
     low = np.minimum.reduceat(cells.portal_point, start) - near / 2
@@ -212,9 +281,9 @@ def _touching(cells: Cells, near: float) -> list[list[int]]:
         p, q = polygon[i[rows]], polygon[j[rows]]
         meet = np.minimum(_distance(p, q), _distance(q, p)) <= near
         for a, b in zip(i[rows][meet].tolist(), j[rows][meet].tolist(), strict=True):
-            found[a].append(b)
-            found[b].append(a)
-    return found
+            result[a].append(b)
+            result[b].append(a)
+    return result
 
 
 def _distance(points: Floats, polygon: Floats) -> Floats:

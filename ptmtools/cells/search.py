@@ -1,17 +1,20 @@
-"""The triangles near a plane or in a box, found without looking at all of them.
+"""Searches in less than quadratic time: equal rows, triangles near a plane or in a box, spans of
+height, and similar planes.
 
-A building has as many wall planes as rooms and each holds a few of its triangles: asking every
-triangle of every plane is quadratic (800 rooms: 24,000 planes and a million triangles). Triangles
-are therefore put into blocks of neighbours with bounding boxes, and only blocks that come near the
-plane are looked into.
+Model files repeat a vertex for each texture coordinate, object or face that uses it; triangles
+touch where positions are equal, to the last bit. Rows are compared by a hash of 64 bits and then by
+themselves: `numpy.unique` over the rows of 15 million corners takes ten times as long, and sorts
+them by value, which separates neighbours.
 
-What is as high as something else, found without looking at all of it: a tower has many storeys,
-and what is in one has nothing to do with the others.
+A building has as many wall planes as rooms and each holds a few of its triangles: testing every
+triangle against every plane is quadratic (800 rooms: 24,000 planes and a million triangles).
+`Nearby` puts triangles into blocks of neighbours with bounding boxes, and only blocks near the
+plane are searched. `ByHeight` does so for spans of height: a tower has many storeys, and one has
+nothing to do with the others.
 
-Planes in bins of similar normal and offset, so that each finds all that are near it.
-
-There are `_GRIDS` grids of bins, and a plane is looked up in the one in which it lies furthest from
-the edges of its bin: its neighbours to a tenth of the step are there, wherever it lies.
+`Bins` holds planes of similar normal and offset, so that each finds all that are near it. There are
+`_GRIDS` grids of bins, and a plane is looked up in the one in which it lies furthest from the edges
+of its bin: its neighbours to a tenth of the step are there, wherever it lies.
 """
 
 from __future__ import annotations
@@ -19,9 +22,80 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, summed
-from ptmtools.cells.connectivity import distinct
+from ptmtools.arrays import Bits, Bools, Floats, Ints, summed
 from ptmtools.tolerance import Tolerance
+
+#: Odd, with no pattern in its bits: 2⁶⁴ over the golden ratio.
+_FACTOR = np.uint64(0x9E3779B97F4A7C15)
+_HALF = np.uint64(32)
+#: A direction in no simple relation to the axes of any building.
+_ACROSS = np.array([0.683, 0.577, 0.448])
+
+
+def distinct(rows: NDArray[np.float64] | NDArray[np.int64]) -> tuple[Ints, Ints]:
+    """(k,) the first of each of the distinct (n, w) rows, ascending, and (n,) for each row the
+    index of its equal among these. Zeros are equal whatever their sign."""
+    bits: Bits = np.ascontiguousarray(rows + rows.dtype.type(0)).view(np.uint64)
+    code = np.zeros(len(bits), dtype=np.uint64)
+    for column in bits.T:
+        code = (code ^ column) * _FACTOR
+        code ^= code >> _HALF
+    order = np.argsort(code, kind="stable")
+    alike = code[order[1:]] == code[order[:-1]]
+    same = alike.copy()
+    for column in bits.T:
+        same &= column[order[1:]] == column[order[:-1]]
+    if not np.array_equal(alike, same):  # two rows have one hash
+        order = np.lexsort(bits.T)
+        same = np.all(bits[order[1:]] == bits[order[:-1]], axis=1)
+    begins = np.append(True, ~same)[: len(order)]
+    first = order[begins]
+    place = np.empty(len(first), dtype=np.int64)
+    place[np.argsort(first)] = np.arange(len(first))
+    row = np.empty(len(order), dtype=np.int64)
+    row[order] = place[np.cumsum(begins) - 1]
+    return np.sort(first), row
+
+
+def first_alike(rows: NDArray[np.float64] | NDArray[np.int64]) -> Ints:
+    """(n,) the first of the (n, w) rows equal to each."""
+    first, row = distinct(rows)
+    return first[row]
+
+
+def welded(points: Floats, reach: float) -> Ints:
+    """(n,) the first of the (n, 3) points that chains of steps up to ``reach`` join to each."""
+    first = first_alike(points)
+    one_each = np.flatnonzero(first == np.arange(len(first)))
+    # What is near in space is near along any direction.
+    along = points[one_each] @ _ACROSS
+    order = np.argsort(along, kind="stable")
+    place, step = np.arange(len(order)), 1
+    pairs = [np.zeros((2, 0), dtype=np.int64)]
+    while len(place := place[place + step < len(order)]):
+        pair = order[np.stack([place, place + step])]
+        near = along[pair[1]] - along[pair[0]] <= reach
+        place, pair = place[near], pair[:, near]
+        apart = np.subtract(*points[one_each[pair]])
+        pairs.append(pair[:, np.einsum("ij,ij->i", apart, apart) <= reach**2])
+        step += 1
+    one, other = np.concatenate(pairs, axis=1)
+    group = connected(len(one_each), np.append(one, other), np.append(other, one))
+    to = np.arange(len(points))
+    to[one_each] = one_each[group]
+    return to[first]
+
+
+def connected(count: int, one: Ints, other: Ints) -> Ints:
+    """(count,) the least index to which pairs of (n,) ``one`` and ``other``, listed both ways,
+    connect each index below ``count``."""
+    group = np.arange(count)
+    while np.any(group[one] != group[other]):
+        least = group.copy()
+        np.minimum.at(least, group[one], group[other])
+        group = least[least[group]]  # pointer jumping: long strips need few rounds
+    return group
+
 
 #: Triangles in a block.
 _BLOCK = 64
@@ -73,8 +147,8 @@ def along_a_curve(points: Floats) -> Ints:
 
 
 class ByHeight:
-    """Things that reach from (n,) ``low`` to (n,) ``high``, metres: sorted by their lowest points
-    among those that are about as high."""
+    """Spans from (n,) ``low`` to (n,) ``high``, metres, sorted by their lower ends among those of
+    similar length."""
 
     def __init__(self, low: Floats, high: Floats) -> None:
         self._low, self._high = low, high
@@ -84,24 +158,24 @@ class ByHeight:
         self._groups = np.split(order, start[1:]) if len(start) else []
 
     def between(self, lowest: float, highest: float) -> Ints:
-        """Those, ascending, of which something is between two heights, metres."""
-        found = [np.zeros(0, dtype=np.int64)]
+        """The spans, ascending, that meet the range between two heights, metres."""
+        rows = [np.zeros(0, dtype=np.int64)]
         for size, group in zip(self._sizes.tolist(), self._groups, strict=True):
             reach = np.searchsorted(self._low[group], [lowest - 2.0**size, highest], "right")
-            found.append(group[slice(*reach)])
-        about = np.sort(np.concatenate(found))
+            rows.append(group[slice(*reach)])
+        about = np.sort(np.concatenate(rows))
         meets = (self._high[about] >= lowest) & (self._low[about] <= highest)
         return np.asarray(about[meets])
 
 
 #: The step of a grid, in the parts of a unit normal, and in shares of the extent.
 _STEP = 0.02
-#: So many grids, each moved on by as large a share of the step: one more than a plane has numbers,
-#: so that in one of them none of its numbers is nearer to an edge than half that share.
+#: Number of grids, each shifted by this fraction of the step: one more than a plane has numbers, so
+#: that in one of them none of its numbers is nearer to an edge than half that fraction.
 _GRIDS = 5
-#: So many planes of a bin are tried in vain before only some of the others are.
+#: Number of failures in a bin before only some of its other planes are tried.
 _TRIES = 64
-#: Of these, so many for each area that would do: one in 3,000 layers of just that area is missed.
+#: Number of these per sufficient area: one in 3,000 layers of just that area is missed.
 _DRAWS = 8
 
 
@@ -130,7 +204,7 @@ class Bins:
         return summed(self._label.ravel(), every, self.count)
 
     def drop(self, weights: Floats, planes: Ints, weight: Floats) -> None:
-        """Takes these planes, which weigh (k,) ``weight``, out of the ``weights`` of the bins."""
+        """Subtracts (k,) ``weight`` of these planes from the ``weights`` of the bins."""
         np.subtract.at(weights, self._label[planes].ravel(), np.repeat(weight, _GRIDS))
 
     def members(self) -> tuple[Ints, Ints]:
@@ -139,26 +213,26 @@ class Bins:
         order = np.argsort(every, kind="stable") // _GRIDS
         return np.append(0, np.cumsum(np.bincount(every, minlength=self.count))), order
 
-    def beside(self, planes: Ints, weights: Floats) -> Floats:
-        """(k,) how much of (k,) ``weights``, of these planes, is in the bin of each of them."""
+    def own_sums(self, planes: Ints, weights: Floats) -> Floats:
+        """(k,) the sum of (k,) ``weights``, of these planes, in the bin of each."""
         names, place = np.unique(self._label[planes], return_inverse=True)
         sums = summed(place.ravel(), np.repeat(weights, _GRIDS), len(names))
-        found: Floats = sums[np.searchsorted(names, self.own[planes])]
-        return found
+        result: Floats = sums[np.searchsorted(names, self.own[planes])]
+        return result
 
     def holds(self, name: int, planes: Ints) -> Bools:
-        """(k,) which of these planes are in a bin."""
-        found: Bools = (self._label[planes] == name).any(axis=1)
-        return found
+        """(k,) whether these planes are in a bin."""
+        result: Bools = (self._label[planes] == name).any(axis=1)
+        return result
 
 
 class Tries:
-    """Which planes are worth trying, where most are tried in vain.
+    """Planes worth trying, where most tries fail.
 
-    A scanned wall has a hundred thousand triangles, and each has a plane of its own, near which lie
-    all the others. To hold each against all takes the square of their number. A plane that holds
-    enough area is found as well by trying planes drawn in proportion to their areas, of which it
-    has its share, so the tries are as many as the area is times what is needed.
+    A scanned wall has a hundred thousand triangles, each with a plane of its own that is near all
+    the others. Comparing each with all takes the square of their number. Planes drawn in proportion
+    to their areas hit one that holds enough area as well, so the number of tries is proportional to
+    the total area over the area needed.
     """
 
     def __init__(self, bin_of: NDArray[np.integer], areas: Floats) -> None:
@@ -168,8 +242,8 @@ class Tries:
         self.worth: Bools = np.ones(len(areas), dtype=bool)  # (n,)
 
     def fail(self, plane: int, others: Ints, needed: float) -> None:
-        """A plane held less than the area ``needed``; ``others`` are those around it that have not
-        been tried."""
+        """Records that a plane held less than the area ``needed``; ``others``: untried planes
+        around it."""
         name = self._bin[plane]
         self._failed[name] += 1
         if self._failed[name] == _TRIES:

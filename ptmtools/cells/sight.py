@@ -1,15 +1,16 @@
-"""Which leaves surely see each other: an estimate of visibility from below, without the flow.
+"""Visibility between leaves before the portal flow: a lower estimate by lines, an upper bound.
 
-Straight lines through every portal, spread evenly over its area and over the directions, are
-followed to both sides through all portals that they meet. Leaves on one line see each other. Unlike
-a potentially visible set this leaves out what no line happened to find; it serves to weigh, never
-to cull. Two thirds to nine tenths of what the portal flow finds are found in a second or two.
+From below, straight lines through every portal, spread evenly over its area and over the
+directions, are followed to both sides through all portals that they meet. Leaves on one line see
+each other. Unlike a potentially visible set this misses leaves that no line happens to join; it
+serves to weigh, never to cull. Two thirds to nine tenths of the pairs of the portal flow take a
+second or two.
 
 The lines are the same for every portal in its own frame, and the same seen from either side and
 after quarter turns of that frame. So they depend neither on the order of the portals and of their
-corners nor on where the building stands and how it is turned, be it on its head.
+corners nor on the position and rotation of the building, even upside down.
 
-Which leaves see each other at most: the portal flow over the leaves of a subdivision.
+From above, the first bound of the portal flow decides which leaves no standing viewer can see.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from ptmtools.portal_flow.flow import Portals, leaf_matrix, upper_bound
 #: Lines over all portals, and the least and the most through one of them.
 LINES = 2**20
 LEAST_LINES, MOST_LINES = 64, 8192
-#: A line is followed through so many leaves to either side of its portal.
+#: Number of leaves through which a line is followed to either side of its portal.
 LONGEST = 512
 #: A portal whose normal has a level part smaller than this is a hatch.
 LEVEL = 1e-3
@@ -68,8 +69,8 @@ def sampled_sight(cells: Cells) -> Bools:
 
 
 def _even(count: int) -> Floats:
-    """(count, 4) points of the unit cube, evenly spread; integer arithmetic, the same anywhere.
-    They come in eights: the quarter turns of the frame, and those seen from behind (`_lines`)."""
+    """(count, 4) points of the unit cube, evenly spread; integer arithmetic, the same on every
+    machine. They come in eights: quarter turns of the frame, and those from behind (`_lines`)."""
     fixed = np.arange(1, count // 8 + 1, dtype=np.uint64)[:, None] * STEPS
     turned = [(fixed >> np.uint64(11)).astype(np.float64) * 2.0**-53]
     for _ in range(3):
@@ -81,12 +82,12 @@ def _even(count: int) -> Floats:
 
 def _lines(polygon: Floats, normal: Floats, share: Floats) -> tuple[Floats, Floats]:
     """(n, 3) points uniform in a convex polygon, and (n, 3) unit directions ahead of it with a
-    density by the cosine, as light would pass.
+    density by the cosine, like light.
 
     ``share`` (n, 4) chooses the height in the polygon, the place at that height, and the direction
     by its angle from the normal and around it. The frame has the polygon's level direction to the
-    right, that of a hatch its longest edge; turning the normal round mirrors it, and what is level
-    changes when a building is laid on its side, so `_even` holds what becomes of each line.
+    right, that of a hatch its longest edge; reversing the normal mirrors it, and laying a building
+    on its side turns it, so `_even` contains the images of each line.
     """
     right = np.array([normal[2], 0.0, -normal[0]])
     if np.linalg.norm(right) < LEVEL:  # a hatch: no direction is level more than others
@@ -144,11 +145,10 @@ def portals_of(cells: Cells) -> Portals:
 
 
 def seen_from_places(cells: Cells, executor: Executor) -> Bools:
-    """(L,) which leaves may be seen from a leaf in which somebody can stand, themselves included.
+    """(L,) which leaves may be seen from a standing leaf, themselves included.
 
     The first bound of the flow decides, without its search: of the leaves of five real models the
-    search would have dropped two more. Where there are too many portals for it nothing is
-    dropped.
+    search would have dropped two more. With too many portals for the bound, all leaves count.
     """
     standing = cells.leaf_standing
     every = np.ones(cells.leaf_count, dtype=np.bool_)
@@ -163,5 +163,5 @@ def seen_from_places(cells: Cells, executor: Executor) -> Bools:
 
 
 def from_places(sees: Bools, standing: Bools) -> Bools:
-    """(L, L) of (L, L) symmetric sight what somebody stands at one end of; ``standing``: (L,)."""
+    """(L, L) the pairs of (L, L) symmetric sight with a ``standing``, (L,), leaf at one end."""
     return sees & (standing[:, None] | standing)

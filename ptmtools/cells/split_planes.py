@@ -1,29 +1,26 @@
-"""Reveals: the jambs, lintels and sills that close a wall's thickness around an opening.
+"""Split planes beside those of walls: reveals, door leaves and caps.
 
-Two parallel walls near to one another are the faces of one wall. Between them the BSP leaves a
-slab that holds both solids and the doorways through it; the polygons that part the two are
-far smaller than any wall. They are found by what they do: they bridge the slab from face to face.
+**Reveals** are the jambs, lintels and sills that close a wall's thickness around an opening. Two
+parallel walls near to one another are the faces of one wall. Between them the BSP leaves a slab
+that holds both solids and the doorways through it; the polygons that separate the two are far
+smaller than any wall. Their position identifies them: they bridge the slab from face to face.
 Without them, solids that are not capped (a wall ending under a floor slab) would join rooms to the
 outside, and every door in a wall to every other.
 
-The planes of door leaves, which split what walls and reveals have left.
+**Door planes** split after walls and reveals, whatever the size of the leaf. A leaf of 1 × 2.1 m is
+as large as a wall, but as one it would cut the thickness of the wall it hangs in: the jambs beside
+it bridge the wall from face to face, but neither of the two slabs that it makes of it. A leaf of
+0.8 × 2 m would be no wall. Like caps they are removed where both sides are reached (`portals`).
 
-A leaf of 1 × 2.1 m is as large as a wall, but as one it would cut the thickness of the wall it
-hangs in: the jambs beside it bridge the wall from face to face, and neither of the two slabs that
-it makes of it. And one of 0.8 × 2 m would be none. So door leaves come after the reveals, whatever
-their size. Like caps (`rejoin`) they are taken back where both sides are reached.
-
-Caps: small polygons that close the whole cross-section of a leaf.
-
-The planes of walls go on behind them and cut the solids of floors and walls into wedges. A
-flight of stairs does so to the floor slab beside it: between the slope and the top of the slab
-lie a solid and a piece of the stairwell, and what parts the two is the edge of the slab, smaller
-than a wall; nor is it a reveal, for the wedge lies between no two parallel faces. It is
-recognised by what it does: no opening is left beside it. Such a split costs one leaf and never a
-portal. A polygon that leaves an opening, however small, is none.
+**Caps** are small polygons that close the whole cross-section of a leaf. The planes of walls extend
+behind them and cut the solids of floors and walls into wedges. A flight of stairs does so to the
+floor slab beside it: between the slope and the top of the slab lie a solid and a piece of the
+stairwell, separated by the edge of the slab, which is smaller than a wall; nor is it a reveal, for
+the wedge lies between no two parallel faces. It is recognised since it leaves no opening. Such a
+split costs one leaf and never a portal. A polygon that leaves an opening, however small, is no cap.
 
 No area is too small: a chain of solids is as open as its narrowest end, and in the museum of 50
-rooms, with caps of 0.02 m² and more only, all of the 992 leaves stay that 365 are with all caps.
+rooms, with only the caps of at least 0.02 m², all 992 leaves stay instead of 365 with all caps.
 """
 
 from __future__ import annotations
@@ -43,7 +40,7 @@ from ptmtools.tolerance import TIE_SHARE, ranked
 
 
 class Reveals:
-    """The reveals in the thickness of walls, found once for every pair of wall faces."""
+    """The reveals in the thickness of walls, computed once for every pair of wall faces."""
 
     def __init__(self, structure: Structure, wall_thickness: float) -> None:
         self._structure = structure
@@ -52,7 +49,7 @@ class Reveals:
         self._known: dict[bytes, list[WallPlane]] = {}
 
     def __getstate__(self) -> dict[str, object]:
-        return {**vars(self), "_known": {}}  # which another thread may be adding to
+        return {**vars(self), "_known": {}}  # another thread may be adding to it
 
     def within(self, body: Polyhedron, walls: list[WallPlane]) -> list[WallPlane]:
         """The reveals of the slab that a body lies in; none if it lies in no wall.
@@ -90,22 +87,22 @@ class Reveals:
         inside, low, high = near[within], low[within], high[within]
         spans = self._span(inside, low, high, width)
         bridging = inside[spans]
-        found: list[WallPlane] = []
+        result: list[WallPlane] = []
         for seed in bridging[ranked(areas[bridging])]:
             plane = structure.planes[seed]
-            apart = (parallel_gap(plane, w.frame.plane, self._tolerance) for w in found)
+            apart = (parallel_gap(plane, w.frame.plane, self._tolerance) for w in result)
             if min(apart, default=self._limit) < self._tolerance.thin:
                 continue
             frame, lies = Frame.of(plane), structure.lie_in(plane, inside)
             walls, blocking = inside[lies & spans], inside[lies]
-            found.append(
+            result.append(
                 WallPlane(frame, structure.united(frame, walls), structure.united(frame, blocking))
             )
-        return found
+        return result
 
     def _span(self, triangles: Ints, low: Floats, high: Floats, width: float) -> Bools:
-        """(n,) which triangles, ``low`` and ``high`` deep in a slab, are of a flat region that
-        reaches from one of its faces to the other; of the region, what lies between them."""
+        """(n,) which triangles, ``low`` and ``high`` deep in a slab, belong to a flat region that
+        reaches from one of its faces to the other."""
         slack = self._tolerance.hairline
         between = np.flatnonzero((low >= -slack) & (high <= width + slack))
         names, region = np.unique(self._structure.region[triangles[between]], return_inverse=True)
@@ -126,7 +123,7 @@ def _bounds(body: Polyhedron, walls: list[WallPlane]) -> list[Floats]:
     return bounds + [p for p, tag in zip(body.planes, body.tags, strict=True) if tag == BOX_FACE]
 
 
-#: A plane of a leaf holds at least this share of what is largest of it in one plane.
+#: A plane of a leaf holds at least this share of the leaf's largest area in one plane.
 _SHARE = 0.5
 #: It lies square across the leaf to this cosine.
 _SQUARE = 0.99
@@ -134,7 +131,7 @@ _SQUARE = 0.99
 
 @dataclass(frozen=True)
 class DoorPlanes:
-    """The planes of d leaves and the boxes, metres, around what of each lies in them."""
+    """The planes of door leaves, and the boxes, metres, of the triangles in them."""
 
     planes: tuple[WallPlane, ...]
     low: Floats  # (p, 3) and
@@ -142,30 +139,30 @@ class DoorPlanes:
 
     @staticmethod
     def of(structure: Structure, leaf: Ints, across: Floats) -> DoorPlanes:
-        """Of the leaves, ``leaf``: (T,), -1 for none, of the triangles of a structure, that lie
-        across (d, 3) directions."""
+        """The planes of d leaves across their (d, 3) directions; ``leaf``: (T,) the leaf of each
+        triangle of a structure, -1 for none."""
         own = np.flatnonzero(leaf >= 0)
         turn = np.einsum("ij,ij->i", structure.planes[own, :3], across[leaf[own]])
         own = own[np.abs(turn) >= _SQUARE]
         order = own[np.argsort(leaf[own], kind="stable")]
         bounds = np.searchsorted(leaf[order], np.arange(len(across) + 1))
-        found: list[tuple[WallPlane, Ints]] = []
+        layers: list[tuple[WallPlane, Ints]] = []
         for first, last in itertools.pairwise(bounds):
-            found += _planes(structure, order[first:last])
-        boxes = [structure.corners[flat].reshape(-1, 3) for _, flat in found]
+            layers += _planes(structure, order[first:last])
+        boxes = [structure.corners[flat].reshape(-1, 3) for _, flat in layers]
         low = np.array([points.min(axis=0) for points in boxes]).reshape(-1, 3)
         high = np.array([points.max(axis=0) for points in boxes]).reshape(-1, 3)
-        return DoorPlanes(tuple(plane for plane, _ in found), low, high)
+        return DoorPlanes(tuple(plane for plane, _ in layers), low, high)
 
     def within(self, body: Polyhedron) -> list[WallPlane]:
-        """Those of leaves whose boxes meet that of a body."""
+        """The planes whose boxes meet that of a body."""
         low, high = body.points.min(axis=0), body.points.max(axis=0)
         meets = ((self.low <= high) & (self.high >= low)).all(axis=1)
         return [self.planes[i] for i in np.flatnonzero(meets)]
 
 
 def _planes(structure: Structure, triangles: Ints) -> list[tuple[WallPlane, Ints]]:
-    """The planes of one leaf, and which of its ``triangles`` lie in each."""
+    """The planes of one leaf, and its ``triangles`` in each."""
     layers: list[tuple[float, Floats, Ints]] = []
     left = triangles
     while len(left):
@@ -175,26 +172,26 @@ def _planes(structure: Structure, triangles: Ints) -> list[tuple[WallPlane, Ints
         left = left[~flat] if flat.any() else left[1:]
     least = _SHARE * max((area for area, *_ in layers), default=0.0)
     near = structure.tolerance.plane
-    found = []
+    result = []
     for area, plane, own in layers:
         if area >= least:
             frame = Frame.of(plane)
             every = structure.nearby.between(plane, -near, near)
             blocking = structure.united(frame, every[structure.lie_in(plane, every)])
-            found.append((WallPlane(frame, structure.united(frame, own), blocking), own))
-    return found
+            result.append((WallPlane(frame, structure.united(frame, own), blocking), own))
+    return result
 
 
-#: Areas are compared with this share to spare before polygons are.
+#: Margin, as a share, of the comparison of areas that precedes that of polygons.
 _SPARE = 1e-3
-#: So many planes are cut with a leaf at a time.
+#: Number of planes that are cut with a leaf at a time.
 _CHUNK = 4096
 
 
 def closing(structure: Structure, body: Polyhedron) -> list[WallPlane]:
-    """The planes in which what lies there leaves no opening between two parts of a body, in the
-    order of the model's triangles: many are equally good, and areas of strips some centimetres
-    wide keep few digits far from the origin."""
+    """The planes whose polygons leave no opening between two parts of a body, in the order of the
+    model's triangles: many are equally good, and areas of strips some centimetres wide keep few
+    digits far from the origin."""
     low, high = body.points.min(axis=0), body.points.max(axis=0)
     near = structure.nearby.meeting(low, high)
     slack, corners = structure.tolerance.plane, structure.corners[near]
@@ -202,11 +199,11 @@ def closing(structure: Structure, body: Polyhedron) -> list[WallPlane]:
     near = near[~apart.any(axis=1)]
     inside = _reaching_into(body, structure, near)
     areas, planes = structure.areas[inside], structure.planes[inside]
-    beside = structure.bins.beside(inside, areas)
+    nearby = structure.bins.own_sums(inside, areas)
     needed = _section_areas(body, planes) * (1 - _SPARE)
-    free = needed <= beside
+    free = needed <= nearby
     own = structure.bins.own[inside]
-    found: list[tuple[int, WallPlane]] = []
+    caps: list[tuple[int, WallPlane]] = []
     tries = Tries(np.unique(own, return_inverse=True)[1].reshape(-1), areas)
     for seed in ranked(np.where(free, areas, 0.0))[: np.count_nonzero(free)]:
         if not (free[seed] and tries.worth[seed]):
@@ -217,24 +214,24 @@ def closing(structure: Structure, body: Polyhedron) -> list[WallPlane]:
         free[seed] = False
         if areas[members].sum() >= needed[seed]:
             cap = _cap(body, planes[seed], structure, near)
-            found += [(int(inside[members[0]]), cap)] if cap else []
+            caps += [(int(inside[members[0]]), cap)] if cap else []
         else:
             tries.fail(seed, mates[free[mates]], float(needed[seed]))
-    return [cap for _, cap in sorted(found, key=lambda one: one[0])]
+    return [cap for _, cap in sorted(caps, key=lambda one: one[0])]
 
 
 def _reaching_into(body: Polyhedron, structure: Structure, triangles: Ints) -> Ints:
-    """Those triangles that have a point farther inside each face than lies in its plane: all that
+    """The triangles with a point inside each face of the body by more than the tolerance: all that
     have a part inside, and few others."""
-    found = triangles[structure.areas[triangles] > 0]
+    result = triangles[structure.areas[triangles] > 0]
     for plane in body.planes:
-        height = structure.corners[found] @ plane[:3] + plane[3]
-        found = found[height.min(axis=1) < -structure.tolerance.plane]
-    return found
+        height = structure.corners[result] @ plane[:3] + plane[3]
+        result = result[height.min(axis=1) < -structure.tolerance.plane]
+    return result
 
 
 def _cap(body: Polyhedron, plane: Floats, structure: Structure, near: Ints) -> WallPlane | None:
-    """What lies in a plane, if it leaves no opening in a body's section with it."""
+    """The polygons in a plane, if they leave no opening in a body's section with it."""
     tolerance = structure.tolerance
     outline = section(body, plane, tolerance.rounding)
     if len(outline) < 3:

@@ -1,4 +1,4 @@
-"""Walls: the large coplanar polygons of a scene, and the planes that they propose.
+"""Walls, the large coplanar polygons of a scene, the planes that they propose, and ray tests.
 
 Triangles are gathered into *layers*, sets that lie in one plane within tolerance, largest area
 first (cf. the area-weighted clustering of Airey 1990). In its plane, the triangles of a layer are
@@ -6,22 +6,19 @@ united (shapely) and split into connected polygons; those of at least ``wall_are
 
 Merging layers across the building within 1 cm, as the area-weighted mean or as the heaviest one,
 was tried and rejected: real walls of one line differ by millimetres from room to room, the merged
-plane then contains few of them, and what it does not contain cannot block. Near-parallel planes are
-told apart where they meet, in the BSP.
+plane then contains few of them, and walls outside the plane cannot block. Near-parallel planes are
+separated where they meet, in the BSP.
 
 A polygon blocks a portal only where it lies in the portal's plane within tolerance (design,
 "Structure"), so the blocking set of a plane is wider than its walls: every opaque structural
 triangle there, whatever its size.
 
-What somebody who stands somewhere has around: walls that face them, or away, and a roof.
-
-A column that stands on a floor has a place inside, as far as surfaces tell: floor, and head room.
-But all its sides face outwards. And of the outside of a building what is under a roof and between
-walls is another building, with a door or a window open. Rays from the middle of the body tell.
-
-Where a solid touches another, two faces lie in one plane, and which of them a ray meets is chance.
-So it is cast at all triangles moved a little to their fronts, and to their backs: where what it
-meets faces one way in the one and the other way in the other, it tells nothing.
+`Surroundings` casts rays from points to test for walls that face them, or away, and for a roof. A
+column on a floor has walkable floor inside, as far as surfaces show: floor and head room. But all
+its sides face outwards. And a point outside a building that is under a roof and between walls is in
+another building, with a door or a window open. Where a solid touches another, two faces lie in one
+plane, and a ray may meet either. So it is cast at all triangles moved a little to their fronts, and
+to their backs; a ray that meets faces of opposite directions in the two is ignored.
 """
 
 from __future__ import annotations
@@ -34,11 +31,10 @@ import shapely
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, cross, normals
-from ptmtools.cells.connectivity import Welded
-from ptmtools.cells.facets import UPWARD, Facets
+from ptmtools.cells.facets import UPWARD, Facets, Welded
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, neighbours, unite
-from ptmtools.cells.roles import Designated, recognised
+from ptmtools.cells.roles import Designated, detail_by_shape
 from ptmtools.cells.search import Bins, Nearby, Tries
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
@@ -76,7 +72,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class WallPlane:
-    """A plane that may split cells, and what lies in it, in its coordinates."""
+    """A plane that may split cells, and the polygons in it, in its coordinates."""
 
     frame: Frame
     walls: Geometry  # the polygons that may split
@@ -85,35 +81,35 @@ class WallPlane:
 
 @dataclass(frozen=True)
 class Structure:
-    """The triangles that may bound a leaf, as few as will do, and what is asked of them again and
-    again."""
+    """The triangles that may bound a leaf, as few as possible, with indices for searches."""
 
     corners: Floats  # (T, 3, 3) metres
     forced: Bools  # (T,) whether `SubdivideOptions.structural` names them
     planes: Floats  # (T, 4) and
     areas: Floats  # (T,), see `planes_of`
-    region: Ints  # (T,) the flat region that each is of
+    region: Ints  # (T,) the flat region of each
     nearby: Nearby
     bins: Bins
     tolerance: Tolerance
-    detail: Ints  # (d,) triangles of the scene that are detail by their shape
-    source: Ints  # (T,) the triangle of the scene that each is, or that its region begins with
-    door: Bools  # (T,) whether it is of a door leaf, which is no wall but may block
+    detail: Ints  # (d,) triangles of the scene that are detail by shape
+    source: Ints  # (T,) the triangle of the scene that each is, or the first of its region
+    door: Bools  # (T,) whether it belongs to a door leaf, which is no wall but may block
 
     @staticmethod
     def of(scene: Scene, options: SubdivideOptions, tolerance: Tolerance) -> Structure:
         """The structural triangles of a scene, without repetitions and in the order of the file,
         flat regions of many in as few as their outlines need (`facets`)."""
-        return Structure.made(Opaque.of(scene, options), tolerance)
+        return Structure.of_opaque(Opaque.of(scene, options), tolerance)
 
     @staticmethod
-    def made(opaque: Opaque, tolerance: Tolerance, doors: Bools | None = None) -> Structure:
-        """Of what is opaque in a scene; ``doors``: (T,) the triangles of door leaves."""
+    def of_opaque(opaque: Opaque, tolerance: Tolerance, doors: Bools | None = None) -> Structure:
+        """The structure of the opaque triangles; ``doors``: (T,) whether one of the scene's
+        triangles belongs to a door leaf."""
         facets, source, detail, forced, file = opaque
         mesh = facets.mesh
         door = np.zeros(len(source), dtype=bool) if doors is None else doors[source]
         leaf, rest = np.flatnonzero(door & ~detail), np.flatnonzero(~door)
-        if len(rest) < len(door):  # the edge of a leaf must not part the jamb that it touches
+        if len(rest) < len(door):  # the edge of a leaf must not split the jamb that it touches
             facets = Facets.of(Welded(mesh.point, mesh.triangle[rest], rest), file)
         parts = [
             facets.fewer(~detail[rest] & (forced[rest] == value), file) for value in (False, True)
@@ -139,7 +135,7 @@ class Structure:
         )
 
     def lie_in(self, plane: Floats, triangles: Ints) -> Bools:
-        """(n,) which of these triangles, by number, lie in a plane."""
+        """(n,) whether these triangles, by number, lie in a plane."""
         distance = np.abs(self.corners[triangles] @ plane[:3] + plane[3])
         lies: Bools = np.all(distance <= self.tolerance.plane, axis=1)
         return lies
@@ -156,42 +152,41 @@ def structural_triangles(
     the door leaves that are ``opened`` (see `Cells.opened`). Of triangles that are the same, the
     first may stand for all."""
     opaque = Opaque.of(scene, options)
-    found = np.zeros(len(scene.triangles), dtype=bool)
-    found[opaque.source[~opaque.detail]] = True
+    result = np.zeros(len(scene.triangles), dtype=bool)
+    result[opaque.source[~opaque.detail]] = True
     if opened is not None:
-        found[opened] = False
-    return found
+        result[opened] = False
+    return result
 
 
 class Opaque(NamedTuple):
-    """What is opaque in a scene and not said to be detail."""
+    """The opaque triangles of a scene that are not detail by name or class."""
 
     facets: Facets
-    source: Ints  # (n,) the triangles of the scene that its mesh consists of, ascending
-    detail: Bools  # (n,) which of them are detail by their shape
-    forced: Bools  # (n,) which `SubdivideOptions.structural` names
+    source: Ints  # (n,) the triangles of the scene in the mesh, ascending
+    detail: Bools  # (n,) whether each is detail by shape
+    forced: Bools  # (n,) whether `SubdivideOptions.structural` names it
     tolerance: Tolerance  # the scene's
 
     @staticmethod
     def of(scene: Scene, options: SubdivideOptions) -> Opaque:
-        """Of a scene."""
-        said = Designated.of(scene, options)
-        candidates = np.flatnonzero(scene.opaque & ~said.detail)
+        roles = Designated.of(scene, options)
+        candidates = np.flatnonzero(scene.opaque & ~roles.detail)
         mesh = Welded.of(scene.points, scene.triangles[candidates])
         source = candidates[mesh.source]
         facets = Facets.of(mesh, scene.tolerance)
         detail = np.zeros(len(source), dtype=bool)
         if options.detail_by_shape:
-            detail = recognised(facets, scene.triangle_object[source], options.wall_area)
-            detail &= ~said.structural[source]
-        return Opaque(facets, source, detail, said.forced[source], scene.tolerance)
+            detail = detail_by_shape(facets, scene.triangle_object[source], options.wall_area)
+            detail &= ~roles.structural[source]
+        return Opaque(facets, source, detail, roles.forced[source], scene.tolerance)
 
 
 def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:
     """The planes that may split leaves, heaviest first."""
     tolerance, forced = structure.tolerance, structure.forced
     least = (1 - TIE_SHARE) * wall_area
-    found: list[tuple[float, WallPlane]] = []
+    walls_by_area: list[tuple[float, WallPlane]] = []
     for plane in _layers(structure, least):
         frame = Frame.of(plane)
         near = structure.nearby.between(plane, -tolerance.plane, tolerance.plane)
@@ -207,8 +202,8 @@ def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:
             large |= shapely.intersects(parts, structure.united(frame, flat[forced[flat]]))
         if np.any(large):
             walls = shapely.multipolygons(parts[large])
-            found.append((float(shapely.area(walls)), WallPlane(frame, walls, blocking)))
-    return [found[i][1] for i in ranked(np.array([area for area, _ in found]))]
+            walls_by_area.append((float(shapely.area(walls)), WallPlane(frame, walls, blocking)))
+    return [walls_by_area[i][1] for i in ranked(np.array([area for area, _ in walls_by_area]))]
 
 
 def planes_of(corners: Floats) -> tuple[Floats, Floats]:
@@ -226,12 +221,12 @@ def _layers(structure: Structure, wall_area: float) -> list[Floats]:
     """Planes that hold enough coplanar area to carry a wall, heaviest first.
 
     Triangles are compared only within bins of similar normal and offset, and a bin is left as soon
-    as what is free in it cannot reach ``wall_area``, or too many planes were tried in vain: curved
-    detail, slivers and scans fall away before anything quadratic happens.
+    as its free area falls below ``wall_area``, or too many planes were tried without success: so
+    curved detail, slivers and scans do not take quadratic time.
     """
     planes, areas, forced = structure.planes, structure.areas, structure.forced
     bins = structure.bins
-    # A bin with a triangle that is forced is never left for want of area.
+    # A bin with a forced triangle is never left for lack of area.
     weights = np.where(structure.door, 0.0, areas + 2 * wall_area * forced)
     waiting = bins.weights(weights)
     start, members_of = bins.members()
@@ -261,8 +256,7 @@ def _layers(structure: Structure, wall_area: float) -> list[Floats]:
 
 
 def parallel_gap(plane: Floats, other: Floats, tolerance: Tolerance) -> float:
-    """Distance of two parallel (4,) planes in metres, whichever way they face; infinite for planes
-    that are not parallel."""
+    """Distance of two parallel (4,) planes in metres, whichever way they face; else infinite."""
     turn = float(plane[:3] @ other[:3])
     if abs(turn) < tolerance.cosine:
         return float("inf")
@@ -271,23 +265,21 @@ def parallel_gap(plane: Floats, other: Floats, tolerance: Tolerance) -> float:
 
 #: Level rays from a point.
 _RAYS = 32
-#: Somebody is inside if as large a share of them meets a wall: under eaves half of them do.
+#: A point is inside if at least this share of them meets a wall: under eaves half of them do.
 _INSIDE = 0.75
-#: It is the inside of a solid if as large a share of the walls around faces away.
+#: Points are inside a solid if at least this share of the walls around them faces away.
 _AWAY = 0.9
-
-
-#: From so many points walls are looked at.
+#: Number of points that look at the walls around.
 LOOKS = 16
 
 
 def spread_over(points: Floats, count: int) -> Floats:
-    """About so many of (n, 3) points."""
+    """About ``count`` of (n, 3) points, evenly taken."""
     return points[:: -(-len(points) // count)] if len(points) else points
 
 
 class Surroundings:
-    """(T, 3, 3) triangles, counter-clockwise as seen from their front."""
+    """Ray tests on (T, 3, 3) triangles, counter-clockwise as seen from their front."""
 
     def __init__(self, corners: Floats, tolerance: Tolerance) -> None:
         from embreex.mesh_construction import TriangleMesh
@@ -308,23 +300,23 @@ class Surroundings:
         self._level = np.stack([np.cos(angle), np.zeros(_RAYS), np.sin(angle)], axis=1)
 
     def solid(self, points: Floats) -> bool:
-        """Whether (n, 3) points are inside a solid: the walls that level rays from them meet face
-        away, nearly all."""
+        """Whether (n, 3) points are inside a solid: nearly all walls that level rays from them meet
+        face away."""
         along = np.tile(self._level, (len(points), 1))
         hit = self._hits(np.repeat(points, _RAYS, axis=0), along)
         away = np.einsum("sij,ij->si", self._front[hit], along) > 0
-        told = (hit >= 0).all(axis=0) & (away[0] == away[1])
-        return bool(told.any() and away[0, told].mean() >= _AWAY)
+        sure = (hit >= 0).all(axis=0) & (away[0] == away[1])
+        return bool(sure.any() and away[0, sure].mean() >= _AWAY)
 
     def floored(self, points: Floats) -> Bools:
-        """(n,) whether what is straight below each of (n, 3) points faces up."""
+        """(n,) whether the surface straight below each of (n, 3) points faces up."""
         hit = self._hits(points, np.tile([0.0, -1.0, 0.0], (len(points), 1)))
-        found: Bools = ((hit >= 0) & (self._front[hit, 1] > 0)).all(axis=0)
-        return found
+        result: Bools = ((hit >= 0) & (self._front[hit, 1] > 0)).all(axis=0)
+        return result
 
     def first(self, points: Floats, along: Floats) -> tuple[Floats, Floats]:
-        """What rays from (n, 3) points along (n, 3) unit vectors meet first: (n,) how far away,
-        metres, infinite where there is nothing, and (n, 3) its unit normal."""
+        """The first surfaces that rays from (n, 3) points along (n, 3) unit vectors meet: (n,)
+        distances, metres, infinite without a hit, and (n, 3) unit normals."""
         hit = self._hits(points, along)[0]
         far, facing = np.full(len(points), np.inf), np.zeros((len(points), 3))
         met = np.flatnonzero(hit >= 0)
@@ -336,19 +328,19 @@ class Surroundings:
         return far, facing
 
     def inside(self, points: Floats, roofed: bool = True) -> Bools:
-        """(n,) which of (n, 3) points are between walls, and under a roof if there are ``roofed``
-        ones."""
-        found: Bools = self._hits(points, np.tile([0.0, 1.0, 0.0], (len(points), 1)))[0] >= 0
-        found |= not roofed
-        under = np.flatnonzero(found)
+        """(n,) which of (n, 3) points are between walls and, if the building is ``roofed``, under a
+        roof."""
+        result: Bools = self._hits(points, np.tile([0.0, 1.0, 0.0], (len(points), 1)))[0] >= 0
+        result |= not roofed
+        under = np.flatnonzero(result)
         along = np.tile(self._level, (len(under), 1))
         met = self._hits(np.repeat(points[under], _RAYS, axis=0), along)[0] >= 0
-        found[under] = met.reshape(-1, _RAYS).mean(axis=1) >= _INSIDE
-        return found
+        result[under] = met.reshape(-1, _RAYS).mean(axis=1) >= _INSIDE
+        return result
 
     def _hits(self, points: Floats, along: Floats) -> Ints:
-        """(2, n) the triangle that each ray meets first, or -1, with all moved to their fronts, and
-        to their backs."""
+        """(2, n) the first triangle that each ray meets, or -1, with all triangles moved to their
+        fronts, and to their backs."""
         origin = np.ascontiguousarray((points - self._middle) * self._scale, dtype=np.float32)
         direction = np.ascontiguousarray(along, dtype=np.float32)
         if not len(origin):

@@ -1,56 +1,52 @@
-"""From a scene to convex cells, portals and cut geometry (paper §3).
+"""Subdivision of a scene into convex cells, portals and cut geometry (paper §3).
 
-1. Walls propose planes (`structure`), the planes split the root box into convex leaves (`bsp`),
-   what no wall covers between two leaves is a portal (`portals`).
-2. A flood through the portals finds what somebody can reach (`reach`). The first root box is wider
-   than the model: if the flood never meets it, the model is closed and everything else is dropped.
-   If it does, the model is open; the root box is then clipped to the walls and the subdivision done
-   again, so that the open space over low walls does not join everything to everything
-   (`division`).
-3. The geometry is cut to the leaves, and each piece gets its owners (`ownership`); the leaves that
-   are reached are put together with it (`assembly`).
-4. What cannot be seen from where one can stand (`standing`) is left out (`seen`). Each of the
-   other leaves is a cell, or the leaves of a room are (`grouping`).
-5. Pieces of the geometry with the same owners are joined again (`joining`).
+1. Walls propose planes (`structure`), the planes split the root box into convex leaves (`bsp`), and
+   the parts of the leaves' boundaries that no wall covers are portals (`portals`).
+2. A flood through the portals finds the reachable leaves. The first root box is wider than the
+   model: if the flood never meets it, the model is closed and the remaining leaves are dropped.
+   Otherwise the model is open; the root box is then clipped to the walls and divided again, so that
+   the open space over low walls does not connect all rooms (`division`).
+3. The geometry is cut to the leaves, and each piece gets its owners (`ownership`).
+4. Leaves that no standing viewer sees are left out (`sight`). Each remaining leaf is a cell, or all
+   leaves of a room are one (`rooms`).
+5. Pieces of geometry with the same owners are joined again (`joining`).
 
-A world in which nothing is seen is a mistake in the model, and not a result.
+A model none of whose faces is visible from inside is an error, not a result.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, normals
+from ptmtools.arrays import Bools, Floats, Ints, normals
 from ptmtools.cells.diagnostics import (
-    of_detail,
-    of_doors,
-    of_leaves,
-    of_no_doors,
-    of_triangles,
-    of_undecided,
-    of_unreached,
+    NO_PLACES,
+    detail_notes,
+    door_notes,
+    leaf_notes,
+    triangle_notes,
+    undecided_notes,
+    unreached_notes,
+    unrecognised_door_notes,
+    viewpoint_notes,
 )
-from ptmtools.cells.division import (
-    Building,
-    Space,
-    assembled,
-    bounds,
-    divide,
-    divide_inside,
-    kept_names,
-)
+from ptmtools.cells.division import Building, Space, bounds, divide, divide_inside
 from ptmtools.cells.joining import joined
-from ptmtools.cells.model import Cells
+from ptmtools.cells.model import OUTSIDE, Cells, descend
 from ptmtools.cells.options import SubdivideOptions
-from ptmtools.cells.ownership import cut_to_leaves
+from ptmtools.cells.ownership import Pieces, cut_to_leaves
+from ptmtools.cells.places import eye_region, find_places, meets
 from ptmtools.cells.planar import count, counting
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.portals import ROOFED, roofed_share
 from ptmtools.cells.roles import matches
 from ptmtools.cells.rooms import grouped
 from ptmtools.cells.sight import seen_from_places
+from ptmtools.cells.structure import LOOKS, Surroundings, spread_over
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
 from ptmtools.parallel import Executor
@@ -59,47 +55,9 @@ from ptmtools.scene.model import Scene
 from ptmtools.scene.orientation import main_axes
 from ptmtools.tolerance import Tolerance
 
-
-def check_seen(scene: Scene, cells: Cells) -> None:
-    """Raises InputError PTM-I304 if from nowhere in the cells a face of the scene is seen."""
-    if _something_seen(scene, cells):
-        return
-    if scene.two_sided.all():
-        raise InputError(
-            "PTM-I304",
-            "no face of the model lies in or around a cell",
-            remedy="give a --viewpoint X,Y,Z inside a room",
-        )
-    raise InputError(
-        "PTM-I304",
-        "nothing of the model is visible from inside: no face around its cells is turned towards "
-        "them or has a back",
-        remedy="give --two-sided to draw every face from both sides, or turn the normals",
-    )
-
-
-def _something_seen(scene: Scene, cells: Cells) -> bool:
-    """Whether some face is two-sided or faces the box around its cell. In doubt it does: what lies
-    in a side of the root box is emitted with the cell there, whichever way it looks."""
-    piece, cell = cells.emitted(scene.two_sided)
-    if not len(piece) or scene.two_sided[cells.triangle_source[piece]].any():
-        return len(piece) > 0
-    low, high = np.full((2, cells.cell_count, 3), [[[np.inf]], [[-np.inf]]])
-    starts = cells.leaf_point_start[:-1]
-    kept = cells.leaf_cell >= 0
-    of = cells.leaf_cell[kept]
-    np.minimum.at(low, of, np.minimum.reduceat(cells.leaf_point, starts)[kept])
-    np.maximum.at(high, of, np.maximum.reduceat(cells.leaf_point, starts)[kept])
-    corners = cells.vertex[cells.triangle[piece]]
-    facing = normals(corners)
-    furthest = np.where(facing > 0, high[cell], low[cell])
-    ahead = np.einsum("nk,nk->n", furthest - corners[:, 0], facing)
-    return bool((ahead > cells.tolerance.thin * np.linalg.norm(facing, axis=1)).any())
-
-
 #: How far the first root box stands off the model, as a share of the model's extent.
 BOX_MARGIN = 0.01
-#: So many triangles take as long to subdivide as two processes to start.
+#: Number of triangles that take as long to subdivide as two processes take to start.
 LARGE = 4000
 
 
@@ -118,15 +76,14 @@ def subdivide(
     ------
     InputError: PTM-I111 if an option is out of range or a viewpoint lies in no leaf, PTM-I302
         if a name pattern matches nothing, PTM-I247 if the scene is a single triangle, PTM-I304 if
-        nothing of it would be seen, PTM-I305 if much is left out and must not be.
+        no face would be visible, PTM-I305 if much is left out under ``strict``.
     """
     options = options or SubdivideOptions()
     _check(scene, options)
     with counting() as undecided:
         cells = _subdivided(scene, options, progress, executor or Executor())
-    cells = replace(cells, notes=(*cells.notes, *of_undecided(undecided)))
     check_seen(scene, cells)
-    return cells
+    return replace(cells, notes=(*cells.notes, *undecided_notes(undecided)))
 
 
 def _subdivided(
@@ -140,7 +97,7 @@ def _subdivided(
     wide = Polyhedron.box(low - margin, high + margin)
     wide = replace(wide, points=wide.points @ axes)
     tight = _thickened(*bounds(corners if len(corners) else scene.corners), tolerance)
-    notes = of_detail(scene, building.structure.detail)
+    notes = detail_notes(scene, building.structure.detail)
     clipped = executor.submit(divide_inside, building, tight, long=len(scene.triangles) >= LARGE)
     try:
         space = divide(building, wide, progress)
@@ -152,25 +109,25 @@ def _subdivided(
         clipped.cancel()
     opened = building.doors.triangles(space.doors)
     if options.doors != "closed":
-        notes += of_doors(building.doors.leaves, space.doors, options.doors == "hidden")
+        notes += door_notes(building.doors.leaves, space.doors, options.doors == "hidden")
         if space.beyond.rooms or space.beyond.outside:
-            notes += of_no_doors(scene, building.doors.leaves)
-    notes += of_unreached(space.beyond, options.reach == "all", space.place, options.strict)
+            notes += unrecognised_door_notes(scene, building.doors.leaves)
+    notes += unreached_notes(space.beyond, options.reach == "all", space.place, options.strict)
     if space.tree.unsplit:
         notes.append(
             Warned(
                 f"the limit of {options.max_leaves:,} leaves was reached: {space.tree.unsplit:,} "
-                "of them contain walls that do not divide them, so what is behind these walls "
+                "of them contain walls that do not divide them, so the space behind these walls "
                 "counts as visible; raise --max-leaves"
             )
         )
     pieces = cut_to_leaves(scene, space.tree, tolerance)
-    owner = kept_names(space.reached)[pieces.leaf]
+    owner = compact_numbers(space.reached)[pieces.leaf]
     cells = assembled(scene, building, space, pieces, owner, notes)
-    name = np.append(kept_names(seen_from_places(cells, executor)), np.int32(-1))
+    name = np.append(compact_numbers(seen_from_places(cells, executor)), np.int32(-1))
     cells = replace(cells, leaf_cell=name[:-1], triangle_cell=name[cells.triangle_cell])
-    said = [*of_leaves(cells, space.reached), *of_triangles(scene, pieces, name[owner])]
-    cells = grouped(replace(cells, notes=(*cells.notes, *said)), options)
+    dropped = [*leaf_notes(cells, space.reached), *triangle_notes(scene, pieces, name[owner])]
+    cells = grouped(replace(cells, notes=(*cells.notes, *dropped)), options)
     owner = np.append(cells.leaf_cell, np.int32(-1))[owner]
     if options.doors == "hidden":
         owner[np.isin(pieces.source, opened)] = -1
@@ -196,18 +153,168 @@ def _check(scene: Scene, options: SubdivideOptions) -> None:
 
 
 def _thickened(low: Floats, high: Floats, tolerance: Tolerance) -> Floats:
-    """A box that is flat nowhere: a scene that is only a floor still has one cell above it."""
+    """(2, 3) box with a height in every direction: a mere floor still has one cell above it."""
     flat = high - low < tolerance.thin
     return np.array([low, np.where(flat, low + BOX_MARGIN * tolerance.extent, high)])
 
 
 def _open_note(space: Space, roofed: float, box: Floats) -> str:
     if roofed < ROOFED:
-        what = f"open above: {1 - roofed:.0%} of the floor has no ceiling"
+        state = f"open above: {1 - roofed:.0%} of the floor has no ceiling"
     elif not space.reached.any():
-        what = "open: no room is closed off from the outside"
+        state = "open: no room is closed off from the outside"
     else:
-        what = "open: the outside can be reached from the rooms (windows, doors or gaps)"
+        state = "open: the outside can be reached from the rooms (windows, doors or gaps)"
     size = " × ".join(f"{s:.2f}" for s in box[1] - box[0])
-    note = f"the model is {what}; cells end at the bounding box of its walls, {size} m"
+    note = f"the model is {state}; cells end at the bounding box of its walls, {size} m"
     return Warned(note) if roofed < ROOFED else note
+
+
+def assembled(
+    scene: Scene,
+    building: Building,
+    space: Space,
+    pieces: Pieces,
+    owner: NDArray[np.int32],
+    notes: list[str],
+) -> Cells:
+    """Cells that are single leaves, with the pieces of the geometry as they were cut."""
+    tree = space.tree
+    keep = space.reached
+    rename = compact_numbers(keep)
+    bodies = [tree.leaves[i] for i in np.flatnonzero(keep)]
+    standing, eye_floor = _standing(building, bodies, space.doors)
+    if not standing.any():
+        standing[:], eye_floor = True, eye_floor[:0]
+        notes = [*notes, NO_PLACES]
+    viewpoints, cameras = (
+        np.array(points, dtype=np.float64).reshape(-1, 3)
+        for points in (building.options.viewpoints, [camera.position for camera in scene.cameras])
+    )
+    leaf = _leaf_at(space, rename, viewpoints)
+    notes = [*notes, *viewpoint_notes(_buried(building, viewpoints, eye_floor))]
+    # Viewers stand at requested viewpoints, whatever the floor there.
+    leaf = np.append(leaf, _leaf_at(space, rename, cameras))
+    standing[leaf[leaf >= 0]] = True
+    portals = [portal for portal in space.portals if keep[[*portal.leaves]].all()]
+    ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
+    children = tree.children.copy()
+    is_leaf = children <= -2
+    leaf = rename[-2 - children[is_leaf]]
+    children[is_leaf] = np.where(leaf >= 0, -2 - leaf, OUTSIDE)
+
+    owned = np.any(owner >= 0, axis=1)
+    corners = scene.corners[pieces.source]
+    corners[pieces.cut] = pieces.corner[..., :3]
+    vertex = corners[owned].reshape(-1, 3)
+
+    point_start = _starts(len(b.points) for b in bodies)
+    loops = [loop + point_start[i] for i, b in enumerate(bodies) for loop in b.faces]
+    return Cells(
+        node_plane=tree.planes,
+        node_child=children,
+        root_box=space.box,
+        leaf_cell=np.arange(len(bodies), dtype=np.int32),
+        leaf_standing=standing,
+        leaf_point=np.concatenate([b.points for b in bodies]),
+        leaf_point_start=point_start,
+        face_index=np.concatenate(loops).astype(np.int32),
+        face_start=_starts(map(len, loops)),
+        leaf_face_start=_starts(len(b.faces) for b in bodies),
+        portal_leaf=rename[ends],
+        portal_plane=tree.planes[[portal.node for portal in portals]].reshape(-1, 4),
+        portal_point=np.concatenate([np.zeros((0, 3)), *(portal.polygon for portal in portals)]),
+        portal_start=_starts(len(portal.polygon) for portal in portals),
+        portal_area=np.array([portal.area for portal in portals]),
+        vertex=vertex,
+        vertex_uv=np.zeros((len(vertex), 2)),
+        triangle=np.arange(len(vertex), dtype=np.int32).reshape(-1, 3),
+        triangle_source=pieces.source[owned].astype(np.int32),
+        triangle_cell=owner[owned],
+        tolerance=scene.tolerance,
+        eye_floor=eye_floor,
+        left_out=space.left_out,
+        walker=building.walker,
+        closed=space.closed,
+        notes=tuple(notes),
+    )
+
+
+def compact_numbers(keep: Bools) -> NDArray[np.int32]:
+    """(L,) the new numbers of the leaves that are kept, -1 for the others."""
+    return np.where(keep, np.cumsum(keep) - 1, -1).astype(np.int32)
+
+
+def _standing(building: Building, bodies: list[Polyhedron], opened: Bools) -> tuple[Bools, Floats]:
+    """(L,) whether a viewer can stand in a leaf, and `Cells.eye_floor`; ``opened``: (d,) doors."""
+    walker, tolerance = building.walker, building.structure.tolerance
+    if building.options.standing == "anywhere":
+        return np.ones(len(bodies), dtype=np.bool_), np.zeros((0, 3, 3))
+    boxes = np.array([bounds(body.points) for body in bodies]).reshape(-1, 2, 3)
+    blocking = ~np.append(opened, False)[building.doors.of]
+    structure = replace(building.structure, corners=building.structure.corners[blocking])
+    places = find_places(building.footing, structure, walker, boxes)
+    eyes = eye_region(places, walker, tolerance)
+    return meets(eyes, bodies, walker, tolerance), eyes.triangles(tolerance)
+
+
+def _leaf_at(space: Space, rename: NDArray[np.int32], points: Floats) -> NDArray[np.int32]:
+    """(n,) the new number of the leaf that contains each of (n, 3) points, or -1."""
+    leaf = rename[-2 - descend(space.tree.planes, space.tree.children, points)]
+    inside = ((points >= space.box[0]) & (points <= space.box[1])).all(axis=1)
+    return np.where(inside, leaf, -1).astype(np.int32)
+
+
+def _buried(building: Building, points: Floats, eye_floor: Floats) -> Floats:
+    """Those of (n, 3) points that lie inside a solid, unless bodies on the ``eye_floor`` do so
+    too: in a model whose room faces point outwards, solids cannot be recognised."""
+    structure = building.structure
+    if not (len(points) and len(eye_floor)):
+        return points[:0]
+    around = Surroundings(structure.corners, structure.tolerance)
+    body = eye_floor.mean(axis=1) + [0.0, building.walker.middle, 0.0]
+    if around.solid(spread_over(body, LOOKS)):
+        return points[:0]
+    return points[[around.solid(point[None]) for point in points]]
+
+
+def _starts(lengths: Iterable[int]) -> Ints:
+    """(n + 1,) where the rows of a CSR begin."""
+    return np.cumsum([0, *lengths], dtype=np.int64)
+
+
+def check_seen(scene: Scene, cells: Cells) -> None:
+    """Raises InputError PTM-I304 if no face of the scene is visible from any cell."""
+    if _any_face_seen(scene, cells):
+        return
+    if scene.two_sided.all():
+        raise InputError(
+            "PTM-I304",
+            "no face of the model lies in or around a cell",
+            remedy="give a --viewpoint X,Y,Z inside a room",
+        )
+    raise InputError(
+        "PTM-I304",
+        "nothing of the model is visible from inside: no face around its cells is turned towards "
+        "them or has a back",
+        remedy="give --two-sided to draw every face from both sides, or turn the normals",
+    )
+
+
+def _any_face_seen(scene: Scene, cells: Cells) -> bool:
+    """Whether some face is two-sided or faces the box around its cell. In doubt it does: a face in
+    a side of the root box is emitted with the adjacent cell, whichever way it is turned."""
+    piece, cell = cells.emitted(scene.two_sided)
+    if not len(piece) or scene.two_sided[cells.triangle_source[piece]].any():
+        return len(piece) > 0
+    low, high = np.full((2, cells.cell_count, 3), [[[np.inf]], [[-np.inf]]])
+    starts = cells.leaf_point_start[:-1]
+    kept = cells.leaf_cell >= 0
+    of = cells.leaf_cell[kept]
+    np.minimum.at(low, of, np.minimum.reduceat(cells.leaf_point, starts)[kept])
+    np.maximum.at(high, of, np.maximum.reduceat(cells.leaf_point, starts)[kept])
+    corners = cells.vertex[cells.triangle[piece]]
+    facing = normals(corners)
+    furthest = np.where(facing > 0, high[cell], low[cell])
+    ahead = np.einsum("nk,nk->n", furthest - corners[:, 0], facing)
+    return bool((ahead > cells.tolerance.thin * np.linalg.norm(facing, axis=1)).any())

@@ -22,7 +22,7 @@ from ptmtools.scene.options import SUFFIXES, IngestOptions
 from ptmtools.texture.model import Description, PtmHeader, gpu_texel_bytes
 
 if TYPE_CHECKING:
-    from ptmtools.cells.entrances import Enclosure
+    from ptmtools.cells.open_doors import Enclosure
     from ptmtools.scene.inspection import Guess, Inspection
 
 #: Shown for a stage whose record has another recipe.
@@ -218,7 +218,7 @@ def _described(description: Description) -> dict[str, Any]:
 
 def _info_model(console: Console, target: str, options: IngestOptions, as_json: bool) -> None:
     """Raises what `ptmtools.scene.ingest` raises."""
-    from ptmtools.cells.entrances import enclosure
+    from ptmtools.cells.open_doors import enclosure
     from ptmtools.parallel import processors
     from ptmtools.scene.inspection import inspect
 

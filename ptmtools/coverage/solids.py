@@ -27,9 +27,8 @@ from functools import cached_property
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints, areas
-from ptmtools.cells.connectivity import connected
 from ptmtools.cells.model import Cells
-from ptmtools.cells.search import Nearby
+from ptmtools.cells.search import Nearby, connected
 from ptmtools.scene.model import Scene
 
 #: Directions of the parity rays. Fixed, in no simple relation to each other or to the axes, so

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from ptmtools.cells import Cells, SubdivideOptions, structural_triangles, subdivide
-from ptmtools.cells.connectivity import connected
-from ptmtools.cells.entrances import Doors
+from ptmtools.cells.open_doors import Doors
 from ptmtools.cells.options import DoorState
-from ptmtools.cells.roles import says_door
+from ptmtools.cells.roles import is_door_name
+from ptmtools.cells.search import connected
 from ptmtools.cells.structure import Opaque, Structure
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
@@ -99,7 +99,7 @@ def found(scene: Scene, **options: object) -> list[str]:
     chosen = SubdivideOptions(**options)  # type: ignore[arg-type]
     tolerance = scene.tolerance.for_walls(chosen.wall_thickness)
     opaque = Opaque.of(scene, chosen)
-    doors, _ = Doors.found(scene, opaque, Structure.made(opaque, tolerance), chosen)
+    doors, _ = Doors.recognise(scene, opaque, Structure.of_opaque(opaque, tolerance), chosen)
     return [door.name for door in doors.leaves]
 
 
@@ -113,7 +113,7 @@ def said(cells: Cells) -> list[str]:
     "Voordeur innerdörr drzwi_2 Дверь porte-01 puerta.001 M_Door_Oak".split(),
 )
 def test_what_is_called_door(name: str) -> None:
-    assert says_door(name)
+    assert is_door_name(name)
 
 
 @pytest.mark.parametrize(
@@ -122,7 +122,7 @@ def test_what_is_called_door(name: str) -> None:
     "doorhandle doormat wall_with_door Türrahmen matador support porter importer tuermatte".split(),
 )
 def test_what_is_not_called_door(name: str) -> None:
-    assert not says_door(name)
+    assert not is_door_name(name)
 
 
 PAIR: Faces = leaf(4.05, (0, 2.1, -0.9, -0.002)) + leaf(4.05, (0, 2.1, 0.002, 0.9))

@@ -10,8 +10,7 @@ import shapely
 
 from ptmtools.arrays import areas
 from ptmtools.cells import SubdivideOptions, subdivide
-from ptmtools.cells.connectivity import Welded
-from ptmtools.cells.facets import Facets
+from ptmtools.cells.facets import Facets, Welded
 from ptmtools.cells.planar import counting
 from ptmtools.cells.structure import Structure, find_walls
 from ptmtools.scene import ingest

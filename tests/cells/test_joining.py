@@ -13,10 +13,10 @@ import pytest
 
 from ptmtools.arrays import areas
 from ptmtools.cells import SubdivideOptions, subdivide, subdivision
-from ptmtools.cells.connectivity import first_alike, welded
 from ptmtools.cells.joining import Mesh, joined, patches
 from ptmtools.cells.ownership import Pieces
 from ptmtools.cells.planar import triangulated
+from ptmtools.cells.search import first_alike, welded
 from ptmtools.scene import ingest
 from ptmtools.scene.model import Material, Scene
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ptmtools.cells.connectivity import first_alike
 from ptmtools.cells.joining import patches
+from ptmtools.cells.search import first_alike
 from ptmtools.scene.model import Scene
 from tests.conftest import scene_of
 

@@ -12,7 +12,7 @@ import pytest
 import shapely
 
 from ptmtools.cells import planar, subdivision
-from ptmtools.cells.diagnostics import of_undecided
+from ptmtools.cells.diagnostics import undecided_notes
 from ptmtools.cells.division import Space, divide
 from ptmtools.cells.planar import (
     bounded,
@@ -241,10 +241,10 @@ def test_what_cannot_be_decided_errs_to_the_safe_side_and_is_counted() -> None:
     assert undecided == {
         "union": 2, "difference": 3, "intersection": 2, "buffer": 3, "triangles": 4,
     }  # fmt: skip
-    flat, rest = of_undecided(undecided)
+    flat, rest = undecided_notes(undecided)
     assert flat.startswith("4 flat surfaces could not be divided")
     assert "(3 buffers, 3 differences, 2 intersections, 2 unions)" in rest
-    assert of_undecided({}) == []
+    assert undecided_notes({}) == []
 
 
 def test_counts_of_a_context_inside_are_its_own() -> None:

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ptmtools.cells import connectivity as welding
-from ptmtools.cells.connectivity import Welded, across_edges, distinct
+from ptmtools.cells import search
+from ptmtools.cells.facets import Welded, across_edges
+from ptmtools.cells.search import distinct
 
 ROWS = st.lists(st.tuples(*[st.sampled_from([0.0, -0.0, 1.0, 2.0**60, 1e-300])] * 3), max_size=40)
 
@@ -18,9 +19,9 @@ def first_of_each(rows: list[tuple[float, ...]]) -> tuple[list[int], list[int]]:
     return [rows.index(row) for row in seen], place
 
 
-@pytest.mark.parametrize("factor", [welding._FACTOR, np.uint64(0)], ids=["hash", "collisions"])
+@pytest.mark.parametrize("factor", [search._FACTOR, np.uint64(0)], ids=["hash", "collisions"])
 def test_distinct_rows(monkeypatch: pytest.MonkeyPatch, factor: np.uint64) -> None:
-    monkeypatch.setattr(welding, "_FACTOR", factor)
+    monkeypatch.setattr(search, "_FACTOR", factor)
 
     @given(ROWS)
     def check(rows: list[tuple[float, ...]]) -> None:

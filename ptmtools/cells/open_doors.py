@@ -1,19 +1,17 @@
-"""Which doors open, and the portals that this brings.
+"""Doors that open, the portals that result, and how closed a model looks before it is divided.
 
-The building is divided as if all doors were shut. A door opens if both its sides are inside: if
-the flood came there, or if somebody could be there that it did not come to (`cut_off`). Then its
-leaves no longer block: what they covered in the planes of the tree becomes portals, and nothing
-need be divided again. An entrance has nothing but the outside on one side, and stays shut, as does
-the door of a cupboard in which nobody can stand. So a closed model stays closed.
+The building is divided with all doors shut. A door opens if both its sides are inside: reached by
+the flood, or in an unreachable room (`division`). Its leaves then no longer block: the parts of the
+tree's planes that they covered become portals, and nothing is divided again. An entrance has the
+outside on one side and stays shut, as does the door of a cupboard without standing room. So a
+closed model stays closed.
 
-Of an open model the outside may be reached like any room: through a window. There somebody inside
-has walls around, glass included, and a roof over the head, if the building has any.
+The flood may reach the outside of an open model like any room: through a window. There a point
+counts as inside if it has walls around it, glass included, and a roof above, if the building has
+any.
 
-How a model looks to somebody who stands in it, before it is divided: whether it is closed, and
-what is taken for a door.
-
-Division decides this exactly (`reach`), and takes its time. Here sight lines are cast from points
-at the height of eyes over the floors of rooms, and those are counted that leave the model.
+`enclosure` estimates in advance, without a division, whether a model is closed: it casts sight
+lines from points at eye height over the floors of rooms and counts those that leave the model.
 """
 
 from __future__ import annotations
@@ -26,9 +24,8 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.bsp import Tree
-from ptmtools.cells.doors import DoorLeaf, find_doors
-from ptmtools.cells.doorways import RELIEF
-from ptmtools.cells.model import sunk
+from ptmtools.cells.doors import RELIEF, DoorLeaf, find_doors
+from ptmtools.cells.model import descend
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.places import Floors, detail_of, spread
 from ptmtools.cells.portals import ROOFED, Portal, find_portals, flood, roofed_share
@@ -36,79 +33,81 @@ from ptmtools.cells.split_planes import DoorPlanes
 from ptmtools.cells.structure import Opaque, Structure, Surroundings, spread_over
 from ptmtools.scene.model import Scene
 
-#: What is so far from a leaf, in front and behind, metres, is beyond it.
+#: The sides of a leaf are sampled this far in front of it and behind, metres.
 _BEYOND = 0.1
-#: Somebody who comes through an open door has so much, metres, of the way before and behind it
-#: inside: under a porch one soon is not.
+#: Points on the way through a door that must be inside, metres from the leaf: the way under a porch
+#: soon leaves it.
 _WAY = (0.5, 1.0, 2.0)
-#: Most of the points over a side of a leaf say where that side is.
+#: A side of a leaf is inside if a greater share of its points is.
 _MOST = 0.5
 
 
 @dataclass(frozen=True)
 class Doors:
-    """The door leaves of a building, and what there is to tell its inside from the outside."""
+    """The door leaves of a building, with the glass and roofs that separate inside and outside."""
 
     leaves: list[DoorLeaf]
-    of: Ints  # (T,) the leaf that each triangle of the structure is of, or -1
-    glass: Floats  # (n, 3, 3) what is transparent, metres
+    of: Ints  # (T,) the leaf to which each triangle of the structure belongs, or -1
+    glass: Floats  # (n, 3, 3) transparent triangles, metres
     roofed: bool  # whether the building has roofs or ceilings
     planes: DoorPlanes
 
     @staticmethod
-    def found(
+    def recognise(
         scene: Scene, opaque: Opaque, structure: Structure, options: SubdivideOptions
     ) -> tuple[Doors, Structure]:
-        """The doors of a scene, and its structure with every triangle of theirs as it was."""
+        """The doors of a scene, and its structure with their triangles unsimplified."""
         leaves = find_doors(scene, opaque, structure, options)
         leaf = np.full(len(scene.triangles), -1)
         for i, door in enumerate(leaves):
             leaf[door.triangles] = i
         glass, roofed = scene.corners[~scene.opaque], True
         if leaves:
-            structure = Structure.made(opaque, structure.tolerance, leaf >= 0)
+            structure = Structure.of_opaque(opaque, structure.tolerance, leaf >= 0)
             roofed = roofed_share(structure.corners, options.wall_area) >= ROOFED
         of = leaf[structure.source]
         across = np.array([door.axes[0] for door in leaves]).reshape(-1, 3)
         return Doors(leaves, of, glass, roofed, DoorPlanes.of(structure, of, across)), structure
 
     def triangles(self, which: Bools) -> NDArray[np.int32]:
-        """The triangles of the scene, ascending, that some of the (d,) leaves consist of."""
+        """The triangles of the scene, ascending, of the leaves ``which``, (d,)."""
         each = [self.leaves[i].triangles for i in np.flatnonzero(which)]
         return np.unique(np.concatenate([np.zeros(0, np.int64), *each])).astype(np.int32)
 
     def sides(self, tree: Tree, within: Bools) -> Bools:
-        """(d, 2) which sides of leaves are in the (L,) leaves of the tree ``within``."""
-        found = np.zeros((len(self.leaves), 2), dtype=bool)
+        """(d, 2) which sides of door leaves are in the (L,) tree leaves ``within``."""
+        result = np.zeros((len(self.leaves), 2), dtype=bool)
         for i, door in enumerate(self.leaves):
-            at = np.array([sunk(tree.planes, tree.children, side) for side in door.grid(_BEYOND)])
-            found[i] = within[-2 - at].mean(axis=1) > _MOST
-        return found
+            at = np.array(
+                [descend(tree.planes, tree.children, side) for side in door.grid(_BEYOND)]
+            )
+            result[i] = within[-2 - at].mean(axis=1) > _MOST
+        return result
 
     def lead_to_open_rooms(
         self, structure: Structure, tree: Tree, inside: Bools, outside: Bools
     ) -> bool:
-        """Whether one leads from ``inside``, (L,) leaves of the tree, into a room that the
-        ``outside``, (L,), comes into too, such as through a window."""
+        """Whether a door leads from ``inside``, (L,) tree leaves, into a room that the ``outside``,
+        (L,), reaches too, such as through a window."""
         which = self.sides(tree, inside).any(axis=1) & self.sides(tree, outside).any(axis=1)
         return bool(which.any()) and bool((which & self.sheltered(structure)).any())
 
     def sheltered(self, structure: Structure) -> Bools:
-        """(d,) which leaves have, on both sides, walls around whoever goes there, and a roof."""
+        """(d,) which leaves have walls around and a roof above the ways on both sides."""
         around = Surroundings(np.concatenate([structure.corners, self.glass]), structure.tolerance)
-        found = np.zeros(len(self.leaves), dtype=bool)
+        result = np.zeros(len(self.leaves), dtype=bool)
         for i, door in enumerate(self.leaves):
-            found[i] = all(
+            result[i] = all(
                 around.inside(points, self.roofed).all() for points in _ways(door, around)
             )
-        return found
+        return result
 
     def lead_out(self, portals: list[Portal], outside: Bools) -> Bools:
-        """(d,) which leaves have portals around them that lead ``outside``, (L,): the frames of
-        some leave a gap into the wall."""
+        """(d,) which leaves have portals around them that lead ``outside``, (L,): some frames leave
+        a gap into the wall."""
         out = [p.polygon for p in portals if outside[p.leaves[0]] != outside[p.leaves[1]]]
         reach = np.array([RELIEF, _BEYOND, _BEYOND])
-        found = np.zeros(len(self.leaves), dtype=bool)
+        result = np.zeros(len(self.leaves), dtype=bool)
         if out:
             points = np.concatenate(out)
             first = np.cumsum([0, *(len(polygon) for polygon in out[:-1])])
@@ -116,8 +115,8 @@ class Doors:
                 local = points @ door.axes.T
                 low, high = (f.reduceat(local, first) for f in (np.minimum, np.maximum))
                 meets = (high >= door.low - reach) & (low <= door.high + reach)
-                found[i] = meets.all(axis=1).any()
-        return found
+                result[i] = meets.all(axis=1).any()
+        return result
 
 
 def _ways(door: DoorLeaf, around: Surroundings) -> Iterator[Floats]:
@@ -131,7 +130,7 @@ def _ways(door: DoorLeaf, around: Surroundings) -> Iterator[Floats]:
 
 @dataclass(frozen=True)
 class Opened:
-    """A tree and its portals when doors are open."""
+    """A tree and its portals with open doors."""
 
     doors: Bools  # (d,) which leaves do not block
     tree: Tree
@@ -146,11 +145,11 @@ def open_doors(
     within: Bools,
     outer: Bools,
 ) -> Opened | None:
-    """What becomes of a tree when all doors open that lead from inside to inside; None if none
+    """The tree and its portals with all doors open that lead from inside to inside; None if none
     does.
 
-    ``within``: (L,) the leaves where somebody can be. ``outer``: (L,) those at the box around a
-    closed model, in which the flood must not end.
+    ``within``: (L,) leaves that are inside. ``outer``: (L,) those at the box around a closed model,
+    which the flood must not reach.
     """
     which = np.asarray(doors.sides(tree, within).all(axis=1))
     if which.any() and not outer.any():
@@ -158,10 +157,10 @@ def open_doors(
     rooms = tuple(np.flatnonzero(within).tolist())
     outside = flood(len(tree.leaves), portals, tuple(np.flatnonzero(outer).tolist()))
     while which.any():
-        way = _opened(doors, which, structure, tree, portals)
-        if not (flood(len(tree.leaves), way.portals, rooms) & outer).any():
-            return way
-        out = doors.lead_out(way.portals, outside) & which
+        opened = _opened(doors, which, structure, tree, portals)
+        if not (flood(len(tree.leaves), opened.portals, rooms) & outer).any():
+            return opened
+        out = doors.lead_out(opened.portals, outside) & which
         which = which & ~out & out.any()
     return None
 
@@ -169,7 +168,7 @@ def open_doors(
 def _opened(
     doors: Doors, which: Bools, structure: Structure, tree: Tree, portals: list[Portal]
 ) -> Opened:
-    """With ``which``, (d,), of the doors open."""
+    """The tree and its portals with the doors ``which``, (d,), open."""
     free = np.append(which, False)[doors.of]
     near = structure.tolerance.plane
     walls, fresh = list(tree.walls), []
@@ -183,9 +182,9 @@ def _opened(
             fresh.append(node)
     tree = replace(tree, walls=tuple(walls))
     stale = set(fresh)
-    found = [portal for portal in portals if portal.node not in stale]
-    found += find_portals(tree, structure.tolerance, fresh)
-    return Opened(which, tree, sorted(found, key=lambda portal: portal.node))
+    remaining = [portal for portal in portals if portal.node not in stale]
+    remaining += find_portals(tree, structure.tolerance, fresh)
+    return Opened(which, tree, sorted(remaining, key=lambda portal: portal.node))
 
 
 #: Points from which sight lines are cast, how high over a floor, metres, and lines from each.
@@ -199,10 +198,10 @@ class Enclosure:
     """
     Attributes
     ----------
-    doors: names of the door leaves that are recognised, in the order of the file.
-    roofed: share of the floor, by area, that has something over it.
-    rooms: how many points in rooms, under a roof and between walls, sight lines were cast from.
-    leaving: share of these lines that meet nothing; 0 without rooms.
+    doors: names of the recognised door leaves, in the order of the file.
+    roofed: share of the floor, by area, that has a surface above it.
+    rooms: number of points in rooms, under a roof and between walls, that sight lines start from.
+    leaving: share of these lines that leave the model; 0 without rooms.
     """
 
     doors: tuple[str, ...]
@@ -217,11 +216,13 @@ class Enclosure:
 
 
 def enclosure(scene: Scene, options: SubdivideOptions | None = None) -> Enclosure:
-    """How a scene looks from its inside. Door leaves are shut in that."""
+    """How enclosed a scene is, its door leaves shut."""
     options = options or SubdivideOptions()
     tolerance = scene.tolerance.for_walls(options.wall_thickness)
     opaque = Opaque.of(scene, options)
-    doors, structure = Doors.found(scene, opaque, Structure.made(opaque, tolerance), options)
+    doors, structure = Doors.recognise(
+        scene, opaque, Structure.of_opaque(opaque, tolerance), options
+    )
     corners, names = structure.corners, tuple(leaf.name for leaf in doors.leaves)
     if not len(corners):
         return Enclosure(names, 0.0, 0, 0.0)
