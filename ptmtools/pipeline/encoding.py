@@ -1,10 +1,10 @@
 """Encodes one image as a task: a `.ptm`, the `Detail` of its levels, a fallback image.
 
 `encoded_image` takes and returns bytes. `encoded_on_disk` is for processes, of this machine or
-others, that see the disk of the database: only names and digests travel. (The bytes of images
-and textures would keep the process that builds so busy that it serves eight workers and no more,
-docs/design/scaling.md.) A worker writes to a folder with a new name in every run, so one that an
-interrupted run has left behind writes nowhere.
+others, that see the disk of the database: only names and digests travel. (Sending the bytes of
+images and textures limits the building process to eight workers, docs/design/scaling.md.) A worker
+writes to a folder with a new name in every run, so one that an interrupted run has left behind
+writes nowhere.
 """
 
 from __future__ import annotations
@@ -78,10 +78,11 @@ class TextureOptions(EncodeOptions):
 
 
 def encoded_image(options: TextureOptions, image: tuple[str, bytes, int]) -> list[bytes]:
-    """An image, (name, bytes of its file, how many of its finest levels to leave out), as the bytes
-    of a `.ptm`, of its `Detail` as JSON and, if there is to be one, of its fallback image.
+    """The bytes of a `.ptm`, of its `Detail` as JSON and, if the options ask for one, of its
+    fallback image; from an image (name, bytes of its file, number of its finest levels to leave
+    out).
 
-    Raises what `encode` and `read_image` raise.
+    Raises as `encode` and `read_image`.
     """
     from ptmtools.texture import Limits, decode, encode_to, read_header, read_image
     from ptmtools.texture.images import png_bytes
@@ -110,8 +111,8 @@ def encoded_image(options: TextureOptions, image: tuple[str, bytes, int]) -> lis
 
 @dataclass(frozen=True)
 class SharedDisk:
-    """Shared by the tasks: the options, and two absolute paths, of the database and of the folder
-    for results."""
+    """The options of all tasks, and the absolute paths of the database and of the folder for
+    results."""
 
     options: TextureOptions
     database: str
@@ -120,12 +121,12 @@ class SharedDisk:
 
 @dataclass(frozen=True)
 class ImageTask:
-    """An image of the database, the stem of the files that its task writes, and the number of its
-    finest levels to leave out."""
+    """An image of the database, the stem of its result files, and the number of its finest levels
+    to leave out."""
 
     name: str
     sha256: str
-    made: str
+    stem: str
     unresolved: int = 0
 
 
@@ -133,7 +134,7 @@ class ImageTask:
 def shared_disk(
     transaction: Transaction, database: Path, options: TextureOptions, executor: Executor
 ) -> Iterator[SharedDisk | None]:
-    """The disk, if all workers are other processes that see it; None if bytes must travel.
+    """The disk, if all workers are other processes that see it; None if bytes must be sent.
 
     Raises WorkerError PTM-W005 if only some workers see it.
     """
@@ -157,21 +158,21 @@ def shared_disk(
 def encoded_on_disk(disk: SharedDisk, image: ImageTask) -> list[tuple[str, str]]:
     """Writes the results of `encoded_image` to the shared disk: (file, SHA-256) of each.
 
-    Raises what that raises; WorkerError PTM-W005 where the disk cannot be seen.
+    Raises as that; WorkerError PTM-W005 where the disk cannot be seen.
     """
     from ptmtools.files import write_bytes
 
     results = encoded_image(disk.options, (image.name, _image(disk, image), image.unresolved))
     files = []
     for number, data in enumerate(results):
-        file = Path(disk.out, f"{image.made}-{number}")
+        file = Path(disk.out, f"{image.stem}-{number}")
         write_bytes(file, data, force=True)
         files.append((str(file), sha256(data)))
     return files
 
 
 def _image(disk: SharedDisk, image: ImageTask) -> bytes:
-    """Its bytes, from `IMAGES` or, until the scene is committed, from the staging folder."""
+    """The bytes of an image from `IMAGES` or, until the scene is committed, the staging folder."""
     for folder in ("", f"{STAGING}/scene", ""):
         with suppress(OSError):
             data = Path(disk.database, folder, IMAGES, image.sha256).read_bytes()
@@ -194,18 +195,18 @@ def _half_seen(disk: SharedDisk) -> WorkerError:
 
 
 def read_detail(data: bytes) -> Detail:
-    """The `Detail` of which `encoded_image` made JSON; raises what damage makes of it: ValueError,
-    LookupError or TypeError."""
+    """The `Detail` that `encoded_image` has written as JSON; raises ValueError, LookupError or
+    TypeError if it is damaged."""
     from ptmtools.texture.detail import Detail
 
-    found = json.loads(data)
-    red, green, blue = map(int, found["color"])
-    return Detail(tuple(map(float, found["differences"])), (red, green, blue))
+    fields = json.loads(data)
+    red, green, blue = map(int, fields["color"])
+    return Detail(tuple(map(float, fields["differences"])), (red, green, blue))
 
 
 def without_finest(options: TextureOptions, count: int, width: int, height: int) -> TextureOptions:
-    """The options that leave out so many of the finest levels of an image besides, but for the
-    coarsest level that is kept without."""
+    """The options that also leave out ``count`` of the finest levels of an image, but keep at least
+    the coarsest level that ``options`` keep."""
     from ptmtools.texture.encoder import kept_levels
     from ptmtools.texture.pyramid import level_sizes
 
@@ -224,7 +225,7 @@ def fallback_level(header: PtmHeader, size: int) -> int:
 
 
 def bare_png(data: bytes) -> bytes:
-    """An intact PNG reduced to what makes its texels: no gamma, colour profile, text or date.
+    """An intact PNG without the chunks that do not change its texels: gamma, profile, text, date.
 
     Deflating a megatexel again takes half a second, three times as long as encoding it, and gives
     other bytes with another zlib.

@@ -1,4 +1,4 @@
-"""The table of stages, in the order in which they run. A new stage is a file and a line here."""
+"""The table of stages, in the order of their runs. A new stage is a file and a line here."""
 
 from __future__ import annotations
 

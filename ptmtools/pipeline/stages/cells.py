@@ -37,8 +37,8 @@ def _summary(n: Mapping[str, Any]) -> str:
 
 
 def _fits_scene(cells: Cells, scene: Scene) -> str:
-    strange = (cells.triangle_source >= len(scene.triangles)).any()
-    return "a piece belongs to no triangle of the scene" if strange else ""
+    foreign = (cells.triangle_source >= len(scene.triangles)).any()
+    return "a piece belongs to no triangle of the scene" if foreign else ""
 
 
 CELLS: Stage[Cells] = Stage(

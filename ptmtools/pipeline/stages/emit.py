@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 class EmissionJob(Job):
-    """Writes the served files; raises what `ptmtools.output.emit` raises."""
+    """Writes the served files; raises as `ptmtools.output.emit`."""
 
     def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
         """See `Job.make`."""
@@ -66,7 +66,7 @@ class EmissionJob(Job):
         return replace(work, counts=counts, notes=report.notes, warnings=warnings_in(report.notes))
 
     def _need(self, textures: Iterable[TextureRecord]) -> Need | None:
-        """How fine textures are needed, if that is asked for."""
+        """The required levels of the textures, if the options ask for them."""
         if not self.options.need:
             return None
         from ptmtools.coverage.required_levels import TextureSize, compute_need
@@ -77,12 +77,12 @@ class EmissionJob(Job):
 
 
 def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
-    """What the emitted files say of the textures of a database."""
+    """The textures of a database, for the served files."""
     from ptmtools.output import TextureRecord
 
     def detail(name: str) -> Detail:
-        kept = detail_file(name)
-        return run.cached(kept, lambda: read_detail(run.db.read_output(TEXTURES.name, kept)))
+        file = detail_file(name)
+        return run.cached(file, lambda: read_detail(run.db.read_output(TEXTURES.name, file)))
 
     record = run.record(TEXTURES)
     options, served = run.recorded(TEXTURES), run.db.path / SERVED
@@ -115,9 +115,9 @@ def _summary(n: Mapping[str, Any]) -> str:
     if "owners" in n:  # missing in databases of earlier releases
         of = f" from {n['visible']:,} of the model ({n['owners']:,} without cuts)"
     looks = n.get("first_look")
-    looked = f" ({size(looks)} of first-look bundles)" if looks else ""
+    bundles = f" ({size(looks)} of first-look bundles)" if looks else ""
     return (
-        f"{count(n['files'], 'file')}, {size(n['bytes'])}{looked}; "
+        f"{count(n['files'], 'file')}, {size(n['bytes'])}{bundles}; "
         f"{count(n['triangles'], 'triangle')}{of}, {count(n['viewpoints'], 'viewpoint')}"
     )
 

@@ -15,7 +15,7 @@ import io
 import json
 import re
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import takewhile
@@ -47,8 +47,8 @@ if TYPE_CHECKING:
     from ptmtools.texture.model import PtmHeader
 
 FOLDER = "textures"
-#: Images that are named together at most: a message costs a few ms.
-AT_ONCE = 4
+#: Largest number of images in one message to a worker; a message costs a few ms.
+IMAGES_PER_MESSAGE = 4
 
 
 def texture_names(images: Iterable[str]) -> list[str]:
@@ -56,21 +56,19 @@ def texture_names(images: Iterable[str]) -> list[str]:
     and with its suffix where two images share a stem."""
     names = [image.rpartition(".") for image in images]
     stems = [stem or suffix for stem, _, suffix in names]
-    often: dict[str, int] = {}
-    for stem in stems:
-        often[stem.casefold()] = often.get(stem.casefold(), 0) + 1
+    uses = Counter(stem.casefold() for stem in stems)
     taken: set[str] = set()
-    found = []
+    unique = []
     for (_, _, suffix), stem in zip(names, stems, strict=True):
-        shared = often[stem.casefold()] > 1
-        wanted = f"{stem}_{re.sub('[^A-Za-z0-9]', '', suffix)}" if shared else stem
-        name, number = wanted, 1
+        shared = uses[stem.casefold()] > 1
+        base = f"{stem}_{re.sub('[^A-Za-z0-9]', '', suffix)}" if shared else stem
+        name, number = base, 1
         while name.casefold() in taken:
             number += 1
-            name = f"{wanted}_{number}"
+            name = f"{base}_{number}"
         taken.add(name.casefold())
-        found.append(name)
-    return found
+        unique.append(name)
+    return unique
 
 
 def texture_files(images: Iterable[str]) -> list[str]:
@@ -79,13 +77,13 @@ def texture_files(images: Iterable[str]) -> list[str]:
 
 
 def detail_file(texture: str) -> str:
-    """Where the `Detail` of a `.ptm` is kept, relative to the database."""
+    """The file of the `Detail` of a `.ptm`, relative to the database."""
     return f"{STAGES_FOLDER}/{texture.removesuffix('ptm')}json"
 
 
 def _inputs(artifacts: Artifacts, options: TextureOptions) -> dict[str, str]:
-    """See `Stage.inputs`: under the name of each `.ptm` the digest of its image; where levels of it
-    are left out that no eye resolves, one of that and their number."""
+    """See `Stage.inputs`: the name of each `.ptm` → the digest of its image, and of the number of
+    its unresolved levels."""
     images = image_digests(artifacts)
     digests = [
         sha256(f"{digest} - {fewer}".encode()) if fewer else digest
@@ -95,22 +93,22 @@ def _inputs(artifacts: Artifacts, options: TextureOptions) -> dict[str, str]:
 
 
 def _coding(record: StageRecord) -> dict[str, Any]:
-    """The parameters that count for every texture; what ``--trim`` does to one is in its input."""
+    """The parameters that change every texture; the effect of ``--trim`` is in the inputs."""
     return {n: value for n, value in record.parameters.items() if not n.startswith("trim")}
 
 
 def stale_textures(before: StageRecord | None, work: StageRecord) -> list[str]:
-    """The `.ptm`s, relative to the served folder, that the record does not hold as they would be
-    encoded."""
+    """The `.ptm`s, relative to the served folder, that would be encoded from another image or with
+    other options than in the record."""
     if before is None or (before.recipe, _coding(before)) != (work.recipe, _coding(work)):
         return list(work.inputs)
     return [name for name in work.inputs if before.inputs.get(name) != work.inputs[name]]
 
 
 def unresolved(artifacts: Artifacts, options: TextureOptions) -> list[int]:
-    """Of each image of the scene how many of its finest levels are left out for that.
+    """The number of the finest levels of each image that ``--trim`` leaves out.
 
-    Raises what reading the artifacts of the scene, the cells and the sets raises.
+    Raises as `Artifacts`.
     """
     rows = image_rows(artifacts)
     if not options.trim:
@@ -127,21 +125,21 @@ def unresolved(artifacts: Artifacts, options: TextureOptions) -> list[int]:
 
 
 def _sizes(artifacts: Artifacts, options: TextureOptions) -> list[tuple[int, int]]:
-    """(width, height) of the scene's images. One that is not in the database yet, of a dry run,
-    counts as a texel: it is encoded anew in any case."""
+    """(width, height) of the scene's images. In a dry run, an image that is not in the database yet
+    counts as one texel: it will be encoded in any case."""
     from ptmtools.texture.images.opening import opened, pillow_faults
     from ptmtools.texture.model import Limits
 
-    there = artifacts.record(SCENE).outputs
-    found = []
+    outputs = artifacts.record(SCENE).outputs
+    sizes = []
     for image in images_of(artifacts):
         width = height = 1
-        if f"{IMAGES}/{image.sha256}" in there:
+        if f"{IMAGES}/{image.sha256}" in outputs:
             with naming(image.name), pillow_faults():
                 file = io.BytesIO(image.load())
                 width, height = opened(file, Limits(options.limit << 20)).size
-        found.append((width, height))
-    return found
+        sizes.append((width, height))
+    return sizes
 
 
 def _left_out(header: PtmHeader, options: TextureOptions) -> list[tuple[int, int]]:
@@ -154,25 +152,25 @@ def _left_out(header: PtmHeader, options: TextureOptions) -> list[tuple[int, int
 
 
 def unresolved_counts(headers: Iterable[PtmHeader], options: TextureOptions) -> dict[str, int]:
-    """The figures of ``--trim``, none without: of how many textures levels were left out, and how
-    many bytes less their finest levels have, decoded."""
+    """The counts of ``--trim``, none without it: the textures with levels left out, and the decoded
+    bytes by which their finest levels are smaller."""
     if not options.trim:
         return {}
-    found = {"unresolved": 0, "unresolved_bytes": 0}
+    counts = {"unresolved": 0, "unresolved_bytes": 0}
     for header in headers:
         if sizes := _left_out(header, options):
             (width, height), finest = sizes[-1], header.levels[-1]
-            found["unresolved"] += 1
+            counts["unresolved"] += 1
             texels = width * height - finest.width * finest.height
-            found["unresolved_bytes"] += texels * header.texel_bytes
-    return found
+            counts["unresolved_bytes"] += texels * header.texel_bytes
+    return counts
 
 
 def notes_on_trim(
     names: Iterable[str], headers: Sequence[PtmHeader], options: TextureOptions
 ) -> Iterator[str]:
-    """Which textures have less levels for it, and what about that saves: as many bytes for a texel
-    as the finest level that is kept."""
+    """The textures with levels left out, and the bytes saved, estimated from the bytes for a texel
+    of the finest level kept."""
     for name, header in zip(names, headers, strict=True):
         sizes = _left_out(header, options) if options.trim else []
         if sizes:
@@ -214,7 +212,7 @@ class TexturesJob(Job):
 
     @property
     def left(self) -> int:
-        """How many textures are left to encode."""
+        """Number of textures left to encode."""
         return len(self._left)
 
     def begin(self) -> None:
@@ -227,8 +225,8 @@ class TexturesJob(Job):
             free = self.run.workers.alone.free
             self._background = BackgroundLoop(self.encode, executor, free)
 
-    def check(self) -> None:
-        """See `Job.check`."""
+    def raise_failure(self) -> None:
+        """See `Job.raise_failure`."""
         if self._background:
             self._background.check()
 
@@ -238,7 +236,7 @@ class TexturesJob(Job):
             self._background.abandon()
 
     def do(self) -> None:
-        """Encodes what is left, with all workers, and commits."""
+        """Encodes the textures left, with all workers, and commits."""
         self._prepare()
         if self._background:
             self._background.finish()
@@ -259,7 +257,7 @@ class TexturesJob(Job):
         self.run.end(self.stage, self._why, self._seconds, self._tasks)
 
     def _prepare(self) -> None:
-        """Once: keeps what the last run made, and takes over what an interrupted one left."""
+        """Once: keeps the textures of the last run, and takes over those of an interrupted one."""
         if self._prepared:
             return
         self._prepared = True
@@ -269,7 +267,7 @@ class TexturesJob(Job):
         self._tasks = (len(self._names), len(self._names), 0)
         if not self._why:
             return
-        # Not `Run.begin`: another stage may be under way.
+        # Not `Run.begin`: another stage may be running.
         self._transaction = transaction = self.run.writer.begin(self.stage.name)
         kept, resumed = 0, 0
         before = self.run.before(self.stage)
@@ -286,10 +284,9 @@ class TexturesJob(Job):
         self._tasks = (len(self._names), kept, resumed)
 
     def encode(self, executor: Executor, stop: Event | None = None) -> None:
-        """Encodes what is left; nothing is committed. No more images are taken once another thread
-        sets ``stop``.
+        """Encodes the textures left, until another thread sets ``stop``; commits nothing.
 
-        Raises what `encode` raises.
+        Raises as `encode`.
         """
         assert self._transaction
         start = time.perf_counter()
@@ -307,7 +304,7 @@ class TexturesJob(Job):
         return [f"{SERVED}/{name}", detail_file(name), *fallback]
 
     def _task(self, i: int) -> str:
-        """A digest of all that the files of a texture depend on, their names included."""
+        """A digest of everything that the files of a texture depend on, their names included."""
         name = self._names[i]
         depends = [self._work.recipe, _coding(self._work), name, self._work.inputs[name]]
         return sha256(json.dumps(depends, sort_keys=True).encode())
@@ -315,49 +312,48 @@ class TexturesJob(Job):
     def _staged(
         self, transaction: Transaction, executor: Executor, wanted: Iterator[int]
     ) -> Iterator[list[str]]:
-        """The names of the files of each image, once they are staged; in order, so it is always the
-        first of what is left."""
+        """The files of each image, once they are staged. The order is that of `_left`, so they are
+        always those of its first."""
         images, fewer = images_of(self.run), self._fewer
         with shared_disk(transaction, self.run.db.path, self.options, executor) as disk:
             if disk is None:
                 sources = ((images[i].name, images[i].load(), fewer[i]) for i in wanted)
-                for made in executor.each(encoded_image, self.options, sources, releases_lock=True):
+                for data in executor.each(encoded_image, self.options, sources, releases_lock=True):
                     files = self._files(self._names[self._left[0]])
-                    for name, data in zip(files, made, strict=True):
-                        transaction.put(name, data)
+                    for name, content in zip(files, data, strict=True):
+                        transaction.put(name, content)
                     yield files
                 return
-            chunk = max(1, min(AT_ONCE, len(self._left) // (8 * executor.workers)))
+            chunk = max(1, min(IMAGES_PER_MESSAGE, len(self._left) // (8 * executor.workers)))
             tasks = (ImageTask(images[i].name, images[i].sha256, str(i), fewer[i]) for i in wanted)
-            for left in executor.each(
+            for written in executor.each(
                 encoded_on_disk, disk, tasks, releases_lock=True, chunk=chunk
             ):
                 files = self._files(self._names[self._left[0]])
-                for name, (file, digest) in zip(files, left, strict=True):
+                for name, (file, digest) in zip(files, written, strict=True):
                     transaction.take(name, Path(file), digest)
                 yield files
 
     def _headers(self, transaction: Transaction) -> Iterator[PtmHeader]:
-        """Of all textures, wherever they are."""
+        """Of all textures, staged or committed."""
         for ptm, *_ in map(self._files, self._names):
-            place = transaction.folder / ptm
-            yield header_of(place if place.is_file() else self.run.db.path / ptm)
+            staged = transaction.folder / ptm
+            yield header_of(staged if staged.is_file() else self.run.db.path / ptm)
 
 
 def counts_of(headers: Iterable[PtmHeader]) -> dict[str, int]:
-    """The figures of the stage."""
-    found = {"textures": 0, "raw_bytes": 0, "ptm_bytes": 0}
+    """The counts of the stage."""
+    counts = {"textures": 0, "raw_bytes": 0, "ptm_bytes": 0}
     for header in headers:
         finest = header.levels[-1]
-        found["textures"] += 1
-        found["raw_bytes"] += finest.width * finest.height * header.texel_bytes
-        found["ptm_bytes"] += header.file_size
-    return found
+        counts["textures"] += 1
+        counts["raw_bytes"] += finest.width * finest.height * header.texel_bytes
+        counts["ptm_bytes"] += header.file_size
+    return counts
 
 
 def notes_on_size(names: Iterable[str], headers: Iterable[PtmHeader], most: int) -> Iterator[str]:
-    """What ``--max-side`` has chosen where no level is of that size, as levels halve: the texture
-    that is farthest below it."""
+    """The texture farthest below ``--max-side``, where no level has that size: levels halve."""
     from ptmtools.texture.encoder import level_above
 
     below = []
@@ -376,7 +372,7 @@ def notes_on_size(names: Iterable[str], headers: Iterable[PtmHeader], most: int)
 
 
 def header_of(file: Path) -> PtmHeader:
-    """The header of a `.ptm` of ours; raises what `read_header` raises."""
+    """The header of a `.ptm`; raises as `read_header`."""
     from ptmtools.files import open_regular
     from ptmtools.texture.container import HEAD_MAX, read_header
 
