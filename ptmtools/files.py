@@ -1,15 +1,13 @@
-"""Writing a file so that it is, at any moment, either as it was before or whole; and reading what
-others name, which may be no file at all.
+"""Writes files atomically, and opens files of unknown origin safely.
 
 The bytes go to a temporary file in the target's folder, are flushed to the disk, and take the
-target's name in one step. Whatever goes wrong, the temporary file is removed and the target is
-untouched. Where the system can, the temporary file has no name until it is whole, so that not even
-a killed process leaves one; elsewhere a killed process leaves a hidden ``.part`` file.
+target's name in one step. After an error, the temporary file is removed and the target unchanged.
+On Linux, the temporary file has no name until it is complete (``O_TMPFILE``), so that a killed
+process leaves none; elsewhere it leaves a hidden ``.part`` file.
 
-Links are not followed on the way: a target that is a symbolic link is replaced itself, and what it
-points to is left alone. A folder that was made to be written into is walked by `real_folder`, which
-refuses links. That guards against what lies there before, such as a database from elsewhere, not
-against somebody who may write in the folder and exchanges it at the same moment.
+Links are not followed: a target that is a symbolic link is itself replaced, and `real_folder`
+refuses links below its root. This guards against links that already exist, such as in a database
+from elsewhere, not against a process that replaces folders at the same moment.
 """
 
 from __future__ import annotations
@@ -27,9 +25,9 @@ from typing import IO
 
 from ptmtools.errors import OutputError
 
-#: So many folders may lie in each other below a root.
-_DEEPEST = 64
-#: Of renameat2: relative to the working folder; exchange.
+#: Largest depth of folders below a root.
+_MAX_DEPTH = 64
+#: Arguments of renameat2: AT_FDCWD, RENAME_EXCHANGE.
 _HERE, _EXCHANGE = -100, 2
 
 
@@ -45,16 +43,13 @@ def write_bytes(path: str | os.PathLike[str], data: bytes, *, force: bool = Fals
 def write_with(
     path: str | os.PathLike[str], write: Callable[[IO[bytes]], object], *, force: bool = False
 ) -> None:
-    """As `write_bytes`, for what ``write`` puts into the open binary file it is given.
-
-    The file can be read and can seek.
-    """
+    """As `write_bytes`, with ``write(file)``; the binary file can be read and can seek."""
     target = Path(path)
     if "\0" in os.fspath(target):
         raise OutputError("PTM-O002", "has a NUL in its name", file=target)
     with writing(target):
-        in_the_way = target.exists() and not target.is_file()
-    if in_the_way:  # renaming would replace a device
+        blocked = target.exists() and not target.is_file()
+    if blocked:  # renaming would replace a device
         kind = "a folder" if target.is_dir() else "a device"
         raise OutputError(
             "PTM-O002", f"is {kind}, not a file", file=target, remedy="name a file instead"
@@ -69,8 +64,8 @@ def write_with(
                 file.flush()
                 os.fsync(file.fileno())
                 if not named:
-                    # With a folder's descriptor, although it is not looked at: else Python makes
-                    # a call that would link the link in /proc.
+                    # Python calls linkat, which follows the link in /proc, only with a folder's
+                    # descriptor; its value is ignored.
                     descriptor = file.fileno()
                     os.link(f"/proc/self/fd/{descriptor}", temporary, src_dir_fd=descriptor)
             if not force:
@@ -82,18 +77,18 @@ def write_with(
 
 
 def _claim(temporary: Path, target: Path) -> None:
-    """Gives the file its name unless something has come to bear it meanwhile, PTM-O001."""
+    """Gives the file its name unless the name was taken meanwhile, PTM-O001."""
     try:
         os.link(temporary, target)
     except FileExistsError:
         refuse_existing(target)
-    except OSError:  # a disk without links: a moment remains
+    except OSError:  # a disk without links: not atomic
         refuse_existing(target)
 
 
 @contextlib.contextmanager
 def _temporary(path: Path) -> Iterator[tuple[IO[bytes], bool]]:
-    """A new file, and whether it has the name ``path`` or, so far, none."""
+    """A new file, and whether it has the name ``path`` or none yet."""
     try:
         flags = os.O_TMPFILE | os.O_RDWR | os.O_CLOEXEC
         os.stat("/proc/self/fd")
@@ -108,8 +103,7 @@ def _temporary(path: Path) -> Iterator[tuple[IO[bytes], bool]]:
 
 @contextlib.contextmanager
 def writing(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Whatever the system refuses while ``path`` is written becomes an OutputError, PTM-O002 or
-    PTM-O003."""
+    """Turns an OSError while ``path`` is written into an OutputError, PTM-O002 or PTM-O003."""
     try:
         yield
     except OSError as error:
@@ -119,7 +113,7 @@ def writing(path: str | os.PathLike[str]) -> Iterator[None]:
 def refuse_existing(
     path: str | os.PathLike[str], remedy: str = "use --force to replace it, or name another file"
 ) -> None:
-    """Raise OutputError PTM-O001 if there is something at ``path``."""
+    """Raises OutputError PTM-O001 if ``path`` exists."""
     if os.path.lexists(path):
         raise OutputError(
             "PTM-O001",
@@ -130,10 +124,9 @@ def refuse_existing(
 
 
 def open_regular(path: str | os.PathLike[str]) -> BufferedReader:
-    """A file opened for reading, if it is one: a named pipe would be waited for, and a device may
-    never end.
+    """Opens a regular file for reading; a pipe could block, and a device may never end.
 
-    Raises OSError, EINVAL for what is no file and no folder. ValueError for a NUL in the name.
+    Raises OSError, with EINVAL for a pipe or device; ValueError for a NUL in the name.
     """
     flags = os.O_RDONLY
     for name in ("O_BINARY", "O_CLOEXEC", "O_NOCTTY", "O_NONBLOCK"):
@@ -148,35 +141,32 @@ def open_regular(path: str | os.PathLike[str]) -> BufferedReader:
     except BaseException:
         os.close(descriptor)
         raise
-    return os.fdopen(descriptor, "rb")  # which closes it, whatever happens
+    return os.fdopen(descriptor, "rb")
 
 
 def open_below(root: str | os.PathLike[str], name: str) -> BufferedReader:
-    """The file ``name`` (with slashes) of a folder that may come from a stranger, opened as by
-    `open_regular`, and reached through no link, which might lead anywhere.
+    """As `open_regular`, for the file ``name`` (with slashes) of a folder of unknown origin;
+    refuses links below ``root``, which may itself be a link.
 
-    ``root`` may be a link: whoever named it chose it. Raises OSError, ELOOP, for a link below it;
-    ValueError.
+    Raises OSError, with ELOOP for a link; ValueError.
     """
     here = Path(root)
     for step in name.split("/"):
         here /= step
         if here.is_symlink():
-            what = "a symbolic link, which is not followed"
-            raise OSError(errno.ELOOP, what, os.fspath(here))
+            message = "a symbolic link, which is not followed"
+            raise OSError(errno.ELOOP, message, os.fspath(here))
     return open_regular(here)
 
 
 def real_folder(root: Path, relative: str = "", *, make: bool = True) -> Path:
-    """The folder ``relative`` (with slashes) below ``root``, reached through no link.
-
-    ``root`` may be a link: whoever named it chose it. What is absent is made, or with ``make``
-    False left absent, and the path is returned all the same.
+    """The folder ``relative`` (with slashes) below ``root``, which may itself be a link. Creates
+    absent folders, unless ``make`` is False.
 
     Raises
     ------
     OutputError: PTM-O005 if a component below the root is a symbolic link; PTM-O002 if one is no
-        folder, or the name leads out of the root, or a folder cannot be made; PTM-O003.
+        folder, or the name leads out of the root, or a folder cannot be created; PTM-O003.
     """
     here, steps = root, _steps(root, relative)
     with writing(here.joinpath(*steps)):
@@ -203,8 +193,8 @@ def real_folder(root: Path, relative: str = "", *, make: bool = True) -> Path:
 def real_file(root: Path, relative: str) -> Path | None:
     """The regular file ``relative`` (with slashes) below ``root``, or None if there is none.
 
-    For what is read to be written on, moved or removed. Raises OutputError PTM-O005 if it is a
-    symbolic link or is reached through one, and as `real_folder` does.
+    For files to be moved, removed or continued. Raises OutputError PTM-O005 if it, or a folder on
+    its path, is a symbolic link; and as `real_folder`.
     """
     steps = _steps(root, relative)
     if not steps:
@@ -218,7 +208,7 @@ def real_file(root: Path, relative: str) -> Path | None:
 
 
 def _steps(root: Path, name: str) -> list[str]:
-    """The components of a relative name, none of which leads out on any system."""
+    """The components of a relative name, which leads out on no system."""
     if not name:
         return []
     if not leads_inside(name):
@@ -232,14 +222,14 @@ def _steps(root: Path, name: str) -> list[str]:
 
 
 def leads_inside(name: str) -> bool:
-    """Whether a relative name, with slashes, is that of something below its root on any system."""
+    """Whether a relative name, with slashes, stays below its root on every system."""
     steps = name.split("/")
-    strange = any(letter in name for letter in "\\\0:") or {"", ".", ".."}.intersection(steps)
-    return not strange and len(steps) <= _DEEPEST
+    unsafe = any(letter in name for letter in "\\\0:") or {"", ".", ".."}.intersection(steps)
+    return not unsafe and len(steps) <= _MAX_DEPTH
 
 
 def _mode(path: Path) -> int:
-    """The kind of what is there, a link's own; 0 if nothing is."""
+    """The file mode of a path, of the link itself if it is one; 0 if the path does not exist."""
     try:
         return os.lstat(path).st_mode
     except (FileNotFoundError, NotADirectoryError):
@@ -256,16 +246,15 @@ def _link(path: Path) -> OutputError:
 
 
 def exchanged(one: Path, other: Path) -> bool:
-    """Whether two folders of one disk have changed names, at once: Linux can do that."""
+    """Exchanges the names of two folders of one disk atomically; False where that is impossible."""
     call = getattr(ctypes.CDLL(None), "renameat2", None) if sys.platform == "linux" else None
     if call is None:
         return False
-    done: int = call(_HERE, os.fsencode(one), _HERE, os.fsencode(other), _EXCHANGE)
-    return done == 0
+    return bool(call(_HERE, os.fsencode(one), _HERE, os.fsencode(other), _EXCHANGE) == 0)
 
 
 def output_error(target: str | os.PathLike[str], error: OSError) -> OutputError:
-    """What `writing` makes of an error of the system."""
+    """The OutputError for an OSError, PTM-O002 or PTM-O003."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return OutputError(
             "PTM-O003",

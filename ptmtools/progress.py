@@ -1,8 +1,7 @@
-"""How a long operation tells of its progress: a function handed in by the caller.
+"""The progress of long operations: a function that the caller passes.
 
-``progress(done, total, what)`` is called from the thread that runs the operation; `silent` does
-nothing and is the default everywhere. Waits that cannot be counted are announced to whoever
-listens.
+``progress(done, total, unit)`` is called from the thread that runs the operation; the default,
+`silent`, does nothing. Listeners are told of waits that cannot be counted.
 """
 
 from __future__ import annotations
@@ -12,8 +11,8 @@ from collections.abc import Callable
 Progress = Callable[[int, int, str], None]
 
 
-def silent(done: int, total: int, what: str) -> None:
-    """Says nothing."""
+def silent(done: int, total: int, unit: str) -> None:
+    """Ignores the progress."""
 
 
 Listener = Callable[[str], None]
@@ -21,11 +20,11 @@ _listeners: list[Listener] = []
 
 
 def listen(listener: Listener) -> None:
-    """From now on ``listener`` is called with a few words for each wait that is announced."""
+    """Adds a listener, which is called with a few words for each wait."""
     _listeners.append(listener)
 
 
-def announce(what: str) -> None:
-    """Calls the listeners before something that takes a while."""
+def announce(wait: str) -> None:
+    """Calls the listeners before a wait."""
     for listener in _listeners:
-        listener(what)
+        listener(wait)

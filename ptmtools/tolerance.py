@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.store.checked import Stored
+from ptmtools.store.archive import Stored
 
 #: On-plane distance as a share of the extent: 0.4 mm in a building of 50 m, well above the
 #: rounding of the float32 coordinates that model files carry (6e-8 of the extent).

@@ -1,7 +1,7 @@
-"""Folders of ours that are written whole or not at all: beside their place, then renamed.
+"""Writes folders of a known form atomically: beside their place, then renamed.
 
-One that is there already is replaced with ``force`` alone, and only if it is of the same form and
-holds nothing that such a folder does not: nothing is removed that we did not write.
+An existing folder is replaced only with ``force``, if it is of the same form and contains no other
+files: nothing is removed that ptmtools has not written.
 """
 
 from __future__ import annotations
@@ -16,19 +16,20 @@ from pathlib import Path, PurePosixPath
 from ptmtools.errors import OutputError
 from ptmtools.files import exchanged, leads_inside, open_regular, refuse_existing, writing
 
-#: How an index begins, in so many first bytes.
+#: The format of an index is within this many bytes.
 _HEAD = 256
 
 
 @dataclass(frozen=True)
 class FolderForm:
-    """What tells folders of one kind.
+    """A kind of folder.
 
     Attributes
     ----------
-    index: the file that says what the others are, a JSON document. format: its member of that name.
-    command: that writes such folders.
-    owns: whether a path in it, with slashes, is one of its files'.
+    index: the JSON file that describes the others.
+    format: its member of that name.
+    command: the command that writes such folders.
+    owns: whether a path in the folder, with slashes, is one of its files.
     """
 
     index: str
@@ -37,11 +38,11 @@ class FolderForm:
     owns: Callable[[str], bool]
 
     def check(self, folder: str | os.PathLike[str], *, force: bool = False) -> None:
-        """Whether a folder may be written: nothing is there, or nothing in it, or with ``force``
-        one of this form.
+        """Checks that a folder may be written: it is absent or empty, or with ``force`` of this
+        form.
 
-        Raises OutputError: PTM-O001 it is there already; PTM-O010 it is something else, or
-        holds other files too; PTM-O002 it cannot be looked into.
+        Raises OutputError: PTM-O001 it exists; PTM-O010 it is something else, or contains
+        other files too; PTM-O002 it cannot be read.
         """
         with writing(folder):
             target = Path(os.path.realpath(folder))
@@ -55,11 +56,11 @@ class FolderForm:
                     file=folder,
                     remedy="name another with -o; --force does not replace it either",
                 )
-            strange = next((n for n, plain in _paths(target) if not (plain and self.owns(n))), None)
-            if strange is not None:
+            foreign = next((n for n, plain in _paths(target) if not (plain and self.owns(n))), None)
+            if foreign is not None:
                 raise OutputError(
                     "PTM-O010",
-                    f"holds {strange[:80]}, which `{self.command}` did not write; nothing was "
+                    f"holds {foreign[:80]}, which `{self.command}` did not write; nothing was "
                     "changed",
                     file=folder,
                     remedy="move it away, or name another folder with -o",
@@ -74,7 +75,7 @@ class FolderForm:
         *,
         force: bool = False,
     ) -> None:
-        """Writes a folder of (path, bytes), whole or not at all; raises what `staged` raises."""
+        """Writes a folder of (path, bytes), atomically; raises as `staged`."""
         with self.staged(folder, force=force) as put:
             for path, data in files:
                 put(path, data)
@@ -83,13 +84,13 @@ class FolderForm:
     def staged(
         self, folder: str | os.PathLike[str], *, force: bool = False
     ) -> Iterator[Callable[[str, bytes], None]]:
-        """Takes files, by path and contents, which become the folder once the context ends; if
-        that fails nothing has changed.
+        """A function of path and contents that adds a file; the files become the folder as the
+        context ends. After an error, nothing has changed.
 
-        Raises OutputError: what `check` raises; PTM-O002, PTM-O003 it cannot be written.
+        Raises OutputError: as `check`; PTM-O002, PTM-O003 it cannot be written.
         """
         self.check(folder, force=force)
-        # A link was chosen by whoever named it; what it leads to is replaced.
+        # If the folder is a link, its target is replaced.
         target = Path(os.path.realpath(folder))
         marked = f".{target.name[:200]}.{os.urandom(6).hex()}"
         beside, old = target.with_name(f"{marked}.part"), target.with_name(f"{marked}.old")
@@ -97,7 +98,7 @@ class FolderForm:
             try:
                 beside.mkdir()
                 yield lambda path, data: self._put(beside, path, data)
-                self.check(folder, force=force)  # something may have come to be there meanwhile
+                self.check(folder, force=force)  # it may have been created meanwhile
                 _replace(target, beside, old)
             finally:
                 self._remove(beside)
@@ -114,7 +115,7 @@ class FolderForm:
             os.fsync(stream.fileno())
 
     def _is_ours(self, index: Path) -> bool:
-        """Whether an index begins as ours do; the rest of it may be damaged."""
+        """Whether an index begins with the format; the rest may be damaged."""
         try:
             with open_regular(index) as file:
                 return f'"{self.format}"'.encode() in file.read(_HEAD)
@@ -122,7 +123,7 @@ class FolderForm:
             return False
 
     def _remove(self, folder: Path) -> None:
-        """A folder of ours, and nothing else that has come to be in it."""
+        """Removes the files of this form, and the folders that this empties."""
         if not folder.is_dir():
             return
         for path, plain in list(_paths(folder)):
@@ -135,8 +136,8 @@ class FolderForm:
 
 
 def _paths(folder: Path) -> Iterator[tuple[str, bool]]:
-    """Of all that is in a folder, but for folders that hold something: the path, with slashes, and
-    whether it is a file."""
+    """The path, with slashes, of each file, link or empty folder in a folder, and whether it is a
+    regular file."""
     for place, folders, files in os.walk(folder):
         for name in [*folders, *files]:
             path = Path(place, name)
@@ -146,15 +147,16 @@ def _paths(folder: Path) -> Iterator[tuple[str, bool]]:
 
 
 def _replace(target: Path, new: Path, old: Path) -> None:
-    """Gives a new folder its name, and what has it now another: at once where that can be done."""
-    there = os.path.lexists(target)
-    if there and exchanged(new, target):
+    """Moves ``new`` to ``target``, and an existing target to ``new`` or ``old``; atomically where
+    that is possible."""
+    exists = os.path.lexists(target)
+    if exists and exchanged(new, target):
         return
-    if there:
+    if exists:
         os.rename(target, old)
     try:
         os.rename(new, target)
     except OSError:
-        if there:
+        if exists:
             os.rename(old, target)
         raise

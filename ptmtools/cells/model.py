@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, fans, volumes
 from ptmtools.cells.options import WALKER, Walker
 from ptmtools.cells.search import Nearby
-from ptmtools.store.checked import Stored, texts
+from ptmtools.store.archive import Stored, texts
 from ptmtools.tolerance import Tolerance
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.store.checked import Stored, texts
+from ptmtools.store.archive import Stored, texts
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,8 @@
-"""The command that brings a database up to date, with the options that it was built with."""
+"""The command that brings a database up to date, with the options of its last build.
+
+Errors advise a build by a `Rebuild` remedy; its command is completed here, above the table of
+stages, which knows their options.
+"""
 
 from __future__ import annotations
 
@@ -19,8 +23,8 @@ from ptmtools.store.manifest import StageRecord, listed_before
 
 
 def build_command(db: str | PathLike[str]) -> str:
-    """The command for a database, also for one of an earlier schema; what cannot be read of its
-    options is left out."""
+    """The command for a database, also for one of an earlier schema; without the options that
+    cannot be read."""
     model, stages = _recorded(Path(db))
     options = []
     for name, stage in STAGES.items():

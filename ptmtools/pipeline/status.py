@@ -19,10 +19,9 @@ from ptmtools.pipeline.stage import Artifacts, Options, Stage
 from ptmtools.pipeline.stages import STAGES
 from ptmtools.store.folder import DatabaseFolder, read_manifest
 from ptmtools.store.layout import LOCK, STAGING
-from ptmtools.store.lock import holder, is_held
 from ptmtools.store.manifest import Manifest
 from ptmtools.store.transaction import finished_tasks
-from ptmtools.store.writer import admitted
+from ptmtools.store.writer import admitted, holder, is_held
 
 State = Literal["done", "not run", "stale", "damaged"]
 

@@ -20,8 +20,7 @@ from ptmtools.scene.model import Camera, Storey, fields_of
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.sandbox import run_in_sandbox, unreadable
 from ptmtools.scene.source import FileRange, Source, SourceMaterial, SourceWrap, Texture
-from ptmtools.store.archive import pack_arrays, unpack_arrays
-from ptmtools.store.checked import Stored
+from ptmtools.store.archive import Stored, pack_arrays, unpack_arrays
 
 _ARRAYS = "source.npz"
 _NAMES = ("points", "triangles", "uv", "triangle_object", "triangle_material")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ptmtools import schemas
 from ptmtools.scene.orientation import tolerance_of
-from ptmtools.store.checked import Stored
+from ptmtools.store.archive import Stored
 from ptmtools.tolerance import Tolerance
 
 Wrap = Literal["repeat", "clamp"]

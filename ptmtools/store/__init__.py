@@ -1,5 +1,5 @@
-"""What a database is on disk: its files, its manifest, and how one state follows another.
+"""A database on disk: its files, its manifest, and the change from one state to the next.
 
-Nothing here knows what a stage computes. `layout` has the names of files, `folder` reads,
-`writer` and `transaction` write one.
+Nothing here depends on what a stage computes. `layout` has the names of the files, `folder` reads
+them, `writer` and `transaction` write them.
 """

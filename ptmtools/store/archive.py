@@ -4,11 +4,12 @@
 installed zlib. Here members are stored, in the order of their names, dated 1980-01-01, little
 endian, C order. numpy itself reads the result (``numpy.load(path, allow_pickle=False)``).
 
-`unpack_arrays` trusts nothing. It reads what `pack_arrays` writes and no other archive: plain
-members of plain names that together are no larger than the file (entries of one directory may
-otherwise share, and multiply, the same bytes), numbers only, and heads that are matched, not
-evaluated. Each CRC is checked, and a declared shape is held against the bytes that are there
-before memory is taken for it.
+A database may come from elsewhere, with matching checksums. `unpack_arrays` reads only what
+`pack_arrays` writes: plain members of plain names that together are no larger than the file
+(entries of one directory may otherwise share, and multiply, the same bytes), numbers only, and
+headers that are matched, not evaluated. Each CRC is checked, and a declared shape is compared with
+the number of bytes before memory is allocated. Compiled loops do not check indices: `Stored` checks
+types, shapes and indices once, as an artifact is read.
 """
 
 from __future__ import annotations
@@ -20,29 +21,32 @@ import struct
 import zipfile
 from collections.abc import Mapping
 from os import PathLike
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.errors import DatabaseError
+from ptmtools.errors import DatabaseError, Rebuild
+
+Arrays = Mapping[str, NDArray[np.generic]]
 
 #: The earliest date that a zip archive can carry.
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 
-#: Names that are stored under: those of fields.
+#: Names of members: those of fields.
 _MEMBER = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)\.npy")
-#: The flag that says that a name is UTF-8; all others (encrypted, sizes further on) are refused.
+#: The flag of UTF-8 names; all others (encrypted, sizes after the data) are refused.
 _UTF8 = 1 << 11
-#: What numpy's `write_array` puts before an array of truths or numbers, and where it begins.
+#: The header that numpy's `write_array` gives an array of booleans or numbers, and its start.
 _HEAD = re.compile(
     rb"\x93NUMPY\x01\x00..\{'descr': '([<|][biuf][1248])', 'fortran_order': False, "
     rb"'shape': \(((?:\d{1,19}, ?){0,31}(?:\d{1,19})?)\), \} *\n",
     re.DOTALL,
 )
 _HEAD_START = 10
-#: The largest side, of an array that has no elements.
-_MOST = (1 << 63) - 1
-#: What `zipfile` raises for a damaged archive.
+#: The largest side, for arrays without elements.
+_LARGEST_SIDE = (1 << 63) - 1
+#: The exceptions of `zipfile` for a damaged archive.
 _FAULTS = (ArithmeticError, EOFError, LookupError, RuntimeError, TypeError, ValueError,
            struct.error, zipfile.BadZipFile)  # fmt: skip
 
@@ -68,31 +72,31 @@ def unpack_arrays(data: bytes, *, file: str | PathLike[str]) -> dict[str, NDArra
 
     Raises
     ------
-    DatabaseError: PTM-D006 if the bytes are no such archive, or damaged.
+    DatabaseError: PTM-D006 if `pack_arrays` has not written the bytes.
     """
     arrays: dict[str, NDArray[np.generic]] = {}
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = archive.infolist()
             if sum(member.file_size for member in members) > len(data):
-                raise ValueError("its members claim more bytes than the file has")
+                raise ValueError("its members declare more bytes than the file has")
             for member in members:
                 name = _checked_name(member)
                 if name in arrays:
-                    raise ValueError(f"array {name} is there twice")
+                    raise ValueError(f"array {name} occurs twice")
                 arrays[name] = _array(archive.read(member))
     except _FAULTS as fault:
         raise DatabaseError(
             "PTM-D006",
             f"damaged: {fault}",
             file=file,
-            remedy="run `ptm build-scene` again to rebuild it",
+            remedy=Rebuild("run {} again to rebuild it"),
         ) from fault
     return arrays
 
 
 def _checked_name(member: zipfile.ZipInfo) -> str:
-    """The name of the array that a member holds, if `pack_arrays` can have written it."""
+    """The array's name; raises ValueError for a member that `pack_arrays` does not write."""
     name = _MEMBER.fullmatch(member.filename)
     if name is None:
         raise ValueError(f"member {member.filename[:80]!r} has an impossible name")
@@ -109,6 +113,54 @@ def _array(body: bytes) -> NDArray[np.generic]:
     dtype = np.dtype(head[1].decode())
     shape = tuple(int(side) for side in head[2].decode().split(",") if side.strip())
     count = math.prod(shape)  # of Python's integers, which do not overflow
-    if count * dtype.itemsize != len(body) - head.end() or max(shape, default=0) > _MOST:
+    if count * dtype.itemsize != len(body) - head.end() or max(shape, default=0) > _LARGEST_SIDE:
         raise ValueError("array whose shape does not match its bytes")
     return np.frombuffer(body, dtype, count, offset=head.end()).reshape(shape).copy()
+
+
+class Stored:
+    """The arrays of an artifact, checked as they are read by name.
+
+    Raises KeyError for an array that is missing, ValueError for one that fails a check.
+    """
+
+    def __init__(self, arrays: Arrays) -> None:
+        self._arrays = arrays
+
+    def array(
+        self, name: str, dtype: type[np.generic], *shape: int | None, finite: bool = False
+    ) -> NDArray[Any]:
+        """An array of this type and shape; None is a side of any length. Numbers of another type of
+        the same kind are converted. With ``finite``, NaN and infinities are errors."""
+        array = np.asarray(self._arrays[name])
+        if array.dtype.kind != np.dtype(dtype).kind:
+            raise ValueError(f"{name} has elements of type {array.dtype}")
+        sides = zip(shape, array.shape, strict=False)
+        if len(array.shape) != len(shape) or any(side not in (None, own) for side, own in sides):
+            raise ValueError(f"{name} has the shape {array.shape}")
+        if finite and not np.isfinite(array).all():
+            raise ValueError(f"{name} has numbers that are not finite")
+        return array.astype(dtype, copy=False)
+
+    def indices(
+        self, name: str, dtype: type[np.integer[Any]], *shape: int | None, low: int = 0, high: int
+    ) -> NDArray[Any]:
+        """An array of integers from ``low`` to below ``high``."""
+        array = self.array(name, dtype, *shape)
+        if array.size and not low <= int(array.min()) <= int(array.max()) < high:
+            raise ValueError(f"{name} has an index out of range")
+        return array
+
+    def starts(self, name: str, rows: int | None, total: int) -> NDArray[np.int64]:
+        """The row starts of a CSR, (rows + 1,): ascending from 0 to ``total``."""
+        array = self.array(name, np.int64, None if rows is None else rows + 1)
+        if not len(array) or array[0] != 0 or array[-1] != total or (np.diff(array) < 0).any():
+            raise ValueError(f"{name} does not divide {total} entries")
+        return array
+
+
+def texts(values: Any, name: str) -> tuple[str, ...]:
+    """A list of texts."""
+    if not isinstance(values, list) or not all(isinstance(value, str) for value in values):
+        raise ValueError(f"{name} are not texts")
+    return tuple(values)

@@ -1,13 +1,13 @@
-"""SHA-256 of files, remembered from run to run as long as a file has not been touched.
+"""SHA-256 of files, cached between runs while a file is unchanged.
 
-A build that has nothing to do must not read a terabyte to find that out. A digest is taken again
-unless the file's size, inode, and times of modification and of change are what they were when it
-was last taken; the time of change no program sets. A file that changed just before it was read
-could change once more within the same tick of the clock, so its digest is not remembered (Git
-calls such an entry racy). ``ptm validate`` never asks here: it reads every byte.
+A build with nothing to do must not read a terabyte. A digest is computed again unless the file has
+its cached size, inode, and times of modification and of status change; programs cannot set the
+latter. A file that changed just before it was read could change again within the same tick of the
+clock, so its digest is not cached (Git calls such an entry racy). ``ptm validate`` does not use the
+cache: it reads every byte.
 
-What is remembered is no artifact. It lies in the user's cache folder (``XDG_CACHE_HOME``), a file
-for each database, and losing it costs time only.
+The cache is in the user's cache folder (``XDG_CACHE_HOME``), a file for each database; losing it
+costs time only.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from typing import Any
 
 from ptmtools.files import open_regular
 
-#: A clock may stand still for so long, in nanoseconds: most tick every 1 to 10 ms, some disks'
-#: every 2 s; theirs are recognised by whole seconds.
+#: Ticks of the clocks of file times, ns: most are 1 to 10 ms; those of some disks, recognised by
+#: whole seconds, are 2 s.
 TICK, COARSE_TICK = 50_000_000, 3_000_000_000
-#: Files for databases that were not built for so many days are removed.
+#: Caches of databases that were not built for this many days are removed.
 KEPT_DAYS = 90
 
 _FORMAT = 1
@@ -33,19 +33,14 @@ Stamp = tuple[int, int, int, int]
 
 
 class Digests:
-    """Digests of files, by absolute path.
-
-    Parameters
-    ----------
-    database: the folder for which they are remembered.
-    """
+    """The digests of the files of a database and of its model, by absolute path."""
 
     def __init__(self, database: Path) -> None:
         name = hashlib.sha256(os.fsencode(database.absolute())).hexdigest()[:32]
         folder = _cache_folder()
         self._file = None if folder is None else folder / f"{name}.json"
         self._known: dict[str, tuple[Stamp, str]] = {}
-        self._noted: dict[str, tuple[Stamp, str]] = {}
+        self._written: dict[str, tuple[Stamp, str]] = {}
         self._used: set[str] = set()
         self._changed = False
         with suppress(OSError, ValueError, TypeError, RecursionError):
@@ -69,16 +64,16 @@ class Digests:
         return digest
 
     def note(self, path: Path, digest: str) -> None:
-        """What was just written to a file; it counts from the next run on."""
+        """Sets the digest of a file that was just written, for the next runs."""
         with suppress(OSError):
-            self._noted[os.path.abspath(path)] = (_stamp(path), digest)
+            self._written[os.path.abspath(path)] = (_stamp(path), digest)
 
     def save(self) -> None:
-        """Remembers what was found out; in silence if that cannot be."""
-        for name, (stamp, digest) in self._noted.items():
+        """Writes the cache; ignores errors."""
+        for name, (stamp, digest) in self._written.items():
             with suppress(OSError):
                 self._remember(Path(name), stamp, digest, time.time_ns())
-        self._noted = {}
+        self._written = {}
         if self._file is None or not self._changed:
             return
         rows = {
@@ -98,9 +93,10 @@ class Digests:
         self._changed = False
 
     def _remember(self, path: Path, stamp: Stamp, digest: str, before: int) -> None:
-        """The digest of a file that was read at the time ``before``, if it is known to stand."""
+        """Caches the digest of a file read at the time ``before``, unless the file may have changed
+        since."""
         if stamp == _stamp(path) and _settled(stamp, before):
-            name = os.path.abspath(path)  # another file's, if a link stands before a ``..``
+            name = os.path.abspath(path)  # differs from ``path`` if a link precedes a ``..``
             self._known[name] = (stamp, digest)
             self._used.add(name)
             self._changed = True
@@ -118,12 +114,12 @@ class Digests:
 
 def _stamp(path: Path) -> Stamp:
     """Size, inode, and times of modification and of change in nanoseconds."""
-    found = os.stat(path)
-    return found.st_size, found.st_ino, found.st_mtime_ns, found.st_ctime_ns
+    state = os.stat(path)
+    return state.st_size, state.st_ino, state.st_mtime_ns, state.st_ctime_ns
 
 
 def _settled(stamp: Stamp, now: int) -> bool:
-    """Whether a change at the time ``now``, in nanoseconds, or later would show in the stamp."""
+    """Whether a change at the time ``now``, ns, or later would change the stamp."""
     tick = COARSE_TICK if stamp[2] % 1_000_000_000 == 0 else TICK
     return max(stamp[2:]) + tick < now
 

@@ -1,4 +1,4 @@
-"""A database on disk, to read: every file is compared with its recorded hash."""
+"""Reads a database: every file is compared with its recorded hash."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class DatabaseFolder:
     Attributes
     ----------
     path: the folder.
-    manifest: what it says of itself.
-    digests: of its files, and of those that it is made from.
+    manifest: its last committed state.
+    digests: of its files and of the model's.
     """
 
     def __init__(self, path: Path, manifest: Manifest) -> None:
@@ -75,7 +75,7 @@ class DatabaseFolder:
 
         Raises
         ------
-        DatabaseError: PTM-D005 if it is missing, PTM-D006 if it is not what was recorded.
+        DatabaseError: PTM-D005 if it is missing, PTM-D006 if its hash is not the recorded one.
         """
         file = self.path / name
         try:
@@ -88,11 +88,11 @@ class DatabaseFolder:
         return data
 
     def read_output(self, stage: str, name: str) -> bytes:
-        """The bytes of an output that a stage must have; raises as `output` and `read` do."""
+        """The bytes of an output that a stage must have; raises as `output` and `read`."""
         return self.read(name, self.output(stage, name))
 
     def output(self, stage: str, name: str) -> str:
-        """The recorded hash of an output that a stage must have; raises as `record` does, and
+        """The recorded hash of an output that a stage must have; raises as `record`, and
         PTM-D002 if it has no such output."""
         digest = self.record(stage).outputs.get(name)
         if digest is None:
@@ -100,14 +100,14 @@ class DatabaseFolder:
         return digest
 
     def read_arrays(self, stage: str) -> dict[str, NDArray[np.generic]]:
-        """The arrays of a stage; raises as `read_output` does."""
+        """The arrays of a stage; raises as `read_output`."""
         from ptmtools.store.archive import unpack_arrays
 
         name = arrays_of(stage)
         return unpack_arrays(self.read_output(stage, name), file=self.path / name)
 
     def damaged(self, outputs: Mapping[str, str]) -> str | None:
-        """The first file that is not there with its recorded hash, or None."""
+        """The first file that is missing or has another hash, or None."""
         for name, digest in outputs.items():
             try:
                 if self.digests.of(self.path / name) != digest:
@@ -118,12 +118,12 @@ class DatabaseFolder:
 
 
 def unreadable(file: Path, fault: OSError) -> DatabaseError:
-    """The error for a file of a database that the system does not let read, PTM-D005."""
+    """The error for a file of a database that cannot be read, PTM-D005."""
     return _unusable("PTM-D005", f"cannot be read ({fault.strerror or fault})", file)
 
 
 def damaged(file: Path, what: str) -> DatabaseError:
-    """The error for a file of a database whose contents cannot be right, PTM-D006."""
+    """The error for a file of a database with damaged contents, PTM-D006."""
     return _unusable("PTM-D006", f"damaged: {what}", file)
 
 

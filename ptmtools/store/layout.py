@@ -1,16 +1,16 @@
-"""The names of what lies in a database folder.
+"""The names of the files in a database folder.
 
 ::
 
-    manifest.json       what the database says of itself, see `manifest`
+    manifest.json       the state of the database, see `manifest`
     stages/NAME.npz     the arrays of a stage
     stages/images.json  the list of the model's images
     stages/images/      a copy of each, under its SHA-256
     stages/octrees.json the list of the octree textures
-    stages/textures/    what the levels of each texture show
-    www/                what is served, and nothing else
-    .ptm-new/           outputs on their way in, see `transaction`
-    .ptm-lock           who is writing, see `lock`
+    stages/textures/    the details of the levels of each texture
+    www/                the served files, and nothing else
+    .ptm-new/           outputs before their commit, see `transaction`
+    .ptm-lock           the writing process, see `writer`
 """
 
 from __future__ import annotations

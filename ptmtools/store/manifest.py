@@ -1,22 +1,22 @@
-"""What a database says of itself: `manifest.json`, the one file that is written last.
+"""The manifest of a database: `manifest.json`, the file that is written last.
 
 ::
 
     {"format": "ptmtools database", "schema": 2,
      "model": "museum.obj",                          the file's name, never its folder
      "stages": {"cells": {
-         "recipe": 1,                                the version of what the stage does
+         "recipe": 1,                                the version of the stage's computation
          "parameters": {"wall_area": 1.0, …},        the options that can change the outputs
-         "inputs":  {"stages/scene.npz": "9f86…"},   name → SHA-256 of what was read
+         "inputs":  {"stages/scene.npz": "9f86…"},   name → SHA-256 of the files read
          "outputs": {"stages/cells.npz": "60b7…"},   path in the database → SHA-256
          "counts":  {"cells": 52, "portals": 61, …}, figures and choices, for reports
-         "notes":   ["open above: …"],               what it had to say, one line each
-         "warnings": ["open above: …"]               the gravest of that
+         "notes":   ["open above: …"],               one line each
+         "warnings": ["open above: …"]               the notes that are warnings
      }, …}}
 
-Stages stand in the order of their names. There is no time and no folder of the machine in it:
-the same model and options give the same manifest anywhere. A stage is current if it would be run
-by the same recipe with the same parameters on the same inputs, and its outputs are all there.
+Stages are sorted by name. It contains no time and no folder of the machine: the same model and
+options give the same manifest anywhere. A stage is current if recipe, parameters and inputs would
+be the same, and all its outputs exist.
 """
 
 from __future__ import annotations
@@ -35,15 +35,15 @@ from ptmtools.store.layout import WRITTEN
 FORMAT = "ptmtools database"
 SCHEMA = 2
 
-#: Lists and objects may be nested this deep at most.
-_DEEPEST = 16
+#: Largest depth of nested lists and objects.
+_MAX_DEPTH = 16
 
 
 @dataclass(frozen=True)
 class StageRecord:
-    """What one run of a stage was, see the module's description.
+    """The record of one run of a stage, see the head of the module.
 
-    `inputs` may map to the empty string: a file that was looked for and not found.
+    An input that did not exist has the digest "".
     """
 
     recipe: int
@@ -63,7 +63,7 @@ class Manifest:
     ----------
     model: the file's name.
     stages: by name.
-    replaced: the schema of an earlier manifest that this one takes the place of; not written.
+    replaced: the schema of the earlier manifest that this one replaces; not written.
     """
 
     model: str
@@ -71,7 +71,7 @@ class Manifest:
     replaced: int | None = field(default=None, compare=False)
 
     def with_stages(self, records: Mapping[str, StageRecord]) -> Manifest:
-        """This manifest with some stages recorded anew."""
+        """A copy with these records replaced."""
         return replace(self, stages={**self.stages, **records})
 
     def outputs(self) -> dict[str, str]:
@@ -93,15 +93,15 @@ class Manifest:
 
         Raises
         ------
-        DatabaseError: PTM-D001 if it is not a manifest of ours, PTM-D002 if it is damaged,
+        DatabaseError: PTM-D001 if it is no manifest, PTM-D002 if it is damaged,
             PTM-D003 if another version of ptmtools wrote it.
         """
         try:
             document = json.loads(data)
         except (ValueError, RecursionError) as fault:
             raise damaged_manifest(file, f"not JSON ({fault})") from fault
-        if _nested(document, _DEEPEST):
-            raise damaged_manifest(file, f"nested more than {_DEEPEST} deep")
+        if _nested(document, _MAX_DEPTH):
+            raise damaged_manifest(file, f"nested more than {_MAX_DEPTH} deep")
         if not isinstance(document, dict) or document.get("format") != FORMAT:
             raise DatabaseError(
                 "PTM-D001", "not a ptmtools database", file=file, remedy="give a database folder"
@@ -130,8 +130,8 @@ class Manifest:
 
 
 class Earlier(NamedTuple):
-    """A manifest of an earlier schema: its number, the model, the files that are listed, and the
-    stages, of whose records only recipe and parameters are kept and may be anything."""
+    """A manifest of an earlier schema: the schema, the model, the listed files, and the stages,
+    whose records have only a recipe and parameters, both unchecked."""
 
     schema: int
     model: str
@@ -140,10 +140,9 @@ class Earlier(NamedTuple):
 
 
 def listed_before(data: bytes) -> Earlier | None:
-    """What a manifest of an earlier schema says; None if it is no such manifest.
+    """Reads a manifest of an earlier schema; None if it is no such manifest.
 
-    Of such a database nothing can be used but the knowledge of what is ours in its folder, and how
-    it was built.
+    It tells which files of the folder belong to the database, and how it was built.
     """
     try:
         document = json.loads(data)
@@ -154,18 +153,17 @@ def listed_before(data: bytes) -> Earlier | None:
         stages = document["stages"]
         listed = [path for stage in stages.values() for path in stage["outputs"]]
         outputs = {path for path in listed if isinstance(path, str) and _is_output(path)}
-        ran = {
+        records = {
             name: StageRecord(stage.get("recipe"), stage.get("parameters"), {}, {})
             for name, stage in stages.items()
         }
-        return Earlier(schema, model, outputs, ran)
+        return Earlier(schema, model, outputs, records)
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
 
 
 def _nested(value: object, deepest: int) -> bool:
-    """Whether lists and objects lie deeper in it than any option or figure does. They would be
-    written a line for each, indented."""
+    """Whether lists and objects are nested deeper than in any option or count."""
     if not isinstance(value, dict | list):
         return False
     inner = value.values() if isinstance(value, dict) else value
@@ -173,14 +171,13 @@ def _nested(value: object, deepest: int) -> bool:
 
 
 def _is_output(path: str) -> bool:
-    """Whether a path is one that stages write to: inside of the database on every system, and
-    nothing that somebody else has put beside it."""
+    """Whether a path is one that stages write: in one of their folders, on every system."""
     folder, _, name = path.partition("/")
     return folder in WRITTEN and name != "" and leads_inside(path)
 
 
 def damaged_manifest(file: str | PathLike[str], what: str) -> DatabaseError:
-    """The error for a manifest that cannot be right, PTM-D002."""
+    """The error for a damaged manifest, PTM-D002."""
     return DatabaseError(
         "PTM-D002",
         f"damaged manifest: {what}",

@@ -1,16 +1,15 @@
-"""How a database passes from one state to the next, and what is left of a run that was killed.
+"""Passes a database from one state to the next, and recovers an interrupted run.
 
-A transaction. The outputs of a stage gather in a folder of their own below `.ptm-new/`; once all
-are there, the new manifest is put beside them, and that is the commit: from then on they are moved
-to their places, what they replace is removed, and the manifest goes last. Killed before the commit,
-the database is what it was; killed after it, the next run finishes the move. (Tried: renaming every
-output as it is written. A build killed half-way through an update then leaves files that no
-manifest describes.)
+A transaction gathers the outputs of a stage in a folder below `.ptm-new/`. Writing the new manifest
+beside them is the commit. Then the outputs are moved to their places, replaced outputs are removed,
+and the manifest is moved last. Killed before the commit, the database is in its old state; killed
+after it, the next run completes the move. (Tried: renaming every output as it is written. A build
+killed during an update then leaves files that no manifest lists.)
 
-A stage of many tasks notes each finished one in a journal beside its outputs: the next run takes
-them over instead of doing them again. The rest of an interrupted run goes.
+A stage of many tasks appends each finished task to a journal beside its outputs; the next run takes
+these over, and removes the other files of an interrupted run.
 
-Nothing is removed but what a manifest of ours lists, and `.ptm-new/` itself. No link is followed.
+Only files that a manifest lists and `.ptm-new/` are removed. No link is followed.
 """
 
 from __future__ import annotations
@@ -37,13 +36,13 @@ _JOURNAL = "journal"
 
 
 class Transaction:
-    """The outputs of one stage or more on their way into the database.
+    """The outputs of one or more stages before their commit.
 
     Parameters
     ----------
     db: the database; its manifest is replaced at the commit.
     name: of the folder below `.ptm-new/`, the same in every run.
-    turn: held while the database passes from one state to the next.
+    turn: held during the commit.
     """
 
     def __init__(self, db: DatabaseFolder, name: str, turn: Lock) -> None:
@@ -51,16 +50,16 @@ class Transaction:
         self._turn = turn
         self._relative = f"{STAGING}/{name}"
         self._pending: dict[str, str] = {}
-        self._standing = db.manifest.outputs()
-        self._done = _read_journal(self.folder)
+        self._committed = db.manifest.outputs()
+        self._finished = _read_journal(self.folder)
 
     @property
     def folder(self) -> Path:
-        """Where outputs wait for their commit, each under its name in the database."""
+        """The folder of the outputs, each under its name in the database."""
         return self._db.path / self._relative
 
     def put(self, name: str, data: bytes) -> None:
-        """Stages one output, unless it stands in the database already.
+        """Stages one output, unless the database already has it.
 
         Raises
         ------
@@ -78,8 +77,8 @@ class Transaction:
         self.put(arrays_of(stage), pack_arrays(arrays))
 
     def take(self, name: str, file: Path, digest: str = "") -> None:
-        """Stages a file that another wrote into a `subfolder`, unless it stands in the database;
-        moves it, or removes it. Its ``digest`` is taken where it is not given; raises as `put`."""
+        """Stages a file that was written into a `subfolder`: moves it, or removes it if the
+        database already has it. Computes the ``digest`` if it is not given. Raises as `put`."""
         with writing(file):
             digest = digest or sha256(file.read_bytes())
             if self.keep({name: digest}):
@@ -89,15 +88,15 @@ class Transaction:
         self._pending[name] = digest
 
     def subfolder(self, name: str = "") -> Path:
-        """A folder below `folder`, made where it is absent. It goes with the transaction.
+        """A folder below `folder`, created where it is absent, removed with the transaction.
 
         Raises OutputError PTM-O002, PTM-O003, PTM-O005.
         """
         return real_folder(self._db.path, f"{self._relative}/{name}".rstrip("/"))
 
     def keep(self, outputs: Mapping[str, str]) -> bool:
-        """Takes outputs that stand in the database as they are; False if one does not."""
-        same = all(self._standing.get(name) == digest for name, digest in outputs.items())
+        """Keeps committed outputs; False if one is missing or different."""
+        same = all(self._committed.get(name) == digest for name, digest in outputs.items())
         if not same or self._db.damaged(outputs):
             return False
         self._pending.update(outputs)
@@ -105,8 +104,8 @@ class Transaction:
 
     def resume(self, task: str) -> bool:
         """Takes over the outputs of a task that an interrupted run has finished; False if there
-        are none. ``task`` is a digest of all that they depend on."""
-        outputs = self._done.get(task)
+        are none. ``task`` is a digest of everything that they depend on."""
+        outputs = self._finished.get(task)
         if outputs is None:
             return False
         for name, digest in outputs.items():
@@ -116,7 +115,7 @@ class Transaction:
         return True
 
     def finish(self, task: str, names: Iterable[str]) -> None:
-        """Notes in the journal that a task is done, whose outputs were put."""
+        """Appends a task, whose outputs were put, to the journal."""
         line = json.dumps({"task": task, "outputs": {name: self._pending[name] for name in names}})
         folder = self.subfolder()
         with writing(folder), open(folder / _JOURNAL, "a", encoding="utf-8") as journal:
@@ -129,11 +128,11 @@ class Transaction:
         return False
 
     def pending(self) -> dict[str, str]:
-        """What was put: name → SHA-256."""
+        """The outputs so far: name → SHA-256."""
         return dict(self._pending)
 
     def commit(self, records: Mapping[str, StageRecord]) -> None:
-        """Makes what was put the outputs of these stages, and records them."""
+        """Commits the outputs with the records of their stages."""
         with self._turn:
             manifest = self._db.manifest.with_stages(records)
             write_bytes(self.subfolder() / MANIFEST, manifest.to_bytes(), force=True)
@@ -141,17 +140,17 @@ class Transaction:
             self._db.manifest = manifest
         for name, digest in self._pending.items():
             self._db.digests.note(self._db.path / name, digest)
-        self._pending, self._done = {}, {}
-        self._standing = manifest.outputs()
+        self._pending, self._finished = {}, {}
+        self._committed = manifest.outputs()
 
     def _place(self, name: str) -> Path:
-        """Where an output waits, in a folder that is there."""
+        """The path of a staged output, whose folder is created."""
         folder, _, base = name.rpartition("/")
         return self.subfolder(folder) / base
 
 
 def recover(folder: Path) -> None:
-    """Completes a commit that was interrupted; of what was not committed, finished tasks stay."""
+    """Completes an interrupted commit; of uncommitted outputs, those of finished tasks stay."""
     staging = real_folder(folder, STAGING, make=False)
     if not staging.is_dir():
         return
@@ -165,14 +164,14 @@ def recover(folder: Path) -> None:
 
 
 def finished_tasks(folder: Path) -> int:
-    """How many tasks of an interrupted run wait to be taken over."""
+    """Number of tasks of an interrupted run that the next takes over."""
     with suppress(OSError):
         return sum(len(_read_journal(entry)) for entry in (folder / STAGING).iterdir())
     return 0
 
 
 def discard(folder: Path, *, also_finished: bool) -> None:
-    """Removes what was staged; with ``also_finished`` False not if there are finished tasks."""
+    """Removes staged outputs; without ``also_finished``, those of finished tasks stay."""
     staging = folder / STAGING
     if staging.is_symlink() or not staging.is_dir():
         return
@@ -184,22 +183,22 @@ def discard(folder: Path, *, also_finished: bool) -> None:
 
 
 def _read_journal(folder: Path) -> dict[str, dict[str, str]]:
-    """Task → its outputs; what a killed process wrote by halves is left out."""
-    found: dict[str, dict[str, str]] = {}
+    """Task → its outputs; incomplete lines of a killed process are ignored."""
+    tasks: dict[str, dict[str, str]] = {}
     try:
         file = real_file(folder, _JOURNAL) if folder.is_dir() and not folder.is_symlink() else None
         lines = file.read_bytes().splitlines() if file else []
     except OSError:
-        return found
+        return tasks
     for line in lines:
         with suppress(ValueError, KeyError, TypeError, AttributeError, RecursionError):
             entry = json.loads(line)
-            found[str(entry["task"])] = {str(n): str(d) for n, d in entry["outputs"].items()}
-    return found
+            tasks[str(entry["task"])] = {str(n): str(d) for n, d in entry["outputs"].items()}
+    return tasks
 
 
 def _complete(folder: Path, relative: str) -> None:
-    """Moves committed outputs to their places, removes what they replace, the manifest last."""
+    """Moves committed outputs to their places, removes replaced ones, moves the manifest last."""
     staging = folder / relative
     with writing(folder):
         data = (staging / MANIFEST).read_bytes()
@@ -213,12 +212,12 @@ def _complete(folder: Path, relative: str) -> None:
             if name not in after:
                 _remove(folder, name)
         (staging / MANIFEST).replace(folder / MANIFEST)
-        shutil.rmtree(staging)  # not its parent, in which another transaction may just be beginning
+        shutil.rmtree(staging)  # not its parent, where another transaction may begin
 
 
 def _listed(folder: Path) -> Iterable[str]:
-    """The files that the manifest of a database lists, or one of an earlier schema; none of a
-    damaged one, which is replaced."""
+    """The files listed in the manifest of a database, also in one of an earlier schema; none if it
+    is damaged."""
     try:
         manifest = read_manifest(folder)
     except DatabaseError:
@@ -230,7 +229,7 @@ def _listed(folder: Path) -> Iterable[str]:
 
 
 def _remove(folder: Path, name: str) -> None:
-    """Removes an output that no stage has any more, and the folders that this empties."""
+    """Removes an obsolete output, and the folders that this empties."""
     file = real_file(folder, name)
     if file is None:
         return

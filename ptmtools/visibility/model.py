@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.store.checked import Stored
+from ptmtools.store.archive import Stored
 
 #: What is counted for each portal.
 COUNTED = ("work", "ties", "decided", "opened")

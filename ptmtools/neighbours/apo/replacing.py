@@ -36,7 +36,7 @@ from ptmtools.progress import Progress, silent
 from ptmtools.quantities import count
 from ptmtools.scene.model import Scene
 from ptmtools.simplification import Mesh, Simplified, SimplifyOptions, simplify
-from ptmtools.store.checked import Stored
+from ptmtools.store.archive import Stored
 
 
 @dataclass(frozen=True)
