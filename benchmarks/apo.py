@@ -24,8 +24,8 @@ sys.path[:0] = [str(ROOT), str(ROOT / "sample_data")]
 from ptmtools.neighbours.apo.files import streamed  # noqa: E402
 from ptmtools.neighbours.apo.making import Made, make_apo  # noqa: E402
 from ptmtools.neighbours.apo.model import ApoOptions  # noqa: E402
-from ptmtools.neighbours.apo.warm_up import warm_up  # noqa: E402
 from ptmtools.parallel import open_executor  # noqa: E402
+from ptmtools.pipeline.warm_up import warm_statue  # noqa: E402
 from ptmtools.scene import IngestOptions, ingest  # noqa: E402
 
 #: Model, triangles, faces, seconds, MB, frames a second.
@@ -88,7 +88,7 @@ def main() -> None:
     given = parser.parse_args()
     files = given.files or list(made_statues(given.triangles, given.only))
     options = ApoOptions(faces=given.faces, error=given.error)
-    warm_up()
+    warm_statue()
     print(f"{HEAD}\n|{'---|' * (HEAD.count('|') - 1)}")
     for name, triangles, faces, seconds, mb, _ in PAPER:
         print(

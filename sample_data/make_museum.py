@@ -14,10 +14,8 @@ closed); pictures, statues and benches. The same seed gives the same bytes, what
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -219,7 +217,6 @@ def main(arguments: list[str] | None = None) -> int:
     options = MuseumOptions(
         given.rooms, given.textures, given.size, given.seed, not given.no_windows, given.images
     )
-    _compile_ahead()
     try:
         if given.two_rooms:
             files = [(name, constant(data)) for name, data in two_rooms().items()]
@@ -231,16 +228,6 @@ def main(arguments: list[str] | None = None) -> int:
     total = sum((given.output / name).stat().st_size for name, _ in files)
     print(f"{given.output}: {len(files)} files, {total / 1e6:.1f} MB")
     return 0
-
-
-def _compile_ahead() -> None:
-    """Another process compiles meanwhile what building a database of the museum needs."""
-    if (os.cpu_count() or 1) > 1:
-        with suppress(ImportError):
-            from ptmtools.ahead import compile_ahead
-            from ptmtools.pipeline.build import WARM_UP
-
-            compile_ahead(WARM_UP)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.compiled import plain_kernel, plain_kernel as kernel
+from ptmtools.jit import plain_kernel, plain_kernel as kernel
 
 
 @kernel

@@ -224,17 +224,18 @@ def status(console: Console, db: str, as_json: bool) -> None:
 def warm_up(console: Console) -> None:
     """Compile the code that the first build, encoding or octree texture would compile.
 
-    This takes a minute, once per release and user. A first build compiles beside its work; use this
-    command for images of containers.
+    This takes a minute, once per release and user. A first build compiles too; use this command for
+    images of containers, and before the workers of a cluster start.
     """
-    from ptmtools.ahead import compile_now
-    from ptmtools.pipeline.build import WARM_UP
+    from ptmtools.jit import compilations
+    from ptmtools.pipeline.warm_up import warm_building, warm_statue
 
-    start = time.perf_counter()
-    octrees: Lazy[Callable[[], object]] = Lazy("ptmtools.neighbours.apo.warm_up:warm_up")
-    compiled = [compile_now(task) for task in (WARM_UP, octrees)]
+    start, before = time.perf_counter(), compilations()
+    warm_building()
+    warm_statue()
     seconds = time.perf_counter() - start
-    console.print(f"compiled in {seconds:.1f} s" if any(compiled) else "nothing to compile")
+    fresh = compilations() > before
+    console.print(f"compiled in {seconds:.1f} s" if fresh else "nothing to compile")
 
 
 def print_plan(console: Console, plans: Sequence[StagePlan], as_json: bool) -> None:

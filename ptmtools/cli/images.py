@@ -10,7 +10,6 @@ from typing import IO, Any
 
 import click
 
-from ptmtools.ahead import compile_ahead_if_needed
 from ptmtools.cli.batch import (
     STANDARD,
     Batch,
@@ -22,7 +21,6 @@ from ptmtools.cli.batch import (
 )
 from ptmtools.cli.parameters import Command, Numbers, option, options_of, take
 from ptmtools.errors import InputError, OutputError, naming
-from ptmtools.parallel import processors
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Description, EncodeOptions
 from ptmtools.texture.profiles import PROFILES
@@ -60,9 +58,6 @@ def encode(
     jobs = jobs_for(images, SUFFIXES, output, ".ptm", (".ptm", *SUFFIXES))
     if output and any(job.target and not job.folder for job in jobs):
         _refuse_image_suffix(output)
-    ahead = PROFILES[options.profile].ahead
-    if ahead and (batch.workers or processors()) > 1:
-        compile_ahead_if_needed(ahead)
 
     def work(job: Job, threads: int) -> Report:
         source, target = job.source, job.target

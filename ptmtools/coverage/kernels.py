@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints, Singles
-from ptmtools.compiled import plain_kernel
+from ptmtools.jit import plain_kernel
 
 
 @plain_kernel

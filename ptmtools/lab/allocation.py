@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles
-from ptmtools.compiled import kernel, plain_kernel
+from ptmtools.jit import kernel, plain_kernel
 
 #: Steps that are exchanged for others at most, in one choice.
 _EXCHANGES = 8

@@ -12,11 +12,8 @@ import time
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
-from ptmtools.ahead import Task, compile_ahead
-from ptmtools.lazy import Lazy
 from ptmtools.parallel import Workers
 from ptmtools.pipeline.command import naming_command
 from ptmtools.pipeline.records import StageReport
@@ -28,18 +25,6 @@ from ptmtools.store.writer import DatabaseWriter
 
 PathLike = str | os.PathLike[str]
 Tell = Callable[[StageReport], None]
-
-
-def warm_up() -> None:
-    """Compiles the kernels of builds and encoding with default options, by building a small
-    model."""
-    from ptmtools.pipeline.warm_up import write_building
-
-    with TemporaryDirectory() as folder:
-        build_scene(write_building(Path(folder)), Path(folder, "database"), workers=1)
-
-
-WARM_UP: Task = Lazy(f"{__name__}:{warm_up.__name__}")
 
 
 def _ignore(report: StageReport) -> None:
@@ -151,11 +136,8 @@ def _run(
 
     run.progress = progress
     finished: set[Stage[Any]] = set()
-    ahead = run.workers.here > 1 and len(stages) == len(STAGES)
     try:
         for i, job in enumerate(jobs):
-            if ahead and job.planned()[1]:
-                compile_ahead(WARM_UP)
             if job.stage.one_thread and job.planned()[1]:
                 for later in jobs[i + 1 :]:
                     if finished.issuperset(later.stage.sources(later.options)):

@@ -1,18 +1,21 @@
-"""Writes a small building that makes a build with default options call every kernel.
+"""Compiles all kernels for ``ptm warm-up``: builds a small building and lightens a small statue.
 
-It contains the cases that decide which loops run: doors in a row, whose edges meet in one line
-(near ties), a solid that hangs in a room, and an image large enough for the coder to fit weights.
+The building has what decides which kernels run: doors in a row, whose edges meet in one line (near
+ties), a solid that stands in a room, and an image large enough for the coder to fit weights. The
+statue becomes an octree texture, and the same mesh with texture coordinates is simplified.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-#: The plan in squares of a metre: # is solid from floor to ceiling at 3 m, + at half height only.
+#: From above, in squares of a metre. # is solid from floor to ceiling, three metres up, + at half
+#: height.
 PLAN = """
 ##################
 #....#.....#.....#
@@ -21,18 +24,31 @@ PLAN = """
 #....#.....#.....#
 ##################
 """
-#: Side of the image, in texels.
-SIDE = 256
+#: Side of the image, texels.
+TEXELS = 256
+#: Squares along each side of the statue's mesh.
+SQUARES = 12
+
+
+def warm_building() -> None:
+    """Calls the kernels of builds and encoding with default options."""
+    from ptmtools.pipeline.build import build_scene
+
+    with TemporaryDirectory() as folder:
+        build_scene(write_building(Path(folder)), Path(folder, "database"), workers=1)
 
 
 def write_building(folder: Path) -> Path:
-    """Writes an OBJ file of the `PLAN`, Y up, its material and its image; returns the OBJ file."""
-    texels = np.random.default_rng(1).integers(0, 32, (SIDE, SIDE, 3))
-    texels += np.arange(SIDE)[:, None, None] // 2
+    """An OBJ file of the `PLAN`, Y up, with its material and image in the same folder."""
+    texels = np.random.default_rng(1).integers(0, 32, (TEXELS, TEXELS, 3))
+    texels += np.arange(TEXELS)[:, None, None] // 2
     Image.fromarray(texels.astype(np.uint8)).save(folder / "wall.png")
     (folder / "building.mtl").write_text("newmtl wall\nmap_Kd wall.png\n")
+    plan = np.array([list(row) for row in PLAN.split()]).T
+    walls, slab = plan == "#", plan != ""
+    solid = np.stack([slab, walls, walls | (plan == "+"), walls, slab], axis=1)
     lines = ["mtllib building.mtl", "usemtl wall", "vt 0 0", "vt 1 0", "vt 1 1", "vt 0 1"]
-    for corners in _squares(_solid()):
+    for corners in _squares(solid):
         lines += [f"v {x} {y} {z}" for x, y, z in corners.tolist()]
         lines.append("f -4/1 -3/2 -2/3 -1/4")
     model = folder / "building.obj"
@@ -40,15 +56,9 @@ def write_building(folder: Path) -> Path:
     return model
 
 
-def _solid() -> NDArray[np.bool_]:
-    """(x, y, z) whether the cube of a metre is solid."""
-    plan = np.array([list(row) for row in PLAN.split()]).T
-    walls, slab = plan == "#", plan != ""
-    return np.stack([slab, walls, walls | (plan == "+"), walls, slab], axis=1)
-
-
 def _squares(solid: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(n, 4, 3) squares between solid and empty cubes, counter-clockwise as seen from the empty."""
+    """(n, 4, 3) faces between solid and empty cubes of a metre, given which are solid, (x, y, z);
+    counter-clockwise from the empty side."""
     squares = []
     for axis in range(3):
         up, u, v = np.roll(np.eye(3, dtype=np.int64), -axis, axis=0)
@@ -57,3 +67,38 @@ def _squares(solid: NDArray[np.bool_]) -> NDArray[np.int64]:
             square = np.array([0 * u, u, u + v, v])[:: 1 - 2 * side]
             squares.append((walls + side * up)[:, None] + square)
     return np.concatenate(squares)
+
+
+def warm_statue() -> None:
+    """Calls the kernels of octree textures and of simplification, of plain and painted meshes."""
+    from ptmtools.neighbours.apo.making import make_apo
+    from ptmtools.neighbours.apo.model import ApoOptions
+    from ptmtools.neighbours.apo.traversal import look_up
+    from ptmtools.parallel import Executor
+    from ptmtools.scene.model import Material, Scene
+    from ptmtools.scene.orientation import tolerance_of
+    from ptmtools.simplification import Mesh, SimplifyOptions, simplify
+
+    # A square with waves, seen from above.
+    x, z = np.meshgrid(*[np.arange(SQUARES + 1) / SQUARES] * 2, indexing="ij")
+    points = np.stack([x, np.sin(9 * x) * np.sin(9 * z) / 9, z], axis=-1).reshape(-1, 3)
+    a = (np.arange(SQUARES)[:, None] * (SQUARES + 1) + np.arange(SQUARES)).ravel()
+    b, c, d = a + 1, a + SQUARES + 2, a + SQUARES + 1
+    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]).astype(np.int32)
+    uv = points[triangles][:, :, [0, 2]]
+    count = len(triangles)
+    none = np.zeros(count, np.int32)
+    scene = Scene(
+        points,
+        triangles,
+        uv,
+        none,
+        none,
+        np.ones(count, bool),
+        ("waves",),
+        (Material("stone"),),
+        tolerance_of(points, triangles),
+    )
+    made = make_apo(scene, ApoOptions(faces=count // 4, depth=3), Executor())
+    look_up(made.octree, np.full((1, 3), 0.5))
+    simplify(Mesh(points, triangles, none, uv), SimplifyOptions(count // 4))

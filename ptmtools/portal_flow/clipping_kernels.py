@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.compiled import plain_kernel as kernel
+from ptmtools.jit import plain_kernel as kernel
 
 #: What clipping left. NEAR_TIE is EMPTY, but the polygon ends within `NEAR` slacks of where it
 #: would have been kept.

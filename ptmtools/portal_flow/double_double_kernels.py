@@ -24,7 +24,7 @@ from __future__ import annotations
 import numpy as np
 
 from ptmtools.arrays import Ints
-from ptmtools.compiled import plain_kernel as kernel
+from ptmtools.jit import plain_kernel as kernel
 from ptmtools.portal_flow.storage import DoubleDoublePortals, DoubleDoubleScratch
 
 #: More than a product of vectors and a vertex newly cut may be wrong by.

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from ptmtools.arrays import Bits, Floats, Ints
-from ptmtools.compiled import kernel, plain_kernel
+from ptmtools.jit import kernel, plain_kernel
 from ptmtools.portal_flow.clipping_kernels import (
     CUT,
     EMPTY,

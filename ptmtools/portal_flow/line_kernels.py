@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ptmtools.arrays import Bits, Bools, Floats, Ints
-from ptmtools.compiled import kernel, plain_kernel
+from ptmtools.jit import kernel, plain_kernel
 from ptmtools.portal_flow.storage import Geometry
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.compiled import inlined_kernel, kernel, plain_kernel
+from ptmtools.jit import inlined_kernel, kernel, plain_kernel
 from ptmtools.rendering.records import Pyramids, Shows, Sight, Triangles
 
 #: What is shown where nothing is known: 0 to 255.

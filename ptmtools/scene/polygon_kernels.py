@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.compiled import kernel
+from ptmtools.jit import kernel
 
 
 @kernel

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ptmtools.compiled import plain_kernel as kernel
+from ptmtools.jit import plain_kernel as kernel
 from ptmtools.simplification.legality_kernels import (
     has_counterparts,
     is_linked,

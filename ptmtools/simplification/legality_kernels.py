@@ -8,7 +8,7 @@ goes has no counterpart at the one that stays.
 
 from __future__ import annotations
 
-from ptmtools.compiled import plain_kernel as kernel
+from ptmtools.jit import plain_kernel as kernel
 from ptmtools.simplification.state_kernels import DROP, FACES, MARKS, TOPOLOGY, State
 from ptmtools.tolerance import FILE_SHARE
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from ptmtools.arrays import Floats
-from ptmtools.compiled import plain_kernel as kernel
+from ptmtools.jit import plain_kernel as kernel
 from ptmtools.simplification.model import Mesh
 from ptmtools.simplification.surface import COLOR_SHARE, Surface
 

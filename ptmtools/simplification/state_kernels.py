@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.compiled import plain_kernel as kernel
+from ptmtools.jit import plain_kernel as kernel
 
 #: So many faces at an edge at most; an edge with more does not collapse.
 MOST_AT_EDGE = 64

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.compiled import plain_kernel as kernel
+from ptmtools.jit import plain_kernel as kernel
 from ptmtools.simplification.model import Mesh
 from ptmtools.simplification.surface import Edges, Surface, edges_of, flattened, following, unite
 

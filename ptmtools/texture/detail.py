@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.compiled import kernel
+from ptmtools.jit import kernel
 
 
 @kernel

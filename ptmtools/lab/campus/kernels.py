@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.compiled import plain_kernel
+from ptmtools.jit import plain_kernel
 from ptmtools.rendering.kernels import GREY, blend, distance, texel_under
 from ptmtools.rendering.records import Pyramids, Sight, Triangles
 

@@ -7,7 +7,7 @@ from heapq import heappop, heappush
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.compiled import kernel
+from ptmtools.jit import kernel
 
 
 @kernel

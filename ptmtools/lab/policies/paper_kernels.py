@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.compiled import kernel, plain_kernel
+from ptmtools.jit import kernel, plain_kernel
 
 
 @plain_kernel

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.compiled import kernel, plain_kernel
+from ptmtools.jit import kernel, plain_kernel
 from ptmtools.lab.relief.octrees import Octrees
 from ptmtools.neighbours.apo.traversal import child_of
 from ptmtools.rendering.kernels import GREY, Sums, blend, distance, texel_under

@@ -36,7 +36,7 @@ from ptmtools.lab.world import World, prepare
 from ptmtools.options import option
 from ptmtools.output.served import Served, Surfaces, read_served
 from ptmtools.pipeline import Artifacts
-from ptmtools.pipeline.build import WARM_UP
+from ptmtools.pipeline.warm_up import warm_building
 from ptmtools.progress import Progress, silent
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.records import Pyramids
@@ -168,7 +168,7 @@ def try_settings(
     original = prepare(served, walk, progress=progress)
     looked = time.perf_counter() - begin
     progress(0, len(chosen), "trying settings")
-    WARM_UP.load()()
+    warm_building()
     with copied(db) as copy:
         seconds = build_again(copy, own)
     least = sum(

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.compiled import kernel, plain_kernel
+from ptmtools.jit import kernel, plain_kernel
 
 #: Degrees between triangles that are smoothed over.
 CREASE = 40.0

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.compiled import plain_kernel
+from ptmtools.jit import plain_kernel
 from ptmtools.neighbours.apo.model import Octree
 
 #: Deeper than any octree: nothing stops there.

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Singles
-from ptmtools.compiled import kernel
+from ptmtools.jit import kernel
 from ptmtools.lazy import component
 from ptmtools.neighbours.campus.model import LIGHT_SIZES
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.compiled import kernel, plain_kernel
+from ptmtools.jit import kernel, plain_kernel
 
 DONE = -1
 #: Elements of a block at most, and of a group; bytes of a block at most.

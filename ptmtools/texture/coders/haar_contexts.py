@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ptmtools.compiled import plain_kernel as kernel
+from ptmtools.jit import plain_kernel as kernel
 
 i32 = np.int32
 

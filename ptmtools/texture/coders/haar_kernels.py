@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ptmtools.compiled import plain_kernel as kernel
+from ptmtools.jit import plain_kernel as kernel
 from ptmtools.texture.coders.group import ESCAPE, IMPOSSIBLE, OK, TRUNCATED
 from ptmtools.texture.coders.haar_contexts import context_g, context_h, context_v, gradient_row
 from ptmtools.texture.coders.haar_layout import CLASSES, EDGE_TABLE

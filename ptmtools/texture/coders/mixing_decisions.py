@@ -34,7 +34,7 @@ from typing import Any
 
 import numpy as np
 
-from ptmtools.compiled import inlined_kernel, plain_kernel, prefetch
+from ptmtools.jit import inlined_kernel, plain_kernel, prefetch
 from ptmtools.texture.coders import mixing_tables as tables
 
 i32 = np.int32

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ptmtools.compiled import inlined_kernel, plain_kernel, prefetch
+from ptmtools.jit import inlined_kernel, plain_kernel, prefetch
 from ptmtools.texture.coders import mixing_tables as tables
 from ptmtools.texture.coders.mixing_decisions import (
     CONFIRMED,

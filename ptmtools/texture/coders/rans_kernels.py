@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ptmtools.compiled import plain_kernel as kernel
+from ptmtools.jit import plain_kernel as kernel
 from ptmtools.texture.coders.group import ESCAPE, TABLE_BITS, TABLE_SIZE
 
 #: A state stays at or above this and below 2^31.

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ptmtools.compiled import plain_kernel as kernel
+from ptmtools.jit import plain_kernel as kernel
 from ptmtools.texture.coders.group import ESCAPE
 from ptmtools.texture.coders.rans_kernels import decode_single
 

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from ptmtools.compiled import plain_kernel as kernel
+from ptmtools.jit import plain_kernel as kernel
 from ptmtools.texture.coders.group import IMPOSSIBLE, OK, TRUNCATED
 from ptmtools.texture.coders.rans_kernels import STATE_LOW, start_states
 from ptmtools.texture.coders.repeats_blocks import (

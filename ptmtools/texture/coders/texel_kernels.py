@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ptmtools.compiled import kernel
+from ptmtools.jit import kernel
 from ptmtools.texture.coders.group import ESCAPE, IMPOSSIBLE, OK, TRUNCATED
 from ptmtools.texture.coders.rans_kernels import STATE_LOW, decode_single, start_states
 

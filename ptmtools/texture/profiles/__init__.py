@@ -9,12 +9,9 @@ from the table, so a new one needs its module and a line here.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, cast
-
-from ptmtools.lazy import Lazy
 
 if TYPE_CHECKING:
     from ptmtools.texture.coder import Coder
@@ -31,7 +28,6 @@ class Profile:
     about: what it is for, in a few words, for the help.
     lossy: whether it can make use of an allowed error.
     since: the first version of the container that may hold it.
-    ahead: what another process may compile while the coder compiles the first of its loops.
     module: the `Coder`, if not the module of this package that has the profile's name.
     """
 
@@ -40,7 +36,6 @@ class Profile:
     about: str
     lossy: bool = False
     since: int = 2
-    ahead: Lazy[Callable[[], object]] | None = None
     module: str = ""
 
     @property
@@ -59,7 +54,6 @@ PROFILES = {
             "for streaming",
             lossy=True,
             since=1,
-            ahead=Lazy(f"{__name__}.fast:compile_ahead"),
         ),
         Profile("small", 2, "for archives; smaller, but 30 to 60 times slower", lossy=True),
         Profile("raw", 0, "uncompressed, the layout of Marvie & Bouatouch, 2003", since=1),

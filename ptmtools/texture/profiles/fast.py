@@ -55,15 +55,6 @@ TOO_MANY_BLOCKS = 1 << 27
 Bytes = NDArray[np.uint8]
 
 
-def compile_ahead() -> None:
-    """Compiles what `encode_tile` of bytes needs but for `repeats`, with which that begins."""
-    from ptmtools.texture.coders.rans import built_in, empty_sink, encode_symbols
-
-    encode_symbols(empty_sink(0, 1), 1, built_in())
-    # So large that weights are fitted.
-    haar.encode(np.zeros((192, 192, 1), np.uint8), np.zeros((96, 96, 1), np.uint8))
-
-
 def encode_base(level: Samples) -> bytes:
     """One byte that names the coder, then what it wrote."""
     levels = build_pyramid(level)

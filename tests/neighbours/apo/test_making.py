@@ -263,21 +263,21 @@ def test_options_out_of_range(wrong: dict[str, float]) -> None:
 
 
 def test_the_warm_up_calls_every_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
-    from ptmtools import compiled
-    from ptmtools.neighbours.apo.warm_up import warm_up
+    from ptmtools import jit
+    from ptmtools.pipeline.warm_up import warm_statue
 
     names: set[str] = set()
-    call = compiled._Kernel.__call__
+    call = jit._Kernel.__call__
 
     def record(self: Any, *arguments: Any) -> Any:
         names.add(f"{self.__module__}.{self.__name__}")
         return call(self, *arguments)
 
-    monkeypatch.setattr(compiled._Kernel, "__call__", record)
+    monkeypatch.setattr(jit._Kernel, "__call__", record)
     found = make_apo(scene_of(*sphere(5, 0.03)), OPTIONS, Executor())
     look_up(found.octree, np.full((1, 3), 0.5))
     needed = set(names)
     names.clear()
-    warm_up()
+    warm_statue()
     assert needed
     assert needed <= names

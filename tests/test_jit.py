@@ -1,0 +1,167 @@
+"""Cache folders of machine code: one for each state of the sources that it depends on."""
+
+from __future__ import annotations
+
+import ast
+import os
+import shutil
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+import ptmtools
+from ptmtools import jit
+
+ROOT = Path(ptmtools.__file__).parent
+PROGRAM = """
+from ptmtools.progress import listen
+from ptmtools.one import outer
+listen(print)
+print(outer(1))
+"""
+#: A package of two kernels and a table, of which the program calls the one that uses all.
+SOURCES = {
+    "__init__": "",
+    "one": """
+from ptmtools.jit import kernel
+from ptmtools.two import (  # what it calls
+    inner as called,
+)
+
+@kernel
+def outer(x):
+    return called(x) + 1
+""",
+    "two": """
+from ptmtools import tables
+from ptmtools.jit import kernel
+
+FACTOR = tables.FACTOR
+
+@kernel
+def inner(x):
+    return x * FACTOR + 1
+""",
+    "tables": "FACTOR = 10\n",
+    "apart": "NOTHING = 0\n",
+}
+
+
+def run(program: str, folder: Path, **environment: str) -> list[str]:
+    """What a program prints that imports the package in ``folder``, line by line."""
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(folder), **environment},
+        check=True,
+        capture_output=True,
+    )
+    return done.stdout.decode().splitlines()
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """A package of this name, of `SOURCES`."""
+    package = tmp_path / "ptmtools"
+    package.mkdir()
+    for name, source in SOURCES.items():
+        (package / f"{name}.py").write_text(source)
+    for name in ("errors", "jit", "progress"):
+        shutil.copy(ROOT / f"{name}.py", package)
+    return package
+
+
+@pytest.mark.parametrize("chosen", ["", "chosen"])
+def test_what_a_kernel_sees_decides_about_its_machine_code(package: Path, chosen: str) -> None:
+    """Numba alone would run yesterday's inner kernel, with yesterday's table."""
+    for edited, old, new, result, fresh in (
+        ("one", "", "", 12, True),
+        ("tables", "10", "20", 22, True),
+        ("two", "+ 1", "+ 2", 23, True),
+        ("apart", "0", "1", 23, False),
+        ("tables", "20", "10", 13, True),
+        ("two", "+ 2", "+ 1", 12, False),
+    ):
+        file = package / f"{edited}.py"
+        file.write_text(file.read_text().replace(old, new))
+        *announced, found = run(PROGRAM, package.parent, NUMBA_CACHE_DIR=chosen)
+        assert int(found) == result
+        assert len(announced) == fresh
+
+
+def test_two_processes_that_start_together(package: Path) -> None:
+    """Both may compile; what they leave is whole."""
+    with ThreadPoolExecutor(2) as pool:
+        printed = list(pool.map(lambda _: run(PROGRAM, package.parent, NUMBA_CACHE_DIR=""), "ab"))
+    assert [lines[-1] for lines in printed] == ["12", "12"]
+    assert run(PROGRAM, package.parent, NUMBA_CACHE_DIR="") == ["12"]
+
+
+def test_literals_are_not_types_of_their_own(package: Path) -> None:
+    """Dispatchers that call each other compile the callee for every literal."""
+    (package / "one.py").write_text(
+        SOURCES["one"].replace("called(x)", "called(x) + called(2) + called(3)")
+    )
+    program = f"{PROGRAM}\nfrom ptmtools.jit import compilations\nprint(compilations())"
+    lines = run(program, package.parent, NUMBA_CACHE_DIR="")
+    assert lines[1:] == [str(11 + 21 + 31 + 1), "2"]
+
+
+def test_both_forms_of_a_kernel(package: Path) -> None:
+    """Called from Python it is cached by itself, whether or not it is a part of another."""
+    program = f"{PROGRAM}\nfrom ptmtools.two import inner\nprint(inner(1))"
+    assert run(program, package.parent, NUMBA_CACHE_DIR="")[1:] == ["12", "11"]
+    assert run(program, package.parent, NUMBA_CACHE_DIR="") == ["12", "11"]
+
+
+def test_a_constant_of_this_package(tmp_path: Path) -> None:
+    shutil.copytree(
+        ROOT, tmp_path / "ptmtools", ignore=shutil.ignore_patterns("__pycache__", "schemas")
+    )
+    program = (
+        "import numpy; from ptmtools.texture.coders.mixing_decisions import counted; "
+        "print(counted(numpy.uint32(1 << 31), 1, 9))"
+    )
+    before = run(program, tmp_path)
+    tables = tmp_path / "ptmtools" / "texture/coders/mixing_tables.py"
+    source = tables.read_text()
+    assert source.count("655360") == 1
+    tables.write_text(source.replace("655360", "327680"))
+    after = run(program, tmp_path)
+    assert before != after
+    tables.write_text(source)
+    assert run(program, tmp_path) == before
+
+
+def test_without_a_place_to_keep_it_code_still_runs(tmp_path: Path) -> None:
+    """As a user without a home, of a package that is not theirs."""
+    (tmp_path / "file").touch()
+    program = (
+        "import os; os.environ.pop('HOME', None)\n"
+        "from pathlib import Path; from ptmtools import jit\n"
+        f"jit._PACKAGE = Path({str(tmp_path / 'file')!r})\n"
+        "assert jit._root() == ''\n"
+        "print(jit.kernel(lambda x: x + 1)(41))"
+    )
+    place = str(tmp_path / "file")
+    assert run(program, ROOT.parent, XDG_CACHE_HOME=place, NUMBA_CACHE_DIR="") == ["42"]
+
+
+def test_no_import_is_overlooked() -> None:
+    for file in ROOT.rglob("*.py"):
+        found = set()
+        for node in ast.walk(ast.parse(file.read_text())):
+            names = []
+            if isinstance(node, ast.Import):
+                names = [name.name for name in node.names]
+            elif isinstance(node, ast.ImportFrom):
+                assert not node.level
+                names = [f"{node.module}.{name.name}" for name in node.names]
+            for name in names:
+                if name.split(".")[0] == ROOT.name:
+                    own = jit._module(name)
+                    found.add(own or jit._module(name.rpartition(".")[0]))
+        assert found <= jit._imports(file), file
