@@ -1,30 +1,22 @@
-"""Places: where somebody can stand.
+"""Places, the walkable parts of floors, and the leaves in which visitors stand.
 
 A **place** is a point of a surface within 45° of level over which an upright cylinder, the body of
-a walker from the height of a step to that of the head, meets nothing structural. It is found in
-the structure itself and not in leaves: a walker spans slivers, and does not fit into the hollow of
-a wall. In doubt it fits.
+a walker from the height of a step to that of the head, meets nothing structural. Places are
+computed from the structure itself and not from leaves: a walker spans slivers, and does not fit
+into the hollow of a wall. In doubt the body fits.
 
-Of each flat region of floor it is what is clear of the structure (`clearance`). Circles are
-polygons inside them, so that a body is never wider than asked for. Curved floors are many small
-regions.
+Places are the parts of flat regions of floor that are clear of the structure; curved floors are
+many small regions. The part of a triangle in a band of heights above a floor is projected onto it
+along the vertical, widened by a radius, and subtracted. Above a slope, heights are measured from
+the slope. Circles are polygons inside them, so that a body is never wider than its radius. Floors
+and triangles are sorted by storeys, and regions with many triangles about them are cut in two, so
+the time is proportional to the triangles near floors.
 
-Tried and rejected: a grid of columns, as navigation meshes are made. Doors of 60 cm need cells of
-5 cm, of which a campus has a hundred million.
+Leaves are standing if they meet the eye region. Ceilings lower than the eyes may be are ignored, so
+space just above one counts as well: a small cost that hides nothing.
 
-What of flat regions of floor is clear of what stands about them, in plan.
-
-What of a triangle is as high above a floor as a band is projected onto it along the vertical,
-widened by a radius, and taken away. Above a slope, heights are measured from the slope. A circle
-is a polygon inside it. Floors and triangles are sorted by storeys, regions with much about them are
-cut in two, so the time is in proportion to what stands about.
-
-Polygons are united and cut on the grid of `planar`.
-
-Which leaves somebody can stand in: those that meet the eye region (`eyes`).
-
-Ceilings that hang lower than eyes may be are not asked for, so what is just above one counts as
-well. It costs a little and hides nothing.
+Tried and rejected: a grid of columns, as in navigation meshes. Doors of 60 cm need cells of 5 cm,
+of which a campus has a hundred million.
 """
 
 from __future__ import annotations
@@ -55,16 +47,15 @@ from ptmtools.cells.structure import Structure
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import Tolerance
 
-#: Floors so near to each other in height, as a share of the band that is looked at, are looked at
-#: together.
+#: Floors within this height, as a share of the band, are compared together.
 _STOREY = 0.2
 #: A shape of less area for its length than this share of a radius is a line.
 _THIN = 4e-3
-#: A region is first held against one of the triangles about it, then against so many times more.
+#: A region is compared with one of the triangles about it, then with this many times more.
 _GROWTH = 1.25
 #: Regions with more triangles about them, and shapes of more corners, are cut in two,
 _CROWD, CORNERS = 256, 256
-#: unless they are no longer than this many times what they are held against is high, or wide.
+#: unless they are no longer than this many times the height of the band, or the margin.
 _SHORT, _NARROW = 1.2, 8.0
 #: Corners of a quarter of a circle.
 QUARTER = 4
@@ -117,7 +108,7 @@ def _about(
     least, most = least - margin, most + margin
     storey = np.floor(least / (_STOREY * (band[1] - band[0])))
     rows, hits = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
-    # Storey by storey, so that a floor is held against what is as high only.
+    # Storey by storey, so that a floor is compared only with triangles of its height.
     for name in np.unique(storey):
         here = np.flatnonzero(storey == name)
         about = by_height.between(least[here].min() + band[0], most[here].max() + band[1])
@@ -141,12 +132,12 @@ def _less(
     radius: float,
     tolerance: Tolerance,
 ) -> Geometry:
-    """(r,) regions less what is less than a radius from triangles, (n, 3, 3), each of which stands
-    about the region of its ``row``.
+    """(r,) regions without the points less than a radius from triangles, (n, 3, 3), each near the
+    region of its ``row``.
 
-    Of most regions, such as the tops of mouldings, the first few leave nothing, and of a wall of
-    many triangles, a few take what all do. So they are tried by turns, those first that may take
-    most, and only the ones that still come near to what is left."""
+    The first few triangles leave nothing of most regions, such as the tops of mouldings, and a few
+    triangles of a large wall remove as much as all do. So they are tried by turns, those first that
+    may remove most, and only the ones that are still near the rest."""
     low, high = corners.min(axis=1)[:, PLAN] - radius, corners.max(axis=1)[:, PLAN] + radius
     x0, z0, x1, z1 = shapely.bounds(plan).reshape(-1, 4)[row].T
     across = np.minimum(high[:, 0], x1) - np.maximum(low[:, 0], x0)
@@ -175,8 +166,8 @@ def _less(
 def _merged(
     shapes: Geometry, row: Ints, radius: float, tolerance: Tolerance
 ) -> tuple[Geometry, Ints]:
-    """Shapes and the (n,) row of each, those with an area united row by row: fewer to widen. Of
-    thin ones, such as a wall's, nothing would be left; those without width are lines."""
+    """Shapes and the (n,) row of each, those with an area united row by row: fewer to widen. Thin
+    ones, such as a wall's, would vanish; those without width are lines."""
     size, around = shapely.area(shapes), shapely.length(shapes)
     line = size <= tolerance.rounding * around
     flat = ~line & (size > _THIN * radius * around)
@@ -190,7 +181,7 @@ def _lines(shapes: Geometry) -> Geometry:
     """(n,) from end to end of shapes without width, of which GEOS would widen one end only."""
     points, of = shapely.get_coordinates(shapes, return_index=True)
     first = np.searchsorted(of, np.arange(len(shapes)))
-    for _ in range(2):  # what is farthest from any point is an end, and from that, the other one
+    for _ in range(2):  # the farthest point from any point is an end, and from that, the other one
         away = np.linalg.norm(points - points[first[of]], axis=1)
         last, first = first, np.lexsort((-away, of))[np.searchsorted(of, np.arange(len(shapes)))]
     return shapely.linestrings(np.stack([points[last], points[first]], axis=1))
@@ -221,8 +212,9 @@ def above(corners: Floats, slope: Floats) -> Floats:
 def shadows(
     plan: Floats, height: Floats, band: tuple[float, float], owner: Ints
 ) -> tuple[Ints, Geometry]:
-    """What of convex things is in a band of heights, in plan: their names, ascending, and shapes.
-    They are given by polygons or edges, (n, k, 2) in plan and (n, k) high, and (n,) names."""
+    """The parts of convex bodies in a band of heights, in plan: their owners, ascending, and
+    shapes. Bodies are given by polygons or edges, (n, k, 2) in plan, (n, k) heights and (n,)
+    owners."""
     points, valid = [plan], [(height >= band[0]) & (height <= band[1])]
     following, after = np.roll(plan, -1, axis=1), np.roll(height, -1, axis=1)
     for level in band:
@@ -239,9 +231,9 @@ def shadows(
 
 
 def tiled(shapes: Geometry, margin: float, grid: float) -> tuple[Geometry, Geometry, Ints]:
-    """(m,) boxes that share out what is up to a margin from each of (n,) shapes, (m,) what of the
-    shape is up to a margin from each box, of few corners each, and (m,) its shape: what is done to
-    corners one by one is in proportion to their number."""
+    """(m,) boxes that divide the surroundings, up to a margin, of each of (n,) shapes, (m,) the
+    part of the shape up to a margin from each box, with few corners, and (m,) its shape: GEOS takes
+    more than linear time in the number of corners."""
     x0, y0, x1, y1 = shapely.bounds(shapes).reshape(-1, 4).T
     own = shapely.box(x0 - margin, y0 - margin, x1 + margin, y1 + margin)
     which = np.arange(len(shapes))
@@ -282,7 +274,7 @@ _STEPS = np.array([0.7548776662466927, 0.5698402909980532])
 
 @dataclass(frozen=True)
 class Floors:
-    """The flat regions of all that is nearly level and no detail."""
+    """The flat regions of all nearly level triangles that are no detail."""
 
     corners: Floats  # (n, 3, 3) metres
     region: Ints  # (n,) ascending from 0
@@ -302,8 +294,8 @@ class Floors:
         return Floors(corners[order], region)
 
     def within(self, boxes: Floats, above: float, grid: float) -> tuple[Geometry, Ints]:
-        """(k,) pieces of floor in plan, what is ``above`` metres over which lies in one of
-        (m, 2, 3) boxes, and (k,) the region of each, ascending."""
+        """(k,) pieces of floor in plan whose points ``above`` metres higher lie in one of (m, 2, 3)
+        boxes, and (k,) the region of each, ascending."""
         plan = shapely.polygons(self.corners[:, :, PLAN])
         (x0, y0, z0), (x1, y1, z1) = boxes.transpose(1, 2, 0)
         areas = shapely.box(x0, z0, x1, z1)
@@ -318,7 +310,7 @@ class Floors:
 
 
 def detail_of(scene: Scene, structure: Structure, options: SubdivideOptions) -> Bools:
-    """(T,) which triangles are detail, of glass as well."""
+    """(T,) which triangles are detail, including glass."""
     roles = Designated.of(scene, options)
     detail = roles.detail.copy()
     detail[structure.detail] = True
@@ -343,7 +335,7 @@ class Places:
 
 
 def find_places(floors: Floors, structure: Structure, walker: Walker, boxes: Floats) -> Places:
-    """Where somebody can stand, the middle of whose body is in one of (m, 2, 3) boxes, metres."""
+    """The places of bodies whose middles are in one of (m, 2, 3) boxes, metres."""
     tolerance = structure.tolerance
     pieces, region = floors.within(boxes, walker.middle, tolerance.grid)
     names, plan = united_by(region, pieces, tolerance.grid, more=True)
@@ -354,13 +346,13 @@ def find_places(floors: Floors, structure: Structure, walker: Walker, boxes: Flo
     foot = (2 * tolerance.plane, walker.step)
     plan, which = clear_of(floors.corners, plan, slope[source], foot, 0.0, tolerance)
     names, plan = united_by(source[which], plan, tolerance.grid, more=True)
-    # Less corners on straight edges, and with the rest in an order that does not depend on the way.
+    # Without corners on straight edges, and in an order independent of the computation.
     plan = straightened(shapely.normalize(plan), tolerance.grid)
     return Places(plan, slope[names])
 
 
 def spread(corners: Floats) -> tuple[Floats, Floats]:
-    """(m, 3) points spread evenly over (n, 3, 3) triangles, and (m,) the m² that each is for."""
+    """(m, 3) points spread evenly over (n, 3, 3) triangles, and (m,) the m² of each."""
     size = areas(corners)
     each = max(_SAMPLE_AREA, float(size.sum()) / _MOST_SAMPLES)
     count = np.maximum(np.ceil(size / each), 1).astype(np.int64)
@@ -411,7 +403,7 @@ _AT_ONCE = 1 << 16
 
 
 def eye_region(places: Places, walker: Walker, tolerance: Tolerance) -> Places:
-    """What eyes can be above: the places as wide as the body, but not into what it touches."""
+    """The floor below the eyes: the places, widened by the body's radius less a slack."""
     inside = walker.radius * np.cos(np.pi / (4 * QUARTER))  # of a circle that is a polygon
     reach = inside - min(2 * tolerance.plane, _SLACK * walker.radius)
     box, plan, which = tiled(places.plan, walker.radius, tolerance.grid)

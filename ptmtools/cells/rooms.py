@@ -1,21 +1,22 @@
-"""Which leaves make up which room: a watershed of free space on the graph of leaves.
+"""Grouping of leaves into rooms, and of a room's leaves into cells.
 
-Walls cut a building into more leaves than it has rooms: every plane goes on behind the wall that
-proposed it. Leaves grow together through the openings between them, widest first, as basins do in
-a watershed of the distance from the walls: an opening joins two *regions* if it is at least
-`OPEN` of the cross-section of the narrower one. What is left of the openings then are doors.
+**Rooms** are a watershed of free space on the graph of leaves. Walls cut a building into more
+leaves than it has rooms: every plane extends behind the wall that proposed it. Leaves grow together
+through the openings between them, widest first, like basins in a watershed of the distance from the
+walls: an opening joins two *regions* if it is at least `OPEN` of the cross-section of the narrower
+one. The remaining openings are doors.
 
 The cross-section of a region is its volume over its length in plan, and never less than that of
 anything that has joined it; length is the area over the width (least breadth in any direction) of
 the hull of its plan. So a corridor's is its width times its height, that of a room is its narrower
-side times its height, and a doorway, a sliver or a bay is narrow and joins whatever it opens into
-most: one room, since as part of that room it is narrow no more.
+side times its height, and a doorway, a sliver or a bay is narrow and joins the region into which it
+opens most: one room, since as part of that room it is narrow no more.
 
 The opening between two regions is the largest group of touching portals, by true area: two doors
 into one corridor are two openings, a wide arch that planes have cut up is one.
 
-A region in which nobody can stand, such as the space above a ceiling with holes, is no room. Leaf
-by leaf it joins the rooms around it, through the largest opening first.
+A region without standing leaves, such as the space above a ceiling with holes, is no room. Leaf by
+leaf it joins the rooms around it, through the largest opening first.
 
 Tried and rejected: the share of the common boundary that is open (two rooms joined by a doorway as
 deep as its wall share nothing but the doorway); the volume of the convex hull that two regions
@@ -23,37 +24,32 @@ fill together (splits every room with a pillar, and joins small rooms through th
 largest sphere in each leaf instead of its cross-section (under a ceiling of 2.6 m all halls have
 the same).
 
-What it gains to part a room, and the leaves that are one cell because it gains too little.
-
-Whoever is in a cell has to fetch all that the cell may see, and whoever may see a cell has to
-fetch all of it. With v the volume of a leaf (how often somebody is in it), w the area of the
-surfaces in it (what it takes to fetch it) and S the leaves that it sees, a group G of leaves costs
+**Cells.** A room is one cell, unless dividing it saves its viewers more than
+`SubdivideOptions.gain` of their download: a corridor along many doors is worth dividing, a hall is
+not. A viewer in a cell fetches all cells that it may see, and every viewer that may see a cell
+fetches all of it. With v the volume of a leaf (the frequency of viewers in it), w the area of the
+surfaces in it (their cost) and S the leaves that it sees, a group G of leaves costs
 
     apart     Σ v·w(S) + w·v(S)  over the leaves of G
     together  v(G)·w(∪S) + w(G)·v(∪S)
 
-and the **gain** of parting it is 1 - apart / together, the share of the fetching that this saves.
-It is 0 in a hall, whatever the size of the rest of the building, and says the same in any unit.
-Groups are joined in the order of what parting the two together would gain, the lower numbered
-leaves first where it is the same, as long as that is less than the threshold.
+and the **gain** of dividing it is 1 - apart / together, the saved share of the download. It is 0 in
+a hall, whatever the size of the rest of the building, and the same in any unit. Groups are joined
+in the order of the gain of dividing the two, the lower numbered leaves first where it is the same,
+as long as it is less than the threshold.
 
-Leaves in which nobody can stand have no viewers, and nothing is gained by parting them from one
-another. They come last: what adds least to the cost of all groups is joined first, until half of
-the threshold has been added. So slivers and what few can see join whatever they are part of, and
-the top of a hall that the whole building sees stays by itself.
+Leaves without standing room have no viewers, and dividing them from one another gains nothing. They
+come last: the pair that adds least to the cost of all groups is joined first, until half of the
+threshold has been added. So slivers and leaves that few see join their surroundings, and the top of
+a hall that the whole building sees stays by itself.
 
-Who sees whom is estimated (`sight`), not computed: the subdivision comes before visibility, and
-the estimate decides only where cells end, never what they see.
+Sight is estimated (`sight`), not computed: the subdivision comes before visibility, and the
+estimate decides only where cells end, never what they see. Cells never reach through a door, even
+if both sides see the same: the space behind a door covers little of the view, and the coverage
+hints can express that only of another cell.
 
-Tried and rejected: what parting the two groups gains, each taken as the whole that it has become.
-Once a cell sees nearly everything, anything may join it, and little by little it is the building.
-
-Leaves become cells: each for itself, or grouped into rooms where parting gains too little.
-
-A room of several leaves is one cell, unless keeping some of them apart saves its viewers more than
-`SubdivideOptions.gain` of what they fetch: a corridor along many doors is worth parting, a hall is
-not. Cells never reach through a door (`rooms`), even if both sides see the same: what is behind a
-door covers little of the view, and the coverage hints can say so only of another cell.
+Tried and rejected: the gain of dividing the two groups, each as the whole that it has become. Once
+a cell sees nearly everything, anything may join it, and step by step it becomes the building.
 """
 
 from __future__ import annotations
@@ -97,8 +93,8 @@ class Groups(ABC):
 
     @abstractmethod
     def cost(self, a: int, b: int) -> float:
-        """What joining two groups side by side costs, the lower one first; rounded, so that last
-        digits put nothing in order."""
+        """The cost of joining two adjacent groups, the lower one first; rounded, so that last
+        digits do not decide the order."""
 
     def join(self, a: int, b: int) -> list[tuple[int, int]]:
         """Adds b to a; returns the pairs that are new or may cost less than before."""
@@ -147,8 +143,8 @@ class Groups(ABC):
 
 #: An opening joins two regions if it is at least this share of the narrower one's cross-section.
 OPEN = 0.7
-#: Shares that agree in so many significant digits are equal: symmetrical buildings have many, which
-#: rounding must not put in order, not even that of a file far from its origin on a sliver.
+#: Shares, and gains, are compared in this many significant digits: symmetrical buildings have many
+#: equal ones, which rounding must not order, not even that of a sliver far from the origin.
 DIGITS = 4
 #: Pairs of portals that are compared at a time.
 AT_ONCE = 2048
@@ -217,7 +213,7 @@ class _Regions(Groups):
         return -float(f"{share:.{DIGITS}g}")
 
     def join(self, a: int, b: int) -> list[tuple[int, int]]:
-        """Called by the one with more neighbours."""
+        """The group with more neighbours keeps its name."""
         if len(self.near[a]) < len(self.near[b]):
             a, b = b, a
         self._volume[a] += self._volume[b]
@@ -296,9 +292,7 @@ def _distance(points: Floats, polygon: Floats) -> Floats:
     return np.asarray(nearest.min(axis=(1, 2)))
 
 
-#: Gains that differ by less are equal, in digits: symmetrical buildings have many, which rounding
-#: must not put in order.
-#: Joining what has no viewers may add this share of the threshold to all that is fetched.
+#: Joining leaves without viewers may add this share of the threshold to the whole download.
 ATTACHED = 0.5
 
 
@@ -322,7 +316,7 @@ def join_by_gain(
 
 
 class _Costs(Groups):
-    """Groups, and what they cost."""
+    """Groups and their costs."""
 
     def __init__(self, sees: Bools, own: Floats, every: Floats, pairs: NDArray[np.integer]) -> None:
         """``sees``: (L, L) which leaves a group sees; ``own``: (L, 2) its volume and area,
@@ -350,7 +344,7 @@ class _Costs(Groups):
 
 
 class _Parted(_Costs):
-    """Groups with viewers, that cost what parting them gains."""
+    """Groups with viewers; the cost of a pair is the gain of dividing it."""
 
     def cost(self, a: int, b: int) -> float:
         if not (self.own[a][0] and self.own[b][0]):
@@ -365,8 +359,8 @@ class _Parted(_Costs):
 
 
 class _Attached(_Costs):
-    """Groups one of which has no viewers, that cost what joining them adds to all costs, as a
-    share."""
+    """Pairs of groups, one without viewers; the cost is the share that joining adds to all
+    costs."""
 
     def __init__(self, sees: Bools, own: Floats, every: Floats, pairs: NDArray[np.integer]) -> None:
         super().__init__(sees, own, every, pairs)
@@ -391,12 +385,12 @@ class _Attached(_Costs):
 
 #: Shares of a triangle that differ by less are equal, in digits.
 GAIN_DIGITS = 6
-#: What is said of a model of one cell.
+#: The warning on a model of one cell.
 ONE_HALL = Warned("visibility culling gains nothing here: the model is a single hall")
 
 
 def grouped(cells: Cells, options: SubdivideOptions) -> Cells:
-    """The cells that the options ask for, of cells that are single leaves.
+    """Groups cells that are single leaves by the options.
 
     Cells are numbered in the order of their first leaves; geometry in a boundary between two
     leaves of one cell lies inside that cell.
@@ -484,8 +478,8 @@ def _groups(cells: Cells, gain: float) -> NDArray[np.integer]:
 
 
 def _sides(cells: Cells) -> tuple[Ints, Ints, Floats]:
-    """(n,) leaves and (n,) pieces of geometry that belong to them, of cells that are single leaves;
-    what lies in a boundary counts on both sides. And (M,) the areas of the pieces, m²."""
+    """(n,) leaves and (n,) their pieces of geometry, of cells that are single leaves; pieces in a
+    boundary count on both sides. And (M,) the areas of the pieces, m²."""
     front, back = np.append(leaf_of_cell(cells), -1)[cells.triangle_cell].T
     behind = (back >= 0) & (back != front)
     leaf = np.concatenate([front[front >= 0], back[behind]])
