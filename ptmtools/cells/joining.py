@@ -1,23 +1,20 @@
-"""Pieces with the same owners are joined again.
+"""Joining of pieces of geometry with the same owners.
 
 Geometry is cut to the leaves (`ownership`), and only then do leaves become cells. So triangles are
-cut where leaves of one cell part, by planes with one owner on both sides, and each cut makes two
-triangles of a quadrilateral. Here a triangle all of whose pieces have the same owners comes back as
-it was, to the last bit. Of the others, and of those that continue each other (`patches`), pieces
-with the same owners are united (`outlines`) and divided into triangles anew (`triangulation`).
+cut where leaves of one cell meet, by planes with one owner on both sides, and each cut makes two
+triangles of a quadrilateral. Here a triangle all of whose pieces have the same owners is restored
+to the last bit. Of the others, and of triangles that continue each other (`patches`: one plane, one
+material, one texture map), pieces with the same owners are united (`outlines`) and divided into
+triangles anew (`planar.triangulated`).
 
-No position is new, and a corner goes from an edge only if it goes from all that have it there,
-whoever owns them; where one triangle has a corner on an edge, so have all others that share the
-edge. So nothing gapes that did not gape before, neither between parts of a triangle nor between
+No position is new, and a corner is removed from an edge only if it is removed from all triangles
+that have it there, whatever their owners; where one triangle has a corner on an edge, so have all
+others that share the edge. So no new gaps open, neither between parts of a triangle nor between
 triangles. (Cutting alone leaves gaps: a wall that lies in a plane is cut to the leaves on both its
-sides, the floor that it stands on only to those in front of it.)
+sides, the floor on which it stands only to those in front of it.) Corners on edges between joined
+triangles that only the cut made are removed as well.
 
-Triangles that go through GEOS are those of several owners; all others cost a few sorts.
-
-Triangles that continue each other: one plane, one look, one texture map.
-
-Cutting such triangles makes corners on the edges between them that nothing but the cut accounts
-for; where triangles are joined these go as well.
+Only triangles of several owners go through GEOS; all others cost a few sorts.
 """
 
 from __future__ import annotations
@@ -49,8 +46,8 @@ _MOST = 8
 
 
 def patches(scene: Scene, triangle: Ints, corner: Ints, may: Bools, tolerance: Tolerance) -> Ints:
-    """(n,) for each of the scene's triangles, (n,) ``triangle``, the place of the largest one that
-    it continues, directly or by way of others, its own if there is none.
+    """(n,) for each of the scene's triangles, (n,) ``triangle``, the index of the largest one that
+    it continues, directly or through others, or its own.
 
     ``corner``: (n, 3) numbers of their corners; ``may``: (n,) which may be joined to others.
 
@@ -90,8 +87,8 @@ def patches(scene: Scene, triangle: Ints, corner: Ints, may: Bools, tolerance: T
 
 
 def _opposite(corner: Ints) -> tuple[Ints, Ints, Ints]:
-    """The number of each edge of (n, 3) triangles, (3n,), the same for those with the same ends;
-    and all pairs of edges, by row, that run between these in opposite directions."""
+    """The number of each edge of (n, 3) triangles, (3n,), equal for edges with the same ends; and
+    all pairs of edges, by row, with the same ends in opposite directions."""
     start, end = corner.reshape(-1), np.roll(corner, -1, axis=1).reshape(-1)
     code = np.minimum(start, end) * (int(corner.max(initial=-1)) + 1) + np.maximum(start, end)
     _, edge, users = np.unique(code, return_inverse=True, return_counts=True)
@@ -110,7 +107,7 @@ def _continues(
     corners: Floats, uv: Floats, one: Ints, other: Ints, tolerance: Tolerance
 ) -> tuple[Bools, Bools]:
     """Whether triangles ``other`` lie in the planes of triangles ``one`` and face the same way, and
-    whether they have the texture coordinates (and colours) that these would have there."""
+    whether their texture coordinates (and colours) continue those of ``one``."""
     origin = corners[one, 0]
     a, b = corners[one, 1] - origin, corners[one, 2] - origin
     aa, ab, bb = (np.einsum("ij,ij->i", p, q) for p, q in ((a, a), (a, b), (b, b)))
@@ -130,7 +127,7 @@ def _continues(
     return flat, same
 
 
-_NOBODY = -1
+_NO_OWNER = -1
 
 
 @dataclass(frozen=True)
@@ -167,9 +164,9 @@ class _Parts:
 
 def joined(scene: Scene, pieces: Pieces, owner: NDArray[np.int32], tolerance: Tolerance) -> Mesh:
     """Join pieces with the same ``owner``: (M, 2) the cells in front of and behind each piece, -1
-    for none. Pieces that are nobody's are dropped."""
+    for none. Pieces without owners are dropped."""
     count = len(scene.triangles)
-    owned = (owner != _NOBODY).any(axis=1)
+    owned = (owner != _NO_OWNER).any(axis=1)
     first = np.searchsorted(pieces.source, np.arange(count))
     alike = (owner == owner[first[pieces.source]]).all(axis=1)
     single = np.bincount(pieces.source, ~alike, count) == 0
@@ -180,7 +177,7 @@ def joined(scene: Scene, pieces: Pieces, owner: NDArray[np.int32], tolerance: To
     whole = np.flatnonzero(single & ~adjacent)
     taken = owned & parted[pieces.source]
     uncut = np.tile(np.eye(3), (int(adjacent.sum()), 1, 1))
-    # What has several owners is cut.
+    # A triangle with several owners is cut.
     parts = pieces.corner[np.searchsorted(pieces.cut, np.flatnonzero(taken))]
     cut = _Cut(
         np.concatenate([np.dstack([scene.corners[adjacent], uncut]), parts]),
@@ -195,13 +192,13 @@ def joined(scene: Scene, pieces: Pieces, owner: NDArray[np.int32], tolerance: To
 
 
 def _emitters(scene: Scene, source: Ints, owner: NDArray[np.int32]) -> Ints:
-    """(n,) a triangle of the scene for each cell that emits some of it, ascending."""
+    """(n,) each triangle of the scene once for every cell that emits some of it, ascending."""
     front, back = owner.T
     behind = (back != front) & scene.two_sided[source]
     triangle = np.append(source, source[behind])
     cell = np.append(front, back[behind])
     code = triangle * (int(cell.max(initial=0)) + 1) + cell
-    return np.unique(code[cell != _NOBODY]) // (int(cell.max(initial=0)) + 1)
+    return np.unique(code[cell != _NO_OWNER]) // (int(cell.max(initial=0)) + 1)
 
 
 def _sharing_edges(corner: NDArray[np.integer], marked: Bools) -> Bools:
@@ -229,13 +226,13 @@ class _Network:
 
     cut: _Cut
     points: Floats  # (n, 3) by the numbers of corners
-    name: Ints  # (K,) the triangle of the scene that stands for each
+    name: Ints  # (K,) the triangle of the scene that represents each
     corner: Ints  # (K, 3) numbers of the corners of each piece
-    kind: Ints  # (K,) the same for pieces that may be united
+    kind: Ints  # (K,) equal for pieces that may be united
     frame: Floats  # (K, 2, 3) two unit vectors in the plane of each piece
     fixed: Bools  # (n,) which corners are those of the model
     edges: Edges
-    weight: Floats  # (m, 3) where edges start: barycentric, in the triangle of their piece
+    weight: Floats  # (m, 3) barycentric starts of edges, in the triangle of their piece
     reach: float
 
     @staticmethod
@@ -244,7 +241,7 @@ class _Network:
         triangle, of = np.unique(cut.source, return_inverse=True)
         model = scene.corners[triangle]
         points = np.concatenate([model.reshape(-1, 3), cut.corner[..., :3].reshape(-1, 3)])
-        # The model's own corners stay what they are, however near each other.
+        # The model's own corners stay distinct, however near each other.
         same, number = first_alike(points), welded(points, reach)
         number = np.where(same < model.size // 3, same, number)
         whole, corner = np.split(number.reshape(-1, 3), [len(triangle)])

@@ -52,11 +52,11 @@ from ptmtools.tolerance import GRID_SHARE, ROUNDING_SHARE, Tolerance
 Geometry = Any
 
 _COLLECTION = 7
-#: So many polygons are united at a time.
+#: Number of polygons that are united at a time.
 _CHUNK = 256
 #: Grids that are tried, in steps of the first: up to the distance that counts as rounding.
 _COARSER = tuple(float(step) for step in np.geomspace(1, ROUNDING_SHARE / GRID_SHARE, 3))
-#: None is finer than so many times the last digit of the coordinates.
+#: None is finer than this many times the last digit of the coordinates.
 _DIGITS = 4.0
 
 _undecided: ContextVar[Counter[str] | None] = ContextVar("undecided", default=None)
@@ -65,7 +65,7 @@ _undecided: ContextVar[Counter[str] | None] = ContextVar("undecided", default=No
 @contextmanager
 def counting() -> Iterator[Counter[str]]:
     """Counts the operations that end in a safe answer, by name (``"union"``, …), until the context
-    ends; contexts inside it count for themselves."""
+    ends; contexts inside it count separately."""
     counts: Counter[str] = Counter()
     token = _undecided.set(counts)
     try:
@@ -75,7 +75,7 @@ def counting() -> Iterator[Counter[str]]:
 
 
 def count(names: Iterable[str] | Mapping[str, int]) -> None:
-    """Adds operations, by name, to those that the innermost `counting` has counted."""
+    """Adds operations, by name, to the counts of the innermost `counting`."""
     if (counter := _undecided.get()) is not None:
         counter.update(names)
 
@@ -108,8 +108,8 @@ def union(shapes: Geometry, grid: float, *, more: bool = False) -> Geometry:
 def united_by(
     row: Ints, shapes: Geometry, grid: float, *, more: bool = False
 ) -> tuple[Ints, Geometry]:
-    """(g,) the rows, (n,), that shapes have, ascending, and the union of those of each; none of
-    those only that are as wide as rounding, whose union is empty."""
+    """(g,) the distinct rows, (n,), of shapes, ascending, and the union of the shapes of each,
+    without empty unions of shapes as narrow as rounding."""
     if not len(shapes):
         return row, shapes
     order = np.argsort(row, kind="stable")
@@ -156,7 +156,7 @@ def buffer(
 
 
 def straightened(shapes: Geometry, grid: float) -> Geometry:
-    """The same less corners on straight edges, where no polygon comes to cross itself by that."""
+    """Shapes without corners on straight edges, except where a polygon would then cross itself."""
     simple = simplified(shapes, grid)
     return np.asarray(np.where(shapely.is_valid(simple), simple, shapes))[()]
 
@@ -177,11 +177,11 @@ def neighbours(polygons: Geometry, gap: float) -> Ints:
 
 
 def left_open(region: Geometry, blocking: Geometry, tolerance: Tolerance) -> Geometry:
-    """What of a region is not blocked, less cracks, what is narrower than a hairline: a crack under
-    a wall would stretch the hull of a door along all of it.
+    """The unblocked part of a region without cracks narrower than a hairline: a crack under a wall
+    would stretch the hull of a door along all of it.
 
-    A morphological opening, grown by twice what was eroded and clipped, so that what stays is not
-    shrunk.
+    A morphological opening, grown by twice the erosion and clipped, so that the rest does not
+    shrink.
     """
     width, grid = tolerance.hairline, tolerance.grid
     opening = difference(region, blocking, grid)
@@ -192,15 +192,15 @@ def left_open(region: Geometry, blocking: Geometry, tolerance: Tolerance) -> Geo
 
 def bounded(segments: Floats, of: Ints) -> Geometry:
     """The areas that (n, 2, 2) segments bound, one for each run of equal numbers in (n,) ``of``,
-    ascending; empty where they bound none that GEOS can tell."""
+    ascending; empty where GEOS recognises none."""
     lines = shapely.multilinestrings(shapely.linestrings(segments), indices=of)
     return _each("triangles", shapely.build_area, (lines,), [], lambda _: shapely.Polygon())
 
 
 def divided(shapes: Geometry) -> tuple[Floats, Ints]:
     """(m, 3, 2) triangles of an array of polygons, and (m,) the polygon of each, ascending: the
-    constrained Delaunay triangulation, whose corners are those of the polygon to the last bit. None
-    of a polygon that GEOS cannot divide so, such as some whose holes touch; it is counted."""
+    constrained Delaunay triangulation, whose corners are those of the polygon to the last bit.
+    Polygons that GEOS cannot divide so, such as some with touching holes, are left out, counted."""
     parts, of = shapely.get_parts(delaunay(shapes), return_index=True)
     triangle = shapely.get_coordinates(parts).reshape(-1, 4, 2)[:, :3]
     corner, owner = shapely.get_coordinates(shapes, return_index=True)
@@ -322,7 +322,7 @@ def _step(grid: float, shapes: Geometry) -> float:
 
 
 def _rounded(shapes: Geometry, grid: float) -> Geometry:
-    """Polygons with their corners on a grid, where GEOS can; of what has no area there, nothing."""
+    """Polygons with their corners on a grid, where GEOS can; empty if they have no area there."""
     return _each(
         "",
         lambda shapes: shapely.set_precision(shapes, grid),
@@ -343,7 +343,7 @@ def _repaired(shape: Geometry) -> Geometry:
 
 
 def _common_box(one: Geometry, other: Geometry) -> Geometry:
-    """What the boxes around two shapes have in common."""
+    """The intersection of the boxes around two shapes."""
     a, b = shapely.bounds(one), shapely.bounds(other)
     low, high = np.maximum(a[:2], b[:2]), np.minimum(a[2:], b[2:])
     return shapely.box(*low, *high) if (low < high).all() else shapely.Polygon()
@@ -356,7 +356,7 @@ def _polygons_in(shapes: Geometry) -> Geometry:
 
 
 def _polygonal(shapes: Geometry) -> Geometry:
-    """The same without points and lines."""
+    """Shapes without points and lines."""
     every = np.array(shapes, dtype=object).reshape(-1)
     flat = shapely.get_dimensions(every) < 2
     if flat.any():
@@ -412,7 +412,7 @@ def _delaunay(corner: Floats, ring: Ints, polygon: Ints) -> tuple[Ints, Ints]:
     sound = np.flatnonzero(shapely.is_valid(shapes))
     triangles, of = divided(shapes[sound])
     points, of = triangles.reshape(-1, 2), sound[of]
-    # Which corner of its polygon a point is: they are the same to the last bit.
+    # The corner of its polygon that each point equals, to the last bit.
     shape = np.concatenate([place[ring], np.repeat(of, 3)])
     same = first_alike(np.column_stack([shape, np.concatenate([corner, points])]))
     return same[len(corner) :].reshape(-1, 3), owner[of]
