@@ -121,6 +121,21 @@ class Camera:
     field_of_view: float = np.pi / 4
 
 
+def perspective_camera(
+    name: str, position: NDArray[np.float64], direction: NDArray[np.float64], field_of_view: float
+) -> Camera | None:
+    """A camera of a model, whose direction may have any length; None unless it is a perspective
+    camera with finite values."""
+    with np.errstate(all="ignore"):
+        length = float(np.linalg.norm(direction))
+    finite = bool(np.isfinite(position).all()) and np.isfinite(length) and length > 0
+    if not (finite and 0 < field_of_view < np.pi):
+        return None
+    x, y, z = position.tolist()
+    dx, dy, dz = (direction / length).tolist()
+    return Camera(name, (x, y, z), (dx, dy, dz), float(field_of_view))
+
+
 @dataclass(frozen=True)
 class Storey:
     """A storey named by the model, and the height of its floor in world metres."""

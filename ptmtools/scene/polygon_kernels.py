@@ -19,7 +19,7 @@ def clip_ears(
     x, y = flat[:, 0].copy(), flat[:, 1].copy()
     ring = np.arange(len(flat))
     ears = np.empty((len(flat) - 2, 3), np.int64)
-    left, found, at, tried, steps = len(flat), 0, 0, 0, 0
+    left, count, at, tried, steps = len(flat), 0, 0, 0, 0
     while left > 2:
         a, b, c = ring[(at - 1) % left], ring[at], ring[(at + 1) % left]
         px, py, qx, qy = x[b] - x[a], y[b] - y[a], x[c] - x[b], y[c] - y[b]
@@ -43,8 +43,8 @@ def clip_ears(
             steps += k + 1
         if ear or (tried > left and abs(area) <= rounding):
             if ear:
-                ears[found] = a, b, c
-                found += 1
+                ears[count] = a, b, c
+                count += 1
             left -= 1
             for k in range(at, left):
                 ring[k] = ring[k + 1]
@@ -54,7 +54,7 @@ def clip_ears(
             at, tried = (at + 1) % left, tried + 1
             if tried > 2 * left + 2 or steps > most:
                 for k in range(1, left - 1):
-                    ears[found] = ring[0], ring[k], ring[k + 1]
-                    found += 1
-                return ears[:found], False, steps
-    return ears[:found], True, steps
+                    ears[count] = ring[0], ring[k], ring[k + 1]
+                    count += 1
+                return ears[:count], False, steps
+    return ears[:count], True, steps

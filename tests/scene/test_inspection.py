@@ -114,7 +114,7 @@ def test_of_a_gltf_model(put: Put, capsys: pytest.CaptureFixture[str]) -> None:
     assert not found["space"]["unit_guessed"]
     assert "PTM-N204" in {note["code"] for note in found["notes"]}
     text = info(put("a.glb", doc.glb()), capsys)
-    assert "warning    material 1: texture 1: names no image [PTM-N204]" in text
+    assert "warning    material 1: texture 1: has no image [PTM-N204]" in text
 
 
 def test_options_count_as_in_a_build(put: Put, capsys: pytest.CaptureFixture[str]) -> None:

@@ -123,7 +123,7 @@ def test_a_format_is_believed_and_doubted() -> None:
     assert (space.up, notes) == ("z", {})
     space, notes = settled(y_up(house()) * 100, by_format=gltf)
     assert (space.metres, list(notes)) == (1.0, ["PTM-N227"])
-    assert "cm would be more likely" in notes["PTM-N227"]
+    assert "cm is more likely" in notes["PTM-N227"]
 
 
 def test_a_format_is_doubted_where_the_other_axis_is_somewhat_likelier() -> None:

@@ -1,4 +1,4 @@
-"""Reads glTF 2.0 (.glb and .gltf) and the extensions by which files of it are made smaller.
+"""Reads glTF 2.0 (.glb and .gltf) with its compression extensions.
 
-`read_gltf` in `reader` is the way in; `document` is the container with its buffers and numbers.
+`reader` contains the entry point `read_gltf`, and `document` the container, buffers and accessors.
 """

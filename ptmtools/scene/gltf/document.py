@@ -1,11 +1,10 @@
-"""The container of a glTF model: its JSON, its buffers, and where in which file they lie.
+"""Opens the container of a glTF model: JSON, buffers, accessors and extensions.
 
-GLB chunks, data URIs and separate files all become `Buffer`s; sizes and ranges are checked
-before anything is made of them (glTF 2.0, sections 3.6 and 4.4). A file that several buffers name
-is read once, and no more of it than the longest of them. A buffer may have no bytes where all its
-views are compressed (`meshopt`): these are decompressed when they are first asked for.
-
-What becomes of the extensions of glTF that a model names."""
+GLB chunks, data URIs and separate files become `Buffer`s with their location; sizes and ranges are
+checked before use (glTF 2.0, sections 3.6 and 4.4). A file that several buffers refer to is read
+once, up to the longest of them. A buffer may have no bytes if all its views are compressed
+(`meshopt`); these are decompressed on first use.
+"""
 
 from __future__ import annotations
 
@@ -31,16 +30,16 @@ from ptmtools.scene.notes import Findings
 from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import FileRange, HeldBytes, decode
 
-#: How JSON writes halves of characters of UTF-16, of which one alone is no text.
-_HALF = re.compile(r"\\u[dD][89a-fA-F]")
-#: All that is compressed may take so many bytes, and so many for each byte of the buffers besides:
-#: attributes that are all alike take a thousandth of what they are decompressed to.
+#: A surrogate in JSON; a single one is not valid text.
+_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
+#: Limit of all decompressed bytes: constant, and per byte of the buffers. Constant attributes
+#: compress to a thousandth.
 _DECODED, _DECODED_PER_BYTE = 1 << 30, 100
 
 
 @dataclass(frozen=True)
 class Buffer:
-    """The bytes of a buffer, and the file and offset they come from (no path: a data URI)."""
+    """The bytes of a buffer, and their file and offset (no path: a data URI)."""
 
     data: bytes
     path: Path | None
@@ -54,19 +53,21 @@ class Buffer:
 
 
 class Document:
-    """A glTF model: its file, the parsed JSON and its buffers in order, None where one has no
-    bytes of its own."""
+    """A glTF model: its file, the parsed JSON and its buffers in order, None for those without
+    bytes."""
 
     def __init__(self, path: Path, tree: dict[str, Any], buffers: Sequence[Buffer | None]) -> None:
         self.path, self.tree = path, tree
         self._buffers = buffers
         self._decoded: dict[int, Buffer] = {}
-        there = sum(len(buffer.data) for buffer in buffers if buffer is not None)
-        self._left = _DECODED + _DECODED_PER_BYTE * there
+        size = sum(len(buffer.data) for buffer in buffers if buffer is not None)
+        self._budget = _DECODED + _DECODED_PER_BYTE * size
 
     def view(self, index: int) -> tuple[Buffer, int, int]:
-        """Buffer, start and length of a buffer view; ValueError if it leaves the buffer or is
-        damaged, LimitError PTM-L204."""
+        """Buffer, start and length of a buffer view.
+
+        Raises ValueError if it exceeds the buffer or is damaged, LimitError PTM-L204.
+        """
         view = self.tree["bufferViews"][natural(index)]
         extensions = view.get("extensions", {})
         compressed = next((extensions[name] for name in EXTENSIONS if name in extensions), None)
@@ -77,17 +78,17 @@ class Document:
         buffer = self._decoded[index]
         length = natural(view["byteLength"])
         if length > len(buffer.data):
-            raise ValueError(f"buffer view {index} ends beyond what it decompresses to")
+            raise ValueError(f"buffer view {index} exceeds its decompressed bytes")
         return buffer, 0, length
 
     def _decompressed(self, index: int, compressed: dict[str, Any]) -> Buffer:
         size = natural(compressed["count"]) * natural(compressed["byteStride"])
-        self._left -= size
-        if self._left < 0:
+        self._budget -= size
+        if self._budget < 0:
             raise LimitError(
                 "PTM-L204",
-                f"decompresses to {size >> 20:,} MiB, and more than can be meant with what is "
-                "decompressed before",
+                f"decompresses to {size >> 20:,} MiB, which exceeds the limit of all "
+                "decompressed data",
                 file=self.path,
                 place=f"buffer view {index}",
                 remedy="export it without compression",
@@ -102,12 +103,11 @@ class Document:
         if buffer is None:
             raise ValueError(f"buffer {number} has no bytes")
         if start + length > len(buffer.data):
-            raise ValueError(f"{place} ends beyond its buffer")
+            raise ValueError(f"{place} exceeds its buffer")
         return buffer, start, length
 
     def values(self, index: int) -> NDArray[np.float64]:
-        """(count, items) the numbers of an accessor (section 3.6.2), of which a sparse one has some
-        others than its buffer view, or than 0.
+        """(count, items) the values of an accessor, sparse ones included (section 3.6.2).
 
         Raises ValueError, LookupError or TypeError if it is damaged, LimitError PTM-L204.
         """
@@ -121,23 +121,23 @@ class Document:
                     raise ValueError("no elements")
                 stored = np.zeros(shape, np.dtype(COMPONENTS[accessor["componentType"]]))
             if "sparse" in accessor:
-                stored = self._with_others(stored, accessor)
+                stored = self._substituted(stored, accessor)
         except ValueError as error:
             raise ValueError(f"accessor {index}: {error}") from None
         return meaning(stored, bool(accessor.get("normalized")))
 
-    def _with_others(self, stored: NDArray[Any], accessor: dict[str, Any]) -> NDArray[Any]:
-        """The elements of a sparse accessor (section 3.6.2.3)."""
+    def _substituted(self, stored: NDArray[Any], accessor: dict[str, Any]) -> NDArray[Any]:
+        """The elements with the substitutes of a sparse accessor (section 3.6.2.3)."""
         sparse = accessor["sparse"]
         count = natural(sparse["count"])
         form = sparse["indices"] | {"count": count, "type": "SCALAR"}
         place = self._elements(form, form["bufferView"]).ravel()
         if not (np.diff(place.astype(np.int64)) > 0).all() or place[-1] >= len(stored):
-            raise ValueError("its sparse indices do not rise, or end beyond its elements")
+            raise ValueError("sparse indices are not increasing, or exceed the elements")
         form = accessor | {"count": count, "byteOffset": sparse["values"].get("byteOffset", 0)}
-        found = stored.copy()
-        found[place] = self._elements(form, sparse["values"]["bufferView"])
-        return found
+        result = stored.copy()
+        result[place] = self._elements(form, sparse["values"]["bufferView"])
+        return result
 
     def _elements(self, accessor: dict[str, Any], view: int) -> NDArray[Any]:
         buffer, start, length = self.view(view)
@@ -145,11 +145,11 @@ class Document:
         return elements(accessor, self.tree["bufferViews"][view] | place, buffer.data)
 
 
-def damaged(path: Path, what: str, place: str | None = None) -> InputError:
-    """The error for a file that is not what glTF 2.0 says."""
+def damaged(path: Path, reason: str, place: str | None = None) -> InputError:
+    """The error for a file that violates glTF 2.0, PTM-I249."""
     return InputError(
         "PTM-I249",
-        f"not a valid glTF 2.0 model: {what}",
+        f"not a valid glTF 2.0 model: {reason}",
         file=path,
         place=place,
         remedy="export or download it again",
@@ -157,9 +157,9 @@ def damaged(path: Path, what: str, place: str | None = None) -> InputError:
 
 
 def open_document(path: Path, folder: Folder) -> Document:
-    """Read a .glb or .gltf file and all buffers it names.
+    """Reads a .glb or .gltf file and all its buffers.
 
-    Raises InputError where the container is damaged or a buffer is missing.
+    Raises InputError if the container is damaged or a buffer is missing.
     """
     tree, binary = _opened(path)
     version = str(tree["asset"].get("version", ""))
@@ -169,12 +169,12 @@ def open_document(path: Path, folder: Folder) -> Document:
 
 
 def document_json(path: Path) -> dict[str, Any]:
-    """The JSON of a .glb or .gltf file. Raises InputError where the container is damaged."""
+    """The JSON of a .glb or .gltf file. Raises InputError if the container is damaged."""
     return _opened(path)[0]
 
 
 def _opened(path: Path) -> tuple[dict[str, Any], Buffer | None]:
-    """The JSON, and the buffer of a GLB."""
+    """The JSON, and the binary chunk of a GLB."""
     data = path.read_bytes()
     binary: Buffer | None = None
     if data.startswith(MAGIC) or path.suffix.lower() == ".glb":
@@ -189,30 +189,30 @@ def _opened(path: Path) -> tuple[dict[str, Any], Buffer | None]:
     try:
         tree = _parsed(decode(text))
     except (ValueError, RecursionError) as error:
-        raise damaged(path, f"its JSON cannot be read ({error})") from None
+        raise damaged(path, f"invalid JSON ({error})") from None
     if not isinstance(tree, dict) or not isinstance(tree.get("asset"), dict):
-        raise damaged(path, "its JSON is not a glTF document")
+        raise damaged(path, "the JSON is not a glTF document")
     return tree, binary
 
 
 def _parsed(text: str) -> Any:
-    """JSON; ValueError for what is none, NaN among it. What is no text becomes question marks."""
-    tree = json.loads(text, parse_constant=_no_constant)
-    if _HALF.search(text):
+    """Parsed JSON, with single surrogates replaced by question marks; ValueError for invalid JSON,
+    NaN included."""
+    tree = json.loads(text, parse_constant=_reject_constant)
+    if _SURROGATE.search(text):
         tree = json.loads(json.dumps(tree, ensure_ascii=False).encode("utf-8", "replace"))
     return tree
 
 
-def _no_constant(name: str) -> float:
+def _reject_constant(name: str) -> float:
     raise ValueError(f"{name} is not valid JSON")
 
 
 def _buffers(
     path: Path, tree: dict[str, Any], folder: Folder, binary: Buffer | None
 ) -> list[Buffer | None]:
-    """The buffers of a document, in order; None for those that only stand for what is compressed
-    elsewhere."""
-    found: list[Buffer | Path | None] = []
+    """The buffers of a document, in order; None for placeholders of compressed data."""
+    entries: list[Buffer | Path | None] = []
     lengths: list[int] = []
     longest: dict[Path, int] = {}
     for index, entry in enumerate(tree.get("buffers", [])):
@@ -220,34 +220,32 @@ def _buffers(
         lengths.append(natural(entry["byteLength"]))
         extensions = entry.get("extensions", {})
         if any(extensions.get(name, {}).get("fallback") for name in EXTENSIONS):
-            found.append(None)
+            entries.append(None)
         elif "uri" not in entry:
-            found.append(None if index else binary)
+            entries.append(None if index else binary)
         elif str(entry["uri"]).startswith("data:"):
-            found.append(Buffer(data_uri(path, entry["uri"], place), None))
+            entries.append(Buffer(data_uri(path, entry["uri"], place), None))
         else:
             file = _external(path, folder, str(entry["uri"]), place)
-            found.append(file)
+            entries.append(file)
             longest[file] = max(lengths[-1], longest.get(file, 0))
     read: dict[Path, Buffer] = {}
     for file, length in longest.items():
         with open_regular(file) as stream:
-            # Reading takes memory for all that is asked for.
+            # read() allocates the whole requested length.
             read[file] = Buffer(stream.read(min(length, os.fstat(stream.fileno()).st_size)), file)
-    buffers = [read[entry] if isinstance(entry, Path) else entry for entry in found]
+    buffers = [read[entry] if isinstance(entry, Path) else entry for entry in entries]
     for index, (buffer, length) in enumerate(zip(buffers, lengths, strict=True)):
         if buffer is not None and len(buffer.data) < length:
-            raise damaged(
-                path, f"{length} bytes expected, {len(buffer.data)} found", f"buffer {index}"
-            )
+            raise damaged(path, f"{len(buffer.data)} bytes instead of {length}", f"buffer {index}")
     return buffers
 
 
 def _external(path: Path, folder: Folder, uri: str, place: str) -> Path:
     """The file of a buffer. Raises InputError PTM-I203, PTM-I205."""
-    found = folder.find(unquote(uri))
-    if found.path is None:
-        outside = found.outcome == "outside"
+    result = folder.find(unquote(uri))
+    if result.path is None:
+        outside = result.outcome == "outside"
         raise InputError(
             "PTM-I205" if outside else "PTM-I203",
             f"{uri[:80]}: " + ("lies outside the model's folder" if outside else "not found"),
@@ -255,7 +253,7 @@ def _external(path: Path, folder: Folder, uri: str, place: str) -> Path:
             place=place,
             remedy="give --allow-outside" if outside else "put it into the model's folder",
         )
-    return found.path.resolve()
+    return result.path.resolve()
 
 
 def data_uri(path: Path, uri: str, place: str) -> bytes:
@@ -269,44 +267,32 @@ def data_uri(path: Path, uri: str, place: str) -> bytes:
         raise damaged(path, f"data URI {head[:40]}: {error}", place) from None
 
 
-#: Drawn as the extension says; used where it serves, and passed over where it does not matter to
-#: what is drawn here; not carried over, which is noted.
-Outcome = Literal["read", "silent", "noted"]
+#: Support of an extension: applied; without effect on the emitted files; dropped with a note.
+Support = Literal["read", "silent", "noted"]
 
-#: All that are known, with what becomes of them.
-KNOWN: dict[str, Outcome] = {
-    "EXT_mesh_gpu_instancing": "read",
-    "EXT_meshopt_compression": "read",
-    "EXT_texture_webp": "read",
-    "KHR_animation_pointer": "silent",
-    "KHR_draco_mesh_compression": "read",
-    "KHR_lights_punctual": "silent",
-    "KHR_materials_anisotropy": "silent",
-    "KHR_materials_clearcoat": "silent",
-    "KHR_materials_diffuse_transmission": "noted",
-    "KHR_materials_dispersion": "silent",
-    "KHR_materials_emissive_strength": "silent",
-    "KHR_materials_ior": "silent",
-    "KHR_materials_iridescence": "silent",
-    "KHR_materials_pbrSpecularGlossiness": "read",
-    "KHR_materials_sheen": "silent",
-    "KHR_materials_specular": "silent",
-    "KHR_materials_transmission": "read",
-    "KHR_materials_unlit": "read",
-    "KHR_materials_variants": "noted",
-    "KHR_materials_volume": "silent",
-    "KHR_mesh_quantization": "read",
-    "KHR_meshopt_compression": "read",
-    "KHR_node_visibility": "read",
-    "KHR_texture_basisu": "read",
-    "KHR_texture_transform": "read",
-    "KHR_xmp_json_ld": "silent",
+_SUPPORTED: dict[Support, str] = {
+    "read": """
+        EXT_mesh_gpu_instancing EXT_meshopt_compression EXT_texture_webp
+        KHR_draco_mesh_compression KHR_materials_pbrSpecularGlossiness
+        KHR_materials_transmission KHR_materials_unlit KHR_mesh_quantization
+        KHR_meshopt_compression KHR_node_visibility KHR_texture_basisu KHR_texture_transform
+    """,
+    "silent": """
+        KHR_animation_pointer KHR_lights_punctual KHR_materials_anisotropy
+        KHR_materials_clearcoat KHR_materials_dispersion KHR_materials_emissive_strength
+        KHR_materials_ior KHR_materials_iridescence KHR_materials_sheen KHR_materials_specular
+        KHR_materials_volume KHR_xmp_json_ld
+    """,
+    "noted": """
+        KHR_materials_diffuse_transmission KHR_materials_variants
+    """,
 }
-#: A free program that turns a model into one without an extension, by extension.
+KNOWN = {name: support for support, names in _SUPPORTED.items() for name in names.split()}
+#: A command that removes an extension from a model.
 _REMEDIES = {
     "EXT_texture_avif": "npx @gltf-transform/cli png --formats '*' IN.glb OUT.glb",
 }
-_WORDS: dict[Outcome, str] = {
+_WORDS: dict[Support, str] = {
     "read": "read",
     "silent": "does not change what is drawn",
     "noted": "not carried over",
@@ -315,27 +301,23 @@ _ANY = "open it in Blender and export it as glTF again"
 
 
 def support_of(name: str) -> str:
-    """What becomes of an extension, in words."""
+    """The support of an extension in words."""
     return _WORDS[KNOWN.get(name, "noted")]
 
 
 def check_extensions(tree: dict[str, object], findings: Findings) -> None:
-    """Notes what is not carried over.
-
-    Raises InputError PTM-I243 for an extension that the model cannot do without and that is not
-    read.
-    """
+    """Notes dropped extensions. Raises InputError PTM-I243 for an unsupported required one."""
     required, used = tree.get("extensionsRequired", []), tree.get("extensionsUsed", [])
     if not isinstance(required, list) or not isinstance(used, list):
-        raise ValueError("its extensions are not a list")
+        raise ValueError("extensions are not a list")
     for name in sorted({str(name) for name in required} - KNOWN.keys()):
         remedy = _REMEDIES.get(name, _ANY)
         raise InputError(
             "PTM-I243",
-            f"needs the glTF extension {name}, which is not read",
+            f"requires the unsupported glTF extension {name}",
             file=findings.model,
             remedy=remedy if remedy == _ANY else f"run `{remedy}`",
         )
     for name in sorted({str(name) for name in used}):
         if KNOWN.get(name, "noted") == "noted":
-            findings.note("PTM-N215", f"{name} is not carried over")
+            findings.note("PTM-N215", f"{name} dropped")

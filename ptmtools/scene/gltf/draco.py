@@ -1,7 +1,7 @@
-"""Decodes primitives compressed with Draco (KHR_draco_mesh_compression), in a process of its own.
+"""Decodes primitives compressed with Draco (KHR_draco_mesh_compression) in a child process.
 
-As a program: ``python -P -m ptmtools.scene.gltf.draco MEMORY FOLDER COUNT`` reads ``0.drc``, … in
-the folder and writes ``0.npz``, …
+``python -P -m ptmtools.scene.gltf.draco MEMORY FOLDER COUNT`` reads ``0.drc``, … in the folder and
+writes ``0.npz``, … (`sandbox`).
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ from ptmtools.scene.sandbox import run_in_sandbox, serve
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 
 EXTENSION = "KHR_draco_mesh_compression"
-#: Of the grid of an attribute: its width, and its bits, of which Draco has 30 at most.
+#: The grid of an attribute: its width, and its number of bits, at most 30.
 _GRID, _GRID_MARK = struct.Struct("<fB"), b"(.{4}[\x01-\x1e])"
-#: So many places are looked at, as a hostile stream may have its beginning everywhere.
+#: Largest number of matches that are tested; a hostile stream may match everywhere.
 _TRIES = 1000
-#: What the width may differ by from what is decoded, in units of the last place of the largest
-#: number: rounding of float32.
+#: Largest difference between the width of the grid and of the decoded values, in units in the last
+#: place of the largest value.
 _WIDTH_ULPS = 4
 
 
 @dataclass(frozen=True)
 class Decoded:
-    """A primitive.
+    """A decoded primitive.
 
     Attributes
     ----------
     triangles: (m, 3).
-    attributes: by their ids, (n, items) as stored.
-    data: what it was decoded from.
+    attributes: by id, (n, items) as stored.
+    data: the compressed stream.
     """
 
     triangles: NDArray[np.int64]
@@ -50,12 +50,12 @@ class Decoded:
     data: bytes
 
     def step(self, attribute: int) -> float | None:
-        """The step of the grid that an attribute was rounded to, 0 if that is not known; None for
-        integers, which were not rounded here.
+        """The step of the grid that an attribute was rounded to, 0 if it is unknown; None for
+        integers, which Draco does not round.
 
-        The stream has where the grid begins, its width and its bits one after the other. Encoders
-        let it begin with the least number of each component, by which it is found; a grid that the
-        user has set is not.
+        The stream contains the origin of the grid, its width and its number of bits in sequence.
+        Encoders use the minimum of each component as the origin, which locates the sequence; a grid
+        set by the user is not recognised.
         """
         values = self.attributes.get(attribute)
         if values is not None and values.dtype.kind != "f":
@@ -68,43 +68,43 @@ class Decoded:
             slack = _WIDTH_ULPS * float(np.spacing(np.abs(values).max()))
         mark = re.escape(low.astype("<f4").tobytes())
         grids = re.compile(b"(?=" + mark + _GRID_MARK + b")", re.DOTALL)
-        for found in islice(grids.finditer(self.data), _TRIES):
-            width, bits = _GRID.unpack(found[1])
+        for match in islice(grids.finditer(self.data), _TRIES):
+            width, bits = _GRID.unpack(match[1])
             if abs(width - widest) <= slack:
                 return widest / float((1 << bits) - 1)
         return 0.0
 
 
 def decode_primitives(document: Document, views: Iterable[int]) -> dict[int, Decoded]:
-    """The primitives that these buffer views hold.
+    """The primitives in these buffer views.
 
-    Raises ValueError for a view that leaves its buffer, InputError PTM-I254 for what cannot be
+    Raises ValueError for a view that exceeds its buffer, InputError PTM-I254 if one cannot be
     decoded, MissingComponentError PTM-M100 without DracoPy.
     """
-    wanted = sorted(set(views))
-    if not wanted:
+    distinct = sorted(set(views))
+    if not distinct:
         return {}
     if find_spec("DracoPy") is None:
         raise MissingComponentError(
             "PTM-M100",
-            "DracoPy is needed for meshes compressed with Draco",
+            "meshes compressed with Draco require DracoPy",
             file=document.path,
             remedy="pip install DracoPy",
         )
-    found = {}
+    primitives = {}
     with tempfile.TemporaryDirectory() as scratch:
-        for k, view in enumerate(wanted):
+        for k, view in enumerate(distinct):
             buffer, start, length = document.view(view)
             Path(scratch, f"{k}.drc").write_bytes(buffer.data[start : start + length])
-        run_in_sandbox(__name__, "Draco", document.path, scratch, str(len(wanted)))
-        for k, view in enumerate(wanted):
+        run_in_sandbox(__name__, "Draco", document.path, scratch, str(len(distinct)))
+        for k, view in enumerate(distinct):
             file = Path(scratch, f"{k}.npz")
             arrays = unpack_arrays(file.read_bytes(), file=file)
             triangles = arrays.pop("triangles").astype(np.int64)
             attributes = {int(name.removeprefix("id_")): array for name, array in arrays.items()}
             data = Path(scratch, f"{k}.drc").read_bytes()
-            found[view] = Decoded(triangles, attributes, data)
-    return found
+            primitives[view] = Decoded(triangles, attributes, data)
+    return primitives
 
 
 def _decode(folder: str, count: str) -> None:

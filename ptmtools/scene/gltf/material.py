@@ -1,9 +1,9 @@
-"""Materials, samplers and images of a glTF document (glTF 2.0, sections 3.8 and 3.9).
+"""Reads materials, samplers and images of a glTF document (glTF 2.0, sections 3.8 and 3.9).
 
-Of the metallic-roughness model only the base colour is kept. Its factor is linear light, and the
-tint of the emitted files is not, so the factor is converted to sRGB; the product of tint and
-texel then differs from the linear product for partial tints, and the conversion is noted. The alpha
-of texels counts in the modes MASK and BLEND only (section 3.9.6).
+The reader keeps only the base colour of the metallic-roughness model. Its factor is linear light,
+but the tint of the emitted files is sRGB, so the factor is converted and the conversion noted; for
+partial tints the product of tint and texel differs from the linear product. The alpha of texels
+applies in the modes MASK and BLEND only (section 3.9.6).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ptmtools.scene.ktx2 import TranscodedBytes
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.source import FileRange, HeldBytes, SourceMaterial, SourceWrap, Texture
 
-#: A material of a document → a texture of it, with its texture coordinates.
+#: Maps the JSON of a material to that of one of its textures.
 TextureOf = Callable[[dict[str, Any]], dict[str, Any] | None]
 
 _KTX2 = "image/ktx2"
@@ -32,15 +32,15 @@ _WRAPS: dict[int | None, SourceWrap] = {33071: "clamp", 33648: "mirror"}
 
 @dataclass(frozen=True)
 class MaterialUse:
-    """How a material applies to a primitive.
+    """The material of a primitive.
 
     Attributes
     ----------
     index: into `MaterialReader.materials`.
     coords: the attribute with its texture coordinates.
-    matrix: (2, 3) KHR_texture_transform, origin at the upper left as glTF has it.
-    see_through: whether it has an alpha mode other than opaque.
-    light: (3,) its base colour, linear light, by which colours of vertices are multiplied.
+    matrix: (2, 3) KHR_texture_transform, origin at the upper left as in glTF.
+    see_through: whether its alpha mode is not opaque.
+    light: (3,) its base colour, linear light, the factor of vertex colours.
     """
 
     index: int
@@ -51,10 +51,9 @@ class MaterialUse:
 
 
 class MaterialReader:
-    """Reads each material once, when a primitive first asks for it.
+    """Reads each material once, on first use.
 
-    ``texture_of`` says which texture of a material counts, as the document has it, or None; without
-    it, that of its base colour.
+    ``texture_of`` selects the texture of a material; the default is that of the base colour.
     """
 
     def __init__(
@@ -63,7 +62,7 @@ class MaterialReader:
         self._document = document
         self._findings = findings
         self._texture_of = texture_of
-        self._painted: dict[tuple[int | None, bool], MaterialUse] = {}
+        self._uses: dict[tuple[int | None, bool], MaterialUse] = {}
         self._materials: list[SourceMaterial] = []
 
     @property
@@ -71,12 +70,13 @@ class MaterialReader:
         return tuple(self._materials)
 
     def read(self, index: int | None, colored: bool) -> MaterialUse:
-        """The material of a primitive; None is the default material of the format. Vertices that
-        are ``colored`` have its base colour in theirs, so that the two are multiplied as light."""
-        if (index, colored) not in self._painted:
+        """The material of a primitive; None is the default material of the format. The colours of
+        ``colored`` vertices include the base colour, so that both are multiplied as linear light.
+        """
+        if (index, colored) not in self._uses:
             entry = {} if index is None else self._document.tree["materials"][index]
-            self._painted[index, colored] = self._read(entry, index, colored)
-        return self._painted[index, colored]
+            self._uses[index, colored] = self._read(entry, index, colored)
+        return self._uses[index, colored]
 
     def _read(self, entry: dict[str, Any], index: int | None, colored: bool) -> MaterialUse:
         place = f"material {index}"
@@ -108,12 +108,12 @@ class MaterialReader:
         texture, coords, matrix = None, "TEXCOORD_0", np.eye(2, 3)
         if use is not None:
             texture = self._texture(use["index"], place, _share(use.get("strength", 1.0)))
-            moved = use.get("extensions", {}).get("KHR_texture_transform", {})
-            matrix = _transform(moved)
-            coords = f"TEXCOORD_{moved.get('texCoord', use.get('texCoord', 0))}"
-            if moved:
+            transform = use.get("extensions", {}).get("KHR_texture_transform", {})
+            matrix = _transform(transform)
+            coords = f"TEXCOORD_{transform.get('texCoord', use.get('texCoord', 0))}"
+            if transform:
                 self._findings.note(
-                    "PTM-N215", f"{name}: KHR_texture_transform is baked into its faces", place
+                    "PTM-N215", f"{name}: KHR_texture_transform baked into its faces", place
                 )
         self._materials.append(
             SourceMaterial(
@@ -122,7 +122,7 @@ class MaterialReader:
                 opacity=opacity,
                 see_through=see_through,
                 ignores_alpha=mode not in ("MASK", "BLEND"),
-                # Of a texel, where all are multiplied with the factor's alpha.
+                # The cutoff of a texel, because the factor's alpha scales all texels.
                 cutoff=max(cutoff / a, 0.0) if tested and opacity and a > 0 else None,
                 two_sided=bool(entry.get("doubleSided", False)),
                 texture=texture,
@@ -135,11 +135,11 @@ class MaterialReader:
         texture = tree["textures"][index]
         sampler = tree["samplers"][texture["sampler"]] if "sampler" in texture else {}
         sources = [texture, *texture.get("extensions", {}).values()]
-        # The texture's own image is that for programs without extensions, with the least loss.
+        # The image without an extension has the least loss.
         source = next((each["source"] for each in sources if "source" in each), None)
         what = f"texture {index}"
         if source is None:
-            self._findings.miss("PTM-N204", f"{what}: names no image", place)
+            self._findings.miss("PTM-N204", f"{what}: has no image", place)
             return None
         image = tree["images"][source]
         uri = image.get("uri")
@@ -168,19 +168,20 @@ class MaterialReader:
 
 
 def _share(value: Any) -> float:
-    """A number, brought into [0, 1]; ValueError for what is none."""
+    """A number, clipped to [0, 1]; ValueError for other values."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ValueError(f"{value!r} is no number")
+        raise ValueError(f"{value!r} is not a number")
     return min(max(float(value), 0.0), 1.0)
 
 
-def _transform(given: dict[str, Any]) -> NDArray[np.float64]:
+def _transform(extension: dict[str, Any]) -> NDArray[np.float64]:
     """(2, 3) matrix of KHR_texture_transform: scale, then rotation, then offset.
 
-    Turned as its text, its test model and the viewers have it; its sample of GLSL, read by columns,
-    turns the other way.
+    The direction of rotation is that of its text, its test model and the viewers; the GLSL sample
+    in the specification, read by columns, rotates the other way.
     """
-    offset = np.array(given.get("offset", [0.0, 0.0]), dtype=np.float64)
-    scale = np.array(given.get("scale", [1.0, 1.0]), dtype=np.float64)
-    c, s = np.cos(given.get("rotation", 0.0)), np.sin(given.get("rotation", 0.0))
+    offset = np.array(extension.get("offset", [0.0, 0.0]), dtype=np.float64)
+    scale = np.array(extension.get("scale", [1.0, 1.0]), dtype=np.float64)
+    angle = extension.get("rotation", 0.0)
+    c, s = np.cos(angle), np.sin(angle)
     return np.column_stack([np.array([[c, s], [-s, c]]) * scale, offset])

@@ -1,7 +1,7 @@
 """Decodes buffer views compressed with meshopt (EXT_meshopt_compression, KHR_meshopt_compression).
 
-Written from the extensions' texts (their appendices A and B). There are bindings of the library on
-PyPI, the one that installs without a compiler a month old; the format is small, and fixed.
+Implemented from the texts of the extensions (appendices A and B). Of the bindings on PyPI the only
+one that installs without a compiler was a month old; the format is small and stable.
 """
 
 from __future__ import annotations
@@ -16,40 +16,38 @@ from ptmtools.glb import natural
 
 EXTENSIONS = ("KHR_meshopt_compression", "EXT_meshopt_compression")
 _ATTRIBUTES, _TRIANGLES, _INDICES = 0xA0, 0xE1, 0xD1
-#: Least bytes of the tail by version, zeros before it included.
+#: Smallest size of the tail by version, in bytes, with the zeros before it.
 _TAIL = (32, 24)
 
 
 def decode(data: bytes, extension: Mapping[str, Any]) -> bytes:
     """The bytes of a buffer view.
 
-    ``extension`` is the object of the view that says mode, filter, ``count`` and ``byteStride``.
-    Raises ValueError where these contradict each other or the data, and KeyError for what is
-    missing. No memory is taken for more elements than so many bytes can hold.
+    ``extension`` is the object of the view with mode, filter, ``count`` and ``byteStride``. Raises
+    ValueError if these contradict each other or the data, and KeyError if one is missing. The
+    allocated memory is bounded by the number of elements that the data can encode.
     """
     count, stride = natural(extension["count"]), natural(extension["byteStride"])
     mode, filtered = extension["mode"], extension.get("filter", "NONE")
     stream = np.frombuffer(data, np.uint8)
     if mode == "ATTRIBUTES":
         if stride not in _FILTERED.get(filtered, ()):
-            raise ValueError(f"meshopt filter {filtered!r} over a stride of {stride}")
+            raise ValueError(f"meshopt filter {filtered!r} with a stride of {stride}")
         return bytes(_FILTERS[filtered](_attributes(stream, count, stride)).tobytes())
     if filtered != "NONE" or stride not in (2, 4):
         raise ValueError(f"meshopt mode {mode} with filter {filtered} and a stride of {stride}")
     if mode == "TRIANGLES":
-        return _cut(_triangles(stream, count), stride)
-    if mode == "INDICES":
-        return _cut(_indices(stream, count), stride)
-    raise ValueError(f"meshopt mode {mode!r}")
-
-
-def _cut(indices: NDArray[np.uint32], stride: int) -> bytes:
+        indices = _triangles(stream, count)
+    elif mode == "INDICES":
+        indices = _indices(stream, count)
+    else:
+        raise ValueError(f"meshopt mode {mode!r}")
     return (indices.astype(np.uint16) if stride == 2 else indices).tobytes()
 
 
-def _check(place: int, what: str) -> None:
+def _check(place: int, mode: str) -> None:
     if place >= 0:
-        raise ValueError(f"meshopt {what}: damaged at byte {place}")
+        raise ValueError(f"meshopt {mode}: damaged at byte {place}")
 
 
 def _attributes(stream: NDArray[np.uint8], count: int, stride: int) -> NDArray[np.uint8]:
@@ -60,7 +58,7 @@ def _attributes(stream: NDArray[np.uint8], count: int, stride: int) -> NDArray[n
         raise ValueError("meshopt attributes: not of version 0 or 1")
     end = len(stream) - max(_TAIL[version], stride + stride // 4 * version)
     block = min(BLOCK_BYTES // stride // GROUP * GROUP, BLOCK)
-    # What a full block takes at least: its control bytes, or two bits for every group of a byte.
+    # Smallest size of a full block: its control bytes, or two bits for every group of a byte.
     least = stride // 4 if version else stride * -(-block // (4 * GROUP))
     if end < 1 + count // block * least:
         raise ValueError(f"meshopt attributes: {len(stream)} bytes for {count} elements")
@@ -105,7 +103,7 @@ def _rounded(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _octahedral(elements: NDArray[np.uint8]) -> NDArray[Any]:
-    """Unit vectors, of two components and what stands for 1."""
+    """Unit vectors of two components and the value that represents 1."""
     stored = _signed(elements)
     most = np.iinfo(stored.dtype).max
     one = np.where(stored[:, 2] == 0, 1, stored[:, 2]).astype(np.float64)
@@ -114,38 +112,38 @@ def _octahedral(elements: NDArray[np.uint8]) -> NDArray[Any]:
     below = np.minimum(z, 0)
     vector = np.stack([x - np.copysign(below, x), y - np.copysign(below, y), z], axis=1)
     vector /= np.maximum(np.linalg.norm(vector, axis=1), np.finfo(np.float64).tiny)[:, None]
-    found = stored.copy()
-    found[:, :3] = _rounded(vector * most)
-    return found
+    result = stored.copy()
+    result[:, :3] = _rounded(vector * most)
+    return result
 
 
 def _quaternion(elements: NDArray[np.uint8]) -> NDArray[Any]:
-    """Unit quaternions, without their largest component."""
+    """Unit quaternions stored without their largest component."""
     stored = elements.view(np.int16)
     one = (stored[:, 3] | 3).astype(np.float64)
     rest = stored[:, :3] / one[:, None] / np.sqrt(2)
     largest = np.sqrt(np.maximum(0, 1 - (rest**2).sum(axis=1)))
-    found = np.empty_like(stored)
+    result = np.empty_like(stored)
     values = np.clip(_rounded(np.column_stack([largest, rest]) * 32767), -32768, 32767)
     place = ((stored[:, 3] & 3)[:, None] + np.arange(4)) % 4
-    np.put_along_axis(found, place.astype(np.int64), values.astype(np.int16), axis=1)
-    return found
+    np.put_along_axis(result, place.astype(np.int64), values.astype(np.int16), axis=1)
+    return result
 
 
 def _exponential(elements: NDArray[np.uint8]) -> NDArray[Any]:
-    """float32 of an exponent of 8 bits and a mantissa of 24."""
+    """float32 from an exponent of 8 bits and a mantissa of 24."""
     stored = elements.view("<i4")
-    found: NDArray[Any] = np.ldexp(((stored << 8) >> 8).astype(np.float32), stored >> 24)
-    return found.astype("<f4")
+    values: NDArray[Any] = np.ldexp(((stored << 8) >> 8).astype(np.float32), stored >> 24)
+    return values.astype("<f4")
 
 
 def _color(elements: NDArray[np.uint8]) -> NDArray[Any]:
-    """Red, green, blue and alpha of luma, two chrominances and alpha with a leading 1."""
+    """Red, green, blue and alpha from luma, two chrominances and alpha with a leading 1."""
     stored = _signed(elements)
     kind = np.dtype(f"u{stored.dtype.itemsize}")
     orange, green = stored[:, 1].astype(np.int64), stored[:, 2].astype(np.int64)
     luma, alpha = (stored[:, k].view(kind).astype(np.int64) for k in (0, 3))
-    # The highest bit of alpha says how many bits there are.
+    # The highest bit of alpha marks the number of bits.
     scale = (1 << np.frexp(np.maximum(alpha, 1))[1].astype(np.int64)) - 1
     alpha &= scale >> 1
     alpha = alpha << 1 | alpha & 1
@@ -154,7 +152,7 @@ def _color(elements: NDArray[np.uint8]) -> NDArray[Any]:
     return np.clip(_rounded(values * (most / scale)[:, None]), 0, most).astype(kind)
 
 
-#: The strides that elements may have with each filter.
+#: Valid strides by filter.
 _FILTERED = {
     "NONE": range(4, 257, 4),
     "OCTAHEDRAL": (4, 8),

@@ -1,7 +1,7 @@
 """Compiled decoders of meshopt's three bit streams (`meshopt`).
 
-Each returns `DONE`, or the place in the data where it ends too early or is wrong. No read or write
-leaves its array, whatever the data are.
+Each returns `DONE`, or the position in the data where these are invalid or truncated. No read or
+write leaves its array for any data.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ptmtools.jit import kernel, plain_kernel
 
 DONE = -1
-#: Elements of a block at most, and of a group; bytes of a block at most.
+#: Largest number of elements of a block; elements of a group; largest size of a block in bytes.
 BLOCK, GROUP, BLOCK_BYTES = 256, 16, 8192
 #: Entries of the lists of recent edges and vertices.
 _RECENT = 16
@@ -26,8 +26,7 @@ def decode_attributes(data: _Bytes, end: int, version: int, stride: int, out: _B
 
     Parameters
     ----------
-    data: the stream; ``end`` is where its tail of baseline and channel modes begins, padding
-        included.
+    data: the stream; ``end`` is the start of its tail (padding, baseline, channel modes).
     out: (count, stride) the elements; the stride is a multiple of 4, at most 256.
     """
     count, channels = len(out), stride // 4
@@ -52,7 +51,7 @@ def decode_attributes(data: _Bytes, end: int, version: int, stride: int, out: _B
                 if at < 0:
                     return -at
             mode = int(np.int64(data[tail + stride + channel])) if version else 0
-            if not _undone(delta, n, mode, last, 4 * channel, out[first : first + n]):
+            if not _accumulate(delta, n, mode, last, 4 * channel, out[first : first + n]):
                 return tail + stride + channel
         first += n
     return DONE if at == end else at
@@ -60,8 +59,8 @@ def decode_attributes(data: _Bytes, end: int, version: int, stride: int, out: _B
 
 @plain_kernel
 def _deltas(data: _Bytes, at: int, end: int, control: int, n: int, delta: _Bytes) -> int:
-    """The deltas of one byte of the ``n`` elements of a block; where the next begin, or minus the
-    place where the data end too early."""
+    """Reads the deltas of one byte of the ``n`` elements of a block. Returns the position of the
+    next ones, or minus the position where the data are truncated."""
     if control == 2:
         delta[:n] = 0
         return at
@@ -109,9 +108,9 @@ def _deltas(data: _Bytes, at: int, end: int, control: int, n: int, delta: _Bytes
 
 
 @plain_kernel
-def _undone(delta: _Bytes, n: int, mode: int, last: _Bytes, at: int, out: _Bytes) -> bool:
-    """Adds up the deltas of a channel, bytes ``at`` to ``at`` + 4 of elements; False for a channel
-    mode that there is not. ``last`` is the element before, and then the last of these."""
+def _accumulate(delta: _Bytes, n: int, mode: int, last: _Bytes, at: int, out: _Bytes) -> bool:
+    """Adds up the deltas of a channel, bytes ``at`` to ``at`` + 4 of elements; False for an invalid
+    channel mode. ``last`` is the previous element, and afterwards the last of these."""
     if mode == 0:
         for byte in range(4):
             value = int(np.int64(last[at + byte]))
@@ -156,8 +155,8 @@ def decode_triangles(data: _Bytes, out: NDArray[np.uint32]) -> int:
     triangles, end = len(out) // 3, len(data) - 16
     edge = np.zeros((_RECENT, 2), dtype=np.uint32)
     vertex = np.zeros(_RECENT, dtype=np.uint32)
-    # How many there have been of each, the next vertex not seen before, the last that was written
-    # in full, and where the next of these is.
+    # Counts of edges and vertices, the next new vertex, the last explicit vertex, and the position
+    # of the next explicit one.
     state = np.array([0, 0, 0, 0, 1 + triangles])
     for t in range(triangles):
         code = int(np.int64(data[1 + t]))
@@ -189,19 +188,19 @@ def decode_triangles(data: _Bytes, out: NDArray[np.uint32]) -> int:
                 state[4] += 1
                 if pair == 0:
                     state[2] = 0
-            known_a = low == 15
-            if known_a and not _explicit(data, end, state):
+            explicit_a = low == 15
+            if explicit_a and not _explicit(data, end, state):
                 return end
-            a = state[3] if known_a else _next(state)
+            a = state[3] if explicit_a else _next(state)
             b = c = 0
             for corner in range(2):
-                what = (pair >> 4) if corner == 0 else pair & 15
-                if what == 0:
+                code = (pair >> 4) if corner == 0 else pair & 15
+                if code == 0:
                     value = _next(state)
-                elif what < 15:
-                    if what > state[1]:
+                elif code < 15:
+                    if code > state[1]:
                         return 1 + t
-                    value = int(np.int64(vertex[(state[1] - what) % _RECENT]))
+                    value = int(np.int64(vertex[(state[1] - code) % _RECENT]))
                 elif low < 14 or not _explicit(data, end, state):
                     return end
                 else:
@@ -239,7 +238,7 @@ def _remember(vertex: NDArray[np.uint32], value: int, state: NDArray[np.int64]) 
 
 @plain_kernel
 def _explicit(data: _Bytes, end: int, state: NDArray[np.int64]) -> bool:
-    """Reads a vertex that is written in full, as a difference from the last such."""
+    """Reads an explicit vertex, a difference from the last one."""
     value, state[4] = _number(data, state[4], end)
     if state[4] < 0:
         return False
@@ -249,8 +248,7 @@ def _explicit(data: _Bytes, end: int, state: NDArray[np.int64]) -> bool:
 
 @plain_kernel
 def _number(data: _Bytes, at: int, end: int) -> tuple[int, int]:
-    """An unsigned LEB128 of at most five bytes, and where the next begins; -1 where there is
-    none."""
+    """An unsigned LEB128 of at most five bytes, and the position of the next; -1 if invalid."""
     value = 0
     for k in range(5):
         if at + k >= end:
@@ -272,7 +270,7 @@ def decode_indices(data: _Bytes, out: NDArray[np.uint32]) -> int:
         value, at = _number(data, at, end)
         if at < 0:
             return end
-        which, value = value & 1, value >> 1
-        last[which] = (last[which] + ((value >> 1) ^ -(value & 1))) & 0xFFFFFFFF
-        out[i] = last[which]
+        baseline, value = value & 1, value >> 1
+        last[baseline] = (last[baseline] + ((value >> 1) ^ -(value & 1))) & 0xFFFFFFFF
+        out[i] = last[baseline]
     return DONE if at == end else at

@@ -1,18 +1,16 @@
-"""Reads glTF 2.0 (.glb and .gltf).
+"""Reads the nodes and primitives of glTF 2.0 models (.glb and .gltf) into a `Source`.
 
-The document is read here and not by trimesh, which (5.2) reads only TEXCOORD_0, leaves normalised
-integers unscaled, drops the mesh and children of a camera's node, keeps neither wrap modes nor the
-images' own bytes, and takes a time that grows with the third power of the graph's depth (six
-minutes for a file of 100 KB). Metres and Y up are fixed by the format.
+Covers sections 3.5.3 (transformations), 3.7.2 (meshes) and 3.10 (cameras), KHR_node_visibility and
+EXT_mesh_gpu_instancing. The unit is the metre and Y is up by specification.
 
-The nodes of a glTF scene: where in the world each is, and as often as it is drawn.
-
-Sections 3.5.3 (transformations) and 3.10 (cameras), KHR_node_visibility,
-EXT_mesh_gpu_instancing."""
+trimesh (5.2) is not used because it reads only TEXCOORD_0, leaves normalised integers unscaled,
+drops the mesh and children of a camera's node, keeps neither wrap modes nor the bytes of images,
+and takes a time that grows with the third power of the graph's depth (six minutes for a file of
+100 KB).
+"""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -28,7 +26,7 @@ from ptmtools.scene.colors import encoded
 from ptmtools.scene.gltf.document import Document, check_extensions, damaged, open_document
 from ptmtools.scene.gltf.draco import EXTENSION as DRACO, Decoded, decode_primitives
 from ptmtools.scene.gltf.material import MaterialReader, MaterialUse, TextureOf
-from ptmtools.scene.model import Camera
+from ptmtools.scene.model import Camera, perspective_camera
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.rows import Rows
 from ptmtools.scene.source import MAX_VERTICES, Source, too_many_triangles
@@ -42,8 +40,8 @@ _DEFAULTS = {
 
 
 def world_matrices(tree: dict[str, Any], findings: Findings) -> dict[int, Floats]:
-    """(4, 4) local to world of each visible node of the scene, parents first; of the first scene if
-    none is the default. Raises ValueError for a node with two parents."""
+    """(4, 4) local to world of each visible node of the default scene, else of the first one,
+    parents first. Raises ValueError for a node with two parents."""
     nodes = tree.get("nodes", [])
     scenes = tree.get("scenes", [])
     if scenes:
@@ -54,16 +52,16 @@ def world_matrices(tree: dict[str, Any], findings: Findings) -> dict[int, Floats
     world: dict[int, Floats] = {}
     stack = [(root, np.eye(4)) for root in reversed(roots)]
     while stack:
-        node, above = stack.pop()
+        node, parent = stack.pop()
         if natural(node) in world:
             raise ValueError(f"node {node} has two parents")
         entry = nodes[node]
         visibility = entry.get("extensions", {}).get("KHR_node_visibility", {})
         if visibility.get("visible", True) is False:
-            findings.note("PTM-N215", "not visible, and so is what hangs on it", f"node {node}")
+            findings.note("PTM-N215", "invisible, dropped with its children", f"node {node}")
             continue
         with np.errstate(all="ignore"):
-            world[node] = above @ _local_matrix(entry)
+            world[node] = parent @ _local_matrix(entry)
         stack += [(child, world[node]) for child in reversed(entry.get("children", []))]
     return world
 
@@ -71,14 +69,12 @@ def world_matrices(tree: dict[str, Any], findings: Findings) -> dict[int, Floats
 def _local_matrix(entry: dict[str, Any]) -> Floats:
     """(4, 4) of a node: its matrix, or scale, then rotation, then translation."""
     if "matrix" in entry:
-        whole: Floats = np.array(entry["matrix"], dtype=np.float64).reshape(4, 4).T
-        return whole
+        return np.array(entry["matrix"], dtype=np.float64).reshape(4, 4).T
     parts = (
         np.array(entry.get(name.lower(), default), dtype=np.float64).reshape(1, len(default))
         for name, default in _DEFAULTS.items()
     )
-    matrix: Floats = _matrices(*parts)[0]
-    return matrix
+    return np.asarray(_matrices(*parts)[0])
 
 
 def _matrices(translation: Floats, rotation: Floats, scale: Floats) -> Floats:
@@ -100,14 +96,14 @@ def _matrices(translation: Floats, rotation: Floats, scale: Floats) -> Floats:
 
 
 def instance_count(document: Document, node: int) -> int:
-    """How often a node's mesh is drawn. Raises ValueError where its attributes disagree."""
+    """The number of instances of a node's mesh. Raises ValueError if its attributes disagree."""
     attributes = _instance_attributes(document, node)
     if attributes is None:
         return 1
     accessors = document.tree["accessors"]
     counts = {natural(accessors[natural(accessor)]["count"]) for accessor in attributes.values()}
     if len(counts) != 1:
-        raise ValueError(f"node {node}: its instances have attributes of {len(counts)} lengths")
+        raise ValueError(f"node {node}: attributes of instances differ in length")
     count = counts.pop()
     if not count:
         raise ValueError(f"node {node}: no instances")
@@ -115,7 +111,7 @@ def instance_count(document: Document, node: int) -> int:
 
 
 def instances(document: Document, node: int) -> Floats:
-    """(n, 4, 4) from the mesh of a node to the node, for each time that it is drawn."""
+    """(n, 4, 4) from the mesh of a node to the node, for each instance."""
     attributes = _instance_attributes(document, node)
     if attributes is None:
         return np.eye(4)[None]
@@ -133,58 +129,52 @@ def instances(document: Document, node: int) -> Floats:
 
 def _instance_attributes(document: Document, node: int) -> dict[str, int] | None:
     extensions = document.tree["nodes"][node].get("extensions", {})
-    found: dict[str, int] | None = extensions.get(_INSTANCING, {}).get("attributes")
-    return found or None
+    attributes: dict[str, int] | None = extensions.get(_INSTANCING, {}).get("attributes")
+    return attributes or None
 
 
 def cameras(
     tree: dict[str, Any], world: dict[int, Floats], findings: Findings
 ) -> tuple[Camera, ...]:
     """The perspective cameras of the nodes."""
-    found: list[Camera] = []
+    result: list[Camera] = []
     for node, matrix in world.items():
         entry = tree["nodes"][node]
         if "camera" not in entry:
             continue
-        given = tree["cameras"][entry["camera"]]
-        name = str(entry.get("name") or given.get("name") or f"camera {len(found)}")
-        direction = -matrix[:3, 2]
-        with np.errstate(all="ignore"):
-            length = float(np.linalg.norm(direction))
-        position = matrix[:3, 3]
-        yfov = given.get("perspective", {}).get("yfov", 0.0)
-        usable = np.isfinite(position).all() and math.isfinite(length) and length > 0
-        if not (usable and 0 < yfov < math.pi):
+        definition = tree["cameras"][entry["camera"]]
+        name = str(entry.get("name") or definition.get("name") or f"camera {len(result)}")
+        yfov = definition.get("perspective", {}).get("yfov", 0.0)
+        camera = perspective_camera(name, matrix[:3, 3], -matrix[:3, 2], yfov)
+        if camera is None:
             findings.note("PTM-N215", f"camera {name} has no perspective, skipped", f"node {node}")
-            continue
-        x, y, z = position.tolist()
-        dx, dy, dz = (direction / length).tolist()
-        found.append(Camera(name, (x, y, z), (dx, dy, dz), float(yfov)))
-    return tuple(found)
+        else:
+            result.append(camera)
+    return tuple(result)
 
 
-#: What is raised where a document is malformed: one this deep has no end of ways to be that.
+#: Exceptions of malformed documents, which can be malformed in any place.
 _FAULTS = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
-#: So many vertices may there be for each triangle that is allowed.
-_VERTICES_A_TRIANGLE = 10
+#: Largest number of vertices per allowed triangle.
+_VERTICES_PER_TRIANGLE = 10
 
 
 @dataclass(frozen=True)
 class _Draw:
-    """One primitive at one node, as often as that draws it."""
+    """A primitive of a node, with its number of instances and of triangles in each."""
 
     node: int
     name: str
     primitive: dict[str, Any]
     place: str
-    times: int
+    instances: int
     triangles: int = 0
 
     @property
     def attributes(self) -> dict[str, int]:
-        found: dict[str, int] = self.primitive["attributes"]
-        return found
+        attributes: dict[str, int] = self.primitive["attributes"]
+        return attributes
 
     @property
     def mode(self) -> int:
@@ -193,8 +183,8 @@ class _Draw:
 
 @dataclass(frozen=True)
 class _Mesh:
-    """What a primitive consists of: (n, 3) points and (m, 3) triangles over them; (m, 3, 2) texture
-    coordinates from the lower left and (m, 3, 3) colours of corners, if they have any."""
+    """The arrays of a primitive: (n, 3) points and (m, 3) triangles over them; (m, 3, 2) texture
+    coordinates from the lower left and (m, 3, 3) colours of corners, if it has any."""
 
     points: Floats
     triangles: Ints
@@ -208,20 +198,18 @@ def read_gltf(
     max_triangles: int = MAX_VERTICES,
     texture_of: TextureOf | None = None,
 ) -> Source:
-    """Read a glTF model, painted with another texture than that of the base colour where
-    ``texture_of`` says so (`MaterialReader`).
+    """Reads a glTF model; ``texture_of`` as in `MaterialReader`.
 
-    Raises InputError where it is damaged or needs what is not supported; LimitError for more
-    vertices than int32 can number or more than ``max_triangles`` (PTM-L203), each as
-    often as a node shows it, before anything is made of them, and for more that is compressed than
-    can be meant (PTM-L204).
+    Raises InputError if it is damaged or requires an unsupported extension; LimitError, before
+    arrays are allocated, for more vertices than int32 can number (PTM-L203) or more triangles than
+    ``max_triangles`` (PTM-L203), instances included, and for too much decompressed data (PTM-L204).
     """
     try:
         document = open_document(path, findings.folder)
         return _read(document, findings, max_triangles, texture_of)
     except _FAULTS as error:
-        what = f"{error.args[0]!r} is missing" if isinstance(error, KeyError) else str(error)
-        raise damaged(path, what.splitlines()[0] if what else type(error).__name__) from None
+        text = f"{error.args[0]!r} is missing" if isinstance(error, KeyError) else str(error)
+        raise damaged(path, text.splitlines()[0] if text else type(error).__name__) from None
 
 
 def _read(
@@ -230,24 +218,25 @@ def _read(
     path, tree = document.path, document.tree
     check_extensions(tree, findings)
     world_of = world_matrices(tree, findings)
-    drawn = (draw for node in world_of for draw in _draws(document, node, findings))
-    draws = list(_limited(document, drawn, max_triangles))
+    every = (draw for node in world_of for draw in _draws(document, node, findings))
+    draws = list(_limited(document, every, max_triangles))
     if not draws:
         raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with triangles")
-    painter = MaterialReader(document, findings, texture_of)
-    painted = [
-        painter.read(draw.primitive.get("material"), "COLOR_0" in draw.attributes) for draw in draws
+    materials = MaterialReader(document, findings, texture_of)
+    uses = [
+        materials.read(draw.primitive.get("material"), "COLOR_0" in draw.attributes)
+        for draw in draws
     ]
     compressed = [_compressed(document, draw) for draw in draws]
     decoded = decode_primitives(document, (c["bufferView"] for c in compressed if c is not None))
     rows, first, step = Rows(), dict[int, int](), 0.0
     grids: dict[tuple[bool, int], float] = {}
-    for draw, paint, told in zip(draws, painted, compressed, strict=True):
+    for draw, use, draco in zip(draws, uses, compressed, strict=True):
         try:
-            values = _Values(document, draw, told, decoded)
-            mesh = _mesh(values, draw, paint, findings)
+            values = _Values(document, draw, draco, decoded)
+            mesh = _mesh(values, draw, use, findings)
             placed = instances(document, draw.node)
-            key = (True, told["bufferView"]) if told else (False, draw.attributes["POSITION"])
+            key = (True, draco["bufferView"]) if draco else (False, draw.attributes["POSITION"])
             if key not in grids:
                 grids[key] = values.step("POSITION")
             grid = grids[key]
@@ -255,16 +244,16 @@ def _read(
             raise damaged(path, str(error), draw.place) from None
         if draw.node not in first:
             first[draw.node] = len(rows.names)
-            rows.names += [draw.name] * draw.times
+            rows.names += [draw.name] * draw.instances
         with np.errstate(all="ignore"):
             frames = world_of[draw.node] @ placed
             scale = np.linalg.norm(frames[:, :3, :3], axis=1)
             step = max(step, grid * float(scale[np.isfinite(scale)].max(initial=0.0)))
         rows.add(
-            frames, mesh.points, mesh.triangles, mesh.uv, paint.index, mesh.colors, first[draw.node]
+            frames, mesh.points, mesh.triangles, mesh.uv, use.index, mesh.colors, first[draw.node]
         )
     return rows.source(
-        materials=painter.materials,
+        materials=materials.materials,
         cameras=cameras(tree, world_of, findings),
         metres=1.0,
         up="y",
@@ -273,7 +262,7 @@ def _read(
 
 
 def _draws(document: Document, node: int, findings: Findings) -> Iterator[_Draw]:
-    """What a node draws."""
+    """The primitives of a node."""
     tree = document.tree
     entry = tree["nodes"][node]
     if "mesh" not in entry:
@@ -281,8 +270,8 @@ def _draws(document: Document, node: int, findings: Findings) -> Iterator[_Draw]
     mesh = tree["meshes"][entry["mesh"]]
     name = str(entry.get("name") or mesh.get("name") or f"node {node}")
     if "skin" in entry:
-        findings.note("PTM-N215", "skin: shown in its rest pose", f"node {node}")
-    times = instance_count(document, node)
+        findings.note("PTM-N215", "skin drawn in its rest pose", f"node {node}")
+    count = instance_count(document, node)
     for k, primitive in enumerate(mesh["primitives"]):
         place = f"mesh {entry['mesh']}, primitive {k}"
         mode = primitive.get("mode", _TRIANGLES)
@@ -290,13 +279,13 @@ def _draws(document: Document, node: int, findings: Findings) -> Iterator[_Draw]
             findings.note("PTM-N215", f"primitive of mode {mode} (points or lines), skipped", place)
             continue
         if primitive.get("targets"):
-            findings.note("PTM-N215", "morph targets are not carried over", place)
-        yield _Draw(node, name, primitive, place, times)
+            findings.note("PTM-N215", "morph targets dropped", place)
+        yield _Draw(node, name, primitive, place, count)
 
 
 def _limited(document: Document, draws: Iterable[_Draw], max_triangles: int) -> Iterator[_Draw]:
-    """The same, as long as they are not too many. Raises LimitError PTM-L203."""
-    most = min(MAX_VERTICES, _VERTICES_A_TRIANGLE * max_triangles)
+    """The same primitives with their counts of triangles. Raises LimitError PTM-L203."""
+    most = min(MAX_VERTICES, _VERTICES_PER_TRIANGLE * max_triangles)
     vertices = triangles = 0
     for draw in draws:
         accessors = document.tree["accessors"]
@@ -305,15 +294,15 @@ def _limited(document: Document, draws: Iterable[_Draw], max_triangles: int) -> 
             corners = natural(accessors[draw.primitive["indices"]]["count"])
         each = max(1, corners // 3 if draw.mode == _TRIANGLES else corners)
         if DRACO in draw.primitive.get("extensions", {}) and "indices" not in draw.primitive:
-            each = max(1, 2 * points)  # it has its own; a surface has no more, by Euler
-        vertices += points * draw.times
-        triangles += each * draw.times
+            each = max(1, 2 * points)  # the stream has the indices; Euler's bound of a surface
+        vertices += points * draw.instances
+        triangles += each * draw.instances
         if triangles > max_triangles:
             raise too_many_triangles(max_triangles, document.path)
         if vertices > most:
             raise LimitError(
                 "PTM-L203",
-                f"more than {most} vertices, counting shared ones once for each primitive",
+                f"more than {most} vertices, shared ones counted for each primitive",
                 file=document.path,
                 remedy="raise the limit (--max-triangles), or split the model",
             )
@@ -321,10 +310,10 @@ def _limited(document: Document, draws: Iterable[_Draw], max_triangles: int) -> 
 
 
 def _compressed(document: Document, draw: _Draw) -> dict[str, Any] | None:
-    """What the primitive says of its compression, unless it has plain data, too."""
-    found: dict[str, Any] | None = draw.primitive.get("extensions", {}).get(DRACO)
+    """The Draco extension of a primitive, unless it also has uncompressed data."""
+    draco: dict[str, Any] | None = draw.primitive.get("extensions", {}).get(DRACO)
     plain = "bufferView" in document.tree["accessors"][draw.attributes["POSITION"]]
-    return None if plain else found
+    return None if plain else draco
 
 
 class _Values:
@@ -334,37 +323,37 @@ class _Values:
         self,
         document: Document,
         draw: _Draw,
-        told: dict[str, Any] | None,
+        draco: dict[str, Any] | None,
         decoded: dict[int, Decoded],
     ) -> None:
         self._document, self._draw = document, draw
-        self._ids = {} if told is None else told["attributes"]
-        self._decoded = None if told is None else decoded[told["bufferView"]]
+        self._ids = {} if draco is None else draco["attributes"]
+        self._decoded = None if draco is None else decoded[draco["bufferView"]]
 
     def attribute(self, name: str, count: int | None = None) -> Floats | None:
-        """(n, items) of an attribute, None if there is none; ValueError unless it has as many
-        elements as it says, and ``count`` where that is given."""
+        """(n, items) of an attribute, None without it; ValueError unless it has the number of
+        elements of its accessor, and ``count`` elements if that is given."""
         if name not in self._draw.attributes:
             return None
         index = self._draw.attributes[name]
         accessor = self._document.tree["accessors"][natural(index)]
-        told = natural(accessor["count"])
-        if count is not None and told != count:
-            raise ValueError(f"{told} elements of {name} for {count} vertices")
+        length = natural(accessor["count"])
+        if count is not None and length != count:
+            raise ValueError(f"{length} elements of {name} for {count} vertices")
         if self._decoded is None or name not in self._ids:
             return self._document.values(index)
         stored = self._decoded.attributes.get(self._ids[name])
-        if stored is None or stored.ndim != 2 or len(stored) != told:
-            raise ValueError(f"Draco has other elements of {name} than the accessor says")
+        if stored is None or stored.ndim != 2 or len(stored) != length:
+            raise ValueError(f"the elements of {name} in Draco differ from the accessor")
         return meaning(stored, bool(accessor.get("normalized")))
 
     @property
     def decoded(self) -> bool:
-        """Whether it was compressed with Draco."""
+        """Whether the primitive was compressed with Draco."""
         return self._decoded is not None
 
     def step(self, name: str) -> float:
-        """The step of the grid that an attribute lies on, as its accessor has it; 0 for floats."""
+        """The step of the grid of an attribute, in the values of its accessor; 0 for floats."""
         if self._decoded is not None and name in self._ids:
             step = self._decoded.step(self._ids[name])
             if step is not None:
@@ -388,26 +377,26 @@ class _Values:
         else:
             return np.arange(count)
         if not len(index) or not 0 <= index.min() <= index.max() < count:
-            raise ValueError("an index points beyond the vertices")
+            raise ValueError("an index exceeds the vertices")
         return index
 
 
-def _mesh(values: _Values, draw: _Draw, paint: MaterialUse, findings: Findings) -> _Mesh:
+def _mesh(values: _Values, draw: _Draw, use: MaterialUse, findings: Findings) -> _Mesh:
     points = values.attribute("POSITION")
     if points is None:
         raise KeyError("POSITION")
-    # Draco has triangles, whatever the primitive was.
+    # Draco always encodes triangles.
     mode = _TRIANGLES if values.decoded else draw.mode
     triangles = _triangles(values.indices(len(points)), mode)
-    uv, raw = np.zeros((len(points), 2)), values.attribute(paint.coords, len(points))
+    uv, raw = np.zeros((len(points), 2)), values.attribute(use.coords, len(points))
     if raw is not None:
-        moved = raw @ paint.matrix[:, :2].T + paint.matrix[:, 2]
+        moved = raw @ use.matrix[:, :2].T + use.matrix[:, 2]
         uv = np.stack([moved[:, 0], 1.0 - moved[:, 1]], axis=1)
     colors, raw = None, values.attribute("COLOR_0", len(points))
     if raw is not None:
-        colors = encoded(raw[:, :3] * paint.light)[triangles]
-    if raw is not None and paint.see_through and not (raw[:, 3:] == 1).all():
-        findings.note("PTM-N215", "opacities of vertices are not carried over", draw.place)
+        colors = encoded(raw[:, :3] * use.light)[triangles]
+        if use.see_through and not (raw[:, 3:] == 1).all():
+            findings.note("PTM-N215", "opacities of vertices dropped", draw.place)
     return _Mesh(points, triangles, uv[triangles], colors)
 
 

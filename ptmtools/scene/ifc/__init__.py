@@ -1,5 +1,5 @@
-"""Reads IFC through IfcOpenShell, in a process of its own.
+"""Reads IFC through IfcOpenShell in a child process.
 
-`read_ifc` in `reader` is the way in; `products` goes through what a file holds, and `classes` says
-what each product is to the building.
+`reader` contains the entry point `read_ifc`; `products` makes triangles of the products of a file,
+and `properties` reads classes, names, units, storeys and materials.
 """

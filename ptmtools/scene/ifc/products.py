@@ -1,22 +1,19 @@
-"""The products of an IFC file as one object each, through IfcOpenShell, in a process of its own.
+"""Makes one object of triangles of each product of an IFC file, through IfcOpenShell.
 
-Each product is made in its own coordinates and placed in float64, so that buildings in the
-coordinates of a land register, thousands of kilometres from their origin, keep their millimetres.
-The kernel (`kernel`) gives metres whatever the file's unit is, and makes shapes in any order:
-they are sorted by the number of their product in the file. A product may come in several
-representations, of which one is drawn.
+The geometry kernel computes each product in its own coordinates, in metres for any unit of the
+file. Placement is in float64, so that buildings in the coordinates of a land register, thousands of
+kilometres from their origin, keep their millimetres. The kernel returns shapes in any order; they
+are sorted by the number of their product. Of several representations of a product one is drawn.
 
-As a program: ``python -P -m ptmtools.scene.ifc.products MEMORY FOLDER MODEL FILE TRIANGLES`` reads
-FILE, the model or what was packed in it, and hands over what `handed.read_in_sandbox` takes.
+Open CASCADE handles all products, but only some 5,000 triangles a second: each becomes a face with
+edges, is sewn to its neighbours, and separated again. So products of triangles only use the kernel
+`passthrough` of IfcOpenShell 0.9: an office of 2,450 products and 1.4 million triangles, most of
+them of chairs, is read in 18 s instead of 319. Products with other polygons do not use it, because
+it cuts concave ones as fans. (Rejected: two threads, which took more time than one.)
 
-The shapes that IfcOpenShell's geometry kernels make of products.
-
-Open CASCADE makes them all, but of what is triangles already some 5,000 a second: each becomes a
-face with edges, is sewn to its neighbours, and taken apart again. So products of nothing but
-triangles go through the kernel `passthrough` where there is one (IfcOpenShell 0.9): an office of
-2,450 products and 1.4 million triangles, most of them of chairs, is read in 18 s instead of 319.
-Other polygons do not: it cuts concave ones as fans. (Tried: two threads, which took more time than
-one.)"""
+``python -P -m ptmtools.scene.ifc.products MEMORY FOLDER MODEL FILE TRIANGLES`` reads FILE, the
+model or its unpacked content, and replies with the message of `messages.pack_source`.
+"""
 
 from __future__ import annotations
 
@@ -34,15 +31,15 @@ from ptmtools.errors import InputError
 from ptmtools.scene.ifc.properties import (
     FAULTS,
     UNSTYLED,
-    called,
     drawn,
     is_part,
     kind_of,
     length_unit,
     material_of,
-    note_lost,
+    note_dropped,
     one_line,
     storeys,
+    title_of,
 )
 from ptmtools.scene.messages import pack_source
 from ptmtools.scene.model import Kind
@@ -53,24 +50,24 @@ from ptmtools.scene.source import Source, SourceMaterial, too_many_triangles
 _PLAIN, _DIRECT = "opencascade", "passthrough"
 _THREADS = 1
 _TRIANGLE = 3
-#: Without subclasses, which have holes.
+#: Excluding subclasses, which have holes.
 _FACE, _BREP = "IfcIndexedPolygonalFace", "IfcFacetedBrep"
-#: Representations repeat others, which repeat others; a damaged file has them in a circle.
+#: Largest depth of mapped representations, which are circular in a damaged file.
 _DEEPEST = 16
 
 
 def elements(file: Any, products: list[Any]) -> Iterator[Any]:
-    """What the kernels make of products: one, none or several of each, in any order."""
+    """The shapes of products from the kernels: none, one or several of each, in any order."""
     from ifcopenshell import geom
 
     direct = []
     if hasattr(geom, "has_geometry_library") and geom.has_geometry_library(_DIRECT):
         direct = [product for product in products if _of_triangles(product)]
-    there = {product.id() for product in direct}
-    rest = [product for product in products if product.id() not in there]
+    numbers = {product.id() for product in direct}
+    rest = [product for product in products if product.id() not in numbers]
     settings = geom.settings()
     settings.set("apply-default-materials", False)
-    # The second is for what the first cannot make after all, such as triangles with openings.
+    # The hybrid falls back to Open CASCADE, for instance for triangles with openings.
     for chosen, kernel in ((direct, f"hybrid-{_DIRECT}-{_PLAIN}"), (rest, _PLAIN)):
         if chosen:
             yield from geom.iterator(
@@ -79,7 +76,7 @@ def elements(file: Any, products: list[Any]) -> Iterator[Any]:
 
 
 def items(representation: Any, deep: int = _DEEPEST) -> Iterator[Any]:
-    """The items of a representation, in place of repeated ones those that they repeat."""
+    """The items of a representation, with mapped ones replaced by their sources."""
     for item in representation.Items or ():
         if item.is_a("IfcMappedItem") and deep:
             yield from items(item.MappingSource.MappedRepresentation, deep - 1)
@@ -88,7 +85,7 @@ def items(representation: Any, deep: int = _DEEPEST) -> Iterator[Any]:
 
 
 def _of_triangles(product: Any) -> bool:
-    """Whether nothing of a product is anything but triangles."""
+    """Whether a product consists of triangles only."""
     try:
         every = product.Representation.Representations or ()
         return all(_is_triangles(item) for one in every for item in items(one))
@@ -107,23 +104,23 @@ def _is_triangles(item: Any) -> bool:
     return False
 
 
-#: Representations that are no bodies: nothing of them is drawn.
+#: Representations that are not drawn.
 _NO_BODY = frozenset(
     ["Annotation", "Axis", "Box", "Clearance", "CoG", "FootPrint", "Plan", "Profile", "Reference"]
 )
-#: Items that have no surface.
+#: Items without a surface.
 _LINES = ("IfcCurve", "IfcPoint", "IfcGeometricCurveSet", "IfcTextLiteral", "IfcAnnotationFillArea")
-#: Of several representations of a product, bodies come first.
+#: The preferred representation of a product.
 _BODY = "Body"
-#: A line of the library's log: how grave it is, a code, when, and what about.
+#: A line of the library's log: severity, code, time, GlobalId and message.
 _LOGGED = re.compile(
-    r"\[(?P<level>\w+)\]\s*(\[[A-Z]+\d+\]\s*)?\[[^]]*\]\s*(\{(?P<guid>[^}]*)\}\s*)?(?P<what>.*)"
+    r"\[(?P<level>\w+)\]\s*(\[[A-Z]+\d+\]\s*)?\[[^]]*\]\s*(\{(?P<guid>[^}]*)\}\s*)?(?P<text>.*)"
 )
 
 
 @dataclass(frozen=True)
 class Shape:
-    """What is drawn of a product."""
+    """The triangles of a product."""
 
     product: Any
     points: Floats  # (V, 3) metres
@@ -133,28 +130,28 @@ class Shape:
 
 
 def read_products(file: Any, findings: Findings, max_triangles: int) -> Source:
-    """What an IfcOpenShell file has to draw.
+    """The source of an IfcOpenShell file.
 
-    Raises InputError PTM-I247 if that is nothing, LimitError PTM-L203.
+    Raises InputError PTM-I247 without geometry, LimitError PTM-L203.
     """
     unit, metres = length_unit(file)
     if metres is None:
-        findings.note("PTM-N201", "the file says no unit of length")
+        findings.note("PTM-N201", "the file defines no unit of length")
     elif metres != 1:
-        findings.note("PTM-N201", f"lengths are in {unit} ({metres:g} m), and read as metres")
-    products = _shown(file, findings)
+        findings.note("PTM-N201", f"lengths in {unit} ({metres:g} m) converted to metres")
+    products = _drawn_products(file, findings)
     shapes = _shapes(file, products, max_triangles, findings.model) if products else []
     _note_products(products, shapes, findings)
-    note_lost(file, findings)
+    note_dropped(file, findings)
     if not shapes:
         raise InputError(
             "PTM-I247",
-            "no faces" if products else "no product that is drawn",
+            "no faces" if products else "no drawable product",
             remedy="export it with the geometry of its building elements",
         )
-    known: dict[SourceMaterial, int] = {}
+    numbers: dict[SourceMaterial, int] = {}
     material = [
-        np.array([known.setdefault(m, len(known)) for m in shape.materials])[shape.material]
+        np.array([numbers.setdefault(m, len(numbers)) for m in shape.materials])[shape.material]
         for shape in shapes
     ]
     points = [shape.points for shape in shapes]
@@ -166,8 +163,8 @@ def read_products(file: Any, findings: Findings, max_triangles: int) -> Source:
         uv=np.zeros((sum(size), 3, 2)),
         triangle_object=np.repeat(np.arange(len(shapes)), size),
         triangle_material=np.concatenate(material),
-        objects=tuple(called(shape.product) for shape in shapes),
-        materials=tuple(known),
+        objects=tuple(title_of(shape.product) for shape in shapes),
+        materials=tuple(numbers),
         metres=None if metres is None else 1.0,
         up="z",
         kinds=tuple(_kind(shape.product) for shape in shapes),
@@ -182,21 +179,21 @@ def _kind(product: Any) -> Kind:
     return kind_of(product.is_a)
 
 
-def _shown(file: Any, findings: Findings) -> list[Any]:
-    """The products to draw, and notes on those that are not."""
-    shown, hidden = [], Counter[str]()
+def _drawn_products(file: Any, findings: Findings) -> list[Any]:
+    """The products to draw; notes the others with geometry."""
+    result, hidden = [], Counter[str]()
     for product in sorted(file.by_type("IfcProduct"), key=lambda product: int(product.id())):
         if product.Representation is None:
             continue
         if not drawn(product.is_a):
             hidden[product.is_a()] += 1
         elif not _has_body(product):
-            findings.note("PTM-N215", f"{product.is_a()}: has no surface, only lines")
+            findings.note("PTM-N215", f"{product.is_a()}: lines without a surface")
         else:
-            shown.append(product)
+            result.append(product)
     for name, count in hidden.items():
         findings.note("PTM-N215", f"{name}: not drawn", "", count)
-    return shown
+    return result
 
 
 def _has_body(product: Any) -> bool:
@@ -205,12 +202,12 @@ def _has_body(product: Any) -> bool:
         bodies = (one for one in every if one.RepresentationIdentifier not in _NO_BODY)
         return any(not any(map(item.is_a, _LINES)) for one in bodies for item in items(one))
     except FAULTS:
-        return True  # and missed if nothing can be made of it
+        return True  # becomes a miss if the kernel fails
 
 
 def _shapes(file: Any, products: list[Any], most: int, model: Path) -> list[Shape]:
-    """One shape of each product that has any, in the order of their numbers."""
-    made: dict[int, tuple[tuple[bool, str], Shape]] = {}
+    """The preferred shape of each product that has any, in the order of their numbers."""
+    best: dict[int, tuple[tuple[bool, str], Shape]] = {}
     count = 0
     for element in elements(file, products):
         shape = _shape(file, element)
@@ -218,26 +215,26 @@ def _shapes(file: Any, products: list[Any], most: int, model: Path) -> list[Shap
         if not size:
             continue
         rank = element.context != _BODY, _padded(element.geometry.id)
-        if element.id in made:
-            other, replaced = made[element.id]
+        if element.id in best:
+            other, replaced = best[element.id]
             if other <= rank:
                 continue
             count -= len(replaced.triangles)
         count += size
         if count > most:
             raise too_many_triangles(most, model)
-        made[element.id] = rank, shape
-    return [shape for _, (_, shape) in sorted(made.items())]
+        best[element.id] = rank, shape
+    return [shape for _, (_, shape) in sorted(best.items())]
 
 
 def _padded(name: str) -> str:
-    """A name that begins with a number, so that the least number comes first."""
+    """A name that begins with a number, padded so that names sort by number."""
     number, *rest = name.split("-")
     return f"{number:>12}-{rest}"
 
 
 def _shape(file: Any, element: Any) -> Shape:
-    """A copy of what the kernel has made: its own is gone with the next shape."""
+    """A copy of a shape of the kernel, which overwrites it with the next one."""
     geometry = element.geometry
     placed = np.array(element.transformation.matrix, dtype=np.float64).reshape(4, 4).T
     local = np.frombuffer(geometry.verts_buffer, dtype=np.float64).reshape(-1, 3)
@@ -253,34 +250,34 @@ def _shape(file: Any, element: Any) -> Shape:
 
 
 def _note_products(products: list[Any], shapes: list[Shape], findings: Findings) -> None:
-    """Misses: what has no shape in spite of its body, and what lacks a part of it."""
-    made = {shape.product.id() for shape in shapes}
-    faults: dict[str, str] = {}
-    for guid, what in _errors():
-        faults.setdefault(guid, what)
+    """Misses products without a shape, or with an incomplete one."""
+    shaped = {shape.product.id() for shape in shapes}
+    errors: dict[str, str] = {}
+    for guid, text in _errors():
+        errors.setdefault(guid, text)
     for product in products:
         guid = one_line(product.GlobalId)
-        why = f" ({faults[guid]})" if guid in faults else ""
-        if product.id() not in made:
-            message = f"{called(product)}: its geometry cannot be made{why}"
+        reason = f" ({errors[guid]})" if guid in errors else ""
+        if product.id() not in shaped:
+            message = f"{title_of(product)}: geometry cannot be computed{reason}"
             findings.miss("PTM-N253", message, f"GlobalId {guid}")
-        elif why:
-            message = f"{called(product)}: a part of its geometry cannot be made{why}"
+        elif reason:
+            message = f"{title_of(product)}: a part of the geometry cannot be computed{reason}"
             findings.miss("PTM-N253", message, f"GlobalId {guid}")
 
 
 def _errors() -> Iterator[tuple[str, str]]:
-    """What the library has said of errors since it was last asked: of which GlobalId, and what."""
+    """GlobalId and text of the errors in the library's log since the last call."""
     import ifcopenshell
 
     for line in ifcopenshell.get_log().splitlines():
         logged = _LOGGED.match(line)
         if logged and logged["level"].lower() == "error":
-            yield logged["guid"] or "", one_line(logged["what"])
+            yield logged["guid"] or "", one_line(logged["text"])
 
 
 def _open(path: str, findings: Findings) -> Any:
-    """Raises InputError PTM-I243 for an unknown schema, PTM-I254 for what is none."""
+    """Raises InputError PTM-I243 for an unknown schema, PTM-I254 for other errors."""
     import ifcopenshell as library
 
     try:
@@ -290,11 +287,11 @@ def _open(path: str, findings: Findings) -> Any:
             "PTM-I243", one_line(error), remedy="export it as IFC2X3, IFC4 or IFC4X3_ADD2"
         ) from None
     except library.Error as error:
-        wrong = [what for _, what in _errors()]
-        raise unreadable("ifcopenshell", findings.model, one_line([*wrong, error][0])) from None
-    if wrong := [what for _, what in _errors()]:
-        message = f"statements of the file are wrong and left out, the first: {wrong[0]}"
-        findings.miss("PTM-N244", message, "", len(wrong))
+        errors = [text for _, text in _errors()]
+        raise unreadable("ifcopenshell", findings.model, one_line([*errors, error][0])) from None
+    if errors := [text for _, text in _errors()]:
+        message = f"invalid statements skipped, the first: {errors[0]}"
+        findings.miss("PTM-N244", message, "", len(errors))
     return file
 
 

@@ -1,16 +1,11 @@
-"""What the classes of IFC say of a product: whether it is drawn, and what it is to the structure.
+"""Reads properties of an IFC file: roles by class, names, the unit, storeys, and materials.
 
-Classes stand for their subclasses, in IFC2X3, IFC4 and IFC4X3; the first row that fits decides.
-Tables are kept short by what shape tells as well: an opaque face of a column, a beam, a plate of a
-curtain wall, a suspended ceiling or the ground divides the building if it is large enough, and need
-not if it is not. As structural, each of the 32 sides of a round column would divide the hall that
-it stands in.
-
-What things are called in an IFC file, and what is raised where it is wrong about them.
-
-The unit of length of an IFC file, and its storeys.
-
-Materials of the surface styles of an IFC file."""
+A class in the tables includes its subclasses, in IFC2X3, IFC4 and IFC4X3; the first matching row
+decides. The tables omit classes whose role follows from the shape: an opaque face of a column, a
+beam, a plate of a curtain wall, a suspended ceiling or the ground divides the building if it is
+large enough, and need not divide it otherwise. As structure, each of the 32 sides of a round column
+would divide the hall around it.
+"""
 
 from __future__ import annotations
 
@@ -24,94 +19,66 @@ from ptmtools.scene.model import Kind, Storey
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.source import SourceMaterial
 
-#: Drawn though its superclass is not: it bears the ground.
+#: Drawn although its superclass is not, because it contains the ground.
 _GROUND = "IfcSite"
-#: Space, what is cut away, drawings and models of something else: not there to be seen.
-_NOT_DRAWN = (
-    "IfcSpatialElement",
-    "IfcSpatialStructureElement",  # IFC2X3
-    "IfcFeatureElementSubtraction",
-    "IfcVirtualElement",
-    "IfcAnnotation",
-    "IfcGrid",
-    "IfcPositioningElement",
-    "IfcLinearElement",
-    "IfcPort",
-    "IfcStructuralActivity",
-    "IfcStructuralItem",
-)
-_KINDS: tuple[tuple[Kind, tuple[str, ...]], ...] = (
-    ("door", ("IfcDoor",)),
-    (
-        "structural",
-        (
-            "IfcWall",
-            "IfcSlab",
-            "IfcRoof",
-            "IfcStair",
-            "IfcStairFlight",
-            "IfcRamp",
-            "IfcRampFlight",
-        ),
-    ),
-    # Takes the kind of what it is a part of: a layer of a wall.
-    ("", ("IfcBuildingElementPart",)),
+#: Invisible products: spaces, openings, drawings and analysis models.
+_NOT_DRAWN = """
+    IfcSpatialElement IfcSpatialStructureElement IfcFeatureElementSubtraction IfcVirtualElement
+    IfcAnnotation IfcGrid IfcPositioningElement IfcLinearElement IfcPort IfcStructuralActivity
+    IfcStructuralItem
+"""
+#: Roles by class. A building element part has the kind of its whole, such as the wall of a layer. A
+#: window is detail because a pane without a style is opaque, but not meant to block sight.
+_KINDS: tuple[tuple[Kind, str], ...] = (
+    ("door", "IfcDoor"),
+    ("structural", "IfcWall IfcSlab IfcRoof IfcStair IfcStairFlight IfcRamp IfcRampFlight"),
+    ("", "IfcBuildingElementPart"),
     (
         "detail",
-        (
-            # Its pane may be opaque for want of a style; nobody means a window to hide the street.
-            "IfcWindow",
-            "IfcRailing",
-            "IfcFurnishingElement",
-            "IfcDistributionElement",
-            "IfcElectricalElement",  # IFC2X3
-            "IfcEquipmentElement",  # IFC2X3
-            "IfcElementComponent",
-            "IfcReinforcingElement",  # in IFC2X3 no component
-            "IfcShadingDevice",
-            "IfcSurfaceFeature",
-        ),
+        """IfcWindow IfcRailing IfcFurnishingElement IfcDistributionElement IfcElectricalElement
+        IfcEquipmentElement IfcElementComponent IfcReinforcingElement IfcShadingDevice
+        IfcSurfaceFeature""",
     ),
 )
-_PART = "IfcBuildingElementPart"
+_PART, _STOREY = "IfcBuildingElementPart", "IfcBuildingStorey"
 
 
 def drawn(is_a: Callable[[str], bool]) -> bool:
-    """Whether products of a class are drawn; ``is_a`` says whether it is one or a subclass."""
-    return is_a(_GROUND) or not any(map(is_a, _NOT_DRAWN))
+    """Whether products of a class are drawn; ``is_a`` tests for a class or its subclasses."""
+    return is_a(_GROUND) or not any(map(is_a, _NOT_DRAWN.split()))
 
 
 def kind_of(is_a: Callable[[str], bool]) -> Kind:
-    """What products of a class are."""
-    return next((kind for kind, classes in _KINDS if any(map(is_a, classes))), "")
+    """The role of products of a class."""
+    return next((kind for kind, classes in _KINDS if any(map(is_a, classes.split()))), "")
 
 
 def is_part(is_a: Callable[[str], bool]) -> bool:
-    """Whether products of a class are what the product is that they are parts of."""
+    """Whether products of a class have the role of their whole."""
     return is_a(_PART)
 
 
-#: What is raised over an attribute that is not of its type: the kernel may do without it.
+#: Exceptions for an attribute of the wrong type, which the kernel may not require.
 FAULTS = (AttributeError, LookupError, RuntimeError, TypeError, ValueError)
 
 
 def one_line(text: object) -> str:
-    """Text of a file as it may stand in a message: on one line, and nothing that UTF-8 lacks."""
+    """Text of a file for a message: on one line, in valid UTF-8."""
     return " ".join(str(text).encode("utf-8", "replace").decode().split())
 
 
 def name_of(thing: Any) -> str:
-    """Its name; "" if it has none."""
+    """The name of an entity, "" without one."""
     return one_line(getattr(thing, "Name", None) or "")
 
 
-def called(product: Any) -> str:
-    """A product's class and name, or, in want of a name, what tells it from all others."""
+def title_of(product: Any) -> str:
+    """A product's class and name, or its class and GlobalId without a name."""
     return f"{product.is_a()} {name_of(product) or one_line(product.GlobalId)}"
 
 
 def length_unit(file: Any) -> tuple[str, float | None]:
-    """The name of the file's unit of length, and its metres; None if it says none."""
+    """The name of the file's unit of length and its length in metres; None without a unit."""
     from ifcopenshell.util import unit
 
     for context in file.by_type("IfcUnitAssignment"):
@@ -124,27 +91,24 @@ def length_unit(file: Any) -> tuple[str, float | None]:
 
 
 def storeys(file: Any, metres: float) -> tuple[Storey, ...]:
-    """The storeys that have a name and a height, at their heights in metres along z."""
-    found = [(one, name) for one in file.by_type("IfcBuildingStorey") if (name := _name(one))]
-    placed = [_placed(one) for one, _ in found]
-    stated = [_stated(one) for one, _ in found]
-    # What stands in a storey stands on its placement, whatever the elevation says of it, which is
-    # often that above sea level. But some exporters place everything at 0, storeys included.
+    """The storeys with a name and a height, in metres along z."""
+    every = ((s, name_of(s) or one_line(s.LongName or "")) for s in file.by_type(_STOREY))
+    named = [(storey, name) for storey, name in every if name]
+    placed = [_placement(storey) for storey, _ in named]
+    stated = [_elevation(storey) for storey, _ in named]
+    # Products are placed relative to the placement of their storey; the elevation is often that
+    # above sea level. But some exporters place everything at 0, storeys included.
     if len(set(placed)) == 1 < len(set(stated)):
-        placed = [None] * len(found)
+        placed = [None] * len(named)
     return tuple(
         Storey(name, height * metres)
-        for (_, name), at, said in zip(found, placed, stated, strict=True)
-        if (height := said if at is None else at) is not None and math.isfinite(height)
+        for (_, name), at, elevation in zip(named, placed, stated, strict=True)
+        if (height := elevation if at is None else at) is not None and math.isfinite(height)
     )
 
 
-def _name(storey: Any) -> str:
-    return name_of(storey) or one_line(storey.LongName or "")
-
-
-def _placed(product: Any) -> float | None:
-    """How high a product is placed, in the file's unit; None if nothing says it."""
+def _placement(product: Any) -> float | None:
+    """The height of a product's placement, in the file's unit; None without one."""
     from ifcopenshell.util import placement
 
     if product.ObjectPlacement is None:
@@ -155,17 +119,17 @@ def _placed(product: Any) -> float | None:
         return None
 
 
-def _stated(storey: Any) -> float | None:
-    """A storey's elevation, which is above the zero of its building."""
+def _elevation(storey: Any) -> float | None:
+    """A storey's elevation, which is relative to its building, in the file's unit."""
     if storey.Elevation is None:
         return None
-    building = next((one for one in _above(storey) if one.is_a("IfcBuilding")), None)
-    ground = 0.0 if building is None else _placed(building) or 0.0
+    building = next((whole for whole in _wholes(storey) if whole.is_a("IfcBuilding")), None)
+    ground = 0.0 if building is None else _placement(building) or 0.0
     return ground + float(storey.Elevation)
 
 
-def _above(product: Any) -> Iterator[Any]:
-    """What it is a part of, and what that is a part of."""
+def _wholes(product: Any) -> Iterator[Any]:
+    """The product that this one is a part of, and so on."""
     seen = set()
     while product.id() not in seen:
         seen.add(product.id())
@@ -175,17 +139,17 @@ def _above(product: Any) -> Iterator[Any]:
             break
 
 
-#: Of surfaces without a style.
+#: The material of surfaces without a style.
 UNSTYLED = SourceMaterial("default")
-_LOST = (
-    ("IfcSurfaceTexture", "textures are not carried over"),
-    ("IfcIndexedColourMap", "colours of single faces are not carried over"),  # not in IFC2X3
+_DROPPED = (
+    ("IfcSurfaceTexture", "textures dropped"),
+    ("IfcIndexedColourMap", "colours of single faces dropped"),  # not in IFC2X3
 )
 
 
 def material_of(file: Any, style: Any) -> SourceMaterial:
-    """The material of a style as the geometry kernel has it. Styles of one name and look are one:
-    programs write the same thousands of times."""
+    """The material of a style of the geometry kernel. Materials of equal name and appearance are
+    equal, because programs write the same style thousands of times."""
     tint = [style.diffuse.r(), style.diffuse.g(), style.diffuse.b()]
     color = None
     if np.isfinite(tint).all():
@@ -194,22 +158,22 @@ def material_of(file: Any, style: Any) -> SourceMaterial:
     opacity = 1.0
     if style.has_transparency() and np.isfinite(style.transparency):
         opacity = 1.0 - float(np.clip(style.transparency, 0, 1))
-    number = style.instance_id()  # of the style, or of the material that has it
+    number = style.instance_id()  # of the style, or of its material
     name = name_of(file.by_id(number)) if number else ""
     return SourceMaterial(name or _shade(color), color, opacity)
 
 
-def note_lost(file: Any, findings: Findings) -> None:
-    """Notes on what surfaces have and is not shown."""
-    for name, what in _LOST:
+def note_dropped(file: Any, findings: Findings) -> None:
+    """Notes the unsupported properties of surfaces."""
+    for name, message in _DROPPED:
         try:
             count = len(file.by_type(name))
-        except RuntimeError:  # no class of this schema
+        except RuntimeError:  # not a class of this schema
             continue
         if count:
-            findings.note("PTM-N215", what, "", count)
+            findings.note("PTM-N215", message, "", count)
 
 
 def _shade(color: tuple[float, float, float] | None) -> str:
-    """The name of a style without one."""
+    """The name of an unnamed style."""
     return "#" + "".join(f"{round(255 * part):02x}" for part in color) if color else UNSTYLED.name

@@ -1,8 +1,7 @@
-"""Reads IFC, the exchange format of building information models (ISO 16739), as STEP files.
+"""Checks and unpacks IFC files (ISO 16739, as STEP), and reads them through `products`.
 
-What can be told without a library is told here: whether it is a STEP file, and all of it. The
-rest is read through IfcOpenShell (LGPL-3, extra `ifc`) in a process of its own, see
-`products`.
+IfcOpenShell (LGPL-3, extra `ifc`) reads the content in a child process. This module needs no
+library: it tests whether the file is a complete STEP file, and unpacks archives.
 """
 
 from __future__ import annotations
@@ -22,12 +21,12 @@ from ptmtools.scene.messages import read_in_sandbox
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.source import MAX_VERTICES, Source
 
-#: ISO 10303-21: how such a file begins, and how it ends.
-_BEGINS = re.compile(rb"(\xef\xbb\xbf)?\s*ISO-10303-21\s*;")
-_ENDS = re.compile(rb"END-ISO-10303-21\s*;")
-#: Bytes in which its beginning and its end are looked for.
+#: The start and the end of a file of ISO 10303-21.
+_START = re.compile(rb"(\xef\xbb\xbf)?\s*ISO-10303-21\s*;")
+_END = re.compile(rb"END-ISO-10303-21\s*;")
+#: Number of bytes that contain the start or the end.
 _MARGIN = 1 << 12
-#: GiB that a file unpacked from an archive may have.
+#: Size limit of an unpacked file, GiB.
 _LARGEST = 1
 _CHUNK = 1 << 20
 _DAMAGED = (
@@ -35,21 +34,21 @@ _DAMAGED = (
     zlib.error,
     lzma.LZMAError,
     EOFError,
-    NotImplementedError,  # packed in a way of its own
+    NotImplementedError,  # unsupported compression
     RuntimeError,  # with a password
 )
 
 
 def read_ifc(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) -> Source:
-    """Read an IFC file, or the one in a `.ifczip`.
+    """Reads an IFC file, or the one in a `.ifczip`.
 
-    Points are in metres, Z up, in the file's own coordinate system; openings are cut out.
+    Points are in metres, Z up, in the coordinate system of the file; openings are cut out.
 
     Raises
     ------
-    InputError: PTM-I266 no STEP file, not all of one, or an archive without one,
-        PTM-I243 of a schema that is not known, PTM-I247 nothing to draw, and PTM-I254 for what
-        IfcOpenShell cannot read.
+    InputError: PTM-I266 not a STEP file, a truncated one, or an archive without exactly one,
+        PTM-I243 an unknown schema, PTM-I247 nothing to draw, and PTM-I254 if IfcOpenShell cannot
+        read the file.
     LimitError: PTM-L203 more than ``max_triangles``, PTM-L204 an archive that unpacks to more than
         1 GiB.
     MissingComponentError: PTM-M100 IfcOpenShell is not installed.
@@ -62,7 +61,7 @@ def read_ifc(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) 
         if not find_spec("ifcopenshell"):
             raise MissingComponentError(
                 "PTM-M100",
-                "IFC is read through ifcopenshell",
+                "IFC requires ifcopenshell",
                 file=path,
                 remedy="pip install 'ptmtools[ifc]'",
             )
@@ -77,31 +76,31 @@ def read_ifc(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) 
 def _check(file: Path) -> None:
     """Raises InputError unless a file begins and ends as STEP files do."""
     with open_regular(file) as stream:
-        if not _BEGINS.match(stream.read(_MARGIN)):
+        if not _START.match(stream.read(_MARGIN)):
             raise InputError(
                 "PTM-I266",
-                "is not an IFC file (a STEP file begins with ISO-10303-21)",
+                "not an IFC file (a STEP file starts with ISO-10303-21)",
                 remedy="export it again, as IFC-SPF",
             )
         end = stream.seek(0, 2)
         stream.seek(max(0, end - _MARGIN))
-        if not _ENDS.search(stream.read()):
+        if not _END.search(stream.read()):
             raise InputError(
                 "PTM-I266",
-                "is not whole (a STEP file ends with END-ISO-10303-21)",
+                "truncated (a STEP file ends with END-ISO-10303-21)",
                 remedy="copy or export it again",
             )
 
 
 def _unpacked(path: Path, folder: Path) -> Path:
-    """The file in an archive, unpacked into a folder."""
+    """Unpacks the file of an archive into a folder."""
     try:
         with open_regular(path) as stream, zipfile.ZipFile(stream) as archive:
             names = [n for n in archive.namelist() if PurePosixPath(n).suffix.lower() == ".ifc"]
             if len(names) != 1:
                 raise InputError(
                     "PTM-I266",
-                    f"holds {len(names) or 'no'} IFC files instead of one",
+                    f"contains {len(names) or 'no'} IFC files instead of one",
                     remedy="unpack it, and give the .ifc file",
                 )
             file = folder / "model.ifc"
@@ -110,7 +109,7 @@ def _unpacked(path: Path, folder: Path) -> Path:
             return file
     except _DAMAGED as error:
         raise InputError(
-            "PTM-I266", f"is no archive that can be unpacked ({error})", remedy="pack it again"
+            "PTM-I266", f"the archive cannot be unpacked ({error})", remedy="pack it again"
         ) from None
 
 

@@ -1,5 +1,5 @@
-"""Reads USD through usd-core, in a process of its own.
+"""Reads USD through usd-core in a child process.
 
-`read_usd` in `reader` is the way in; `layers` opens a stage, `drawn` finds what of it is drawn, and
-`source` makes triangles of that.
+`reader` contains the entry point `read_usd`; `layers` opens a stage, `source` traverses it, `mesh`
+cuts meshes into triangles, and `material` reads materials and colours.
 """

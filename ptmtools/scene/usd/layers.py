@@ -1,9 +1,9 @@
-"""Opens a USD stage from the files of a model's folder, and from nothing else.
+"""Opens a USD stage from files in the model's folder only.
 
-The library opens every layer that another one names, wherever it lies. So the layers are gone
-through first, each with the names that it refers to: one that lies outside of the folder ends the
-reading before it is opened. Names that are expressions, and clips, are known only to the composed
-stage, and are looked at there. Layers are files: of the library's resolvers none reads a network.
+The library opens every layer that another one refers to, in any folder. So this module first
+resolves the references of all layers, and raises an error before a layer outside the folder is
+opened. References that are expressions, and clips, are known only to the composed stage and are
+checked there. No resolver of the library reads a network.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from ptmtools.errors import InputError
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.sandbox import unreadable
 
-#: What the library is called in messages.
+#: Name of the library in messages.
 LIBRARY = "usd-core"
-#: What the library calls its own functions by.
-_INNER = re.compile(r"pxrInternal\w*::")
-#: So much of a message of the library is passed on, in characters.
+#: Namespace of the library's functions.
+_NAMESPACE = re.compile(r"pxrInternal\w*::")
+#: Largest length of a message of the library, in characters.
 _LONGEST = 300
-#: An attribute that changes has its first value, one that does not change its only one.
+#: The first value of an attribute that changes, the only one of others.
 TIME = Usd.TimeCode.EarliestTime()
 
 
 def open_stage(path: Path, findings: Findings) -> tuple[Any, list[str]]:
-    """The composed stage of a model; and what it was read from beside the model, and what was not
-    found, relative to its folder.
+    """The composed stage of a model; and its other files, missing ones included, relative to the
+    model's folder.
 
     Raises InputError PTM-I254 for a layer that the library cannot read, and PTM-I205 for one
-    outside of the model's folder. Layers that are not there are missed (PTM-N203), as are other
-    faults of the composition (PTM-N214).
+    outside the model's folder. Missing layers are misses (PTM-N203), as are other errors of the
+    composition (PTM-N214).
     """
     layer = _layer(os.fspath(path), path)
     context = Ar.GetResolver().CreateDefaultContextForAsset(os.fspath(path))
@@ -48,15 +48,15 @@ def open_stage(path: Path, findings: Findings) -> tuple[Any, list[str]]:
         except Tf.ErrorException as error:
             raise unreadable(LIBRARY, path, reason(error)) from None
     files.update(_note_faults(stage, absent, findings))
-    del layers  # held so long, so that the stage did not read them again
+    del layers  # kept until here so that the stage does not read them again
     return stage, list(files | used_files(stage, path, findings))
 
 
 def used_files(stage: Any, path: Path, findings: Findings) -> dict[str, None]:
-    """What a stage was read from beside the model, relative to its folder.
+    """The other files that a stage was read from, relative to the model's folder.
 
-    Clips are opened as their values are asked for: what is used is known for sure in the end only.
-    Raises InputError PTM-I205 for what lies outside of that folder.
+    Clips are opened when their values are read, so the result is complete only after reading.
+    Raises InputError PTM-I205 for a file outside the folder.
     """
     files: dict[str, None] = {}
     for used in stage.GetUsedLayers(includeClipLayers=True):
@@ -67,7 +67,7 @@ def used_files(stage: Any, path: Path, findings: Findings) -> dict[str, None]:
 
 
 def metres_of(stage: Any) -> float | None:
-    """Metres in one unit, if the stage says it."""
+    """Metres in one unit, if the stage defines it."""
     if not UsdGeom.StageHasAuthoredMetersPerUnit(stage):
         return None
     metres = float(UsdGeom.GetStageMetersPerUnit(stage))
@@ -75,7 +75,7 @@ def metres_of(stage: Any) -> float | None:
 
 
 def up_of(stage: Any) -> Literal["y", "z"] | None:
-    """The up axis, if the stage says it."""
+    """The up axis, if the stage defines it."""
     if not stage.HasAuthoredMetadata(UsdGeom.Tokens.upAxis):
         return None
     up: Literal["y", "z"] = "z" if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else "y"
@@ -83,17 +83,17 @@ def up_of(stage: Any) -> Literal["y", "z"] | None:
 
 
 def file_of(resolved: str) -> Path:
-    """The file on the disk of a resolved path, which may lead into a package."""
+    """The file of a resolved path, which may point into a package."""
     if Ar.IsPackageRelativePath(resolved):
         return Path(Ar.SplitPackageRelativePathOuter(resolved)[0])
     return Path(resolved)
 
 
 def reason(error: Any) -> str:
-    """What an error of the library says, in a line without the places of its own source."""
+    """The message of an error of the library, in one line without locations in its source."""
     for fault in error.args:
         if lines := str(getattr(fault, "commentary", fault)).strip().splitlines():
-            return _INNER.sub("", lines[0])[:_LONGEST]
+            return _NAMESPACE.sub("", lines[0])[:_LONGEST]
     return type(error).__name__
 
 
@@ -105,25 +105,25 @@ def _layer(identifier: str, file: Path) -> Any:
             LIBRARY, file, reason(error).replace(f"{file.parent}{os.sep}", "")
         ) from None
     if layer is None:
-        raise unreadable(LIBRARY, file, "it is no layer")
+        raise unreadable(LIBRARY, file, "not a layer")
     return layer
 
 
 def _gathered(
     root: Any, files: dict[str, None], absent: dict[str, tuple[str, str]], findings: Findings
 ) -> list[Any]:
-    """All layers that the root leads to, of all variants. ``absent`` becomes what is missing, by
-    what the library calls it: its name, and where that stands."""
+    """All layers that are reachable from the root, in all variants. Adds the missing ones to
+    ``absent``, by identifier: name, and place of the reference."""
     resolver = Ar.GetResolver()
-    layers, known = [root], {root.identifier}
+    layers, visited = [root], {root.identifier}
     for layer in layers:
         for name in sorted(layer.GetCompositionAssetDependencies()):
             if not name or name.startswith("`"):
                 continue
             identifier = Sdf.ComputeAssetPathRelativeToLayer(layer, name)
-            if identifier in known:
+            if identifier in visited:
                 continue
-            known.add(identifier)
+            visited.add(identifier)
             resolved = resolver.Resolve(identifier).GetPathString()
             if not resolved:
                 place = findings.folder.label(file_of(layer.realPath))
@@ -136,7 +136,7 @@ def _gathered(
 
 
 def _inside(file: Path, findings: Findings, name: str = "") -> str:
-    """The file relative to the model's folder. Raises InputError PTM-I205 if it may not be read."""
+    """The file relative to the model's folder. Raises InputError PTM-I205 if it is not allowed."""
     folder = findings.folder
     if not folder.allow_outside and not file.resolve().is_relative_to(folder.root.resolve()):
         raise InputError(
@@ -151,15 +151,15 @@ def _inside(file: Path, findings: Findings, name: str = "") -> str:
 def _note_faults(
     stage: Any, absent: dict[str, tuple[str, str]], findings: Findings
 ) -> dict[str, None]:
-    """Misses what the composed stage lacks; the names of files among it."""
-    missed: dict[str, None] = {}
+    """Records the composition errors of a stage as misses; returns the names of missing files."""
+    missing: dict[str, None] = {}
     for text in sorted(" ".join(str(error).split()) for error in stage.GetCompositionErrors()):
-        known = next((names for each, names in absent.items() if f"@{each}@" in text), None)
-        if known is not None:
-            name, place = known
+        reference = next((entry for key, entry in absent.items() if f"@{key}@" in text), None)
+        if reference is not None:
+            name, place = reference
             findings.miss("PTM-N203", f"{name}: not found", place)
-            missed[name] = None
+            missing[name] = None
         else:
             text = text.replace(f"{findings.folder.root}{os.sep}", "")
             findings.miss("PTM-N214", text[:_LONGEST])
-    return missed
+    return missing

@@ -1,12 +1,11 @@
-"""Materials of USD: what UsdPreviewSurface says of the colour and opacity of a surface.
+"""Reads materials of USD (UsdPreviewSurface), and assigns materials, coordinates and colours to
+meshes.
 
-Colours of USD are linear light and are converted to sRGB, as in glTF. Of networks
-of shaders in other languages (MaterialX, MDL, OSL) nothing is read.
-
-What the meshes of a USD stage are painted with: materials, texture coordinates and colours.
-
-A mesh, and each subset of its faces, has a material by its own binding, that of a prim above it, or
-that of a collection. Where none is read its displayed colour counts, as other programs show it."""
+Colours of USD are linear light and are converted to sRGB, as in glTF. Networks of shaders in other
+languages (MaterialX, MDL, OSL) are not supported. The material of a mesh, or of a subset of its
+faces, follows from its own binding, that of a parent, or that of a collection. Without a supported
+material the displayed colour is used, as in other programs.
+"""
 
 from __future__ import annotations
 
@@ -28,13 +27,13 @@ from ptmtools.scene.source import SourceMaterial, SourceWrap
 from ptmtools.scene.usd.layers import TIME
 from ptmtools.scene.usd.mesh import Shape, array, at_corners
 
-#: What UsdPreviewSurface has where nothing is said (its specification, "Core Nodes").
+#: Defaults of UsdPreviewSurface (its specification, "Core Nodes").
 _DIFFUSE = (0.18, 0.18, 0.18)
-_ONES, _ZEROS = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.0)
-#: Where the library has its reader of packages, and where it had it in older releases.
+_ONES, _ZEROS, _WHITE = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+#: The reader of packages, which older releases have in another module.
 _ARCHIVES = Sdf.ZipFile if hasattr(Sdf, "ZipFile") else Usd.ZipFile
 _WRAPS: dict[str, SourceWrap] = {"repeat": "repeat", "clamp": "clamp", "mirror": "mirror"}
-#: A network deeper than this goes round in a circle.
+#: Largest depth of a network, which is circular in a damaged file.
 _DEEPEST = 32
 
 Color = tuple[float, float, float]
@@ -42,16 +41,16 @@ Color = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Surface:
-    """What a material says.
+    """The supported properties of a material.
 
     Attributes
     ----------
-    color: sRGB; of an image white, and None where the material says nothing that is read.
+    color: sRGB; white with an image, None without a supported colour.
     opacity, see_through, ignores_alpha, cutoff: see `ptmtools.scene.source.SourceMaterial`.
-    image: as the stage names it.
-    coords: the primvar with the image's coordinates, "" if there is none.
-    matrix: (2, 3) by which they are transformed.
-    painted: the primvar with the colours, "" if there is none.
+    image: the image of its colour.
+    coords: the primvar with the image's coordinates, "" without one.
+    matrix: (2, 3) transformation of the coordinates.
+    colors: the primvar with the colours, "" without one.
     """
 
     name: str
@@ -63,7 +62,7 @@ class Surface:
     image: NamedImage | None = None
     coords: str = ""
     matrix: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    painted: str = ""
+    colors: str = ""
 
 
 def tint(linear: Any) -> Color:
@@ -73,166 +72,158 @@ def tint(linear: Any) -> Color:
 
 
 class MaterialReader:
-    """Reads each material once. ``model`` is the file, whose folder names are relative to."""
+    """Reads each material of the file ``model`` once."""
 
     def __init__(self, findings: Findings, model: Path) -> None:
         self._findings = findings
         self._model = model
-        self._known: dict[Any, Surface] = {}
+        self._surfaces: dict[str, Surface] = {}
 
     def read(self, material: Any) -> Surface:
-        """What a `UsdShade.Material` says."""
-        prim = material.GetPrim()
-        path = (prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim).GetPath()
-        if path not in self._known:
-            self._known[path] = self._read(material)
-        return self._known[path]
+        """The surface of a `UsdShade.Material`."""
+        key = key_of(material.GetPrim())
+        if key not in self._surfaces:
+            self._surfaces[key] = self._read(material)
+        return self._surfaces[key]
 
     def _read(self, material: Any) -> Surface:
         name, place = material.GetPrim().GetName(), str(material.GetPath())
         shader, *_ = material.ComputeSurfaceSource()
         if not shader or shader.GetIdAttr().Get(TIME) != "UsdPreviewSurface":
-            self._findings.miss("PTM-N214", f"{name}: has no UsdPreviewSurface, not read", place)
+            self._findings.miss("PTM-N214", f"{name}: no UsdPreviewSurface, ignored", place)
             return Surface(name)
         opacity, see_through, from_image = self._opacity(shader, name, place)
-        value, source, output = _followed(shader.GetInput("diffuseColor"))
+        value, source, output = _resolved(shader.GetInput("diffuseColor"))
         if source is None:
             color = tint(_numbers(value, _DIFFUSE))
             self._findings.note("PTM-N215", f"{name}: colour factor converted to sRGB", place)
             return Surface(name, color, opacity, see_through or from_image is not None)
         kind = str(source.GetIdAttr().Get(TIME))
         if kind.startswith("UsdPrimvarReader_float"):
-            painted = str(_followed(source.GetInput("varname"))[0] or "")
+            colors = str(_resolved(source.GetInput("varname"))[0] or "")
             see_through |= from_image is not None
-            return Surface(name, (1.0, 1.0, 1.0), opacity, see_through, painted=painted)
+            return Surface(name, _WHITE, opacity, see_through, colors=colors)
         if kind != "UsdUVTexture":
-            self._findings.miss("PTM-N214", f"{name}: colours of {kind} are not read", place)
+            self._findings.miss("PTM-N214", f"{name}: colours of {kind} ignored", place)
             return Surface(name, None, opacity, see_through or from_image is not None)
-        file = _followed(source.GetInput("file"))[0]
+        file = _resolved(source.GetInput("file"))[0]
         if from_image is not None and from_image != (_path_of(file), "a"):
-            what = f"{name}: its opacity is an image of its own"
-            self._findings.note(
-                "PTM-N215", f"{what}, which makes it transparent and is not written", place
-            )
+            message = f"{name}: image of opacities ignored, the material is transparent"
+            self._findings.note("PTM-N215", message, place)
             see_through = True
         if output not in ("rgb", "rgba"):
-            self._findings.note("PTM-N215", f"{name}: ignored that its colour is {output}", place)
+            self._findings.note("PTM-N215", f"{name}: colour output {output} ignored", place)
         image = self._image(source, file, name, place)
         if image is None:
             return Surface(name, None, opacity, see_through)
         coords, matrix = self._coords(source, name, place)
-        turned = tuple((float(a), float(b), float(c)) for a, b, c in matrix.tolist())
-        white = (1.0, 1.0, 1.0)
         own_alpha = from_image == (_path_of(file), "a")
         cutoff = _threshold(shader) if own_alpha else 0.0
         return Surface(
             name,
-            white,
+            _WHITE,
             opacity,
             see_through,
             ignores_alpha=not own_alpha,
             cutoff=cutoff or None,
             image=image,
             coords=coords,
-            matrix=turned,
+            matrix=tuple((float(a), float(b), float(c)) for a, b, c in matrix.tolist()),
         )
 
     def _opacity(self, shader: Any, name: str, place: str) -> tuple[float, bool, Any]:
-        """The opacity; whether it is not the same everywhere, other than by an image; and of an
-        image the path and the output."""
+        """The opacity; whether it varies or is tested, other than by the colour's image; and the
+        path and output of an image of opacities."""
         threshold = _threshold(shader)
-        value, source, output = _followed(shader.GetInput("opacity"))
+        value, source, output = _resolved(shader.GetInput("opacity"))
         if source is None:
             opacity = min(max(_number(value, 1.0), 0.0), 1.0)
-            if threshold > 0:  # a mask: there, or not
+            if threshold > 0:  # alpha testing
                 opacity = float(opacity >= threshold)
             return opacity, False, None
         if source.GetIdAttr().Get(TIME) == "UsdUVTexture":
-            return 1.0, threshold > 0, (_path_of(_followed(source.GetInput("file"))[0]), output)
-        self._findings.note("PTM-N215", f"{name}: ignored its opacity, it never occludes", place)
+            return 1.0, threshold > 0, (_path_of(_resolved(source.GetInput("file"))[0]), output)
+        message = f"{name}: opacity ignored, the material is transparent"
+        self._findings.note("PTM-N215", message, place)
         return 1.0, True, None
 
     def _image(self, texture: Any, file: Any, name: str, place: str) -> NamedImage | None:
         path = _path_of(file)
         if not path:
-            self._findings.miss("PTM-N204", f"{name}: its texture names no image", place)
+            self._findings.miss("PTM-N204", f"{name}: texture without an image", place)
             return None
         if "<UDIM>" in path:
-            self._findings.miss("PTM-N214", f"{path}: tiles of UDIM are not carried over", place)
+            self._findings.miss("PTM-N214", f"{path}: UDIM tiles ignored", place)
             return None
-        scale = _numbers(_followed(texture.GetInput("scale"))[0], _ONES)
-        bias = _numbers(_followed(texture.GetInput("bias"))[0], _ZEROS)
+        scale = _numbers(_resolved(texture.GetInput("scale"))[0], _ONES)
+        bias = _numbers(_resolved(texture.GetInput("bias"))[0], _ZEROS)
         if scale != _ONES or bias != _ZEROS:
-            self._findings.note("PTM-N215", f"{path}: ignored scale and bias", place)
+            self._findings.note("PTM-N215", f"{path}: scale and bias ignored", place)
         wrap_s, wrap_t = (self._wrap(texture, key, path, place) for key in ("wrapS", "wrapT"))
         return self._named(file, place, wrap_s, wrap_t)
 
     def _named(
         self, file: Any, place: str, wrap_s: SourceWrap, wrap_t: SourceWrap
     ) -> NamedImage | None:
-        """An image by its name relative to the model's folder, or in a package."""
-        found = file.resolvedPath
-        if not found:
+        """An image of a separate file, relative to the model's folder, or of a package."""
+        resolved = file.resolvedPath
+        if not resolved:
             return NamedImage(file.path, place, wrap_s, wrap_t)
         folder = self._findings.folder.root
-        if not Ar.IsPackageRelativePath(found):
-            name = Path(os.path.relpath(found, folder)).as_posix()
+        if not Ar.IsPackageRelativePath(resolved):
+            name = Path(os.path.relpath(resolved, folder)).as_posix()
             return NamedImage(name, place, wrap_s, wrap_t)
-        package, inner = Ar.SplitPackageRelativePathOuter(found)
+        package, inner = Ar.SplitPackageRelativePathOuter(resolved)
         offset, length = 0, None
-        whole, rest = package, inner
+        container, rest = package, inner
         while rest:
-            entry, deeper = rest, ""
+            entry, nested = rest, ""
             if Ar.IsPackageRelativePath(rest):
-                entry, deeper = Ar.SplitPackageRelativePathOuter(rest)
-            archive = _ARCHIVES.Open(whole)
+                entry, nested = Ar.SplitPackageRelativePathOuter(rest)
+            archive = _ARCHIVES.Open(container)
             info = archive.GetFileInfo(entry) if archive else None
             if info is None or info.compressionMethod or info.encrypted:
-                self._findings.miss(
-                    "PTM-N206", f"{inner}: compressed, or not in its package", place
-                )
+                message = f"{inner}: compressed, or missing in its package"
+                self._findings.miss("PTM-N206", message, place)
                 return None
             offset, length = offset + info.dataOffset, info.size
-            whole, rest = Ar.JoinPackageRelativePath([whole, entry]), deeper
-        beside = "" if Path(package) == self._model else os.path.relpath(package, folder)
-        return NamedImage(
-            inner, place, wrap_s, wrap_t, offset, length, Path(beside).as_posix() if beside else ""
-        )
+            container, rest = Ar.JoinPackageRelativePath([container, entry]), nested
+        other = "" if Path(package) == self._model else os.path.relpath(package, folder)
+        other = Path(other).as_posix() if other else ""
+        return NamedImage(inner, place, wrap_s, wrap_t, offset, length, other)
 
     def _wrap(self, texture: Any, key: str, path: str, place: str) -> SourceWrap:
-        mode = str(_followed(texture.GetInput(key))[0] or "useMetadata")
-        if mode not in _WRAPS:  # without metadata it is black, too
-            self._findings.note("PTM-N215", f"{path}: black beyond its edge becomes clamp", place)
+        mode = str(_resolved(texture.GetInput(key))[0] or "useMetadata")
+        if mode not in _WRAPS:  # useMetadata without metadata is black, too
+            self._findings.note("PTM-N215", f"{path}: wrap mode black becomes clamp", place)
         return _WRAPS.get(mode, "clamp")
 
     def _coords(self, texture: Any, name: str, place: str) -> tuple[str, Floats]:
-        """The primvar that a texture's coordinates come from, and how they are transformed."""
-        matrix, moved = np.eye(3), False
-        source = _followed(texture.GetInput("st"))[1]
+        """The primvar with a texture's coordinates, and their (2, 3) transformation."""
+        matrix, transformed = np.eye(3), False
+        source = _resolved(texture.GetInput("st"))[1]
         for _ in range(_DEEPEST):
             if source is None or source.GetIdAttr().Get(TIME) != "UsdTransform2d":
                 break
-            matrix, moved = matrix @ _transform(source), True
-            source = _followed(source.GetInput("in"))[1]
-        if moved:
-            self._findings.note(
-                "PTM-N215", f"{name}: UsdTransform2d is baked into its faces", place
-            )
+            matrix, transformed = matrix @ _transform(source), True
+            source = _resolved(source.GetInput("in"))[1]
+        if transformed:
+            self._findings.note("PTM-N215", f"{name}: UsdTransform2d baked into its faces", place)
         if source is None or source.GetIdAttr().Get(TIME) != "UsdPrimvarReader_float2":
             return "", matrix[:2]
-        return str(_followed(source.GetInput("varname"))[0] or ""), matrix[:2]
+        return str(_resolved(source.GetInput("varname"))[0] or ""), matrix[:2]
 
 
 def _threshold(shader: Any) -> float:
-    """Texels of less opacity are not drawn; 0 where they are blended."""
-    return _number(_followed(shader.GetInput("opacityThreshold"))[0], 0.0)
+    """The opacity below which texels are not drawn; 0 if they are blended."""
+    return _number(_resolved(shader.GetInput("opacityThreshold"))[0], 0.0)
 
 
-def _followed(given: Any) -> tuple[Any, Any, str]:
-    """What an input of a shader comes to: a value, or a shader and its output."""
-    if not given:
+def _resolved(source: Any) -> tuple[Any, Any, str]:
+    """The value of an input of a shader, or the shader and output that it is connected to."""
+    if not source:
         return None, None, ""
-    for attribute in given.GetValueProducingAttributes():
+    for attribute in source.GetValueProducingAttributes():
         if UsdShade.Output.IsOutput(attribute):
             shader = UsdShade.Shader(attribute.GetPrim())
             return None, shader, str(UsdShade.Output(attribute).GetBaseName())
@@ -240,21 +231,21 @@ def _followed(given: Any) -> tuple[Any, Any, str]:
     return None, None, ""
 
 
-def _number(value: Any, otherwise: float) -> float:
+def _number(value: Any, default: float) -> float:
     try:
         number = float(value)
     except (TypeError, ValueError):
-        return otherwise
-    return number if math.isfinite(number) else otherwise
+        return default
+    return number if math.isfinite(number) else default
 
 
-def _numbers(value: Any, otherwise: tuple[float, ...]) -> tuple[float, ...]:
-    """As many numbers as there are otherwise; what is of another type says nothing."""
+def _numbers(value: Any, default: tuple[float, ...]) -> tuple[float, ...]:
+    """The numbers of a value, or the default if these differ in type or count."""
     try:
-        numbers = tuple(float(each) for each in value)
+        numbers = tuple(map(float, value))
     except (TypeError, ValueError):
-        return otherwise
-    return numbers if len(numbers) == len(otherwise) else otherwise
+        return default
+    return numbers if len(numbers) == len(default) else default
 
 
 def _path_of(file: Any) -> str:
@@ -263,22 +254,22 @@ def _path_of(file: Any) -> str:
 
 def _transform(shader: Any) -> Floats:
     """(3, 3) of UsdTransform2d: scale, then rotation, counter-clockwise, then translation."""
-    angle = math.radians(_number(_followed(shader.GetInput("rotation"))[0], 0.0))
+    angle = math.radians(_number(_resolved(shader.GetInput("rotation"))[0], 0.0))
     c, s = math.cos(angle), math.sin(angle)
-    sx, sy = _numbers(_followed(shader.GetInput("scale"))[0], (1.0, 1.0))
-    tx, ty = _numbers(_followed(shader.GetInput("translation"))[0], (0.0, 0.0))
+    sx, sy = _numbers(_resolved(shader.GetInput("scale"))[0], (1.0, 1.0))
+    tx, ty = _numbers(_resolved(shader.GetInput("translation"))[0], (0.0, 0.0))
     return np.array([[c * sx, -s * sy, tx], [s * sx, c * sy, ty], [0.0, 0.0, 1.0]])
 
 
 class Painter:
-    """The materials of the meshes, each (material, side, colour) once."""
+    """Assigns materials to meshes; each combination of material, sides and colour is one."""
 
     def __init__(self, reader: MaterialReader, findings: Findings) -> None:
         self._reader = reader
         self._findings = findings
         self._number: dict[tuple[SourceMaterial, NamedImage | None], int] = {}
         self._coords: dict[tuple[Any, ...], Floats] = {}
-        self._colors: dict[tuple[Any, ...], Any] = {}
+        self._colors: dict[tuple[Any, ...], tuple[Color | None, NDArray[np.uint8] | None]] = {}
 
     @property
     def materials(self) -> tuple[SourceMaterial, ...]:
@@ -291,31 +282,31 @@ class Painter:
     def paint(
         self, prim: Any, shape: Shape, key: Any
     ) -> tuple[Ints, Floats, NDArray[np.uint8] | None]:
-        """The (T,) materials, (T, 3, 2) coordinates and, if they have any, (T, 3, 3) colours of a
-        mesh of this shape, whose ``key`` is the same for all of its instances."""
+        """The (T,) materials, (T, 3, 2) coordinates and, if there are any, (T, 3, 3) colours of a
+        mesh, whose ``key`` is that of all its instances (`key_of`)."""
         two_sided = bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get(TIME))
-        bound, face_surface = self._bound(prim, shape)
-        which = face_surface[shape.face]
-        material = np.zeros(len(which), dtype=np.int64)
-        uv = np.zeros((len(which), 3, 2))
+        surfaces, face_surface = self._bound(prim, shape)
+        index = face_surface[shape.face]
+        material = np.zeros(len(index), dtype=np.int64)
+        uv = np.zeros((len(index), 3, 2))
         colors: NDArray[np.uint8] | None = None
-        for number, surface in enumerate(bound):
-            faces = which == number
+        for number, surface in enumerate(surfaces):
+            faces = index == number
             if not faces.any():
                 continue
-            entry, image, painted = self._material(prim, shape, key, surface, two_sided)
+            entry, image, own = self._material(prim, shape, key, surface, two_sided)
             material[faces] = self._number.setdefault((entry, image), len(self._number))
             if image is not None:
                 assert surface is not None
-                uv[faces] = self._at(prim, shape, key, surface)[faces]
-            if painted is not None:
+                uv[faces] = self._coordinates(prim, shape, key, surface)[faces]
+            if own is not None:
                 if colors is None:
-                    colors = np.full((len(which), 3, 3), 255, dtype=np.uint8)
-                colors[faces] = painted[faces]
+                    colors = np.full((len(index), 3, 3), 255, dtype=np.uint8)
+                colors[faces] = own[faces]
         return material, uv, colors
 
     def _bound(self, prim: Any, shape: Shape) -> tuple[list[Surface | None], Ints]:
-        """The surfaces of a mesh, and which of them each of its faces has."""
+        """The surfaces of a mesh, and (F,) the surface of each of its faces."""
         binding = UsdShade.MaterialBindingAPI(prim)
         subsets = binding.GetMaterialBindSubsets()
         face_surface = np.zeros(shape.faces, dtype=np.int64)
@@ -339,12 +330,12 @@ class Painter:
         """The material of a surface on this mesh, and the colours of its corners."""
         surface = surface or Surface("default")
         color, opacity, see_through = surface.color, surface.opacity, surface.see_through
-        painted = None
-        if surface.painted or (color is None and surface.image is None):
-            color, painted = self._display(prim, shape, key, surface.painted or "displayColor")
-            if not surface.painted:
-                given, clear = self._clear(prim)
-                opacity, see_through = opacity * given, see_through or clear
+        corners = None
+        if surface.colors or (color is None and surface.image is None):
+            color, corners = self._display(prim, shape, key, surface.colors or "displayColor")
+            if not surface.colors:
+                displayed, varies = self._display_opacity(prim)
+                opacity, see_through = opacity * displayed, see_through or varies
         return (
             SourceMaterial(
                 name=surface.name,
@@ -356,35 +347,32 @@ class Painter:
                 two_sided=two_sided,
             ),
             surface.image,
-            painted,
+            corners,
         )
 
     def _display(
         self, prim: Any, shape: Shape, key: Any, name: str
     ) -> tuple[Color | None, NDArray[np.uint8] | None]:
-        """The colour of a mesh, or those of its corners, by a primvar."""
+        """The colour of a mesh, and the colours of its corners, from a primvar."""
         primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
         if not primvar or not primvar.HasValue() or not primvar.Get(TIME):
             return None, None
-        known = (key, key_of(primvar.GetAttr().GetPrim()), name)
-        if known not in self._colors:
+        cached = (key, key_of(primvar.GetAttr().GetPrim()), name)
+        if cached not in self._colors:
             values = at_corners(primvar, shape)
-            place = str(prim.GetPath())
-            found: Any = None, None
+            colors: tuple[Color | None, NDArray[np.uint8] | None] = None, None
             if values is None or values.shape[2] != 3:
-                self._findings.miss("PTM-N214", f"{name}: does not fit the mesh, ignored", place)
-            elif primvar.GetInterpolation() == UsdGeom.Tokens.constant:
-                self._findings.note("PTM-N215", f"{name}: colour factor converted to sRGB")
-                found = tint(values[0, 0]), None
+                message = f"{name}: does not match the mesh, ignored"
+                self._findings.miss("PTM-N214", message, str(prim.GetPath()))
             else:
                 self._findings.note("PTM-N215", f"{name}: colour factor converted to sRGB")
-                found = (1.0, 1.0, 1.0), encoded(values)
-            self._colors[known] = found
-        found = self._colors[known]
-        return found[0], found[1]
+                constant = primvar.GetInterpolation() == UsdGeom.Tokens.constant
+                colors = (tint(values[0, 0]), None) if constant else (_WHITE, encoded(values))
+            self._colors[cached] = colors
+        return self._colors[cached]
 
-    def _clear(self, prim: Any) -> tuple[float, bool]:
-        """The displayed opacity of a mesh, and whether it is not the same everywhere."""
+    def _display_opacity(self, prim: Any) -> tuple[float, bool]:
+        """The displayed opacity of a mesh, and whether it varies."""
         primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("displayOpacity")
         if not primvar or not primvar.HasValue():
             return 1.0, False
@@ -393,16 +381,16 @@ class Painter:
             return 1.0, False
         if (values == values[0]).all():
             return float(values[0]), False
-        place = str(prim.GetPath())
-        self._findings.note("PTM-N215", "displayOpacity: ignored, the mesh never occludes", place)
+        message = "varying displayOpacity ignored, the mesh is transparent"
+        self._findings.note("PTM-N215", message, str(prim.GetPath()))
         return 1.0, True
 
-    def _at(self, prim: Any, shape: Shape, key: Any, surface: Surface) -> Floats:
-        """(T, 3, 2) coordinates of a surface's image on this mesh."""
+    def _coordinates(self, prim: Any, shape: Shape, key: Any, surface: Surface) -> Floats:
+        """(T, 3, 2) coordinates of a surface's image on a mesh."""
         primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(surface.coords)
         owner = key_of(primvar.GetAttr().GetPrim()) if primvar else None
-        known = (key, owner, surface.coords, surface.matrix)
-        if known not in self._coords:
+        cached = (key, owner, surface.coords, surface.matrix)
+        if cached not in self._coords:
             place = str(prim.GetPath())
             values = None
             if not surface.coords or not primvar or not primvar.HasValue():
@@ -411,8 +399,8 @@ class Painter:
             else:
                 values = at_corners(primvar, shape)
                 if values is None or values.shape[2] != 2:
-                    what = f"{surface.coords}: does not fit the mesh, ignored"
-                    self._findings.miss("PTM-N214", what, place)
+                    message = f"{surface.coords}: does not match the mesh, ignored"
+                    self._findings.miss("PTM-N214", message, place)
                     values = None
             if values is None:
                 values = np.zeros((len(shape.face), 3, 2))
@@ -420,10 +408,10 @@ class Painter:
                 matrix = np.array(surface.matrix)
                 with np.errstate(all="ignore"):
                     values = values @ matrix[:, :2].T + matrix[:, 2]
-            self._coords[known] = values
-        return self._coords[known]
+            self._coords[cached] = values
+        return self._coords[cached]
 
 
 def key_of(prim: Any) -> str:
-    """The same for a prim in all instances of a prototype."""
+    """A key of a prim that is equal in all instances of a prototype."""
     return str((prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim).GetPath())

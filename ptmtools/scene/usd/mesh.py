@@ -1,8 +1,8 @@
-"""Meshes of USD as triangles, and their primvars at the corners of these.
+"""Cuts meshes of USD into triangles, and evaluates their primvars at the corners.
 
-A mesh is drawn as its control cage: subdividing it would need another library, and buildings have
-little that is meant to be smooth. Of the solids of USD those with flat faces are meshes, too;
-balls, cylinders and the like, of which the library knows no mesh, are not.
+A mesh is drawn as its control cage: subdivision would require another library, and buildings
+contain few smooth surfaces. Cubes and planes are drawn too; spheres, cylinders and the like, for
+which the library has no mesh, are not.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ _CUBE = np.array([[x, y, z] for x in (-1.0, 1) for y in (-1.0, 1) for z in (-1.0
 _CUBE_FACES = np.array(
     [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
 )
-#: A square of two units, and where the width and the length of a plane with this axis go. All of
-#: them face along their axis, so where that is not the first side's product with the second, the
-#: square is turned over.
+#: A square of two units, and the directions of the width and the length of a plane by its axis. A
+#: plane faces along its axis, so the square is reversed if the axis is not the cross product of the
+#: sides.
 _SQUARE = np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
 _PLANE_SIDES = {
     "X": ((0, 0, 1), (0, 1, 0)),
@@ -43,12 +43,12 @@ class Shape:
 
     Attributes
     ----------
-    points: (P, 3) float64 in the space of its prim, those that are used.
+    points: (P, 3) float64 used points in the space of its prim.
     triangles: (T, 3) int64 into `points`, counter-clockwise seen from the front.
-    corner: (T, 3) int64 the same into the corners of the mesh's faces.
+    corner: (T, 3) int64 the same triangles as indices of corners of the mesh's faces.
     vertex: (C,) int64 the point of the mesh at each corner of its faces.
     face: (T,) int64 the mesh's face of each triangle.
-    vertices, faces: how many points and faces the mesh has.
+    vertices, faces: numbers of points and faces of the mesh.
     """
 
     points: Floats
@@ -61,24 +61,24 @@ class Shape:
 
 
 def array(value: Any, kind: Any, *shape: int) -> NDArray[Any]:
-    """An array of the library's, (0, *shape) if there is none."""
+    """An array of the library as a numpy array, (0, *shape) without one."""
     if value is None or not len(value):
         return np.zeros((0, *shape), dtype=kind)
     return np.asarray(value).astype(kind).reshape(-1, *shape)
 
 
 def is_cut(prim: Any) -> bool:
-    """Whether a prim is drawn: a mesh, a cube or a plane."""
+    """Whether a prim is a mesh, a cube or a plane, which are drawn."""
     return any(prim.IsA(kind) for kind in (UsdGeom.Mesh, UsdGeom.Cube, UsdGeom.Plane))
 
 
 def triangles_of(prim: Any) -> int:
-    """How many triangles a prim has at most, before it is cut."""
+    """An upper bound of the number of triangles of a prim, before cutting."""
     return int(np.maximum(_faces(prim)[1] - 2, 0).sum())
 
 
 def _faces(prim: Any) -> tuple[Floats, Ints, Ints]:
-    """(P, 3) points, (F,) how many corners each face has, and (C,) the points of these."""
+    """(P, 3) points, (F,) numbers of corners of the faces, and (C,) the points of the corners."""
     if prim.IsA(UsdGeom.Cube):
         half = (UsdGeom.Cube(prim).GetSizeAttr().Get(TIME) or 0.0) / 2
         return _CUBE * half, np.full(6, 4), _CUBE_FACES.ravel()
@@ -87,8 +87,8 @@ def _faces(prim: Any) -> tuple[Floats, Ints, Ints]:
         half_width = (plane.GetWidthAttr().Get(TIME) or 0.0) / 2
         half_length = (plane.GetLengthAttr().Get(TIME) or 0.0) / 2
         axis = str(plane.GetAxisAttr().Get(TIME))
-        along = _PLANE_SIDES.get(axis, _PLANE_SIDES["Z"])
-        points = _SQUARE @ (np.array(along, dtype=np.float64) * [[half_width], [half_length]])
+        sides = _PLANE_SIDES.get(axis, _PLANE_SIDES["Z"])
+        points = _SQUARE @ (np.array(sides, dtype=np.float64) * [[half_width], [half_length]])
         corners = np.arange(4)[::-1] if axis in ("X", "Y") else np.arange(4)
         return points, np.array([4]), corners
     mesh = UsdGeom.Mesh(prim)
@@ -100,16 +100,16 @@ def _faces(prim: Any) -> tuple[Floats, Ints, Ints]:
 
 
 def cut(prim: Any, findings: Findings, model: Path) -> Shape:
-    """Cuts what `is_cut`. Raises InputError PTM-I245 or PTM-I254 where its arrays do not fit
-    together."""
+    """Cuts a prim of `is_cut` into triangles. Raises InputError PTM-I245 or PTM-I254 if its arrays
+    are inconsistent."""
     place = str(prim.GetPath())
     points, counts, vertex = _faces(prim)
     if (counts < 0).any() or counts.sum() != len(vertex):
-        raise unfit(model, place, f"its faces have {counts.sum()} corners of {len(vertex)}")
-    if len(vertex) and not 0 <= vertex.min() <= vertex.max() < len(points):
-        raise InputError(
-            "PTM-I245", "a face names a point that does not exist", file=model, place=place
+        raise inconsistent(
+            model, place, f"faces of {counts.sum()} corners, but {len(vertex)} indices"
         )
+    if len(vertex) and not 0 <= vertex.min() <= vertex.max() < len(points):
+        raise InputError("PTM-I245", "a face refers to a missing point", file=model, place=place)
     kept = counts >= 3
     if short := int((~kept).sum()):
         findings.miss("PTM-N214", "faces of fewer than three corners", place, short)
@@ -120,39 +120,38 @@ def cut(prim: Any, findings: Findings, model: Path) -> Shape:
     face = np.flatnonzero(kept)
     corner = np.arange(len(vertex))[np.repeat(kept, counts)]
     start = np.concatenate([[0], np.cumsum(counts[face])])
-    made = triangulate(points[vertex[corner]], start)
-    if made.tangled:
+    triangulation = triangulate(points[vertex[corner]], start)
+    if triangulation.tangled:
         findings.note(
             "PTM-N211",
-            "polygons with crossing edges, or too many corners, were cut into fans of triangles",
+            "polygons with crossing edges or too many corners cut into fans of triangles",
             place,
-            made.tangled,
+            triangulation.tangled,
         )
-    result = corner[made.corner]
+    result = corner[triangulation.corner]
     if UsdGeom.Gprim(prim).GetOrientationAttr().Get(TIME) == UsdGeom.Tokens.leftHanded:
         result = result[:, ::-1]
-    # Points that no face uses would be there as often as the mesh is shown.
+    # Unused points would be repeated for each instance.
     used, triangles = np.unique(vertex[result], return_inverse=True)
     return Shape(
         points=points[used],
         triangles=triangles.reshape(-1, 3),
         corner=result,
         vertex=vertex,
-        face=face[made.polygon],
+        face=face[triangulation.polygon],
         vertices=len(points),
         faces=len(counts),
     )
 
 
-def unfit(model: Path, place: str, what: str) -> InputError:
-    """The error for arrays that do not fit together, PTM-I254."""
-    return InputError(
-        "PTM-I254", what, file=model, place=place, remedy="the file may be damaged, export it again"
-    )
+def inconsistent(model: Path, place: str, reason: str) -> InputError:
+    """The error for inconsistent arrays, PTM-I254."""
+    remedy = "the file may be damaged, export it again"
+    return InputError("PTM-I254", reason, file=model, place=place, remedy=remedy)
 
 
 def at_corners(primvar: Any, shape: Shape) -> Floats | None:
-    """(T, 3, n) values of a primvar; None if they do not fit the mesh."""
+    """(T, 3, n) values of a primvar; None if they do not match the mesh."""
     raw = primvar.Get(TIME)
     if raw is None or not hasattr(raw, "__len__") or primvar.GetElementSize() != 1:
         return None
@@ -179,16 +178,16 @@ def at_corners(primvar: Any, shape: Shape) -> Floats | None:
 
 
 def _note(prim: Any, mesh: Any, findings: Findings) -> None:
-    """Says once for each mesh what of it is not shown."""
+    """Notes the unsupported properties of a mesh."""
     scheme = mesh.GetSubdivisionSchemeAttr().Get(TIME)
     if scheme not in (None, UsdGeom.Tokens.none):
-        findings.note("PTM-N215", f"surfaces to be subdivided ({scheme}) are drawn as their cages")
+        findings.note("PTM-N215", f"subdivision surfaces ({scheme}) drawn as their control cages")
     if prim.HasAttribute("primvars:skel:jointIndices"):
-        findings.note("PTM-N215", "skins are shown in their rest pose")
+        findings.note("PTM-N215", "skins drawn in their rest pose")
     if prim.HasRelationship("skel:blendShapeTargets"):
-        findings.note("PTM-N215", "blend shapes are not carried over")
+        findings.note("PTM-N215", "blend shapes dropped")
     if any(
         attribute.ValueMightBeTimeVarying()
         for attribute in (mesh.GetPointsAttr(), mesh.GetFaceVertexIndicesAttr())
     ):
-        findings.note("PTM-N215", "meshes that change are shown as they are at first")
+        findings.note("PTM-N215", "animated meshes drawn at their first time")

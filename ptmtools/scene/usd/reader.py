@@ -1,10 +1,8 @@
-"""Reads USD (.usd, .usda, .usdc and .usdz) through usd-core, in a process of its own (`apart`).
+"""Reads USD (.usd, .usda, .usdc and .usdz) through usd-core in a child process (`sandbox`).
 
-The library composes the stage of layers (`layers`). What of it is drawn, and where, is found by
-`drawn`, and made into triangles by `source`. As a program:
-``python -P -m ptmtools.scene.usd.reader MEMORY SCRATCH MODEL MOST OUTSIDE``, where ``MOST`` is the
-number of triangles that may be, and ``OUTSIDE`` empty if files outside of the model's folder may
-not be read.
+``python -P -m ptmtools.scene.usd.reader MEMORY SCRATCH MODEL TRIANGLES OUTSIDE`` reads the model,
+with at most TRIANGLES triangles, and replies with the message of `messages.pack_source`. OUTSIDE is
+empty unless files outside the model's folder are allowed.
 """
 
 from __future__ import annotations
@@ -23,22 +21,22 @@ from ptmtools.scene.options import USD
 from ptmtools.scene.sandbox import serve
 from ptmtools.scene.source import MAX_VERTICES, Source
 
-#: So many files of the model's folder are looked at for their size.
+#: Largest number of files in the model's folder whose size is read.
 _MOST_FILES = 100_000
 
 
 def read_usd(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) -> Source:
-    """Read a USD model.
+    """Reads a USD model.
 
-    Raises InputError where it is damaged (PTM-I245, PTM-I254), has no mesh (PTM-I247), or
-    is composed of files outside its folder (PTM-I205); LimitError PTM-L203 for more than
-    ``max_triangles``, as often as they are shown, before anything is made of them; and
-    MissingComponentError PTM-M100.
+    Raises InputError if it is damaged (PTM-I245, PTM-I254), has no mesh (PTM-I247), or
+    refers to layers outside its folder (PTM-I205); LimitError PTM-L203, before arrays are
+    allocated, for more than ``max_triangles``, instances included; and MissingComponentError
+    PTM-M100.
     """
     if find_spec("pxr") is None:
         raise MissingComponentError(
             "PTM-M100",
-            "usd-core is needed for this format, and is not installed",
+            "USD requires usd-core",
             remedy="pip install 'ptmtools[usd]'",
         )
     outside = "outside" if findings.folder.allow_outside else ""
@@ -56,7 +54,8 @@ def read_usd(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) 
 
 
 def _bytes_of_layers(folder: Path) -> int:
-    """How large all layers in a folder are: a model is often a small one that refers to others."""
+    """The total size of the layers in a folder: a model often is a small layer that refers to
+    others."""
     total, left = 0, _MOST_FILES
     for parent, _, names in os.walk(folder):
         for name in names:
@@ -70,7 +69,7 @@ def _bytes_of_layers(folder: Path) -> int:
 
 
 def _read_in_child(scratch: str, model: str, most: str, outside: str) -> dict[str, Any]:
-    # Each thread takes memory that none of them needs: most of the work is ours.
+    # Each thread allocates memory, and the library does little of the work.
     os.environ["PXR_WORK_THREAD_LIMIT"] = "1"
     from ptmtools.scene.usd.source import make_source
 

@@ -1,11 +1,9 @@
-"""Makes triangles of a USD stage: each mesh as often as it is shown, with what it is painted with.
+"""Traverses a USD stage and makes a `Source` of its meshes, instances, materials and cameras.
 
-What a mesh and all of its instances have in common is made once.
-
-What of a USD stage is drawn, and where: meshes with the places at which they stand.
-
-Native instances are gone through like all else. The prototypes of a point instancer are gone
-through once; what they come to is counted before any place is multiplied with another."""
+Data that a mesh shares with its instances is computed once. Native instances are traversed like
+other prims. The prototypes of a point instancer are traversed once, and their triangles are counted
+before the transformations of nested instancers are multiplied.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +20,7 @@ from pxr import Tf, Usd, UsdGeom
 from ptmtools.arrays import Floats
 from ptmtools.errors import InputError
 from ptmtools.scene.messages import NamedImage
-from ptmtools.scene.model import Camera
+from ptmtools.scene.model import Camera, perspective_camera
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.rows import Rows
 from ptmtools.scene.sandbox import unreadable
@@ -37,20 +35,20 @@ from ptmtools.scene.usd.layers import (
     used_files,
 )
 from ptmtools.scene.usd.material import MaterialReader, Painter, key_of
-from ptmtools.scene.usd.mesh import Shape, array, cut, is_cut, triangles_of, unfit
+from ptmtools.scene.usd.mesh import Shape, array, cut, inconsistent, is_cut, triangles_of
 
 _HIDDEN = (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
 
 
 @dataclass(frozen=True)
 class Placed:
-    """A mesh.
+    """A mesh and its instances.
 
     Attributes
     ----------
-    prim: an instance proxy, if it stands in an instance.
+    prim: an instance proxy within an instance.
     name: see `Traversal`.
-    frames: (k, 4, 4) its space to the world's, for row vectors, as often as it is shown.
+    frames: (k, 4, 4) local to world of each instance, for row vectors.
     """
 
     prim: Any
@@ -60,32 +58,33 @@ class Placed:
 
 @dataclass
 class Group:
-    """What is drawn below a prim: meshes and point instancers, each with its (4, 4) transformation
-    to the group's space; of an instancer each prototype with the (n, 4, 4) of its instances."""
+    """The meshes and point instancers below a prim, each with its name and (4, 4) transformation to
+    the group's space; an instancer has the (n, 4, 4) instances of each prototype."""
 
     parts: list[tuple[str, Floats, Any | list[tuple[Group, Floats]]]] = field(default_factory=list)
     triangles: int = 0
     places: int = 0
 
-    def placed(self, frames: Floats, above: str = "") -> Iterator[Placed]:
-        """Its meshes, of a group that stands at (k, 4, 4) frames."""
-        for name, matrix, what in self.parts:
+    def placed(self, frames: Floats, prefix: str = "") -> Iterator[Placed]:
+        """The meshes of the group at (k, 4, 4) frames."""
+        for name, matrix, part in self.parts:
             with np.errstate(all="ignore"):
-                here = matrix @ frames
-            if not isinstance(what, list):
-                yield Placed(what, above + name, here)
+                own = matrix @ frames
+            if not isinstance(part, list):
+                yield Placed(part, prefix + name, own)
                 continue
-            for group, instances in what:
+            for group, instances in part:
                 with np.errstate(all="ignore"):
-                    each = (instances[None] @ here[:, None]).reshape(-1, 4, 4)
-                yield from group.placed(each, f"{above}{name}/")
+                    nested = (instances[None] @ own[:, None]).reshape(-1, 4, 4)
+                yield from group.placed(nested, f"{prefix}{name}/")
 
 
 class Traversal:
-    """Goes through a stage once.
+    """The traversal of a stage.
 
     The name of a mesh is the path of its prim below the stage's default prim, or else below the
-    root; that of an instance, the path of its instancer and that of the prim below its prototype.
+    root; that of an instance is the path of its instancer and that of the prim below the parent of
+    its prototype.
     """
 
     def __init__(self, stage: Any, findings: Findings, model: Path) -> None:
@@ -94,15 +93,15 @@ class Traversal:
         self._model = model
         self._cache = UsdGeom.XformCache(TIME)
         self._prototypes: dict[Any, Group | None] = {}
-        self._left_out: Counter[tuple[bool, str, str]] = Counter()
+        self._omitted: Counter[tuple[bool, str, str]] = Counter()
         self.cameras: list[tuple[str, Floats, Any]] = []
 
     def group(self) -> Group:
-        """All that is drawn, and notes of what is not. Raises InputError PTM-I254."""
-        found = self._below(self._stage.GetPseudoRoot(), None)
-        for (missed, code, message), count in self._left_out.items():
+        """The drawn prims of the stage; notes the others. Raises InputError PTM-I254."""
+        result = self._below(self._stage.GetPseudoRoot(), None)
+        for (missed, code, message), count in self._omitted.items():
             (self._findings.miss if missed else self._findings.note)(code, message, "", count)
-        return found
+        return result
 
     def name(self, prim: Any) -> str:
         path = prim.GetPath()
@@ -112,7 +111,7 @@ class Traversal:
         return str(path)[1:]
 
     def _below(self, root: Any, prototype: Any | None) -> Group:
-        """What is drawn at and below a prim, of a prototype in its parent's place."""
+        """The drawn prims at and below a prim, of a prototype in the space of its parent."""
         group = Group()
         predicate = _predicate(root)
         stack = [(root, UsdGeom.Tokens.default_)]
@@ -121,7 +120,7 @@ class Traversal:
             if prim.IsA(UsdGeom.Imageable):
                 imageable = UsdGeom.Imageable(prim)
                 if imageable.GetVisibilityAttr().Get(TIME) == UsdGeom.Tokens.invisible:
-                    self._leave_out("invisible", _surfaces(prim, predicate))
+                    self._omit("invisible", _surfaces(prim, predicate))
                     continue
                 if imageable.GetPurposeAttr().HasAuthoredValue():
                     purpose = imageable.GetPurposeAttr().Get()
@@ -129,12 +128,12 @@ class Traversal:
             if prim.IsA(UsdGeom.PointInstancer):
                 below = []
                 if purpose in _HIDDEN:
-                    self._leave_out(f"of purpose {purpose}", 1)
+                    self._omit(f"of purpose {purpose}", 1)
                 else:
                     self._instancer(group, prim, prototype)
             elif prim.IsA(UsdGeom.Gprim):
                 if purpose in _HIDDEN:
-                    self._leave_out(f"of purpose {purpose}", 1)
+                    self._omit(f"of purpose {purpose}", 1)
                 elif is_cut(prim):
                     group.parts.append((*self._place(prim, prototype), prim))
                     group.triangles += triangles_of(prim)
@@ -143,29 +142,29 @@ class Traversal:
                     surface = not prim.IsA(UsdGeom.Curves) and not prim.IsA(UsdGeom.Points)
                     kind = str(prim.GetTypeName())
                     code = "PTM-N214" if surface else "PTM-N215"
-                    self._left_out[surface, code, f"{kind}: not drawn"] += 1
+                    self._omitted[surface, code, f"{kind}: not drawn"] += 1
             elif prim.IsA(UsdGeom.Camera) and prototype is None:
                 self.cameras.append((*self._place(prim, None), prim))
             if (
                 prim.IsA(UsdGeom.Xformable)
                 and UsdGeom.Xformable(prim).TransformMightBeTimeVarying()
             ):
-                moved = "what moves is shown where it is at first"
-                self._left_out[False, "PTM-N215", moved] += 1
+                message = "animated prims drawn at their first position"
+                self._omitted[False, "PTM-N215", message] += 1
             stack += [(child, purpose) for child in reversed(below)]
         return group
 
-    def _leave_out(self, why: str, count: int) -> None:
+    def _omit(self, reason: str, count: int) -> None:
         if count:
-            self._left_out[False, "PTM-N215", f"surfaces {why} are not drawn"] += count
+            self._omitted[False, "PTM-N215", f"surfaces {reason}: not drawn"] += count
 
     def _place(self, prim: Any, prototype: Any | None) -> tuple[str, Floats]:
         """The name and the (4, 4) of a prim: below a prototype, or in the world."""
         if prototype is None:
             return self.name(prim), np.array(self._cache.GetLocalToWorldTransform(prim))
-        above = prototype.GetPath().GetParentPath()
+        parent = prototype.GetPath().GetParentPath()
         matrix, _ = self._cache.ComputeRelativeTransform(prim, prototype)
-        return str(prim.GetPath().MakeRelativePath(above)), np.array(matrix)
+        return str(prim.GetPath().MakeRelativePath(parent)), np.array(matrix)
 
     def _instancer(self, group: Group, prim: Any, prototype: Any | None) -> None:
         instancer, place = UsdGeom.PointInstancer(prim), str(prim.GetPath())
@@ -175,7 +174,7 @@ class Traversal:
         targets = instancer.GetPrototypesRel().GetForwardedTargets()
         positions = array(instancer.GetPositionsAttr().Get(TIME), np.float64, 3)
         if not 0 <= index.min() <= index.max() < len(targets) or len(positions) != len(index):
-            raise unfit(self._model, place, "the arrays of the instancer do not fit together")
+            raise inconsistent(self._model, place, "inconsistent arrays of the instancer")
         frames = instancer.ComputeInstanceTransformsAtTime(
             TIME,
             TIME,
@@ -184,61 +183,59 @@ class Traversal:
         )
         frames = array(frames, np.float64, 4, 4)
         if len(frames) != len(index):
-            raise unfit(self._model, place, "the arrays of the instancer do not fit together")
+            raise inconsistent(self._model, place, "inconsistent arrays of the instancer")
         mask = instancer.ComputeMaskAtTime(TIME)
-        shown = np.array(mask, dtype=bool) if mask else np.ones(len(index), dtype=bool)
-        if hidden := int((~shown).sum()):
-            self._left_out[False, "PTM-N215", "instances that are invisible are not drawn"] += (
-                hidden
-            )
-        found: list[tuple[Group, Floats]] = []
+        visible = np.array(mask, dtype=bool) if mask else np.ones(len(index), dtype=bool)
+        if hidden := int((~visible).sum()):
+            self._omitted[False, "PTM-N215", "invisible instances: not drawn"] += hidden
+        parts: list[tuple[Group, Floats]] = []
         for number, target in enumerate(targets):
-            each = frames[shown & (index == number)]
-            below = self._prototype(target) if len(each) else None
+            instances = frames[visible & (index == number)]
+            below = self._prototype(target) if len(instances) else None
             if below is not None and below.parts:
-                found.append((below, each))
-                group.triangles += below.triangles * len(each)
-                group.places += below.places * len(each)
-        group.parts.append((*self._place(prim, prototype), found))
+                parts.append((below, instances))
+                group.triangles += below.triangles * len(instances)
+                group.places += below.places * len(instances)
+        group.parts.append((*self._place(prim, prototype), parts))
 
     def _prototype(self, path: Any) -> Group | None:
-        """What is drawn of a prototype, None if there is none or it contains itself."""
+        """The drawn prims of a prototype, None if it is missing or contains itself."""
         if path not in self._prototypes:
             self._prototypes[path] = None
             prim = self._stage.GetPrimAtPath(path)
             if prim:
                 self._prototypes[path] = self._below(prim, prim)
         if self._prototypes[path] is None:
-            self._left_out[True, "PTM-N214", f"{path}: no such prototype"] += 1
+            self._omitted[True, "PTM-N214", f"{path}: no such prototype"] += 1
         return self._prototypes[path]
 
 
 def _predicate(root: Any) -> Any:
-    """Which prims are gone through: those that are active, loaded, defined and not abstract. The
-    root may be a class, or below an over, as prototypes often are so as not to be drawn."""
-    plain: Any = Usd.PrimIsActive & Usd.PrimIsLoaded
+    """The filter of traversed prims: active, loaded, defined and not abstract. The root may be a
+    class, or below an over, as prototypes often are so that they are not drawn themselves."""
+    accepted: Any = Usd.PrimIsActive & Usd.PrimIsLoaded
     if root.IsDefined():
-        plain = plain & Usd.PrimIsDefined
+        accepted = accepted & Usd.PrimIsDefined
     if not root.IsAbstract():
-        plain = plain & ~Usd.PrimIsAbstract
-    return Usd.TraverseInstanceProxies(plain)
+        accepted = accepted & ~Usd.PrimIsAbstract
+    return Usd.TraverseInstanceProxies(accepted)
 
 
 def _surfaces(prim: Any, predicate: Any) -> int:
-    """How many meshes and instancers stand at and below a prim."""
+    """The number of meshes and instancers at and below a prim."""
     below = Usd.PrimRange(prim, predicate)
-    return sum(each.IsA(UsdGeom.Gprim) or each.IsA(UsdGeom.PointInstancer) for each in below)
+    return sum(p.IsA(UsdGeom.Gprim) or p.IsA(UsdGeom.PointInstancer) for p in below)
 
 
 def make_source(
     path: Path, findings: Findings, most: int
 ) -> tuple[Source, dict[int, NamedImage], list[str]]:
-    """The model without textures; the images of its materials by number; and the names of the files
-    that it is composed of. Raises what `ptmtools.scene.usd.read_usd` does.
+    """The model without textures; the images of its materials by number; and the names of its
+    files. Raises the errors of `ptmtools.scene.usd.reader.read_usd`.
     """
     try:
         return _make(path, findings, most)
-    except Tf.ErrorException as error:  # damage that shows when a value is asked for
+    except Tf.ErrorException as error:  # damage that is detected when a value is read
         raise unreadable(LIBRARY, path, reason(error)) from None
 
 
@@ -262,7 +259,7 @@ def _make(
         shape = shapes[key]
         if len(shape.corner):
             material, uv, colors = painter.paint(placed.prim, shape, key)
-            frames = placed.frames.transpose(0, 2, 1)  # of the library, for rows of coordinates
+            frames = placed.frames.transpose(0, 2, 1)  # the library's are for row vectors
             first = len(rows.names)
             rows.names += [placed.name] * len(frames)
             rows.add(frames, shape.points, shape.triangles, uv, material, colors, first)
@@ -277,25 +274,19 @@ def _make(
     return source, painter.images, list(dict.fromkeys(files) | used_files(stage, path, findings))
 
 
-def _cameras(found: list[tuple[str, Floats, Any]], findings: Findings) -> tuple[Camera, ...]:
+def _cameras(definitions: list[tuple[str, Floats, Any]], findings: Findings) -> tuple[Camera, ...]:
     cameras: list[Camera] = []
-    for name, matrix, prim in found:
-        camera = UsdGeom.Camera(prim)
-        direction, position = 0.0 - matrix[2, :3], matrix[3, :3]
-        with np.errstate(all="ignore"):
-            length = float(np.linalg.norm(direction))
-        height = camera.GetVerticalApertureAttr().Get(TIME) or 0.0
-        distance = camera.GetFocalLengthAttr().Get(TIME) or 0.0
-        usable = np.isfinite(position).all() and math.isfinite(length) and length > 0
-        flat = camera.GetProjectionAttr().Get(TIME) != UsdGeom.Tokens.perspective
-        # Both are in the same unit, a tenth of the stage's.
-        if flat or not (
-            usable and math.isfinite(height / (distance or 1)) and height > 0 < distance
-        ):
+    for name, matrix, prim in definitions:
+        definition, view = UsdGeom.Camera(prim), 0.0
+        height = definition.GetVerticalApertureAttr().Get(TIME) or 0.0
+        distance = definition.GetFocalLengthAttr().Get(TIME) or 0.0
+        perspective = definition.GetProjectionAttr().Get(TIME) == UsdGeom.Tokens.perspective
+        # Both lengths are in the same unit, a tenth of the stage's.
+        if perspective and height > 0 < distance and math.isfinite(height / distance):
+            view = 2 * math.atan(height / (2 * distance))
+        camera = perspective_camera(name, matrix[3, :3], 0.0 - matrix[2, :3], view)
+        if camera is None:
             findings.note("PTM-N215", f"camera {name} has no perspective, skipped", name)
-            continue
-        x, y, z = position.tolist()
-        dx, dy, dz = (direction / length).tolist()
-        view = 2 * math.atan(height / (2 * distance))
-        cameras.append(Camera(name, (x, y, z), (dx, dy, dz), view))
+        else:
+            cameras.append(camera)
     return tuple(cameras)

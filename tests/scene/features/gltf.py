@@ -525,7 +525,7 @@ def _(put: Put) -> str:
 
 
 def asked(text: str) -> None:
-    assert "needs the glTF extension EXT_texture_avif, which is not read; run `npx" in text
+    assert "requires the unsupported glTF extension EXT_texture_avif; run `npx" in text
 
 
 @feature("glTF", "unknown required extension", "refused", asked, "PTM-I243")

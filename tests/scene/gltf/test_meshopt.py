@@ -200,9 +200,9 @@ def test_a_count_that_no_data_could_hold(mode: str) -> None:
     [
         (told("ATTRIBUTES", 1, 6), "stride of 6"),
         (told("ATTRIBUTES", 1, 260), "stride of 260"),
-        (told("ATTRIBUTES", 1, 12, "QUATERNION"), "'QUATERNION' over a stride of 12"),
+        (told("ATTRIBUTES", 1, 12, "QUATERNION"), "'QUATERNION' with a stride of 12"),
         (told("ATTRIBUTES", 1, 12, "COLOR"), "stride of 12"),
-        (told("ATTRIBUTES", 1, 4, "SQUARE"), "'SQUARE' over"),
+        (told("ATTRIBUTES", 1, 4, "SQUARE"), "'SQUARE' with"),
         (told("TRIANGLES", 3, 1), "stride of 1"),
         (told("INDICES", 3, 4, "COLOR"), "filter COLOR"),
         (told("POINTS", 3, 4), "'POINTS'"),

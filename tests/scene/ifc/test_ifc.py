@@ -87,7 +87,7 @@ def test_a_house(tmp_path: Path, schema: str) -> None:
     assert np.allclose(low, [-THICK] * 3, rtol=0, atol=1e-9)
     assert np.allclose(high, [2 * WIDE + 2 * THICK, DEEP + THICK, 2 * STOREY], rtol=0, atol=1e-9)
     assert notes(findings) == [
-        ("PTM-N201", "lengths are in millimetre (0.001 m), and read as metres", 1),
+        ("PTM-N201", "lengths in millimetre (0.001 m) converted to metres", 1),
         ("PTM-N215", "IfcOpeningElement: not drawn", 3),
         ("PTM-N215", "IfcSpace: not drawn", 4),
         ("PTM-N215", "IfcAnnotation: not drawn", 1),
@@ -189,9 +189,9 @@ def test_what_is_not_drawn(tmp_path: Path, kind: str) -> None:
     ("unit", "metres", "said"),
     [
         ("METERS", 1.0, []),
-        ("MILLIMETERS", 1e-3, ["lengths are in millimetre (0.001 m), and read as metres"]),
-        ("CENTIMETERS", 1e-2, ["lengths are in centimetre (0.01 m), and read as metres"]),
-        ("FOOT", 0.3048, ["lengths are in foot (0.3048 m), and read as metres"]),
+        ("MILLIMETERS", 1e-3, ["lengths in millimetre (0.001 m) converted to metres"]),
+        ("CENTIMETERS", 1e-2, ["lengths in centimetre (0.01 m) converted to metres"]),
+        ("FOOT", 0.3048, ["lengths in foot (0.3048 m) converted to metres"]),
     ],
 )
 @pytest.mark.parametrize("schema", SCHEMAS)
@@ -209,7 +209,7 @@ def test_no_unit(tmp_path: Path) -> None:
     file = house(Ifc("IFC4", None, 1.0)).write(tmp_path / "house.ifc")
     source, findings = read(file)
     assert source.metres is None
-    assert ("PTM-N201", "the file says no unit of length", 1) in notes(findings)
+    assert ("PTM-N201", "the file defines no unit of length", 1) in notes(findings)
     assert np.allclose(size(source.points), [10.6, 4.4, 6.2])
     assert ingest(file).space.unit_guessed
 
@@ -361,7 +361,7 @@ class TestMaterials:
         made = house(Ifc(), ["EG"])
         made.file.create_entity("IfcImageTexture", True, True, URLReference="brick.png")
         _, findings = read(made.write(tmp_path / "house.ifc"))
-        assert ("PTM-N215", "textures are not carried over", 1) in notes(findings)
+        assert ("PTM-N215", "textures dropped", 1) in notes(findings)
 
 
 class TestNames:
@@ -429,7 +429,7 @@ def test_only_lines(tmp_path: Path) -> None:
         made.represent(wall, line, "Curve3D", name)
     source, findings = read(made.write(tmp_path / "wall.ifc"))
     assert source.objects == ("IfcWall Wall",)
-    assert ("PTM-N215", "IfcWall: has no surface, only lines", 2) in notes(findings)
+    assert ("PTM-N215", "IfcWall: lines without a surface", 2) in notes(findings)
 
 
 def test_what_cannot_be_made_is_missed(tmp_path: Path) -> None:
@@ -441,7 +441,7 @@ def test_what_cannot_be_made_is_missed(tmp_path: Path) -> None:
     source, findings = read(file)
     assert source.objects == ("IfcWall Good",)
     (missed,) = [note for note in findings.notes if note.code == "PTM-N253"]
-    assert missed.message.startswith("IfcWall Bad: its geometry cannot be made")
+    assert missed.message.startswith("IfcWall Bad: geometry cannot be computed")
     assert missed.place == f"GlobalId {bad.GlobalId}"
     with pytest.raises(InputError, match=r"IfcWall Bad.*PTM-I253"):
         ingest(file, IngestOptions(strict=True))
@@ -584,7 +584,7 @@ class TestArchives:
             archive.writestr("a.txt", "")
             for name in names:
                 archive.writestr(name, "")
-        with pytest.raises(InputError, match=f"holds {what} IFC files instead of one.*PTM-I266"):
+        with pytest.raises(InputError, match=f"contains {what} IFC files instead of one.*PTM-I266"):
             read(tmp_path / "a.ifczip")
 
     def test_none(self, put: Put) -> None:
@@ -628,13 +628,13 @@ class TestDamage:
     def test_no_products(self, tmp_path: Path) -> None:
         made = Ifc()
         made.storey("EG", 0)
-        with pytest.raises(InputError, match=r"no product that is drawn.*PTM-I247"):
+        with pytest.raises(InputError, match=r"no drawable product.*PTM-I247"):
             ingest(made.write(tmp_path / "empty.ifc"))
 
     def test_only_spaces(self, tmp_path: Path) -> None:
         made = Ifc()
         made.box("IfcSpace", "Room", (0, 0, 0), (1, 1, 1))
-        with pytest.raises(InputError, match=r"no product that is drawn.*PTM-I247"):
+        with pytest.raises(InputError, match=r"no drawable product.*PTM-I247"):
             ingest(made.write(tmp_path / "space.ifc"))
 
     def test_cut_off(self, put: Put, whole: bytes) -> None:
