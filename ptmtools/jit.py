@@ -12,9 +12,9 @@ Called from Python, a kernel is numba's cached dispatcher. Called from another k
 compile in two thirds of the time that dispatchers calling each other take.
 
 Tried and rejected: a second process that compiles ahead, and locks with which one process waits for
-the machine code of another. A first `ptm encode` took 10.4 instead of 9.7 s of processor time. Only
-where a processor is idle did a first run end sooner. Without locks, two processes that start at the
-same time may both compile a kernel; numba replaces files in one step, so either result is whole.
+the machine code of another. With them a first `ptm encode` took 9.1 times as long as a second, and
+a first build of the museum 3.2 times; without, 8.7 and 3.3 times (`benchmarks/codec/startup.py` on
+two busy processors). Processes that start at the same time may both compile a kernel.
 """
 
 from __future__ import annotations
