@@ -269,6 +269,20 @@ def in_order(
         dropped(list(waiting))
 
 
+def ordered(function: Callable[[T], R], tasks: Iterable[T], threads: int) -> Iterator[R]:
+    """``function`` of each task, in order, by threads of its own; at most ``threads`` + 1 tasks are
+    begun and not yielded. With one thread, a task begins when its result is asked for."""
+    if threads <= 1:
+        yield from map(function, tasks)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+
+        def submit(task: T) -> Future[R]:
+            return pool.submit(function, task)
+
+        yield from in_order(submit, tasks, lambda: threads + 1)
+
+
 def chunks(tasks: Iterable[T], size: int) -> Iterator[list[T]]:
     """Lists of ``size`` tasks; the last one is shorter."""
     rest = iter(tasks)

@@ -272,7 +272,7 @@ class Batch:
         to stderr. The other jobs continue after a failure. A single job has all the threads; each
         of several has one.
         """
-        from ptmtools.texture.parallel import ordered
+        from ptmtools.parallel import ordered
 
         console, workers = self.console, self.workers or os.cpu_count() or 1
         console.to_stderr = any(job.to_stdout for job in jobs)

@@ -38,9 +38,9 @@ from ptmtools.output.emitters import GZIP, Emitter, chosen_emitters
 from ptmtools.output.model import EmitOptions, EmitReport, OctreeRecord, TextureRecord, Visit
 from ptmtools.output.names import BUNDLE, HINTS, RECORD_FILES, path_of
 from ptmtools.output.viewpoints import place_viewpoints
+from ptmtools.parallel import ordered
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
-from ptmtools.texture.parallel import ordered
 from ptmtools.visibility.model import Pvs, over_places
 
 if TYPE_CHECKING:

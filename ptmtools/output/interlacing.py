@@ -25,10 +25,10 @@ from ptmtools.output.model import TextureRecord
 from ptmtools.output.names import HINTS, INTERLACE_FILES, INTERLACE_FOLDER, texture_name
 from ptmtools.output.validation.files import ServedDatabase
 from ptmtools.output.validation.textures import ReadTexture
+from ptmtools.parallel import ordered
 from ptmtools.texture import reader
 from ptmtools.texture.images import Picture
 from ptmtools.texture.model import Limits
-from ptmtools.texture.parallel import ordered
 from ptmtools.texture.samples import KINDS, in_eight_bits
 
 #: Files that a set's manifest does not name; the check of the database reports them.

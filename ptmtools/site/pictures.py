@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.output.served import Served
+from ptmtools.parallel import ordered
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.rendering.records import Sight, Triangles, triangles_of
 from ptmtools.texture.model import Limits
-from ptmtools.texture.parallel import ordered
 from ptmtools.texture.samples import in_eight_bits
 
 #: Pixels of the poster, and of the small pictures; bytes that they may have.

@@ -21,6 +21,7 @@ from typing import IO
 import numpy as np
 
 from ptmtools.errors import InputError, LimitError, OutputError
+from ptmtools.parallel import ordered
 from ptmtools.texture.coder import Coder, Tile
 from ptmtools.texture.container import (
     DESCRIPTION_MAX,
@@ -33,7 +34,6 @@ from ptmtools.texture.container import (
 )
 from ptmtools.texture.detail import Detail, detail_of, difference_between
 from ptmtools.texture.model import TILE_SIDES, Description, EncodeOptions, PtmHeader
-from ptmtools.texture.parallel import ordered
 from ptmtools.texture.profiles import PROFILES
 from ptmtools.texture.pyramid import (
     Box,

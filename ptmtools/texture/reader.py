@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, LimitError, naming
+from ptmtools.parallel import ordered
 from ptmtools.texture.coder import Tile
 from ptmtools.texture.coders.group import damaged
 from ptmtools.texture.container import (
@@ -29,7 +30,6 @@ from ptmtools.texture.container import (
     whole_levels,
 )
 from ptmtools.texture.model import Description, Level, Limits, PtmHeader
-from ptmtools.texture.parallel import ordered
 from ptmtools.texture.profiles import PROFILES
 from ptmtools.texture.pyramid import Box, covering, tiles_under
 from ptmtools.texture.sources import Ranges, Source, ranges_of

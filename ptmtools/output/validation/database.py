@@ -342,7 +342,7 @@ class _Check:
     def _read_files(
         self, ours: Collection[str], database: ServedDatabase, progress: Progress, workers: int
     ) -> None:
-        from ptmtools.texture.parallel import ordered
+        from ptmtools.parallel import ordered
 
         reader = FileReader(self._folder, self._outputs, ours, self._limits)
         names = sorted({*self._outputs, *(f"{SERVED}/{path}" for path in ours)})
