@@ -97,6 +97,7 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/mypy --config-file benchmarks/mypy.ini -p benchmarks.fuzz -p benchmarks.web_rivals
 	@large=$$(git ls-files -z | xargs -0 stat -c '%s %n' | awk '$$1 > 1048576 { print $$2 }'); \
 	  [ -z "$$large" ] || { echo "Tracked files over 1 MiB: $$large" >&2; exit 1; }
+	$(BIN)/python benchmarks/house.py --check
 	$(BIN)/python benchmarks/docs_tables.py --check
 
 bench-codec: $(VENV)/.installed-dev

@@ -27,8 +27,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ptmtools.errors import WorkerError
+from ptmtools.executor import AHEAD, Executor, Outcome, chunks, in_order, outcome, results
 from ptmtools.lazy import component
-from ptmtools.parallel import AHEAD, Executor, Outcome, chunks, in_order, outcome, results
 from ptmtools.progress import announce
 from ptmtools.version import __version__
 

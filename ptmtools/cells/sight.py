@@ -20,7 +20,7 @@ import numpy as np
 from ptmtools.arrays import Bools, Floats, cross
 from ptmtools.cells.model import Cells
 from ptmtools.errors import LimitError
-from ptmtools.parallel import Executor
+from ptmtools.executor import Executor
 from ptmtools.portal_flow.flow import Portals, leaf_matrix, upper_bound
 
 #: Lines over all portals, and the least and the most through one of them.

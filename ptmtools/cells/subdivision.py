@@ -49,7 +49,7 @@ from ptmtools.cells.sight import seen_from_places
 from ptmtools.cells.structure import LOOKS, Surroundings, spread_over
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
-from ptmtools.parallel import Executor
+from ptmtools.executor import Executor
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.scene.orientation import main_axes

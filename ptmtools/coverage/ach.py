@@ -25,7 +25,7 @@ from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
 from ptmtools.coverage.sampling import RULE_OF_THREE, CellHints, Sampler, estimate
 from ptmtools.errors import InputError, MissingComponentError
-from ptmtools.parallel import Executor
+from ptmtools.executor import Executor
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs

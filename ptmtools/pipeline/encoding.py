@@ -24,7 +24,7 @@ from ptmtools.store.layout import IMAGES, STAGING, sha256
 from ptmtools.texture.model import EncodeOptions
 
 if TYPE_CHECKING:
-    from ptmtools.parallel import Executor
+    from ptmtools.executor import Executor
     from ptmtools.store.transaction import Transaction
     from ptmtools.texture.detail import Detail
     from ptmtools.texture.model import PtmHeader

@@ -71,10 +71,10 @@ def _squares(solid: NDArray[np.bool_]) -> NDArray[np.int64]:
 
 def warm_statue() -> None:
     """Calls the kernels of octree textures and of simplification, of plain and painted meshes."""
+    from ptmtools.executor import Executor
     from ptmtools.neighbours.apo.making import make_apo
     from ptmtools.neighbours.apo.model import ApoOptions
     from ptmtools.neighbours.apo.traversal import look_up
-    from ptmtools.parallel import Executor
     from ptmtools.scene.model import Material, Scene
     from ptmtools.scene.orientation import tolerance_of
     from ptmtools.simplification import Mesh, SimplifyOptions, simplify

@@ -44,7 +44,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bits, Bools, Floats, Ints
 from ptmtools.errors import InputError, LimitError
-from ptmtools.parallel import Executor
+from ptmtools.executor import Executor
 from ptmtools.portal_flow.double_double import Searched, SequenceTest, searched
 from ptmtools.portal_flow.storage import Geometry, Scratch
 from ptmtools.progress import Progress, silent

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.model import Cells
 from ptmtools.cells.sight import LONGEST, from_places, portals_of
-from ptmtools.parallel import Executor
+from ptmtools.executor import Executor
 from ptmtools.portal_flow.flow import PortalFlow, Portals, check, geometry, leaf_matrix, portal_flow
 from ptmtools.portal_flow.storage import Geometry
 from ptmtools.progress import Progress, silent

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from ptmtools.parallel import Executor, Local, open_executor
+from ptmtools.executor import Executor
+from ptmtools.parallel import Local, open_executor
 
 # Where worker processes find `parallel_tasks`: they are given this path.
 sys.path.append(str(Path(__file__).parent / "tasks"))

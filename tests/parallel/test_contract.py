@@ -10,7 +10,7 @@ import parallel_tasks as tasks
 import pytest
 
 from ptmtools.errors import InputError
-from ptmtools.parallel import AHEAD
+from ptmtools.executor import AHEAD
 
 #: Whether the function may run in threads.
 IN_THREADS = pytest.mark.parametrize("releases_lock", [False, True])

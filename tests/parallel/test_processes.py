@@ -16,7 +16,8 @@ import parallel_tasks as tasks
 import pytest
 
 from ptmtools.errors import InputError, OutputError, WorkerError
-from ptmtools.parallel import Executor, Local, in_background, open_executor
+from ptmtools.executor import Executor
+from ptmtools.parallel import Local, in_background, open_executor
 
 HERE = Path(__file__).parent / "tasks"
 

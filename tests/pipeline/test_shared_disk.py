@@ -10,7 +10,7 @@ import pytest
 
 from ptmtools import parallel
 from ptmtools.errors import OutputError, WorkerError
-from ptmtools.parallel import Executor
+from ptmtools.executor import Executor
 from ptmtools.pipeline import TextureOptions, build_scene
 from ptmtools.pipeline.encoding import ImageTask, _sees, encoded_on_disk, shared_disk
 from ptmtools.store.layout import sha256

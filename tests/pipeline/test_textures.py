@@ -12,7 +12,8 @@ import pytest
 from PIL import Image, PngImagePlugin
 
 from ptmtools import parallel
-from ptmtools.parallel import Executor, Workers
+from ptmtools.executor import Executor
+from ptmtools.parallel import Workers
 from ptmtools.pipeline import TextureOptions, build_scene, run_stage
 from ptmtools.pipeline.encoding import bare_png
 from ptmtools.pipeline.stage import Run

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ptmtools.arrays import Floats, Ints, Singles
+from ptmtools.executor import Executor
 from ptmtools.neighbours.apo.octree import (
     Bounds,
     Codes,
@@ -26,7 +27,6 @@ from ptmtools.neighbours.apo.octree import (
     pruned,
 )
 from ptmtools.neighbours.apo.sampling import Points, Source, areas, at, nearest, spread
-from ptmtools.parallel import Executor
 from ptmtools.progress import Progress, silent
 
 #: Depths of the cells that blocks are made of: 1/16 of the cube wide, or 1/1024 where a block would

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints, Singles
+from ptmtools.executor import Executor
 from ptmtools.neighbours.apo.blocks import Surface, Work, build
 from ptmtools.neighbours.apo.model import ApoOptions, Octree
 from ptmtools.neighbours.apo.normals import corner_normals
 from ptmtools.neighbours.apo.octree import Bounds, cube_around, octree_of
 from ptmtools.neighbours.apo.sampling import Paint, Source, paint_of, spacing_for
-from ptmtools.parallel import Executor
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene, Space
 from ptmtools.simplification import Mesh, SimplifyOptions, simplify

@@ -28,10 +28,10 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.cells.roles import matches
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import LimitError
+from ptmtools.executor import Executor
 from ptmtools.neighbours.apo.making import octree_around, once, smooth, welded
 from ptmtools.neighbours.apo.model import ApoOptions, Octree
 from ptmtools.neighbours.apo.options import ReplaceOptions
-from ptmtools.parallel import Executor
 from ptmtools.progress import Progress, silent
 from ptmtools.quantities import count
 from ptmtools.scene.model import Scene

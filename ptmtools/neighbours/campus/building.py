@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.executor import Executor
 from ptmtools.lazy import component
 from ptmtools.neighbours.campus.making import ObjectMade, Work, make_object
 from ptmtools.neighbours.campus.model import ALPHA, FORM, INDEX, Campus, CampusMaterial, Names
@@ -23,7 +24,6 @@ from ptmtools.neighbours.campus.occlusion import Surroundings
 from ptmtools.neighbours.campus.options import CampusOptions
 from ptmtools.neighbours.campus.second_set import model_light, model_masks
 from ptmtools.neighbours.campus.textures import BaseImage, Mask, texture_files
-from ptmtools.parallel import Executor
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.ingestion import ingest
 from ptmtools.scene.model import Material, Scene

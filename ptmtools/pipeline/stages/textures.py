@@ -41,7 +41,8 @@ from ptmtools.store.layout import IMAGES, SERVED, STAGES_FOLDER, sha256
 if TYPE_CHECKING:
     from threading import Event
 
-    from ptmtools.parallel import BackgroundLoop, Executor
+    from ptmtools.executor import Executor
+    from ptmtools.parallel import BackgroundLoop
     from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
     from ptmtools.texture.model import PtmHeader

@@ -20,6 +20,7 @@ from ptmtools import schemas
 from ptmtools.cli.main import main
 from ptmtools.diagnostics import FOLDER_CODES, ValidationReport
 from ptmtools.errors import InputError, PtmError
+from ptmtools.executor import Executor
 from ptmtools.neighbours.apo.checking import check_folder, describe
 from ptmtools.neighbours.apo.files import (
     COLORS,
@@ -37,7 +38,6 @@ from ptmtools.neighbours.apo.files import (
 from ptmtools.neighbours.apo.making import make_apo
 from ptmtools.neighbours.apo.model import ApoOptions
 from ptmtools.neighbours.apo.octree import fault_of
-from ptmtools.parallel import Executor
 from ptmtools.texture.model import Limits
 from tests.neighbours.apo.building import nodes, octree_of
 from tests.neighbours.apo.meshes import ply, scene_of, sphere

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from ptmtools.errors import InputError, LimitError
+from ptmtools.executor import Executor
 from ptmtools.neighbours.apo import blocks
 from ptmtools.neighbours.apo.blocks import Surface
 from ptmtools.neighbours.apo.making import Made, make_apo, welded
@@ -17,7 +18,7 @@ from ptmtools.neighbours.apo.normals import corner_normals
 from ptmtools.neighbours.apo.octree import fault_of
 from ptmtools.neighbours.apo.sampling import REACH, Source, areas, nearest
 from ptmtools.neighbours.apo.traversal import look_up
-from ptmtools.parallel import Executor, open_executor
+from ptmtools.parallel import open_executor
 from tests.neighbours.apo.meshes import scene_of, sphere, square
 
 OPTIONS = ApoOptions(faces=500, depth=9, error=0.1)

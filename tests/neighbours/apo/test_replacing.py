@@ -10,11 +10,12 @@ import pytest
 
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError, LimitError
+from ptmtools.executor import Executor
 from ptmtools.neighbours.apo.octree import fault_of
 from ptmtools.neighbours.apo.options import ReplaceOptions
 from ptmtools.neighbours.apo.replacing import Replaced, Replacement, replaced
 from ptmtools.neighbours.apo.traversal import look_up
-from ptmtools.parallel import Executor, open_executor
+from ptmtools.parallel import open_executor
 from ptmtools.scene import ingest
 from ptmtools.scene.model import Scene
 from tests.neighbours.apo.statues import STATUES, statue, wrapped, write_rooms
