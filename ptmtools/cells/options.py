@@ -58,29 +58,31 @@ class SubdivideOptions:
 
     wall_area: float = option(
         2.0,
-        "Smallest wall that divides the building into leaves (its convex parts). Smaller values "
-        "give more and tighter cells, and slower visibility.",
+        "Area of the smallest wall that divides the building into leaves (its convex parts). "
+        "Smaller values give more and smaller cells, and make the visibility stage slower.",
         metavar="M2",
     )
     wall_thickness: float = option(
         0.5,
-        "Largest distance of the two faces of one wall. Jambs, lintels and sills between them "
+        "Largest distance between the two faces of a wall. Jambs, lintels and sills between them "
         "divide the building, whatever their area.",
         metavar="METRES",
     )
     max_leaves: int = option(
-        10_000, "Largest number of leaves. The best splits come first.", was=("max-cells",)
+        10_000,
+        "Largest number of leaves. The most useful divisions come first.",
+        was=("max-cells",),
     )
     structural: tuple[str, ...] = option(
         (),
-        "Objects or materials (names, with * and ?) that divide the building, whatever their area. "
-        "Repeatable.",
+        "Objects or materials (names; * and ? are wildcards) that divide the building, whatever "
+        "their area. Repeatable.",
         metavar="NAME",
     )
     detail: tuple[str, ...] = option(
         (),
-        "Objects or materials (names, with * and ?) that neither divide the building nor hide "
-        "anything, such as furniture. --structural takes precedence. Repeatable.",
+        "Objects or materials (names; * and ? are wildcards) that neither divide the building "
+        "nor hide anything, such as furniture. --structural takes precedence. Repeatable.",
         metavar="NAME",
         basic=True,
     )
@@ -89,19 +91,19 @@ class SubdivideOptions:
     )
     cells: CellKind = option(
         "room",
-        "Unit that clients load and draw: a convex leaf, or a room, which is all leaves between "
-        "its doors; see --gain.",
+        "Unit that clients load and draw: a convex leaf, or a room, which consists of all leaves "
+        "between its doors; see --gain.",
     )
     gain: float = option(
         0.1,
-        "Divide a room into its leaves where that saves clients at least this share of their "
-        "download; 0 divides every room, 1 none.",
+        "Divide a room into its leaves if that saves clients at least this share of their "
+        "download; 0 divides every room, 1 divides none.",
         metavar="SHARE",
     )
     walker: tuple[float, float, float] = option(
         WALKER,
-        "Size of the visitor: radius, highest step and height, in metres. Space where such a body "
-        "fits is walkable.",
+        "Size of the visitor: radius, highest step and height, in metres. Space is walkable "
+        "where a body of this size fits.",
         metavar="RADIUS,STEP,HEIGHT",
     )
     reach: Reach = option(
@@ -111,19 +113,19 @@ class SubdivideOptions:
     )
     standing: Standing = option(
         "places",
-        "Positions of eyes: above walkable floor, up to 1.3 times the height of --walker (places), "
-        "or in the whole cell, as of a flying camera (anywhere).",
+        "Possible positions of the eyes: above walkable floor, up to 1.3 times the height of "
+        "--walker (places), or anywhere in the cell, for flying cameras (anywhere).",
     )
     doors: DoorState = option(
         "open",
-        "Doors between rooms: open ones are drawn and hide nothing, hidden ones are not drawn, "
-        "closed ones are walls. Entrances stay shut.",
+        "Doors between rooms: open ones are drawn but hide nothing, hidden ones are not drawn, "
+        "closed ones act as walls. Entrances stay shut.",
         basic=True,
     )
     door: tuple[str, ...] = option(
         (),
-        "Objects or materials (names, with * and ?) that are door leaves, beside those recognised "
-        "by name and shape. --structural takes precedence. Repeatable.",
+        "Objects or materials (names; * and ? are wildcards) that are door leaves, in addition "
+        "to those recognised by name and shape. --structural takes precedence. Repeatable.",
         metavar="NAME",
     )
     viewpoints: tuple[Position, ...] = option(

@@ -101,7 +101,7 @@ def _from_model(last: Stage[Any] | None) -> Callable[..., None]:
     @force_option(
         "Replace the database of another model, or write into a folder that is not a database."
     )
-    @option("--rebuild", is_flag=True, help="Run all stages, also those that are up to date.")
+    @option("--rebuild", is_flag=True, help="Run all stages, even those that are up to date.")
     @option("--dry-run", is_flag=True, help="Show which stages would run, and why; write nothing.")
     @json_option
     @with_console
@@ -119,9 +119,9 @@ def _from_model(last: Stage[Any] | None) -> Callable[..., None]:
     ) -> None:
         """Build a database from MODEL, or bring it up to date.
 
-        MODEL is an OBJ, glTF or GLB file, or of a format that trimesh, pymeshlab, IfcOpenShell or
-        usd-core reads. The database is a folder. A second run repeats only the stages whose input
-        or options have changed.
+        MODEL is an OBJ, glTF or GLB file, or a file in a format that trimesh, pymeshlab,
+        IfcOpenShell or usd-core reads. The database is a folder. A second run repeats only the
+        stages whose input or options have changed.
         """
         options: list[Any] = [take(stage.options, values) for stage in stages]
         if dry_run:
@@ -224,8 +224,8 @@ def status(console: Console, db: str, as_json: bool) -> None:
 def warm_up(console: Console) -> None:
     """Compile the code that the first build, encoding or octree texture would compile.
 
-    This takes a minute, once per release and user. A first build compiles too; use this command for
-    images of containers, and before the workers of a cluster start.
+    This takes a minute, once per release and user. The first build compiles too; use this command
+    for container images, and before the workers of a cluster start.
     """
     from ptmtools.jit import compilations
     from ptmtools.pipeline.warm_up import warm_building, warm_statue

@@ -83,8 +83,8 @@ def validate(
 ) -> None:
     """Check a database, another folder written by ptm, or a .ptm file.
 
-    Prints the worst finding of each file first, and the command that repairs them at the end. The
-    exit status is 8 if there are errors.
+    The command prints the worst finding of each file first, and at the end the command that
+    repairs them. The exit status is 8 if there are errors.
     """
     if not target:
         raise no_name()
@@ -114,7 +114,7 @@ def validate(
 
 @click.command("plot", cls=Command)
 @database_argument
-@option("-o", "--output", type=click.Path(), required=True, help="Picture to write, a PNG.")
+@option("-o", "--output", type=click.Path(), required=True, help="PNG to write.")
 @options_of(PlotOptions)
 @option(
     "--walk", type=click.Path(), metavar="FILE", help="Also draw this walk, which `ptm path` wrote."
@@ -124,7 +124,9 @@ def validate(
 def plot(
     console: Console, db: str, output: str, walk: str | None, force: bool, **values: Any
 ) -> None:
-    """Draw the floor plan of DB, storey by storey: cells, portals, and what --cell sees."""
+    """Draw the floor plan of DB, storey by storey: cells, portals, and the cells that
+    are visible from --cell.
+    """
     from ptmtools.lab.walk import read_walk
     from ptmtools.output import plot_plan
 

@@ -32,13 +32,14 @@ from ptmtools.texture.profiles import PROFILES
     "-o",
     "--output",
     type=click.Path(),
-    help="File to write; - for stdout. For several images, or with a final /, a folder. Default: "
-    "beside each image.",
+    help="File to write, or - for stdout; a folder for several images or if it ends with /. "
+    "Default: beside each image.",
 )
 @options_of(EncodeOptions)
 @option(
     "--orient / --no-orient",
-    help="Rotate the texels by the EXIF orientation of the image, instead of recording it.",
+    help="Rotate the texels by the EXIF orientation of the image instead of storing the "
+    "orientation.",
 )
 @many_files
 def encode(
@@ -172,8 +173,8 @@ def _share(part: int, whole: int) -> str:
     "-o",
     "--output",
     type=click.Path(),
-    help="Image to write (.png, .npy, .tif, .hdr, .exr); - for stdout. For several files, or with "
-    "a final /, a folder. Default: a .png beside each file, or an .npy for floats.",
+    help="Image to write (.png, .npy, .tif, .hdr, .exr); - for stdout; a folder for several "
+    "files or if it ends with /. Default: a .png beside each file, or an .npy for floats.",
 )
 @many_files
 def decode(

@@ -53,7 +53,7 @@ trace_option = option(
     type=click.Path(),
     heading="Walk and reference",
     metavar="FILE",
-    help="Changes of the link over time, JSON or CSV.",
+    help="File with the changes of the link over time, JSON or CSV.",
 )
 
 
@@ -125,8 +125,8 @@ def _path_document(path: WalkPath) -> dict[str, Any]:
     "--db",
     heading="Walk and reference",
     type=click.Path(),
-    help="Database of the same model, whose full picture is the reference instead of that of the "
-    "campus.",
+    help="Database of the same model. Its fully loaded picture replaces that of the campus as "
+    "the reference.",
 )
 @options_of(CampusWalkOptions)
 @option(
@@ -141,7 +141,7 @@ def _path_document(path: WalkPath) -> dict[str, Any]:
     heading="Walk and reference",
     default="*",
     metavar="NAMES",
-    help="Keep only these objects (names, with * and ?).",
+    help="Keep only these objects (names; * and ? are wildcards).",
 )
 @trace_option
 @json_option
@@ -192,7 +192,7 @@ def walk_campus(
     type=click.Path(),
     multiple=True,
     metavar="FILE",
-    help=f"Walk that `ptm path` wrote. Repeatable. Default: a new one of {DURATION:.0f} s.",
+    help=f"Walk that `ptm path` wrote. Repeatable. Default: a new walk of {DURATION:.0f} s.",
 )
 @option(
     "--seed",
@@ -208,8 +208,8 @@ def walk_campus(
     heading="Walk and reference",
     type=click.Path(),
     metavar="DB",
-    help="Another database of the same model, such as one without --max-error, whose full picture "
-    "is the reference instead of that of DB.",
+    help="Another database of the same model, such as one without --max-error. Its fully loaded "
+    "picture replaces that of DB as the reference.",
 )
 @option(
     "--campus",
@@ -223,8 +223,8 @@ def walk_campus(
     "--flip",
     heading="Output",
     is_flag=True,
-    help="Also measure FLIP, the perceived difference, of 12 frames of each run; takes seconds per "
-    "run.",
+    help="Also measure FLIP, the perceived difference, in 12 frames of each run. This takes "
+    "seconds per run.",
 )
 @option(
     "--csv",
@@ -263,7 +263,7 @@ def walk_campus(
     type=click.FloatRange(0, min_open=True),
     default=10.0,
     metavar="SECONDS",
-    help="Interval of the frames of --frames.",
+    help="Interval between the frames of --frames.",
 )
 @option(
     "--strip",
@@ -271,8 +271,8 @@ def walk_campus(
     heading="Output",
     type=click.Path(),
     metavar="FILE",
-    help="Also draw the pictures at the start of the walk after 10, 35 and 80 s, and the full "
-    "picture, as one PNG, likewise of the first run.",
+    help="Also draw one PNG with the pictures at the start of the walk after 10, 35 and 80 s, "
+    "and the full picture, for the same run as --frames.",
 )
 @force_option()
 @json_option
@@ -298,7 +298,8 @@ def simulate(
 ) -> None:
     """Simulate clients that walk through DB over a modelled link, and measure their pictures.
 
-    Every policy walks over every link with every amount of memory. DB is not changed.
+    The command simulates every policy with every link and every amount of memory. It does not
+    change DB.
     """
     options, paper = take(SimulateOptions, values), take(PaperOptions, values)
     with_paper = any(policy.options for policy in options.policies)

@@ -59,12 +59,14 @@ GROUPS: dict[str, dict[str, Entry]] = {
         "encode": Entry("Encode images as .ptm files.", "images:encode"),
         "decode": Entry("Decode .ptm files to images.", "images:decode"),
         "compare": Entry("Compare .ptm with other image formats.", "image_formats:compare"),
-        "interlace": Entry("Split an image into files that sharpen it.", "image_formats:interlace"),
+        "interlace": Entry(
+            "Split an image into a series of files, from coarse to fine.", "image_formats:interlace"
+        ),
         "deinterlace": Entry("Join the files of an interlaced image.", "image_formats:deinterlace"),
     },
     "Other representations": {
         "apo": Entry(
-            "Convert a mesh to a light mesh and an octree texture.", "representations:apo"
+            "Convert a mesh to a simplified mesh and an octree texture.", "representations:apo"
         ),
         "campus": Entry(
             "Convert a model to objects with levels of detail.", "representations:campus"
@@ -74,7 +76,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
         "path": Entry("Make a walk through every room of a database.", "lab:path_command"),
         "simulate": Entry("Simulate clients that walk through a database.", "lab:simulate"),
         "walk-campus": Entry("Simulate a walk through a campus.", "lab:walk_campus"),
-        "tradeoff": Entry("Measure cost and benefit of settings.", "tradeoff:tradeoff"),
+        "tradeoff": Entry("Measure the cost and the benefit of each option.", "tradeoff:tradeoff"),
     },
 }
 COMMANDS = {name: entry for group in GROUPS.values() for name, entry in group.items()}
@@ -131,7 +133,7 @@ def _stages() -> dict[str, Stage[Any]]:
 )
 @click.version_option(__version__, prog_name="ptm", message="%(prog)s %(version)s")
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
-@click.option("-v", "--verbose", is_flag=True, help="Print more, and tracebacks of errors.")
+@click.option("-v", "--verbose", is_flag=True, help="Print details, and the traceback of an error.")
 @click.pass_context
 def ptm(ctx: click.Context, quiet: bool, verbose: bool) -> None:
     """Turn an architectural model into a database that clients can stream."""

@@ -326,7 +326,7 @@ def with_console(function: Function) -> Function:
     """Adds ``-q`` and ``-v``, and passes the `Console` as the first argument."""
 
     @option("-q", "--quiet", is_flag=True, help="Print errors only.")
-    @option("-v", "--verbose", is_flag=True, help="Print more, and tracebacks of errors.")
+    @option("-v", "--verbose", is_flag=True, help="Print details, and the traceback of an error.")
     @click.pass_obj
     @wraps(function)
     def command(console: Console, /, quiet: bool, verbose: bool, **values: Any) -> Any:
@@ -355,7 +355,7 @@ jobs_option: Decorator = option(
     "workers",
     type=click.IntRange(0, 1024),
     default=0,
-    help="Number of workers; 0 for one per processor. It does not change the result.",
+    help="Number of workers; 0 means one per processor. The result does not depend on it.",
 )
 
 
@@ -365,8 +365,8 @@ def cluster_options(function: Function) -> Function:
         "--scheduler",
         metavar="ADDRESS",
         callback=_address,
-        help="Run the tasks on the cluster of this Dask scheduler, such as tcp://10.0.0.1:8786; -j "
-        "then limits the tasks that run at a time.",
+        help="Run the tasks on the cluster of this Dask scheduler, such as tcp://10.0.0.1:8786; "
+        "-j then limits the number of tasks that run at the same time.",
     )(jobs_option(function))
 
 
@@ -404,7 +404,8 @@ def new_database_option(function: Function) -> Function:
         "db",
         type=click.Path(),
         metavar="DB",
-        help="Database to write, a folder. Default: museum.db beside museum.obj.",
+        help="Folder of the database to write. Default: beside the model, such as museum.db for "
+        "museum.obj.",
     )
     @wraps(function)
     def command(*arguments: Any, model: str, db: str | None, **values: Any) -> Any:

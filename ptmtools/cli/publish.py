@@ -105,15 +105,24 @@ def _open_in_browser(url: str) -> bool:
 
 @click.command("publish", cls=Command)
 @database_argument
-@option("-o", "--output", "folder", type=click.Path(), required=True, help="Site to write.")
+@option(
+    "-o",
+    "--output",
+    "folder",
+    type=click.Path(),
+    required=True,
+    help="Folder of the site to write.",
+)
 @options_of(SiteOptions, PublishOptions)
-@force_option("Write into a folder that is not a site, and replace files of the same names in it.")
+@force_option(
+    "Write into a folder that is not a site, and replace files with the same names in it."
+)
 @json_option
 @with_console
 def publish(
     console: Console, db: str, folder: str, force: bool, as_json: bool, **values: Any
 ) -> None:
-    """Write DB as a web site for browsers, a folder that any web server can serve.
+    """Write DB as a web site: a folder that any web server can serve.
 
     A second run rewrites only the files that have changed.
     """

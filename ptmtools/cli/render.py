@@ -34,7 +34,7 @@ from ptmtools.quantities import count
     type=click.Path(),
     metavar="FILE",
     required=True,
-    help="Picture to write, a PNG.",
+    help="PNG to write.",
 )
 @options_of(ViewOptions, RenderOptions)
 @force_option("Replace an existing picture.")

@@ -39,7 +39,7 @@ from ptmtools.scene.options import IngestOptions
     "folder",
     type=click.Path(),
     metavar="DIR",
-    help="Folder to write. Default: bust.apo beside bust.ply.",
+    help="Folder to write. Default: beside the mesh, such as bust.apo for bust.ply.",
 )
 @options_of(ApoOptions, IngestOptions)
 @option("--render", "view", type=click.Path(), hidden=True, help="Now `ptm render`.")
@@ -58,7 +58,7 @@ def apo(
     as_json: bool,
     **values: Any,
 ) -> None:
-    """Convert a mesh of many triangles to a light mesh and an octree texture of its normals.
+    """Convert a mesh with many triangles to a simplified mesh and an octree texture of its normals.
 
     The octree streams level by level (docs/formats/apo.md). `ptm render DIR -o view.png` draws it.
     """
@@ -134,7 +134,12 @@ def _refuse_conversion() -> None:
 @click.command("campus", cls=Command)
 @click.argument("model", type=click.Path())
 @option(
-    "-o", "--output", "folder", type=click.Path(), required=True, help="Campus to write, a folder."
+    "-o",
+    "--output",
+    "folder",
+    type=click.Path(),
+    required=True,
+    help="Folder of the campus to write.",
 )
 @options_of(CampusOptions, IngestOptions)
 @force_option("Replace a folder that ptm campus wrote.")

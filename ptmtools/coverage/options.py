@@ -38,40 +38,44 @@ class AchOptions:
 
     preset: Preset = option(
         "default",
-        "Defaults of --samples, --face and --placement. paper is the setting of Marvie & Bouatouch "
-        "(2003), 8 points with views of 256 x 256 pixels: slower and less accurate than fast.",
+        "Defaults for --samples, --face and --placement. paper takes them from Marvie & "
+        "Bouatouch (2003), 8 points with views of 256 x 256 pixels, and is slower and less "
+        "accurate than fast.",
         basic=True,
     )
     samples: int | None = option(
-        None, "Sample points of each cell; with --tolerance, the upper limit. Default: by --preset."
+        None,
+        "Number of sample points in each cell; with --tolerance, the upper limit. Default: "
+        "set by --preset.",
     )
     face: int | None = option(
         None,
-        "Side of the six square views of a sample point. More points help far more than larger "
-        "views. Default: by --preset.",
+        "Side of the six square views of a sample point. More sample points improve the hints "
+        "far more than larger views. Default: set by --preset.",
         metavar="PIXELS",
     )
     placement: Placement | None = option(
         None,
-        "Distribution of the sample points in a cell: sobol, evenly spread; kd, in the middles of "
-        "equal parts, best for fewer than 16 points; uniform, at random. Default: by --preset.",
+        "Distribution of the sample points in a cell: sobol, evenly spread; kd, in the middles "
+        "of equal parts, best for fewer than 16 points; uniform, at random. Default: set by "
+        "--preset.",
     )
     tolerance: float | None = option(
         None,
-        "Add sample points to each cell until its hints are within this total variation of the "
-        "exact ones, with about 95 % confidence, or --samples is reached.",
+        "Largest error of the hints of a cell, as total variation, with about 95 % confidence. "
+        "Sample points are added until the error is below this or --samples is reached.",
     )
     weighting: Weighting = option(
         "pixel",
-        "Weight of a pixel: the same for all, or its solid angle, which is smaller near the edges "
-        "of a view.",
+        "Weight of each pixel: the same for all pixels, or its solid angle, which is smaller "
+        "near the edges of a view.",
     )
     backend: str = option(AUTO, "Renderer of the views", choices=CHOICES)
-    gpu: int | None = option(None, "Number of the graphics device. Default: the first.")
+    gpu: int | None = option(None, "Graphics device to use, by number. Default: the first.")
     clearance: float | None = option(
         None,
-        "Smallest distance of a sample point from any surface. Default: a quarter of the smallest "
-        "cell thickness.",
+        "Smallest distance between a sample point and any surface. Default: a quarter of the "
+        "smallest cell thickness.",
         metavar="METRES",
     )
     seed: int = option(0, "Seed of the random sample points.")

@@ -41,8 +41,8 @@ class SimulateOptions:
     )
     bandwidth: str = option(
         "512k,4M",
-        "Bandwidth of the link in bit/s: 56k, 4M (powers of ten) or inf, one or several with "
-        "commas.",
+        "Bandwidth of the link in bit/s: 56k, 4M (powers of ten) or inf. Commas separate several "
+        "values.",
         metavar="RATE[,RATE]",
     )
     latency: str = option(
@@ -56,7 +56,8 @@ class SimulateOptions:
     )
     memory: str = option(
         "4MiB,10%",
-        "Texture memory: 4MiB, 10% of that of all textures, or inf; one or several with commas.",
+        "Texture memory: 4MiB, 10% of that of all textures, or inf. Commas separate several "
+        "values.",
         metavar="SIZE[,SIZE]",
     )
     paper_bytes: bool = option(

@@ -142,7 +142,9 @@ class EmitOptions:
 
     heading: ClassVar[str] = "Served files"
 
-    title: str = option("ptmtools database", "Title of the world, which browsers show.", basic=True)
+    title: str = option(
+        "ptmtools database", "Title of the database, which browsers show.", basic=True
+    )
     fallback: bool = option(
         True, "Also refer to the PNG of each texture, for clients that cannot read .ptm."
     )
@@ -159,13 +161,13 @@ class EmitOptions:
     )
     viewpoint_count: int = option(
         32,
-        "Largest number of further rooms that get a viewpoint, the largest rooms first. They are "
-        "listed in the order of a walk.",
+        "Largest number of further rooms that get a viewpoint; the largest rooms come first. The "
+        "viewpoints are listed in the order of a walk.",
     )
     avatar_size: Vector | None = option(
         None,
         "Size of the visitor in VRML browsers: distance from walls, eye height and highest step, "
-        "in metres. Default: that of --walker, with the eyes at 0.94 of its height.",
+        "in metres. Default: the size of --walker, with the eyes at 0.94 of its height.",
         metavar="RADIUS,EYE,STEP",
         default_before=(6, (0.25, 1.6, 0.75)),
     )
@@ -177,14 +179,14 @@ class EmitOptions:
     )
     first_look: int = option(
         0,
-        "Also write, for each cell, one file with the levels of up to this side of all textures "
-        "visible from it; 0 for none.",
+        "Also write one file for each cell with the levels, up to this side, of all textures "
+        "visible from the cell; 0 writes none.",
         metavar="TEXELS",
     )
     need: int = option(
         16,
-        "Sample points of each cell for the resolution that each texture needs there; 0 leaves it "
-        "out.",
+        "Number of sample points in each cell that measure the resolution that each texture "
+        "needs there; 0 omits this measurement.",
         default_before=(8, 0),
     )
     gzip: bool = option(
@@ -296,7 +298,7 @@ class PlotOptions:
         1.2, "Height of the horizontal cut above the floor of each storey.", metavar="METRES"
     )
     storey_gap: float = option(
-        1.5, "Smallest vertical distance of the floors of two storeys.", metavar="METRES"
+        1.5, "Smallest vertical distance between the floors of two storeys.", metavar="METRES"
     )
     width: float = option(12.0, "Width of the picture.", metavar="INCHES")
     dpi: int = option(110, "Resolution, in dots per inch.")

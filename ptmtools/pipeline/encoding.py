@@ -41,21 +41,24 @@ class TextureOptions(EncodeOptions):
     )
     fallback_size: int = option(
         0,
-        "Largest side of the PNGs, which hold the finest level within it; 0 for the finest level.",
+        "Largest side of the PNGs; each holds the finest level that fits. 0 sets no limit.",
         metavar="TEXELS",
     )
     trim: bool = option(
         False,
-        "Leave out levels that no screen of --trim-height resolves from any place where a visitor "
-        "can stand. Larger screens and flying cameras see them blurred.",
+        "Leave out levels that no screen of --trim-height resolves from any place where a "
+        "visitor can stand. On larger screens and with flying cameras, textures then look "
+        "blurred.",
         basic=True,
     )
     trim_height: int = option(
-        1080, "Height of the screen that --trim assumes; it is 16:9.", metavar="PIXELS"
+        1080, "Height of the 16:9 screen that --trim assumes.", metavar="PIXELS"
     )
     trim_fov: float = option(60.0, "Vertical field of view that --trim assumes.", metavar="DEGREES")
     trim_distance: float = option(
-        0.25, "Smallest distance of an eye from a surface that --trim assumes.", metavar="METRES"
+        0.25,
+        "Smallest distance between the eye and a surface that --trim assumes.",
+        metavar="METRES",
     )
     limit: int = option(1024, "Largest decoded size of an image.", metavar="MIB", compare=False)
 

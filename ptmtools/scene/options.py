@@ -35,7 +35,7 @@ class IngestOptions:
     )
     up: Literal["y", "z"] | None = option(
         None,
-        "Up axis of the model. Default: the axis that the format prescribes (glTF: y), or else "
+        "Up axis of the model. Default: the axis that the format prescribes (glTF: y); otherwise "
         "guessed from floors and walls.",
         basic=True,
     )

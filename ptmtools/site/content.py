@@ -106,13 +106,15 @@ class SiteOptions:
     title: str = option("", "Title of the page. Default: the name of the database.")
     poster: str = option(
         "",
-        "Picture (JPEG, PNG or WebP) to show while the building loads. Default: drawn.",
+        "Picture (JPEG, PNG or WebP) to show while the building loads. Default: a drawn picture "
+        "of the first viewpoint.",
         metavar="FILE",
     )
     pictures: bool = option(True, "Draw a poster and pictures of the viewpoints.")
     clients: Literal["page", "vrml"] = option(
         "page",
-        "Clients of the site: its own page, or also VRML browsers, with their files and images.",
+        "Clients of the site: only its own page, or also VRML browsers, which need more files "
+        "and images.",
         name="for",
     )
 

@@ -51,7 +51,8 @@ class PublishOptions:
     heading: ClassVar[str] = "Site"
 
     gzip: bool = option(
-        False, "Also write gzip copies, for servers that send those (nginx: gzip_static)."
+        False,
+        "Also write gzip copies, for servers that send precompressed files (nginx: gzip_static).",
     )
     keep: bool = option(
         False, "Keep the files of earlier versions of the site, for visitors who are using them."

@@ -40,10 +40,10 @@ class ServeOptions:
 
     heading: ClassVar[str] = "Server"
 
-    port: int = option(0, "Port to listen on; 0 for any free one.")
+    port: int = option(0, "Port to listen on; 0 picks a free one.")
     host: str = option(
         "127.0.0.1",
-        "Address to listen on; 0.0.0.0 for all addresses of this machine.",
+        "Address to listen on; 0.0.0.0 means all addresses of this machine.",
         metavar="ADDRESS",
     )
     bandwidth: str = option(

@@ -29,13 +29,13 @@ class EncodeOptions:
     max_error: int = option(
         0,
         "Largest error of any sample of any level; 0 is lossless. An error of 4 (of 255) is hard "
-        "to see and about halves most files. Integer images only.",
+        "to see and makes most files about half as large. Integer images only.",
         basic=True,
     )
     tile: int = option(
         512,
-        "Side of the tiles into which large levels are cut, for parallel work, bounded memory and "
-        "random access; 0 for no tiles.",
+        "Side of the tiles into which large levels are cut, for parallel work, bounded memory "
+        "and random access; 0 disables tiles.",
         metavar="TEXELS",
     )
     min_side: int = option(
@@ -57,8 +57,8 @@ class EncodeOptions:
     )
     max_level: int = option(
         -1,
-        "Finest level to keep, counted likewise. The levels kept are numbered from 0; the file "
-        "records the original size.",
+        "Finest level to keep, numbered in the same way. The levels kept are numbered from 0; "
+        "the file records the original size.",
     )
 
 

@@ -18,18 +18,20 @@ class PvsOptions:
     method: Literal["full", "fast", "sampled"] = option(
         "full",
         "Method that finds the potentially visible set (PVS) of each cell: full follows every "
-        "sequence of portals within the budget; fast tests the first two portals, for larger sets; "
-        "sampled shoots random lines and misses visible cells, for comparison only.",
+        "sequence of portals within the budget; fast tests only the first two portals, which "
+        "gives larger sets; sampled shoots random lines and misses visible cells, so it is only "
+        "for comparison.",
         name="pvs",
     )
     budget: int = option(
         200_000,
-        "Most operations (tests and clips of portals) of the search from one side of a portal. "
-        "Undecided cells then count as visible: sets become larger, never wrong.",
+        "Largest number of operations (tests and clips of portals) in the search from one side "
+        "of a portal. Beyond it, undecided cells count as visible: sets become larger, never "
+        "wrong.",
         name="pvs-budget",
     )
     lines: int = option(
-        1000, "Random lines through each portal, with --pvs sampled.", name="pvs-lines"
+        1000, "Number of random lines through each portal, with --pvs sampled.", name="pvs-lines"
     )
     exact: bool = option(
         True,

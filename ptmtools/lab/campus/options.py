@@ -28,7 +28,7 @@ class Choice:
     @property
     def about(self) -> str:
         """Sides of textures and lightmaps."""
-        cached = ", all of it in the browser's cache" if self.quality.cached else ""
+        cached = ", all files in the browser's cache" if self.quality.cached else ""
         return f"{self.quality.diffuse} and {self.quality.light}{cached}"
 
 

@@ -262,7 +262,7 @@ class CampusPolicy:
 CAMPUS_POLICIES = {
     f"campus-{name}": CampusPolicy(
         f"campus-{name}",
-        f"client of --campus; sides of textures and lightmaps {choice.about}",
+        f"client of --campus; sides of textures and lightmaps in texels: {choice.about}",
         choice.quality,
     )
     for name, choice in QUALITIES.items()

@@ -28,8 +28,8 @@ class PathOptions:
     )
     duration: float | None = option(
         None,
-        "Length of the walk; a longer one than needed goes round again. Default: the time that all "
-        "rooms take.",
+        "Length of the walk, which starts again if time is left after all rooms. Default: the "
+        "time that all rooms take.",
         metavar="SECONDS",
     )
     speed: float = option(1.4, "Walking speed.", metavar="M/S")

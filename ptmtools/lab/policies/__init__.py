@@ -100,7 +100,7 @@ _LIST = (
     ),
     Declared(
         "ach",
-        "average coverage hints, in the common engine",
+        "average coverage hints, in the engine that most policies share",
         Knows.CAMERA,
         _same(coverage.Weighted(coverage.coverage_shares)),
     ),
@@ -149,10 +149,10 @@ _LIST = (
         _same(Screen(around.by_need)),
         needs=("need", "measure it with `ptm emit DB --need 16`"),
     ),
-    Declared("best", "policy of the page: screen, need and distance", Knows.SCREEN, _same(BEST)),
+    Declared("best", "policy of the viewer: screen, need and distance", Knows.SCREEN, _same(BEST)),
     Declared(
         "apo",
-        "client of Lacoste et al., §4.2: octree textures level by level; textures as best",
+        "client of Lacoste et al., §4.2: octree textures level by level; other textures as in best",
         Knows.SCREEN,
         ApoClient,
         form="octree",

@@ -59,19 +59,21 @@ class PaperOptions:
     heading: ClassVar[str] = "Policy paper"
 
     delta_t: float = option(
-        0.5, "Longest download of a level, while the viewpoint moves.", metavar="SECONDS"
+        0.5, "Longest time to download a level while the viewpoint moves.", metavar="SECONDS"
     )
     delta_t_static: float = option(
-        20.0, "Longest download of a level, while the viewpoint is static.", metavar="SECONDS"
+        20.0, "Longest time to download a level while the viewpoint is static.", metavar="SECONDS"
     )
     static_memory: str = option(
         "",
-        "Texture memory while the viewpoint is static: 16MiB, 40% or inf. Default: that of "
+        "Texture memory while the viewpoint is static: 16MiB, 40% or inf. Default: the value of "
         "--memory.",
         metavar="SIZE",
     )
     static_after: float = option(
-        STILL_SECONDS, "Time without movement until the viewpoint is static.", metavar="SECONDS"
+        STILL_SECONDS,
+        "Time without movement after which the viewpoint is static.",
+        metavar="SECONDS",
     )
 
     def __post_init__(self) -> None:

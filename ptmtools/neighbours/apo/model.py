@@ -22,22 +22,24 @@ class ApoOptions:
 
     heading: ClassVar[str] = "Octree texture"
 
-    faces: int = option(10_000, "Most faces of the simplified mesh.")
+    faces: int = option(10_000, "Largest number of faces of the simplified mesh.")
     error: float = option(
         0.05,
-        "Divide leaves of the octree while the normals in them deviate more than this from their "
-        "mean: root mean square, 0 to 2.",
+        "Largest deviation of the normals in a leaf of the octree from their mean, as a root "
+        "mean square from 0 to 2. Leaves that exceed it are divided.",
     )
     depth: int = option(
         13, "Greatest depth of the octree. Leaves of depth 13 are 1/8192 of its cube wide."
     )
     density: float = option(8.0, "Samples per triangle of the mesh, on average.")
     method: Literal["quadric", "meshlab"] = option(
-        "quadric", "Simplification: that of ptmtools, or pymeshlab's, the tool of the paper."
+        "quadric",
+        "Method of simplification: quadric, that of ptmtools, or meshlab, that of "
+        "pymeshlab and the paper.",
     )
     color: bool = option(False, "Also keep the colours of vertices or of the texture.")
     color_error: float = option(
-        0.05, "The same as --error for colours, as a share of the full range."
+        0.05, "Like --error, but for colours, as a share of the full range."
     )
 
     def __post_init__(self) -> None:

@@ -45,17 +45,19 @@ class ReplaceOptions:
 
     apo: tuple[str, ...] = option(
         (),
-        "Replace these objects (names, with * and ?), such as scanned statues, by a light mesh, "
-        "and write an octree of their normals. Repeatable.",
+        "Objects (names; * and ? are wildcards), such as scanned statues, to replace by a "
+        "simplified mesh and an octree of their normals. Repeatable.",
         metavar="NAME",
     )
     apo_faces: int = option(
-        2_000, "Most faces of a simplified mesh. Objects with fewer triangles stay unchanged."
+        2_000,
+        "Largest number of faces of a simplified mesh. Objects with fewer triangles stay "
+        "unchanged.",
     )
     apo_error: float = option(
         0.05,
-        "Divide leaves of the octree while the normals in them deviate more than this from their "
-        "mean: root mean square, 0 to 2.",
+        "Largest deviation of the normals in a leaf of the octree from their mean, as a root "
+        "mean square from 0 to 2. Leaves that exceed it are divided.",
     )
     apo_depth: int = option(
         11, "Greatest depth of the octree. Leaves of depth 11 are 1/2048 of the object wide."

@@ -18,22 +18,23 @@ class CampusOptions:
 
     heading: ClassVar[str] = "Campus"
 
-    lods: int = option(
-        2, "Meshes of each object, from the coarsest to the finest, which is that of the model."
-    )
+    lods: int = option(2, "Number of meshes of each object. The finest is that of the model.")
     ratio: float = option(
-        0.1, "Faces of a mesh as a share of those of the next finer one.", metavar="SHARE"
+        0.1,
+        "Number of faces of a mesh, as a share of those of the next finer mesh.",
+        metavar="SHARE",
     )
     faces: int = option(100, "Smallest number of faces of a simplified mesh.")
     error: float = option(
         0.01,
-        "Greatest error of a step of the simplification, as a share of the diagonal of the "
-        "object's box.",
+        "Largest error of each step of the simplification, as a share of the diagonal of the "
+        "object's bounding box.",
         metavar="SHARE",
     )
     small: float = option(
         10.0,
-        "Join objects with a box diagonal below this with small neighbours; 0 joins none.",
+        "Join objects whose bounding box has a diagonal below this with small objects nearby; 0 "
+        "joins none.",
         metavar="METRES",
     )
     lightmaps: Literal["bake", "model", "none"] = option(
@@ -41,10 +42,10 @@ class CampusOptions:
         "Lightmaps: computed from the share of the sky that each point sees, taken from a glTF "
         "model, or none.",
     )
-    samples: int = option(64, "Rays for each point of a baked lightmap.")
+    samples: int = option(64, "Number of rays for each point of a baked lightmap.")
     reach: float = option(
         20.0,
-        "Distance beyond which surfaces cast no shadow; inf is plain ambient occlusion.",
+        "Distance beyond which surfaces cast no shadow; inf gives plain ambient occlusion.",
         metavar="METRES",
     )
     quality: int = option(85, "Quality of the JPEG files, 1 to 95.")
