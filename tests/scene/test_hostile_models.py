@@ -361,7 +361,7 @@ def test_large_libraries_are_refused(put: Put, monkeypatch: pytest.MonkeyPatch) 
     ],
 )
 def test_indices_out_of_range(put: Put, face: str) -> None:
-    with pytest.raises(InputError, match=r"PTM-I24[56]"):
+    with pytest.raises(InputError, match="PTM-I245"):
         read(put("a.obj", QUAD + face + "\n"))
 
 
@@ -483,7 +483,7 @@ LIES: dict[str, bytes] = {
 
 @pytest.mark.parametrize("what", LIES)
 def test_gltf_that_lies(put: Put, what: str) -> None:
-    with pytest.raises(PtmError, match=r"PTM-(I24[89]|L203)"):
+    with pytest.raises(PtmError, match=r"PTM-(I24[79]|L203)"):
         ingest(put("a.glb", LIES[what]))
 
 

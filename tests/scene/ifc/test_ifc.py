@@ -639,7 +639,7 @@ class TestDamage:
 
     def test_cut_off(self, put: Put, whole: bytes) -> None:
         for length in np.linspace(1, len(whole) - 3, 40).astype(int).tolist():
-            with pytest.raises(InputError, match=r"PTM-I26[67]"):
+            with pytest.raises(InputError, match="PTM-I266"):
                 ingest(put("cut.ifc", whole[:length]))
 
     @pytest.mark.parametrize("share", [0.05, 0.2, 0.4, 0.6, 0.8, 0.95])
