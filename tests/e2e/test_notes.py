@@ -114,6 +114,6 @@ def test_the_runner_up_of_the_up_axis_is_shown_with_its_stage(ptm: Ptm, tmp_path
     path.write_text(obj_text(house()))
     lines = ptm("cells", path).out.splitlines()
     assert lines[1].startswith("note: the runner-up is y up: 19.2 m wide and 11.6 m high, ")
-    assert lines[1].endswith("; give --up y to take it [PTM-N238]")
+    assert lines[1].endswith("; give --up y to select it [PTM-N238]")
     assert sum("PTM-N238" in line for line in ptm("cells", path, "-v").out.splitlines()) == 1
     assert "PTM-N238" not in ptm("cells", MODEL, "-o", tmp_path / "rooms.db").out
