@@ -9,7 +9,6 @@ from ptmtools.lazy import lazy_exports
 if TYPE_CHECKING:
     from ptmtools.output.emission import emit as emit
     from ptmtools.output.model import (
-        EmitOptions as EmitOptions,
         EmitReport as EmitReport,
         GivenViewpoint as GivenViewpoint,
         PlotOptions as PlotOptions,
@@ -17,6 +16,7 @@ if TYPE_CHECKING:
         TextureRecord as TextureRecord,
         Viewpoint as Viewpoint,
     )
+    from ptmtools.output.options import EmitOptions as EmitOptions
     from ptmtools.output.plan import plot_plan as plot_plan
     from ptmtools.output.validation.database import (
         validate_database as validate_database,
@@ -28,8 +28,9 @@ __getattr__ = lazy_exports(
     {
         "ptmtools.output.emission": "emit",
         "ptmtools.output.model": (
-            "EmitOptions EmitReport GivenViewpoint PlotOptions PlotReport TextureRecord Viewpoint"
+            "EmitReport GivenViewpoint PlotOptions PlotReport TextureRecord Viewpoint"
         ),
+        "ptmtools.output.options": "EmitOptions",
         "ptmtools.output.plan": "plot_plan",
         "ptmtools.output.validation.database": "validate_database validate_ptm",
     },

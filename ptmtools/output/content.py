@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
-from ptmtools.output.model import EmitOptions, OctreeRecord, TextureRecord, Viewpoint
+from ptmtools.output.emitter import Emitter
+from ptmtools.output.model import OctreeRecord, TextureRecord, Viewpoint, WriterOptions
 from ptmtools.output.numbers import shares_of, single
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.colors import gradients
@@ -190,6 +191,7 @@ class Content:
     need: the required levels of textures, if measured.
     octrees: the octree textures of objects.
     workers: number of threads.
+    emitters: the forms that are written, in the order of writing.
     """
 
     scene: Scene
@@ -198,11 +200,12 @@ class Content:
     ach: Ach
     textures: tuple[TextureRecord, ...]
     viewpoints: tuple[Viewpoint, ...] = ()
-    options: EmitOptions = EmitOptions()  # noqa: RUF009 - a frozen value
+    options: WriterOptions = WriterOptions()  # noqa: RUF009 - a frozen value
     progress: Progress = silent
     need: Need | None = None
     octrees: tuple[OctreeRecord, ...] = ()
     workers: int = 1
+    emitters: tuple[Emitter, ...] = ()
 
     @cached_property
     def geometry(self) -> Geometry:

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import os
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -32,11 +32,12 @@ from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
 from ptmtools.errors import DatabaseError
 from ptmtools.files import real_folder, refuse_existing, write_bytes, writing
-from ptmtools.lazy import Lazy
 from ptmtools.output.content import Content
-from ptmtools.output.emitters import GZIP, Emitter, chosen_emitters
-from ptmtools.output.model import EmitOptions, EmitReport, OctreeRecord, TextureRecord, Visit
+from ptmtools.output.emitter import GZIP, Emitter, File
+from ptmtools.output.emitters import chosen_emitters
+from ptmtools.output.model import EmitReport, OctreeRecord, TextureRecord, Visit
 from ptmtools.output.names import BUNDLE, HINTS, RECORD_FILES, path_of
+from ptmtools.output.options import EmitOptions
 from ptmtools.output.viewpoints import place_viewpoints
 from ptmtools.parallel import ordered
 from ptmtools.progress import Progress, silent
@@ -48,17 +49,6 @@ if TYPE_CHECKING:
 
 
 #: A path in the served folder and the file's content.
-File = tuple[str, str | bytes]
-
-#: Name of an emitter → function from a `Content` to its files, in the order of writing. The call
-#: itself, before the first file, raises what the emitter refuses.
-WRITERS: dict[str, Lazy[Callable[[Content], Iterator[File]]]] = {
-    "vrml": Lazy("ptmtools.output.vrml:vrml_files"),
-    "gltf": Lazy("ptmtools.output.gltf:gltf_files"),
-    "interlace": Lazy("ptmtools.output.interlacing:interlaced_files"),
-    "hints": Lazy("ptmtools.output.hints:hints_files"),
-}
-
 #: Files written at a time.
 _WRITER_THREADS = 8
 #: Deflate, no name, no time, best compression, no system (RFC 1952).
@@ -115,7 +105,7 @@ def visit_of(content: Content, sizes: Mapping[str, int]) -> Visit:
     ``sizes``: bytes of each file, by its path in the served folder.
     """
     pvs, records = content.pvs, content.textures
-    forms = [e for e in chosen_emitters(content.options.format) if e.cell_files]
+    forms = [e for e in content.emitters if e.cell_files]
     nothing = np.zeros(pvs.cell_count, np.int64)
     fetched = [f for f in forms if not f.entry] or forms
     geometry = _geometry(content, fetched[0], sizes) if fetched else nothing
@@ -211,9 +201,20 @@ def emit(
             refuse_existing(folder / name, remedy)
     viewpoints, notes = place_viewpoints(scene, cells, options, textures)
     content = Content(
-        scene, cells, pvs, ach, textures, viewpoints, options, progress, need, octrees, workers
+        scene,
+        cells,
+        pvs,
+        ach,
+        textures,
+        viewpoints,
+        options,
+        progress,
+        need,
+        octrees,
+        workers,
+        emitters,
     )
-    written = [WRITERS[emitter.name].load()(content) for emitter in emitters]
+    written = [emitter.writer.load()(content) for emitter in emitters]
     for name in owned:
         if name.endswith("/"):
             real_folder(folder, name[:-1])

@@ -1,15 +1,14 @@
-"""The table of forms in which a database is served: the names and files of each.
+"""The table of emitters, the forms in which a database is served.
 
-A form is one frozen value. `emission.WRITERS` has the function that writes it, and
-`validation.database.CHECKERS` those that read and check its files; nothing else branches on a name.
-The tables are apart because the options and all writers need the names, and writers and checks need
-the options.
+Options, writing, validation and the command line go by the table, and nothing else branches on a
+name: a new form is a file with its functions and a declaration here.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from ptmtools.lazy import Lazy
+from ptmtools.output import names
+from ptmtools.output.emitter import Emitter
 from ptmtools.output.names import (
     CELL_FOLDER,
     GLTF_FILES,
@@ -22,56 +21,31 @@ from ptmtools.output.names import (
     VRML_FILES,
 )
 
-#: Suffix of a gzip copy.
-GZIP = ".gz"
-
-
-@dataclass(frozen=True)
-class Emitter:
-    """A form of the cells or of their textures.
-
-    Attributes
-    ----------
-    name: the name in `--format` and in the index of the hints.
-    about: a short description for help.
-    owns: files and folders in the served folder that belong to the form; a folder ends in a slash.
-        The files must exist once the form has been written.
-    entry: the file that leads to the others and that a browser opens, written last; "" for a form
-        that only clients of the hints read.
-    cell_files: template of the paths of the cells' geometry (`names.path_of`), if it has geometry.
-    texture_files: template of the folders of the textures' files, if it has a texture form of its
-        own (`names.texture_name`).
-    """
-
-    name: str
-    about: str
-    owns: tuple[str, ...]
-    entry: str = ""
-    cell_files: str = ""
-    texture_files: str = ""
-
-    def is_owner(self, path: str) -> bool:
-        """Whether a path in the served folder, or that of a gzip copy, belongs to the form."""
-        plain = path.removesuffix(GZIP)
-        return any(path.startswith(own) if own.endswith("/") else plain == own for own in self.owns)
-
-
 GLTF = Emitter(
-    name="gltf",
+    name=names.GLTF,
     about="a GLB of each cell, in gltf/",
     owns=(f"{GLTF_FOLDER}/",),
+    writer=Lazy("ptmtools.output.gltf:gltf_files"),
+    reader=Lazy("ptmtools.output.validation.gltf:read_file"),
+    check=Lazy("ptmtools.output.validation.gltf:check_files"),
     cell_files=GLTF_FILES,
 )
 INTERLACE = Emitter(
-    name="interlace",
+    name=names.INTERLACE,
     about="an interlaced image of each texture, in interlace/",
     owns=(f"{INTERLACE_FOLDER}/",),
+    writer=Lazy("ptmtools.output.interlacing:interlaced_files"),
+    reader=Lazy("ptmtools.output.interlacing:read_file"),
+    check=Lazy("ptmtools.output.interlacing:check_files"),
     texture_files=INTERLACE_FILES,
 )
 VRML = Emitter(
-    name="vrml",
+    name=names.VRML,
     about="VRML97 files",
     owns=(ROOT, f"{CELL_FOLDER}/"),
+    writer=Lazy("ptmtools.output.vrml:vrml_files"),
+    reader=Lazy("ptmtools.output.validation.vrml:read_file"),
+    check=Lazy("ptmtools.output.validation.vrml:check_files"),
     entry=ROOT,
     cell_files=VRML_FILES,
 )
@@ -79,6 +53,9 @@ _HINTS = Emitter(
     name="hints",
     about="hints.json, and a record and a first-look bundle of each cell",
     owns=(HINTS, f"{HINTS_FOLDER}/"),
+    writer=Lazy("ptmtools.output.hints:hints_files"),
+    reader=Lazy("ptmtools.output.validation.hints:read_file"),
+    check=Lazy("ptmtools.output.validation.hints:check_files"),
     entry=HINTS,
 )
 
@@ -99,10 +76,10 @@ def chosen_emitters(format: str) -> tuple[Emitter, ...]:
 
     Raises ValueError, with the reason, for an unknown name or none.
     """
-    names = set(format.split(","))
-    if unknown := sorted(names - set(EMITTERS)):
+    chosen = set(format.split(","))
+    if unknown := sorted(chosen - set(EMITTERS)):
         raise ValueError(f"{unknown[0]!r} is not one of {', '.join(EMITTERS)}")
-    return (*(emitter for name, emitter in EMITTERS.items() if name in names), *_ALWAYS)
+    return (*(emitter for name, emitter in EMITTERS.items() if name in chosen), *_ALWAYS)
 
 
 def owner_of(path: str) -> Emitter | None:

@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
 from ptmtools.output.convexity import portal_polygons, slack_of
-from ptmtools.output.emitters import chosen_emitters
 from ptmtools.output.first_look import FirstLooks
 from ptmtools.output.model import OctreeRecord, TextureRecord, Viewpoint
 from ptmtools.output.names import (
@@ -56,7 +55,7 @@ def index_text(content: Content) -> str:
     Raises DatabaseError: PTM-D601 a number is not finite.
     """
     space, cells = content.scene.space, content.cells
-    emitters = chosen_emitters(content.options.format)
+    emitters = content.emitters
     head: dict[str, Any] = {
         "format": FORMAT,
         "schema": SCHEMA,

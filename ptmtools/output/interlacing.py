@@ -20,9 +20,8 @@ from ptmtools.neighbours.interlace.reading import deinterlace, read_manifest, va
 from ptmtools.neighbours.interlace.steps import scaled
 from ptmtools.neighbours.interlace.writing import Written, interlace
 from ptmtools.output.content import Content
-from ptmtools.output.emitters import INTERLACE
 from ptmtools.output.model import TextureRecord
-from ptmtools.output.names import HINTS, INTERLACE_FILES, INTERLACE_FOLDER, texture_name
+from ptmtools.output.names import HINTS, INTERLACE, INTERLACE_FILES, INTERLACE_FOLDER, texture_name
 from ptmtools.output.validation.files import ServedDatabase
 from ptmtools.output.validation.textures import ReadTexture
 from ptmtools.parallel import ordered
@@ -85,10 +84,10 @@ def check_files(database: ServedDatabase) -> Mapping[str, int]:
     hints = database.hints
     if hints is None:
         return {}
-    template = hints.index.get("textureSets", {}).get(INTERLACE.name)
+    template = hints.index.get("textureSets", {}).get(INTERLACE)
     if template is None:
         database.at(HINTS, "textureSets").add(
-            "PTM-D700", f"does not name {INTERLACE.name}, whose files exist"
+            "PTM-D700", f"does not name {INTERLACE}, whose files exist"
         )
         return {}
     rows = hints.index["textures"]

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, ClassVar
 from ptmtools import schemas
 from ptmtools.errors import InputError
 from ptmtools.options import degrees_text, option
-from ptmtools.output.emitters import EMITTERS, chosen_emitters
 
 if TYPE_CHECKING:
     from ptmtools.cells.options import Walker
@@ -137,8 +136,11 @@ def _numbers(viewpoints: Sequence[GivenViewpoint]) -> list[tuple[float, ...]]:
 
 
 @dataclass(frozen=True)
-class EmitOptions:
-    """Options of `emit`. Raises InputError PTM-I111 for values out of range."""
+class WriterOptions:
+    """Options of the writers of served files.
+
+    Raises InputError PTM-I111 for values out of range.
+    """
 
     heading: ClassVar[str] = "Served files"
 
@@ -194,26 +196,9 @@ class EmitOptions:
         "Also write a gzip copy of each VRML and JSON file, for servers that send precompressed "
         "files.",
     )
-    format: str = option(
-        "vrml,gltf",
-        "Formats to write",
-        choices=EMITTERS,
-        several=True,
-        default_before=(5, "vrml"),
-        basic=True,
-    )
 
     def __post_init__(self) -> None:
         fault = ""
-        try:
-            emitters = chosen_emitters(self.format)
-            if not any(emitter.cell_files for emitter in emitters):
-                raise ValueError("none of them is of cells; add vrml or gltf")
-            chosen = {emitter.name for emitter in emitters}
-            names = ",".join(name for name in EMITTERS if name in chosen)
-            object.__setattr__(self, "format", names)
-        except ValueError as error:
-            fault = f"--format: {error}"
         if not 0 < self.field_of_view < math.pi:
             fault = (
                 f"a field of view of {degrees_text(self.field_of_view)}° is not between 0 and 180"
@@ -227,12 +212,17 @@ class EmitOptions:
         elif self.need < 0:
             fault = f"--need {self.need} is below 0"
         if fault:
-            raise InputError("PTM-I111", fault, remedy="leave the option out for its default")
+            raise refused(fault)
 
     def avatar(self, walker: Walker) -> Vector:
         """``avatar_size``, by default that of the walker."""
         eye = round(walker.height * EYE, 6)
         return self.avatar_size or (walker.radius, eye, walker.step)
+
+
+def refused(problem: str) -> InputError:
+    """The error for an option out of range."""
+    return InputError("PTM-I111", problem, remedy="leave the option out for its default")
 
 
 @dataclass(frozen=True)

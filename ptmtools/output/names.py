@@ -10,6 +10,8 @@ import re
 import unicodedata
 from pathlib import PurePosixPath
 
+#: Forms of the served files, in `--format` and in the index of the hints.
+VRML, GLTF, INTERLACE = "vrml", "gltf", "interlace"
 #: In the served folder.
 ROOT = "root.wrl"
 HINTS = "hints.json"

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
 from ptmtools.errors import InputError
-from ptmtools.output.model import EmitOptions, TextureRecord, Viewpoint, storey_name
+from ptmtools.output.model import TextureRecord, Viewpoint, WriterOptions, storey_name
 from ptmtools.output.standpoints import Ground, largest_leaves, places
 from ptmtools.output.views import Outlook
 from ptmtools.scene.model import Scene
@@ -121,7 +121,7 @@ _WIDEST = 3.0
 
 
 def place_viewpoints(
-    scene: Scene, cells: Cells, options: EmitOptions, textures: Sequence[TextureRecord] = ()
+    scene: Scene, cells: Cells, options: WriterOptions, textures: Sequence[TextureRecord] = ()
 ) -> tuple[tuple[Viewpoint, ...], tuple[str, ...]]:
     """The viewpoints of a database, the default one first, and notes on omitted ones. They face
     ``textures``; other textures are ignored.
@@ -190,7 +190,7 @@ def _heading(yaw: float) -> NDArray[np.float64]:
 
 
 def _standing(
-    cells: Cells, ground: Ground, position: NDArray[np.float64], options: EmitOptions
+    cells: Cells, ground: Ground, position: NDArray[np.float64], options: WriterOptions
 ) -> tuple[NDArray[np.float64], int]:
     """A place to stand at a position, and its cell, -1 for none; on the floor below if that is
     within reach."""
@@ -211,7 +211,7 @@ def _cell_to_stand_in(cells: Cells, position: NDArray[np.float64]) -> int:
 
 
 def _cameras(
-    scene: Scene, cells: Cells, ground: Ground, options: EmitOptions, notes: list[str]
+    scene: Scene, cells: Cells, ground: Ground, options: WriterOptions, notes: list[str]
 ) -> list[Viewpoint]:
     placed: list[Viewpoint] = []
     for camera in scene.cameras:
@@ -225,7 +225,9 @@ def _cameras(
     return placed
 
 
-def _given(cells: Cells, ground: Ground, outlook: Outlook, options: EmitOptions) -> list[Viewpoint]:
+def _given(
+    cells: Cells, ground: Ground, outlook: Outlook, options: WriterOptions
+) -> list[Viewpoint]:
     placed = []
     for i, given in enumerate(options.viewpoints):
         position, cell = _standing(cells, ground, np.array(given.position), options)
@@ -254,7 +256,7 @@ def _touring(
     cells: Cells,
     ground: Ground,
     outlook: Outlook,
-    options: EmitOptions,
+    options: WriterOptions,
     initial: Sequence[Viewpoint],
 ) -> list[Viewpoint]:
     """A viewpoint for each room without one, in the order of a walk from the first."""
@@ -299,7 +301,7 @@ def _storey_names(
     ]
 
 
-def _anywhere(cells: Cells, outlook: Outlook, options: EmitOptions) -> Viewpoint:
+def _anywhere(cells: Cells, outlook: Outlook, options: WriterOptions) -> Viewpoint:
     """A viewpoint in the middle of the largest leaf."""
     (leaf,) = largest_leaves(cells, 1)
     middle = cells.leaf_points(leaf).mean(axis=0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,9 +14,8 @@ from ptmtools.errors import InputError, OutputError
 from ptmtools.lazy import Lazy
 from ptmtools.output import EmitOptions, emit, validate_database
 from ptmtools.output.content import Content
-from ptmtools.output.emission import WRITERS
-from ptmtools.output.emitters import EMITTERS, Emitter, all_emitters, owner_of
-from ptmtools.output.validation.database import CHECKERS, Checker
+from ptmtools.output.emitter import Emitter
+from ptmtools.output.emitters import EMITTERS, all_emitters, owner_of
 from ptmtools.output.validation.files import ServedDatabase
 from tests.output.agreement import disagreements
 
@@ -23,6 +23,9 @@ TOY = Emitter(
     name="toy",
     about="how many shapes there are",
     owns=("toy.txt", "toys/"),
+    writer=Lazy(f"{__name__}:write_toy"),
+    reader=Lazy(f"{__name__}:read_toy"),
+    check=Lazy(f"{__name__}:check_toy"),
     entry="toy.txt",
 )
 
@@ -48,9 +51,6 @@ def check_toy(database: ServedDatabase) -> Mapping[str, int]:
 @pytest.fixture
 def toy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(EMITTERS, TOY.name, TOY)
-    monkeypatch.setitem(WRITERS, TOY.name, Lazy(f"{__name__}:write_toy"))
-    checker = Checker(Lazy(f"{__name__}:read_toy"), Lazy(f"{__name__}:check_toy"))
-    monkeypatch.setitem(CHECKERS, TOY.name, checker)
 
 
 @pytest.mark.usefixtures("toy")
@@ -82,7 +82,7 @@ def test_an_emitter_without_a_check(
     artifacts, tmp_path: Path, put_textures, seal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Only the hashes of its files are checked."""
-    monkeypatch.delitem(CHECKERS, TOY.name)
+    monkeypatch.setitem(EMITTERS, TOY.name, replace(TOY, reader=None, check=None))
     a, db = artifacts, tmp_path / "db"
     records = put_textures(db / "www")
     emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", EmitOptions(format="vrml,toy"))
@@ -125,10 +125,8 @@ def test_both_by_default_and_each_alone(artifacts, tmp_path: Path, put_textures)
 
 
 def test_each_emitter_has_a_writer_and_a_check() -> None:
-    names = {emitter.name for emitter in all_emitters()}
-    assert set(WRITERS) == set(CHECKERS) == names
-    for name in names:
-        for function in (WRITERS[name], CHECKERS[name].read, CHECKERS[name].check):
+    for emitter in all_emitters():
+        for function in (emitter.writer, emitter.reader, emitter.check):
             assert callable(function.load())
 
 

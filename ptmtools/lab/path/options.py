@@ -9,7 +9,7 @@ from typing import ClassVar
 from ptmtools.cells.options import Walker
 from ptmtools.errors import InputError
 from ptmtools.options import degrees_text, option
-from ptmtools.output.model import EmitOptions
+from ptmtools.output.model import WriterOptions
 
 #: Longest walk, seconds.
 DAY = 86_400.0
@@ -72,7 +72,7 @@ class PathOptions:
 
         Raises InputError PTM-I111 if it is not above a step, or too high for the visitor.
         """
-        eye = EmitOptions().avatar(walker)[1] if self.eye is None else self.eye
+        eye = WriterOptions().avatar(walker)[1] if self.eye is None else self.eye
         if not walker.step < eye <= walker.reach:
             raise _out_of_range(
                 f"--eye {eye:g} is not between a step, {walker.step:g} m, and the reach of eyes, "

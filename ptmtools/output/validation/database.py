@@ -1,8 +1,8 @@
 """The check of a database on disk, or of one `.ptm`: everything that a client may rely on.
 
 Each file is read once, compared with its hash in the manifest, and then with the other files, by
-the checks of the forms (`CHECKERS`). No issue ends the check: unreadable files are left out of the
-comparisons that need them.
+the checks of the forms (`Emitter.check`). No issue ends the check: unreadable files are left out of
+the comparisons that need them.
 
 Several threads read files, since decoding textures and hashing, most of the work, release the
 interpreter lock. Their issues are gathered in the order of the files.
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,16 +23,15 @@ from ptmtools import schemas
 from ptmtools.diagnostics import Findings, Place, ValidationReport, one_line
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.files import open_regular
-from ptmtools.lazy import Lazy
+from ptmtools.output.emitter import GZIP, Emitter
 from ptmtools.output.emitters import (
-    GZIP,
-    Emitter,
     all_emitters,
     chosen_emitters,
     owner_of,
 )
-from ptmtools.output.model import EmitOptions, FileError
+from ptmtools.output.model import FileError
 from ptmtools.output.names import HINTS, OCTREE_FOLDER, TEXTURE_FOLDER
+from ptmtools.output.options import EmitOptions
 from ptmtools.output.validation.files import ServedDatabase, check_gzip, check_names, served_files
 from ptmtools.output.validation.findings import CODES
 from ptmtools.output.validation.hints import gather
@@ -41,42 +40,6 @@ from ptmtools.progress import Progress, silent
 from ptmtools.quantities import count
 from ptmtools.store.layout import MANIFEST, SERVED
 from ptmtools.texture.model import Limits
-
-
-@dataclass(frozen=True)
-class Checker:
-    """The check of a form's files.
-
-    Attributes
-    ----------
-    read: function from (path in the served folder, bytes) of one file to its content for the check,
-        None if the check needs nothing of it; called from several threads. Raises FileError.
-    check: function from a `ServedDatabase` to those counts of the manifest that it knows, by name.
-    """
-
-    read: Lazy[Callable[[str, bytes], object | None]]
-    check: Lazy[Callable[[ServedDatabase], Mapping[str, int]]]
-
-
-#: Name of an emitter → the check of its files; of others only the hashes are checked.
-CHECKERS = {
-    "vrml": Checker(
-        Lazy("ptmtools.output.validation.vrml:read_file"),
-        Lazy("ptmtools.output.validation.vrml:check_files"),
-    ),
-    "gltf": Checker(
-        Lazy("ptmtools.output.validation.gltf:read_file"),
-        Lazy("ptmtools.output.validation.gltf:check_files"),
-    ),
-    "interlace": Checker(
-        Lazy("ptmtools.output.interlacing:read_file"),
-        Lazy("ptmtools.output.interlacing:check_files"),
-    ),
-    "hints": Checker(
-        Lazy("ptmtools.output.validation.hints:read_file"),
-        Lazy("ptmtools.output.validation.hints:check_files"),
-    ),
-}
 
 #: Foreign files listed by name in a note.
 _LISTED = 3
@@ -230,9 +193,9 @@ class FileReader:
             fallback = self._neighbour(f"{stem}.png")
             reading.content = read_texture(data, digest, fallback, self.limits, at)
             reading.intact &= reading.content is not None
-        elif emitter and (checker := CHECKERS.get(emitter.name)):
+        elif emitter and emitter.reader:
             try:
-                reading.content = checker.read.load()(path, data)
+                reading.content = emitter.reader.load()(path, data)
             except FileError as fault:
                 at.add(fault.code, fault.message, fault.place)
             reading.intact &= reading.content is not None
@@ -270,7 +233,9 @@ class _Check:
         self._read_manifest()
         served = served_files(self._folder / SERVED, self.findings)
         check_names(served, self.findings)
-        database = ServedDatabase(self._folder / SERVED, served, self.findings, self._limits)
+        database = ServedDatabase(
+            self._folder / SERVED, served, self.findings, self._limits, all_emitters()
+        )
         ours = {path for path in served if self._is_ours(path)}
         self._note_foreign([path for path in served if path not in ours])
         self._strays = any(f"{SERVED}/{path}" not in self._outputs for path in ours)
@@ -287,8 +252,8 @@ class _Check:
         database.hints = gather(database)
         counts: dict[str, int] = {}
         for emitter in present:
-            if checker := CHECKERS.get(emitter.name):
-                counts |= checker.check.load()(database)
+            if emitter.check:
+                counts |= emitter.check.load()(database)
         self._check_counts(_TEXTURES, _texture_counts(self._sizes, database))
         self._check_counts(_EMIT, counts)
         for path in sorted(ours - database.named):

@@ -16,6 +16,7 @@ from urllib.parse import unquote_to_bytes
 
 from ptmtools.diagnostics import Findings, Issue, Place
 from ptmtools.files import open_regular
+from ptmtools.output.emitter import Emitter
 from ptmtools.output.validation.textures import ReadTexture
 from ptmtools.store.layout import SERVED
 from ptmtools.texture.model import Limits
@@ -154,6 +155,7 @@ class ServedDatabase:
     folder: the served folder.
     files: all paths.
     limits: of the check.
+    emitters: all forms.
     contents: the result of the form's reader for each file that could be read.
     textures: each `.ptm` that could be read.
     hints: None without a readable index.
@@ -161,9 +163,14 @@ class ServedDatabase:
     """
 
     def __init__(
-        self, folder: Path, files: Iterable[str], findings: Findings, limits: Limits = _LIMITS
+        self,
+        folder: Path,
+        files: Iterable[str],
+        findings: Findings,
+        limits: Limits = _LIMITS,
+        emitters: Sequence[Emitter] = (),
     ) -> None:
-        self.folder, self.limits = folder, limits
+        self.folder, self.limits, self.emitters = folder, limits, emitters
         self.files = set(files)
         self.contents: dict[str, Any] = {}
         self.textures: dict[str, ReadTexture] = {}

@@ -12,9 +12,8 @@ import numpy as np
 from ptmtools.arrays import Floats
 from ptmtools.diagnostics import Place
 from ptmtools.errors import InputError
-from ptmtools.output.emitters import GLTF
 from ptmtools.output.gltf_reader import ReadGlb, ReadMaterial, ReadPrimitive, read_glb
-from ptmtools.output.names import CELL_FOLDER, GLTF_FOLDER, HINTS, UP, cell_name
+from ptmtools.output.names import CELL_FOLDER, GLTF, GLTF_FOLDER, HINTS, UP, cell_name
 from ptmtools.output.validation.files import ReadHints, ServedDatabase
 
 if TYPE_CHECKING:
@@ -45,7 +44,7 @@ def check_files(database: ServedDatabase) -> Mapping[str, int]:
     if hints is None:
         expected = _stems(files, CELL_FOLDER, ".wrl") or present
     else:
-        urls = hints.urls(GLTF.name) or ()
+        urls = hints.urls(GLTF) or ()
         expected = {posixpath.splitext(posixpath.basename(url))[0] for url in urls}
     for stem in sorted(expected ^ present):
         message = "is missing" if stem in expected else "belongs to no cell"

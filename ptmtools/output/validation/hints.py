@@ -12,7 +12,7 @@ import numpy as np
 
 from ptmtools import schemas
 from ptmtools.diagnostics import Place
-from ptmtools.output.emitters import EMITTERS
+from ptmtools.output.emitter import Emitter
 from ptmtools.output.hints import RECORD_FORMAT as FORMAT, SCHEMA
 from ptmtools.output.model import FileError, shaped
 from ptmtools.output.names import BUNDLE, HINTS, HINTS_FOLDER, STATISTICS, path_of
@@ -313,13 +313,13 @@ def _check_forms(hints: ReadHints, database: ServedDatabase) -> None:
     at, geometry = database.at(HINTS, "geometry"), hints.index["geometry"]
     if not geometry:
         at.add("PTM-D700", "names no form")
-    present = {form for form in EMITTERS if _is_present(form, len(hints.records), database)}
+    present = {e.name for e in database.emitters if _is_present(e, len(hints.records), database)}
     for form in sorted(present - set(geometry)):
         at.add("PTM-D700", f"does not name {form}, whose files exist")
     for form in sorted(set(geometry) - present):
         database.resolve_each(HINTS, "geometry", hints.urls(form) or ())
 
 
-def _is_present(form: str, cells: int, database: ServedDatabase) -> bool:
-    files = EMITTERS[form].cell_files
+def _is_present(emitter: Emitter, cells: int, database: ServedDatabase) -> bool:
+    files = emitter.cell_files
     return bool(files) and any(path_of(cell, files) in database.files for cell in range(cells))

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from ptmtools.diagnostics import Place
 from ptmtools.errors import DatabaseError
 from ptmtools.output.convexity import convex_hull
-from ptmtools.output.emitters import VRML
-from ptmtools.output.names import CELL_FOLDER, HINTS, ROOT
+from ptmtools.output.names import CELL_FOLDER, HINTS, ROOT, VRML
 from ptmtools.output.validation.files import ServedDatabase
 from ptmtools.output.validation.findings import check_graph, check_list, check_shares
 from ptmtools.output.validation.space import (
@@ -161,7 +160,7 @@ def _check_root(
 def _check_index(cells: Mapping[str, ReadCell], database: ServedDatabase) -> None:
     """The index names each cell's file, and no other."""
     hints = database.hints
-    urls = hints.urls(VRML.name) if hints else None
+    urls = hints.urls(VRML) if hints else None
     if urls is not None:
         database.resolve_each(HINTS, "cells", urls)
         for unlisted in sorted({f"{CELL_FOLDER}/{name}" for name in cells} - set(urls)):

@@ -7,7 +7,7 @@ from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 from ptmtools.diagnostics import warnings_in
-from ptmtools.output.model import EmitOptions
+from ptmtools.output.options import EmitOptions
 from ptmtools.pipeline.encoding import fallback_level, read_detail
 from ptmtools.pipeline.stage import Artifacts, Job, Stage
 from ptmtools.pipeline.stages.ach import ACH

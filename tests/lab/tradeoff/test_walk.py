@@ -20,7 +20,7 @@ from ptmtools.lab.tradeoff.report import said, sentence, settings_table as table
 from ptmtools.lab.tradeoff.walk import Seen, Tried, WalkTrade, begins_with, compared
 from ptmtools.lab.walk import Walk, read_walk
 from ptmtools.lab.world import World, prepare
-from ptmtools.output.model import EmitOptions
+from ptmtools.output import EmitOptions
 from ptmtools.output.served import read_served
 from ptmtools.pipeline import Artifacts, build_scene
 from ptmtools.pipeline.build import run_stage
