@@ -10,30 +10,24 @@ triangles within it.
 A name alone is not enough: a wall of 6 m called `wall_with_door`, a frame, a mat and a hatch in the
 floor are no slabs of that size, and a panel on a wall or a door open against it separates nothing.
 
-Rays from around a slab decide whether it closes an opening. Rays across the leaf meet a wall beside
-it and above it in both directions, as far apart as walls are thick. In front of the leaf, or behind
-it, are the reveals of the opening, below it is floor, and both sides have standing room. A panel in
-a wall has no reveals, one between two pillars no wall above, a cupboard door no wall beside it, a
-shutter no floor below, and a niche or a door on a wall has no room behind its back.
+Rays from around a slab decide whether it closes an opening (`doorways`).
 """
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, areas, cross, normals, summed
+from ptmtools.arrays import Bools, Floats, Ints, areas
+from ptmtools.cells.doorways import _GRID, RELIEF, Slabs, close_openings, free_on_both_sides
 from ptmtools.cells.facets import Facets, Welded
 from ptmtools.cells.options import SubdivideOptions
-from ptmtools.cells.planar import unite
 from ptmtools.cells.roles import Designated, connected_pieces, is_door_name, triangles_named
-from ptmtools.cells.search import ByHeight, Nearby, connected, distinct
-from ptmtools.cells.structure import Opaque, Structure, Surroundings
+from ptmtools.cells.search import Nearby, connected, distinct
+from ptmtools.cells.structure import Opaque, Structure
 from ptmtools.scene.model import Scene
 
 #: A leaf is thinner than this, metres,
@@ -44,31 +38,6 @@ WIDE, HIGH = (0.3, 2.4), (1.8, 3.0)
 FILLED = 0.5
 #: Leaves of a pair are nearer to one another than this, metres.
 PAIR = 0.03
-#: Range of widths of an opening, metres.
-OPENING_WIDTH = (0.6, 2.4)
-#: Rays look for the wall, or the frame, this far beside the leaf, metres.
-_BESIDE = 0.05
-#: How far the leaf may project from the wall, and the least depth of the reveals, metres.
-_PROUD, _REVEAL = 0.03, 0.02
-#: Largest gap to the jambs, the lintel and, on one side, the floor, metres: the other side may have
-#: a step, or no ground.
-_GAP = 0.05
-#: Panels and handles project from a leaf by less than this, and both sides are free as far as this,
-#: metres.
-RELIEF, _FREE = 0.06, 0.5
-#: Places along a side where rays begin, as shares of it, and the share of rays that must agree.
-_SHARES, _AGREEING = np.array([0.2, 0.5, 0.8]), 2 / 3
-#: A surface is square to a ray if the cosine between its normal and the ray is at least this.
-_SQUARE = 0.9
-_UP, _ASIDE = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])
-#: An upright slab leans by less than this (sine), and one that lies by less (cosine).
-_LEANS = 0.02
-#: Slabs whose axes across have a dot product of at least this are parallel.
-_PARALLEL = 0.99
-#: Slabs within this height, metres, are compared together.
-_STOREY = 1.0
-#: Points in each direction on a leaf.
-_GRID = 3
 
 
 @dataclass(frozen=True)
@@ -98,134 +67,6 @@ class DoorLeaf:
             for depth in (self.high[0] + beyond, self.low[0] - beyond)
         )
         return front, back
-
-
-@dataclass(frozen=True)
-class Slabs:
-    """k groups of triangles, each in a box along its own axes: across its flat sides, along, up."""
-
-    axes: Floats  # (k, 3, 3) across, along, up
-    low: Floats  # (k, 3) and
-    high: Floats  # (k, 3) the box along the axes, metres
-    corners: Floats  # (n, 3, 3) their triangles, metres
-    group: Ints  # (n,) the group of each, ascending from 0
-
-    @staticmethod
-    def of(corners: Floats, group: Ints) -> Slabs:
-        """Of (n, 3, 3) triangles in (n,) groups from 0, none empty."""
-        order = np.argsort(group, kind="stable")
-        corners, group = corners[order], group[order]
-        normal = normals(corners)
-        size = np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)
-        parts = (normal[:, :, None] * normal[:, None, :] / size[:, None, None]).reshape(-1, 9)
-        count = int(group.max(initial=-1)) + 1
-        tensor = np.stack([summed(group, part, count) for part in parts.T], axis=1)
-        across = np.linalg.eigh(tensor.reshape(-1, 3, 3))[1][:, :, 2]
-        upright = np.abs(across[:, 1]) <= _LEANS
-        across[upright, 1] = 0.0
-        across /= np.linalg.norm(across, axis=1, keepdims=True)
-        # One sign of the eigenvector, whichever rounding gave.
-        across *= np.where(across @ [0.6, 0.5, 0.62] < 0, -1.0, 1.0)[:, None]
-        lies = np.abs(across[:, 1]) > 1 - _LEANS
-        along = cross(np.where(lies[:, None], _ASIDE, _UP), across)
-        along /= np.linalg.norm(along, axis=1, keepdims=True)
-        return Slabs._along(np.stack([across, along, cross(across, along)], axis=1), corners, group)
-
-    @staticmethod
-    def _along(axes: Floats, corners: Floats, group: Ints) -> Slabs:
-        local = np.einsum("nck,nak->nca", corners, axes[group])
-        begin = np.searchsorted(group, np.arange(len(axes)))
-        if not len(begin):
-            return Slabs(axes, np.zeros((0, 3)), np.zeros((0, 3)), corners, group)
-        low = np.minimum.reduceat(local.min(axis=1), begin)
-        high = np.maximum.reduceat(local.max(axis=1), begin)
-        return Slabs(axes, low, high, corners, group)
-
-    def __len__(self) -> int:
-        return len(self.axes)
-
-    @property
-    def size(self) -> Floats:
-        """(k, 3) metres across, along and up."""
-        return self.high - self.low
-
-    @property
-    def upright(self) -> Bools:
-        """(k,) which slabs are upright."""
-        return np.asarray(self.axes[:, 0, 1] == 0)
-
-    def only(self, which: Bools) -> Slabs:
-        """The slabs ``which``, (k,)."""
-        row = np.flatnonzero(which)
-        place = np.cumsum(which) - 1
-        kept = which[self.group]
-        group = place[self.group[kept]]
-        return Slabs(self.axes[row], self.low[row], self.high[row], self.corners[kept], group)
-
-    def joined(self, other: Slabs) -> Slabs:
-        """These slabs, then the others."""
-        return Slabs(
-            np.concatenate([self.axes, other.axes]),
-            np.concatenate([self.low, other.low]),
-            np.concatenate([self.high, other.high]),
-            np.concatenate([self.corners, other.corners]),
-            np.concatenate([self.group, other.group + len(self)]),
-        )
-
-    def merged(self, whole: Ints) -> Slabs:
-        """One for each of (k,) names, from 0, along the axes of the largest of its slabs."""
-        size = self.size
-        order = np.lexsort((np.arange(len(self)), -size[:, 1] * size[:, 2], whole))
-        first = order[np.unique(whole[order], return_index=True)[1]]
-        group = whole[self.group]
-        row = np.argsort(group, kind="stable")
-        return Slabs._along(self.axes[first], self.corners[row], group[row])
-
-    def near(self, gap: float) -> Ints:
-        """(p, 2) pairs, each once, of parallel slabs whose world-aligned boxes in plan, and whose
-        heights, are less than a gap apart."""
-        if not len(self):
-            return np.zeros((0, 2), dtype=np.int64)
-        begin = np.searchsorted(self.group, np.arange(len(self)))
-        low = np.minimum.reduceat(self.corners.min(axis=1), begin)
-        high = np.maximum.reduceat(self.corners.max(axis=1), begin)
-        plan = shapely.box(low[:, 0], low[:, 2], high[:, 0], high[:, 2])
-        by_height, storey = ByHeight(low[:, 1], high[:, 1]), np.floor(low[:, 1] / _STOREY)
-        pairs = []
-        for name in np.unique(storey):
-            here = np.flatnonzero(storey == name)
-            about = by_height.between(low[here, 1].min() - gap, high[here, 1].max() + gap)
-            one, other = shapely.STRtree(plan[about]).query(plan[here], "dwithin", distance=gap)
-            pairs.append(np.stack([here[one], about[other]], axis=1))
-        pair = np.concatenate(pairs)
-        pair = np.unique(np.sort(pair[pair[:, 0] != pair[:, 1]], axis=1), axis=0)
-        apart = np.maximum(low[pair[:, 0], 1], low[pair[:, 1], 1]) - np.minimum(
-            high[pair[:, 0], 1], high[pair[:, 1], 1]
-        )
-        pair = pair[apart <= gap]
-        across = self.axes[pair, 0]
-        turn = np.abs(np.einsum("pk,pk->p", across[:, 0], across[:, 1]))
-        return np.asarray(pair[turn >= _PARALLEL])
-
-    def overlaps(self, one: Ints, other: Ints) -> Floats:
-        """(p, 3) how far the boxes of parallel slabs overlap across, along and up, metres, both in
-        the axes of the first; negative where they are apart."""
-        bits = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T
-        ends = np.where(bits[None] == 1, self.high[other, None], self.low[other, None])
-        world = np.einsum("pca,pak->pck", ends, self.axes[other])
-        local = np.einsum("pck,pak->pca", world, self.axes[one])
-        low = np.maximum(local.min(axis=1), self.low[one])
-        result: Floats = np.minimum(local.max(axis=1), self.high[one]) - low
-        return result
-
-    def filled(self, grid: float) -> Floats:
-        """(k,) the share of its rectangle, along and up, that each fills, united on a ``grid``."""
-        flat = np.einsum("nck,nak->nca", self.corners, self.axes[self.group][:, 1:])
-        begin = np.searchsorted(self.group, np.arange(len(self) + 1))
-        united = [unite(flat[a:b], grid) for a, b in itertools.pairwise(begin)]
-        area = self.size[:, 1] * self.size[:, 2]
-        share = np.divide(shapely.area(united), area, out=np.zeros(len(self)), where=area > 0)
-        return np.asarray(share)
 
 
 def find_doors(
@@ -399,117 +240,3 @@ def _repeated(corners: Floats, which: Bools) -> Bools:
     _, point = distinct(corners.reshape(-1, 3))
     _, row = distinct(np.sort(point.reshape(-1, 3), axis=1))
     return np.isin(row[which], row[~which])
-
-
-def close_openings(slabs: Slabs, structure: Structure, wall_thickness: float) -> Bools:
-    """(k,) which slabs, each a leaf or a pair of them, close an opening in a wall of at most this
-    thickness, metres."""
-    slack = structure.tolerance.plane
-    wide = slabs.size[:, 1]
-    fits = (wide >= OPENING_WIDTH[0] - slack) & (wide <= OPENING_WIDTH[1] + slack)
-    result = np.zeros(len(slabs), dtype=bool)
-    if fits.any():
-        rays = _Rays(slabs.only(fits), Surroundings(structure.corners, structure.tolerance))
-        result[fits] = _closes_by_rays(rays, wall_thickness)
-    return result
-
-
-def free_on_both_sides(slabs: Slabs, structure: Structure) -> Bools:
-    """(k,) which slabs have room on both sides, unlike a door on a wall or open against it."""
-    if not (len(slabs) and len(structure.corners)):
-        return np.ones(len(slabs), dtype=bool)
-    return _Rays(slabs, Surroundings(structure.corners, structure.tolerance)).free()
-
-
-def _closes_by_rays(rays: _Rays, wall_thickness: float) -> Bools:
-    half = rays.size[:, 0] / 2
-    walls = [_wall(rays, *side, half, wall_thickness) for side in _SIDES]
-    result: Bools = np.all([np.isfinite(ahead) for ahead, _ in walls], axis=0)
-    revealed, floors = np.zeros(len(result), dtype=bool), []
-    for k, turn in ((0, 1.0), (1, -1.0)):
-        depth = np.minimum(walls[0][k], walls[1][k]) - half
-        depth = np.where(np.isfinite(depth), depth, 0.0)
-        revealed |= (depth >= _REVEAL) & _revealed(rays, turn * (half + depth / 2))
-        room = np.maximum(walls[0][k], walls[1][k])
-        room = np.where(np.isfinite(room), room, 0.0) + 2 * _GAP
-        below = rays.at(turn * room, _SHARES, np.zeros(3), above=2 * _GAP)
-        floors.append(np.median(rays.meet(below, (0, 0, -1))[0], axis=1) - 2 * _GAP)
-    result &= revealed & (np.minimum(*floors) <= _GAP) & rays.free()
-    return result
-
-
-def _wall(
-    rays: _Rays, along: Floats, up: Floats, aside: float, above: float, half: Floats, limit: float
-) -> tuple[Floats, Floats]:
-    """(k,) and (k,): metres from the middle of the leaf ahead and back to the faces of the wall at
-    one of its sides; infinite where there is no wall."""
-    start = rays.at(np.zeros(len(half)), along, up, aside, above)
-    (ahead, square), (behind, squared) = (rays.meet(start, (turn, 0, 0)) for turn in (1, -1))
-    within = np.minimum(ahead, behind) >= half[:, None] - _PROUD
-    wall = within & square & squared & (ahead + behind <= limit)
-    stands = wall.mean(axis=1) >= _AGREEING
-    first, second = (np.where(wall, far, 0.0).max(axis=1) for far in (ahead, behind))
-    return np.where(stands, first, np.inf), np.where(stands, second, np.inf)
-
-
-def _revealed(rays: _Rays, depth: Floats) -> Bools:
-    """(k,) which leaves have the sides and the top of an opening in front of them, (k,) metres
-    from the middle of each."""
-    result = np.ones(len(depth), dtype=bool)
-    middle = rays.at(depth, np.full(3, 0.5), _SHARES)
-    for turn in (1, -1):
-        far, square = rays.meet(middle, (0, turn, 0))
-        jamb = square & (np.abs(far - rays.size[:, 1, None] / 2) <= _GAP)
-        result &= jamb.mean(axis=1) >= _AGREEING
-    top = rays.at(depth, _SHARES, np.ones(3), above=-2 * _GAP)
-    far, square = rays.meet(top, (0, 0, 1))
-    result &= (square & (far <= 3 * _GAP)).mean(axis=1) >= _AGREEING
-    return result
-
-
-#: Rays to the wall around a leaf: shares along and up, and metres beyond them.
-_SIDES: tuple[tuple[Floats, Floats, float, float], ...] = (
-    (np.zeros(3), _SHARES, -_BESIDE, 0.0),
-    (np.ones(3), _SHARES, _BESIDE, 0.0),
-    (_SHARES, np.ones(3), 0.0, _BESIDE),
-)
-
-
-#: Points all over a leaf: shares along and up.
-_SHARES_ALL_OVER = np.repeat(_SHARES, 3), np.tile(_SHARES, 3)
-
-
-class _Rays:
-    """Rays from around slabs, in the axes of each."""
-
-    def __init__(self, slabs: Slabs, around: Surroundings) -> None:
-        self._slabs, self._around = slabs, around
-        self.size = slabs.size
-
-    def at(
-        self, depth: Floats, along: Floats, up: Floats, aside: float = 0.0, above: float = 0.0
-    ) -> Floats:
-        """(k, p, 3) points (k,) metres across from the middle of each slab, at (p,) shares of its
-        extents along and up, and metres beyond these."""
-        low, size = self._slabs.low[:, None], self.size[:, None]
-        across = low[..., 0] + size[..., 0] / 2 + depth[:, None] + 0 * along
-        along = low[..., 1] + along * size[..., 1] + aside
-        return np.stack([across, along, low[..., 2] + up * size[..., 2] + above], axis=2)
-
-    def free(self) -> Bools:
-        """(k,) which slabs have room in front of them and behind."""
-        result = np.ones(len(self.size), dtype=bool)
-        for turn in (1, -1):
-            ahead = self.at(turn * (self.size[:, 0] / 2 + RELIEF), *_SHARES_ALL_OVER)
-            result &= (self.meet(ahead, (turn, 0, 0))[0] >= _FREE).mean(axis=1) >= _AGREEING
-        return result
-
-    def meet(self, start: Floats, to: tuple[float, float, float]) -> tuple[Floats, Bools]:
-        """(k, p) metres to the first surface that rays from (k, p, 3) points meet, and whether it
-        is square to them."""
-        axes = self._slabs.axes
-        points = np.einsum("kpa,kac->kpc", start, axes)
-        along = np.broadcast_to((np.array(to) @ axes)[:, None], points.shape)
-        far, facing = self._around.first(points.reshape(-1, 3), along.reshape(-1, 3))
-        square = np.abs(np.einsum("pc,pc->p", facing, along.reshape(-1, 3))) >= _SQUARE
-        return far.reshape(start.shape[:2]), square.reshape(start.shape[:2])

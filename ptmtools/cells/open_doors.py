@@ -24,7 +24,8 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.bsp import Tree
-from ptmtools.cells.doors import RELIEF, DoorLeaf, find_doors
+from ptmtools.cells.doors import DoorLeaf, find_doors
+from ptmtools.cells.doorways import RELIEF
 from ptmtools.cells.model import descend
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.places import Floors, detail_of, spread

@@ -12,6 +12,7 @@ from ptmtools.cli.console import Console
 from ptmtools.cli.parameters import (
     Command,
     database_argument,
+    file_option,
     force_option,
     json_option,
     option,
@@ -226,22 +227,8 @@ def walk_campus(
     help="Also measure FLIP, the perceived difference, in 12 frames of each run. This takes "
     "seconds per run.",
 )
-@option(
-    "--csv",
-    "csv_file",
-    heading="Output",
-    type=click.Path(),
-    metavar="FILE",
-    help="Also write all frames as CSV.",
-)
-@option(
-    "--plot",
-    "plot_file",
-    heading="Output",
-    type=click.Path(),
-    metavar="FILE",
-    help="Also plot --measure over time, as a PNG.",
-)
+@file_option("csv", "Also write all frames as CSV.")
+@file_option("plot", "Also plot --measure over time, as a PNG.")
 @option(
     "--measure",
     heading="Output",
@@ -265,13 +252,9 @@ def walk_campus(
     metavar="SECONDS",
     help="Interval between the frames of --frames.",
 )
-@option(
-    "--strip",
-    "strip_file",
-    heading="Output",
-    type=click.Path(),
-    metavar="FILE",
-    help="Also draw one PNG with the pictures at the start of the walk after 10, 35 and 80 s, "
+@file_option(
+    "strip",
+    "Also draw one PNG with the pictures at the start of the walk after 10, 35 and 80 s, "
     "and the full picture, for the same run as --frames.",
 )
 @force_option()

@@ -343,6 +343,18 @@ json_option = option("--json", "as_json", is_flag=True, help="Print the report a
 database_argument = click.argument("db", type=click.Path())
 
 
+def file_option(name: str, text: str) -> Decorator:
+    """``--NAME FILE`` for a further file to write, as ``NAME_file``."""
+    return option(
+        f"--{name}",
+        f"{name}_file",
+        heading="Output",
+        type=click.Path(),
+        metavar="FILE",
+        help=text,
+    )
+
+
 def force_option(text: str = "Replace existing files.") -> Decorator:
     """``--force``."""
     return option("--force", is_flag=True, help=text)

@@ -13,6 +13,7 @@ from ptmtools.cli.console import Console
 from ptmtools.cli.parameters import (
     Command,
     database_argument,
+    file_option,
     force_option,
     json_option,
     option,
@@ -99,22 +100,8 @@ DURATION, QUICK = 60.0, 30.0
     help="Sample points per cell of the reference for coverage hints. Only settings with fewer "
     "points are tried.",
 )
-@option(
-    "--csv",
-    "csv_file",
-    heading="Output",
-    type=click.Path(),
-    metavar="FILE",
-    help="Also write all trials as CSV.",
-)
-@option(
-    "--plot",
-    "plot_file",
-    heading="Output",
-    type=click.Path(),
-    metavar="FILE",
-    help="Also plot error against cost, as a PNG.",
-)
+@file_option("csv", "Also write all trials as CSV.")
+@file_option("plot", "Also plot error against cost, as a PNG.")
 @force_option()
 @json_option
 @with_console

@@ -189,7 +189,8 @@ def _shade_plain(sight: Sight, triangles: Triangles, shown: Floats) -> None:
     plain = plain[triangles.texture[sight.triangle[plain]] < 0]
     normal, ray = triangles.normal[sight.triangle[plain]], sight.ray[plain]
     length = np.linalg.norm(normal, axis=1) * np.linalg.norm(ray, axis=1)
-    facing = np.abs(np.einsum("ij,ij->i", normal, ray)) / np.maximum(length, 1e-300)
+    along = np.abs(np.einsum("ij,ij->i", normal, ray))
+    facing = np.divide(along, length, out=np.zeros(len(along)), where=length > 0)
     shown[plain] *= (_AMBIENT + (1 - _AMBIENT) * facing)[:, None]
 
 
