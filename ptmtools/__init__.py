@@ -1,13 +1,12 @@
 """ptmtools: architectural scenes that stream.
 
 The functions here are the commands of `ptm`: `build_scene` builds a database from a model,
-`run_stage` runs one stage of it, `ingest`, `subdivide`, `compute_pvs`, `compute_ach` and `emit`
-are what the stages do, `encode` and `decode` turn one image into a `.ptm` and back, `open` reads
-one level by level, `validate` and `plot_plan` look at the result.
-Each has a frozen class of options, which holds the defaults. Whatever a user can cause raises a
-`PtmError`.
+`run_stage` runs one stage of it, `ingest`, `subdivide`, `compute_pvs`, `compute_ach` and `emit` are
+the stages, `encode` and `decode` turn one image into a `.ptm` and back, `open` reads one level by
+level, `validate` and `plot_plan` look at the result. Each has a frozen class of options, which
+holds the defaults. Every failure that a user can cause raises a `PtmError`.
 
-All of it is loaded when first used.
+Names are imported when first used.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Arrays by what their elements are, in short.
+"""Short names of array types by their elements.
 
 Products of vectors, and the triangles and tetrahedra that they span."""
 
@@ -17,8 +17,8 @@ Bools = NDArray[np.bool_]
 
 
 def cross(a: Floats, b: Floats) -> Floats:
-    """The cross product of (…, 3) vectors: `numpy.cross`, which for a few of them spends four
-    fifths of its time on the axes that it allows for."""
+    """The cross product of (…, 3) vectors. `numpy.cross` spends four fifths of its time for a few
+    of them on the axes that it supports."""
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
     bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
     result = np.empty(np.broadcast_shapes(a.shape, b.shape))

@@ -127,9 +127,9 @@ class Cluster(Executor):
         def submit(some: list[Any]) -> Future[Outcome]:
             call = pickle.dumps((function, some), 5)
             with self._losses():
-                there = self._client.submit(_perform, value, call, alone, software(), pure=False)
+                remote = self._client.submit(_perform, value, call, alone, software(), pure=False)
                 # Results are fetched as soon as they are ready, many at a time.
-                return asyncio.run_coroutine_threadsafe(_fetched(there), loop)
+                return asyncio.run_coroutine_threadsafe(_fetch(remote), loop)
 
         loop = self._client.loop.asyncio_loop
         for left in range(AGAIN, -1, -1):
@@ -209,8 +209,8 @@ class Cluster(Executor):
                 raise _other_software(worker, answer)
 
 
-async def _fetched(there: Any) -> Any:
-    return await there
+async def _fetch(remote: Any) -> Any:
+    return await remote
 
 
 def _other_software(worker: str, difference: str) -> WorkerError:

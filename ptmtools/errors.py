@@ -1,8 +1,8 @@
 """The error tree: every failure that a user can cause, with a stable code and an exit status.
 
-The command prints one line, ``ptm: FILE: PLACE: what is wrong: remedy [CODE]``, and exits with
-the status of the error's class. Codes never change their meaning. A code stands for a kind of
-failure that a program or a page of the docs tells apart; the message names the case.
+The command prints one line, ``ptm: FILE: PLACE: problem: remedy [CODE]``, and exits with the
+status of the error's class. Codes never change their meaning. A code stands for a kind of failure
+that programs and the docs distinguish; the message names the case.
 
 ========  ======================================================================
 status    meaning
@@ -10,15 +10,15 @@ status    meaning
 0         done
 1         an internal error: a bug in ptmtools
 2         the command line is wrong (Click's own status)
-3         an input cannot be read or is not what it should be (`InputError`)
+3         an input cannot be read or is invalid (`InputError`)
 4         an output cannot be written (`OutputError`)
 5         a database is damaged or of another version (`DatabaseError`)
 6         something that is not installed is needed (`MissingComponentError`)
 7         an input is beyond a limit (`LimitError`)
 8         a check found errors (``ptm validate``)
-9         processes or machines that should help cannot, or no longer (`WorkerError`)
+9         worker processes or machines are unavailable or have ended (`WorkerError`)
 130       interrupted
-141       the reader of the output went away
+141       the reader of the output has ended
 ========  ======================================================================
 """
 
@@ -47,10 +47,10 @@ class PtmError(Exception):
     Parameters
     ----------
     code: stable identifier such as ``"PTM-I101"``.
-    message: what is wrong, one line, no trailing full stop.
+    message: the problem, one line, no trailing full stop.
     file: the file in question, if there is one.
     place: where in the file ("line 12", "level 3", "byte 40"), if known.
-    remedy: what the user can do about it, if anything can be said.
+    remedy: the user's possible action, if known.
     """
 
     exit_status = 1
@@ -80,7 +80,7 @@ class PtmError(Exception):
         return f"{what} [{self.code}]".replace("\r", " ").replace("\n", " ")
 
     def __reduce__(self) -> tuple[object, ...]:
-        """For errors that come from other processes: what else is needed than ``args``."""
+        """Pickles errors of other processes with the attributes that ``args`` lacks."""
         return _restored, (type(self), str(self)), vars(self)
 
 
@@ -89,13 +89,13 @@ def _restored(kind: type[PtmError], text: str) -> PtmError:
 
 
 class InputError(PtmError):
-    """An input cannot be read, or is not what it should be. Codes PTM-Ixxx."""
+    """An input cannot be read or is invalid. Codes PTM-Ixxx."""
 
     exit_status = 3
 
 
 class OutputError(PtmError):
-    """An output cannot be written, or would overwrite what is not ours. Codes PTM-Oxxx."""
+    """An output cannot be written, or would overwrite foreign files. Codes PTM-Oxxx."""
 
     exit_status = 4
 
@@ -125,14 +125,14 @@ class CheckError(PtmError):
 
 
 class WorkerError(PtmError):
-    """Processes or machines that should help cannot be had, or have ended. Codes PTM-Wxxx."""
+    """Worker processes or machines are unavailable or have ended. Codes PTM-Wxxx."""
 
     exit_status = 9
 
 
 @contextmanager
 def naming(file: str | PathLike[str] | None = None, *, place: str | None = None) -> Iterator[None]:
-    """Errors that come out of this know which file they are about, and which place in it."""
+    """Adds the file, and the place in it, to errors raised in the block that lack them."""
     try:
         yield
     except PtmError as error:

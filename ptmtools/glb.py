@@ -1,7 +1,7 @@
 r"""What readers and writers of glTF 2.0 share: the container GLB, and the numbers of a buffer.
 
-Sections 3.6.1, 3.6.2 and 4.4 of the specification. Everything that a file says is held against the
-bytes that are there before an array is made. A GLB is a header, a chunk of JSON, a chunk of bytes:
+Sections 3.6.1, 3.6.2 and 4.4 of the specification. Every declared size is checked against the
+file's bytes before an array is created. A GLB is a header, a chunk of JSON, a chunk of bytes:
 
 =======  ==========================================================
 offset   little-endian uint32
@@ -46,7 +46,7 @@ def glb(chunks: Iterable[tuple[bytes, bytes]]) -> bytes:
 def glb_chunks(data: bytes) -> list[tuple[bytes, int, bytes]]:
     """(kind, offset, bytes with padding) of the chunks of a GLB, the first of them JSON.
 
-    Raises ValueError with what is wrong, and where.
+    Raises ValueError with the fault and its place.
     """
     if not data.startswith(MAGIC):
         raise ValueError("the magic bytes are missing", "byte 0")
@@ -91,7 +91,7 @@ def elements(
 
 
 def meaning(stored: NDArray[Any], normalized: bool) -> NDArray[np.float64]:
-    """What stored numbers mean: normalised integers are shares (section 3.6.2.2)."""
+    """The values of stored numbers: normalised integers are shares (section 3.6.2.2)."""
     values = stored.astype(np.float64)
     if normalized and stored.dtype.kind != "f":
         values = np.maximum(values / np.iinfo(stored.dtype).max, -1.0)
@@ -121,7 +121,7 @@ class BufferWriter:
         self._size = 0
 
     def positions(self, point: NDArray[np.floating[Any]]) -> int:
-        """(n, 3), with the bounds that glTF wants of them."""
+        """(n, 3), with the bounds that glTF requires."""
         held = point.astype("<f4")
         bounds = {"min": _numbers(held.min(axis=0)), "max": _numbers(held.max(axis=0))}
         return self._attribute(held, bounds)
@@ -135,7 +135,7 @@ class BufferWriter:
         return self._attribute(values.astype("<u2"), {"normalized": True})
 
     def indices(self, triangle: NDArray[np.integer[Any]], vertices: int) -> int:
-        """(m, 3) indices into so many vertices."""
+        """(m, 3) indices, below the number of ``vertices``."""
         kind, form = (SHORT, "<u2") if vertices <= _NARROW else (INT, "<u4")
         accessor = {"componentType": kind, "count": triangle.size, "type": "SCALAR"}
         return self._append(accessor, triangle.astype(form).tobytes(), _INDICES)

@@ -180,12 +180,12 @@ def _digest(file: Path) -> str:
 @cache
 def _imports(file: Path) -> frozenset[Path]:
     """The modules of the package that a module imports."""
-    found = set()
+    modules = set()
     for module, names, whole in _IMPORT.findall(file.read_text()):
         # A name may be a module of a package, or defined in a module.
         for name in re.findall(r"\w+", re.sub(r"#.*| as \w+", "", names)) or [""]:
-            found.add(_module(f"{module}.{name}") or _module(module or whole))
-    return frozenset(one for one in found if one)
+            modules.add(_module(f"{module}.{name}") or _module(module or whole))
+    return frozenset(one for one in modules if one)
 
 
 @cache

@@ -45,7 +45,7 @@ def read_trace(path: str | PathLike[str]) -> Trace:
 
     Raises
     ------
-    InputError: PTM-I710 it is no trace: not as the schema says, or nothing ever gets through.
+    InputError: PTM-I710 it is no trace: it does not match the schema, or transmits nothing.
     LimitError: PTM-L204 it is larger than `LARGEST`.
     OSError: it cannot be read.
     """
@@ -76,7 +76,7 @@ def read_trace(path: str | PathLike[str]) -> Trace:
 
 
 def _table(data: bytes) -> dict[str, Any]:
-    """The document that says the same as a CSV file; an empty field is one left out."""
+    """The JSON document equivalent to a CSV file; an empty field is left out."""
     try:
         lines = data.decode("utf-8-sig").splitlines()
         header, *rows = list(csv.reader(lines, strict=True)) or [[]]

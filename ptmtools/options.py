@@ -64,8 +64,8 @@ def option(default: Any, help: str, *, compare: bool = True, **details: Any) -> 
 
 def option_of(field: Field[Any]) -> Option:
     """The metadata of a field; empty if it was not declared by `option`."""
-    found: Option = field.metadata.get(_KEY, Option())
-    return found
+    own: Option = field.metadata.get(_KEY, Option())
+    return own
 
 
 def option_name(field: Field[Any]) -> str:

@@ -4,8 +4,8 @@
     ptmtools.pillow.register()
     image = Image.open("wall.ptm")
 
-Opening reads the head alone; texels are decoded when they are asked for. `draft` and `reduce`
-choose a coarser level before that, of which the finer groups are neither read nor decoded.
+Opening reads the head alone; texels are decoded on access. `draft` and `reduce`
+choose a coarser level before that; finer groups are then neither read nor decoded.
 
 ==========================  ==========  =======================================================
 samples                     components  mode
@@ -23,9 +23,9 @@ A file cut short opens, and decodes up to its last whole level. A finer one rais
 is loaded, unless ``PIL.ImageFile.LOAD_TRUNCATED_IMAGES`` is set: then it is the finest whole level,
 each texel repeated.
 
-Where profile and orientation are damaged, that is a warning, and texels are decoded without them.
-Errors have Pillow's classes, and the code of ours in the message. HP's Polynomial Texture Maps,
-which share the suffix, are not taken for ours.
+A damaged profile or orientation is a warning, and texels are decoded without them. Errors have
+Pillow's classes and our codes in the message. HP's Polynomial Texture Maps, which share the suffix,
+are not taken for ours.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ _OPTIONS = tuple(field.name for field in fields(EncodeOptions))
 class PtmImageFile(ImageFile.ImageFile):
     """One level of a `.ptm`, the finest unless another is chosen before it is loaded.
 
-    ``info`` has ``ptm``, the file's `ptmtools.texture.PtmHeader`, and where the file says so
+    ``info`` has ``ptm``, the file's `ptmtools.texture.PtmHeader`, and, if the file has them,
     ``icc_profile``, ``srgb``, ``gamma``, ``chromaticity`` (as Pillow's PNG) and ``exif`` with the
     orientation, which is not applied (`PIL.ImageOps.exif_transpose` does).
     """
@@ -182,7 +182,7 @@ class PtmImageFile(ImageFile.ImageFile):
             return self._ptm.level(self._chosen)
         texels = self._ptm.level(whole - 1)
         width, height = self.size
-        # As many as the level below has for each, and the last for what is odd.
+        # As many as the level below has for each; the last is repeated for an odd size.
         steps = self._chosen - (whole - 1)
         rows = np.minimum(np.arange(height) >> steps, texels.shape[0] - 1)
         columns = np.minimum(np.arange(width) >> steps, texels.shape[1] - 1)
@@ -247,7 +247,7 @@ def _save(im: Image.Image, fp: IO[bytes], filename: str | bytes) -> None:
 
 
 def _description(im: Image.Image, given: Mapping[str, Any]) -> Description:
-    """What the image says of itself, unless the arguments of ``save`` override it."""
+    """The image's own description, unless the arguments of ``save`` override it."""
     kept = described(im)
     if "icc_profile" in given:
         kept = replace(kept, icc=given["icc_profile"] or None)
@@ -281,7 +281,7 @@ def _rows(im: Image.Image) -> Rows:
 
 
 def _colour_key(im: Image.Image) -> tuple[int, ...] | None:
-    """The colour that stands for what is not there, as PNG and GIF have it."""
+    """The colour that stands for transparent pixels, as in PNG and GIF."""
     key = im.info.get("transparency")
     if im.mode not in ("L", "RGB") and not im.mode.startswith("I;16"):
         return None
@@ -292,7 +292,7 @@ def _colour_key(im: Image.Image) -> tuple[int, ...] | None:
 
 @contextmanager
 def _pillow_errors(kind: type[Exception] = OSError) -> Iterator[None]:
-    """What we raise becomes an OSError, which Pillow's users expect, or another class."""
+    """Turns our errors into OSError, which Pillow's users expect, or another class."""
     try:
         yield
     except PtmError as error:

@@ -1,7 +1,7 @@
 """The progress of long operations: a function that the caller passes.
 
 ``progress(done, total, unit)`` is called from the thread that runs the operation; the default,
-`silent`, does nothing. Listeners are told of waits that cannot be counted.
+`silent`, does nothing. The module also reports waits that cannot be counted.
 """
 
 from __future__ import annotations

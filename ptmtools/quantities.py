@@ -1,4 +1,4 @@
-"""Numbers as people read and write them."""
+"""Formats and parses numbers with units: bytes, bandwidths, times."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _BYTES |= {f"{prefix}B": 1000**n for n, prefix in enumerate(("k", "M", "G"), 1)}
 _BYTES |= {f"{prefix}iB": 1024**n for n, prefix in enumerate(("K", "M", "G"), 1)}
 _BITS = {"": 1, "k": 10**3, "M": 10**6, "G": 10**9}
 _SECONDS: dict[str, int | Fraction] = {"": 1, "s": 1, "ms": Fraction(1, 1000)}
-#: A number of so many digits is a slip.
+#: A number of more digits is a mistake.
 _DIGITS = 18
 _QUANTITY = re.compile(rf"(\d{{1,{_DIGITS}}}(?:\.\d{{0,{_DIGITS}}})?) *([a-zA-Z]*|%)", re.ASCII)
 
@@ -56,14 +56,15 @@ def parse_duration(text: str) -> float:
 
 @dataclass(frozen=True)
 class MemorySize:
-    """So many bytes, a share of all there is, or, if both are None, no limit; as ``text`` says."""
+    """An amount of memory: bytes, a share of the whole, or, if both are None, no limit; ``text`` as
+    given."""
 
     text: str
     bytes: int | None = None
     share: Fraction | None = None
 
     def of(self, whole: int) -> int | None:
-        """Bytes, rounded down, where all there is takes ``whole``; None for no limit."""
+        """Bytes, rounded down, of ``whole`` bytes; None for no limit."""
         return self.bytes if self.share is None else math.floor(self.share * whole)
 
     def __str__(self) -> str:
@@ -71,9 +72,9 @@ class MemorySize:
 
 
 def parse_memory(text: str) -> MemorySize:
-    """What ``4MiB`` (2²² B), ``4MB`` (4·10⁶ B), ``4096``, ``10%`` or ``inf`` stands for.
+    """Parses ``4MiB`` (2²² B), ``4MB`` (4·10⁶ B), ``4096``, ``10%`` or ``inf``.
 
-    Raises InputError PTM-I111 for anything else, and for nothing at all.
+    Raises InputError PTM-I111 for anything else, also for 0.
     """
     text = text.strip()
     if text == "inf":
@@ -87,11 +88,11 @@ def parse_memory(text: str) -> MemorySize:
 
 
 def _quantity(text: str, units: Mapping[str, int | Fraction]) -> Fraction | None:
-    """A number with one of some units, exactly; None if it is none."""
-    found = _QUANTITY.fullmatch(text.strip())
-    if not found or found[2] not in units:
+    """The exact value of a number with one of some units; None if ``text`` is not one."""
+    match = _QUANTITY.fullmatch(text.strip())
+    if not match or match[2] not in units:
         return None
-    return Fraction(found[1]) * units[found[2]]
+    return Fraction(match[1]) * units[match[2]]
 
 
 def _refused(text: str, what: str, remedy: str) -> InputError:

@@ -1,4 +1,4 @@
-"""The one place that tolerances come from; they scale with the scene.
+"""Tolerances, all derived here; they scale with the scene.
 
 All geometry behind ingest is float64 in metres with its origin at the centre of the model's
 floor, so the extent of the scene bounds every coordinate. A tolerance is a fixed share of that
@@ -24,11 +24,11 @@ PLANE_SHARE = 8e-6
 #: Parallel polygons nearer than this count as one wall (a picture hung on it), unless the second
 #: closes what the first leaves open: 5 cm in a building of 50 m.
 CLUSTER_SHARE = 1e-3
-#: But for what is farther apart than this share of the thickness that walls may have (6 cm of the
-#: usual 50): in a building of 250 m the other face of a wall of 20 cm is no picture.
+#: Polygons farther apart than this share of the largest wall thickness (6 cm of the usual 50) do
+#: not: in a building of 250 m the other face of a wall of 20 cm is no picture.
 CLUSTER_OF_WALL = 0.12
-#: What coordinates in model files may be off by, having six decimals or 24 bits: points that were
-#: meant to lie in one plane lie so far from it. 5 µm in a building of 50 m.
+#: Error of coordinates in model files, which have six decimals or 24 bits, and so the distance from
+#: a plane of points meant to lie in it. 5 µm in a building of 50 m.
 FILE_SHARE = 1e-7
 #: A cell thinner than this is refused: it could be flat after rounding to float32, and it must be
 #: thicker than the on-plane distance. 0.5 mm in a building of 50 m.
@@ -36,20 +36,20 @@ THIN_SHARE = 1e-5
 #: A gap between walls narrower than this is a crack of the modelling, not an opening: 0.4 mm in a
 #: building of 50 m.
 HAIRLINE_SHARE = 8e-6
-#: What the last digits of coordinates may have lost, in any unit and at any angle: half a picometre
-#: in a building of 50 m.
+#: Error of the last digits of coordinates, in any unit and at any angle: half a picometre in a
+#: building of 50 m.
 NOISE_SHARE = 1e-14
-#: Where coordinates lie on a coarser grid, in steps of it: how far from a plane what was meant to
-#: lie in it may be, how wide a crack may be, and how thin a cell. (A museum of 26 m, compressed
-#: with Draco at 14 bits: 51 cells, with planes of .75 of a step 35, from 1.1 on 21, as plain.)
+#: Where coordinates lie on a coarser grid, in steps of it: distance from a plane of points meant to
+#: lie in it, width of a crack, thickness of a cell. (A museum of 26 m, compressed with Draco at 14
+#: bits: 51 cells, with planes of .75 of a step 35, from 1.1 on 21, as plain.)
 PLANE_STEPS, HAIRLINE_STEPS, THIN_STEPS = 1.5, 2.0, 2.0
-#: A step counts as this at most, metres. On coarser grids lie terrains, and models that are made of
-#: blocks, whose coordinates are meant as they are.
+#: A step counts as this at most, metres. Terrains and models made of blocks lie on coarser grids,
+#: where coordinates are exact.
 COARSEST = 0.01
 #: Rounding of float64 arithmetic on coordinates and their intersections, with a margin.
 ROUNDING_SHARE = 1e-10
 #: Polygons of one plane are united and cut on a grid of this step (`cells.planar`): well above the
-#: rounding of float64, well below what is taken for rounding.
+#: rounding of float64, well below the distance that counts as rounding.
 GRID_SHARE = 1e-13
 
 #: Unit normals with a dot product of at least this are parallel: 1.4 mm over a metre.
@@ -63,8 +63,8 @@ TIE_SHARE = 3e-7
 #: Of two surfaces in one pixel, depths that differ by less than this share are the same depth:
 #: 0.3 mm at 20 m, above the rounding of float32 depth and below a picture 1 mm off its wall.
 DEPTH_SHARE = 2.0**-16
-#: What is looked at from an edge of a face lies so far towards its middle, as a share of the way: 5
-#: mm in a wall of 10 m, above the rounding of float32 in a face of a centimetre.
+#: Points examined beside an edge of a face lie this share of the way towards its middle: 5 mm in a
+#: wall of 10 m, above the rounding of float32 in a face of a centimetre.
 INWARD_SHARE = 1e-3
 #: Directions whose length differs from 1 by less are unit vectors: of six digits.
 UNIT_SHARE = 1e-5
@@ -77,11 +77,11 @@ class Tolerance:
     Attributes
     ----------
     extent: largest side of the scene's bounding box, metres.
-    step: what the step of the grid that the file has its coordinates on counts as, metres
-        (`COARSEST` at most); 0 where that is float32's.
+    step: step of the grid of the file's coordinates, metres, at most `COARSEST`; 0 for the grid of
+        float32.
     plane: a point nearer than this to a plane lies in it.
     cluster: parallel planes nearer than this count as one wall.
-    file: coordinates in model files are rounded by so much.
+    file: rounding of coordinates in model files.
     thin: the least thickness of a cell.
     hairline: an opening narrower than this is a crack.
     rounding: distances below this are rounding errors of the arithmetic itself.
@@ -111,7 +111,7 @@ class Tolerance:
 
     def for_walls(self, thickness: float) -> Tolerance:
         """The same where walls are up to ``thickness`` metres thick; 0 changes nothing. However
-        thin they are, what lies in one plane is one wall."""
+        thin they are, polygons in one plane are one wall."""
         if thickness == 0:
             return self
         return replace(
@@ -140,13 +140,13 @@ class Tolerance:
         )
 
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:
-        """What `from_arrays` makes it of again."""
+        """The tolerances as arrays, for `from_arrays`."""
         step = {"step": np.array(self.step)} if self.step else {}
         return {"extent": np.array(self.extent), **step}
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> Tolerance:
-        """Raises KeyError or ValueError for what is none."""
+        """Inverse of `to_arrays`. Raises KeyError or ValueError for invalid arrays."""
         stored = Stored(arrays)
         extent, step = (
             stored.array(name, np.float64, finite=True).item() if name in arrays else 0.0

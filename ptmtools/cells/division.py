@@ -53,7 +53,7 @@ from ptmtools.tolerance import Tolerance, ranked
 LEAST_PLACE = 0.05
 #: and outside, where bus shelters are, with less than this.
 LEAST_INSIDE = 2.0
-#: Number of points from which those that look at the walls are chosen.
+#: Number of points from which the ones that test the walls are chosen.
 _CHOICE = 256
 
 

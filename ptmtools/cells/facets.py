@@ -158,8 +158,8 @@ class Facets:
         self, chosen: Ints, area: Floats, outline: Bools, tolerance: Tolerance
     ) -> tuple[Floats, Ints]:
         """Triangles (m, 3, 3) of the chosen regions, whose ``area`` these (n, 3) edges outline, and
-        (m,) the region of each; none of a region whose outline bounds another area or has no
-        triangulation."""
+        (m,) the region of each; regions whose outline bounds another area or has no triangulation
+        are left out."""
         if not len(chosen):
             return np.zeros((0, 3, 3)), np.zeros(0, dtype=np.int64)
         at, k = np.nonzero(outline)

@@ -1,10 +1,10 @@
 """Polygons in a plane: union, difference, intersection, buffers and triangles, which never raise.
 
 Every overlay of the package goes through this module, on a grid: ours is `Tolerance.grid`, a
-thousandth of what counts as rounding. GEOS overlays in floating point find their own way out of
-rounding, and now and then the wrong one: of two rectangles 1.3 × 2.6 and 1.3 × 2.4 that share three
-sides, one of them but for 4e-16, GEOS 3.14 gives a point as the intersection. A wall lost so opens
-a room, an opening lost so hides one. On a grid (snap rounding, exact) this cannot happen.
+thousandth of what counts as rounding. GEOS overlays in floating point resolve rounding by
+themselves, occasionally wrongly: of two rectangles 1.3 × 2.6 and 1.3 × 2.4 that share three sides,
+one of them but for 4e-16, GEOS 3.14 gives a point as the intersection. A wall lost so opens a room,
+an opening lost so hides one. On a grid (snap rounding, exact) this cannot happen.
 
 GEOS still gives up on some operands: polygons that cross themselves, and coordinates so large that
 the grid is finer than their last digit. Such an operation is tried again, alone,
@@ -16,11 +16,11 @@ the grid is finer than their last digit. Such an operation is tried again, alone
 If that fails too, the result is a safe answer, and `counting` counts it:
 
 ============= ==================================================================================
-union         what could be united, without the smallest of the rest (a wall blocks less); with
-              ``more``, the box around all of it (an opening is wider)
+union         the part that could be united, without the smallest of the rest (a wall blocks
+              less); with ``more``, the box around all of it (an opening is wider)
 difference    the first operand (an opening is wider)
-intersection  nothing (a wall proposes no split); with ``more``, what the boxes of the operands
-              share (an opening is wider)
+intersection  nothing (a wall proposes no split); with ``more``, the intersection of the operands'
+              boxes (an opening is wider)
 buffer        the shape itself; with ``more``, the box around it, widened
 triangles     none (a piece is drawn as it is)
 ============= ==================================================================================
@@ -89,8 +89,8 @@ def unite(triangles: Floats, grid: float) -> Geometry:
 def union(shapes: Geometry, grid: float, *, more: bool = False) -> Geometry:
     """Union of an array of polygons, less corners on straight edges.
 
-    Snap rounding takes the square of the corners on one line, so many polygons are united by
-    neighbourhoods, each rid of corners on straight edges, and these in turn.
+    Snap rounding takes the square of the corners on one line, so large sets of polygons are united
+    by neighbourhoods, each rid of corners on straight edges, and these in turn.
     """
     polygons = _polygons_in(_rounded(shapes, grid))
     before = 2 * len(polygons) + 1
@@ -170,7 +170,7 @@ def simplified(shapes: Geometry, distance: float) -> Geometry:
 
 def neighbours(polygons: Geometry, gap: float) -> Ints:
     """(n,) the group of each of n polygons: those less than ``gap`` apart are in one, so that a
-    T-junction whose edge misses the corner by a rounding joins what it was meant to join."""
+    T-junction whose edge misses the corner by a rounding still joins."""
     tree = shapely.STRtree(polygons)
     one, other = tree.query(polygons, predicate="dwithin", distance=gap)
     return connected(len(polygons), one, other)

@@ -75,11 +75,11 @@ if TYPE_CHECKING:
 
 
 class Groups(ABC):
-    """Groups of leaves, each called by one of its leaves, at first of one leaf each.
+    """Groups of leaves, each named by one of its leaves, initially of one leaf each.
 
     Attributes
     ----------
-    near: for each group those beside it, each with the portals between the two.
+    near: for each group its neighbours, each with the portals between the two.
     """
 
     def __init__(self, count: int, pairs: NDArray[np.integer]) -> None:
@@ -151,7 +151,7 @@ AT_ONCE = 2048
 
 
 def room_of_leaf(cells: Cells, rank: Ints) -> Ints:
-    """(L,) the room of each leaf, called by the rank of one of its leaves.
+    """(L,) the room of each leaf, named by the rank of one of its leaves.
 
     Of equally open pairs the one whose leaves come first by (L,) ``rank`` is joined first: a
     doorway between two equal rooms.
@@ -303,10 +303,10 @@ def join_by_gain(
 
     Parameters
     ----------
-    sees: (L, L) symmetric, which leaf sees which.
+    sees: (L, L) symmetric, visibility between leaves.
     volume, area: (L,) of a leaf, m³ in which viewers are, and of the surfaces in it, m².
     pairs: (n, 2) leaves through whose portals groups may grow.
-    gain: no group of which parting gains as much is made; 0 to 1.
+    gain: threshold, 0 to 1, of the gain of dividing a group.
     """
     every = np.stack([volume, area], axis=1)
     parted = _Parted(sees.copy(), every.copy(), every, pairs)
@@ -327,11 +327,11 @@ class _Costs(Groups):
         self.before = [self.of(row, each) for row, each in zip(sees, own, strict=True)]
 
     def together(self, a: int, b: int) -> float:
-        """Of two groups as one."""
+        """The cost of two groups joined."""
         return self.of(self.sees[a] | self.sees[b], self.own[a] + self.own[b])
 
     def of(self, seen: Bools, own: Floats) -> float:
-        """Of a group that sees leaves, (L,), and has a volume and an area."""
+        """The cost of a group that sees leaves, (L,), and has a volume and an area."""
         volume, area = self.every[seen].sum(axis=0)
         return float(own[0] * area + own[1] * volume)
 
@@ -368,7 +368,7 @@ class _Attached(_Costs):
         self._added = 0.0
 
     def grown_by(self, share: float) -> Ints:
-        """(L,) the groups, before joining them has added so much; none is joined for 0."""
+        """(L,) the groups, before joining has added ``share``; none is joined for 0."""
         return self.grown(lambda added: self._added + added < share)
 
     def cost(self, a: int, b: int) -> float:

@@ -148,9 +148,9 @@ class Structure:
 def structural_triangles(
     scene: Scene, options: SubdivideOptions, opened: NDArray[np.integer] | None = None
 ) -> Bools:
-    """(T,) which triangles occlude: opaque, detail neither by name, class nor shape, and none of
-    the door leaves that are ``opened`` (see `Cells.opened`). Of triangles that are the same, the
-    first may stand for all."""
+    """(T,) which triangles occlude: opaque, detail neither by name, class nor shape, and no door
+    leaves that are ``opened`` (see `Cells.opened`). The first of equal triangles may stand for
+    all."""
     opaque = Opaque.of(scene, options)
     result = np.zeros(len(scene.triangles), dtype=bool)
     result[opaque.source[~opaque.detail]] = True

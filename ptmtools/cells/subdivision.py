@@ -55,7 +55,7 @@ from ptmtools.scene.model import Scene
 from ptmtools.scene.orientation import main_axes
 from ptmtools.tolerance import Tolerance
 
-#: How far the first root box stands off the model, as a share of the model's extent.
+#: Margin of the first root box around the model, as a share of the model's extent.
 BOX_MARGIN = 0.01
 #: Number of triangles that take as long to subdivide as two processes take to start.
 LARGE = 4000
@@ -266,7 +266,7 @@ def _leaf_at(space: Space, rename: NDArray[np.int32], points: Floats) -> NDArray
 
 
 def _buried(building: Building, points: Floats, eye_floor: Floats) -> Floats:
-    """Those of (n, 3) points that lie inside a solid, unless bodies on the ``eye_floor`` do so
+    """The (n, 3) points that lie inside a solid, unless bodies on the ``eye_floor`` do so
     too: in a model whose room faces point outwards, solids cannot be recognised."""
     structure = building.structure
     if not (len(points) and len(eye_floor)):

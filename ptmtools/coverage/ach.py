@@ -8,8 +8,8 @@ The paper takes 8 points and large views. The points decide (docs/design/coverag
 there are hundreds of them, with views of a few pixels.
 
 The paper draws "all the objects of its PVS". Here all objects are drawn, so that a pixel can show a
-cell outside the PVS, which is an error of the PVS or a crack in the model. Such pixels are looked
-up again, left out of the hints and reported as missed mass (`tally`).
+cell outside the PVS, which is an error of the PVS or a crack in the model. Such pixels are checked
+again, left out of the hints and reported as missed mass (`tally`).
 
 `choose` picks the backend that draws the item buffers.
 """
@@ -32,8 +32,8 @@ from ptmtools.visibility.model import Pvs
 
 
 def choose(cells: Cells, pvs: Pvs, options: AchOptions) -> Backend:
-    """The backend that the options name; for "auto" the one that is expected to take the least
-    processor time, of those that can run here.
+    """The backend that the options name; for "auto" the available backend with the least expected
+    processor time.
 
     Raises `MissingComponentError` PTM-M500 if one cannot run though a graphics device is named.
     """
@@ -45,13 +45,13 @@ def choose(cells: Cells, pvs: Pvs, options: AchOptions) -> Backend:
         try:
             costs[name] = backend.cost(triangles, pixels, options.gpu)
         except MissingComponentError:
-            if options.gpu is not None:  # who names a device wants that one
+            if options.gpu is not None:  # a named device requires this backend
                 raise
     return BACKENDS[min(costs, key=costs.__getitem__)]
 
 
 def triangles_of_a_pvs(cells: Cells, pvs: Pvs) -> float:
-    """How many pieces of triangles the cells of a PVS have, on average over the cells."""
+    """Number of pieces of triangles in the cells of a PVS, averaged over the cells."""
     if not cells.cell_count:
         return 0.0
     front, back = cells.triangle_cell.T
@@ -60,7 +60,7 @@ def triangles_of_a_pvs(cells: Cells, pvs: Pvs) -> float:
     return float(each[pvs.cell].sum()) / cells.cell_count
 
 
-#: Rays that a process of its own is worth: it takes a second or two to start, as 5 million rays do.
+#: Rays that justify another process: it takes a second or two to start, as 5 million rays do.
 WORTH_A_PROCESS = 1e7
 #: Rays that are cast for one task: a tenth of a second.
 TASK = 2e5

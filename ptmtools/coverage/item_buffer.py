@@ -1,8 +1,8 @@
-"""The item buffer: which surface shows in each pixel of six square views around a point (§5).
+"""The item buffer: the surface in each pixel of six square views around a point (§5).
 
 Every backend answers the same question, *which triangle does pixel (view, row, column) show*, for
-the same directions; whose triangle that is is decided elsewhere (`tally`), in float64. A triangle
-in a boundary belongs to a cell on either side, and the pixel counts for the viewer's side (design,
+the same directions; the owner of the triangle is decided in `tally`, in float64. A triangle in a
+boundary belongs to a cell on either side, and the pixel counts for the viewer's side (design,
 "Ownership"), so of coincident faces it does not matter which one wins.
 
 The paper draws each object in its cell's colour. The triangle's own number was preferred: with
@@ -45,14 +45,14 @@ VIEWS = np.array(
     dtype=np.float64,
 )
 
-#: What a transparent surface's depth is multiplied with before it is compared with the opaque
-#: one's, so that a pane lying in a wall counts whichever way rounding falls.
+#: Factor of a transparent surface's depth before it is compared with the opaque one's, so that a
+#: pane lying in a wall counts regardless of rounding.
 BEFORE = 1.0 - DEPTH_SHARE
 
 
 @dataclass(frozen=True)
 class Surfaces:
-    """The geometry cut to the cells, as the backends take it.
+    """The geometry cut to the cells, in the form that the backends take.
 
     ``(world - centre) * scale`` lies within about 1 of the origin; scale is a power of two. Planes
     are those of the scene's triangles, better known than those of slivers.
@@ -64,7 +64,7 @@ class Surfaces:
     triangle: NDArray[np.int32]  # (M, 3) into `vertex`
     plane: Floats  # (M, 4) unit normal and offset, in normalised coordinates
     cell: NDArray[np.int32]  # (M, 2) the cell on the front and on the back, -1 for none
-    image: NDArray[np.int32]  # (M,) the image that each shows, -1 for none
+    image: NDArray[np.int32]  # (M,) the image on each, -1 for none
     opaque: Bools  # (M,)
     cell_count: int
 
@@ -106,12 +106,12 @@ class Surfaces:
 
 
 class Renderer(Protocol):
-    """A backend, ready to draw the surfaces it was made with.
+    """A backend that holds its surfaces, ready to draw.
 
     Attributes
     ----------
     name: its own name, with its version or device, for the record.
-    most: how many sample points it takes at a time.
+    most: the most sample points that it takes at a time.
     """
 
     @property
@@ -123,12 +123,13 @@ class Renderer(Protocol):
     def show(self, points: SamplePoints, needed: Bools | None = None) -> NDArray[np.int32]:
         """(L, K, 6, face²) the triangle that each pixel shows, -1 for none, in the order (point,
         view, row, column); opaque surfaces first, then the transparent ones before them, if the
-        scene has any. ``needed`` (C,) are the cells whose surfaces may show, if that is known:
-        others need not be drawn."""
+        scene has any. ``needed`` (C,) are the cells whose surfaces may show, if known: others need
+        not be drawn."""
 
     def trace(self, points: SamplePoints, pixels: Ints) -> tuple[NDArray[np.int32], Floats]:
-        """(L, n) what a ray through each of the (n,) pixels, numbered from 0 in the order of
-        `show`, says of its layers, and (L, n, 3) where it hits, in world metres."""
+        """(L, n) the triangle that a ray through each of the (n,) pixels, numbered from 0 in the
+        order of `show`, meets in each layer, and (L, n, 3) the points that it hits, in world
+        metres."""
 
     def close(self) -> None:
-        """Gives back what the backend holds."""
+        """Frees the backend's resources."""

@@ -15,8 +15,9 @@ from ptmtools.jit import plain_kernel
 def clearances(
     points: Floats, corners: Floats, first: Ints, end: Ints, enough: float, distances: Floats
 ) -> None:
-    """Lowers ``found`` (n,) to the distance of each of the (n, 3) points from the nearest of the
-    (m, 3, 3) triangles, each held against the points from its ``first`` to its ``end`` (m,)."""
+    """Lowers ``distances`` (n,) to the distance of each of the (n, 3) points from the nearest of
+    the (m, 3, 3) triangles, each tested against the points from its ``first`` to its ``end``
+    (m,)."""
     for t in range(len(corners)):
         a, b, c = corners[t, 0], corners[t, 1], corners[t, 2]
         low_y, high_y = min(a[1], b[1], c[1]) - enough, max(a[1], b[1], c[1]) + enough
@@ -55,9 +56,9 @@ def distance(p: Floats, corner: Floats) -> float:
 
 @plain_kernel
 def crossings(points: Floats, corners: Floats, first: Ints, end: Ints, crossed: Ints) -> None:
-    """Adds to ``crossed`` (n,) how many of the (m, 3, 3) triangles the ray along +z from each of
-    the (n, 3) points crosses: those that its line passes through ahead of it. Each triangle is held
-    against the points from its ``first`` to its ``end`` (m,)."""
+    """Adds to ``crossed`` (n,) the number of (m, 3, 3) triangles that the ray along +z from each of
+    the (n, 3) points crosses. Each triangle is tested against the points from its ``first`` to its
+    ``end`` (m,)."""
     for t in range(len(corners)):
         a, b, c = corners[t, 0], corners[t, 1], corners[t, 2]
         low, high = min(a[1], b[1], c[1]), max(a[1], b[1], c[1])
@@ -114,7 +115,7 @@ def add_pixels(
     in_views: Ints,
     doubt: Ints,
 ) -> int:
-    """Adds up whom the pixels belong to; returns how many are in doubt.
+    """Adds up the pixels of each owner; returns the number of pixels in doubt.
 
     Parameters
     ----------
@@ -122,10 +123,10 @@ def add_pixels(
     point: (K, 3) the sample points.
     plane: (M, 4) of the triangles, in the coordinates of the points; it is seen from the front
         where the plane's value is above 0.
-    owner: (M, 2) to whom a pixel counts that shows a triangle from its front or back, or -1.
+    owner: (M, 2) the owner of a pixel that shows a triangle from its front or back, or -1.
     column: (S + 1,) the column of each owner, -1 if it is not expected; the last is -1.
     weight: (1 or K, face²) of the pixels.
-    at_points, in_views: (K, n) and (6, n) what is added to.
+    at_points, in_views: (K, n) and (6, n) the sums, added to.
     doubt: (m,) filled with the numbers of pixels, from 0 in the order of ``shows``, that show a
         triangle whose owner is not expected; as many as there is room for.
     """

@@ -21,10 +21,10 @@ class Ach:
     Attributes
     ----------
     start: (C + 1,) int64 CSR over cells, equal to the PVS's.
-    value: (n,) float64 share of the covered pixels; a row sums to 1. A cell none of whose pixels
-        was covered has 1 for itself.
-    pixels: (n,) float64 the pixels counted, N_j of the paper; weighted by their solid angle over
-        that of a pixel in the middle of a view, if that was asked for.
+    value: (n,) float64 share of the covered pixels; a row sums to 1. A cell without covered pixels
+        has 1 for itself.
+    pixels: (n,) float64 the pixels counted, N_j of the paper; weighted, on request, by their solid
+        angle over that of a pixel in the middle of a view.
     error: (n,) float64 standard error of `value`; NaN for an entry that no point saw (see
         `unseen_below`) and where there was one sample point only.
     p95: (n,) float64 the share that is exceeded from at most 5 % of the sample points.
@@ -32,19 +32,19 @@ class Ach:
     views: (n, 6) float64 the same as `value` for each of the six views alone: +x, -x, +y, -y, +z,
         -z.
     missed: (C,) float64 share of the covered pixels that fell on cells outside the PVS, or on
-        what belongs to no cell.
+        surfaces of no cell.
     samples: (C,) int32 sample points used.
     rejected: (C,) int32 sample points rejected: inside a solid, or too near to a surface.
     uncertain: (C,) float64 bound of the total variation between the row and the truth, at about
         95 %; NaN with fewer than eight sample points.
     unseen_below: (C,) float64 an entry that no point saw is seen from less than this share of the
         cell, at 95 % (rule of three).
-    floor: (C,) float64 what a client may take for an entry that no point saw: half a pixel's
-        share.
+    floor: (C,) float64 the value that a client may assume for an entry that no point saw: half a
+        pixel's share.
     texture_start, texture, texture_value: (n + 1,) int64 CSR over entries, (m,) int32 images of the
-        scene, -1 for what has none, ascending within an entry, and (m,) float64 their shares, which
-        sum to the entry's `value`. Empty unless asked for.
-    backend: the one that drew, a name in `BACKENDS`.
+        scene, -1 for surfaces without one, ascending within an entry, and (m,) float64 their
+        shares, which sum to the entry's `value`. Empty unless asked for.
+    backend: the backend that drew, a name in `BACKENDS`.
     renderer: the renderer's own name, for the record.
     """
 
@@ -72,7 +72,7 @@ class Ach:
         return self.value[self.entries(i)]
 
     def entries(self, i: int) -> slice:
-        """Where the entries of cell ``i`` are."""
+        """The slice of the entries of cell ``i``."""
         return slice(int(self.start[i]), int(self.start[i + 1]))
 
     @property
@@ -91,7 +91,7 @@ class Ach:
     def from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> Ach:
         """Inverse of `to_arrays`.
 
-        Raises KeyError, TypeError or ValueError for what no hints have.
+        Raises KeyError, TypeError or ValueError for invalid arrays.
         """
         stored = Stored(arrays)
         about = json.loads(stored.array("about", np.uint8, None).tobytes().decode())

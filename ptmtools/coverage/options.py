@@ -122,7 +122,7 @@ class AchOptions:
 
     @property
     def placed(self) -> Placement:
-        """How sample points are placed."""
+        """Placement of the sample points."""
         return PRESETS[self.preset][2] if self.placement is None else self.placement
 
     def _check_tolerance(self, tolerance: float) -> None:
@@ -131,7 +131,7 @@ class AchOptions:
                 f"a tolerance of {tolerance} is out of range",
                 "give a total variation above 0 and below 1, such as 0.01",
             )
-        if self.points < GROUPS:  # of which each needs one
+        if self.points < GROUPS:  # each group needs one
             raise _refused(
                 f"{self.points} sample points are too few to estimate their error",
                 f"allow {GROUPS} or more, or omit --samples",

@@ -1,16 +1,17 @@
 """Placement of the sample points of a cell, spread over its volume.
 
 The paper takes "samples per cell whose COPs are uniformly distributed inside the cell" (§5).
-Position matters far more than resolution (docs/design/coverage.md), so there is a choice of how:
+Position matters far more than resolution (docs/design/coverage.md), so there is a choice of
+placements:
 
 ``sobol``
-    A scrambled Sobol' sequence in the cell's bounding box, of which the points in the cell are
-    kept. Any number of points is evenly spread, and more can be added: the error falls as K^-0.8.
-    Where hardly any of the box is cell, as with a thin slanting one, the sequence fills the
-    tetrahedra of its leaves instead, with a fourth dimension for the choice among them.
+    A scrambled Sobol' sequence in the cell's bounding box, restricted to the points in the cell.
+    Any number of points is evenly spread, and more can be added: the error falls as K^-0.8. Where
+    the cell fills little of the box, as a thin slanting one does, the sequence fills the tetrahedra
+    of its leaves instead, with a fourth dimension for the choice among them.
 ``kd``
     The volume is halved again and again along its longest axis into as many parts of equal volume
-    as there are points, and of each part the point nearest to its centroid is taken: best below
+    as there are points, and the point nearest to the centroid of each part is taken: best below
     some sixteen points.
 ``uniform``
     Independent random points, as in the paper: K^-0.5.
@@ -131,7 +132,7 @@ def _hashed(value: Bits, key: Bits) -> Bits:
 #: Points of the cloud that is divided into parts, for each part: enough that parts of equal count
 #: are parts of equal volume within a few percent.
 CLOUD = 256
-#: Points that a part of the cell offers, evenly picked from its share of the cloud.
+#: Candidate points of a part of the cell, evenly picked from its share of the cloud.
 TRIES = 32
 #: A cell that fills less than this share of its bounding box is filled by tetrahedra.
 FILLED = 1 / 32
@@ -140,9 +141,9 @@ Room = tuple[Floats, Floats]
 
 
 def filling(tetra: Floats, volume: Floats, unit: Floats) -> Floats:
-    """(m, 3) points, uniform in the union of (n, 4, 3) tetrahedra with (n,) volumes if the (m, 4 or
-    more) coordinates in (0, 1) are: the first three tell where in a tetrahedron, the fourth in
-    which."""
+    """(m, 3) points in the union of (n, 4, 3) tetrahedra with (n,) volumes, uniform if the (m, 4 or
+    more) coordinates in (0, 1) are: the first three place a point in a tetrahedron, the fourth
+    chooses the tetrahedron."""
     share = np.cumsum(volume)
     which = np.minimum(np.searchsorted(share / share[-1], unit[:, 3], "right"), len(tetra) - 1)
     # The gaps between three sorted numbers and the ends of [0, 1] are uniform barycentric
@@ -155,12 +156,12 @@ def filling(tetra: Floats, volume: Floats, unit: Floats) -> Floats:
 
 
 class Volume:
-    """A cell as something to put points into.
+    """The volume of a cell to place points in.
 
     Attributes
     ----------
     tetrahedra, volume: (n, 4, 3) metres and (n,) m³, disjoint, none flat, together the cell.
-    boxed: whether enough of its bounding box is cell.
+    boxed: whether the cell fills enough of its bounding box.
     """
 
     def __init__(self, cells: Cells, cell: int, eyes: EyeRegion, room: Room) -> None:
@@ -176,7 +177,7 @@ class Volume:
 
     @staticmethod
     def of_cells(cells: Cells) -> list[Volume]:
-        """All cells; those in which nobody can stand are empty."""
+        """All cells; those without standing room are empty."""
         tetrahedra, leaf = cells.tetrahedra()
         volume = volumes(tetrahedra)
         cell = np.where(cells.leaf_standing, cells.leaf_cell, -1)[leaf]
@@ -191,7 +192,7 @@ class Volume:
 
     @property
     def everywhere(self) -> bool:
-        """Whether eyes may be anywhere in it."""
+        """Whether eyes may be anywhere in the cell."""
         return self.empty or self._eyes.everywhere
 
     def anywhere(self) -> Volume:

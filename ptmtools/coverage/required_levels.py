@@ -5,8 +5,8 @@ From sample points of the cell, as those of the coverage hints (in the eye regio
 up to the ceiling), rays are cast over the whole sphere, weighted by solid angle. Where one meets a
 textured surface, OpenGL's isotropic level of detail is log2 ρ, with ρ the larger of the lengths, in
 texels, that a pixel's width and height span in the texture; the pixel is that in the middle of an
-upright picture, so directions are alike. Of the two levels that are then blended the finer one is
-*wanted*. What is drawn at most once a texel (ρ ≤ 1) wants the finest.
+upright picture, so directions are alike. Of the two levels that are then blended, the finer one is
+*wanted*. A surface with ρ ≤ 1, at most one texel a pixel, wants the finest level.
 
 Tried: the band of ±30° that a level view of 60° shows, instead of the sphere. It leaves out the
 floor at one's feet, which wants the finest level, and with it a share that `ach` counts.
@@ -62,7 +62,7 @@ _UP = np.array([0.0, 1.0, 0.0])
 
 @dataclass(frozen=True)
 class TextureSize:
-    """Of the finest level stored, texels, and how many levels there are."""
+    """Size of the finest level stored, texels, and the number of levels."""
 
     width: int
     height: int
@@ -99,7 +99,7 @@ def compute_need(
     """The need of all cells, from ``points`` sample points each; ``sizes`` of the images that have
     a texture. Equal input gives equal results.
 
-    Raises InputError PTM-I111 for a number of points that makes no sense.
+    Raises InputError PTM-I111 for an invalid number of points.
     """
     options = AchOptions(
         samples=points, face=FACE, backend="embree", weighting="solid-angle", placement="sobol"
@@ -118,7 +118,7 @@ def compute_need(
 
 
 class _Wanting:
-    """Ready to say what the pixels at any sample points want."""
+    """Computes the levels that the pixels at any sample points want."""
 
     def __init__(
         self, scene: Scene, cells: Cells, sizes: Mapping[int, TextureSize], sampler: Sampler
@@ -175,12 +175,12 @@ def levels_of_detail(ray: Floats, normal: Floats, gradient: Floats) -> Floats:
             step = PIXEL * distance * (axis - along * lean)
             spans.append(np.linalg.norm(np.einsum("ijk,ik->ij", gradient, step), axis=1))
         detail = np.log2(np.maximum(*spans))
-    # On edge, or where the eye touches the surface, nothing is seen of it: the coarsest will do.
+    # Edge on, or where the eye touches the surface, none of it is seen: the coarsest suffices.
     return np.asarray(np.where(np.isnan(detail), np.inf, detail))
 
 
 def _gathered(parts: list[Floats]) -> Need:
-    """Of each cell (I, L) shares that want just that level."""
+    """For each cell, the (I, L) shares that want exactly that level."""
     counts, images, firsts, lengths, shares = [0], [], [], [0], [np.zeros(0)]
     for wanted in parts:
         finer = np.cumsum(wanted[:, ::-1], axis=1)[:, ::-1]
@@ -201,19 +201,19 @@ def _gathered(parts: list[Floats]) -> Need:
     )
 
 
-#: Screens are at most so many times as wide as high.
+#: Largest ratio of a screen's width to its height.
 ASPECT = 16 / 9
 #: Samples along a footprint that is longer than wide, at most.
 ANISOTROPY = 16
 #: More levels than any image has.
 ALL = 64
-#: Pieces held against boxes at a time.
+#: Pieces compared with boxes at a time.
 _AT_ONCE = 1 << 16
 
 
 @dataclass(frozen=True)
 class Screen:
-    """What a visitor looks at.
+    """The screen of a visitor.
 
     Attributes
     ----------
@@ -228,7 +228,7 @@ class Screen:
 
     @property
     def pixel(self) -> float:
-        """How much a pixel covers at a distance of 1, at least, wherever it is in the picture."""
+        """Lower bound of the size of a pixel at a distance of 1, anywhere in the picture."""
         half = np.tan(np.radians(self.field_of_view) / 2)
         corner = 1 + half**2 * (1 + ASPECT**2)  # 1 / cos²φ
         return float(2 * half / self.height / corner)
@@ -237,7 +237,7 @@ class Screen:
 def unresolved_levels(
     scene: Scene, cells: Cells, pvs: Pvs, sizes: Sequence[tuple[int, int]], screen: Screen
 ) -> Ints:
-    """(I,) of each image how many of its finest levels no eye resolves; `ALL` if none sees it.
+    """(I,) the number of finest levels of each image that no eye resolves; `ALL` if no eye sees it.
 
     Parameters
     ----------
@@ -253,14 +253,14 @@ def unresolved_levels(
     footprint = screen.pixel * distance * texels[cells.triangle_source[piece]]
     least = np.full(len(sizes), np.inf)
     np.minimum.at(least, shown, footprint)
-    # The exponent of a number from 1 up is what its logarithm is rounded down to, and 1.
+    # The exponent of a number from 1 up is its logarithm rounded down, plus 1.
     levels = np.frexp(np.where(np.isfinite(least), least, 0.0))[1].astype(np.int64) - 1
     return np.where(np.isfinite(least), np.clip(levels, 0, ALL), ALL)
 
 
 def _texels(scene: Scene, sizes: Floats) -> Floats:
-    """(T,) texels that count for a metre of each triangle, in any direction; 0 where the texture is
-    drawn out without end, inf where the triangle is none."""
+    """(T,) texels for a metre of each triangle, in any direction; 0 where the texture is stretched
+    without limit, inf where the triangle is degenerate."""
     image = np.array([m.image for m in scene.materials], dtype=np.int64)[scene.triangle_material]
     size = np.ones((len(image), 2))
     size[image >= 0] = sizes[image[image >= 0]]
@@ -278,8 +278,8 @@ def _texels(scene: Scene, sizes: Floats) -> Floats:
 def _distances(
     cells: Cells, pvs: Pvs, piece: NDArray[np.int64], owner: NDArray[np.int32]
 ) -> Floats:
-    """(n,) metres from pieces to the nearest eye that may see them, at least; inf if none may.
-    ``owner`` (n,) ascends."""
+    """(n,) lower bounds of the distance, metres, from pieces to the nearest eye that may see them;
+    inf without such an eye. ``owner`` (n,) ascends."""
     corners = cells.vertex[cells.triangle[piece]]
     low, high = corners.min(axis=1), corners.max(axis=1)
     bottom, top, start = _eye_boxes(cells)

@@ -30,12 +30,12 @@ class SamplePoints:
         return len(self.position)
 
     def part(self, rows: slice) -> SamplePoints:
-        """Some of them."""
+        """A subset of the points."""
         return SamplePoints(self.position[rows], self.near[rows], self.shift[rows])
 
     @staticmethod
     def join(parts: list[SamplePoints]) -> SamplePoints:
-        """Several, one after the other."""
+        """Concatenates the points of several."""
         columns = zip(*(vars(part).values() for part in parts), strict=True)
         return SamplePoints(*(np.concatenate(column) for column in columns))
 
@@ -44,8 +44,8 @@ class SamplePoints:
 class PointFinder:
     """Finds usable points in one cell, ``clearance`` metres from all surfaces.
 
-    ``rejected`` counts the points that were rejected so far; the best of them is kept for the case
-    that there is no usable one.
+    ``rejected`` counts the points that were rejected so far; the best of them is kept in case no
+    point is usable.
     """
 
     volume: Volume
@@ -85,12 +85,12 @@ class PointFinder:
         return SamplePoints(points, np.full(len(points), self.clearance), 2 * unit - 1)
 
     def least_bad(self) -> SamplePoints:
-        """Where nothing is usable: the one point that is outside solids, if possible, and farthest
+        """The fallback if no point is usable: a point outside solids, if possible, and farthest
         from all surfaces. None in a cell without volume."""
         if self._best is None:
             return self.at(np.zeros((0, 3)), np.zeros((0, 2)))
         _, free, point = self._best
-        # On the surface itself, where nothing can be right, the near plane still has to be.
+        # On the surface itself no clearance is right, but the near plane needs one.
         near = free or self.clearance * np.finfo(np.float32).eps
         return SamplePoints(point[None], np.array([near]), np.zeros((1, 2)))
 
@@ -110,7 +110,7 @@ class PointSequence:
 
     def take(self, count: int) -> SamplePoints:
         """The next ``count`` usable points; fewer if more than `TRIES` in the cell are rejected
-        for each, or its box holds hardly any of the cell, against what its volume says."""
+        for each, or the box holds hardly any of the cell, contrary to its volume."""
         finder = self._finder
         self._asked += count
         while not finder.volume.empty and int(self._good.sum()) < count:

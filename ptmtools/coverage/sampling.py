@@ -4,12 +4,12 @@ error.
 A hint is a ratio, the pixels of one cell over all pixels, both summed over the sample points. Its
 standard error comes from eight groups of points, by the linearised ratio (Cochran, *Sampling
 Techniques*, 1977, §6.4). Where the groups are independently scrambled (``--tolerance``) it is
-honest; where they are stretches of one sequence, which complement one another, it is too large,
-by a factor of about two; of eight single points it is too small at times.
+accurate; where they are stretches of one sequence, which complement one another, it is too large by
+a factor of about two; with eight single points it is sometimes too small.
 
-The error of a whole row is its total variation, half the sum of absolute differences. The distance
-of each group's own hints from the mean says how that is distributed: a mean of R groups is closer
-to the truth than a group to the mean by the square root of R - 1.
+The error of a whole row is its total variation, half the sum of absolute differences. The distances
+of the groups' own hints from the mean estimate its distribution: a mean of R groups is closer to
+the truth than a group to the mean by the square root of R - 1.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
 
 #: Student's t for GROUPS - 1 degrees of freedom, two-sided 95 %. One-sided would be 1.895, but
-#: distances lean to one side: where two cells share the view, that bound held in 91 % of the cases.
+#: distances are skewed: where two cells share the view, that bound held in 91 % of the cases.
 STUDENT_T = 2.365
-#: Rule of three: what did not happen in K trials happens in less than 3/K of all, at 95 %.
+#: Rule of three: an event absent from K trials has a probability below 3/K, at 95 %.
 RULE_OF_THREE = 3.0
 
 
@@ -44,8 +44,8 @@ RULE_OF_THREE = 3.0
 class Row:
     """The hints of one cell, for each of the n cells of its PVS: see `Ach`.
 
-    `uncertain` is NaN with fewer than eight points, which would not tell: of two it held in half of
-    the cases.
+    `uncertain` is NaN with fewer than eight points, which are too few: with two the bound held in
+        half of the cases.
     """
 
     value: Floats
@@ -128,17 +128,17 @@ def grouped(count: int, in_stretches: bool = True) -> Ints:
 #: The default clearance as a share of the thinnest that a cell may be, so that even such a cell
 #: has usable points.
 CLEARANCE = 0.25
-#: Points of each of the groups that a tolerance is first tried with.
+#: Points of each group in the first round of a tolerance.
 FIRST = 8
-#: What a bound falls by, about, as the points are doubled (K^-0.6): one that falls faster has luck,
-#: and stopping at every piece of luck makes bounds too small.
+#: Expected ratio of a bound as the points are doubled (K^-0.6): one that falls faster does so by
+#: chance, and stopping at chance minima makes bounds too small.
 FALL = 2**-0.6
 
 
 @dataclass(frozen=True)
 class CellHints:
-    """What was found out about one cell; see `Ach`. Of the images within the entries of its row,
-    how many each has, (n,), which, (m,), -1 for none, and their (m,) shares of the row."""
+    """The results for one cell; see `Ach`. For the images within the entries of its row: the number
+    in each entry, (n,), the images, (m,), -1 for none, and their (m,) shares of the row."""
 
     row: Row
     missed: float
@@ -150,8 +150,8 @@ class CellHints:
 
 
 class Sampler:
-    """Ready to sample any cell of a scene, with an open `renderer`. It travels to other processes
-    as what it is made of, without the images, whose bytes are not needed."""
+    """Samples any cell of a scene with an open `renderer`. Pickled as its arguments, without the
+    images, whose bytes are not needed."""
 
     def __init__(
         self, scene: Scene, cells: Cells, pvs: Pvs, options: AchOptions, backend: Backend
@@ -186,7 +186,7 @@ class Sampler:
             return self._counter.count(points, wanted)
 
         tallied = self._tallied(finder, count, begin)
-        if tallied is None and not finder.volume.everywhere:  # hardly anywhere in it eyes can be
+        if tallied is None and not finder.volume.everywhere:  # eyes fit almost nowhere in the cell
             finder = replace(finder, volume=finder.volume.anywhere())
             tallied = self._tallied(finder, count, begin)
         if tallied is None:
@@ -211,7 +211,7 @@ class Sampler:
     def _tallied(
         self, finder: PointFinder, count: Callable[[SamplePoints], Tally], begin: Ints
     ) -> tuple[Tally, Ints] | None:
-        """What is seen, and the (K,) group of each point; None if there is none."""
+        """The tally, and the (K,) group of each point; None without points."""
         if self.options.tolerance is not None:
             return self._until_certain(finder, count, begin, self.options.tolerance)
         points = self._points(finder)
@@ -220,7 +220,7 @@ class Sampler:
         return count(points), grouped(len(points), self.options.placed != "kd")
 
     def points_of(self, cell: int) -> SamplePoints:
-        """Where one cell is sampled, without a tolerance."""
+        """The sample points of one cell, without a tolerance."""
         finder = PointFinder(self._volumes[cell], self._obstacles, self._clearance)
         points = self._points(finder)
         if not len(points) and not finder.volume.everywhere:
@@ -246,8 +246,8 @@ class Sampler:
         begin: Ints,
         tolerance: float,
     ) -> tuple[Tally, Ints] | None:
-        """`_tallied` at points of eight independent sequences, as many as make the hints certain,
-        doubled until they are."""
+        """`_tallied` at points of eight independent sequences, doubled until the hints are
+        certain."""
         options = self.options
         seeds = ((options.seed << 3) + g + (1 << 35) for g in range(GROUPS))
         sequences = [PointSequence(finder, options.placed, seed) for seed in seeds]

@@ -1,22 +1,22 @@
-"""Which sample points are usable: not inside a solid, not against a surface.
+"""Decides which sample points are usable: those outside solids and clear of surfaces.
 
 A point too near to a surface sees hardly anything else, and one inside a statue sees the
-statue's inside; either would spoil the average (paper §5 leaves it open).
+statue's inside; either would spoil the average (the paper's §5 does not treat them).
 
 *Near* is exact: the distance from the point to the nearest triangle.
 
-*Inside* is a question about closed surfaces only. The scene's triangles are welded by position
+*Inside* is defined for closed surfaces only. The scene's triangles are welded by position
 and grouped by shared edges; a group is a *solid* if it is closed (every edge is used an even number
 of times, so that the parity of the crossings along a ray does not depend on the ray), unless
 
 - most of its area lies in cell boundaries: then it is structure, and the subdivision has already
-  decided what is behind it (the mesh of a whole building is one group as often as not), or
+  decided what lies behind it (the mesh of a whole building is often one group), or
 - its faces consistently point inwards: a shell that is meant to be seen from within.
 
-So faces need not point the right way for a statue, a table top or a leaf of paper has no inside, a
-wall modelled twice with opposite orientation is closed and empty, and an open surface bounds
-nothing. Rejected: the parity of all crossings (each open or single sheet inverts it), and the
-generalised winding number (wrong wherever faces are oriented at random, as in most OBJ files).
+So the faces of a statue need not point the right way, a table top or a sheet of paper has no
+inside, a wall modelled twice with opposite orientation is closed and empty, and an open surface
+bounds nothing. Rejected: the parity of all crossings (each open or single sheet inverts it), and
+the generalised winding number (wrong wherever faces are oriented at random, as in most OBJ files).
 """
 
 from __future__ import annotations
@@ -118,8 +118,8 @@ def edges(corner: Ints) -> tuple[Ints, Bools]:
 
 
 def edge_groups(edge: Ints) -> Ints:
-    """(T,) for each triangle, of the (T, 3) ``edges``, the least index of the triangles that it
-    hangs together with through shared edges."""
+    """(T,) for each triangle, of the (T, 3) ``edges``, the least index of the triangles connected
+    to it through shared edges."""
     order = np.argsort(edge, axis=None, kind="stable")
     same = np.flatnonzero(np.diff(edge.reshape(-1)[order]) == 0)
     one, other = order[same] // 3, order[same + 1] // 3
@@ -128,7 +128,7 @@ def edge_groups(edge: Ints) -> Ints:
 
 def closed_and_oriented(edge: Ints, forward: Bools, group: Ints) -> tuple[Bools, Bools]:
     """(T,) whether the group with each number is closed, and whether it is wound consistently, from
-    the (T, 3) ``edges`` and their directions; of numbers that no group has, anything."""
+    the (T, 3) ``edges`` and their directions; undefined for numbers of no group."""
     used = np.bincount(edge.ravel())
     turned = np.bincount(edge.ravel(), np.where(forward, 1.0, -1.0).ravel())
     closed, balanced = (np.ones(len(edge), dtype=np.bool_) for _ in range(2))
@@ -152,7 +152,7 @@ def boundary_area(scene: Scene, cells: Cells) -> Floats:
 
 @dataclass(frozen=True)
 class Obstacles:
-    """What a sample point has to keep clear of."""
+    """The surfaces and solids that a sample point has to keep clear of."""
 
     corners: Floats  # (T, 3, 3) all surfaces, metres
     nearby: Nearby
@@ -161,7 +161,7 @@ class Obstacles:
 
     @staticmethod
     def of(scene: Scene, cells: Cells) -> Obstacles:
-        """Those of a subdivided scene."""
+        """The obstacles of a subdivided scene."""
         corners = scene.corners
         bodies = tuple(solids(scene, cells))
         boxes = np.array([solid.box for solid in bodies]).reshape(-1, 2, 3)
@@ -197,8 +197,8 @@ class Obstacles:
 
 
 def by_x(points: Floats, corners: Floats, margin: float) -> tuple[Ints, Ints, Ints]:
-    """The order of the (n, 3) points by x, and for each of the (m, 3, 3) triangles where those that
-    are within ``margin`` of its extent along x begin and end in that order."""
+    """The order of the (n, 3) points by x, and for each of the (m, 3, 3) triangles the begin and
+    end, in that order, of the points within ``margin`` of its extent along x."""
     order = np.argsort(points[:, 0], kind="stable")
     x, along = points[order, 0], corners[:, :, 0]
     first = np.searchsorted(x, along.min(axis=1) - margin)

@@ -1,15 +1,15 @@
-"""The item-buffer tally: how many pixels show whose surfaces, point by point and view by view.
+"""The item-buffer tally: the pixels of each owner, by sample point and view.
 
-A pixel counts for the owner, on the viewer's side, of the triangle that it shows. Where that is a
-cell outside the PVS, or none, the pixel is in doubt, and looked up again in two steps:
+A pixel counts for the owner, on the viewer's side, of the triangle that it shows. If the owner is a
+cell outside the PVS, or missing, the pixel is in doubt and checked again in two steps:
 
 1. a ray through it is cast. A rasteriser rounds corners to 1/256 pixel, and past a rounded edge it
    sees what no straight line reaches;
 2. the point that the ray hits, moved a little towards the viewer, is located in the BSP tree.
    Geometry that reaches into a cell by less than a plane's tolerance is not cut off there, and
-   belongs to the cell that it mostly lies in, but what is seen of it is seen in this one.
+   belongs to the cell that it mostly lies in, but is seen in this one.
 
-What is then still outside the PVS is missed mass: left out of the hints and reported.
+Pixels still outside the PVS after that are missed mass: left out of the hints and reported.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from ptmtools.coverage.sample_points import SamplePoints
 
 #: Weight of a pixel in the middle of a view where pixels are weighted by solid angle.
 SOLID_ANGLE_UNIT = 2**16
-#: How far towards the viewer a hit is moved before it is located, in tolerances of a plane.
+#: Distance, in tolerances of a plane, that a hit is moved towards the viewer before it is located.
 TOWARDS = 4.0
 
 
 @dataclass(frozen=True)
 class Owners:
-    """For whom a pixel can count: each cell, or each image within each cell, where -1 is
-    what has none; every cell has that owner."""
+    """The owners of pixels: each cell, or each image within each cell, where -1 stands for surfaces
+    without an image; every cell has that owner."""
 
     cell: NDArray[np.int32]  # (S,) of each owner, ascending, and
     image: NDArray[np.int32]  # (S,) ascending within a cell
@@ -64,8 +64,8 @@ class Owners:
         return ranges(self.first[cells], size), np.cumsum(size) - size
 
     def at(self, cell: NDArray[np.int32], image: NDArray[np.int32]) -> Ints:
-        """(n,) the owner of each of the (n,) images in each of the (n,) cells; what has no image
-        where the cell has nothing with that one; -1 where the cell is -1."""
+        """(n,) the owner of each of the (n,) images in each of the (n,) cells; the owner without
+        image if the cell does not use the image; -1 where the cell is -1."""
         every = self.cell.astype(np.int64) * self.images + self.image + 1
         key = cell.astype(np.int64) * self.images + image + 1
         place = np.minimum(np.searchsorted(every, key), len(every) - 1)
@@ -79,11 +79,11 @@ class Tally:
 
     at_points: Ints  # (K, m) of each of the owners asked for, at each point
     in_views: Ints  # (6, m) of the same in each view, over all points
-    missed: Ints  # (K,) of what belongs to none of them
+    missed: Ints  # (K,) of all other owners
 
     @staticmethod
     def join(parts: list[Tally]) -> Tally:
-        """From the points of several, one after the other."""
+        """Concatenates the tallies of several sets of points."""
         return Tally(
             np.concatenate([part.at_points for part in parts]),
             np.sum([part.in_views for part in parts], axis=0),

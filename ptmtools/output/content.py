@@ -118,7 +118,7 @@ class Geometry:
         return total
 
     def shape(self, s: int) -> Shape:
-        """One of them."""
+        """One shape."""
         points, uvs, rows = (
             slice(*start[s : s + 2].tolist())
             for start in (self.point_start, self.uv_start, self.triangle_start)

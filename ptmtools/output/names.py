@@ -34,7 +34,7 @@ GLTF_FILES = f"{GLTF_FOLDER}/{{name}}.glb"
 INTERLACE_FILES = f"{INTERLACE_FOLDER}/{{name}}/"
 
 _ILLEGAL = re.compile(r"[^A-Za-z0-9_]+")
-#: Longer object names are cut: they come from generators and say nothing more.
+#: Longer object names are cut: they come from generators and carry no more information.
 _LONGEST = 48
 
 

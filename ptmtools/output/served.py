@@ -1,6 +1,6 @@
 """The files of a database as clients of the hints fetch them: index, records, geometry, textures.
 
-Only the served folder is read, so that everything a client knows is counted as traffic, and a
+Only the served folder is read, so that all of a client's data counts as traffic, and a
 published database can be simulated like a local one. `Locator` finds the cell of an eye: the one
 that has a leaf with the eye behind all its planes.
 
@@ -182,10 +182,10 @@ class Served:
 
     Attributes
     ----------
-    folder: it.
+    folder: its path.
     index: `hints.json`. records: of each cell. statistics: of all of them.
-    index_bytes, statistics_bytes: on the link, and record_bytes, geometry_bytes: (C,). All of it
-        counts as gzip makes it: servers send it so (docs/design/walkthrough.md).
+    index_bytes, statistics_bytes: on the link, and record_bytes, geometry_bytes: (C,). All sizes
+        are compressed by gzip, as servers send the files (docs/design/walkthrough.md).
     surfaces: the geometry of all cells.
     locator: of the cells.
     """

@@ -37,7 +37,7 @@ from ptmtools.scene.model import Scene
 
 #: Directions tried.
 DIRECTIONS = 72
-#: Columns of rays around a place for each of them; rows are as far apart as columns.
+#: Columns of rays around each place; rows are as far apart as columns.
 _FINER = 2
 _COLUMNS = _FINER * DIRECTIONS
 _STEP = 2 * np.pi / _COLUMNS

@@ -1,8 +1,8 @@
 """Compiles all kernels for ``ptm warm-up``: builds a small building and lightens a small statue.
 
-The building has what decides which kernels run: doors in a row, whose edges meet in one line (near
-ties), a solid that stands in a room, and an image large enough for the coder to fit weights. The
-statue becomes an octree texture, and the same mesh with texture coordinates is simplified.
+The building has the features that run all kernels: doors in a row, whose edges meet in one line
+(near ties), a solid that stands in a room, and an image large enough for the coder to fit weights.
+The statue becomes an octree texture, and the same mesh with texture coordinates is simplified.
 """
 
 from __future__ import annotations
@@ -99,6 +99,6 @@ def warm_statue() -> None:
         (Material("stone"),),
         tolerance_of(points, triangles),
     )
-    made = make_apo(scene, ApoOptions(faces=count // 4, depth=3), Executor())
-    look_up(made.octree, np.full((1, 3), 0.5))
+    replaced = make_apo(scene, ApoOptions(faces=count // 4, depth=3), Executor())
+    look_up(replaced.octree, np.full((1, 3), 0.5))
     simplify(Mesh(points, triangles, none, uv), SimplifyOptions(count // 4))

@@ -1,1 +1,1 @@
-"""Which portals lie on one straight line (Teller & Séquin 1991): of portals alone, not of cells."""
+"""Portals that lie on one straight line (Teller & Séquin 1991). Knows portals, not cells."""

@@ -12,10 +12,10 @@ import numpy as np
 from ptmtools.arrays import Floats, Ints
 from ptmtools.jit import plain_kernel as kernel
 
-#: What clipping left. NEAR_TIE is EMPTY, but the polygon ends within `NEAR` slacks of where it
+#: Results of clipping. NEAR_TIE is EMPTY, but the polygon ends within `NEAR` slacks of where it
 #: would have been kept.
 NEAR_TIE, EMPTY, WHOLE, CUT = -1, 0, 1, 2
-#: How many slacks make a near tie.
+#: Slacks that make a near tie.
 NEAR = 16.0
 #: Edges shorter than this many slacks are left over from clipping; their direction is noise.
 SHORTEST_EDGE = 16.0
@@ -33,7 +33,7 @@ def clip(
     offset: float,
     slack: float,
 ) -> int:
-    """Keeps what of a polygon lies at n·x + offset >= 0, and ``slack`` more; in place.
+    """Keeps the part of a polygon at n·x + offset >= 0, and ``slack`` more; in place.
 
     EMPTY or NEAR_TIE if nothing reaches further in front than ``slack``. A polygon that would
     outgrow its slot stays WHOLE.

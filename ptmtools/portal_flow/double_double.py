@@ -1,17 +1,17 @@
 """Decides near ties of the portal flow: whether a line can pass a sequence of portals, in
-double-double arithmetic. Portals are made exactly plane first, by moving their vertices along one
-axis, and drawn in by `Tolerance.noise`: the last digits of coordinates are noise, and in a building
+double-double arithmetic. Portals are first made exactly plane, by moving their vertices along one
+axis, and shrunk by `Tolerance.noise`: the last digits of coordinates are noise, and in a building
 that is turned the edges of doors that meet in a line no longer do, by 1e-16 of its extent.
 
-Tried and dropped: integers of any length for what double-double cannot tell, which were asked for
-one sequence in a hundred and changed no set of any model (docs/design/visibility.md).
+Tried and dropped: integers of any length for cases that double-double cannot decide, which were
+    needed for one sequence in a hundred and changed no set of any model
+    (docs/design/visibility.md).
 
 A near tie is a sequence of portals that a search rejected by less than the rounding of its
-arithmetic allows to be sure of (`clipping_kernels`). Another search that lets all near ties pass
-tells what depends on them, mostly nothing. Those on which something depends are put to
-`SequenceTest`. Where a line can pass one, the search is done again with that let through, as often
-as this brings up new ones. Where there are too many, or a budget ends, all are let through: looser,
-and conservative as ever.
+arithmetic (`clipping_kernels`). A second search that accepts all near ties shows which results
+depend on them, mostly none. `SequenceTest` decides those that matter. If a line can pass one, the
+search is repeated with it accepted, as long as this produces new ones. If there are too many, or a
+budget ends, all are accepted: looser, but still conservative.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ class SequenceTest:
         )
 
     def passes(self, sequence: tuple[int, ...]) -> bool:
-        """Whether something is left when a sequence of directed portals is clipped as the flow does
-        it; False proves that no line passes the interiors of all of them in turn."""
+        """Whether any part of a sequence of directed portals remains after clipping as in the flow;
+        False proves that no line passes the interiors of all of them in turn."""
         from ptmtools.portal_flow.double_double_kernels import something_left
 
         for q in sequence:
@@ -93,7 +93,7 @@ COSTLIEST = 3
 
 
 class Searched(NamedTuple):
-    """What a search took, all repetitions together but for ``cut`` and ``ties``: see `Pvs`."""
+    """The cost of a search, summed over all repetitions except ``cut`` and ``ties``: see `Pvs`."""
 
     cut: bool
     work: int
@@ -115,7 +115,7 @@ def searched(
     overflown = len(noted) < ties
     if not (overflown or _deciding(known, known[source] & ~seen, rejected)):
         return Searched(cut, work, ties, 0, 0)
-    # With all of them let through, what more is seen? What is seen already need not be found again.
+    # Searches again with all of them accepted, for the portals not seen yet.
     most = seen.copy()
     more, loosely, _, _ = kernels.flow(g, s, known, source, budget, none, True, most)
     work += more
@@ -156,8 +156,8 @@ def _sequences(words: Ints) -> list[tuple[int, ...]]:
 
 
 def _deciding(known: Bits, doubtful: Bits, rejected: set[tuple[int, ...]]) -> list[tuple[int, ...]]:
-    """The rejected sequences, in order, whose last portal, or what may lie behind it, is among the
-    ``doubtful`` (W,)."""
+    """The rejected sequences, in order, whose last portal, or a portal that may lie behind it, is
+    among the ``doubtful`` (W,)."""
     lasts = np.array(sorted({sequence[-1] for sequence in rejected}), np.int64)
     itself = doubtful[lasts >> 6] >> (lasts & 63).astype(np.uint64) & np.uint64(1)
     decides = itself.astype(bool) | np.any(known[lasts] & doubtful, axis=1)

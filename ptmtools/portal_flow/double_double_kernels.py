@@ -3,20 +3,20 @@
 A number is the unevaluated sum of two doubles, kept as the parts of a complex number: the real one
 is the sum, rounded, and the imaginary one the rest; 106 bits. Only the sign of such a number is
 changed by complex arithmetic. Sums and products are built from error-free transformations (Dekker,
-Numer. Math. 18, 1971; Knuth, TAOCP 2, 4.2.2). Coordinates are at most 1, so that what is computed
-of them is right to `ERROR`.
+Numer. Math. 18, 1971; Knuth, TAOCP 2, 4.2.2). Coordinates are at most 1, so that results computed
+from them are right to `ERROR`.
 
 The clipping is that of the flow, with polygons and half-spaces too large by more than all errors
-together, so that what is found empty is so. Planes are a unit normal n and an offset d; kept is
+together, so that an empty result is certain. Planes are a unit normal n and an offset d; kept is
 n·x + d >= 0.
 
-Why that is certain. A vertex newly cut is computed somewhere on an edge, wrong by less than
-`ERROR`; the same share of the true edge is off by what the ends are. So after k cuts a vertex is
-off by less than (k + 1) · `ERROR` <= `WRONG` from that of a polygon Q, convex and in the portal's
-plane. Sides are computed to far less than `WRONG`. Q contains what is truly left: a plane accepted
+Proof. A vertex newly cut is computed somewhere on an edge, wrong by less than `ERROR`; the point at
+the same share of the true edge is off by as much as the ends are. So after k cuts a vertex is off
+by less than (k + 1) · `ERROR` <= `WRONG` from that of a polygon Q, convex and in the portal's
+plane. Sides are computed to far less than `WRONG`. Q contains the true remainder: an accepted plane
 has a gap of at least SLACK / 2 between computed polygons, so of SLACK / 2 - 4 WRONG >= 0 between
-the true ones, and does separate them. It is moved by SLACK, so what is cut off of Q is off the true
-half-space by SLACK - 4 WRONG > 0. What would take too much room is left uncut.
+the true ones, and does separate them. It is moved by SLACK, so the part cut off Q is outside the
+true half-space by SLACK - 4 WRONG > 0. A polygon that would take too much room is left uncut.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from ptmtools.arrays import Ints
 from ptmtools.jit import plain_kernel as kernel
 from ptmtools.portal_flow.storage import DoubleDoublePortals, DoubleDoubleScratch
 
-#: More than a product of vectors and a vertex newly cut may be wrong by.
+#: Bound of the error of a product of vectors and of a vertex newly cut.
 ERROR = 2.0**-99
-#: How often a polygon is cut, at most.
+#: Most cuts of a polygon.
 CUTS = 255
-#: More than a vertex of a polygon is wrong by, after so many cuts of points rounded once.
+#: Bound of the error of a vertex after `CUTS` cuts of points rounded once.
 WRONG = (CUTS + 1) * ERROR
-#: By how much polygons and half-spaces are too large. A plane is accepted if it leaves half of this
-#: between two polygons, each wrong by `WRONG`, measured as well as that.
+#: Margin by which polygons and half-spaces are too large. A plane is accepted if it leaves half of
+#: this between two polygons, each wrong by `WRONG` and measured with that error.
 SLACK = 8 * WRONG
-#: What is less than the greatest by this share in doubles is less.
+#: A value below the greatest by this share in doubles is certainly less.
 ROUGHLY = 2.0**-24
-#: What of the source, of the portal passed last and of the next is left; spare.
+#: Slots: the rest of the source, of the portal passed last and of the next; spare.
 SOURCE, PASSED, NEXT, SPARE = 0, 1, 2, 3
 #: Rows of planes: those that bound all lines so far, and others.
 BOUNDS, OTHERS = 0, 1
@@ -122,8 +122,8 @@ def side(s: DoubleDoubleScratch, row: int, i: int, slot: int, k: int) -> complex
 
 @kernel
 def clip(s: DoubleDoubleScratch, row: int, count: int, slot: int) -> bool:
-    """Keeps what of a polygon lies in all half-spaces of a row, in place; whether that is
-    something."""
+    """Keeps the part of a polygon in all half-spaces of a row, in place; returns whether it is not
+    empty."""
     polygon = s.polygon
     for i in range(count):
         size = s.size[slot]
@@ -186,7 +186,7 @@ def separators_through(
 ) -> int:
     """Appends to a row the planes that separate polygons ``a`` and ``b`` through the edges of a.
 
-    Polygon a is what is left of directed portal q, which leads towards b. The plane through an edge
+    Polygon a is the rest of directed portal q, which leads towards b. The plane through an edge
     turns about it, outwards in a's plane + t · normal: the least t that has all of b beyond, and a
     little more. It is accepted by measuring both polygons. With ``flip`` the kept side is a's, else
     b's. Returns the planes in the row.
@@ -219,7 +219,7 @@ def separators_through(
                 rough = -u.real / v.real
                 if rough + ROUGHLY * (1.0 + abs(rough)) < turn.real:
                     continue
-                # By so much more as has the vertex SLACK beyond the plane.
+                # Moved further, so that the vertex is SLACK beyond the plane.
                 more = SLACK * np.sqrt(1.0 + rough * rough) / v.real
                 t = added(over(-u, v), complex(more, 0.0))
                 if greater(t, turn):
@@ -267,11 +267,11 @@ def own_plane(g: DoubleDoublePortals, s: DoubleDoubleScratch, q: int, row: int) 
 
 @kernel
 def something_left(g: DoubleDoublePortals, s: DoubleDoubleScratch, sequence: Ints) -> bool:
-    """Whether something is left when a sequence of directed portals is clipped; False is certain.
+    """Whether any part of a sequence of directed portals remains after clipping; False is certain.
 
     The next portal is clipped by all planes so far, the source by the next, the next by those that
-    separate source and passed, the source by those of next and passed; and what separates source
-    and next bounds all lines further on.
+    separate source and passed, the source by those of next and passed; the planes that separate
+    source and next bound all lines further on.
     """
     first = sequence[0]
     load(g, s, first >> 1, SOURCE)

@@ -3,8 +3,8 @@
 The method is Teller & Séquin's (SIGGRAPH 1991) in the depth-first form of Quake's ``vis``. A line
 that leaves a leaf crosses a sequence of portals. The search keeps, for each sequence, the rest of
 the *source* portal and of the portal *passed* last; the planes that separate the two bound every
-line through both, so the next portal is clipped by them, and in turn what lies between the next
-portal and the passed one clips the source. An empty polygon ends the sequence.
+line through both, so the next portal is clipped by them, and in turn the planes between the next
+portal and the passed one clip the source. An empty polygon ends the sequence.
 
 Over the textbook:
 
@@ -15,12 +15,12 @@ Over the textbook:
   accepted by measuring both polygons against it: ill-conditioned edges cost tightness only.
 * At each step the separators are also tried on every portal that is still possible and not yet
   seen; if none is left, the whole subtree is.
-* A search that grows long shoots one line at each portal that is still possible. What a line
-  crosses is seen without a search; what is left to refute is little, even in an open hall.
-* What is rejected by less than the rounding of the arithmetic is decided again in double-double
+* A search that grows long shoots one line at each portal that is still possible. Portals that a
+  line crosses are seen without a search; few are left to refute, even in an open hall.
+* Rejections by less than the rounding of the arithmetic are decided again in double-double
   (`double_double`).
 * Each source portal has a budget of operations, not of seconds. When it is spent, open branches
-  are not followed; what their separators leave of the possible set counts as seen.
+  are not followed; the part of the possible set that their separators leave counts as seen.
 
 Portals are done in ascending order of how much they might see, in batches of fixed length: a
 batch reads only the results of the batches before it, hence the same answer for any number of
@@ -50,7 +50,7 @@ from ptmtools.portal_flow.storage import Geometry, Scratch
 from ptmtools.progress import Progress, silent
 from ptmtools.tolerance import Tolerance
 
-#: Portals whose results appear to the others at once.
+#: Portals of a batch, whose results appear to later ones together.
 BATCH = 64
 #: Operations that are worth a message to another machine, some 20 ms.
 TASK = 80_000
@@ -97,7 +97,7 @@ class PortalFlow:
 
     @property
     def operations(self) -> int:
-        """Chain tests and clips that were done in all."""
+        """Total of chain tests and clips."""
         return int(self.work.sum())
 
     def portals_in(self, row: Bits) -> Ints:
@@ -154,7 +154,7 @@ def upper_bound(
     portals: Portals,
     executor: Executor = Executor(),  # noqa: B008 - has no state
 ) -> PortalFlow:
-    """What `portal_flow` begins with: its sets before any search. Raises what it raises."""
+    """The initial sets of `portal_flow`, before any search. Raises what it raises."""
     check(portals)
     count = 2 * len(portals.leaf)
     words = (count + 63) // 64
@@ -172,7 +172,8 @@ def upper_bound(
 
 
 def leaf_matrix(portals: Portals, flow: PortalFlow) -> Bools:
-    """(L, L) which leaf may see which: itself, its neighbours, and what its portals see."""
+    """(L, L) the leaves that each leaf may see: itself, its neighbours, and the leaves that its
+    portals see."""
     enters, leaves = portals.leaf[:, ::-1].reshape(-1), portals.leaf.reshape(-1)
     matrix = np.eye(portals.leaf_count, dtype=np.bool_)
     matrix[leaves, enters] = True
@@ -184,7 +185,7 @@ def leaf_matrix(portals: Portals, flow: PortalFlow) -> Bools:
 def _prepass(g: Geometry, executor: Executor) -> Bits:
     """(2K, W) a first upper bound of what each directed portal sees, from planes and floods.
 
-    The rounds of bits take a hundredth of the time of the floods: they are not shared out.
+    The rounds of bits take a hundredth of the time of the floods: they are not distributed.
     """
     from ptmtools.portal_flow.flow_kernels import tighten
     from ptmtools.portal_flow.line_kernels import return_sight
@@ -226,7 +227,7 @@ def check(portals: Portals) -> None:
 
 
 def geometry(portals: Portals) -> Geometry:
-    """The portals as the kernels want them: centred, counter-clockwise, with bounds."""
+    """The portals in the form of the kernels: centred, counter-clockwise, with bounds."""
     start = portals.start.astype(np.int64)
     sizes = np.diff(start)
     middle = (portals.point.min(axis=0) + portals.point.max(axis=0)) / 2
@@ -234,7 +235,7 @@ def geometry(portals: Portals) -> Geometry:
     owner = np.repeat(np.arange(len(sizes)), sizes)
     normal = portals.normal / np.linalg.norm(portals.normal, axis=1, keepdims=True)
 
-    # Newell's area vector about the first vertex tells a polygon's orientation.
+    # Newell's area vector about the first vertex gives a polygon's orientation.
     within = np.arange(len(point)) - start[owner]
     following = np.where(within + 1 < sizes[owner], np.arange(len(point)) + 1, start[owner])
     arm = point - point[start[owner]]
@@ -269,14 +270,14 @@ def geometry(portals: Portals) -> Geometry:
 DEPTH = 1024
 #: Vertices that clipping may add to a portal before it is left unclipped.
 GROWTH = 24
-#: Words that remember which sequences a search rejected by near ties.
+#: Words to record the sequences that a search rejected by near ties.
 NEAR_TIE_WORDS = 1 << 16
 
 Tools = tuple[Scratch, SequenceTest]
 
 
 class Searching:
-    """The portals; what each may see by all that is known, (2K, W) bits; and the budget of each
+    """The portals; the portals that each may see so far, (2K, W) bits; and the budget of each
     search, see `portal_flow`."""
 
     def __init__(self, geometry: Geometry, known: Bits, budget: int) -> None:
@@ -305,8 +306,8 @@ class Searching:
 
 
 def flood_from(shared: Searching, span: tuple[int, int]) -> Bits:
-    """As a task: (last - first, W) what floods reach from the directed portals ``span`` (first,
-    last)."""
+    """As a task: (last - first, W) the portals that floods reach from the directed portals ``span``
+    (first, last)."""
     from ptmtools.portal_flow.flow_kernels import flood
 
     first, last = span
@@ -317,7 +318,8 @@ def flood_from(shared: Searching, span: tuple[int, int]) -> Bits:
 
 
 def search_from(shared: Searching, source: int) -> tuple[Bits, Searched]:
-    """As a task: a (W,) row of bits, what the directed portal ``source`` sees; and what it took."""
+    """As a task: a (W,) row of bits, the portals that the directed portal ``source`` sees; and the
+    cost."""
     seen = np.zeros(shared.words, np.uint64)
     with shared.tools() as (storage, test):
         given = shared.geometry, storage, test, shared.known, source, shared.budget
@@ -325,7 +327,7 @@ def search_from(shared: Searching, source: int) -> tuple[Bits, Searched]:
 
 
 def settle(shared: Searching, batch: Ints, seen: Bits) -> None:
-    """Enters the (B, W) rows ``seen`` that the searches of (B,) directed portals have found."""
+    """Enters the (B, W) rows ``seen`` that the searches from (B,) directed portals returned."""
     from ptmtools.portal_flow.line_kernels import drop_unreturned
 
     dropped = shared.known[batch] & ~seen

@@ -1,10 +1,10 @@
 """Compiled loops of the portal flow (see `flow` for the method and its argument).
 
-Conventions. Every undirected portal k has a unit normal and is listed counter-clockwise around
-it; the directed portal 2k crosses it along the normal, 2k + 1 against it, so ``q ^ 1`` is the
-way back. Rows of bits are little-endian words over directed portals. Of the slots of polygons
-(see `clipping_kernels`) frame f of the depth-first search owns 2f (what is left of the source) and
-2f + 1 (what is left of the portal passed last).
+Conventions. Every undirected portal k has a unit normal and is listed counter-clockwise around it;
+the directed portal 2k crosses it along the normal, 2k + 1 against it, so ``q ^ 1`` is the way back.
+Rows of bits are little-endian words over directed portals. Of the slots of polygons (see
+`clipping_kernels`) frame f of the depth-first search owns 2f (the rest of the source) and 2f + 1
+(the rest of the portal passed last).
 
 The pre-pass bounds each portal by planes and floods.
 """
@@ -126,11 +126,11 @@ def flow(
 
     ``known`` (2K, W) is what each portal may see at most; ``seen`` (W,) the result row,
     zeroed or with what is seen already. A
-    search that grows long `glance`s, once: in an open hall nearly all is seen at once, and what is
-    left to look out for is little. (Glancing first costs more than it saves where walls are many:
-    e1m1 +30 %. Without it, a hall of 1,344 open portals spends its whole budget.)
-    Returns (operations, whether the budget or the depth cut the search short, how many rejections
-    were near ties, see `clipping_kernels`, words of `Scratch.near_tie` that tell which).
+    search that grows long `glance`s, once: in an open hall nearly all portals are seen at once, and
+    few are left to search for. (Glancing first costs more than it saves where walls are many: e1m1
+    +30 %. Without it, a hall of 1,344 open portals spends its whole budget.) Returns (operations,
+    whether the budget or the depth cut the search short, how many rejections were near ties, see
+    `clipping_kernels`, words of `Scratch.near_tie` that list them).
     """
     words = known.shape[1]
     depth = len(s.might)
@@ -173,7 +173,7 @@ def flow(
         if not fresh and seen[word] & bit != ZERO:
             continue
 
-        # What is left of the next portal (slot b), then of the source (slot a).
+        # The rest of the next portal (slot b), then of the source (slot a).
         ops += 1
         k = q >> 1
         sq = 1.0 if q & 1 == 0 else -1.0
@@ -282,9 +282,10 @@ def ahead(g: Geometry, p: int, q: int) -> bool:
 
 @kernel
 def flood(g: Geometry, s: Scratch, first: int, last: int, rows: Bits) -> None:
-    """``rows`` (last - first, W), zeroed, become what floods from first … last - 1 reach.
+    """Fills ``rows`` (last - first, W), zeroed, with the portals that floods from first … last - 1
+    reach.
 
-    From p and each next portal r a flood goes on through what lies ahead of p and of the portal
+    From p and each next portal r a flood goes on through portals ahead of p and of the portal
     before it, and beyond the planes that separate p from r.
     """
     stack = np.empty(len(g.leaf) + 1, np.int64)
@@ -319,7 +320,7 @@ def flood(g: Geometry, s: Scratch, first: int, last: int, rows: Bits) -> None:
                         facing[q] = p + 1 if ahead(g, p, q) else -p - 1
                     if facing[q] < 0 or not ahead(g, before, q):
                         continue
-                    visited[q] = wave  # what the planes hide, they hide from wherever it is reached
+                    visited[q] = wave  # portals that the planes hide are hidden on every path
                     now = beyond(g.point, g.start, g.ball, q >> 1, s.plane, 0, count, g.slack)
                     if now != EMPTY:
                         rows[p - first, q >> 6] |= ONE << np.uint64(q & 63)
@@ -329,8 +330,8 @@ def flood(g: Geometry, s: Scratch, first: int, last: int, rows: Bits) -> None:
 
 @kernel
 def tighten(g: Geometry, first: int, last: int, known: Bits, tighter: Bits) -> None:
-    """Rows first … last - 1 of ``tighter``: what p may see by ``known``, if some q behind p's next
-    leaf is it or may see it."""
+    """Fills rows first … last - 1 of ``tighter``: the portals that p may see by ``known`` and that
+    are, or may be seen by, some q behind p's next leaf."""
     words = known.shape[1]
     some = np.empty(words, np.uint64)
     for p in range(first, last):

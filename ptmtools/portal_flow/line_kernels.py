@@ -25,8 +25,8 @@ from ptmtools.portal_flow.storage import Geometry
 
 
 class Openings(NamedTuple):
-    """Portals as lines meet them; directed portal 2k crosses portal k along its normal, 2k + 1
-    against it."""
+    """Portals in the form that lines are traced through; directed portal 2k crosses portal k along
+    its normal, 2k + 1 against it."""
 
     point: Floats  # (Q, 3) convex polygons, counter-clockwise around their normals
     start: Ints  # (K + 1,) CSR over portals
@@ -84,8 +84,8 @@ def passes(point: Floats, start: Ints, q: int, origin: Floats, along: Floats, tu
     """Whether the line through ``origin`` along ``turn * along`` passes directed portal q: all
     volumes that it makes with the edges then have one sign.
 
-    Of the faces of a convex leaf a line leaves through one, so a portal that is passed outwards is
-    where the ray goes on, and how far away it is need not be asked."""
+    A line leaves a convex leaf through one face, so the ray goes on through the portal that it
+    passes outwards, and no distance is compared."""
     begin, end = start[q >> 1], start[(q >> 1) + 1]
     sense = turn if q & 1 == 0 else -turn
     dx, dy, dz = along[0], along[1], along[2]
@@ -146,7 +146,7 @@ def transpose(square: Bits) -> None:
 @kernel
 def return_sight(known: Bits, first: int, last: int) -> None:
     """Rows of the blocks first … last - 1 of 64: p sees q only if the way back from q sees that
-    from p. Rows may change meanwhile: what they lose so, p loses here anyway.
+    from p. Rows may change meanwhile: bits that they lose are lost by p here anyway.
     """
     count, words = known.shape
     square = np.empty(64, np.uint64)
@@ -164,7 +164,8 @@ def return_sight(known: Bits, first: int, last: int) -> None:
 
 @plain_kernel
 def drop_unreturned(known: Bits, p: int, dropped: Bits) -> None:
-    """Where p sees q no longer, ``dropped`` (W,), the way back from q does not see that from p."""
+    """Clears the way back from p in the rows of the ways back from ``dropped`` (W,), the portals
+    that p no longer sees."""
     back = p ^ 1
     w, keep = back >> 6, ~(ONE << np.uint64(back & 63))
     for v in range(len(dropped)):
@@ -203,11 +204,10 @@ def place_in(g: Geometry, k: int, state: np.uint64, at: Floats) -> np.uint64:
 
 @plain_kernel
 def glance(g: Geometry, known: Bits, source: int, seen: Bits, line: Floats) -> int:
-    """Marks in ``seen`` (W,) what one random line to each possible portal crosses on its way.
+    """Marks in ``seen`` (W,) the portals that one random line to each possible portal crosses.
 
-    A portal so marked is seen beyond doubt, so the search need not look out for it; a line that
-    goes astray by rounding only marks what is possible anyway. ``line`` (2, 3) is overwritten.
-    Returns the leaves walked.
+    A marked portal is certainly seen, so the search need not test it; a line that rounding leads
+    astray only marks possible portals. ``line`` (2, 3) is overwritten. Returns the leaves walked.
     """
     origin, along = line[0], line[1]
     state = np.uint64(source + 1) * np.uint64(0x9E3779B97F4A7C15)

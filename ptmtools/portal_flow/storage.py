@@ -1,4 +1,4 @@
-"""What the kernels work on: portals, and working storage."""
+"""Arrays of the kernels: portals, and working storage."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class DoubleDoublePortals(NamedTuple):
 
 
 class DoubleDoubleScratch(NamedTuple):
-    """Working storage of one worker for these."""
+    """Working storage of one worker for `DoubleDoublePortals`."""
 
     polygon: Doubles  # (4, V, 3)
     size: Ints  # (4,)

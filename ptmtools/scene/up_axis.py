@@ -221,8 +221,8 @@ USUAL_UP: dict[str, Up] = {".obj": "y"}
 CONVENTION, UNUSUAL_UP = "usual up axis", 0.75
 #: The runner-up is printed if it costs at most this many times as much as the best candidate.
 RUNNER_UP = 3.0
-#: Heights of buildings in metres: below the first nobody can stand; above the second a building has
-#: several storeys, which costs little.
+#: Heights of buildings in metres: a visitor cannot stand below the first; above the second a
+#: building has several storeys, which costs little.
 HEIGHTS = (2.0, 15.0)
 #: Widths of buildings and free heights of rooms, in metres.
 WIDTHS, ROOMS = (3.0, 500.0), (2.2, 6.0)

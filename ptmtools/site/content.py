@@ -395,7 +395,7 @@ class Texture:
 def web_texture(file: Path, row: Mapping[str, Any]) -> Texture:
     """A texture of an index, in a form that browsers read. One of another profile, version or kind
     of sample is encoded again with the same levels: integers lose their low bits, floats count from
-    0 to 1, as wherever such a texture is shown.
+        0 to 1, as in every display of such a texture.
 
     Raises
     ------

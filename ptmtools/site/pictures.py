@@ -1,10 +1,10 @@
 """Pictures of viewpoints, as the page draws them: a poster, and a small one for each in the menu.
 
 Rays find the surfaces of the pixels (`ptmtools.rendering.rays`), and textures are sampled at the
-level nearest to what a pixel covers, of those up to `FINEST` texels a side: of a texture that no
-picture shows nothing is read, and of the others their first bytes. (Tried: the compiled sampling of
-`ptmtools.rendering`, trilinear: the two look the same at this size, and where it is not
-compiled yet that takes four seconds.)
+level nearest to the size of a pixel, up to `FINEST` texels a side: textures that no picture shows
+are not read, and only the first bytes of the others. (Tried: the compiled sampling of
+`ptmtools.rendering`, trilinear: the two look the same at this size, and where it is not compiled
+yet that takes four seconds.)
 """
 
 from __future__ import annotations
@@ -47,8 +47,7 @@ Levels = Sequence[NDArray[np.uint8]]
 
 
 def pictures(served: Served) -> tuple[bytes, list[bytes]]:
-    """JPEGs of a database's viewpoints: of the first one for a poster, and small ones of the first
-    `MOST`.
+    """JPEGs of a database's viewpoints: a poster of the first, and small ones of the first `MOST`.
 
     Raises
     ------
@@ -79,7 +78,8 @@ def _jpeg_of(
 
 
 def jpeg(colors: Floats, size: tuple[int, int], most: int) -> bytes:
-    """A JPEG of so many bytes at most, if quality can make it so, of the (n, 3) colours of rays."""
+    """A JPEG of the (n, 3) colours of rays, of at most ``most`` bytes if the lowest quality allows
+    it."""
     from PIL import Image
 
     width, height = _rays(size)
@@ -108,7 +108,7 @@ def _look(caster: Caster, size: tuple[int, int], viewpoint: Mapping[str, Any]) -
 
 
 def _levels(served: Served, texture: int) -> Levels:
-    """Those of a texture up to `FINEST`, the coarsest in any case."""
+    """The levels of a texture up to `FINEST`, always with the coarsest."""
     from ptmtools.texture import open as open_ptm
 
     colors: list[NDArray[np.uint8]] = []

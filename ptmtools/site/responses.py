@@ -48,7 +48,7 @@ _SHOWN = "Accept-Ranges, Content-Encoding, Content-Length, Content-Range, ETag"
 _PIECE = 1 << 18
 #: Files of more bytes are not compressed, which is done in memory.
 _MOST = 64 << 20
-#: One range; more digits than any file's size has are none.
+#: One range; a number with more digits than any file size is malformed.
 _RANGE = re.compile(r"bytes[ \t]*=[ \t,]*(\d{0,18})-(\d{0,18})[ \t,]*", re.ASCII | re.IGNORECASE)
 _TAG = re.compile(r'(?:W/)?("[^"]*")')
 _CODING = re.compile(r"([^\s;,]+)\s*(?:;\s*q\s*=\s*([\d.]+))?", re.ASCII | re.IGNORECASE)
@@ -115,19 +115,19 @@ async def _response(
     request: Request, entry: Entry, content: Content, copies: Copies, common: dict[str, str]
 ) -> Response:
     """The response to a request for an existing file. The stream closes ``content`` in the end."""
-    asked = request.headers
+    headers_in = request.headers
     headers = common | {
         "Content-Type": entry.media,
         "Cache-Control": FOREVER if entry.forever else FRESH,
     }
     part, size = None, content.size
     # Ranges are defined for GET alone; those of If-Range need the very same bytes.
-    if request.method == "GET" and asked.get("If-Range", content.tag).strip() == content.tag:
-        part = asked_range(asked.get("Range"), size)
+    if request.method == "GET" and headers_in.get("If-Range", content.tag).strip() == content.tag:
+        part = asked_range(headers_in.get("Range"), size)
     sent = content
     if entry.compressed:
         headers["Vary"] = "Accept-Encoding"
-        if part is None and accepts_gzip(asked.get("Accept-Encoding")):
+        if part is None and accepts_gzip(headers_in.get("Accept-Encoding")):
             sent = await copies.of(entry.name, content) or content
     headers["ETag"] = sent.tag
     if sent is content:
@@ -135,7 +135,7 @@ async def _response(
     else:
         content.close()
         headers["Content-Encoding"] = "gzip"
-    if names_tag(", ".join(asked.getlist("If-None-Match")), sent.tag):
+    if names_tag(", ".join(headers_in.getlist("If-None-Match")), sent.tag):
         sent.close()
         return Response(status_code=304, headers=headers)
     status = 200

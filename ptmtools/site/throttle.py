@@ -172,9 +172,9 @@ class Paced:
             await self._app(scope, receive, send)
             return
         now = time.monotonic()
-        asked = _field(scope["headers"], b"range")
+        range_header = _field(scope["headers"], b"range")
         path = scope["raw_path"].decode("ascii")
-        text = None if asked is None else asked.decode("latin-1")
+        text = None if range_header is None else range_header.decode("latin-1")
         visit = Visit(scope["method"], path, text, now)
         if self._visits is not None:
             self._visits.add(visit)

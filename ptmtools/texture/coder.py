@@ -20,9 +20,9 @@ class Tile:
     Attributes
     ----------
     data: its bytes (empty after decoding).
-    texels: (h, w, c), as a decoder has them. They are those of the image unless an error was
-        allowed.
-    memory: what an adaptive profile has learned from this tile and those before it; else None.
+    texels: (h, w, c), as a decoder has them. They equal the image's unless an error was allowed.
+    memory: the state that an adaptive profile has learned from this tile and the ones before it;
+        else None.
     """
 
     data: bytes
@@ -38,13 +38,14 @@ class Coder(Protocol):
     ``max_error`` allows an error. Decoding raises InputError (PTM-I112) where the bytes contradict
     the sizes or themselves; it never reads or writes outside its arrays.
 
-    A level is one tile or several; a tile is coded as if there was nothing around it. ``memory``
-    is what the tile of the level below left, None at first; the tiles of a level of several all
-    get what the last single tile left, and what they leave is dropped. It is never changed.
+    A level is one tile or several; a tile is coded as if there was nothing around it. ``memory`` is
+    the state left by the tile of the level below, None at first; the tiles of a level of several
+    all start from the state of the last single tile, and their own states are dropped. A state is
+    never changed in place.
     """
 
     def encode_base(self, level: Samples) -> bytes:
-        """The coarsest level, which has nothing below it; without error."""
+        """Codes the coarsest level, which has no level below, without error."""
 
     def decode_base(self, data: bytes | memoryview, shape: Shape, dtype: np.dtype[Any]) -> Samples:
         """The inverse of `encode_base`."""
@@ -57,7 +58,7 @@ class Coder(Protocol):
         memory: Any = None,
         threads: int = 1,
     ) -> Tile:
-        """What refines ``below`` to ``level``, or to within ``max_error`` of it."""
+        """Codes the refinement of ``below`` to ``level``, or to within ``max_error`` of it."""
 
     def decode_tile(
         self,

@@ -27,8 +27,8 @@ from ptmtools.texture.samples import KINDS
 Samples = NDArray[Any]
 _PILLOW = "pip install --force-reinstall pillow"
 _CODECS = "pip install 'ptmtools[codecs]'"
-#: Before it is timed, a codec codes a corner of so many texels a side, and ours also noise and a
-#: plain image of that size, so that no compiling or loading is counted.
+#: Side, texels, of the corner that a codec codes before it is timed (our profiles also code noise
+#: and a plain image of that size), so that no compiling or loading is counted.
 _CORNER = 256
 _LENGTH = struct.Struct("<I")
 _KINDS = tuple(KINDS)
@@ -37,14 +37,15 @@ _INTEGERS = ("uint8", "uint16")
 
 @dataclass(frozen=True)
 class Codec:
-    """A way to turn an image into bytes, and back.
+    """A codec of images.
 
     Attributes
     ----------
-    name: what it is called in a table.
-    encode, decode: of (h, w, c) texels. Either may raise anything for what it cannot hold.
-    kinds: of the samples that it can hold.
-    pyramid: whether one string holds all levels.
+    name: its name in tables.
+    encode, decode: take or return (h, w, c) texels. Either may raise anything for unsupported
+        texels.
+    kinds: the supported kinds of samples.
+    pyramid: whether one byte string holds all levels.
     remedy: how to install it; None if it is installed.
     """
 
@@ -58,7 +59,7 @@ class Codec:
 
 @dataclass(frozen=True)
 class Measured:
-    """One codec on one image, or on several.
+    """The result of one codec on one image or several.
 
     Attributes
     ----------
@@ -85,7 +86,7 @@ def codecs(profiles: Iterable[str] = PROFILES) -> list[Codec]:
 
 
 def measure(image: Samples, contenders: Sequence[Codec], repeat: int = 1) -> list[Measured]:
-    """What each codec makes of (h, w, c) texels; times are the best of ``repeat``."""
+    """Measures each codec on (h, w, c) texels; times are the best of ``repeat``."""
     from ptmtools.texture.pyramid import build_pyramid
 
     levels = [np.ascontiguousarray(level) for level in build_pyramid(image)]
@@ -134,7 +135,7 @@ def _measured(levels: list[Samples], codec: Codec, repeat: int) -> Measured:
         rest = 0 if codec.pyramid else sum(len(codec.encode(level)) for level in levels[:-1])
     except PtmError as error:
         return replace(none, problem=str(error))
-    except Exception as error:  # other libraries raise whatever they like
+    except Exception as error:  # other libraries raise exceptions of any class
         reason = " ".join(str(error).split()) or type(error).__name__
         height, width, components = image.shape
         what = f"{width} x {height}, {components} components of {image.dtype}"
@@ -194,7 +195,7 @@ def _rivals() -> list[Codec]:
 
 
 def _by_imagecodecs(name: str, function: str, **settings: Any) -> Codec:
-    """A codec of that library: ``function``_encode and ``function``_decode."""
+    """A codec of imagecodecs: ``function``_encode and ``function``_decode."""
     imagecodecs: Any
     try:
         import imagecodecs
@@ -215,7 +216,7 @@ def _by_imagecodecs(name: str, function: str, **settings: Any) -> Codec:
 
 
 def _plain(image: Samples) -> Samples:
-    """Without the axis of components if there is one only."""
+    """Drops the axis of components if there is only one."""
     return image[:, :, 0] if image.shape[2] == 1 else image
 
 
@@ -228,7 +229,7 @@ def _webp(image: Samples) -> bytes:
 
 
 def _by_pillow(data: bytes, shape: tuple[int, ...]) -> Samples:
-    """What Pillow decodes, or for PNGs of 16 bits `load_image`."""
+    """Decodes by Pillow, or by `load_image` for PNGs of 16 bits."""
     from PIL import Image
 
     if data[1:4] == b"PNG" and data[24] == 16:

@@ -41,7 +41,7 @@ _MORE = struct.Struct("<IIII")
 _ENTRY = struct.Struct("<QQI")
 #: Length and CRC-32 of a tile.
 TILE_ENTRY = struct.Struct("<II")
-#: First byte of every tile of a file with an allowed error: whether the tile makes use of it.
+#: First byte of every tile of a file with an allowed error: whether the tile uses it.
 EXACT, WITHIN = 0, 1
 _CRC = struct.Struct("<I")
 #: No head is longer, so that many bytes always suffice for `read_header`.
@@ -53,7 +53,7 @@ _ENCODE_AGAIN = "the file is damaged: fetch or encode it again"
 
 
 def head_size(groups: int) -> int:
-    """Bytes of the head of a file with so many groups."""
+    """Bytes of the head of a file of that many groups."""
     return _FIXED.size + _MORE.size + groups * _ENTRY.size + _CRC.size
 
 
@@ -149,7 +149,7 @@ def read_header(data: bytes) -> PtmHeader:
     expected, texels = size + described, 0
     for number, ((w, h), (offset, length, crc)) in enumerate(zip(sizes, entries, strict=True)):
         tiles = tile_counts(w, h, tile) if number else (1, 1)
-        # No coder makes a group twice as long as its texels, but for small change.
+        # No coder makes a group twice as long as its texels, except for a few bytes.
         if offset != expected or length > 2 * w * h * texel_bytes + 1024 * tiles[0] * tiles[1]:
             raise _damaged_head(f"the byte range of level {len(levels)} is impossible")
         expected += length

@@ -2,9 +2,9 @@
 
 Each texel of level n differs from the texel of level n-1 that covers its 2×2 block (an odd last row
 or column, which has no block, from the texel beside it) by a root mean square over its colour
-components; of these the mean over the texels is taken, as the error of a picture is the mean over
-its pixels. A client that has level k is off by Σ differences[n], n > k, at most, but for odd sides:
-of the museum's textures with two levels missing by 0.7 of it, with six by half.
+components; the detail of a level is the mean of these over its texels, as the error of a picture is
+the mean over its pixels. A client that has level k is off by Σ differences[n], n > k, at most, but
+for odd sides: of the museum's textures with two levels missing by 0.7 of it, with six by half.
 
 (Tried: the root mean square over the texels, too, whose squares do add up. A few strong edges carry
 it, and clients that go by it show worse pictures, see `ptmtools.lab.policies.shares`. Enlarging
@@ -32,9 +32,9 @@ from ptmtools.jit import kernel
 
 @kernel
 def integer_lengths(level: NDArray[Any], below: NDArray[Any], colours: int) -> float:
-    """Of integers of up to 16 bits. The squares are exact; the roots of a row are summed up before
-    they are added to the rest, so of a million texels the sum is off by less than 1e-12 of it. Two
-    texels at a time take half the time of one."""
+    """The sum for integers of up to 16 bits. The squares are exact; the roots of a row are summed
+    up before they are added to the rest, so the sum over a million texels is off by less than 1e-12
+    of it. Two texels at a time take half the time of one."""
     height, width = below.shape[:2]
     total = 0.0
     for y in range(level.shape[0]):
@@ -61,7 +61,7 @@ def integer_lengths(level: NDArray[Any], below: NDArray[Any], colours: int) -> f
 
 @kernel
 def float_lengths(level: NDArray[Any], below: NDArray[Any], colours: int) -> float:
-    """Of floats; what is not finite differs from nothing."""
+    """The sum for floats; values that are not finite count as no difference."""
     height, width = below.shape[:2]
     total = 0.0
     for y in range(level.shape[0]):
@@ -81,7 +81,7 @@ Samples = NDArray[Any]
 
 #: Significant digits of the differences.
 DIGITS = 3
-#: Colours are told as if samples went from 0 to this.
+#: Colours are scaled as if samples went from 0 to this.
 _WHITE = 255
 
 
@@ -90,9 +90,8 @@ class Detail:
     """
     Attributes
     ----------
-    differences: of each level, the coarsest first, how much it differs from the one below on
-        average over its texels, 0 to 255 for integers of any size; floats count as 255 for 1. The
-        first is 0.
+    differences: for each level, coarsest first, the average difference of its texels from the level
+        below, 0 to 255 for integers of any size; floats count as 255 for 1. The first is 0.
     color: red, green and blue of the coarsest level's mean, 0 to 255, as they are stored.
     """
 
@@ -101,15 +100,15 @@ class Detail:
 
 
 def colours_of(components: int) -> int:
-    """How many of so many components are colours; the last of 2 and of 4 is alpha."""
+    """Number of components that are colours; the last of 2 and of 4 is alpha."""
     return components - (components in (2, 4))
 
 
 def difference_between(level: Samples, below: Samples) -> float:
     """By how much (h, w, c) texels differ from (h >> 1, w >> 1, c) enlarged, in their own units:
-    the sum over the texels of the root mean square over the components without alpha. What is not
-    finite differs from nothing."""
-    if level.dtype == np.float16:  # which the compiler does not know
+    the sum over the texels of the root mean square over the components without alpha. Values that
+    are not finite count as no difference."""
+    if level.dtype == np.float16:  # the compiler does not know
         level, below = level.astype(np.float32), below.astype(np.float32)
     lengths = integer_lengths if level.dtype.kind == "u" else float_lengths
     colours = colours_of(level.shape[2])
@@ -122,8 +121,8 @@ def detail_of(coarsest: Samples, above: Iterable[tuple[float, int]]) -> Detail:
     Parameters
     ----------
     coarsest: (h, w, c) texels of level 0.
-    above: of each further level the `difference_between` it and the one below, summed up over
-        tiles, and how many texels it has.
+    above: for each further level, the `difference_between` it and the one below, summed over its
+        tiles, and its number of texels.
     """
     colours = colours_of(coarsest.shape[2])
     whole = coarsest.dtype.kind == "u"
@@ -136,7 +135,7 @@ def detail_of(coarsest: Samples, above: Iterable[tuple[float, int]]) -> Detail:
 
 
 def detail_of_levels(levels: Iterable[Samples]) -> tuple[Detail, Samples]:
-    """The `Detail` of all levels, coarsest first, each (h, w, c); and the finest of them."""
+    """The `Detail` of levels (h, w, c), given coarsest first; and the finest level."""
     following = iter(levels)
     coarsest = finest = next(following)
     above = []

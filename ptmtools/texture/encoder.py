@@ -48,7 +48,7 @@ from ptmtools.texture.sources import ImageRows, Rows, Samples
 
 
 def check_options(options: EncodeOptions) -> None:
-    """Raises InputError PTM-I111 for what no image can be encoded with."""
+    """Raises InputError PTM-I111 for options that no image can be encoded with."""
     for field in fields(options):
         value = getattr(options, field.name)
         if isinstance(field.default, int) and type(value) is not type(field.default):
@@ -83,7 +83,8 @@ def check_options(options: EncodeOptions) -> None:
 
 
 def checked_coder(options: EncodeOptions, image: ImageRows) -> Coder:
-    """What codes an image as the options say. Raises InputError PTM-I111 for what cannot be."""
+    """The coder that the options ask for. Raises InputError PTM-I111 if it cannot code the
+    image."""
     check_options(options)
     top = KINDS[image.dtype.name].top_error
     if options.max_error > top:
@@ -103,8 +104,8 @@ def kept_levels(width: int, height: int, options: EncodeOptions) -> list[int]:
     sizes = level_sizes(width, height)
     count = len(sizes)
 
-    def number(asked: int) -> int:
-        return min(max(asked + count if asked < 0 else asked, 0), count - 1)
+    def number(level: int) -> int:
+        return min(max(level + count if level < 0 else level, 0), count - 1)
 
     last = number(options.max_level)
     first = min(number(options.min_level), last)
@@ -114,8 +115,8 @@ def kept_levels(width: int, height: int, options: EncodeOptions) -> list[int]:
 
 
 def level_above(header: PtmHeader) -> tuple[int, int, int] | None:
-    """Of the coarsest level that was left out on purpose above those in the file: width, height,
-    and about how many bytes it would take, judged by the level below it. None if there is none."""
+    """Width, height and estimated bytes of the coarsest level above those in the file that was left
+    out on purpose, judged by the level below it. None if no level was left out."""
     if not header.trimmed:
         return None
     width, height = level_sizes(header.width, header.height)[-header.trimmed]
@@ -123,8 +124,9 @@ def level_above(header: PtmHeader) -> tuple[int, int, int] | None:
     return width, height, finest.length * width * height // (finest.width * finest.height)
 
 
-#: A tile below others is coded without error, though one is allowed, if that takes at most so many
-#: times the bytes: it lets those above it be exact, which takes fewer where an image is flat.
+#: A tile below others is coded without error, though one is allowed, if that takes at most this
+#: factor more bytes: the tiles above it can then be exact, which takes fewer bytes where an image
+#: is flat.
 EXACT_FACTOR = 1.2
 
 _DEFAULTS = EncodeOptions()
@@ -143,7 +145,7 @@ def encode(
     Parameters
     ----------
     image: (h, w) or (h, w, c), rows from the top, 1 to 4 components (grey; grey and alpha; RGB;
-        RGB and alpha; or whatever else), of uint8, uint16, float16 or float32.
+        RGB and alpha; or any other meaning), of uint8, uint16, float16 or float32.
     threads: how many work at once on the tiles; the bytes do not depend on it.
 
     Raises

@@ -1,4 +1,4 @@
-"""What a `.ptm` holds: options, header, levels, limits. Plain values; nothing heavy is imported."""
+"""The value types of a `.ptm`: options, header, levels, limits. Imports nothing heavy."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-#: About so many samples are averaged at a time: scratch memory is a small multiple of it.
+#: Samples averaged at a time, about: scratch memory is a small multiple of it.
 STRIP_SAMPLES = 1 << 18
 
 
@@ -51,7 +51,7 @@ def build_pyramid(source: Any, min_side: int = 1) -> list[NDArray[Any]]:
     """Levels of an (h, w, c) or (h, w) image, coarsest first, the image itself last.
 
     ``source`` needs a ``shape``, a ``dtype`` (uint8, uint16, float16 or float32) and rows that can
-    be sliced: an array, a memory-mapped file, or something that makes rows when asked. It is read
+    be sliced: an array, a memory-mapped file, or an object that produces rows on demand. It is read
     once, from top to bottom, a strip at a time.
     """
     levels = [source]
@@ -109,7 +109,7 @@ class Box(NamedTuple):
 
     @property
     def below(self) -> Box:
-        """What lies under its whole 2×2 blocks in the level below; its corner is even."""
+        """The rectangle under its whole 2×2 blocks in the level below; its corner is even."""
         return Box(self.x0 >> 1, self.y0 >> 1, self.x1 >> 1, self.y1 >> 1)
 
     @property

@@ -46,7 +46,7 @@ PLAIN_WORK, WORK = 10, 33
 
 
 def open(source: Source, *, limits: Limits = _LIMITS, threads: int = 1) -> PtmReader:
-    """A `.ptm` to take levels from; its head is read, and nothing else yet.
+    """Opens a `.ptm` to take levels from; reads only its head.
 
     Parameters
     ----------
@@ -90,17 +90,17 @@ class PtmReader:
         self.close()
 
     def close(self) -> None:
-        """Closes the file, if it was opened by this."""
+        """Closes the file, if `open` opened it."""
         self._ranges.close()
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """Of the samples."""
+        """The numpy type of the samples."""
         return np.dtype(self.header.kind)
 
     @property
     def whole(self) -> int:
-        """How many levels are whole, as far as the length of the file tells."""
+        """Number of whole levels, judged by the length of the file."""
         size = self._size
         return len(self.header.levels) if size is None else whole_levels(self.header, size)
 
@@ -131,7 +131,7 @@ class PtmReader:
                 try:
                     return self._window(chosen, self.header.levels[chosen].box)
                 except InputError:
-                    # A source of unknown size may have come to its end: there is less.
+                    # A source of unknown size may have ended: fewer levels are whole.
                     if number is not None or chosen < self.whole:
                         raise
 
@@ -227,7 +227,7 @@ class PtmReader:
         return state.texels
 
     def _check_limit(self, number: int, box: Box) -> None:
-        """Texels, and what decoding them a tile at a time takes besides."""
+        """Counts the texels and the memory that decoding them a tile at a time takes besides."""
         header, level = self.header, self.header.levels[number]
         width, height, limit = box.x1 - box.x0, box.y1 - box.y0, self._limits.decoded_bytes
         tile = 4 * header.tile**2 if level.tiled else level.width * level.height
@@ -244,7 +244,7 @@ class PtmReader:
             )
 
     def _step(self, number: int, box: Box, below: _State | None) -> _State:
-        """The texels of a level within ``box``, given at least what lies under its tiles."""
+        """The texels of a level within ``box``, given at least the texels under its tiles."""
         header, level = self.header, self.header.levels[number]
         shape = (level.height, level.width, header.components)
         place = f"level {number}"
@@ -289,7 +289,7 @@ class PtmReader:
         memory: Any,
         threads: int = 1,
     ) -> Tile:
-        """One tile, by way of the byte that says whether it makes use of an allowed error."""
+        """Decodes one tile, after the byte that says whether it uses an allowed error."""
         max_error = self.header.max_error
         if max_error:
             if data[:1] not in (bytes([EXACT]), bytes([WITHIN])):
@@ -342,7 +342,7 @@ class PtmReader:
 
 @dataclass(frozen=True)
 class _State:
-    """What is decoded so far: a rectangle of a level, and what the profile has learned."""
+    """The state of decoding: a rectangle of a level, and what the profile has learned."""
 
     texels: Samples
     box: Box
@@ -356,7 +356,7 @@ def decode(
 
     ``level`` None is the finest level that is whole: of a complete file the finest, of a file cut
     short the finest before the cut. Damage is never passed over: a group whose checksum is wrong
-    is an error, also where coarser levels could be had by naming them.
+    is an error, even if coarser levels could be decoded by naming them.
 
     Raises InputError and LimitError: those of `ptmtools.texture.open` and `PtmReader.level`.
     """
@@ -377,9 +377,9 @@ def decode_levels(
 
 
 def check(data: bytes, limits: Limits = _LIMITS) -> list[str]:
-    """What is wrong with a `.ptm`, one line each; nothing if all of it is as it should be.
+    """The faults of a `.ptm`, one line each; empty if it is intact.
 
-    Also decodes every level, so that a group is found whose checksum is right and contents wrong.
+    Decodes every level, which also detects a group with a correct checksum and wrong contents.
     """
     try:
         return examine(data, limits)[0]
@@ -390,7 +390,8 @@ def check(data: bytes, limits: Limits = _LIMITS) -> list[str]:
 def examine(
     data: bytes, limits: Limits = _LIMITS
 ) -> tuple[list[str], tuple[Detail, NDArray[Any]] | None]:
-    """As `check`, and what its levels show, and the finest of them; None if something is wrong.
+    """The faults as `check`, the detail of its levels, and the finest level; None for both if there
+    is a fault.
 
     Raises LimitError, those of `ptmtools.texture.open` and `PtmReader.level`: nothing is wrong as
     far as the checksums tell.

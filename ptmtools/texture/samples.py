@@ -1,4 +1,4 @@
-"""Kinds of samples: what a component of a texel is, and how floats become integers in order.
+"""Kinds of samples, the components of texels, and the order-preserving map from floats to integers.
 
 Four kinds: unsigned integers of 8 and 16 bits and the IEEE floats of 16 and 32 bits. Coders work
 on integers. The bit pattern of a float, with the sign bit flipped where it is positive and all bits
@@ -25,7 +25,7 @@ class SampleKind:
     Attributes
     ----------
     name: of the numpy type.
-    number: what stands for it in a file.
+    number: its number in files.
     size: bytes of a sample.
     is_float: whether it is an IEEE float.
     mantissa: stored bits of a float's mantissa; 0 for integers.
@@ -49,7 +49,7 @@ class SampleKind:
 
     @property
     def quiet_nan(self) -> int:
-        """Bit pattern of the NaN that a mean is if it is none: 0x7E00 or 0x7FC00000."""
+        """Bit pattern of the NaN of a mean that is not a number: 0x7E00 or 0x7FC00000."""
         exponent = (1 << (8 * self.size - 1)) - (1 << self.mantissa)
         return exponent | 1 << (self.mantissa - 1)
 

@@ -23,7 +23,7 @@ from ptmtools.texture.samples import KINDS
 
 #: ``read(offset, length)``: that range of the file, shorter only where the file ends.
 RangeReader = Callable[[int, int], bytes]
-#: What `ptmtools.texture.open` takes.
+#: The sources that `ptmtools.texture.open` accepts.
 Source = str | os.PathLike[str] | bytes | bytearray | memoryview | BinaryIO | RangeReader
 
 
@@ -33,9 +33,9 @@ class Ranges:
 
     Attributes
     ----------
-    read: that range of it; shorter only where it ends. Raises InputError PTM-I122.
-    size: bytes there are, now; None if that is not known before reading them.
-    close: nothing is read any more.
+    read: returns a range of the file, shorter only where the file ends. Raises InputError PTM-I122.
+    size: of the file, bytes, at present; None if unknown before reading it.
+    close: called after the last read.
     name: of the file, for messages; None if it has none.
     """
 
@@ -51,7 +51,7 @@ def ranges_of(source: Source) -> Ranges:
     Raises
     ------
     InputError: PTM-I120 no such file; PTM-I122 a folder, or not readable.
-    TypeError: for what is none of the kinds of `Source`; text files are not.
+    TypeError: not a `Source`; a text file, for example.
     """
     if isinstance(source, bytes | bytearray | memoryview):
         view = memoryview(source)
@@ -74,14 +74,14 @@ def ranges_of(source: Source) -> Ranges:
 
 
 def _called(read: RangeReader, offset: int, length: int) -> bytes:
-    """What the caller's function gives, over a network for instance."""
+    """Calls the caller's function, which may read over a network."""
     data: object = read(offset, length)
     if not isinstance(data, bytes | bytearray | memoryview):
         raise InputError(
             "PTM-I122",
             f"the function that reads ranges returned {type(data).__name__} instead of bytes",
         )
-    # More than was asked for is no harm: some servers send all there is.
+    # A longer answer does no harm: some servers send the whole file.
     return bytes(data)[:length]
 
 
@@ -132,7 +132,8 @@ Samples = NDArray[Any]
 
 
 class Rows(Protocol):
-    """An image whose rows can be had: an array, a memory map, or what reads them from a file."""
+    """An image whose rows can be sliced: an array, a memory map, or a reader of rows from a
+    file."""
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -140,10 +141,10 @@ class Rows(Protocol):
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """Of the samples."""
+        """The numpy type of the samples."""
 
     def __getitem__(self, rows: slice, /) -> Samples:
-        """Those rows, (n, w) or (n, w, c)."""
+        """The rows, (n, w) or (n, w, c)."""
 
 
 class ImageRows:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ptmtools.store.archive import Stored
 
-#: What is counted for each portal.
+#: Counts for each portal.
 COUNTED = ("work", "ties", "decided", "opened")
 
 
@@ -24,17 +24,17 @@ class Pvs:
     ----------
     start: (C + 1,) int64 CSR over cells.
     cell: (n,) int32 the potentially visible cells; ``cell[start[i]] == i``.
-    work: (K,) int64 operations that the search from each portal took; empty without a search.
+    work: (K,) int64 operations of the search from each portal; empty without a search.
     cut: (K,) bool portals whose search was given up for a looser, still conservative set.
     ties: (K,) int64 near ties of the search from each portal: sequences of portals rejected by less
         than 16 roundings of the arithmetic.
-    decided: (K,) int64 those of them that mattered and were decided in double-double arithmetic.
-    opened: (K,) int64 those that let a line pass; see `PortalFlow`.
+    decided: (K,) int64 near ties that mattered and were decided in double-double arithmetic.
+    opened: (K,) int64 decided near ties that let a line pass; see `PortalFlow`.
     leak: (n, 4) int32 cells that see suspiciously much: the cell, how many cells it sees, the
         smallest portal that shows it half of them, and how many that one shows.
-    volume: (C,) float64 m³ of each cell, for shares of the building; empty if it is not known.
-    standing: (C,) float64 of it, where somebody can stand; empty if it is not known.
-    conservative: False if the sets are of what random lines happened to show.
+    volume: (C,) float64 m³ of each cell, for shares of the building; empty if not known.
+    standing: (C,) float64 m³ of each cell with standing room; empty if not known.
+    conservative: False for sets sampled by random lines.
     """
 
     start: NDArray[np.int64]
@@ -76,15 +76,15 @@ class Pvs:
 
     @property
     def volume_at_hand(self) -> tuple[float, float]:
-        """Share of the building that is at hand, in [0, 1]: on average over places, and at most. If
-        no volume is known, of the cells."""
+        """Share of the building's volume that has to be resident, in [0, 1]: the average over
+        places, and the maximum. If no volume is known, the share of cells."""
         volume = self.volume if self.volume.any() else np.ones(self.cell_count)
         share = self.at_hand(volume) / max(volume.sum(), np.finfo(float).tiny)
         return over_places(share, self.viewers)
 
     @property
     def viewers(self) -> NDArray[np.float64]:
-        """(C,) m³ in which somebody can stand, of each cell; all if it is not known."""
+        """(C,) m³ of each cell with standing room; the whole volume if not known."""
         return self.standing if len(self.standing) else self.volume
 
     def to_matrix(self) -> NDArray[np.bool_]:
@@ -112,7 +112,7 @@ class Pvs:
     def from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> Pvs:
         """Inverse of `to_arrays`.
 
-        Raises KeyError or ValueError for what no visibility has.
+        Raises KeyError or ValueError for invalid arrays.
         """
         stored = Stored(arrays)
         entries = stored.array("cell", np.int32, None)
@@ -141,7 +141,7 @@ class Pvs:
 
 def over_places(values: NDArray[np.float64], volume: NDArray[np.float64]) -> tuple[float, float]:
     """The mean of (C,) values of cells over all places, so that a cell counts by the (C,)
-    ``volume`` where somebody can stand, and the greatest; (0, 0) of no cells."""
+    ``volume`` of its standing room, and the maximum; (0, 0) without cells."""
     if not len(values):
         return 0.0, 0.0
     weight = volume if volume.any() else np.ones(len(values))

@@ -6,12 +6,12 @@ budget are in `flow`.
 Sampled sets come from random lines alone: leaves that a straight line crosses on its way through
 the portals see each other, all others count as hidden. So these sets are a lower bound, not
 conservative: a client that loads by them shows holes. They serve for comparison. Lines are walked
-as in `cells.sight`, which spreads them evenly; random ones, as many as wanted, show more.
+as in `cells.sight`, which spreads them evenly; random ones, in any number, show more.
 
 Leaks are openings that show more than they should. A cell that sees several times as many cells as
-most do sees them through something: a window onto a courtyard, which is as intended, or an
-unintended gap under a wall. Among the openings between cells through which it sees at least half of
-what it sees, the smallest is named.
+most do sees them through something: a window onto a courtyard, as intended, or an unintended gap
+    under a wall. The smallest opening between cells through which it sees at least half of its
+    visible cells is named.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ from ptmtools.progress import Progress, silent
 from ptmtools.visibility.model import Pvs
 from ptmtools.visibility.options import PvsOptions
 
-#: Tasks that the lines are shared out to.
+#: Tasks that the lines are distributed to.
 SPANS = 64
 
 
-#: What the tasks share: portals, how many leaves, lines through each portal, and the seed.
+#: Shared data of the tasks: portals, number of leaves, lines through each portal, and the seed.
 Shooting = tuple[Geometry, int, int, int]
 
 
@@ -43,7 +43,7 @@ def sampled_leaves(
     executor: Executor = Executor(),  # noqa: B008 - has no state
     seed: int = 0,
 ) -> Bools:
-    """(L, L) which leaf sees which on one of ``lines`` random lines through each portal.
+    """(L, L) the leaves that each leaf sees on one of ``lines`` random lines through each portal.
 
     Half of the lines aim at a random point of a random portal, half anywhere. Symmetric; each leaf
     sees itself and its neighbours. The same for any ``executor``.
@@ -66,7 +66,8 @@ def sampled_leaves(
 
 
 def _shoot(shared: Shooting, span: tuple[int, int]) -> NDArray[np.uint8]:
-    """As a task: (L, ⌈L / 8⌉) bits, who sees whom by lines of the portals ``span``."""
+    """As a task: (L, ⌈L / 8⌉) bits, visibility between leaves by lines through the portals
+    ``span``."""
     from ptmtools.portal_flow.line_kernels import Openings, sight_lines
 
     g, leaves, lines, seed = shared
@@ -98,20 +99,20 @@ def _points(rng: np.random.Generator, g: Geometry, portal: Ints) -> Floats:
     return points
 
 
-#: A cell is looked at if it sees more than this times the median of all cells.
+#: A cell is examined if it sees more than this multiple of the median of all cells.
 SUSPICIOUS = 3.0
-#: So many of them, those that see most.
+#: Most cells examined, those that see most.
 MOST = 20
 #: Share of what the cell sees that must be seen through the opening.
 SHARE = 0.5
 
 
 def find_leaks(cells: Cells, flow: PortalFlow, matrix: Bools) -> NDArray[np.int32]:
-    """(n, 4) the leaks of a PVS, those that show most first: see `Pvs.leak`.
+    """(n, 4) the leaks of a PVS, largest first: see `Pvs.leak`.
 
     Parameters
     ----------
-    flow: of the portals of ``cells``. matrix: (C, C) who sees whom.
+    flow: of the portals of ``cells``. matrix: (C, C) the PVS.
     """
     leaks = []
     if cells.portal_count:
@@ -150,10 +151,10 @@ def compute_pvs(
 
     Unless it is sampled, a pair of cells is left out only if no straight line, but for hairlines
     thinner than the rounding of the coordinates (`Tolerance.rounding`), leads through portals from
-    a leaf of one in which somebody can stand to the other, or the other way round. Cells that share
-    a portal always see each other, also such in which nobody can stand. Leaves of no cell are left
-    out. `Pvs.fallbacks` counts the portals
-    whose search was cut short. ``executor`` does the searches; the result is the same for any.
+    a standing leaf of one to the other, or vice versa. Cells that share a portal always see each
+    other, even without standing room. Leaves of no cell are left out. `Pvs.fallbacks` counts the
+    portals whose search was cut short. ``executor`` runs the searches; the result is the same for
+    any.
 
     Raises what `portal_flow` raises.
     """
@@ -178,8 +179,7 @@ def compute_pvs(
 
 
 def lifted(cells: Cells, leaves: Bools) -> Bools:
-    """(C, C) from (L, L): a cell sees what is seen from its leaves in which somebody can stand,
-    and is seen in turn."""
+    """(C, C) from (L, L): a cell sees the cells seen from its standing leaves, symmetrically."""
     owned = cells.leaf_cell >= 0
     rows, columns = np.nonzero(from_places(leaves, cells.leaf_standing) & owned[:, None] & owned)
     matrix = np.zeros((cells.cell_count, cells.cell_count), dtype=np.bool_)

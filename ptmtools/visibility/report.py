@@ -1,4 +1,4 @@
-"""A summary of a PVS: how much cells see, which portals took most work, where it leaks."""
+"""A summary of a PVS: sizes of the sets, most expensive portals, leaks."""
 
 from __future__ import annotations
 
@@ -50,11 +50,11 @@ class LeakingPortal(PortalFacts):
 
 @dataclass(frozen=True)
 class PvsReport:
-    """What `report` finds.
+    """The result of `report`.
 
     Attributes
     ----------
-    cells, portals: how many there are. doors: portals between two cells.
+    cells, portals: their numbers. doors: number of portals between two cells.
     sizes: share of the cells → cells that this share of them sees at most, for `QUANTILES`.
     average: cells that a cell sees, itself included.
     operations, fallbacks, ties, decided, opened: totals of what `Pvs` counts for each portal.

@@ -1,9 +1,9 @@
-"""Is a PVS conservative? Random segments against Embree, which knows nothing of portals.
+"""Tests whether a PVS is conservative, with random segments and Embree, independently of portals.
 
-A segment that begins where an eye can be, ends in a leaf, and that no structural triangle blocks is
-a proof that the cell of the one sees that of the other, so the pair must be in the PVS; and that
-the leaf must not have been dropped. The converse proves nothing: the check finds what is missing,
-never what is too much.
+A segment that begins where an eye can be, ends in a leaf and is blocked by no structural triangle
+proves that the cell of its start sees the cell of its end, so the pair must be in the PVS, and that
+the leaf must not have been dropped. The converse proves nothing: the check detects missing pairs,
+never superfluous ones.
 
 Segments come in four kinds, a quarter each, because segments uniform in volume are nearly all
 blocked and say most about the largest cells: ends uniform in volume; ends in leaves drawn with
@@ -54,7 +54,7 @@ class MissedPair:
     ----------
     cells: the two, the lower first; -1 for a leaf that was dropped.
     start, end: (x, y, z) in metres, the ends of an example, in `cells`' order.
-    segments: how many segments showed it.
+    segments: the number of segments that showed it.
     """
 
     cells: tuple[int, int]
@@ -65,12 +65,12 @@ class MissedPair:
 
 @dataclass(frozen=True)
 class SegmentReport:
-    """What `check_conservative` found.
+    """The result of `check_conservative`.
 
     Attributes
     ----------
     tried: segments that begin where an eye can be and end in a leaf.
-    unoccluded: how many of those nothing blocks.
+    unoccluded: the number of those that nothing blocks.
     missed: the pairs of cells that the PVS misses, ascending; empty if it is conservative.
     hairlines: unoccluded segments outside the PVS that did not survive the jitter.
     """
@@ -99,7 +99,7 @@ def check_conservative(
     Parameters
     ----------
     structural: (T, 3, 3) the triangles that occlude, metres: those from which the cells were made.
-    segments: how many to try; fewer are if too few ends fall into cells.
+    segments: the number to try; fewer are tried if too few ends fall into cells.
 
     Deterministic for a seed. Raises InputError PTM-I400 if the triangles are not (T, 3, 3) or not
     finite, or if cells and PVS are not of the same subdivision.
@@ -146,8 +146,8 @@ def check_conservative(
         hairlines += int((share < 0.5).sum())
         for m in missed[share >= 0.5]:
             ends = (int(a[m]), _place(start[m])), (int(b[m]), _place(end[m]))
-            (one, here), (other, there) = sorted(ends)
-            pair = pairs.get((one, other)) or MissedPair((one, other), here, there, 0)
+            (one, first_end), (other, second_end) = sorted(ends)
+            pair = pairs.get((one, other)) or MissedPair((one, other), first_end, second_end, 0)
             pairs[one, other] = replace(pair, segments=pair.segments + 1)
         progress(tried, segments, "segments")
     missing = tuple(pairs[pair] for pair in sorted(pairs))
@@ -155,8 +155,8 @@ def check_conservative(
 
 
 class _Eyes:
-    """Where an eye can be: in the eye region, whatever is said of leaves; and anywhere in a leaf
-    that stands though there is no floor about, because of a camera or a viewpoint."""
+    """The places of eyes: the eye region, regardless of leaves; and all of a leaf that is standing
+    without a floor, because of a camera or a viewpoint."""
 
     def __init__(self, cells: Cells) -> None:
         self._cells, self._eyes = cells, cells.eyes
@@ -165,7 +165,7 @@ class _Eyes:
         self._whole = cells.leaf_standing & ~np.array(floored, dtype=np.bool_)
 
     def at(self, points: Floats, leaf: NDArray[np.int32]) -> Bools:
-        """(n,) whether one can be at the (n, 3) points, in (n,) leaves or -1."""
+        """(n,) whether an eye can be at the (n, 3) points, in (n,) leaves or -1."""
         inside = leaf >= 0
         standing = inside & self._whole[leaf]
         if not self._eyes.everywhere:
@@ -173,8 +173,8 @@ class _Eyes:
         return np.asarray(standing)
 
     def first(self, start: Floats, end: Floats) -> tuple[Floats, Floats]:
-        """Of segments between (n, 3) points those that begin where an eye can be and end in a leaf;
-        turned round where only the end is such a place."""
+        """The segments between (n, 3) points that begin where an eye can be and end in a leaf;
+        reversed if only the end is such a place."""
         leaf, other = self._cells.locate_leaf(start), self._cells.locate_leaf(end)
         eye = self.at(start, leaf)
         kept = (leaf >= 0) & (other >= 0) & (eye | self.at(end, other))

@@ -1,8 +1,7 @@
 """The renderers that can draw the item buffers, as a table of declared values.
 
-To add one: a module with two functions, as `Backend` says, and a line in `BACKENDS`. Help, checks
-of options, "auto" and the sharing out to processes go by what the line says; nothing else knows a
-backend by its name.
+To add one: a module with the two functions of `Backend`, and a line in `BACKENDS`. Help, checks of
+    options, "auto" and the distribution to processes read that line; no other code names a backend.
 """
 
 from __future__ import annotations
@@ -18,23 +17,23 @@ from ptmtools.lazy import Lazy
 if TYPE_CHECKING:
     from ptmtools.coverage.item_buffer import Renderer, Surfaces
 
-#: The choice of a backend by what it is expected to cost.
+#: The choice of a backend by its expected cost.
 AUTO = "auto"
 
 
 @dataclass(frozen=True)
 class Backend:
-    """One way to draw item buffers.
+    """A renderer of item buffers.
 
     Attributes
     ----------
-    name: what ``--backend`` calls it, and results record.
-    about: what it draws with, for help.
+    name: its name in ``--backend`` and in results.
+    about: the library that it draws with, for help.
     opener: (`Surfaces`, pixels a side of a view, number of a graphics device or None) → `Renderer`;
         raises `MissingComponentError` where it cannot run.
     coster: (triangles of a PVS, pixels of all views, number of a graphics device or None) → the
         processor time in µs that a sample point is expected to take, 0 on graphics hardware; raises
-        as the opener. Goes by the machine and the arguments, never by the clock.
+        as the opener. Depends on the machine and the arguments, never on the clock.
     in_processes: it keeps the interpreter's lock while it draws, so that several workers mean
         processes; otherwise one process draws all cells.
     """
@@ -75,5 +74,5 @@ BACKENDS: dict[str, Backend] = {
 }
 
 _AUTO = SimpleNamespace(about="whichever can run here and should be fastest")
-#: What ``--backend`` takes, each with what it is `about`.
+#: The values of ``--backend``, each with its `about`.
 CHOICES: ChainMap[str, Any] = ChainMap(BACKENDS, {AUTO: _AUTO})

@@ -23,7 +23,7 @@ from ptmtools.coverage.sample_points import SamplePoints
 
 #: Rays that are cast together: their arrays stay within the processor's cache.
 RAYS = 2**16
-#: What a ray takes, µs; fitted, as `opengl.TRIANGLE_COST`, to `benchmarks/ach.py`.
+#: Time of a ray, µs; fitted, as `opengl.TRIANGLE_COST`, to `benchmarks/ach.py`.
 RAY_COST = 0.25
 
 

@@ -11,7 +11,7 @@ compute shader (bit for bit the same, and needs OpenGL 4.3).
 - Depth is linear, w / far. A perspective depth of 24 bits with a small near plane loses pictures
   that hang 1 mm off a wall at 5 to 20 m; linear ones resolve 6e-8 of the farthest depth.
 - The projection has no far plane, and its near plane only clips.
-- Only what can show is drawn (`OpenGLRenderer.lists`).
+- Only surfaces that can show are drawn (`OpenGLRenderer.lists`).
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from ptmtools.errors import MissingComponentError
 APT = "apt install libegl1 libgl1 libgl1-mesa-dri"
 #: Renderers that run on the processor.
 SOFTWARE = re.compile(r"llvmpipe|softpipe|swrast|swiftshader|software", re.IGNORECASE)
-#: The widest target, pixels a side, but for larger views. Software needs no large one.
+#: The widest target, pixels a side, except for larger views. Software needs no large one.
 WIDEST = {True: 2048, False: 4096}
 #: Rays that look for cells outside the PVS, whose surfaces then have to be drawn too: a side of
 #: a view, and points.
 PROBE_FACE, PROBE_POINTS = 8, 16
-#: What Mesa's rasteriser takes, µs, for each triangle (of the PVS, in those of the six views that
+#: Time of Mesa's rasteriser, µs, for each triangle (of the PVS, in those of the six views that
 #: it can show in) and each pixel. Fitted, as `embree.RAY_COST`, to `benchmarks/ach.py`; only their
 #: proportions matter.
 TRIANGLE_COST, PIXEL_COST = 1.0, 0.05
@@ -142,7 +142,7 @@ class OpenGLRenderer:
         """For each of the six views the opaque and the transparent triangles to be drawn: those
         that reach into the view's pyramid from somewhere in the box around the points, of the cells
         ``needed`` and of none, and of those outside that a few rays meet, so that nothing shows
-        through where they stand. (All cells: 1.4 times the processor time in the museum and the
+        through in their place. (All cells: 1.4 times the processor time in the museum and the
         hospital, 2.1 times in willowgarage, preset ``paper``.)"""
         cell = self._surfaces.cell
         kept = np.arange(len(cell))
@@ -151,10 +151,10 @@ class OpenGLRenderer:
             met = self._probe.show(points.part(slice(PROBE_POINTS)))
             drawn = np.append(needed, False)
             drawn[cell[np.unique(met[met >= 0])]] = True
-            drawn[-1] = False  # which is the other side of most walls
+            drawn[-1] = False  # the other side of most walls
             kept = np.flatnonzero(drawn[cell].any(axis=1) | (cell < 0).all(axis=1))
         position = self._surfaces.normalised(points.position)
-        # Where the triangles are, seen from the points.
+        # Extent of the triangles, seen from the points.
         low = self._low[kept] - position.max(axis=0)
         high = self._high[kept] - position.min(axis=0)
         lists = []
@@ -173,8 +173,8 @@ class OpenGLRenderer:
     def _draw(
         self, drawing: Any, first: Ints, count: Ints, layer: int, points: SamplePoints
     ) -> Ints:
-        """One layer of all views, each of so many triangles from its ``first`` on, before the depth
-        that is there: (K, 6, face²) triangles in the order of the upload, from 1; 0 for none."""
+        """One layer of all views, each of ``count`` triangles from its ``first`` on, in front of
+        the stored depth: (K, 6, face²) triangles in the order of the upload, from 1; 0 for none."""
         target, face, tiles = self._targets[layer], self._face, self._tiles
         rows = -(-len(VIEWS) * len(points) // tiles)
         size = (tiles * face, rows * face)
@@ -222,7 +222,7 @@ class OpenGLRenderer:
 
 
 def _two_floats(values: Floats) -> tuple[Singles, Singles]:
-    """Values rounded to float32, and what that leaves."""
+    """Values rounded to float32, and the remainders."""
     high = values.astype(np.float32)
     return high, (values - high).astype(np.float32)
 

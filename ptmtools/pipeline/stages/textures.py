@@ -313,8 +313,8 @@ class TexturesJob(Job):
     def _staged(
         self, transaction: Transaction, executor: Executor, wanted: Iterator[int]
     ) -> Iterator[list[str]]:
-        """The files of each image, once they are staged. The order is that of `_left`, so they are
-        always those of its first."""
+        """The files of each image, once they are staged. The order is that of `_left`, so each
+        belongs to its first entry."""
         images, fewer = images_of(self.run), self._fewer
         with shared_disk(transaction, self.run.db.path, self.options, executor) as disk:
             if disk is None:
@@ -336,7 +336,7 @@ class TexturesJob(Job):
                 yield files
 
     def _headers(self, transaction: Transaction) -> Iterator[PtmHeader]:
-        """Of all textures, staged or committed."""
+        """The headers of all textures, staged or committed."""
         for ptm, *_ in map(self._files, self._names):
             staged = transaction.folder / ptm
             yield header_of(staged if staged.is_file() else self.run.db.path / ptm)

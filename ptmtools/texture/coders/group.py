@@ -1,4 +1,4 @@
-"""The bytes of a group, as all coders read and write them.
+"""Reading and writing the bytes of a group, shared by all coders.
 
 - `Reader` bounds every read; `damaged` is the error for bytes that no encoder writes.
 - The components of a texel are coded as *planes*: green, red, blue, alpha; grey and alpha. Red
@@ -43,14 +43,14 @@ class Reader:
         self._left = memoryview(data)
 
     def take(self, size: int) -> memoryview:
-        """So many bytes; nothing is copied."""
+        """The next ``size`` bytes, not copied."""
         if size > len(self._left):
             raise damaged("it is cut short")
         taken, self._left = self._left[:size], self._left[size:]
         return taken
 
     def number(self, size: int) -> int:
-        """Of so many bytes, little endian."""
+        """The next little-endian integer of ``size`` bytes."""
         return int.from_bytes(self.take(size), "little")
 
     def varint(self) -> int:
@@ -64,7 +64,7 @@ class Reader:
         raise damaged("a number is too long")
 
     def numbers(self, dtype: str, count: int) -> NDArray[Any]:
-        """So many numbers (count,) of a little-endian type, a copy."""
+        """The next (count,) numbers of a little-endian type, copied."""
         return np.frombuffer(self.take(count * np.dtype(dtype).itemsize), dtype).copy()
 
     def texels(self, shape: Shape, dtype: np.dtype[Any]) -> Samples:
@@ -74,7 +74,7 @@ class Reader:
         return samples.astype(dtype).reshape(shape)
 
     def rest(self) -> memoryview:
-        """All that is left."""
+        """The bytes left."""
         return self.take(len(self._left))
 
     def end(self) -> None:
@@ -150,8 +150,8 @@ def fitted(
     ----------
     sums: (m, m + 1), those of the products of two features and, last, of a feature and the target:
         whole numbers below 2^53, which come out the same in whatever order they are added.
-    ridge, share: so much, and 1/2^share of itself, is added to each of the diagonal, so that a
-        feature that never varies gets the weight 0.
+    ridge, share: each element of the diagonal is increased by ``ridge`` and by 1/2^share of itself,
+        so that a feature that never varies gets the weight 0.
     """
     rows = sums.astype(np.int64).tolist()
     for i, row in enumerate(rows):
@@ -189,7 +189,7 @@ def bareiss(rows: list[list[int]]) -> tuple[list[int], int]:
 
 
 def inflate(data: bytes | memoryview, length: int) -> bytes:
-    """Exactly ``length`` bytes; more are never unpacked. Raises InputError PTM-I112."""
+    """Inflates exactly ``length`` bytes and never unpacks more. Raises InputError PTM-I112."""
     unpacker = zlib.decompressobj(-15)
     try:
         out = unpacker.decompress(data, length + 1)
@@ -229,6 +229,6 @@ TABLE_SIZE = 1 << TABLE_BITS
 ESCAPE = 255
 
 
-#: What a pass over a group returns: TRUNCATED where its stream ended early, IMPOSSIBLE where no
-#: encoder writes it.
+#: Results of a pass over a group: TRUNCATED if its stream ended early, IMPOSSIBLE if no encoder
+#: writes it.
 OK, TRUNCATED, IMPOSSIBLE = 0, 1, 2

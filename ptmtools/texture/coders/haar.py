@@ -35,7 +35,7 @@ SENT_WEIGHTS = 1
 RANKED = 16
 
 Bytes = NDArray[np.uint8]
-#: For each component its distinct values, rising, if it is coded by rank; else none.
+#: For each component coded by rank, its distinct values, rising; else None.
 Sets = list[NDArray[np.intp]]
 
 
@@ -130,7 +130,7 @@ class _Ranks:
 
 
 def _sparse_values(blocks: Bytes) -> Sets:
-    """For each component its distinct values, if they are few for their range; else none."""
+    """For each component, its distinct values if they are few for their range; else None."""
     from ptmtools.texture.coders import haar_kernels as kernels
 
     components = blocks.shape[2]
@@ -153,7 +153,7 @@ def _pass(
     sink: Sink | None,
     source: Source | None,
 ) -> int:
-    """`kernels.haar_pass`."""
+    """Calls `haar_kernels.haar_pass`."""
     from ptmtools.texture.coders import haar_kernels as kernels
 
     components = level.shape[2]

@@ -1,4 +1,4 @@
-"""What is known of a row of differences before its first residual: predictions and activities.
+"""Predictions and activities of a row of differences, known before its first residual.
 
 Everything here works on several blocks at once.
 """

@@ -158,9 +158,9 @@ MANY_VALUES = 225
 
 
 class Workspace(NamedTuple):
-    """What a pass needs besides its arguments: made outside, so that nothing compiled allocates.
+    """Scratch arrays of a pass, allocated outside, so that no compiled code allocates.
 
-    Coefficients are numbered: V, h1, h2'. Of two rows the one is block row y, the other y - 1.
+    Coefficients are numbered: V, h1, h2'. Pairs of rows are block row y and block row y - 1.
     """
 
     rows: Any  # (c, 8, blocks + 4) int32: ranks of the level below
@@ -173,12 +173,12 @@ class Workspace(NamedTuple):
 
 
 class Source(NamedTuple):
-    """Where a decoder's symbols come from, and what it needs to make texels of them."""
+    """A decoder's source of symbols, and the tables that turn them into texels."""
 
     words: Any  # uint16, the stream, with a row's length and 8 more of padding behind `limit`
     limit: Any
     escapes: Any  # uint16
-    table: Any  # uint32 of `rans.tables.row_tables`
+    table: Any  # uint32 of `rans.row_tables`
     starts: Any  # (3, 1024) uint64: where the tables begin, by activity, of V and h1, h2', edges
     turning: Any  # the states take turns from row to row; in version 1 each row begins anew
     values: Any  # (c, 256) int32, by component: rank to value
@@ -192,7 +192,7 @@ class Source(NamedTuple):
 
 
 def workspace(blocks: int, components: int) -> Workspace:
-    """For groups ``blocks`` wide."""
+    """Allocates the workspace of groups ``blocks`` wide."""
     wide = blocks + 2
     return Workspace(
         rows=np.zeros((components, 8, blocks + 4), i32),
@@ -236,7 +236,7 @@ def _emit(
 
 @kernel
 def _absorb(decoded: Any, prediction: Any, residual: Any, near: Any, values: Any) -> None:
-    """Decoding: what `_emit` does, the other way round."""
+    """Decoding: the inverse of `_emit`."""
     for x in range(prediction.size):
         z = decoded[x]
         e = i32(i32(z >> 1) ^ i32(-(z & 1)))
@@ -247,7 +247,8 @@ def _absorb(decoded: Any, prediction: Any, residual: Any, near: Any, values: Any
 
 @kernel
 def _edge_prediction(level: Any, y: int, x: int, plane: int) -> Any:
-    """Median of left, upper and left + upper - upper left; what lies outside gives way."""
+    """Median of left, upper and left + upper - upper left; a neighbour outside is replaced by one
+    inside."""
     if x == 0:
         return i32(level[y - 1, x, plane]) if y > 0 else i32(0)
     left = i32(level[y, x - 1, plane])

@@ -6,7 +6,7 @@ one group: weighted least squares over a sample of block rows, one system of at 
 for each plane and Haar difference, solved exactly (`group.fitted`); the decoder only reads them.
 
 With the built-in weights alone, photographs grow by 1.5 % and other textures by 10.7 % (normal maps
-most: their components are related in ways of their own).
+most: their components are correlated differently).
 """
 
 from __future__ import annotations
@@ -83,26 +83,26 @@ def class_of_activity() -> NDArray[np.int64]:
 FEWEST_BLOCKS = 96 * 96
 
 
-#: About so many block rows are sampled.
+#: Block rows sampled, about.
 SAMPLED_ROWS = 12
 
 
 Ranks = NDArray[np.int32]
 
 
-#: Weight of a block by the magnitude of its first feature: steep ones say less.
+#: Weight of a block by the magnitude of its first feature: steep blocks tell less.
 _SLOPE_WEIGHTS = 4096 // (4 + np.arange(256))
 
 
 def fit_weights(
     level: NDArray[np.uint8], below: NDArray[np.uint8], ranks: NDArray[np.int32]
 ) -> NDArray[np.int32] | None:
-    """Weights (c, 3, 7), or None where the built-in ones will do.
+    """Weights (c, 3, 7), or None if the built-in ones suffice.
 
     Parameters
     ----------
     level: (h, w, c) uint8. below: (h >> 1, w >> 1, c) uint8, the level below.
-    ranks: (c, 256) int32, what stands for each value of each component.
+    ranks: (c, 256) int32, the rank of each value of each component.
     """
     bh, bw, nc = below.shape
     if bh * bw < FEWEST_BLOCKS or min(bh, bw) < 4:

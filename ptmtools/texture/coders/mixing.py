@@ -40,7 +40,7 @@ def copied(memory: Memory) -> Memory:
 
 
 def fresh_state() -> State:
-    """Of a plane, before anything was coded."""
+    """The state of a plane before anything is coded."""
     from ptmtools.texture.coders import mixing_decisions as decisions
     from ptmtools.texture.coders.mixing_decisions import BATCH, FEATURES, SAMPLE
     from ptmtools.texture.coders.mixing_kernels import POSITIONS, SECOND, State
@@ -68,7 +68,7 @@ def fresh_state() -> State:
 
 
 def level_tables(texels: int) -> Tables:
-    """What is learned of one plane of a level of so many ``texels``, and forgotten behind it."""
+    """Tables learned for one plane of one level of that many ``texels`` and dropped after it."""
     from ptmtools.texture.coders import mixing_decisions as decisions
     from ptmtools.texture.coders.mixing_decisions import FEATURES
     from ptmtools.texture.coders.mixing_kernels import Tables
@@ -97,7 +97,7 @@ def encode_mixing(
     level: Level, below: Level, max_error: int = 0, memory: Memory | None = None, threads: int = 1
 ) -> tuple[bytes | None, Level, Memory]:
     """``level`` (h, w, c), given ``below`` (h >> 1, w >> 1, c): its stream, the texels that a
-    decoder will have, and what was learned. No stream (None) if it grows beyond all measure."""
+    decoder will have, and what was learned. The stream is None if it grows beyond its buffer."""
     coded = _Pass(level, below, level.shape, max_error, memory, None)
     coded.run(threads)
     return coded.stream(), coded.texels(), coded.memory
@@ -198,7 +198,7 @@ class _Pass:
         running: dict[Future[None], int] = {}
         with ThreadPoolExecutor(min(threads, planes)) as pool:
             while done[-1] < self.strips:
-                # The plane furthest behind first: others wait for none but those before them.
+                # The plane furthest behind first: a plane waits only for those before it.
                 for c in range(planes - 1, -1, -1):
                     needed = min(done[c] + ahead, self.strips)
                     ready = c == 0 or done[c - 1] >= needed
@@ -273,7 +273,7 @@ def _canvas(
             stride=stride,
             across=across,
             errors=planes * size,
-            # The two planes before; of alpha too, which need not be like green.
+            # The two planes before, also for alpha, which need not resemble green.
             first=-c * size,
             second=(1 - c) * size if c > 1 else 0,
             before=-c * size // 4,
@@ -285,7 +285,7 @@ def _canvas(
 
 
 class _Stream:
-    """The arithmetic coder and its bytes: those to read, or room for so many to write."""
+    """The arithmetic coder and its bytes: those to read, or a buffer to write."""
 
     def __init__(self, data: bytes | memoryview | int) -> None:
         self.buffer = np.frombuffer(bytearray(data), np.uint8)
@@ -294,7 +294,7 @@ class _Stream:
         self.coder = np.array([0, 0xFFFFFFFF, window, first], np.int64)
 
     def closed(self) -> bytes:
-        """What was written."""
+        """The bytes written."""
         value, size = self._final()
         return self.buffer[: int(self.coder[3])].tobytes() + value.to_bytes(4, "big")[:size]
 

@@ -3,7 +3,7 @@
 Logistic mixing as in PAQ (Mahoney, "Adaptive weighing of context models for lossless data
 compression", 2005): opinions in the logit domain, two sets of weights chosen by different
 contexts, each trained on its own error, their mean refined by an adaptive probability map.
-All of it in integers. The arithmetic coder is PAQ's carryless one with 32 bits and probabilities
+All in integers. The arithmetic coder is PAQ's carryless one with 32 bits and probabilities
 of 16.
 
 For noise (`code_even`) all blocks that have the parent as their mean are equally likely. A model
@@ -57,7 +57,7 @@ CONSTANT_INPUT = 77
 #: A slot: 15 counters and the tag of their context in 64 bytes, one line of a processor's cache.
 SLOT = 16
 TAG = 15
-#: A counter: 22 bits of probability, 10 of how often it has been used, at most so often.
+#: A counter: 22 bits of probability, 10 of its count of uses, and the limit of that count.
 FRESH = np.uint32(1 << 31)
 COUNT_TOP = 120
 FLAT_COUNT_TOP = 250
@@ -75,11 +75,11 @@ NODE_ROWS = 5 * NODES
 NEAR_ROWS = 24 * KINDS * 9
 #: Adaptive probability map: cells of a node's row, at logits -12 … 12 and beyond.
 CELLS = 26
-#: In `chances`, the maps come first, then how often a match is right.
+#: In `chances`, the maps come first, then the hit rates of the matches.
 TRUST = NODE_ROWS * CELLS
 CHANCES = TRUST + MATCHES * CONFIRMED * KINDS * 2
-#: In `notes`, what is known about a texel: hashed contexts, proposals of the matches (-1: none),
-#: how often each was confirmed, the bit that follows from it, where it is kept.
+#: `notes` describes a texel: hashed contexts, proposals of the matches (-1: none), how often each
+#: was confirmed, the bit that it predicts, and its place.
 FOUND = COUNTERS
 SURE = FOUND + MATCHES
 EXPECTED = SURE + MATCHES
@@ -100,7 +100,7 @@ def look_up(notes: Any, slots: Any, mask: int) -> None:
 
 @plain_kernel
 def open_slots(group: int, notes: Any, slots: Any, mask: int) -> None:
-    """Finds the slots of all contexts for a group of nodes; those of other contexts begin anew."""
+    """Finds the slots of all contexts for a group of nodes; a slot of another context is reset."""
     for i in range(COUNTERS):
         notes[SLOTS + i] = (i * (mask + 1) + ((notes[i] ^ (group * 0x5D4D)) & mask)) * SLOT
     for i in range(COUNTERS):
@@ -278,11 +278,11 @@ TARGET = FEATURES - 1
 SAMPLE = FEATURES + 1
 #: Samples between two solutions.
 BATCH = 16
-#: The first samples are used at once, in smaller batches, and without forgetting.
+#: The first samples are used immediately, in smaller batches and without forgetting.
 EARLY, EARLY_BATCH = 64, 4
-#: From so many samples on, every other batch is enough.
+#: From this number of samples on, every other batch is solved.
 OFTEN = 1024
-#: Of A, with every batch, the past loses this share.
+#: Share of A that is forgotten with every batch.
 FORGET = 1.0 / 32.0
 #: Added to the diagonal of A.
 RIDGE = 20000.0
@@ -346,7 +346,7 @@ def _solve(A: Any, weights: Any, n: int, U: Any, inverse: Any) -> None:
             U[i, j] = A[i, j]
         U[i, i] += RIDGE
     for j in range(n):
-        # At least the ridge but for rounding; at least 1 whatever a damaged file may say.
+        # At least the ridge but for rounding; at least 1 even if a file is damaged.
         inverse[j] = 1.0 / max(U[j, j], 1.0)
         for i in range(j + 1, FEATURES):
             if abs(U[j, i]) < TINY:

@@ -1,12 +1,12 @@
 """Compiled loop of the context mixing coder: one vertical strip of one plane of a level.
 
-A strip is 32 blocks wide. Its blocks are walked row by row, the four texels of a block in the
-order p q r s. Every texel is predicted by least squares, and what is known about its residual is
-turned into binary decisions. One pass serves both directions, so that encoder and decoder cannot
-disagree about a prediction. See `coder` for the planes and the order of strips, and
-``docs/formats/ptm-small.md`` for the format.
+A strip is 32 blocks wide. Its blocks are walked row by row, the four texels of a block in the order
+p q r s. Every texel is predicted by least squares, and its residual is turned into binary
+decisions. One pass serves both directions, so that encoder and decoder cannot disagree about a
+prediction. See `mixing` for the planes and the order of strips, and ``docs/formats/ptm-small.md``
+for the format.
 
-Everything here is in integers; see `squares` for the one part that is not.
+Everything here is in integers; `mixing_decisions` has the one part that is not.
 """
 
 from __future__ import annotations
@@ -121,21 +121,21 @@ class Place(NamedTuple):
 
 
 class State(NamedTuple):
-    """What a plane has learned, level after level; arrays are changed in place."""
+    """The state that a plane learns over the levels; arrays are changed in place."""
 
-    normal: Any  # (5, 24, 24) float64: see squares
+    normal: Any  # (5, 24, 24) float64: see `mixing_decisions`
     pending: Any  # (5, 16, 25) int32
     weights: Any  # (5, 24) int32
     seen: Any  # (5, 2) int64
     bias: Any  # (5 * 729,) int32: mean residual by context, 16 fractional bits
     scale: Any  # (5 * 24 * 12, 2) int32: mean magnitude by context, 16 fractional bits; count
-    mix: Any  # (rows, 16) int32: weights of the mixer, see decisions
+    mix: Any  # (rows, 16) int32: weights of the mixer, see `mixing_decisions`
     chances: Any  # (n,) int32
     flat: Any  # (432,) uint32: counters of flat blocks
 
 
 class Tables(NamedTuple):
-    """What a plane learns of one level only, and scratch space."""
+    """The state that a plane learns for one level only, and scratch space."""
 
     slots: Any  # (6 * 2^n * 16,) uint32: counters by hashed context
     values: Any  # (3 * 2^n,) int32: last value by hashed context | times confirmed << 8
@@ -243,8 +243,8 @@ def _residual(
                 node = (16 if sign > 0 else 40) + inside
             d = (below + above + 1) >> 1
             x[0] = _halves((above - below + 1) * span, d * span - half + sign * off, inverse)
-        # Large residuals that no match foresees: contexts know no more than the density, but in
-        # the first plane, where they often do.
+        # Large residuals that no match predicts: contexts add nothing to the density, except often
+        # in the first plane.
         if (
             phase == 3
             and deep <= bucket
@@ -357,7 +357,7 @@ def _texel(
     if refs > 1:
         v2 = wide(cells[t + place.second])
 
-    # What the parent's sum leaves.
+    # The range that the parent's sum leaves.
     lo, hi, known = wide(0), wide(255), wide(0)
     last = k == 3 and step == 1
     if step == 1 and k < EDGE:
@@ -509,7 +509,7 @@ def _texel(
 
 @plain_kernel
 def _flat_context(block: int, refs: int, place: Any, parents: Any, flats: Any) -> Any:
-    """Context of "this block equals its parent", -1 where that need not be asked."""
+    """Context of "this block equals its parent", -1 where this is not coded."""
     mean, across = parents[block], place.across
     same = 0
     for dy in range(-1, 2):

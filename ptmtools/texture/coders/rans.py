@@ -4,7 +4,7 @@ Layout of a stream: number of escapes (4 bytes); the escapes (2 bytes each); the
 states (2 bytes each) to the end, of which the first eight are the states. All little endian.
 
 Each table of a group is either one of a family of two-sided geometric distributions, named by its
-number, or the frequencies counted. Small groups live on the first kind, large ones on the second;
+number, or the frequencies counted. The first kind suits small groups, the second large ones;
 the encoder takes whichever is shorter, table by table. Tables are written as numbers of groups of
 three bits, so that the tables of a nearly empty group take a few bytes.
 
@@ -47,9 +47,9 @@ BUILT_IN_MEANS = (
 )  # fmt: skip
 UNUSED = 0
 SENT = 255
-#: The first kind is told as the change from this one.
+#: The first kind is coded as the change from this one.
 _FIRST_KIND = 4
-#: What `frequencies.read_tables` finds wrong.
+#: Faults that `rans_kernels.read_tables` reports.
 _ERRORS = {
     1: "its tables are cut short or hold a number above 4095",
     2: "a table is of an unknown kind",
@@ -61,7 +61,7 @@ Frequencies = NDArray[np.int64]
 
 
 def normalise(counts: NDArray[np.int64]) -> Frequencies:
-    """Frequencies (t, 256) of the rows of ``counts`` (t, 256): see `frequencies.normalise`."""
+    """Frequencies (t, 256) of the rows of ``counts`` (t, 256): see `rans_kernels.normalise`."""
     from ptmtools.texture.coders import rans_kernels as frequencies
 
     frequency = np.zeros_like(counts)
@@ -182,9 +182,9 @@ def parse(reader: Reader, tables: int, family: Family, version_1: bool = False) 
 
 
 def row_tables(frequency: Frequencies) -> tuple[NDArray[np.uint32], NDArray[np.uint64]]:
-    """For `kernels.decode_row`: entries symbol << 24 | frequency << 12 | offset of all tables in
-    use, one after the other, and where each table (t,) begins. Those not in use share one of zeros,
-    which only a damaged stream asks for.
+    """For `rans_kernels.decode_row`: entries symbol << 24 | frequency << 12 | offset of all tables
+    in use, one after the other, and where each table (t,) begins. Those not in use share one of
+    zeros, which only a damaged stream asks for.
     """
     from ptmtools.texture.coders import rans_kernels as frequencies
 
@@ -197,7 +197,7 @@ def row_tables(frequency: Frequencies) -> tuple[NDArray[np.uint32], NDArray[np.u
 
 
 def single_tables(frequency: Frequencies) -> NDArray[np.uint32]:
-    """For `kernels.decode_single`: a third of the size; zeros where not in use."""
+    """For `rans_kernels.decode_single`: a third of the size; zeros where not in use."""
     from ptmtools.texture.coders import rans_kernels as frequencies
     from ptmtools.texture.coders.rans_kernels import SINGLE_SIZE
 
@@ -209,7 +209,7 @@ def single_tables(frequency: Frequencies) -> NDArray[np.uint32]:
 
 @dataclass(frozen=True)
 class Stream:
-    """A stream ready for `kernels.decode_row`.
+    """A stream ready for `rans_kernels.decode_row`.
 
     Attributes
     ----------
@@ -224,13 +224,13 @@ class Stream:
 
 
 def empty_sink(n: int, count: int) -> Sink:
-    """For up to n symbols by so many tables."""
+    """An empty sink for up to n symbols by ``count`` tables."""
     counts = np.zeros((count, 256), np.int64)
     return Sink(np.empty(n, np.uint16), np.empty(n, np.uint8), counts)
 
 
 def encode_symbols(sink: Sink, plain: int, family: Family) -> tuple[bytes, bytes]:
-    """The tables, as `tables.choose` finds them, and the stream of a full sink."""
+    """The tables, chosen by `choose`, and the stream of a full sink."""
     from ptmtools.texture.coders import rans_kernels as kernels
 
     symbols, contexts, counts = sink
@@ -247,7 +247,7 @@ def encode_symbols(sink: Sink, plain: int, family: Family) -> tuple[bytes, bytes
 
 
 def read_stream(reader: Reader, longest_row: int) -> Stream:
-    """The stream in what is left, to be decoded in rows of at most ``longest_row`` symbols.
+    """The stream in the remaining bytes, to be decoded in rows of at most ``longest_row`` symbols.
 
     Raises InputError PTM-I112 if the bytes are none.
     """

@@ -5,7 +5,7 @@ rANS (Duda, "Asymmetric numeral systems", arXiv:1311.2540), four states that tak
 a row of symbols at a time, whose tables are all known before; so four chains of table look-ups are
 under way at once.
 
-Frequency tables are normalised, chosen, written, read and looked up here, too.
+Also normalises, chooses, writes, reads and looks up frequency tables.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def decode_row(
     Parameters
     ----------
     state: (4,) uint64. words: uint16, with n + `PADDING` words behind the last that may be read.
-    table: uint32 from `tables.row_tables`: symbol << 24 | frequency << 12 | offset.
+    table: uint32 from `rans.row_tables`: symbol << 24 | frequency << 12 | offset.
     starts: uint64, where in ``table`` the table of each context begins. contexts: of each symbol.
     """
     sixteen, twelve, part = np.uint64(16), np.uint64(12), np.uint64(4095)
@@ -142,7 +142,7 @@ def split_numbers(numbers: Any, symbols: Any, contexts: Any, counts: Any) -> Non
 @kernel
 def decode_single(table: Any, context: Any, state: Any, lane: Any, word: Any) -> Any:
     """The next symbol where its table is known only once the one before is; whether ``word``, the
-    next one, was used. ``table``: from `tables.single_tables`.
+    next one, was used. ``table``: from `rans.single_tables`.
     """
     x = state[lane]
     slot = x & _MASK
@@ -182,8 +182,8 @@ def encode(
                 bits = 0
                 while (1 << bits) < f:
                     bits += 1
-                # x // f == x * reciprocal >> (bits + 31) for every x below 2^31. All that is to be
-                # known of a symbol in 59 bits: reciprocal, frequency, start, bits.
+                # x // f == x * reciprocal >> (bits + 31) for every x below 2^31. All data of a
+                # symbol in 59 bits: reciprocal, frequency, start, bits.
                 entry = np.uint64(((1 << (bits + 31)) + f - 1) // f) << np.uint64(27)
                 entry |= np.uint64(f << 15 | start << 4 | bits)
                 start += f

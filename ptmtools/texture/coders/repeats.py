@@ -1,6 +1,6 @@
-"""The repeats coder: a group's bytes around the compiled pass (`kernels` says what is coded).
+"""The repeats coder: a group's bytes around the compiled pass (see `repeats_kernels`).
 
-Layout of a coded group: the frequency tables; the stream of `rans.stream`.
+Layout of a coded group: the frequency tables; the stream of `rans`.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def find(level: Bytes, below: Bytes) -> Sink:
 
 
 def new_texels(sink: Sink) -> int:
-    """Texels that were not among the guesses, of the first three of each block."""
+    """Number of texels, among the first three of each block, that were not among the guesses."""
     from ptmtools.texture.coders.repeats_blocks import GUESS, TEXEL
     from ptmtools.texture.coders.repeats_kernels import DIFFERENCES
 
@@ -91,7 +91,7 @@ def _pass(
     source: Source | None,
     state: NDArray[np.int64],
 ) -> int:
-    """`kernels.repeats_pass`, with the tables that it fills."""
+    """Calls `repeats_kernels.repeats_pass` with the tables that it fills."""
     from ptmtools.texture.coders import repeats_kernels as kernels
 
     height, width, components = shape

@@ -17,22 +17,22 @@ from ptmtools.jit import plain_kernel as kernel
 from ptmtools.texture.coders.group import ESCAPE
 from ptmtools.texture.coders.rans_kernels import decode_single
 
-#: First table of each sort of symbol: is the block the first guess; which guess it is; which guess
-#: a texel is, by position; the samples of texels that belong to no block; Haar differences; samples
-#: of other texels; remainders of the sum; how much of a run is not flat.
+#: First table of each sort of symbol: whether the block is the first guess; the block's guess; a
+#: texel's guess, by position; samples of texels outside blocks; Haar differences; samples of other
+#: texels; remainders of the sum; the part of a run that is not flat.
 FIRST, GUESS, TEXEL, EDGE, HAAR, SAMPLE, REMAINDER, RUN = 0, 12, 24, 84, 85, 145, 185, 188
 #: Classes of activity of Haar differences; tables for V, h and g, without and with a reference.
 CLASSES = 10
 TABLES = RUN + 8
-#: Where `state` holds what: the four rANS states first; then symbols so far, the next word, the
+#: Places in `state`: the four rANS states first; then symbols so far, the next word, the
 #: next escape, the index behind the last escape, nonzero once something was impossible.
 COUNT, WORD, NEXT_ESCAPE, ESCAPES_END, STRAY = 4, 5, 6, 7, 8
 
 
 class Source(NamedTuple):
-    """Where a decoder's symbols come from."""
+    """A decoder's source of symbols."""
 
-    table: Any  # uint32 of `rans.tables.single_tables`
+    table: Any  # uint32 of `rans.single_tables`
     words: Any  # uint16, the escapes and behind them the words, with room for a block's more
     limit: Any  # index of the word behind the last
 
@@ -60,7 +60,7 @@ def symbol(z: Any, context: Any, sink: Any, source: Any, state: Any) -> Any:
 
 #: Stands for a texel that is none of the guesses.
 OTHER = np.uint64(1 << 32)
-#: Factors of what a key is made of.
+#: Factors of the components of a key.
 K0, K1, K2 = np.uint64(0x9E3779B1), np.uint64(0x85EBCA6B), np.uint64(0xC2B2AE35)
 K3, K4, K5 = np.uint64(0x27D4EB2F), np.uint64(0x165667B1), np.uint64(0xA24BAED5)
 _MASK32 = np.uint64(0xFFFFFFFF)
@@ -129,7 +129,7 @@ def texel_slot(
     mean: Any, k: Any, w: Any, kw: Any, n: Any, kn: Any, nw: Any, knw: Any, ne: Any, kne: Any,
     shift: Any,
 ) -> Any:  # fmt: skip
-    """Where the last texel in such surroundings is kept."""
+    """Slot of the last texel in these surroundings."""
     return slot(mean * k + w * kw + n * kn + nw * knw + ne * kne, shift)
 
 

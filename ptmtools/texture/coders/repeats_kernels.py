@@ -1,12 +1,12 @@
-"""Compiled loop of the repeats coder: blocks, texels and samples that were seen before.
+"""Compiled loop of the repeats coder, which codes repeated blocks, texels and samples.
 
 One pass serves both directions. It goes through the 2×2 blocks in row-major order. Runs of blocks
-that are flat like all around them are one symbol. For each other block it asks tables of the last
-block seen in the same surroundings. If none of these is the one, smooth blocks
-are coded by their Haar differences, rough ones texel by texel: each is a neighbour, or the last
-texel seen in the same surroundings, or new, and then its samples are predicted. A texel is one
-32-bit number, so that components cost nothing while something repeats. There is no search: encoder
-and decoder take the same time, in proportion to the blocks. ``docs/formats/ptm.md`` specifies it.
+that are flat like their surroundings are one symbol. For every other block it looks up the last
+block seen in the same surroundings. If none of the candidates matches, smooth blocks are coded by
+their Haar differences, rough ones texel by texel: each is a neighbour, or the last texel seen in
+the same surroundings, or new, and then its samples are predicted. A texel is one 32-bit number, so
+that the number of components costs no time in repeated content. There is no search: encoder and
+decoder take the same time, in proportion to the blocks. ``docs/formats/ptm.md`` specifies it.
 
 Tried, in sizes relative to PNG on an atlas of an office / a page of small text in colour: asking by
 the mean alone 1.35 / 3.37; by the neighbouring texels 1.31 / 1.36; by the means all around 2.22 /
@@ -58,10 +58,10 @@ from ptmtools.texture.coders.repeats_blocks import (
 
 #: Answers to "which guess": after those that name one, `TEXELS`, one by one, and `DIFFERENCES`.
 GUESSES, TEXELS, DIFFERENCES = 3, 3, 4
-#: A block is coded texel by texel if so many samples of p, q and r are among the guesses, or if its
-#: texels differ so much.
+#: A block is coded texel by texel if this many samples of p, q and r are among the guesses, or if
+#: its texels differ by this much.
 SMOOTH_KNOWN, ROUGH = 3, 48
-#: A run is of at most so many blocks, so that no symbol of it escapes.
+#: Longest run, blocks, so that none of its symbols escapes.
 LONGEST_RUN = 254
 #: No block takes more symbols, so that words need to be counted once a block only.
 MOST_SYMBOLS = 24
@@ -109,8 +109,8 @@ def repeats_pass(
     slots: (5, 2^b) and seen: (2^b,) uint32, zeros; shift: uint64, 32 - b.
     outcome: (width // 2 + 1,) int64, zeros: 1 where the block above was new.
     errors: (3,) int64, overwritten.
-    sink: uint32, filled with symbol | context << 16. source: `symbols.Source`.
-    state: (9,) int64: see `symbols.COUNT`.
+    sink: uint32, filled with symbol | context << 16. source: `repeats_blocks.Source`.
+    state: (9,) int64: see `repeats_blocks.COUNT`.
 
     Returns OK, TRUNCATED or IMPOSSIBLE.
     """

@@ -1,17 +1,18 @@
 """The texel coder: samples of 16 bits, floats, and any integers with an error allowed.
 
-A group is one byte that names its form, then what that form needs:
+A group is one byte that names its form, then the data of that form:
 
 - *raw*: as in profile `raw`; only without error.
-- *plain*: all texels of the level, whatever is below: nothing takes more than this and one byte.
+- *plain*: all texels of the level, without the level below: no group takes more than this and one
+  byte.
 - *coded*, with built-in or with sent weights: every texel predicted from the level below and the
   texels before it, the residual as a token (coded with rANS by the activity around it) and plain
-  bits. ``kernels`` has the pass, ``docs/formats/ptm-kinds.md`` the format.
+  bits. ``texel_kernels`` has the pass, ``docs/formats/ptm-kinds.md`` the format.
 
 Whole pyramids over what zstd -19 makes of the finest level alone: photographs of 16 bits 0.82, as
 float32 0.90, half-float environment maps 0.66 … 0.80, Radiance files 0.68 … 0.83, 8 bits widened to
 16 or divided by 255 0.69 … 0.80, heights as float32 0.69; over OpenEXR (the shorter of ZIP and PIZ)
-0.64 … 0.93. What repeats without being flat is not found: a pattern of 16² random floats costs 90
+0.64 … 0.93. Repetitions that are not flat are not detected: a pattern of 16² random floats costs 90
 times what zstd needs. With an error of 1, 2, 4, 8, 12 Kodak images of 8 bits take 0.74, 0.58, 0.41,
 0.25 of their lossless size; JPEG-LS 0.87, 0.69, 0.50, 0.34 for the finest level alone.
 """
@@ -45,11 +46,10 @@ if TYPE_CHECKING:
 RAW, PLAIN, CODED, CODED_WITH_WEIGHTS = 0, 1, 2, 3
 #: Groups of fewer blocks use the built-in weights: sending others would not pay.
 FEWEST_BLOCKS = 24 * 24
-#: Groups shorter than so many times their weights are tried without them too.
+#: Groups shorter than this multiple of their weights are also tried without them.
 LIGHT = 8
 
-#: The activity where texels differ as they mostly do has this class; the highest window; rows
-#: looked at.
+#: Class of the usual activity; the highest window; rows examined.
 WINDOW_USUAL, WINDOW_TOP, WINDOW_ROWS = 12, 40, 64
 
 Numbers = NDArray[np.uint32]
@@ -94,7 +94,7 @@ def decode(data: bytes | memoryview, below: Samples, shape: Shape, max_error: in
 
 @dataclass(frozen=True)
 class _Group:
-    """What the pass works on, in either direction.
+    """The arrays of a pass, in either direction.
 
     Attributes
     ----------
@@ -121,7 +121,8 @@ class _Group:
         sink: Sink | None = None,
         source: Source | None = None,
     ) -> int:
-        """`kernels.texel_pass`, with empty arrays for the direction that it does not take."""
+        """Calls `texel_kernels.texel_pass`, with empty arrays for the direction that it does not
+        take."""
         from ptmtools.texture.coders import texel_kernels as kernels
 
         components = numbers.shape[2]
@@ -155,7 +156,7 @@ class _Group:
 
 
 def _codings(level: Samples, below: Samples, max_error: int) -> list[Coded]:
-    """The group as it is coded, in one or two ways; none if the level below is not its mean."""
+    """The coded group, in one or two ways; none if the level below is not its mean."""
     kind = kind_of(level.dtype)
     values, means = (to_ordered(one).astype(np.uint32) for one in (level, below))
     numbering = number_planes(values, kind.top, max_error)
@@ -208,7 +209,7 @@ def _coding(
 
 
 def _window(group: _Group, numbers: Numbers) -> int:
-    """How many doublings of activity are one class, so that usual ones have their own."""
+    """Number of doublings of activity in the lowest class, so that usual ones have their own."""
     step = max(1, numbers.shape[0] // WINDOW_ROWS)
     rows = numbers[::step].astype(np.int64)
     if rows.shape[1] < 2:
@@ -232,7 +233,7 @@ def _decode(reader: Reader, below: Samples, shape: Shape, max_error: int, sent: 
     weights = _read_weights(reader, shape[2]) if sent else None
     frequency = tables.parse(reader, kernels.TABLES, layout.table_family())
     bits = reader.numbers("u1", reader.number(4))
-    # A row of blocks is decoded before it is looked whether the stream was long enough.
+    # A row of blocks is decoded before the length of the stream is checked.
     row = 4 * (shape[1] + 1 >> 1) * shape[2] * numbering.symbols
     plain = np.zeros(-(-len(bits) // 4) + row + 2, "<u4")
     plain.view(np.uint8)[: len(bits)] = bits

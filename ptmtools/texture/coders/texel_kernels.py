@@ -23,24 +23,24 @@ from ptmtools.jit import kernel
 from ptmtools.texture.coders.group import ESCAPE, IMPOSSIBLE, OK, TRUNCATED
 from ptmtools.texture.coders.rans_kernels import STATE_LOW, decode_single, start_states
 
-#: How the fourth texel follows from the others: not at all, as integers, as floats of 16, 32 bits.
+#: Rule for the fourth texel from the others: none, as integers, as floats of 16, 32 bits.
 FREE, WHOLE, HALF, SINGLE = 0, 1, 2, 3
 #: Texels of the work plane outside the level: above and left, below and right.
 BEFORE, BEHIND = 2, 3
 #: Neighbours that a prediction looks at, besides the planes coded before.
 FEATURES = 10
-#: Weights are in so many bits behind the point.
+#: Fractional bits of weights.
 WEIGHT_BITS = 12
 HALF_WEIGHT = 1 << (WEIGHT_BITS - 1)
 #: Classes of activity: none, then one for each doubling.
 CLASSES = 18
 #: Tables: for planes of no, one, two references those of p, of q, of r, of s; then those of a
-#: fourth texel of few possible values, by how many and by four grades of activity; those of
-#: whether low bits are 0, by the answers before.
+#: fourth texel of few possible values, by their number and by four grades of activity; those of
+#: flags for low bits of 0, by the flags before.
 NARROW = 12 * CLASSES
 GRID = NARROW + 16
 TABLES = GRID + 4
-#: Ranges of at most so many values are narrow.
+#: Ranges of at most this number of values are narrow.
 NARROW_TOP = 16
 #: Numbers below this are tokens; above it a token has the leading three bits, the rest is plain.
 DIRECT = 16
@@ -49,15 +49,15 @@ PLAIN_TOP = 30
 
 
 class Source(NamedTuple):
-    """Where a decoder's symbols come from."""
+    """A decoder's source of symbols."""
 
     words: Any  # uint16, and
-    escapes: Any  # uint16: as in `rans.stream.Stream`
-    table: Any  # uint32 of `rans.tables.single_tables`
+    escapes: Any  # uint16: as in `rans.Stream`
+    table: Any  # uint32 of `rans.single_tables`
 
 
 class Workspace(NamedTuple):
-    """What a pass needs besides its arguments; made outside, which compiles quicker."""
+    """Scratch arrays of a pass, allocated outside, which compiles faster."""
 
     errors: Any
     residual: Any
@@ -67,10 +67,10 @@ class Workspace(NamedTuple):
 
 
 def workspace(width: int, components: int) -> Workspace:
-    """For groups ``width`` texels wide."""
+    """Allocates the workspace of groups ``width`` texels wide."""
     return Workspace(
         errors=np.zeros(components * 4 * (width + BEFORE + BEHIND), np.int64),
-        # One plane more than there are: it stays 0 and stands for an absent reference.
+        # One additional plane, which stays 0, stands for an absent reference.
         residual=np.zeros((components + 1) * 4, np.int64),
         range=np.zeros(2, np.int64),
         grid=np.zeros(components, np.int64),
@@ -80,7 +80,7 @@ def workspace(width: int, components: int) -> Workspace:
 
 @kernel
 def _bit_length(n: Any) -> Any:
-    """Of 0 … 2^53 - 1; 0 for 0. The exponent of a float64 tells it."""
+    """Bit length of 0 … 2^53 - 1, from the exponent of a float64; 0 for 0."""
     return (np.float64(n).view(np.int64) >> 52) - 1022 if n > 0 else np.int64(0)
 
 
@@ -130,7 +130,7 @@ def _unit(value: Any, kind: int) -> Any:
 
 @kernel
 def _value(number: Any, plane: int, numbering: Any) -> Any:
-    """The ordered value of that number."""
+    """The ordered value with that number."""
     step = numbering.steps[plane]
     if step == 0:
         return numbering.lists[plane, number]
@@ -222,9 +222,9 @@ def texel_pass(
     near: the error allowed. kind: FREE, WHOLE, HALF, SINGLE.
     planes, references: (c,) int64, in coding order. weights: (c * 4 * 12,) int64, in coding order.
     around: (4 * 10,) uint64, offsets in ``work`` of the neighbours of p, q, r, s, modulo 2^64.
-    numbering: `numbering.Arrays`.
+    numbering: `texel_layout.Arrays`.
     window: doublings of activity that are one class at the low end.
-    sink: `rans.sizes.Sink`, for n or with grids 2 * n symbols. source: `Source`.
+    sink: `rans.Sink`, for n or with grids 2 * n symbols. source: `Source`.
     plain: uint32 words of plain bits, with padding for a row of blocks.
     limits: (2,) int64, decoding: numbers of words and of plain bits.
     space: from `workspace`.
@@ -237,7 +237,7 @@ def texel_pass(
     symbols, contexts, counts = sink.symbols, sink.contexts, sink.counts
     words, escapes, table = source.words, source.escapes, source.table
     # Indices are unsigned (numba need not look for negative ones) and arrays flat: a slice made in
-    # the inner loop would cost more than what is done with it.
+    # the inner loop would cost more than its use.
     wide = np.uint64(width + BEFORE + BEHIND)
     size = np.uint64(work.size // nc)
     step = 2 * near + 1
@@ -317,7 +317,7 @@ def texel_pass(
                         target = min(max(guess, low), high)
                     shift = np.int64(0)
                     if grid > 0:
-                        # Is it a whole multiple? Then all that follows is of multiples.
+                        # For a whole multiple, all that follows counts multiples.
                         shift = grid
                         rest = (np.int64(1) << shift) - 1
                         context = (

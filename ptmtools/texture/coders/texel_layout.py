@@ -16,7 +16,7 @@ by itself. Mostly a value is its own number. Where all values lie on a lattice (
 16, halves widened to singles, constant alpha) they are counted along it; where they are few
 (palettes, 8 bits taken through a transfer function to floats) the sorted list of them is sent.
 Where most values have low bits that are 0 (singles that were halves or came from a Radiance file,
-and their means) a bit tells of each whether they are.
+and their means) a bit per number says whether they are.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def offsets(stride: int) -> NDArray[np.uint64]:
     return np.array([[y * stride + x for y, x in k] for k in NEIGHBOURS], np.int64).view(np.uint64)
 
 
-#: Numbers of the built-in tables that spread evenly over so many symbols; the others follow.
+#: Symbol counts of the built-in uniform tables; the other built-in tables follow.
 EVEN = (2, 3, 4, 5, 6, 9, 16)
 
 
@@ -130,12 +130,12 @@ BUILT_IN_WEIGHTS = np.array(
 )
 
 
-#: About so many blocks are sampled.
+#: Blocks sampled, about.
 SAMPLED_BLOCKS = 6144
 #: Features are brought to about ± this, and cut off at the other.
 SCALE = 1 << 9
 FEATURE_TOP = 1 << 12
-#: Spread of the neighbours to which every sample is thought to have at least.
+#: Least spread of the neighbours that is assumed for a sample.
 LEAST_SPREAD = 4
 #: From this error on, the sample is fitted with neighbours that are as wrong as they will be. It
 #: saves 4 % at an error of 8 in photographs and costs 0.4 % at one of 1.
@@ -208,7 +208,7 @@ class _Sample:
 
 
 def _rounded(values: Array, max_error: int) -> Array:
-    """Values with errors as they are to be expected."""
+    """Values with the errors to be expected."""
     step = 2 * max_error + 1
     return (values + max_error) // step * step if max_error else values
 
@@ -241,18 +241,18 @@ def _continuations(used: int) -> list[Array]:
 
 
 def _cost(residual: Array) -> int:
-    """About how many bits these residuals take: one more for each doubling."""
+    """Estimated bits of the residuals: one more for each doubling."""
     return int(np.frexp(np.abs(residual).astype(np.float64))[1].sum())
 
 
 ITSELF, LATTICE, LIST, GRID = 0, 1, 2, 3
-#: A list is sent if it holds fewer than so many of a hundred points of the lattice …
+#: A list is sent if it holds less than this percentage of the points of the lattice …
 LIST_SHARE = 88
-#: … and there are so many samples for each entry.
+#: … and there are this many samples for each entry.
 LIST_SAMPLES = 64
-#: If of this many samples more than three quarters differ, a list is out of the question.
+#: If more than three quarters of this many samples differ, no list is tried.
 PROBE = 4096
-#: Low bits of which it is asked whether they are 0 save at least so many bits a sample.
+#: A flag for low bits of 0 has to save at least this many bits a sample.
 GRID_GAIN = 3
 
 Numbers = NDArray[np.uint32]
@@ -260,7 +260,7 @@ Numbers = NDArray[np.uint32]
 
 @dataclass(frozen=True)
 class Plane:
-    """How the values of one component are numbered.
+    """The numbering of the values of one component.
 
     Attributes
     ----------
@@ -279,7 +279,7 @@ class Plane:
     used: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))
 
     def nearest(self, values: Numbers) -> NDArray[Any]:
-        """Numbers of the nearest values that occur, of any values."""
+        """Numbers of the occurring values nearest to any values."""
         if self.kind == LIST:
             return np.searchsorted((self.used[:-1] + self.used[1:]) >> 1, values)
         if self.kind == LATTICE:
@@ -294,7 +294,7 @@ class Plane:
         return self.offset + numbers.astype(np.int64) * self.step
 
     def packed(self) -> bytes:
-        """What a file says of it behind its kind."""
+        """The bytes that follow its kind in a file."""
         if self.kind == LIST:
             return pack_varints(self.top, *np.diff(self.used, prepend=0).tolist())
         if self.kind == LATTICE:
@@ -313,7 +313,7 @@ class Arrays(NamedTuple):
 
 
 class Numbering:
-    """How the values of all components are numbered."""
+    """The numbering of the values of all components."""
 
     def __init__(self, planes: Iterable[Plane]) -> None:
         self._planes = list(planes)
@@ -324,11 +324,11 @@ class Numbering:
         self.arrays = Arrays(steps, offsets, tops, grids, np.stack(lists))
         #: Whether each value is its own number.
         self.plain = all(plane.kind == ITSELF for plane in self._planes)
-        #: How many symbols a sample may take.
+        #: Most symbols of a sample.
         self.symbols = 2 if self.arrays.grids.any() else 1
 
     def nearest(self, values: Numbers) -> Numbers:
-        """Numbers of the nearest values that occur, of any values (h, w, c)."""
+        """Numbers of the occurring values nearest to any values (h, w, c)."""
         return self._each(Plane.nearest, values)
 
     def values(self, numbers: Numbers) -> Numbers:
@@ -336,7 +336,7 @@ class Numbering:
         return self._each(Plane.values, numbers)
 
     def packed(self) -> bytes:
-        """Two bits for each component that tell its kind, then what each needs."""
+        """Two bits for the kind of each component, then the data of each."""
         kinds = sum(plane.kind << 2 * c for c, plane in enumerate(self._planes))
         return bytes([kinds]) + b"".join(plane.packed() for plane in self._planes)
 
@@ -381,7 +381,7 @@ def _few_values(plane: Numbers, points: int) -> NDArray[np.int64] | None:
 
 
 def _grid(plane: Numbers, largest: int) -> int:
-    """How many low bits are 0 so often that it pays to ask."""
+    """Number of low bits that are 0 often enough for a flag."""
     # Each value once: what fills an area costs nothing anyway.
     spread = np.unique(plane[:: max(1, plane.size // PROBE)])
     best, grid = GRID_GAIN * max(spread.size, PROBE // 16), 0

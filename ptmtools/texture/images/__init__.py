@@ -1,8 +1,8 @@
 """Reading and writing image files without ever changing a texel silently.
 
-Nothing is scaled, rounded or converted on the way: what a format cannot hold exactly, or what a
-`.ptm` cannot, is an error that says so. Colour and orientation are *kept*, not applied: texels are
-numbers, in the order of the file's rows, and what the file says of them goes into a
+Nothing is scaled, rounded or converted on the way: texels that a format or a `.ptm` cannot hold
+exactly are an error. Colour and orientation are *kept*, not applied: texels are numbers, in the
+order of the file's rows, and the file's description of them goes into a
 `ptmtools.texture.Description`. The exception is TIFF, whose orientation says how its rows are
 stored; it is applied.
 """

@@ -55,7 +55,7 @@ _NEXT = 0
 #: Bits and sample format of a TIFF → the type that holds its samples exactly.
 _TYPES = {(16, 1): "uint16", (16, 3): "float16", (32, 3): "float32"}
 Tags = Mapping[int, Any]
-#: So much of a plain PPM is read at a time, and so many digits are the most that a number has.
+#: Bytes of a plain PPM read at a time, and the most digits of a number.
 _BLOCK, _DIGITS_MAX = 1 << 20, 10
 
 
@@ -112,7 +112,7 @@ def tiff_tags(file: BinaryIO) -> Tags:
 
 
 def is_deep(tags: Tags) -> bool:
-    """Whether the samples of a TIFF are more than 8 bits hold."""
+    """Whether the samples of a TIFF need more than 8 bits."""
     return max(tags.get(_BITS, (1,))) > 8 or set(tags.get(_FORMAT, (1,))) != {1}
 
 
@@ -160,7 +160,7 @@ def read_tiff(file: BinaryIO, tags: Tags, limits: Limits) -> Picture:
 def read_ppm(file: BinaryIO, path: str | None, limits: Limits) -> Picture | None:
     """A PPM or PGM of 16 bits a sample; None for others. A binary one is mapped if it is a file.
 
-    Raises InputError PTM-I125, LimitError PTM-L104, and for what is no number ValueError.
+    Raises InputError PTM-I125, LimitError PTM-L104, and ValueError for text that is not a number.
     """
     file.seek(0)
     head = _PPM.match(file.read(4096))
@@ -177,7 +177,7 @@ def read_ppm(file: BinaryIO, path: str | None, limits: Limits) -> Picture | None
 
 
 def _plain_samples(file: BinaryIO, count: int) -> NDArray[np.uint16]:
-    """So many samples (count,) from decimal numbers. Raises InputError PTM-I125, ValueError."""
+    """Reads (count,) samples from decimal numbers. Raises InputError PTM-I125, ValueError."""
     # Before memory is taken: each has a digit, and all but the last something after it.
     start, end = file.tell(), file.seek(0, 2)
     if end - start < 2 * count - 1:

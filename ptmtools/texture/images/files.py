@@ -26,7 +26,7 @@ from ptmtools.texture.images.png import check_chunks
 from ptmtools.texture.model import Description, Limits
 from ptmtools.texture.sources import open_file
 
-#: Of the files that are taken for images where a folder is named.
+#: Suffixes of the files that count as images when a folder is given.
 SUFFIXES = (
     *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".tga", ".bmp", ".gif", ".webp", ".pcx"),
     *(".ppm", ".pgm", ".pbm", ".pnm", ".hdr", ".exr", ".npy"),
@@ -36,7 +36,7 @@ _PPM = (b"P2", b"P3", b"P5", b"P6")
 
 
 def load_image(source: str | os.PathLike[str] | bytes, limits: Limits = _LIMITS) -> Picture:
-    """An image file to encode: texels exactly as stored, and what the file says of them.
+    """Loads an image file to encode: texels exactly as stored, and their description.
 
     8 bits: PNG, JPEG (as it decodes), TIFF, TGA, BMP, GIF, WebP, PPM, PCX. 16 bits: PNG, TIFF,
     PPM and PGM, .npy. Floats: TIFF, Radiance .hdr (float32), OpenEXR, .npy. TIFFs of several
@@ -65,7 +65,7 @@ def load_image(source: str | os.PathLike[str] | bytes, limits: Limits = _LIMITS)
         return _load(cast("BinaryIO", io.BytesIO(source)), None, limits)
     path = os.fspath(source)
     with open_file(path) as file, naming(path):
-        # What was a pipe cannot be opened, or mapped, by its name once more.
+        # A pipe cannot be opened or mapped by its name a second time.
         return _load(file, None if isinstance(file, io.BytesIO) else path, limits)
 
 
@@ -101,7 +101,7 @@ def _check_depth(picture: Picture) -> None:
 
 
 def read_ptm(path: str | os.PathLike[str]) -> bytes:
-    """The bytes of a `.ptm`, of which the head has been found good.
+    """The bytes of a `.ptm` whose head is valid.
 
     Raises InputError: PTM-I120, PTM-I122 as `load_image`; what `read_header` raises.
     """
@@ -123,7 +123,8 @@ def _load(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
 
 
 def _opened(file: BinaryIO, path: str | None, limits: Limits) -> Picture | Callable[[], Picture]:
-    """An image; of one of 8 bits, which Pillow has opened and found good, what unpacks it."""
+    """A loaded image; for one of 8 bits, which Pillow has opened and accepted, a function that
+    unpacks it."""
     first = file.read(HEAD_MAX)
     if not first:
         raise InputError("PTM-I125", "is empty", remedy="download or export it again")
@@ -230,7 +231,7 @@ Writer = Callable[[IO[bytes], "Samples", Description], object]
 
 
 def writer(suffix: str) -> Writer:
-    """What writes files of that suffix. Raises OutputError PTM-O101."""
+    """The function that writes files of that suffix. Raises OutputError PTM-O101."""
     writer = WRITTEN.get(suffix.lower())
     if writer is None:
         lossy = suffix.lower() in LOSSY

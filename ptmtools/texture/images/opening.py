@@ -56,22 +56,22 @@ _PLUGINS: dict[str, bytes | tuple[bytes, ...]] = {
     # A Targa file begins with anything; its own checks decide.
     "Tga": b"",
 }
-#: Of those whose first bytes say too little to call others damaged.
+#: Formats whose first bytes are too short to call a failing file damaged.
 _VAGUE = ("Ppm", "Pcx", "Tga")
 READABLE = "PNG, JPEG, TIFF, TGA, BMP, GIF, WebP, PPM, PCX, Radiance, OpenEXR or .npy"
 #: The tag of EXIF and TIFF.
 ORIENTATION = 0x0112
 #: Tags of TIFF.
 _TILE_WIDTH, _TILE_LENGTH = 322, 323
-#: What Pillow calls layouts of 5 and 6 bits a sample, which it scales to 8.
+#: Pillow's names for layouts of 5 and 6 bits a sample, which it scales to 8.
 _HIGH_COLOUR = re.compile(r"BGRA?;(5|1[56])Z?")
 
 
 def opened(file: BinaryIO, limits: Limits) -> ImageFile:
     """An image whose header is read, and no texel yet; its size is still to be checked.
 
-    Raises what Pillow raises; LimitError PTM-L104 where opening or loading would take
-    what its size does not tell.
+    Raises what Pillow raises; LimitError PTM-L104 if opening or loading would take more memory than
+    its size implies.
     """
     check_file(file, limits)
     file.seek(0)
@@ -113,9 +113,9 @@ def lossy_format(file: BinaryIO, image: ImageFile) -> str | None:
 
 
 def load(image: ImageFile) -> None:
-    """Its texels are unpacked. Raises what Pillow raises."""
+    """Unpacks the texels. Raises what Pillow raises."""
     if image.format == "TIFF":
-        # What this makes is not made, and its size not questioned, a second time.
+        # Its result is not produced, and its size not checked, a second time.
         import PIL.Image
 
         core: Any = PIL.Image.core  # type: ignore[attr-defined]
@@ -135,14 +135,14 @@ def high_colour(image: ImageFile) -> bool:
 
 @contextmanager
 def pillow_faults() -> Iterator[None]:
-    """Whatever Pillow raises inside becomes one of our errors."""
+    """Turns every exception of Pillow in the block into one of our errors."""
     from PIL.Image import DecompressionBombError
 
     try:
         yield
     except PtmError:
         raise
-    except SyntaxError:  # what a plug-in says of a file that is none of its own
+    except SyntaxError:  # raised by a plug-in for a file of another format
         raise InputError(
             "PTM-I125", "is not an image of a supported format", remedy=f"it must be {READABLE}"
         ) from None
@@ -170,8 +170,8 @@ def described(image: Image) -> Description:
 
 
 def orientation_of(exif: Callable[[], Exif]) -> int:
-    """The orientation, 1 to 8, in what ``exif`` makes; 1 where it has none, or an impossible one
-    (some cameras write 0), or cannot be parsed: the texels are no worse for it."""
+    """The orientation, 1 to 8, in the result of ``exif``; 1 if it is missing, impossible (some
+    cameras write 0) or cannot be parsed, none of which damages the texels."""
     try:
         orientation = exif().get(ORIENTATION, 1)
         return int(orientation) if orientation in range(1, 9) else 1
@@ -183,7 +183,7 @@ _COMPONENTS = {"1": 1, "L": 1, "LA": 2, "P": 3, "PA": 4, "RGB": 3, "RGBA": 4}
 
 
 def check(image: ImageFile, limits: Limits) -> None:
-    """Raise InputError PTM-I126, LimitError PTM-L104 for what an opened image cannot be read as."""
+    """Raise InputError PTM-I126, LimitError PTM-L104 if an opened image cannot be read exactly."""
     if image.mode not in _COMPONENTS:
         raise unsupported(f"the colour model {image.mode}")
     check_size(*image.size, _COMPONENTS[image.mode], limits)
@@ -237,7 +237,7 @@ def stripped(
 
 def one_frame(image: ImageFile) -> None:
     """Raise InputError PTM-I126 for an image of several."""
-    # Not how many: the pages of a TIFF may be made to be costly to count.
+    # The frames are not counted: a TIFF may be built so that counting its pages is costly.
     if getattr(image, "is_animated", False):
         raise several("several frames or pages")
 

@@ -4,11 +4,11 @@ The declared size is checked before a decoder takes memory or time.
 
 Pillow's plug-ins give the size of most formats before they unpack anything. The exceptions:
 
-- All: a file may itself be larger than any image of so many texels, and take no room on the disk.
+- All: a file may itself be larger than any image of its declared size, and be sparse on the disk.
 - WebP: its decoder takes two canvases of the declared size as it is opened (RIFF container, RFC
   9649, sections 2.5 to 2.7).
-- JPEG: every scan of a progressive file goes over the whole image, and may take a few bytes to say
-  nothing (ITU T.81, B.2.1): a file of 1 MB can hold days of them.
+- JPEG: every scan of a progressive file goes over the whole image, and an empty scan takes a few
+  bytes (ITU T.81, B.2.1): a file of 1 MB can hold scans that take days to decode.
 - TIFF: a tile has a size of its own, and a buffer is taken for it (TIFF 6.0, section 15).
 """
 
@@ -26,7 +26,7 @@ from ptmtools.errors import InputError, LimitError, OutputError
 from ptmtools.texture.model import MAX_SIDE, Description, Limits
 from ptmtools.texture.sources import Rows, Samples
 
-#: About so many texels are taken from an image at a time.
+#: Texels taken from an image at a time, about.
 _STRIP_TEXELS = 1 << 18
 
 
@@ -36,10 +36,10 @@ class Picture:
 
     Attributes
     ----------
-    texels: rows from the top, (h, w, c) of uint8, uint16, float16 or float32: an array, or what
-        makes one when it is sliced.
+    texels: rows from the top, (h, w, c) of uint8, uint16, float16 or float32: an array, or an
+        object that returns one when sliced.
     description: colour and orientation, as the file has them.
-    lossy: the name of the file's format where that had discarded detail, as JPEG does; else None.
+    lossy: the name of the file's format if it discards detail, as JPEG does; else None.
     """
 
     texels: Rows
@@ -61,7 +61,7 @@ class Picture:
 
 
 def oriented(texels: Samples, orientation: int) -> Samples:
-    """Texels as they are to be shown, given EXIF's orientation, 1 to 8; a view."""
+    """Texels in display order, given EXIF's orientation, 1 to 8; a view."""
     if orientation in (5, 6, 7, 8):
         texels = texels.swapaxes(0, 1)
     if orientation in (2, 3, 6, 7):
@@ -73,7 +73,7 @@ def oriented(texels: Samples, orientation: int) -> Samples:
 
 @dataclass(frozen=True)
 class Strips:
-    """Rows that are made when they are asked for, a strip at a time.
+    """Rows that are produced on demand, a strip at a time.
 
     Attributes
     ----------
@@ -114,9 +114,9 @@ def raster(
 
 
 def check_size(width: int, height: int, texel_bytes: int, limits: Limits | None) -> None:
-    """Raise LimitError PTM-L104 for what cannot be stored or is more than may be decoded.
+    """Raise LimitError PTM-L104 for a size that cannot be stored or exceeds the limits of decoding.
 
-    limits: None for what takes no memory. Raises InputError PTM-I125 for no texels at all.
+    limits: None if no memory is taken. Raises InputError PTM-I125 for no texels at all.
     """
     if min(width, height) < 1:
         raise damaged_image("no texels")
@@ -150,7 +150,7 @@ def several(what: str, remedy: str = "export the one you want as PNG") -> InputE
 
 
 def unsupported(what: str) -> InputError:
-    """The error for what no kind of sample holds exactly."""
+    """The error for samples that no kind holds exactly."""
     return InputError(
         "PTM-I126",
         f"has {what}; supported are grey and RGB of 8 or 16 bits or 16- or 32-bit floats, with or "
@@ -168,15 +168,15 @@ def not_held(suffix: str, texels: Samples, others: str) -> OutputError:
     )
 
 
-#: A file may have so many bytes for each byte of its texels, and so many besides: plain PPMs have
-#: four, descriptions some megabytes.
+#: Most bytes of a file for each byte of its texels, and most bytes besides: plain PPMs have four,
+#: descriptions some megabytes.
 _BYTES, _BYTES_BESIDES = 8, 1 << 24
 #: Encoders make 10 scans, some for an image of four components 20.
 MOST_SCANS = 100
 #: A marker of JPEG that is none of those between and within the data of a scan.
 _MARKER = re.compile(rb"\xff+([^\x00\xd0-\xd7\xff])", re.DOTALL)
 _SCAN, _END = 0xDA, 0xD9
-#: Markers without a length: of the beginning, and one that nobody uses.
+#: Markers without a length: the one of the beginning, and an unused one.
 _BARE = (0xD8, 0x01)
 
 
@@ -231,8 +231,8 @@ def check_jpeg(data: bytes) -> None:
 
 
 def check_tile(width: object, height: object, texel_bytes: int, limits: Limits) -> None:
-    """Raise LimitError PTM-L104 if a tile of a TIFF is larger than all of an image may be; tiles
-    that it has not have None for their size. Raise InputError PTM-I125 for sizes that are none."""
+    """Raise LimitError PTM-L104 if a tile of a TIFF is larger than all of an image may be; an image
+    without tiles has None for their size. Raise InputError PTM-I125 for invalid sizes."""
     if width is None and height is None:
         return
     if not (isinstance(width, int) and isinstance(height, int)):

@@ -79,8 +79,8 @@ def _save_deep(file: IO[bytes], image: NDArray[np.uint16], description: Descript
 
 
 def check_chunks(file: BinaryIO) -> None:
-    """Every chunk is there up to the last, IEND, and those that texels depend on are as they were
-    written. Pillow looks at neither once it has all rows.
+    """Checks that every chunk up to the last, IEND, is present and that the checksums of those that
+    texels depend on match. Pillow checks neither once it has all rows.
 
     Raises InputError PTM-I125.
     """
@@ -89,7 +89,7 @@ def check_chunks(file: BinaryIO) -> None:
     while kind != b"IEND":
         head = file.read(8)
         kind, left = head[4:], int.from_bytes(head[:4], "big")
-        if kind[:1].islower():  # what texels do not depend on
+        if kind[:1].islower():  # texels do not depend on it
             file.seek(left + 4, 1)
             continue
         checksum = zlib.crc32(kind)
@@ -143,7 +143,7 @@ def _paeth(
 
 
 def _colour_chunks(description: Description) -> Iterator[tuple[bytes, bytes]]:
-    """Chunks that say what the colours are, in the order that PNG wants."""
+    """Chunks that describe the colours, in the order that PNG prescribes."""
     if description.chromaticities is not None:
         yield b"cHRM", struct.pack(">8I", *description.chromaticities)
     if description.gamma is not None:

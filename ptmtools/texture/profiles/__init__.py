@@ -1,10 +1,10 @@
-"""The profiles: ways of coding the levels of a file, declared in a table.
+"""The profiles, ways of coding the levels of a file, and the table that declares them.
 
 A profile is one value in `PROFILES` and one module, which turns a tile of a level, given the same
 part of the level below, into bytes and back. The module knows nothing of files, checksums or
-numbering; the container knows nothing of texels. Everything else that depends on the profile (what
-the command line offers and says of it, which options it takes, what a file may declare) is read
-from the table, so a new one needs its module and a line here.
+numbering; the container knows nothing of texels. Everything else that depends on the profile (its
+entry and help on the command line, its options, the values a file may declare) is read from the
+table, so a new one needs its module and a line here.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ class Profile:
     Attributes
     ----------
     name: on the command line and in `EncodeOptions`.
-    number: what stands for it in a file; never that of another, once files have been written.
-    about: what it is for, in a few words, for the help.
+    number: its number in files; never reused for another profile.
+    about: its purpose in a few words, for the help.
     lossy: whether it can make use of an allowed error.
     since: the first version of the container that may hold it.
     module: the `Coder`, if not the module of this package that has the profile's name.
@@ -40,7 +40,7 @@ class Profile:
 
     @property
     def coder(self) -> Coder:
-        """What codes and decodes; imported when it is first used."""
+        """The coder; imported when first used."""
         return cast("Coder", import_module(self.module or f"{__name__}.{self.name}"))
 
 
@@ -63,5 +63,5 @@ PROFILES = {
 
 
 def profile_numbered(number: int) -> Profile | None:
-    """The profile that a number in a file stands for, if there is one."""
+    """The profile with a number in files, or None."""
     return next((profile for profile in PROFILES.values() if profile.number == number), None)

@@ -5,10 +5,10 @@ Images of 8 bits, without error:
 - *Haar* (photographs, most textures; `coders.haar`) predicts the three Haar differences of every
   block, row by row. It decodes fastest.
 - *Repeats* (flat areas, patterns, drawings, few colours, and atlases that mix these with
-  photographs; `coders.repeats`) first asks whether blocks or texels were seen before. A sixteenth
-  of the blocks tells which of the two to try; trying both everywhere, and taking repeats where it
-  is 3 % smaller, gained 0.7 % on photographs and 5 % on the textures of models and took twice the
-  time or more.
+  photographs; `coders.repeats`) first looks for blocks and texels that were seen before. A
+  sixteenth of the blocks decides which of the two to try; trying both everywhere, and taking
+  repeats where it is 3 % smaller, gained 0.7 % on photographs and 5 % on the textures of models and
+  took twice the time or more.
 - *Stored* (noise): as in `raw`, so that no group is longer than that and one byte.
 - A coarsest level of any size is coded as the *pyramid* of its own.
 
@@ -16,8 +16,8 @@ Other kinds of sample and near-lossless images are coded by `coders.texel`.
 
 Whole pyramids over PNG of the finest level alone: 12 Kodak images 0.733, 7 textures of 1024² 0.818,
 17 textures of architectural models 0.82; the largest of any file 1.03. With deflate in the place of
-repeats the last two were 0.871 and 1.104. Mapping repeats first and decoding what is new by rows
-afterwards, which would be faster, finds too little: surroundings have to be known texel by texel
+repeats the last two were 0.871 and 1.104. Mapping repeats first and decoding new texels by rows
+afterwards, which would be faster, detects too few: surroundings have to be known texel by texel
 (office atlas 2.2 instead of 0.68).
 """
 
@@ -160,5 +160,5 @@ def _decode_bytes(data: bytes | memoryview, below: Bytes, shape: Shape) -> Bytes
 
 
 def _nothing(shape: tuple[int, ...], dtype: np.dtype[Any]) -> Samples:
-    """What lies below a level whose shorter side is 1."""
+    """The empty level below a level whose shorter side is 1."""
     return np.zeros((shape[0] >> 1, shape[1] >> 1, shape[2]), dtype)

@@ -5,7 +5,7 @@ those of r are three images of half the size, each in lossless JPEG (ITU-T T.81,
 libjpeg-turbo writes it; edge texels are stored. Predictor 7, and 4 for 16 bits, where libjpeg-turbo
 3.1 does not decode what it has written with predictors 5, 6 and 7.
 
-The bytes depend on the libjpeg-turbo in use; what they decode to does not. Integers only, and
+The bytes depend on the libjpeg-turbo in use; the decoded texels do not. Integers only, and
 always exact. All functions raise MissingComponentError (PTM-M100) where imagecodecs is not
 installed, and InputError (PTM-I111) for floats.
 """
@@ -111,7 +111,7 @@ def decode_tile(
 
 
 def _codecs(dtype: np.dtype[Any]) -> Any:
-    """imagecodecs, for samples that lossless JPEG has."""
+    """imagecodecs, for samples that lossless JPEG supports."""
     if dtype.kind != "u":
         raise InputError(
             "PTM-I111",
@@ -134,7 +134,7 @@ def _plain(texels: Samples) -> Samples:
 
 
 def _decoded(codecs: Any, jpeg: bytes, like: Samples) -> Samples:
-    """The image in a JPEG, which has to have this size and type. Raises InputError PTM-I112."""
+    """Decodes a JPEG, which must have this size and type. Raises InputError PTM-I112."""
     _check_frame(jpeg, like)
     try:
         decoded: Samples = codecs.jpeg8_decode(jpeg)
@@ -146,7 +146,7 @@ def _decoded(codecs: Any, jpeg: bytes, like: Samples) -> Samples:
 
 
 def _check_frame(jpeg: bytes, like: Samples) -> None:
-    """Before it is decoded: has the JPEG one lossless frame of one scan, of the right size?"""
+    """Checks before decoding that a JPEG has one lossless frame of one scan and the right size."""
     height, width, components = like.shape
     at = 2
     while jpeg[:2] == b"\xff\xd8" and jpeg[at : at + 1] == b"\xff":

@@ -109,7 +109,7 @@ def residuals(level: Samples, below: Samples) -> tuple[NDArray[np.uint8], bytes]
 def place_last(
     level: Samples, below: Samples, codes: NDArray[np.uint8], escapes: bytes | memoryview
 ) -> None:
-    """Fill in s of every block of ``level``. Raises InputError PTM-I112 for wrong escapes."""
+    """Fills in s of every block of ``level``. Raises InputError PTM-I112 for wrong escapes."""
     p, q, r, s = corners(level, below)
     if not kind_of(level.dtype).is_float:
         # Modulo 2^8 or 2^16 the result is right even where the sums are not.
@@ -201,7 +201,7 @@ def _pack_numbers(numbers: NDArray[Any]) -> bytes:
 
 
 def _unpack_numbers(data: bytes | memoryview, n: int, bits: int) -> NDArray[np.uint64]:
-    """Exactly n numbers of at most so many bits. Raises InputError PTM-I112."""
+    """Exactly n numbers of at most ``bits`` bits. Raises InputError PTM-I112."""
     pairs = np.frombuffer(data, np.uint8)
     nibbles = np.stack([pairs & 15, pairs >> 4], axis=1).reshape(-1)
     last = np.flatnonzero(nibbles < 8)
