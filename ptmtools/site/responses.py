@@ -115,19 +115,19 @@ async def _response(
     request: Request, entry: Entry, content: Content, copies: Copies, common: dict[str, str]
 ) -> Response:
     """The response to a request for an existing file. The stream closes ``content`` in the end."""
-    headers_in = request.headers
+    request_headers = request.headers
     headers = common | {
         "Content-Type": entry.media,
         "Cache-Control": FOREVER if entry.forever else FRESH,
     }
     part, size = None, content.size
     # Ranges are defined for GET alone; those of If-Range need the very same bytes.
-    if request.method == "GET" and headers_in.get("If-Range", content.tag).strip() == content.tag:
-        part = asked_range(headers_in.get("Range"), size)
+    if request.method == "GET" and request_headers.get("If-Range", content.tag).strip() == content.tag:
+        part = asked_range(request_headers.get("Range"), size)
     sent = content
     if entry.compressed:
         headers["Vary"] = "Accept-Encoding"
-        if part is None and accepts_gzip(headers_in.get("Accept-Encoding")):
+        if part is None and accepts_gzip(request_headers.get("Accept-Encoding")):
             sent = await copies.of(entry.name, content) or content
     headers["ETag"] = sent.tag
     if sent is content:
@@ -135,7 +135,7 @@ async def _response(
     else:
         content.close()
         headers["Content-Encoding"] = "gzip"
-    if names_tag(", ".join(headers_in.getlist("If-None-Match")), sent.tag):
+    if names_tag(", ".join(request_headers.getlist("If-None-Match")), sent.tag):
         sent.close()
         return Response(status_code=304, headers=headers)
     status = 200

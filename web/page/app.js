@@ -10,9 +10,9 @@ import { Solids } from "./walk/solids.js";
 import { Walker } from "./walk/walker.js";
 import { Walkthrough } from "./walkthrough.js";
 
-/** Bytes of texture memory unless the visitor says otherwise: of desks, and of phones. */
+/** Default bytes of texture memory: on desks, and on phones. */
 const BUDGET = 256 << 20, SMALL_BUDGET = 64 << 20;
-/** MiB that a visitor may say at most. */
+/** The most MiB that a visitor may set. */
 const MOST = 4096;
 /** Seconds of a frame for collision geometry. */
 const SOLID_TIME = 0.004;
@@ -57,7 +57,7 @@ export class App {
     this.walker = new Walker({ solids: this.solids, locate, avatar });
     this.goTo(0);
     const linked = poseOf(location.hash);
-    // Whoever listens does so after this.
+    // Listeners are added after this.
     if (linked) queueMicrotask(() => this.follow(linked));
   }
 

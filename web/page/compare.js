@@ -42,7 +42,7 @@ export class Comparison {
     return missing.length === 0;
   }
 
-  /** Gives all of it back. */
+  /** Frees all of it. */
   delete() {
     this.memory.delete();
     this.renderer.delete();

@@ -8,7 +8,7 @@ import { clock, Fetcher } from "./net/fetcher.js";
 import { attachUi } from "./ui/all.js";
 import { showError } from "./ui/errors.js";
 
-/** The site that the page is of. @param {import("./data/site.js").SiteConfig} config */
+/** The site of the page. @param {import("./data/site.js").SiteConfig} config */
 async function siteOf(config) {
   const address = new URL(config.index, location.href).href;
   return new Fetcher(() => {}).whole(

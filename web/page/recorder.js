@@ -29,10 +29,10 @@ export class Recorder {
   }
 
   /**
-   * A frame that is about to ask for files.
-   * @param {number} before when it began, s
+   * Records a frame before it requests files.
+   * @param {number} before the time at which it began, s
    * @param {import("./space/frustum.js").Frustum} frustum
-   * @param {number} drawn when the item buffer was that is at hand, s, or −1
+   * @param {number} drawn the time at which the current item buffer was drawn, s, or −1
    */
   frame(before, { eye, direction }, drawn) {
     const now = clock();
@@ -42,7 +42,7 @@ export class Recorder {
     this.#frames.push([this.walk.cell, age, now - before].map(short));
   }
 
-  /** A document of a walk, with how it was walked. */
+  /** The document of the walk, with the conditions of the recording. */
   get document() {
     const { tall, aspect, budget, policy, sharpness, catalogue } = this.walk;
     return {

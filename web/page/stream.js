@@ -20,7 +20,7 @@ export class Stream {
   records = new Map();
   /** @type {Map<number, Shape[]>} */
   shapes = new Map();
-  /** Whether anything has arrived since the last look. */
+  /** Whether files have arrived since the last look. */
   news = false;
   /** @type {Request[]} */
   #queue = [];
@@ -134,14 +134,14 @@ export class Stream {
     const size = file.row.ends[file.row.ends.length - 1];
     const url = this.site.texture(number), cache = this.#suspect.has(number) ? "no-store" : "default";
     const part = await this.fetcher.range(url, begin, end, size, request, cache);
-    // The bytes before it may have turned out damaged.
+    // The bytes before it may be damaged.
     if (part.begin <= file.length) file.append(part.begin, part.body);
     this.client.arrived(request, file.length);
   }
 
   /**
-   * The first levels, so many, of a texture whose bytes are here. A level that is damaged is asked for
-   * once more; if that is damaged as well, the levels below it remain.
+   * The first levels of a texture whose bytes have arrived. A damaged level is requested once more; if it
+   * is damaged again, the levels below it remain.
    * @param {number} texture
    * @param {number} levels
    */
@@ -154,7 +154,7 @@ export class Stream {
       if (levels > (this.#suspect.get(texture) ?? levels)) this.#suspect.delete(texture);
       return images;
     } catch (fault) {
-      // A worker without a decoder knows nothing of the file.
+      // A worker without a decoder has no access to the file.
       if (!(fault instanceof PtmError) || fault.code === "PTM-M103") {
         if (!this.#cannotDecode && this.workers.failed) {
           this.report(new PageError("PTM-V106", `Textures cannot be decoded: ${fault}`), "decoder", 0);

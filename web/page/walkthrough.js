@@ -1,5 +1,5 @@
-// The walk. Each frame decides where the visitor is, what is drawn, what goes into texture memory and
-// what is requested next (docs/formats/client.md).
+// The walk. Each frame locates the visitor, draws the cells, and chooses the contents of texture
+// memory and the next requests (docs/formats/client.md).
 
 import { Locator } from "../client/src/locating.js";
 import { beginningOf } from "./beginning.js";
@@ -28,7 +28,7 @@ const ITEM_EVERY = 0.1, LOOK_EVERY = 0.2;
 const PAINT_EVERY = 0.05, RESTING = 0.4;
 /** Seconds of a frame for uploads, and for geometry that comes into view. */
 const UPLOAD_TIME = 0.004, GEOMETRY_TIME = 0.004;
-/** The widest that a view is upright on a narrow screen, radians. */
+/** Largest vertical field of view on a narrow screen, radians. */
 const TALLEST = 1.4;
 /** @typedef {import("./gl/camera.js").Pose} Pose */
 /** @typedef {import("./gl/renderer.js").Drawn} Drawn */
@@ -41,7 +41,7 @@ export class Walkthrough {
   faults = [];
   /** Whether the first picture of the room has been drawn. */
   begun = false;
-  /** Whether texture memory stays as it is, and nothing is asked for. */
+  /** Whether texture memory stays unchanged and nothing is requested. */
   frozen = false;
   /** Whether only visible textures and cells are fetched. */
   saving = false;
@@ -149,7 +149,7 @@ export class Walkthrough {
     this.#changed = clock();
   }
 
-  /** Cells that can be seen from where the visitor is, itself first. */
+  /** Cells visible from the visitor's cell, itself first. */
   get visible() {
     const { known, cell } = this.client;
     return (known[this.cell] ?? known[cell])?.visible ?? (this.cell < 0 ? [] : [this.cell]);
@@ -266,7 +266,7 @@ export class Walkthrough {
     this.client.policy = POLICIES[policy];
   }
 
-  /** The levels that the view wants of each texture, or null before the first item buffer. */
+  /** The levels of each texture that the view wants, or null before the first item buffer. */
   get present() {
     return this.#sight?.present ?? null;
   }
@@ -352,7 +352,7 @@ export class Walkthrough {
     memory.settle(client.column, this.#priority());
   }
 
-  /** How much of the view each texture is, for the order of uploads. */
+  /** Share of the view of each texture, for the order of uploads. */
   #priority() {
     const { T, K } = this.catalogue, share = new Float64Array(T);
     for (let t = 0; this.#sight && t < T; t++) share[t] = this.#sight.present[t * K + 1];

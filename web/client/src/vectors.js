@@ -18,7 +18,7 @@ export function minus(a, b) {
 }
 
 /**
- * Where a polygon faces: its normal, as long as twice its area.
+ * The normal of a polygon, as long as twice its area.
  * @param {Vector[]} points counter-clockwise, seen from there
  */
 export function facing(points) {

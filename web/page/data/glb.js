@@ -3,7 +3,7 @@
 /**
  * Triangles with one look.
  * @typedef {object} Shape
- * @property {string} name of the object that they are of
+ * @property {string} name of their object
  * @property {Float32Array} positions x, y, z of each vertex, world metres
  * @property {Float32Array | null} uvs u, v of each vertex, from the top left; null without a texture
  * @property {Uint16Array | null} colors r, g, b, 1 of each vertex in linear light, of 65535; null if white

@@ -6,7 +6,7 @@
 const each = (list, holds, least = 0) =>
   Array.isArray(list) && list.length >= least && list.every(holds);
 
-/** Whether a number counts so many things from 0 on. @param {number} count */
+/** Tests whether a number is an index below a count. @param {number} count */
 const below = (count) => (/** @type {unknown} */ n) =>
   Number.isInteger(n) && /** @type {number} */ (n) >= 0 && /** @type {number} */ (n) < count;
 

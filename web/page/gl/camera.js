@@ -1,4 +1,4 @@
-// The matrices of a view, as the programs take them.
+// The matrices of a view, in the form of the programs.
 
 /**
  * @typedef {object} Pose

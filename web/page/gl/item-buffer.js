@@ -3,7 +3,7 @@
 
 import { aim, programOf } from "./program.js";
 
-/** Pixels of it, whatever the form of the screen: 80 × 45 on most. */
+/** Number of pixels for screens of any shape: 80 × 45 on most. */
 const PIXELS = 3600;
 
 /** @typedef {import("./camera.js").Camera} Camera */
@@ -39,7 +39,7 @@ export class ItemBuffer {
     gl.bindVertexArray(null);
   }
 
-  /** Whether one was drawn and not read yet. */
+  /** Whether an item buffer was drawn and not read yet. */
   get busy() {
     return this.#waiting !== null;
   }
@@ -63,7 +63,7 @@ export class ItemBuffer {
       gl.renderbufferStorage(gl.RENDERBUFFER, gl.RGBA8, width, height);
       gl.framebufferRenderbuffer(gl.FRAMEBUFFER, at, gl.RENDERBUFFER, color);
       gl.bindBuffer(gl.PIXEL_PACK_BUFFER, this.packs[k]);
-      // Chromium warns of buffers to be read that are written once more, read or not.
+      // Chromium warns if a buffer that is to be read is written again, read or not.
       gl.bufferData(gl.PIXEL_PACK_BUFFER, 4 * width * height, gl.DYNAMIC_COPY);
     });
     gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
@@ -167,7 +167,7 @@ export class ItemBuffer {
   }
 }
 
-/** Corners of a box, of which bit k says whether the greater end of axis k; its faces from outside. */
+/** Corners of a box, where bit k selects the greater end of axis k; its faces, seen from outside. */
 const FACES = [
   [0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6],
 ];

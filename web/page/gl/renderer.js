@@ -53,7 +53,7 @@ export class Renderer {
     return true;
   }
 
-  /** Removes all cells but some. @param {Set<number>} wanted */
+  /** Removes all cells except the wanted ones. @param {Set<number>} wanted */
   keep(wanted) {
     for (const [cell, buffers] of this.cells) {
       if (wanted.has(cell)) continue;
@@ -76,7 +76,7 @@ export class Renderer {
   }
 
   /**
-   * Draws into the bound framebuffer; true as long as something fades in.
+   * Draws into the bound framebuffer; true as long as a level fades in.
    * @param {import("./camera.js").Camera} camera
    * @param {Drawn[]} drawn nearest cells first
    * @param {number} now s
@@ -138,7 +138,7 @@ export class Renderer {
 }
 
 /**
- * How far the middle of a batch's box is.
+ * The distance of the middle of a batch's box.
  * @param {number[]} eye
  * @param {Batch} batch
  */

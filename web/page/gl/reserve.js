@@ -5,7 +5,7 @@
 // visitor stays in a cell; otherwise a level could come and go.
 
 export class Reserve {
-  /** That are kept free. */
+  /** Bytes that are kept free. */
   bytes = 0;
   #cell = -1;
   #budget = -1;
@@ -16,7 +16,7 @@ export class Reserve {
   }
 
   /**
-   * It begins anew in another cell, and for another budget.
+   * Resets the reserve in another cell, and for another budget.
    * @param {number} cell that the visitor is in
    * @param {number} budget bytes
    */

@@ -1,7 +1,7 @@
 // The resolution of the canvas: that of the screen, and less while the visitor moves on a machine that
 // cannot keep up.
 
-/** Screens finer than this are drawn at so many pixels for one of CSS. */
+/** The most pixels drawn for one of CSS, also on finer screens. */
 const MOST = 2;
 /** Shares of the full number of lines. */
 const SHARES = [1, 0.7, 0.5];

@@ -2,7 +2,7 @@
 // whole pyramid would take all of its memory at once, and no level of it can be freed. So growing and
 // shrinking mean another storage.
 
-/** Bytes of one upload: so large a stripe blocks for 7 ms at most, a whole level of 2048² for 137. */
+/** Bytes of one upload: a stripe of this size blocks for 7 ms at most, a whole level of 2048² for 137. */
 export const STRIPE = 256 << 10;
 /** Seconds in which a new level fades in. */
 const FADE = 0.3;
@@ -19,7 +19,7 @@ function formats(gl, channels) {
 }
 
 export class Storage {
-  /** How much of the finest level is still to fade in: 1 at first, 0 at last. */
+  /** Share of the finest level that is still to fade in, from 1 to 0. */
   #fading = 0;
   #since = 0;
   #wrap = -1;
@@ -66,7 +66,7 @@ export class Storage {
   }
 
   /**
-   * Lets the levels beyond those that were shown before come slowly.
+   * Fades in the levels beyond those shown before.
    * @param {number} levels
    * @param {number} now s
    */
@@ -76,7 +76,7 @@ export class Storage {
   }
 
   /**
-   * To be drawn with; true as long as it fades.
+   * Binds the texture for drawing; true as long as it fades.
    * @param {boolean} clampU
    * @param {boolean} clampV
    * @param {number} now s

@@ -13,12 +13,11 @@ import { Storage } from "./storage.js";
  * @typedef {object} Row
  * @property {{width: number, height: number}[]} sizes of its levels, coarsest first
  * @property {number} channels of a texel on the GPU
- *
- * The first levels of a texture, so many, decoded.
+ * Decodes the first levels of a texture.
  * @typedef {(texture: number, levels: number) => Promise<Image[]>} Decode
  */
 
-/** Textures that are decoded at a time, and that are on their way at most. */
+/** The most textures that are decoded at a time, and that are under way. */
 const DECODING = 3, UNDER_WAY = 6;
 
 /** A replacement of a texture's storage. */
@@ -62,13 +61,13 @@ export class TextureMemory {
     this.rows = rows;
     this.decode = decode;
     this.#storages = rows.map(() => null);
-    /** Columns on the GPU: so many levels of each texture. */
+    /** Columns on the GPU: the number of levels of each texture. */
     this.held = new Int32Array(rows.length);
-    /** Columns that went with the context, and were not chosen anew. */
+    /** Columns lost with the context and not chosen again. */
     this.#lost = new Int32Array(rows.length);
     this.budget = Infinity;
     this.bytes = 0;
-    /** The most that was ever held. */
+    /** The most bytes ever held. */
     this.peak = 0;
     this.fades = true;
   }
@@ -112,7 +111,7 @@ export class TextureMemory {
   }
 
   /**
-   * The texture of the greatest worth, of those that may be.
+   * The texture of the greatest worth among the permitted ones.
    * @param {(texture: number) => boolean} may
    * @param {(texture: number) => number} worth
    */
@@ -188,7 +187,7 @@ export class TextureMemory {
     const { texture, to, images } = replacement, held = this.held[texture];
     if (!images || this.#underWay.get(texture) !== replacement) return false;
     const want = this.#want[texture];
-    // Not wanted any more; more than wanted; or less than present and wanted.
+    // No longer wanted; more than wanted; or less than present and wanted.
     if (want === 0 || to > want || (to <= held && want >= held)) {
       this.#drop(replacement);
       return false;
@@ -211,7 +210,7 @@ export class TextureMemory {
   }
 
   /**
-   * Storage for so many levels, or null if memory is full. Growing leaves room for textures that are to
+   * Storage for a number of levels, or null if memory is full. Growing leaves room for textures that are to
    * shrink; otherwise they never could.
    * @param {number} texture
    * @param {number} levels
@@ -225,13 +224,13 @@ export class TextureMemory {
     return new Storage(this.gl, sizes.slice(0, levels), channels);
   }
 
-  /** Bytes of so many levels. @param {number} texture @param {number} levels */
+  /** Bytes of a texture's first levels. @param {number} texture @param {number} levels */
   #size(texture, levels) {
     const { sizes, channels } = this.rows[texture];
     return sizes.slice(0, levels).reduce((sum, size) => sum + size.width * size.height * channels, 0);
   }
 
-  /** The most that a texture which is to shrink will take, until it has. */
+  /** The most bytes that a texture takes while it shrinks. */
   #shrinking() {
     return this.#want.reduce(
       (most, levels, t) => (levels < this.held[t] ? Math.max(most, this.#size(t, levels)) : most),
@@ -252,7 +251,7 @@ export class TextureMemory {
     for (let t = 0; t < this.rows.length; t++) this.#clear(t);
   }
 
-  /** All is gone with the context: it comes back by `resume`. */
+  /** Drops everything with the lost context; `resume` restores it. */
   lose() {
     this.#lost = this.held.map((held, t) => Math.max(held, this.#lost[t]));
     this.#storages.fill(null);

@@ -5,7 +5,7 @@ import { PageError } from "./errors.js";
 
 /** Tries, and the pause before the second one, s; each pause is twice the one before. */
 const TRIES = 6, FIRST_WAIT = 0.5;
-/** Seconds without a byte after which an answer is given up. */
+/** Seconds without a byte after which a response is abandoned. */
 const PATIENCE = 20;
 
 /** An error that another request may correct. */
@@ -78,7 +78,7 @@ export class Fetcher {
         return { begin: 0, body };
       }
       if (response.status !== 206) throw refused(url, response.status);
-      // Hosts of other origins may hide it.
+      // Hosts of other origins may hide the header.
       const answered = response.headers.get("content-range") ?? `bytes ${begin}-${end - 1}/${size}`;
       if (answered !== `bytes ${begin}-${end - 1}/${size}` || body.length !== end - begin) {
         throw new Passing(`${body.length} bytes, "${answered}", in place of ${range}`, true);
@@ -107,7 +107,7 @@ export class Fetcher {
     let reason = "";
     for (let tried = 0; tried < TRIES; tried++) {
       if (tried) {
-        // Nothing is on the way meanwhile.
+        // No bytes are under way meanwhile.
         if (progress) Object.assign(progress, { left: 0, waits: true });
         await wait(FIRST_WAIT * 2 ** (tried - 1));
       }

@@ -8,7 +8,7 @@ import { levelSizes } from "../../client/src/levels.js";
 
 export class TextureFile {
   #bytes = new Uint8Array(0);
-  /** Bytes that are here. */
+  /** Bytes received. */
   length = 0;
 
   /**
@@ -46,7 +46,7 @@ export class TextureFile {
   }
 
   /**
-   * The first levels, so many. Throws PtmError with `level`: the one that is damaged.
+   * The first levels. Throws PtmError with `level`, the damaged one.
    * @param {number} levels
    * @returns {Promise<Image[]>}
    */

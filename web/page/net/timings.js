@@ -31,7 +31,7 @@ export function watchLink(estimate, fetcher) {
       take(requestStart / 1000, responseStart / 1000, responseEnd / 1000, encodedBodySize);
     }
   };
-  // Those before are known at once, for the first request to go by.
+  // Earlier entries are available at once, for the first request.
   note(performance.getEntriesByType("resource"));
   new PerformanceObserver((list) => note(list.getEntries())).observe({ type: "resource" });
 }

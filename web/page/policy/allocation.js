@@ -13,8 +13,8 @@
  * The best step of a texture: written to `step`, its density 0 if none is worth anything.
  * @param {Float64Array} worth (T × K) of each column beside those before it
  * @param {Float64Array} cost (T × K) bytes up to each column
- * @param {number} at where the row of the texture begins
- * @param {number} column from where
+ * @param {number} at index of the texture's row
+ * @param {number} column the present column
  * @param {number} paid bytes already paid, at least those of `column`
  * @param {number} last the furthest column
  * @param {Step} step
@@ -95,10 +95,10 @@ export function allocate(worth, cost, last, budget, column) {
  * The texture whose next bytes are worth most.
  * @param {Float64Array} worth (T × K)
  * @param {Float64Array} ends (T × K)
- * @param {Float64Array} asked (T) bytes asked for already
+ * @param {Float64Array} asked (T) bytes requested already
  * @param {Int32Array} last (T) wanted columns
  * @param {number} overhead bytes that a request takes besides
- * @param {(texture: number) => boolean} free which may be asked for
+ * @param {(texture: number) => boolean} free whether it may be requested
  * @returns {Step}
  */
 export function nextFetch(worth, ends, asked, last, overhead, free) {

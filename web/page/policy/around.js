@@ -38,7 +38,7 @@ function byDistance({ catalogue, shapes, frustum }) {
  * @param {Float64Array} around
  */
 export function lookAround(client, around) {
-  // Records may tell of levels that the GPU cannot hold, and the catalogue has not.
+  // Records may list levels that the GPU cannot hold and the catalogue omits.
   const { T, K, levels } = client.catalogue;
   const near = byDistance(client), need = client.known[client.cell]?.need;
   around.fill(0);

@@ -12,19 +12,18 @@ import { meetsBox } from "../space/frustum.js";
 /** @typedef {import("./client.js").Policy} Policy */
 /** @typedef {import("./estimate.js").Belief} Belief */
 
-// A range takes so many seconds of the link, and at least so many bytes.
+// Seconds of the link that a range takes, and its least bytes.
 export const RANGE_SECONDS = 0.2;
 export const RANGE_BYTES = 8000;
 const CONNECTIONS = 6;
-// The most bytes that waiting counts, of links without a limit.
+// The most bytes that waiting counts for, on links without a limit.
 const LONGEST_WAIT = 2 ** 20;
-// The record of a neighbouring cell is worth as much as so large a share of the screen.
+// Worth of the record of a neighbouring cell, as a share of the screen.
 const RECORD_SHARE = 0.005;
 // Weight of the surroundings beside the screen, and of these for what is to
 // be in texture memory now.
 const AROUND = 0.1, HELD = 0.1;
-// A level that is not wanted any more is held on to, at so small a share of its worth, which halves
-// in so many seconds.
+// Share of its worth at which a level that is no longer wanted is kept, and its half-life, s.
 const HELD_ON = 1e-3, HELD_SECONDS = 7;
 
 /**
@@ -43,8 +42,8 @@ export function room(estimate, waiting) {
 }
 
 /**
- * Bytes that a request costs besides its own: headers, and those that its connection could have brought
- * while it waits. So of a fast link more levels are asked for at once.
+ * Bytes that a request costs besides its own: headers, and those that its connection could have
+ * brought while it waits. So a fast link requests more levels at once.
  * @param {Belief} estimate
  */
 function overheadOf({ latency, bandwidth }) {

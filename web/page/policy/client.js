@@ -30,8 +30,8 @@ import { knownOf, shapesOf } from "./knowledge.js";
  * The place and the view of the walker.
  * @typedef {object} Look
  * @property {number} now s, on any clock
- * @property {number} cell that the eye is in; one whose record is not there yet is asked for, and
- *   the one before goes on to be gone by. −1: it is not known
+ * @property {number} cell that the eye is in, −1 if unknown; a missing record is requested, and the
+ *   previous cell stays in use until then
  * @property {Frustum} frustum
  * @property {boolean} [still] whether the eye has not moved for a second
  * @property {Shares} [sight] see `sees`
@@ -55,7 +55,7 @@ export class Client {
     /** (T) the column that each texture should hold in memory. */
     this.column = new Int32Array(T);
     this.downloads = new Downloads(catalogue);
-    /** The cell that the eye is in, and the one whose record is gone by; −1 for none. */
+    /** The cell that the eye is in, and the one whose record is used; −1 for none. */
     this.here = -1;
     this.cell = -1;
     this.still = false;
@@ -71,7 +71,7 @@ export class Client {
     this.known = new Array(C).fill(undefined);
     /** @type {(Shapes | undefined)[]} by cell; they stay when geometry is forgotten */
     this.shapes = new Array(C).fill(undefined);
-    /** (C) whose geometry was forgotten: it is asked for only when it may be seen again. */
+    /** (C) cells whose geometry was dropped: it is requested only when it may be seen again. */
     this.left = new Uint8Array(C);
     this.#policy = policy(this);
   }
@@ -121,7 +121,7 @@ export class Client {
   }
 
   /**
-   * There is an item buffer.
+   * Receives an item buffer.
    * @param {Shares} sight (T × K) the share of its pixels that wants each column
    * @param {Shares} hidden (C) the share that shows the placeholder of each cell
    */
@@ -142,7 +142,7 @@ export class Client {
   }
 
   /**
-   * Another budget at the same look; false from a policy that comes to it by and by.
+   * Sets another budget at the same look; false if the policy adapts gradually.
    * @param {number} bytes
    */
   fit(bytes) {
@@ -172,8 +172,8 @@ export class Client {
 
   /**
    * A request is finished. `learnRecord` and `learnGeometry` take the contents of records and
-   * geometry; of a texture the bytes up to `end` have arrived, be it that it broke off or that
-   * a server sent more.
+   * geometry; of a texture the bytes up to `end` have arrived, whether the response broke off or
+   * the server sent more.
    * @param {Request} request
    */
   arrived(request, end = request.end) {
@@ -189,7 +189,7 @@ export class Client {
   }
 
   /**
-   * Of a texture only so many first bytes are good; more may be asked for from `until` on, s.
+   * Keeps only the first bytes of a texture; more may be requested from `until` on, s.
    * @param {number} texture
    * @param {number} bytes
    * @param {number} until

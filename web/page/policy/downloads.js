@@ -26,7 +26,7 @@ export class Downloads {
   #stock;
   /** @type {Record<Kind, Uint8Array>} */
   #state;
-  /** @type {Record<Kind, Float64Array>} until when nothing of it is asked for, s */
+  /** @type {Record<Kind, Float64Array>} time before which it is not requested, s */
   #rests;
 
   /** @param {Catalogue} stock */
@@ -49,17 +49,17 @@ export class Downloads {
     this.now = 0;
   }
 
-  /** Whether it may be asked for. @param {Kind} kind @param {number} number */
+  /** Whether it may be requested. @param {Kind} kind @param {number} number */
   free(kind, number) {
     return this.#state[kind][number] === ABSENT && this.#rests[kind][number] <= this.now;
   }
 
-  /** Whether a request for it has failed, and it is not to be asked for now. @param {Kind} kind @param {number} number */
+  /** Whether a request for it has failed, and it is not to be requested now. @param {Kind} kind @param {number} number */
   rests(kind, number) {
     return this.#rests[kind][number] > this.now;
   }
 
-  /** Whether it cannot be had: nothing is missing that does not exist. @param {Kind} kind @param {number} number */
+  /** Whether it is unavailable; such a file does not count as missing. @param {Kind} kind @param {number} number */
   gone(kind, number) {
     return this.#rests[kind][number] === Infinity;
   }
@@ -112,7 +112,7 @@ export class Downloads {
   }
 
   /**
-   * Of a texture only so many first bytes are good; no more is asked for before `until`.
+   * Keeps only the first bytes of a texture; no more are requested before `until`.
    * @param {number} texture
    * @param {number} bytes
    * @param {number} until

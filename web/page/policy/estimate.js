@@ -10,12 +10,12 @@
  * @property {number} latency s from a request to its first byte
  */
 
-// After so many s of arriving bytes they count half.
+// Half-life of bytes, in seconds during which bytes arrive.
 const HALF_LIFE = 1;
-// With fewer bytes and less time than these the prior is believed.
+// With fewer bytes and less time than these the prior is used.
 const ENOUGH_BYTES = 16384, ENOUGH_SECONDS = 0.25;
 const LATENCIES = 8;
-// A response that begins so soon after another has ended had to wait for it, s.
+// A response that begins within this time of the end of another had to wait for it, s.
 const AT_ONCE = 1e-3;
 
 /** @implements {Belief} */
@@ -51,7 +51,7 @@ export class Estimate {
     this.#arriving++;
   }
 
-  /** So many bytes have come since it was last called. @param {number} now @param {number} count */
+  /** Counts the bytes that have arrived since the last call. @param {number} now @param {number} count */
   bytes(now, count) {
     const seconds = this.#arriving > 0 ? Math.max(now - this.#seen, 0) : 0;
     const age = Math.LN2 * seconds / HALF_LIFE;
@@ -61,7 +61,7 @@ export class Estimate {
     this.#seconds = this.#seconds * fading + kept * seconds;
   }
 
-  /** It came to its end, whole or not. @param {unknown} id @param {number} now */
+  /** Its response has ended, whole or not. @param {unknown} id @param {number} now */
   finished(id, now) {
     this.bytes(now, 0);
     const request = this.#requests.get(id);
@@ -85,7 +85,7 @@ export class Estimate {
 }
 
 /**
- * Seconds until a request of so many bytes would be finished, if it had the link for itself.
+ * Seconds that a request of `size` bytes takes if it has the link for itself.
  * @param {Belief} estimate
  * @param {number} size
  */

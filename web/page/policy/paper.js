@@ -1,7 +1,7 @@
 // The client of Marvie & Bouatouch, §6.1 and §6.2, as `ptm simulate --policy paper` reads them:
-// memory is shared out among the cells in the frustum by their average coverage, and equally among
-// the shapes of each; a texture adds, removes or asks for one level at each look, if it may be had
-// within the patience of the visitor. Requests are made as soon as they are known.
+// memory is divided among the cells in the frustum by their average coverage, and equally among the
+// shapes of each; a texture adds, removes or requests one level at each look, if it can arrive
+// within the patience of the visitor. Requests are made at once.
 
 import { duration } from "./estimate.js";
 import { refresh, shareOut } from "./sharing.js";
@@ -13,7 +13,7 @@ import { nextCell } from "../space/portals.js";
 /** @typedef {import("./downloads.js").Kind} Kind */
 /** @typedef {import("./estimate.js").Belief} Belief */
 
-// Way that is taken for the way on, and how far ahead, s.
+// Past time from which the way is extrapolated, and the time ahead, s.
 const BEFORE = 0.5, AHEAD = 2;
 // Priorities of requests.
 const LEVEL = 1, NEXT = 2, VISIBLE = 3, CURRENT = 4;
@@ -28,7 +28,7 @@ export class Paper {
   #asks = [];
   /** @type {number[]} */
   #due = [];
-  /** @type {{now: number, eye: number[]}[]} places of late */
+  /** @type {{now: number, eye: number[]}[]} recent places */
   #way = [];
 
   /** @param {Client} client */
@@ -134,7 +134,7 @@ export class Paper {
     return null;
   }
 
-  /** The cell behind the first portal that the way of late leads through soon, or −1. */
+  /** The cell behind the first portal on the extrapolated way, or −1. */
   #following() {
     const { cell, known } = this.#client;
     const first = this.#way[0], last = this.#way[this.#way.length - 1], here = known[cell];

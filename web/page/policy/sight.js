@@ -1,4 +1,5 @@
-// Computes from the pixels of an item buffer what the view wants (docs/formats/client.md, step 2).
+// Computes the needs of the view from the pixels of an item buffer (docs/formats/client.md, step
+// 2).
 
 /**
  * @typedef {object} Sight

@@ -51,7 +51,7 @@ export function frustumOf({ eye, yaw, pitch }, angle, aspect) {
  * @param {Frustum} frustum
  * @param {Numbers} low
  * @param {Numbers} high
- * @param {number} [at] where in `low` its corner is, and where in `high`
+ * @param {number} [at] index of the corner in `low`
  * @param {number} [to]
  */
 export function meetsBox({ eye, planes }, low, high, at = 0, to = at) {
@@ -68,7 +68,7 @@ export function meetsBox({ eye, planes }, low, high, at = 0, to = at) {
 }
 
 /**
- * The same of the convex hull of points.
+ * Whether the convex hull of points reaches into a frustum; see `meetsBox`.
  * @param {Frustum} frustum
  * @param {Numbers} points x, y, z of each
  */

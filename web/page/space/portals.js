@@ -6,8 +6,8 @@ import { cross, dot, facing, minus } from "../../client/src/vectors.js";
 /** @typedef {{neighbour: number, polygon: number[][]}} Portal */
 
 /**
- * Which share of a way leads to a convex polygon; Infinity if it does not lead through.
- * @param {Vector} eye where it begins
+ * The share of a way up to a convex polygon; Infinity if the way does not lead through.
+ * @param {Vector} eye its start
  * @param {Vector} way
  * @param {number[][]} polygon
  */

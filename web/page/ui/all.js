@@ -9,7 +9,7 @@ import { attachLoading } from "./loading.js";
 import { attachMenu } from "./menu.js";
 
 /**
- * The application, as the interface sees it.
+ * The parts of the application that the interface uses.
  * @typedef {object} App
  * @property {{viewpoints: {name: string, description: string, thumbnail?: string}[]}} index
  * @property {{index: string}} config the settings in the page

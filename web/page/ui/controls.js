@@ -12,9 +12,9 @@ const KEYS = {
   KeyA: ["turn", 1], ArrowLeft: ["turn", 1], KeyD: ["turn", -1], ArrowRight: ["turn", -1],
   KeyQ: ["right", -1], KeyE: ["right", 1], PageUp: ["look", 1], PageDown: ["look", -1],
 };
-/** Where keys have a meaning of their own. */
+/** Elements in which keys have a meaning of their own. */
 const OWN = "input, select, textarea, ol, #panels section";
-/** Pixels that a thumb goes for all of a wish, and that are none. */
+/** Pixels of a thumb's movement for a full wish, and below which there is none. */
 const REACH = 56, REST = 8;
 /** Vertical field of view, radians: a dragged point stays under the pointer. */
 const VIEW = Math.PI / 3;
@@ -27,7 +27,7 @@ const pushed = (pixels) => {
 
 /**
  * @param {ParentNode} root @param {{canvas: HTMLElement}} app
- * @returns {{wishes: () => Wishes}} asked for in each frame
+ * @returns {{wishes: () => Wishes}} called in each frame
  */
 export function attachControls(root, { canvas }) {
   /** @type {Set<string>} */

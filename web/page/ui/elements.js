@@ -24,7 +24,7 @@ export function make(tag, properties = {}, ...children) {
   return element;
 }
 
-/** Whether the visitor prefers that things do not move. */
+/** Whether the visitor prefers reduced motion. */
 export const calm = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
 
 /** @param {number} bytes of memory */

@@ -14,13 +14,13 @@ const REMEDIES = {
   "PTM-V105": TELL,
 };
 const OTHERWISE = "Reload the page. If that does not help, tell the owner of this site.";
-/** How long a notice stays, ms. */
+/** Duration of a notice, ms. */
 const STAYS = 8000;
 
 /** Parts of the page that an error disables. */
 const BEHIND = ["nav", "#panels", "#view"];
 
-/** Shows an error, in the way of everything. @param {Document} root
+/** Shows an error over the page. @param {Document} root
  * @param {{code: string, message: string}} error */
 export function showError(root, { code, message }) {
   const panel = find(root, "#error"), again = find(root, "#again");
@@ -34,7 +34,7 @@ export function showError(root, { code, message }) {
   again.focus();
 }
 
-/** The walk has begun after all. @param {Document} root */
+/** Hides the error: the walk has begun after all. @param {Document} root */
 function hideError(root) {
   const panel = find(root, "#error");
   if (panel.hidden) return;
@@ -43,7 +43,7 @@ function hideError(root) {
   find(root, "#view").focus();
 }
 
-/** Says something in passing. @param {Document} root @param {...(string | Node)} message */
+/** Shows a notice for a while. @param {Document} root @param {...(string | Node)} message */
 export function showNotice(root, ...message) {
   const line = make("p", {}, ...message);
   find(root, "#notices").append(line);

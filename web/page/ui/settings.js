@@ -32,7 +32,7 @@ export function attachSettings(root, app) {
   const choice = make("select", {}, ...policies);
   const seconds = (/** @type {number} */ value) => `${value.toPrecision(2)} s`;
   const waiting = slider("Patience, δt", [0.0625, 4], patience, seconds, (s) => app.setPatience(s));
-  // Only the paper's policy goes by it.
+  // Only the paper's policy uses it.
   waiting.hidden = policy !== "paper";
   choice.onchange = () => {
     app.setPolicy(choice.value);

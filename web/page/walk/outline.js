@@ -1,4 +1,5 @@
-// Triangles as an upright cylinder meets them: cut to a range of heights and projected on the floor.
+// Outlines of triangles for an upright cylinder: cut to a range of heights and projected on the
+// floor.
 
 /** A convex polygon in x and z; mostly a wall, then as thin as a line. */
 export class Outline {
@@ -33,7 +34,7 @@ export class Outline {
     this.#points = kept;
   }
 
-  /** How far a point is outside; infinitely, if nothing is left.
+  /** The distance of a point outside; infinite if the outline is empty.
    * @param {number} x @param {number} z */
   distance(x, z) {
     const p = this.#points;

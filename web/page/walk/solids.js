@@ -5,25 +5,25 @@
 
 /** @typedef {import("../data/glb.js").Shape} Shape */
 /** @typedef {{portals: {polygon: number[][]}[]}} Openings */
-/** Its corners are x, y, z thrice from `at` on.
+/** The corners are x, y, z three times from `at` on.
  * @typedef {(corners: Float32Array, at: number, kind: number) => void} Visit */
 
 /** Kinds of triangles: a sum of these. */
 export const BLOCKS = 1;
 export const CARRIES = 2;
-/** How far from the plane of a portal a door may hang, and how much wider than it may be, m. */
+/** Largest distance of a door from the plane of its portal, and its largest excess width, m. */
 const DEEP = 0.25, WIDER = 0.1;
-/** How far inside the opening its middle must be, lest the sides of the opening be doors, m. */
+/** Least distance of its middle inside the opening, so that the sides of the opening are no doors, m. */
 const INSIDE = 0.03;
 const FEW = 4;
-/** Triangles that are looked at without a pause. */
+/** Triangles that are processed without a pause. */
 const AT_ONCE = 64, MANY = 1 << 14;
 /** Number of cells kept out of sight. */
 const MOST = 64;
 
 /**
- * How far a point is inside a polygon (negative: outside), if it is near enough to its plane for a
- * door; null if it lies flat.
+ * The distance of a point inside a polygon (negative: outside), if it is near enough to its plane for a
+ * door; null if the polygon is horizontal.
  * @param {number[][]} polygon convex
  * @returns {((x: number, y: number, z: number) => number) | null}
  */
@@ -53,8 +53,8 @@ function openingOf(polygon) {
   };
 }
 
-/** Triangles in a tree: nodes in the order of a walk through it, each with where the next begins
- * that is not below it. It is built step by step: thousands of triangles take longer than a frame. */
+/** Triangles in a tree: nodes in depth-first order, each with the index of the next node that is not
+ * below it. It is built step by step: thousands of triangles take longer than a frame. */
 class Tree {
   corners = new Float32Array(0);
   kinds = new Uint8Array(0);
@@ -115,7 +115,7 @@ class Tree {
   }
 
   /**
-   * Makes a node of triangles, and where they fall into two; `end`, if they do not.
+   * Makes a node of triangles; returns the place at which they are divided, or `end`.
    * @param {number} begin @param {number} end
    * @returns {Generator<void, number, void>}
    */

@@ -6,13 +6,13 @@ const STILL = { seconds: 1, metres: 1e-3, radians: 0.0175 };
 /** @typedef {import("./walker.js").Pose} Pose */
 
 export class Stillness {
-  /** When the last movement was, s. */
+  /** Time of the last movement, s. */
   moved = 0;
   /** @type {Pose} */
   #from = { eye: [0, 0, 0], yaw: 0, pitch: 0 };
   #place = "";
 
-  /** Whether the pose is another one than before, be it by a hair. @param {Pose} pose @param {number} now s */
+  /** Whether the pose has changed at all. @param {Pose} pose @param {number} now s */
   takes({ eye, yaw, pitch }, now) {
     const from = this.#from, way = Math.hypot(...eye.map((x, k) => x - from.eye[k]));
     const turn = Math.max(Math.abs(yaw - from.yaw), Math.abs(pitch - from.pitch));

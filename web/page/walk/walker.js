@@ -1,9 +1,9 @@
 // The visitor's body: an upright cylinder that glides along walls, climbs steps, and falls.
 //
-// The cylinder begins at step height: lower obstacles are climbed. No triangle comes nearer to its axis
-// than the radius, or than it already is, and obstacles around the body up to a height do not hold it:
-// so a visitor placed inside an object can walk out of it, and through nothing. A part of a step is
-// shorter than the radius, so no wall is too thin.
+// The cylinder begins at step height: lower obstacles are climbed. No triangle comes nearer to its
+// axis than the radius, or than it already is, and obstacles around the body up to a height do not
+// hold it: so a visitor placed inside an object can walk out of it, but not through others. A part of
+// a step is shorter than the radius, so no wall is too thin.
 
 import { BLOCKS, CARRIES } from "./solids.js";
 import { Outline } from "./outline.js";
@@ -30,15 +30,15 @@ const SWIFT = 0.07, GLIDE = 0.1;
 const GRAVITY = 9.8, TERMINAL = 20;
 /** A longer time step is cut to this, s; and it is taken in parts of at most that. */
 const LONGEST = 0.25, PART = 0.02;
-/** From the eye to the top of the head, and how far below a floor is looked for, m. */
+/** From the eye to the top of the head, and the depth in which a floor is searched, m. */
 const FOREHEAD = 0.1, DEEP = 200;
-/** A height or a speed that is as good as none, m and m/s. */
+/** A height or a speed that counts as 0, m and m/s. */
 const NONE = 1e-4;
 /** Share of the radius within which a floor carries. */
 const FOOT = 0.5;
 /** Share of the height of the eye below which it is furniture that the body may stand in. */
 const FURNITURE = 0.75;
-/** Times that the walls around push; m that they push too far, and that are no difference. */
+/** Passes in which walls push the body; m that they push too far, and that count as 0. */
 const PUSHES = 6, AWAY = 1e-6, SAME = 1e-9;
 
 /** @param {number} value */
@@ -52,10 +52,10 @@ export class Walker {
   still = true;
   /** Height of the floor under the feet; not known until the first step from a place. */
   #feet = NaN;
-  /** How much higher the eye is than it should be. */
+  /** Height of the eye above its target. */
   #lift = 0;
   #fall = 0;
-  /** Whether it was put into no cell: then nothing holds it until it is in one. */
+  /** Whether it was placed outside all cells: then nothing holds it until it is in one. */
   #astray = false;
   #velocity = [0, 0];
   #outline = new Outline();
@@ -117,7 +117,7 @@ export class Walker {
     this.#astray = this.locate(this.pose.eye) < 0;
   }
 
-  /** Heights of the floors under the feet, at most so high.
+  /** Heights of the floors under the feet, at most `top`.
    * @param {number} x @param {number} z @param {number} top */
   #floors(x, z, top) {
     const foot = FOOT * this.radius, outline = this.#outline;
@@ -138,7 +138,7 @@ export class Walker {
 
   /** The distance of the axis from a triangle, with the feet at a height.
    * @param {Obstacle} one @param {number} x @param {number} z @param {number} feet
-   * @param {number} [slack] how much deeper it may go into a floor, which a slope asks for */
+   * @param {number} [slack] how much deeper it may go into a floor, for slopes */
   #distance({ corners, at, kind }, x, z, feet, slack = this.radius) {
     const bottom = feet + this.climb + (kind & CARRIES ? slack : 0);
     const top = feet + this.height + Math.max(0, this.#lift) + FOREHEAD;
@@ -181,7 +181,7 @@ export class Walker {
     return near.filter(({ top }) => top > inside);
   }
 
-  /** Whether something is too near; then the outline's nearest point becomes where to go instead.
+  /** Whether an obstacle is too near; the outline's nearest point then gives the place to go instead.
    * @param {Obstacle[]} obstacles @param {number} x @param {number} z */
   #pushed(obstacles, x, z) {
     let worst = AWAY / 2, u = x, w = z;
@@ -231,7 +231,7 @@ export class Walker {
     });
   }
 
-  /** Whether the geometry around a place is loaded, as far as is known.
+  /** Whether the known geometry around a place is loaded.
    * @param {number} x @param {number} z @param {number} feet @param {number} floor */
   #known(x, z, feet, floor) {
     const cell = this.locate([x, feet + this.height + this.#lift, z]);

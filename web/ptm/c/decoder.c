@@ -16,7 +16,7 @@ extern u8 __heap_base;
 enum { PAGE = 1 << 16, WORD_BYTES = 2, ROOM_BEHIND = 256 };
 static u64 used;
 
-// Grows the memory to so many bytes.
+// Grows the memory to a number of bytes.
 static bool grown(u64 size) {
   u64 have = (u64)__builtin_wasm_memory_size(0) * PAGE;
   if (size <= have) return true;
@@ -24,7 +24,7 @@ static bool grown(u64 size) {
   return pages < PAGE && __builtin_wasm_memory_grow(0, (size_t)pages) != (size_t)-1;
 }
 
-// Room for so many bytes, not cleared.
+// Allocates bytes, not cleared.
 static void *room(u64 size) {
   u64 begin = used;
   if (size > UINT32_MAX || !grown(begin + size)) return NULL;
@@ -42,7 +42,7 @@ void *take(u32 size) {
 EXPORT(geometric_tables) u16 *geometric_tables(void) { return geometric[0]; }
 EXPORT(token_tables) u16 *token_tables(void) { return tokens[0]; }
 
-// Room for a tile of so many bytes and texels; false if memory is short.
+// Allocates the bytes and texels of a tile; false if memory is short.
 EXPORT(reserve) bool reserve(u32 length, i32 width, i32 height, i32 components) {
   used = ((u64)(uintptr_t)&__heap_base + 15) & ~(u64)15;
   i32 bw = width >> 1, bh = height >> 1;

@@ -22,7 +22,7 @@ static const i16 activity_weights[3][3][7] = {
     {{8, 74, 31, 128, 0, 0, 0}, {3, 88, 23, 131, 38, 0, 0}, {1, 24, 20, 61, 25, 39, 55}},
 };
 static const i16 class_bounds[CLASSES - 1] = {1, 3, 7, 12, 20, 32, 50, 76, 115, 170, 250, 370, 560};
-// Of an activity, its class times three: so many KB a table is behind the first.
+// Three times the class of an activity: the offset of its table, KB.
 static u8 kilobytes[ACTIVITY_TOP + 1];
 _Static_assert(sizeof(Table) == 3 << 10, "three KB");
 
@@ -179,7 +179,7 @@ static void rebuild(Plane *plane, i32 y) {
     v128_t d = more(more(gx, gx), wasm_v128_and(bottom, one));
     v128_t r = wasm_i16x8_shr(more(bottom, d), 1), s = less(r, d);
     v128_t all = wasm_v128_or(wasm_v128_or(p, q), wasm_v128_or(r, s));
-    // Behind the row anything may stand.
+    // The texels behind the row are undefined.
     v128_t within = wasm_i16x8_lt(places, wasm_i16x8_splat((i16)at_most(tile.bw - x, BLOCKS)));
     all = wasm_v128_and(all, wasm_i16x8_splat(~255));
     stray = wasm_v128_or(stray, wasm_v128_and(all, within));

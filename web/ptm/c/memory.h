@@ -36,7 +36,7 @@ typedef struct {
 
 extern Tile tile;
 
-// So many bytes of zeros at an address that is a multiple of 16, until the next `reserve`; NULL if
+// Allocates zeroed bytes at an address that is a multiple of 16, until the next `reserve`; NULL if
 // memory is short.
 void *take(u32 size);
 

@@ -7,7 +7,7 @@
 
 enum { SUM = 2048, ESCAPE = 255, STATE_LOW = 1 << 15, MOST_TABLES = 236 };
 
-// Three KB stay in a core's own cache where eight, with all that is known at each slot, do not.
+// Three KB stay in a core's own cache; eight, with all data at each slot, do not.
 typedef struct {
   u8 slots[SUM];       // the symbol of each
   u32 intervals[256];  // of each symbol: frequency << 12 | where its slots begin
@@ -30,7 +30,7 @@ extern Stream stream;
 // the texel coder.
 extern u16 geometric[34][256], tokens[78][256];
 
-// Reads so many tables from *data on, which is moved behind them; false if they are damaged.
+// Reads a number of tables from *data on, which is moved behind them; false if they are damaged.
 bool read_tables(const u8 **data, u32 count, const u16 (*family)[256], u32 kinds);
 
 // Begins the stream that is from `data` to the end of the tile. Words behind its end may be read,

@@ -106,7 +106,7 @@ static u32 new_texel(u32 position, u32 mean, u32 w, u32 n, u32 nw, u32 ne) {
   return texel;
 }
 
-// p, q or r of a block: one of those around, or new.
+// p, q or r of a block: a neighbouring texel, or a new one.
 static inline u32 texel_of(u32 position, u32 table, u32 seen, u32 mean, u32 w, u32 n, u32 nw,
                            u32 ne) {
   table += 12 * position + (w == n) + 2 * ((seen == w) | (seen == n));
@@ -208,7 +208,7 @@ static void by_differences(u32 *here, const Block *b, u32 e, u32 s, u32 sw, u32 
   slots[SEEN][at_s] = block[3];
 }
 
-// Decodes a block; whether it is no copy of a whole block.
+// Decodes a block; returns whether it is not a copy of a whole block.
 static u32 decode_block(i32 y, i32 x, u32 near) {
   i32 width = tile.width, bw = tile.bw;
   u32 place = (u32)(2 * (y * width + x));
@@ -271,7 +271,7 @@ static u32 decode_block(i32 y, i32 x, u32 near) {
   return 1;
 }
 
-// How many blocks from here on would be flat if they were like all around them; 0 for none.
+// The number of blocks from here on that are flat if they equal their surroundings.
 static u32 run_of(i32 y, i32 x) {
   const u32 *here = tile.texels + 2 * (y * tile.width + x);
   const u32 *above = here - tile.width, *below = tile.below + y * tile.bw + x;
@@ -321,7 +321,7 @@ int decode_repeats(void) {
     u32 before = 0;
     bool ended = false;
     for (i32 x = 0; x < tile.bw;) {
-      // A block takes up to 24 symbols: so far may words behind the end be read.
+      // A block takes up to 24 symbols: words behind the end may be read.
       if (stream.word > stream.end || stream.stray) return DAMAGED;
       u32 run = ended ? 0 : run_of(y, x), flat = 0;
       if (run) {

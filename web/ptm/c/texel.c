@@ -129,7 +129,7 @@ int decode_texels(i32 error) {
   i32 step = 2 * error + 1, scale = 31 - __builtin_clz((u32)step);
   for (i32 y = 0; y < tile.height; y += 2) {
     for (i32 x = 0; x < tile.width; x += 2) {
-      // A block takes up to 16 symbols: so far may words behind the end be read.
+      // A block takes up to 16 symbols, so words behind the end may be read.
       if (stream.word > stream.end || stream.stray) return DAMAGED;
       for (i32 c = 0; c < tile.components; c++) {
         Plane *plane = &planes[c];

@@ -112,7 +112,7 @@ export function readHeader(bytes) {
     const [across, down] = levels.length ? tileCounts(w, h, tile) : [1, 1];
     const offset = long(view, entry);
     const length = long(view, entry + 8);
-    // No coder makes a group twice as long as its texels, but for small change.
+    // No coder makes a group twice as long as its texels, except for a few bytes.
     if (offset !== end || length > 2 * w * h * components + 1024 * across * down) {
       throw damagedHead(`the byte range of level ${levels.length} is impossible`);
     }
@@ -153,7 +153,7 @@ function storedSizes(width, height, count, trimmed) {
 }
 
 /**
- * A number of 64 bits; beyond 2^53, which none may be, it is rounded.
+ * A number of 64 bits, rounded beyond 2^53, where every number is invalid.
  * @param {DataView} view
  * @param {number} at
  */

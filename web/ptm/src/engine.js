@@ -7,7 +7,7 @@ import { geometricTables, tokenTables } from "./families.js";
 /** @typedef {import("./texels.js").Shape} Shape */
 
 /**
- * Where `decoder.wasm` is: its URL, its bytes, or the compiled module.
+ * The source of `decoder.wasm`: its URL, its bytes, or the compiled module.
  * @typedef {URL | string | BufferSource | WebAssembly.Module} ModuleSource
  */
 

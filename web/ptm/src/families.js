@@ -1,4 +1,4 @@
-// The built-in frequency tables, which encoder and decoder agree on without sending them
+// The built-in frequency tables, which encoder and decoder share without sending them
 // (docs/formats/ptm.md, "Tables and symbols"; docs/formats/ptm-kinds.md, "Entropy coding").
 
 const SUM = 2048;

@@ -28,7 +28,7 @@ import { tileSpan } from "./tiling.js";
 
 /** 256 MiB: enough for 5000² texels in tiles of 512, for 3000² without. */
 export const DEFAULT_MEMORY = 2 ** 28;
-/** More is not taken: texels are counted in 30 bits. */
+/** Upper limit: texels are counted in 30 bits. */
 const MOST_MEMORY = 2 ** 31;
 
 /** Coders of a group of `fast`. */

@@ -8,7 +8,7 @@ import { LevelDecoder } from "./level-decoder.js";
 /** @typedef {import("./level-decoder.js").Image} Image */
 
 /**
- * Gives so many bytes of a file from an offset on; fewer only where the file ends.
+ * Returns `length` bytes of a file from an offset on; fewer only where the file ends.
  * @typedef {(offset: number, length: number, signal?: AbortSignal)
  *   => Promise<Uint8Array | ArrayBuffer>} ReadRange
  */

@@ -1,4 +1,4 @@
-// The worker's side: decoders by number, and the orders that they obey.
+// The worker's side: decoders by number, and the orders that they carry out.
 
 import { readHeader } from "./container.js";
 import { loadEngine } from "./engine.js";
@@ -6,8 +6,8 @@ import { PtmError } from "./errors.js";
 import { LevelDecoder } from "./level-decoder.js";
 
 /**
- * A message to a worker: first where the module is; then a file whose first levels are wanted; or a
- * decoder that begins, that refines, that ends.
+ * A message to a worker: first the source of the module; then a file whose first levels are wanted; or the
+ * begin, a refinement or the end of a decoder.
  * @typedef {{wasm?: import("./engine.js").ModuleSource}
  *   | {bytes: Uint8Array, ends: number[], levels: number,
  *      options: import("./level-decoder.js").DecoderOptions}
@@ -82,8 +82,8 @@ export function serve(port) {
 }
 
 /**
- * The first levels of a file. Throws as `readHeader` and `refine` do; PTM-I105 if its levels do not
- * end where they should.
+ * The first levels of a file. Throws as `readHeader` and `refine` do; PTM-I105 if the ends of its
+ * levels differ from the given ones.
  * @param {{bytes: Uint8Array, ends: number[], levels: number,
  *   options: import("./level-decoder.js").DecoderOptions}} order
  * @param {import("./engine.js").Engine} engine

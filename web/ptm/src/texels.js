@@ -33,7 +33,7 @@ function pack(bytes, components, out, at, step) {
 }
 
 /**
- * A level that is stored as it is.
+ * A level that is stored uncompressed.
  * @param {Uint8Array} data
  * @param {Shape} shape
  */
@@ -88,7 +88,7 @@ export function rawTexels(data, below, { width, height, components }) {
  */
 export function toRgba(texels, components) {
   if (components > 2) return new Uint8Array(texels.slice().buffer);
-  // Signed numbers: unsigned ones of 32 bits are no small integers to an engine.
+  // Signed numbers: engines do not store unsigned ones of 32 bits as small integers.
   const from = new Int32Array(texels.buffer, texels.byteOffset, texels.length);
   const out = new Int32Array(texels.length);
   for (let i = 0; i < out.length; i++) {
@@ -99,7 +99,7 @@ export function toRgba(texels, components) {
 }
 
 /**
- * The components as they are, those of a texel together.
+ * The components unchanged, interleaved by texel.
  * @param {Uint32Array} texels
  * @param {number} components
  */

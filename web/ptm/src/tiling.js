@@ -12,7 +12,7 @@ export function tileCounts(width, height, side) {
 }
 
 /**
- * Where a tile begins along one side, and its size: the last takes the rest.
+ * The begin of a tile along one side, and its size: the last takes the rest.
  * @param {number} i its number along that side
  * @param {number} count of the tiles
  * @param {number} side

@@ -35,7 +35,7 @@ class Task {
   }
 }
 
-/** One worker: it is given a task at a time, so that those that wait can still be called off. */
+/** One worker. It receives one task at a time, so that waiting tasks can be cancelled. */
 class Lane {
   /** @type {Task[]} */
   #waiting = [];
@@ -77,7 +77,7 @@ class Lane {
   }
 
   /**
-   * Whether the task had not begun; then it never will.
+   * Cancels a task; returns whether it had not begun.
    * @param {Task} task
    */
   callOff(task) {
@@ -185,7 +185,7 @@ export class DecoderWorkers {
     this.lanes = Array.from({ length: count }, () => new Lane(make(), wasm));
   }
 
-  /** Whether nothing can be decoded any more. */
+  /** Whether all workers have failed. */
   get failed() {
     return this.lanes.every(({ failure }) => failure);
   }

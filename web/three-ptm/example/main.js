@@ -72,6 +72,6 @@ async function show(index, mebibytes) {
   });
 }
 
-const asked = new URLSearchParams(location.search);
-const index = asked.get("index");
-if (index) await show(index, Number(asked.get("budget") ?? 256));
+const query = new URLSearchParams(location.search);
+const index = query.get("index");
+if (index) await show(index, Number(query.get("budget") ?? 256));

@@ -1,4 +1,4 @@
-// Shares texture memory out by coverage of the view.
+// Distributes texture memory by coverage of the view.
 
 /** Bytes of a texel on the GPU, whatever its components. */
 export const TEXEL_BYTES = 4;
@@ -45,7 +45,7 @@ function fill(wants, gpuBytes) {
   const levels = new Array(wants.length).fill(0);
   let left = gpuBytes;
   let shares = wants.reduce((sum, { share }) => sum + share, 0);
-  // Those that need least for their share first: the rest goes to the others.
+  // Textures that need least for their share come first: the rest goes to the others.
   const order = [...wants.keys()].sort(
     (a, b) => all(wants[a]) / wants[a].share - all(wants[b]) / wants[b].share,
   );

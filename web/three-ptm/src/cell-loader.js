@@ -6,16 +6,16 @@ import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 
 /** @typedef {import("three").Group} Group */
 /**
- * Gives the texture of the index with that number, wrapped so.
+ * Returns the texture with a number in the index, with these wrap modes.
  * @typedef {(texture: number, wrapS: number, wrapT: number) => Texture} TextureOf
  */
 
 const CLAMP = 33071;
 
-/** Loads cells whose surfaces show the textures that it is given. */
+/** Loads cells whose surfaces show the textures of `textureOf`. */
 export class CellLoader {
   #textureOf;
-  // The loader is kept from fetching images.
+  // Prevents the loader from fetching images.
   #loader = new GLTFLoader().register(() => {
     return { name: "none", loadTexture: async () => new Texture() };
   });

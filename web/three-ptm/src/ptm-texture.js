@@ -30,7 +30,7 @@ import { RangeFile } from "./range-file.js";
 /**
  * @typedef {object} TextureOptions
  * @property {DecoderWorkers} [workers] that decode; all textures without share some
- * @property {number[]} [ends] the index's: saves the request that finds out where levels end
+ * @property {number[]} [ends] of the levels, from the index: saves the request that determines them
  * @property {number[]} [color] red, green, blue, 0 to 255: shown before the first level
  * @property {number} [wrapS] `RepeatWrapping` by default
  * @property {number} [wrapT]
@@ -47,7 +47,7 @@ const PATIENCE = 4;
 /** @type {DecoderWorkers | undefined} */
 let shared;
 /**
- * The change of storage that each renderer is at.
+ * The current change of storage of each renderer.
  * @type {WeakMap<WebGLRenderer, Promise<unknown>>}
  */
 const turns = new WeakMap();
@@ -59,7 +59,7 @@ export class PtmTexture extends DataTexture {
   /** @type {import("ptm-decoder").Ptm | undefined} */
   #ptm;
   #wanted = -1;
-  /** The call of `refine` that is being answered. @type {symbol | undefined} */
+  /** The current call of `refine`. @type {symbol | undefined} */
   #call;
   /** @type {Promise<boolean>} */
   #answer = Promise.resolve(true);
@@ -97,15 +97,15 @@ export class PtmTexture extends DataTexture {
 
   /**
    * Fetches, decodes and shows the levels up to this one, coarsest first, and gives finer ones
-   * back; -1 leaves nothing but the colour. Levels larger than the GPU's limit are left out. Calls
-   * off earlier requests. After a loss of the context all comes back from the downloaded
-   * bytes.
+   * back; -1 leaves nothing but the colour. Levels larger than the GPU's limit are left out.
+   * Cancels earlier requests. After a loss of the context the levels are restored from the
+   * downloaded bytes.
    *
    * Rejects as `openPtm` and decoding do, and with an Error that names the file if it
    * does not come; levels that were shown before stay.
    *
    * @param {number} level
-   * @returns {Promise<boolean>} whether it is so; false if it was called off
+   * @returns {Promise<boolean>} true when the levels are shown, false if the call was cancelled
    */
   refine(level) {
     if (this.#call && level === this.#wanted) return this.#answer;
@@ -122,7 +122,7 @@ export class PtmTexture extends DataTexture {
     return /** @type {this} */ (new PtmTexture(this.#renderer, this.file, options));
   }
 
-  /** Gives everything back; it cannot be used any more. */
+  /** Frees everything; the texture cannot be used any more. */
   dispose() {
     this.#call = undefined;
     this.#control.abort();
@@ -149,7 +149,7 @@ export class PtmTexture extends DataTexture {
     this.level = -1;
   }
 
-  /** Nothing but the colour. */
+  /** Shows only the colour. */
   #blank() {
     const [r, g, b] = this.#options.color ?? [128, 128, 128];
     this.source = new DataTexture(new Uint8Array([r, g, b, 255]), 1, 1).source;
@@ -182,7 +182,7 @@ export class PtmTexture extends DataTexture {
   }
 
   /**
-   * From the bytes at hand, and a range behind them. Of bytes with a wrong checksum, once more.
+   * Decodes the downloaded bytes and the range after them; requests bytes with a wrong checksum again.
    * @param {number} level
    * @param {AbortSignal} signal
    */

@@ -1,10 +1,10 @@
 // The downloaded beginning of a file: extended by range requests, one at a time, each of which goes on
 // where the last one ended. Bytes of a broken or aborted request are kept.
 
-/** How often in a row a request may fail, and the pause after the first time, ms. */
+/** Most failures of a request in a row, and the pause after the first, ms. */
 const ATTEMPTS = 3;
 const PAUSE = 500;
-/** Bytes that are worth waiting for. */
+/** Rest of a response, bytes, that is awaited rather than aborted. */
 const SHORT = 65536;
 
 /** Hosts that were seen to ignore ranges. */
@@ -14,12 +14,12 @@ const rangeless = new Set();
 class Unusable extends Error {}
 
 /**
- * An answer under way.
+ * A response under way.
  * @typedef {object} Body
  * @property {ReadableStreamDefaultReader<Uint8Array>} reader
- * @property {number} at where in the file its next byte belongs
- * @property {number} end where it ends
- * @property {boolean} all whether it is the whole file, whatever was asked for
+ * @property {number} at place of its next byte in the file
+ * @property {number} end its end in the file
+ * @property {boolean} all whether it is the whole file, regardless of the request
  */
 
 /** See `read`. */
@@ -39,7 +39,7 @@ export class RangeFile {
   /** @param {string | URL} url */
   constructor(url) {
     this.url = new URL(url, globalThis.document?.baseURI);
-    /** How far a request should lead at least: set it before reading bytes below it. */
+    /** Least end of a request: set it before reading bytes below it. */
     this.until = 0;
   }
 
@@ -61,8 +61,8 @@ export class RangeFile {
   }
 
   /**
-   * Lets go of the connection. A short rest of the answer is awaited, so that it is not
-   * fetched again, and all of the file where a host ignores ranges.
+   * Releases the connection. A short rest of the response is awaited, so that it is not fetched again, and
+   * the whole file if a host ignores ranges.
    * @param {AbortSignal} [signal]
    */
   settle(signal) {
@@ -74,7 +74,7 @@ export class RangeFile {
   }
 
   /**
-   * Forgets the bytes from `offset` on, which are damaged: they are requested again.
+   * Drops the bytes from `offset` on, which are damaged: they are requested again.
    * @param {number} offset
    */
   forget(offset) {
@@ -121,7 +121,7 @@ export class RangeFile {
   }
 
   /**
-   * The next piece of the answer under way, or of a new one.
+   * The next piece of the response under way, or of a new one.
    * @param {number} end
    */
   async #more(end) {

@@ -41,7 +41,7 @@ import { RangeFile } from "./range-file.js";
  * @property {(error: unknown) => void} [onError] called for a file that cannot be loaded
  */
 
-/** Texels of a side: so far all textures are refined before any is refined further. */
+/** Texels of a side to which all textures are refined before any is refined further. */
 const FIRST_LOOK = 64;
 
 /** Shows the cells visible from a cell and frees the others: see `update` and `enter`. */
@@ -108,7 +108,7 @@ export class Walk {
   }
 
   /**
-   * For each frame: enters the cell that holds the viewer when it is another one.
+   * To be called in each frame: enters the cell that holds the viewer if it has changed.
    * @param {Vector3} position
    */
   async update(position) {
@@ -136,8 +136,8 @@ export class Walk {
   }
 
   /**
-   * Frees cells out of sight, fetches visible ones, and shares texture memory out by coverage of the
-   * view. Calls off requests of the cell entered before.
+   * Frees cells out of sight, fetches visible ones, and distributes texture memory by coverage of the view.
+   * Cancels requests of the cell entered before.
    * @param {number} cell
    * @param {number} [budget] texture memory, bytes, from now on
    * @returns {Promise<boolean>} whether everything is loaded; false if another cell was entered since
@@ -161,7 +161,7 @@ export class Walk {
     return !signal.aborted;
   }
 
-  /** Gives everything back; it cannot be used any more. */
+  /** Frees everything; the walk cannot be used any more. */
   dispose() {
     this.#entered.abort();
     this.#free(new Set(), new Map());
@@ -307,7 +307,7 @@ export class Walk {
 }
 
 /**
- * How much of the view the cells cover that use each texture.
+ * The share of the view covered by the cells that use each texture.
  * @param {CellRecord} record
  */
 function sharesOf({ ach, floor, textures }) {
