@@ -122,7 +122,10 @@ async def _response(
     }
     part, size = None, content.size
     # Ranges are defined for GET alone; those of If-Range need the very same bytes.
-    if request.method == "GET" and request_headers.get("If-Range", content.tag).strip() == content.tag:
+    if (
+        request.method == "GET"
+        and request_headers.get("If-Range", content.tag).strip() == content.tag
+    ):
         part = asked_range(request_headers.get("Range"), size)
     sent = content
     if entry.compressed:
