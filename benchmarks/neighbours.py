@@ -33,10 +33,10 @@ import numpy as np
 from scenes import ROOT, ptm
 
 from ptmtools.arrays import Floats
-from ptmtools.lab.comparing import Played, SimulateOptions, play
+from ptmtools.lab.comparing import RunResult, SimulateOptions, play
 from ptmtools.lab.forms import FORMS, PTM
 from ptmtools.lab.measures import STANDS
-from ptmtools.lab.policies import POLICIES, Declared
+from ptmtools.lab.policies import POLICIES, PolicyEntry
 from ptmtools.lab.policies.whole_files import GpuiiClient
 from ptmtools.lab.report import link_text
 from ptmtools.lab.simulation import simulate
@@ -95,7 +95,7 @@ def main() -> None:
             print(line, flush=True)
 
 
-def world_of(scene: Scene, policies: Sequence[Declared]) -> World:
+def world_of(scene: Scene, policies: Sequence[PolicyEntry]) -> World:
     """The world of a walk through a scene, in all forms that the policies take."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     made(scene.script, scene.model)
@@ -133,7 +133,7 @@ def stock_table(world: World) -> Iterator[str]:
     """Sizes of the textures in each form, and the error with all files present."""
     yield "| form | textures | their texture memory | complete |"
     yield "|---|--:|--:|--:|"
-    for form in (PTM, *world.beside):
+    for form in (PTM, *world.other_forms):
         own = world.in_form(form)
         stock = own.catalogue
         fetched, held = size(int(stock.ends[:, -1].sum())), size(stock.whole)
@@ -150,7 +150,7 @@ def complete(world: World) -> float:
     return float(frames[world.view].mean())
 
 
-def runs_table(block: list[Played]) -> Iterator[str]:
+def runs_table(block: list[RunResult]) -> Iterator[str]:
     """A row for each system, of one link and memory."""
     rival = next((p.measures.e.mean for p in block if p.run.policy == RIVAL), float("nan"))
     yield "| system | e | / best | p95 | received | requests | 50 %, s | 90 %, s | 99 %, s |"
@@ -164,7 +164,7 @@ def runs_table(block: list[Played]) -> Iterator[str]:
         )
 
 
-def bytes_table(world: World, policies: Sequence[Declared]) -> Iterator[str]:
+def bytes_table(world: World, policies: Sequence[PolicyEntry]) -> Iterator[str]:
     """e by bytes received, means over places."""
     places = standing_places(world)
     if not places:
@@ -188,7 +188,7 @@ def standing_places(world: World) -> list[int]:
     return found
 
 
-def by_bytes(world: World, policy: Declared, places: Sequence[int]) -> tuple[list[float], float]:
+def by_bytes(world: World, policy: PolicyEntry, places: Sequence[int]) -> tuple[list[float], float]:
     """e at each of the `MARKS` and at the end, and the bytes by then."""
     own, found = world.in_form(policy.form), []
     for frame in places:

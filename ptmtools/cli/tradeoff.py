@@ -178,7 +178,7 @@ def _new_walk(artifacts: Artifacts, quick: bool) -> Walk:
 
 def _walk_document(trade: WalkTrade) -> dict[str, Any]:
     """The trials on a walk as JSON, with their sentences."""
-    return {"stage": WALK, "sentences": sentences.said(trade), **asdict(trade)}
+    return {"stage": WALK, "sentences": sentences.sentences(trade), **asdict(trade)}
 
 
 def _document(trade: Trade, wanted: float | None) -> dict[str, Any]:

@@ -1,9 +1,9 @@
-"""Compiled choices: the levels that are worth most for their bytes.
+"""Compiled choice of texture levels by their worth per byte.
 
-What a level is worth is given one by one, but a coarse level that adds nothing may lead to a fine
-one that does: a step is therefore any number of levels, and the best is the one of the greatest
-worth per byte. Steps of all textures in the order of that worth, as long as they fit, are the
-greedy solution of a knapsack whose items are chains.
+The worth of each level is given. A coarse level of no worth may lead to a fine one of some worth,
+so a step comprises any number of levels, and the best step has the greatest worth per byte. Taking
+the steps of all textures in that order, as long as they fit, is the greedy solution of a knapsack
+whose items are chains.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.jit import kernel, plain_kernel
 
-#: Steps that are exchanged for others at most, in one choice.
+#: Most exchanges of steps in one choice.
 _EXCHANGES = 8
 Numbers = NDArray[np.int32]
 
 
 @plain_kernel
 def best_step(worth: Floats, cost: Ints, column: int, paid: int, last: int) -> tuple[float, int]:
-    """The worth per byte of the best step from ``column`` up to at most ``last``, and where it
-    leads; (0, column) if none is worth anything.
+    """The worth per byte of the best step from ``column`` to ``last`` at most, and the column it
+    leads to; (0, column) if no step has worth.
 
     Parameters
     ----------
-    worth: (K,) of each column beside those before it. cost: (K,) bytes up to each column.
+    worth: (K,) that each column adds to those before it. cost: (K,) bytes up to each column.
     paid: bytes already paid, at least those of ``column``.
     """
     best, to, total = 0.0, column, 0.0
@@ -42,14 +42,14 @@ def best_step(worth: Floats, cost: Ints, column: int, paid: int, last: int) -> t
 
 @kernel
 def allocate(worth: Floats, cost: Ints, last: Ints, budget: int, column: Ints, exact: bool) -> int:
-    """Writes to ``column`` (T,) what each texture should hold; returns the bytes, at most
-    ``budget``.
+    """Writes to ``column`` (T,) the column each texture should hold; returns the bytes used, at
+    most ``budget``.
 
     Parameters
     ----------
     worth, cost: (T, K) see `best_step`. last: (T,) the last column that each may have.
-    exact: whether worth is true to the last bit, and not a guess: then steps are exchanged, too. By
-        a guess that overrates the finest levels, exchanging makes pictures worse.
+    exact: whether worth is exact and not an estimate; only then are steps exchanged. With an
+        estimate that overrates the finest levels, exchanging makes pictures worse.
     """
     used = 0
     heap = [(0.0, 0, 0) for _ in range(0)]
@@ -79,9 +79,9 @@ def allocate(worth: Floats, cost: Ints, last: Ints, budget: int, column: Ints, e
 
 @kernel
 def exchange(worth: Floats, cost: Ints, last: Ints, budget: int, used: int, column: Ints) -> int:
-    """Takes steps that did not fit, where what has to go for them is worth less: what a greedy
-    choice misses where steps are large beside the budget. Returns the bytes then used."""
-    tried, better = column.copy(), column.copy()
+    """Takes steps that did not fit, in exchange for steps of less worth. A greedy choice misses
+    these where steps are large beside the budget. Returns the bytes used afterwards."""
+    candidate, better = column.copy(), column.copy()
     for _ in range(_EXCHANGES):
         most, after = 0.0, used
         for t in range(len(last)):
@@ -89,17 +89,17 @@ def exchange(worth: Floats, cost: Ints, last: Ints, budget: int, used: int, colu
             if to == column[t] or cost[t, to] > budget:
                 continue
             gain = worth[t, column[t] + 1 : to + 1].sum()
-            tried[:] = column
-            tried[t] = to
+            candidate[:] = column
+            candidate[t] = to
             size = used + cost[t, to] - cost[t, column[t]]
             while size > budget and gain > most:
-                other, down, loss = _least(worth, cost, tried, t)
+                other, down, loss = _least(worth, cost, candidate, t)
                 gain -= loss
-                size -= cost[other, tried[other]] - cost[other, down]
-                tried[other] = down
+                size -= cost[other, candidate[other]] - cost[other, down]
+                candidate[other] = down
             if gain > most:
                 most, after = gain, size
-                better[:] = tried
+                better[:] = candidate
         if most <= 0.0:
             break
         column[:] = better
@@ -109,8 +109,8 @@ def exchange(worth: Floats, cost: Ints, last: Ints, budget: int, used: int, colu
 
 @plain_kernel
 def _least(worth: Floats, cost: Ints, column: Ints, kept: int) -> tuple[int, int, float]:
-    """The texture but ``kept`` whose last levels are worth least per byte: which, down to what
-    column, and what is lost."""
+    """The texture other than ``kept`` whose last levels are worth least per byte, the column to
+    reduce it to, and the worth lost."""
     texture, to, lost, least = -1, 0, 0.0, np.inf
     for t in range(len(column)):
         loss = 0.0
@@ -126,23 +126,23 @@ def _least(worth: Floats, cost: Ints, column: Ints, kept: int) -> tuple[int, int
 def next_fetch(
     worth: Floats, ends: Ints, requested: Ints, last: Ints, overhead: int
 ) -> tuple[float, int, int]:
-    """The texture whose next bytes are worth most: worth per byte, texture, and the column that
-    they lead to; (0, -1, 0) if there is none.
+    """The texture whose next bytes are worth most: worth per byte, texture, and the column they
+    lead to; (0, -1, 0) if there is none.
 
     Parameters
     ----------
-    worth, ends: (T, K). requested: (T,) bytes asked for already. last: (T,) wanted columns.
-    overhead: bytes that a request takes besides.
+    worth, ends: (T, K). requested: (T,) bytes requested already. last: (T,) wanted columns.
+    overhead: further bytes of a request.
     """
     best, texture, column = 0.0, -1, 0
     for t in range(len(requested)):
-        asked = requested[t]
-        if asked >= ends[t, last[t]]:
+        requested_bytes = requested[t]
+        if requested_bytes >= ends[t, last[t]]:
             continue
         here = 0
-        while here < last[t] and ends[t, here + 1] <= asked:
+        while here < last[t] and ends[t, here + 1] <= requested_bytes:
             here += 1
-        density, to = best_step(worth[t], ends[t], here, asked - overhead, last[t])
+        density, to = best_step(worth[t], ends[t], here, requested_bytes - overhead, last[t])
         if density > best:
             best, texture, column = density, t, to
     return best, texture, column
@@ -153,8 +153,8 @@ def gather(
     start: int, end: int, cell: Numbers, texture: Numbers, table: Singles,
     loaded: Bools, worth: Floats,
 ) -> None:  # fmt: skip
-    """Adds rows of a table (R, L) of pairs to their textures' worth (T, L + 1), from its second
-    column on, for the cells that are there (C,)."""
+    """Adds rows of a table (R, L) of pairs to the worth (T, L + 1) of their textures, from its
+    second column on, for the loaded cells (C,)."""
     for r in range(start, end):
         t = texture[r]
         if t < 0 or not loaded[cell[r]]:
@@ -168,13 +168,13 @@ def holes(
     ray: Floats, owner: Numbers, depth: Singles, eye: Floats,
     low: Floats, high: Floats, loaded: Bools, missing: Ints, share: Floats,
 ) -> None:  # fmt: skip
-    """Adds to ``share`` (C,) the pixels that would show placeholders of cells whose geometry is
-    missing: the far faces of their boxes, which are rooms.
+    """Adds to ``share`` (C,) the pixels that would show placeholders of cells with missing
+    geometry: the far faces of their boxes, which are rooms.
 
     Parameters
     ----------
-    ray, owner, depth: (n, 3), (n,), (n,) of the pixels, as `Views` has them. eye: (3,).
-    low, high: (C, 3) boxes of the cells. there: (C,) whose geometry is there.
+    ray, owner, depth: (n, 3), (n,), (n,) of the pixels, as in `Views`. eye: (3,).
+    low, high: (C, 3) boxes of the cells. loaded: (C,) whether the geometry is loaded.
     missing: cells whose placeholders are drawn.
     """
     for i in range(len(owner)):
@@ -204,14 +204,15 @@ def picture(
     square: Singles, need: Singles, loaded: Bools, column: Ints, colored: bool,
     shown: Bools, drawn: Bools,
 ) -> tuple[float, float, float]:  # fmt: skip
-    """The mean error, the mean of its square, and the share of wanted levels that is missing, of
-    the rows of a frame; marks what was on the screen.
+    """Sums up the rows of a frame: mean error, mean squared error, and the share of wanted levels
+    that is missing. Marks what is displayed.
 
     Parameters
     ----------
-    cell, texture, error, square, need: see `Views`. there: (C,) geometry. column: (T,) resident.
+    cell, texture, error, square, need: see `Views`. loaded: (C,) whether the geometry is loaded.
+        column: (T,) resident.
     colored: whether mean colours are known.
-    shown: (T, K) becomes true for columns that were wanted and there. drawn: (C,) the same for
+    shown: (T, K) becomes true for columns that were wanted and resident. drawn: (C,) the same for
         geometry.
     """
     mean, squared, missing, wanted = 0.0, 0.0, 0.0, 0.0

@@ -1,11 +1,10 @@
-"""What a client knows once it has the index, a record or the geometry of a cell, as arrays.
+"""The client's catalogue as arrays: the content of the index, of records, and of the geometry of
+cells.
 
-Which of it a client may use at a moment depends on what has arrived; that is the client's part.
+The client decides which part it may use, by what has arrived.
 
-Texture memory: what levels take, and which of them it should hold.
-
-A texture of which column k is resident holds levels 0 to k − 1: column 0 is nothing. GPUs have no
-texels of three bytes, so RGB counts four; the paper counts three.
+A texture with resident column k holds levels 0 to k − 1: column 0 is nothing. GPUs have no texels
+of three bytes, so RGB counts four; the paper counts three.
 """
 
 from __future__ import annotations
@@ -25,12 +24,13 @@ from ptmtools.texture.model import gpu_texel_bytes
 
 
 class Columns(NamedTuple):
-    """What can be fetched of textures; beyond the last column of one all repeat it.
+    """The columns of textures that can be fetched; columns after the last one of a texture repeat
+    it.
 
     Attributes
     ----------
-    last: (T,) of each texture; column 0 is nothing.
-    ends: (T, K) bytes that hold each column and those before it. memory: (T, K) of texture memory.
+    last: (T,) last column of each texture; column 0 is nothing.
+    ends: (T, K) bytes of each column and those before it. memory: (T, K) bytes of texture memory.
     size: (T, K, 2) width and height of the finest image that each column shows.
     """
 
@@ -41,7 +41,7 @@ class Columns(NamedTuple):
 
 
 def texel_bytes(texture: Any, *, paper: bool = False) -> int:
-    """Bytes of a texel of an entry of the index; with ``paper``, as the paper counts."""
+    """Bytes per texel of an index entry; with ``paper``, as the paper counts."""
     stored = int(texture["texelBytes"])
     if paper:
         return stored
@@ -49,8 +49,8 @@ def texel_bytes(texture: Any, *, paper: bool = False) -> int:
 
 
 def columns_of(textures: Sequence[Any], *, paper: bool = False) -> Columns:
-    """Levels of `.ptm`s, for entries of the index: bytes are those of the file, and memory that of
-    all levels of a column."""
+    """Columns of `.ptm`s for entries of the index: bytes in the file, and texture memory of all
+    levels of a column."""
     rows = []
     for texture in textures:
         shift = len(texture["ends"]) - 1 - np.arange(len(texture["ends"]))
@@ -61,7 +61,7 @@ def columns_of(textures: Sequence[Any], *, paper: bool = False) -> Columns:
 
 
 def joined(first: Columns, second: Columns) -> Columns:
-    """Those of two lists of textures, one behind the other."""
+    """The columns of two lists of textures, one after the other."""
     wide = max(first.ends.shape[1], second.ends.shape[1])
 
     def both(one: Ints, other: Ints) -> Ints:
@@ -74,8 +74,8 @@ def joined(first: Columns, second: Columns) -> Columns:
 
 
 def aligned(rows: Sequence[tuple[Any, Any, Any]]) -> Columns:
-    """Columns of textures that have any number of them: of each its (k,) ``ends`` and ``memory``,
-    and (k, 2) ``size``, without the first column."""
+    """Columns of textures with different numbers of them, from each texture's (k,) ``ends`` and
+    ``memory`` and (k, 2) ``size``, without the first column."""
     last = np.array([len(row[0]) for row in rows], dtype=np.int64)
     shape = len(rows), int(last.max(initial=0)) + 1
     ends, memory, size = (np.zeros(s, np.int64) for s in (shape, shape, (*shape, 2)))
@@ -87,8 +87,8 @@ def aligned(rows: Sequence[tuple[Any, Any, Any]]) -> Columns:
     return Columns(last, ends, memory, size)
 
 
-#: A level that only repeats the texels of the one below still sharpens what is filtered between
-#: them, so it adds at least this, 0 to 255.
+#: Least difference of a level, 0 to 255: a level that only repeats the texels of the one below
+#: still sharpens the filtering between them.
 LEAST = 0.5
 
 
@@ -100,8 +100,8 @@ class Shapes:
     ----------
     cell, texture: (n,) int64, ascending by cell; the texture is -1 without.
     low, high: (n, 3) corners of their boxes, metres.
-    side: (n, 2) metres that the width and the height of the texture's image take on the shape, on
-        average over its area; 0 where it shows one point of it.
+    side: (n, 2) mean width and height of the texture's image on the shape, metres; 0 if the shape
+        shows a single point of it.
     """
 
     cell: Ints
@@ -110,8 +110,8 @@ class Shapes:
     high: Floats
     side: Floats
 
-    def beside(self, more: Shapes) -> Shapes:
-        """These and more."""
+    def joined_with(self, more: Shapes) -> Shapes:
+        """These shapes and others, by cell."""
         order = np.argsort(np.concatenate([self.cell, more.cell]), kind="stable")
         both: dict[str, Any] = {
             name: np.concatenate([own, vars(more)[name]])[order] for name, own in vars(self).items()
@@ -121,21 +121,22 @@ class Shapes:
 
 @dataclass(frozen=True)
 class Catalogue:
-    """What can be fetched, and what is said of it. K columns: nothing, then the levels, or what a
-    form has in place of them (`ptmtools.lab.forms`).
+    """The files that can be fetched, and their properties. K columns: nothing, then the levels, or
+    the columns of another form (`ptmtools.lab.forms`).
 
     Attributes
     ----------
-    levels: (T,) columns of each texture beside the first.
-    ends: (T, K) bytes of its file that hold each column; of several files, of all up to it.
-    memory: (T, K) of texture memory. size: (T, K, 2) width and height of the finest
+    levels: (T,) columns of each texture, without the first.
+    ends: (T, K) bytes of the file up to each column; of several files, their sum.
+    memory: (T, K) bytes of texture memory. size: (T, K, 2) width and height of the finest
         image that a column shows.
-    differences: (T, K) of each column to the one before it, on average over its texels, 0 to 255,
-        at least `LEAST`; of what lies behind the last 0.
+    differences: (T, K) mean difference of each column's texels to the column before, 0 to 255, at
+        least `LEAST`; 0 after the last column.
     colors: (T, 3) mean colour, 0 to 255.
-    index_bytes, statistics_bytes, record_bytes, geometry_bytes: on the link; (C,) the latter two.
-    low, high: (C, 3) corners of the cells' boxes, metres, as the index rounds them: a client has
-        leaves only of cells whose record is there.
+    index_bytes, statistics_bytes, record_bytes, geometry_bytes: bytes on the link; the latter two
+        are (C,).
+    low, high: (C, 3) corners of the cells' boxes, metres, as rounded in the index: a client has
+        leaves only of cells whose record has arrived.
     records, statistics: of each cell.
     shapes: see `Shapes`.
     """
@@ -158,32 +159,32 @@ class Catalogue:
 
     @property
     def texture_count(self) -> int:
-        """How many there are."""
+        """Number of textures."""
         return len(self.levels)
 
     @property
     def cell_count(self) -> int:
-        """How many there are."""
+        """Number of cells."""
         return len(self.records)
 
     @property
     def whole(self) -> int:
-        """Bytes of texture memory that all textures take, whole."""
+        """Bytes of texture memory of all textures with all levels."""
         return int(self.memory[:, -1].sum())
 
     @cached_property
     def first_shape(self) -> Ints:
-        """(C + 1,) where the shapes of each cell begin."""
+        """(C + 1,) index of each cell's first shape."""
         return np.searchsorted(self.shapes.cell, np.arange(self.cell_count + 1))
 
     @cached_property
     def visible(self) -> tuple[Ints, ...]:
-        """Of each cell those that it may see, itself first."""
+        """The cells visible from each cell, itself first."""
         return tuple(np.array(record["visible"], dtype=np.int64) for record in self.records)
 
     @cached_property
     def coverage(self) -> tuple[Floats, ...]:
-        """Of each cell its average coverage hints, aligned with `visible`; none is 0."""
+        """The average coverage hints of each cell, aligned with `visible`, all above 0."""
         return tuple(
             np.maximum(np.array(record["ach"], dtype=np.float64), record["floor"])
             for record in self.records
@@ -191,25 +192,25 @@ class Catalogue:
 
     @cached_property
     def adjacent(self) -> tuple[Ints, ...]:
-        """Of each cell those beyond its portals."""
+        """The neighbours of each cell through its portals."""
         return tuple(np.array(record["adjacent"], dtype=np.int64) for record in self.records)
 
     @cached_property
     def in_sight(self) -> tuple[Ints, ...]:
-        """Of each cell the textures of all that it may see, as its record names them."""
+        """The textures of the visible set of each cell, as its record lists them."""
         return tuple(
             np.unique(np.array([t for row in record["textures"] for t in row], dtype=np.int64))
             for record in self.records
         )
 
-    def as_found(self, browser: Browser) -> Catalogue:
-        """The same with records and geometry as large as a browser found them."""
+    def with_browser_sizes(self, browser: Browser) -> Catalogue:
+        """The same catalogue with the record and geometry sizes that a browser recorded."""
         return replace(
             self, record_bytes=browser.record_bytes, geometry_bytes=browser.geometry_bytes
         )
 
     def in_columns(self, columns: Columns) -> Catalogue:
-        """The same textures with other columns, each of which says as little of what it adds."""
+        """The same textures with other columns, all of the least difference."""
         stored = _stored(columns.last, columns.ends.shape[1])
         return replace(
             self,
@@ -221,16 +222,18 @@ class Catalogue:
         )
 
     def with_memory(self, memory: Ints) -> Catalogue:
-        """The same with other texture memory (t, k) of the first textures."""
+        """The same catalogue with other texture memory (t, k) of the first textures."""
         rows, wide = memory.shape
         table = self.memory.copy()
         table[:rows, :wide] = memory
         table[:rows, wide:] = memory[:, -1:]
         return replace(self, memory=table)
 
-    def beside(self, more: Columns, differences: Floats, shapes: Shapes | None = None) -> Catalogue:
-        """The same with more textures behind these, and shapes that show them; ``differences``
-        (T', K')."""
+    def joined_with(
+        self, more: Columns, differences: Floats, shapes: Shapes | None = None
+    ) -> Catalogue:
+        """The same catalogue with further textures and shapes after its own; ``differences`` (T',
+        K')."""
         own = joined(Columns(self.levels, self.ends, self.memory, self.size), more)
         wide = own.ends.shape[1]
         each = [
@@ -244,32 +247,32 @@ class Catalogue:
             size=own.size,
             differences=np.concatenate(each),
             colors=np.concatenate([self.colors, np.zeros((len(more.last), 3))]),
-            shapes=self.shapes if shapes is None else self.shapes.beside(shapes),
+            shapes=self.shapes if shapes is None else self.shapes.joined_with(shapes),
         )
 
 
 def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalogue:
-    """The catalogue of a served folder; ``differences`` (T, L) and ``colors`` (T, 3) as `Pyramids`
-    has them, for hints that do not say them of every texture."""
+    """The catalogue of a served folder; ``differences`` (T, L) and ``colors`` (T, 3) are those of
+    `Pyramids`, for hints without them."""
     textures = served.index["textures"]
     levels, ends, memory, size = columns_of(textures)
-    beside = np.zeros(ends.shape)
-    beside[:, 1:] = differences[:, : ends.shape[1] - 1]
+    differences_ = np.zeros(ends.shape)
+    differences_[:, 1:] = differences[:, : ends.shape[1] - 1]
     if all(len(row.get("differences", ())) == len(row["ends"]) for row in textures):
-        for into, row in zip(beside, textures, strict=True):
+        for into, row in zip(differences_, textures, strict=True):
             into[1 : len(row["ends"]) + 1] = row["differences"]
     if textures and all("color" in row for row in textures):
         colors = np.array([row["color"] for row in textures], dtype=np.float64)
     boxes = np.array([cell["box"] for cell in served.index["cells"]], dtype=np.float64)
     low, high = boxes.reshape(-1, 2, 3).transpose(1, 0, 2).copy()
     stored = _stored(levels, ends.shape[1])
-    beside[stored] = np.maximum(beside[stored], LEAST)
+    differences_[stored] = np.maximum(differences_[stored], LEAST)
     return Catalogue(
         levels=levels,
         ends=ends,
         memory=memory,
         size=size,
-        differences=beside,
+        differences=differences_,
         colors=colors,
         index_bytes=served.index_bytes,
         statistics_bytes=served.statistics_bytes,
@@ -284,7 +287,7 @@ def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalog
 
 
 def _stored(last: Ints, wide: int) -> Bools:
-    """(T, K) which columns there are, the first aside."""
+    """(T, K) which columns exist, without the first."""
     column = np.arange(wide)
     result: Bools = (column > 0) & (column <= last[:, None])
     return result

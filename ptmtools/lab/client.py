@@ -1,19 +1,17 @@
-"""What every client does: it asks for files, keeps what arrives, and knows what it may use.
+"""The base of all clients: requests of files, storage of arrivals, and an estimate of the link.
 
-A client sees the index once it is there, then the record of the cell that it is in and the geometry
-of what that cell sees; of a texture it asks for ranges of the `.ptm` from its beginning on. What
-has been downloaded stays in main memory; texture memory is what is short.
+A client has the index once it has arrived, then the record of its cell and the geometry of the
+visible cells; it requests ranges of a `.ptm` from its beginning on. Downloaded bytes stay in main
+memory; texture memory is limited.
 
-What a client believes of its link, from what it has downloaded lately (§6.2: "network bandwidth
-and latency analysis performed for some recent downloadings").
-
-Bandwidth is bytes over the time during which any were arriving, both forgotten with a half-life of
-such time: so a pause, in which nothing was asked for, neither lowers the estimate nor ages it, and
-parallel requests are not counted against each other. What arrives between two looks is taken to
-arrive evenly, and fades from where it arrives, so that the estimate does not depend on how often
-one looks. Latency is the mean of the last few, of requests whose response did not have to wait for
-those of others: on `h2` the others tell nothing of the network. (A client sees it: another response
-ended as this one began.)
+`Estimate` is the client's estimate of its link, from recent downloads (§6.2: "network bandwidth and
+latency analysis performed for some recent downloadings"). Bandwidth is bytes over the time during
+which any were arriving, both with a half-life of such time. A pause without requests therefore
+neither lowers nor ages the estimate, and parallel requests do not count against each other.
+Arrivals between two observations are taken as evenly spread and fade from their arrival, so the
+estimate does not depend on the rate of observation. Latency is the mean of the last few requests
+whose response did not wait for other responses: on `h2` the others say nothing about the network.
+(A client can tell: another response ended when this one began.)
 """
 
 from __future__ import annotations
@@ -30,21 +28,21 @@ from ptmtools.arrays import Bools, Ints
 from ptmtools.lab.network import Link, Request
 from ptmtools.lab.world import World
 
-#: After so many s of arriving bytes they count half.
+#: Half-life of arrived bytes, in s of arrival time.
 HALF_LIFE = 1.0
-#: With fewer bytes and less time than these, B and s, the prior is believed.
+#: Below these bytes and s the estimate is the prior.
 ENOUGH_BYTES, ENOUGH_SECONDS = 16_384, 0.25
-#: So many latencies are remembered.
+#: Number of latencies in the mean.
 LATENCIES = 8
 
 
 class Estimate:
-    """Bandwidth and latency as a client of ``link`` believes them.
+    """Estimate of bandwidth and latency by a client of ``link``.
 
     Parameters
     ----------
-    link: whose bytes and whose time of arrivals are observed; nothing else of it is looked at.
-    bandwidth, latency: the prior, bit/s and s: what is believed until enough is known.
+    link: only its bytes and arrival times are observed.
+    bandwidth, latency: the prior, bit/s and s, used until enough has arrived.
     """
 
     def __init__(self, link: Link, bandwidth: float, latency: float) -> None:
@@ -55,7 +53,7 @@ class Estimate:
         self._guessed = True
 
     def observe(self, finished: Request | None = None) -> None:
-        """To be called after each `Link.advance`, with what that returned."""
+        """Updates the estimate; call it after each `Link.advance` with its result."""
         carried, busy = self._link.carried, self._link.busy
         seconds = busy - self._seen[1]
         age = math.log(2) * seconds / HALF_LIFE
@@ -82,16 +80,16 @@ class Estimate:
         return sum(self._latencies) / len(self._latencies)
 
     def duration(self, size: float) -> float:
-        """s until a request of ``size`` bytes would be finished, if it had the link for itself."""
+        """s until a request of ``size`` bytes would be finished, alone on the link."""
         return self.latency + 8 * size / self.bandwidth if self.bandwidth else math.inf
 
 
-#: What a client believes of a link before it knows any better: bit/s and s.
+#: Prior estimate of a link: bit/s and s.
 PRIOR = (1e6, 0.1)
 
 
 class Kind(IntEnum):
-    """What is asked for."""
+    """Kind of a requested file."""
 
     INDEX = 0
     RECORD = 1
@@ -100,13 +98,13 @@ class Kind(IntEnum):
     STATISTICS = 4
 
 
-#: What is neither textures nor geometry.
+#: Kinds that are neither textures nor geometry.
 DOCUMENTS = (Kind.INDEX, Kind.RECORD, Kind.STATISTICS)
 
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """Bytes ``begin`` to ``end`` of the file number ``number`` of a kind."""
+    """Bytes ``begin`` to ``end`` of file ``number`` of a kind."""
 
     kind: Kind
     number: int
@@ -115,12 +113,12 @@ class Range:
 
 
 class Files:
-    """The files of one kind: how much of each was asked for, and how much is there.
+    """The files of one kind, with the bytes requested and loaded of each.
 
     Attributes
     ----------
-    size: (n,) bytes. asked, there: (n,) bytes from the beginning that were asked for, that are
-        there without a gap.
+    size: (n,) bytes. asked, loaded: (n,) bytes from the beginning that were requested, and that
+        have arrived without a gap.
     """
 
     def __init__(self, kind: Kind, size: Ints) -> None:
@@ -130,28 +128,28 @@ class Files:
 
     @property
     def whole(self) -> Bools:
-        """(n,) which are there from beginning to end."""
+        """(n,) which are completely loaded."""
         result: Bools = self.loaded >= self.size
         return result
 
     def ask(self, number: int, end: int) -> Range:
-        """The range that leads to ``end``; it counts as asked for."""
+        """Marks a file as requested up to ``end``; returns the range to request."""
         result = Range(self.kind, number, int(self.asked[number]), end)
         self.asked[number] = end
         self._waiting.setdefault(number, deque()).append([end, 0])
         return result
 
     def arrived(self, part: Range) -> None:
-        """A range is there; others before it may not be."""
+        """Marks a range as arrived; ranges before it may be missing."""
         waiting = self._waiting[part.number]
         for entry in waiting:
             if entry[0] == part.end:
                 entry[1] = 1
         self._pass(part.number)
 
-    def given_up(self, part: Range, received: int) -> bool:
-        """The last range of a file is given up, of which so much has arrived; False if it was not
-        the last, and nothing is changed."""
+    def give_up(self, part: Range, received: int) -> bool:
+        """Gives up the last range of a file after ``received`` bytes; returns False and changes
+        nothing if it was not the last."""
         waiting = self._waiting[part.number]
         if waiting[-1][0] != part.end:
             return False
@@ -163,7 +161,7 @@ class Files:
         return True
 
     def _pass(self, number: int) -> None:
-        """Counts what is there without a gap."""
+        """Updates the bytes that have arrived without a gap."""
         waiting = self._waiting[number]
         while waiting and waiting[0][1]:
             self.loaded[number] = waiting.popleft()[0]
@@ -174,12 +172,12 @@ class Client(ABC):
 
     Attributes
     ----------
-    world, link, budget: where it is, what it asks, bytes of texture memory that it may use.
-    frame: at which it is.
+    world, link, budget: the walk, the link, and the limit of texture memory, bytes.
+    frame: current frame.
     index: whether it has the index. records, geometry, textures: see `Files`.
-    column: (T,) what of each texture is in texture memory.
-    estimate: of the link.
-    ticks: how often `tick` is called from one frame to the next, the frames not counted.
+    column: (T,) resident column of each texture.
+    estimate: estimate of the link.
+    ticks: number of calls of `tick` between two frames, plus one.
     """
 
     ticks = 1
@@ -200,24 +198,24 @@ class Client(ABC):
         self.column = np.zeros(stock.texture_count, np.int64)
         self.estimate = Estimate(link, *PRIOR)
         self.waiting: list[Request] = []
-        #: The cell whose record the client goes by: that it is in, once its record is there.
+        #: The cell whose record is in use: the current one, once its record has arrived.
         self.cell = -1
 
     @property
     def index(self) -> bool:
-        """Whether the index is there."""
+        """Whether the index has arrived."""
         return bool(self.files[Kind.INDEX].whole[0])
 
     @property
     def have(self) -> Ints:
-        """(T,) columns that are downloaded whole."""
+        """(T,) columns that are completely downloaded."""
         stock = self.world.catalogue
         held = (stock.ends <= self.textures.loaded[:, None]).sum(axis=1) - 1
         columns: Ints = np.minimum(held, stock.levels)
         return columns
 
     def look(self, frame: int) -> None:
-        """The walker is at a frame."""
+        """Moves the viewpoint to a frame."""
         self.frame = frame
         here = int(self.world.cell[frame])
         if self.records.whole[here]:
@@ -225,29 +223,29 @@ class Client(ABC):
         self.settle()
 
     def glance(self, frame: int) -> None:  # noqa: B027 - only browsers have item buffers of other frames
-        """There is a frame; who has an item buffer may see another one than before."""
+        """Passes a frame; with an item buffer the client may get another one."""
 
     def give(self, kind: Kind, number: int, size: int) -> None:
-        """A file is on the way before the client asks for it."""
+        """Starts a transfer that the client did not request."""
         if not self.files[kind].asked[number]:
             self.files[kind].size[number] = size
             self.ask(kind, number, size, math.inf)
 
     def ask(self, kind: Kind, number: int, end: int, priority: float) -> None:
-        """Asks for a file up to a byte."""
+        """Requests a file up to a byte."""
         part, now = self.files[kind].ask(number, end), self.link.now
         browser = self.world.browser
         late = {"late": browser.sent.until(now) - now} if browser else {}
         self.waiting.append(self.link.request(part.end - part.begin, priority, part, **late))
 
     def arrived(self, request: Request) -> None:
-        """A request is finished."""
+        """Handles a finished request."""
         assert isinstance(request.tag, Range)
         self.waiting.remove(request)
         self.files[request.tag.kind].arrived(request.tag)
 
-    def tick(self) -> None:  # noqa: B027 - most have nothing to do then
-        """Some time has passed, and no frame yet."""
+    def tick(self) -> None:  # noqa: B027 - most clients do nothing
+        """Handles a step of time between frames."""
 
     @abstractmethod
     def settle(self) -> None:
@@ -255,5 +253,4 @@ class Client(ABC):
 
     @abstractmethod
     def fetch(self) -> None:
-        """Asks for what is wanted next, or for nothing; called in every frame, and whenever
-        something has arrived."""
+        """Makes the next requests, if any; called in every frame and after every arrival."""

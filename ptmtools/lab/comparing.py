@@ -1,4 +1,4 @@
-"""Policies, links and amounts of texture memory, all with all, on some walks."""
+"""Simulates every combination of policies, links and amounts of texture memory on some walks."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from types import MappingProxyType
 from typing import ClassVar, Literal
 
 from ptmtools.errors import InputError
-from ptmtools.lab.campus.simulation import CAMPUS_POLICIES, CampusPolicy, walk_beside
+from ptmtools.lab.campus.simulation import CAMPUS_POLICIES, CampusPolicy, measure_campus_walk
 from ptmtools.lab.campus.world import CampusWorld
 from ptmtools.lab.forms import FORMS, PTM
 from ptmtools.lab.measures import STANDS, Flip, Measures, measure
-from ptmtools.lab.policies import POLICIES, Declared
+from ptmtools.lab.policies import POLICIES, PolicyEntry
 from ptmtools.lab.policies.paper import PaperOptions
 from ptmtools.lab.simulation import Run, simulate
 from ptmtools.lab.world import World
@@ -87,23 +87,23 @@ class SimulateOptions:
             )
 
     @property
-    def policies(self) -> list[Declared]:
-        """Those of clients of the database, in the order given."""
+    def policies(self) -> list[PolicyEntry]:
+        """Policies of clients of the database, in the order given."""
         return [POLICIES[name] for name in _parts(self.policy) if name in POLICIES]
 
     @property
     def campus_policies(self) -> list[CampusPolicy]:
-        """Those of clients of a campus, in the order given."""
+        """Policies of clients of a campus, in the order given."""
         return [CAMPUS_POLICIES[name] for name in _parts(self.policy) if name in CAMPUS_POLICIES]
 
     @property
     def memories(self) -> list[MemorySize]:
-        """In the order given; raises InputError PTM-I111."""
+        """Amounts of texture memory in the order given; raises InputError PTM-I111."""
         return [parse_memory(part) for part in _parts(self.memory)]
 
     def links(self, trace: Trace | None = None) -> list[Conditions]:
-        """A link for each bandwidth, however it is written, all as the trace says; raises
-        InputError PTM-I111."""
+        """A link for each different bandwidth, all with the same trace; raises InputError
+        PTM-I111."""
         latency = parse_duration(self.latency)
         bandwidths = dict.fromkeys(parse_bandwidth(part) for part in _parts(self.bandwidth))
         return [
@@ -113,13 +113,13 @@ class SimulateOptions:
 
 
 @dataclass(frozen=True)
-class Played:
-    """A run and its place among the others.
+class RunResult:
+    """A run with its measures, and its place among the others.
 
     Attributes
     ----------
-    walk, memory: what they are called.
-    flip: mean FLIP of some frames, if it was asked for.
+    walk, memory: their names.
+    flip: mean FLIP of some frames, if requested.
     """
 
     walk: str
@@ -129,9 +129,9 @@ class Played:
     flip: float | None = None
 
 
-def require_hints(served: Served, policies: Sequence[Declared]) -> None:
-    """Raises InputError PTM-I701 if the records lack what a policy needs, or the textures are not
-    there in its form."""
+def require_hints(served: Served, policies: Sequence[PolicyEntry]) -> None:
+    """Raises InputError PTM-I701 if the records lack a field that a policy needs, or the textures
+    are not available in its form."""
     for policy in policies:
         form = FORMS[policy.form]
         available = {*served.index, *served.index.get("textureSets", ())}
@@ -152,16 +152,16 @@ def require_hints(served: Served, policies: Sequence[Declared]) -> None:
 
 
 def counted(world: World, options: SimulateOptions) -> World:
-    """The world with texture memory counted, and ranges asked for, as the options say."""
+    """The world with texture memory and requested ranges as the options define them."""
     world = world.changed(lambda w: replace(w, one_range=w.one_range or options.one_range))
     return world.changed(World.counted_by_paper) if options.paper_bytes else world
 
 
 def budget_of(world: World, memory: MemorySize, form: str = PTM) -> int:
-    """Bytes of texture memory: a share is of what all `.ptm`s take, in whatever form clients take
-    textures; no limit is what all take in that form."""
-    held = memory.of(world.catalogue.whole)
-    return world.in_form(form).catalogue.whole if held is None else held
+    """Bytes of texture memory. A share is relative to all `.ptm`s, whatever the form of the
+    textures; no limit is the memory of all textures in that form."""
+    limit = memory.of(world.catalogue.whole)
+    return world.in_form(form).catalogue.whole if limit is None else limit
 
 
 def play(
@@ -173,23 +173,24 @@ def play(
     flip: bool = False,
     campuses: Mapping[str, CampusWorld] = MappingProxyType({}),
     paper: PaperOptions | None = None,
-) -> list[Played]:
-    """All runs: by link, memory, policy, walk; those of a campus after the others.
+) -> list[RunResult]:
+    """Simulates all runs, ordered by link, memory, policy, walk; those of a campus after the
+    others.
 
     Parameters
     ----------
-    flip: also measure that, of clients of the database.
-    campuses: each walk through a campus, where a policy is of one.
+    flip: also measure FLIP, for clients of the database.
+    campuses: for policies of a campus, each walk through it.
     paper: options of the policy `paper`.
 
     Raises
     ------
-    KeyError: a policy is of a campus, and a walk has none.
-    InputError: PTM-I701 a policy's hints, or the textures in its form, are not there; PTM-I111.
+    KeyError: a policy is of a campus, and a walk is missing in ``campuses``.
+    InputError: PTM-I701 a policy's hints, or the textures in its form, are missing; PTM-I111.
     MissingComponentError: PTM-M100 with ``flip``, without flip-evaluator.
     """
     own = [policy.configured(paper or PaperOptions()) for policy in options.policies]
-    policies: list[Declared | CampusPolicy] = [*own, *options.campus_policies]
+    policies: list[PolicyEntry | CampusPolicy] = [*own, *options.campus_policies]
     cases = [
         (link, memory, policy, name)
         for link in options.links(trace)
@@ -199,28 +200,28 @@ def play(
     ]
     for world in worlds.values():
         require_hints(world.served, options.policies)
-    taken = {
+    in_form = {
         (name, p.form): w.in_form(p.form) for name, w in worlds.items() for p in options.policies
     }
-    standing = {of: world.standing(STANDS) for of, world in taken.items()}
-    looks = {of: Flip(world) for of, world in taken.items()} if flip else {}
+    standing = {key: world.standing(STANDS) for key, world in in_form.items()}
+    flips = {key: Flip(world) for key, world in in_form.items()} if flip else {}
     result = []
     for done, (link, memory, policy, name) in enumerate(cases):
         progress(done, len(cases), "simulating")
         if isinstance(policy, CampusPolicy):
-            held = memory.of(worlds[name].catalogue.whole)
-            both = walk_beside(campuses[name], worlds[name], policy, link, held)
-            result.append(Played(name, memory.text, *both))
+            limit = memory.of(worlds[name].catalogue.whole)
+            outcome = measure_campus_walk(campuses[name], worlds[name], policy, link, limit)
+            result.append(RunResult(name, memory.text, *outcome))
             continue
-        of = name, policy.form
-        world, budget = taken[of], budget_of(worlds[name], memory, policy.form)
+        key = name, policy.form
+        world, budget = in_form[key], budget_of(worlds[name], memory, policy.form)
         run = simulate(world, policy, link, budget)
-        stood = simulate(standing[of], policy, link, budget)
-        seen = float(looks[of].each(run).mean()) if flip else None
-        result.append(Played(name, memory.text, run, measure(run, world, stood), seen))
+        standing_run = simulate(standing[key], policy, link, budget)
+        seen = float(flips[key].each(run).mean()) if flip else None
+        result.append(RunResult(name, memory.text, run, measure(run, world, standing_run), seen))
     return result
 
 
 def _parts(text: str) -> list[str]:
-    """Each once."""
+    """The parts of a list, each once."""
     return list(dict.fromkeys(part.strip() for part in text.split(",")))

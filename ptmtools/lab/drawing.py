@@ -27,7 +27,8 @@ from ptmtools.rendering.records import Sight, Triangles, own_levels, triangles_o
 WIDEST = 4096
 #: Field of view where no viewpoint gives one, degrees.
 FIELD_OF_VIEW = 60.0
-#: Rays per pixel each way, for pictures of at most so many pixels; larger ones have one ray.
+#: Rays per pixel each way, and the largest picture, in pixels, that has several; larger ones have
+#: one ray.
 _SAMPLES, _MANY_PIXELS = 2, 1 << 22
 #: Colour of the sky, 0 to 255, and the least light on surfaces without texture, as on the page.
 _SKY, _AMBIENT = (0.16 * 255, 0.17 * 255, 0.19 * 255), 0.25
@@ -128,7 +129,7 @@ def eye_of(served: Served, options: ViewOptions) -> Eye:
 def draw_view(
     served: Served, options: ViewOptions, progress: Progress = silent
 ) -> NDArray[np.uint8]:
-    """A picture (height, width, 3), sRGB. Only textures that it shows are decoded.
+    """Draws a picture (height, width, 3), sRGB. It decodes only visible textures.
 
     Raises
     ------

@@ -1,6 +1,7 @@
-"""A measure over time, a panel for each link and memory; needs matplotlib (extra ``plot``).
+"""Plots of a measure over time, pictures of the frames of a run, and the paper's Figure 3.
 
-Frames of a run as pictures, and the paper's Figure 3: what arrives before one's eyes.
+A plot has a panel for each link and memory, and needs matplotlib (extra ``plot``). Figure 3 shows
+the picture of a standing viewer as data arrives.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats
-from ptmtools.lab.comparing import Played
+from ptmtools.lab.comparing import RunResult
 from ptmtools.lab.policies import POLICIES
 from ptmtools.lab.policies.paper import PaperOptions
 from ptmtools.lab.renderer import Renderer
@@ -24,7 +25,7 @@ from ptmtools.lab.world import World
 from ptmtools.lazy import component
 from ptmtools.rendering.light import as_bytes
 
-#: What may be drawn: how the axis is called, and the values of a run.
+#: Measures of a plot: label of the axis, and the values of a run.
 MEASURES: dict[str, tuple[str, Callable[[Run], Floats]]] = {
     "e": ("e, mean error of the pixels (0 to 255)", lambda run: run.error),
     "rmse": ("root mean square error (0 to 255)", lambda run: np.sqrt(run.square)),
@@ -39,8 +40,8 @@ def require() -> None:
     component("matplotlib.figure", "PTM-M100", "matplotlib is missing", "plot")
 
 
-def picture(played: Sequence[Played], measure: str = "e") -> bytes:
-    """A PNG of one of `MEASURES`, on the first walk; what the viewpoint stands through is shaded.
+def picture(played: Sequence[RunResult], measure: str = "e") -> bytes:
+    """A PNG of one of `MEASURES`, on the first walk; times with a still viewpoint are shaded.
 
     Raises `MissingComponentError` PTM-M100 without matplotlib.
     """
@@ -49,8 +50,8 @@ def picture(played: Sequence[Played], measure: str = "e") -> bytes:
     from matplotlib.figure import Figure
 
     label, values = MEASURES[measure]
-    first = [p for p in played if p.walk == played[0].walk]
-    blocks = [list(some) for _, some in groupby(first, lambda p: (p.run.conditions, p.memory))]
+    first_walk = [p for p in played if p.walk == played[0].walk]
+    blocks = [list(some) for _, some in groupby(first_walk, lambda p: (p.run.conditions, p.memory))]
     figure = Figure(figsize=(9, 3 * len(blocks)), dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
     for number, block in enumerate(blocks):
@@ -63,7 +64,7 @@ def picture(played: Sequence[Played], measure: str = "e") -> bytes:
     return out.getvalue()
 
 
-def _draw(axes: Any, block: list[Played], values: Callable[[Run], Floats]) -> None:
+def _draw(axes: Any, block: list[RunResult], values: Callable[[Run], Floats]) -> None:
     run = block[0].run
     axes.fill_between(
         run.time, 0, 1, where=run.still, step="mid", color="#f2f2f2", linewidth=0,
@@ -72,7 +73,7 @@ def _draw(axes: Any, block: list[Played], values: Callable[[Run], Floats]) -> No
     for k, one in enumerate(block):
         style = {"color": COLORS[k % len(COLORS)], "label": one.run.policy}
         axes.plot(one.run.time, values(one.run), linewidth=1, **style)
-    # What comes before anything is there would dwarf the rest.
+    # Values before the first arrival would dwarf the rest.
     drawn = [values(one.run) for one in block]
     most = max((float(np.percentile(v, 98)) for v in drawn if np.isfinite(v).all()), default=0.0)
     axes.set_ylim(0, 1.1 * most if most > 0 else 1)
@@ -90,7 +91,7 @@ _STRIP_LINES, _LABEL, _GAP = 360, 26, 6
 
 
 def frames(world: World, run: Run, every: float) -> Iterator[tuple[str, bytes]]:
-    """PNGs of the frames of a run, one each ``every`` seconds, by names that say when."""
+    """PNGs of the frames of a run, one each ``every`` seconds, named by their time."""
     world = world.in_form(POLICIES[run.policy].form)
     renderer = Renderer(world, LINES)
     step = max(1, round(every * world.rate))
@@ -100,24 +101,24 @@ def frames(world: World, run: Run, every: float) -> Iterator[tuple[str, bytes]]:
         yield f"{world.time[f]:07.1f}.png", png(as_bytes(colors))
 
 
-def strip(world: World, played: Played, paper: PaperOptions | None = None) -> bytes:
-    """A PNG: what the client of a run shows after `INSTANTS` to who stands where the walk begins,
-    and the full picture."""
-    of = played.run
-    policy = POLICIES[of.policy].configured(paper or PaperOptions())
+def strip(world: World, played: RunResult, paper: PaperOptions | None = None) -> bytes:
+    """A PNG of Figure 3: the picture of a run's client at `INSTANTS`, from the start of the walk
+    without moving, and the full picture."""
+    finished = played.run
+    policy = POLICIES[finished.policy].configured(paper or PaperOptions())
     world = world.in_form(policy.form)
-    stays = world.standing(INSTANTS[-1])
-    run = simulate(stays, policy, of.conditions, of.budget)
+    standing = world.standing(INSTANTS[-1])
+    run = simulate(standing, policy, finished.conditions, finished.budget)
     renderer = Renderer(world, _STRIP_LINES, samples=3)
-    sight = renderer.look(stays.eye[0], stays.direction[0])
+    sight = renderer.look(standing.eye[0], standing.direction[0])
     frames = []
     for instant in INSTANTS:
-        f = int(np.searchsorted(stays.time, instant - 0.5 / stays.rate))
+        f = int(np.searchsorted(standing.time, instant - 0.5 / standing.rate))
         colors = renderer.colors(sight, run.loaded[f], run.column[f])
         label = f"{instant:g} s, {run.fetched[f] / 1e6:.2f} MB, e {run.error[f]:.2f}"
         frames.append((label, as_bytes(colors)))
     frames.append(("full", as_bytes(renderer.full(sight))))
-    title = f"{of.policy}, {link_text(of.conditions)}, texture memory {played.memory}"
+    title = f"{finished.policy}, {link_text(finished.conditions)}, texture memory {played.memory}"
     return png(_side_by_side(frames, title))
 
 
@@ -133,7 +134,7 @@ def png(picture: NDArray[np.uint8]) -> bytes:
 def _side_by_side(
     pictures: Sequence[tuple[str, NDArray[np.uint8]]], title: str
 ) -> NDArray[np.uint8]:
-    """Labels above and pictures below, on white; the title above all."""
+    """Pictures side by side on white, with labels above; the title at the top."""
     from PIL import Image, ImageDraw, ImageFont
 
     height, width = pictures[0][1].shape[:2]

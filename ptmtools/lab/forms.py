@@ -1,22 +1,19 @@
-"""The forms in which clients take textures, as a table: what can be fetched, and what it shows.
+"""The forms in which clients load textures, as a table: their columns, and the image of each
+column.
 
-Of a texture in a form the columns come one after the other (`Catalogue`); what is on the screen
-with each of them is compared with the same picture, that of the `.ptm`s with all of their levels.
-To add a form: a module with two functions, and a line here; a policy says which one it takes.
+The columns of a texture come one after the other (`Catalogue`). Each displayed image is compared
+with the same picture, that of the `.ptm`s with all levels. To add a form, add a module with two
+functions, and a line here; a policy names its form.
 
-Textures as `.ptm`s: ranges of one file, each a level.
+Form `ptm`: ranges of a `.ptm`, each a level.
 
-Textures as interlaced images: files that are joined on the GPU, one after the other (Englert et
-al. 2014, §3.2).
-
-What is shown with so many files is the image that they make, and mip levels of it by box, as
-`generateMipmap` makes them: for these the paper has powers of two. So a texture takes 4/3 of its
-texels, and each step has mip levels of its own, of an image that was decimated unfiltered. The
-next step replaces the one before it.
-
-Files are requests of their own. Manifests are not on the link: axes follow from the paper's rules,
-and sizes could stand in the index. That the old image, the file and the new one are in texture
-memory together while they are joined is not counted.
+Form `interlaced`: interlaced images, files that are joined on the GPU one after the other (Englert
+et al. 2014, §3.2). After some files the display shows their image with its mip levels by box, as
+`generateMipmap` makes them; the paper has powers of two for these. So a texture takes 4/3 of its
+texels, and each step has mip levels of its own, of an image that was decimated without a filter.
+The next step replaces the one before. Each file is a request. Manifests are not on the link: axes
+follow from the paper's rules, and the index could hold the sizes. While files are joined, the old
+image, the file and the new image are in texture memory together; this is not counted.
 """
 
 from __future__ import annotations
@@ -46,17 +43,17 @@ __all__ = ["FORMS", "PTM", "Form"]
 
 @dataclass(frozen=True)
 class Form:
-    """A form.
+    """A form of textures.
 
     Attributes
     ----------
-    name, about: what it is called, and what it is.
-    columns: what can be fetched of the textures of a served folder, with RGB of three bytes in
-        texture memory if the second argument says so. Raises DatabaseError.
-    shows: what the columns show, given the `.ptm`s; None: the levels of those. Raises
+    name, about: its name and description.
+    columns: the columns of the textures of a served folder; with RGB of three bytes in texture
+        memory if the second argument is true. Raises DatabaseError.
+    shows: the images of the columns, given the `.ptm`s; None: the levels of those. Raises
         DatabaseError, LimitError.
-    needs: the one of the index's texture sets or lists that it reads, and how to get it.
-    octrees: whether octree textures are fetched, too, which only lit pictures show.
+    needs: the texture set or list of the index that it reads, and how to get it.
+    octrees: whether octree textures are also fetched, which only lit pictures show.
     """
 
     name: str
@@ -84,7 +81,7 @@ _LIST = (
         octrees=True,
     ),
 )
-#: By name, and the one that others are compared with.
+#: Forms by name, and the reference form.
 FORMS = {form.name: form for form in _LIST}
 PTM = "ptm"
 
@@ -104,8 +101,8 @@ _LIMITS = Limits(decoded_bytes=1 << 33)
 def interlaced_columns(served: Served, paper: bool) -> Columns:
     """See `Form.columns`: a column is a file.
 
-    Raises DatabaseError: PTM-D005, D006 a manifest is missing or damaged, or not what the index
-    says.
+    Raises DatabaseError: PTM-D005, PTM-D006 a manifest is missing or damaged, or does not match the
+    index.
     """
     rows = []
     for t in range(len(served.index["textures"])):
@@ -119,7 +116,7 @@ def interlaced_columns(served: Served, paper: bool) -> Columns:
 
 
 def shows(served: Served, own: Pyramids, progress: Progress) -> Shows:
-    """See `Form.shows`: of each column the image that its files make, and its mip levels.
+    """See `Form.shows`: the image of the files of each column, with its mip levels.
 
     Raises DatabaseError: as `columns`, and of the files. LimitError: PTM-L104, L204.
     """
@@ -141,7 +138,7 @@ def shows(served: Served, own: Pyramids, progress: Progress) -> Shows:
 
 
 def mip_sizes(width: int, height: int) -> Iterator[tuple[int, int]]:
-    """Those of an image and of its mip levels, the finest first."""
+    """Sizes of an image and of its mip levels, the finest first."""
     yield width, height
     while max(width, height) > 1:
         width, height = max(1, width >> 1), max(1, height >> 1)
@@ -149,8 +146,8 @@ def mip_sizes(width: int, height: int) -> Iterator[tuple[int, int]]:
 
 
 def mip_levels(image: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
-    """An (h, w, 3) image, of powers of two, and its mip levels, the coarsest first: means of 2 × 2
-    texels, rounded."""
+    """An (h, w, 3) image, of powers of two, with its mip levels, the coarsest first: rounded means
+    of 2 × 2 texels."""
     levels = [image]
     while max(image.shape[:2]) > 1:
         for axis in (0, 1):
@@ -180,7 +177,7 @@ def _packed(chains: list[list[NDArray[np.uint8]]]) -> Pyramids:
 
 
 def _images(served: Served, texture: int) -> Iterator[NDArray[np.uint8]]:
-    """(h, w, 3) the image that the first file makes, the first two, …"""
+    """(h, w, 3) images of the first file, of the first two, …"""
     folder, interlaced = _manifest(served, texture)
     check_joined(interlaced, len(interlaced.parts), _LIMITS, folder)
     image = None

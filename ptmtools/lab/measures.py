@@ -1,7 +1,7 @@
-"""What a run was worth to the walker, and what it cost, as a few numbers.
+"""The quality and the cost of a run as a few numbers, and FLIP of a few of its frames.
 
-FLIP of a few frames of a run: the difference from the full picture as people see it when they
-flip between the two (Andersson et al. 2020), 0 to 1; needs flip-evaluator (extra ``measures``).
+FLIP is the difference from the full picture as people see it when they flip between the two
+(Andersson et al. 2020), 0 to 1; it needs flip-evaluator (extra ``measures``).
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from ptmtools.lab.world import World
 from ptmtools.lazy import component
 from ptmtools.rendering.records import Sight
 
-#: Of the way from nothing to the full picture.
+#: Shares of the error removed, between no data and the full picture.
 SHARES = (0.5, 0.9, 0.99)
-#: How long the walker stands for it, s.
+#: Duration of the standing run, s.
 STANDS = 60.0
 
 
 @dataclass(frozen=True)
 class Summary:
-    """A measure over the frames: the mean of all, what 95 % of them do not exceed, and the means of
-    those in which the viewpoint is still and in which it is not; NaN where there are none."""
+    """A measure over the frames: its mean, its 95th percentile, and its means over frames with a
+    still and a moving viewpoint; NaN without such frames."""
 
     mean: float
     p95: float
@@ -41,16 +41,16 @@ class Measures:
     """
     Attributes
     ----------
-    e: see `Run.error`. rmse: its squares, averaged before the root is taken. missing, quality: see
-        `Run`; of the quality, ``p95`` is what 95 % of the frames reach.
+    e: see `Run.error`. rmse: root of the mean squared error. missing, quality: see `Run`; the
+        ``p95`` of the quality is what 95 % of the frames reach.
     bytes: received of bodies. overhead, cancelled: received of headers, and after cancellations.
-    waste: the share of what was received of textures, of geometry and after cancellations that was
-        never on the screen; 0 if nothing was received.
-    requests: how many. stalls: s in which the cell that the walker is in was not there.
-    uploads: bytes that went to texture memory. switches: of finest levels, a minute.
+    waste: the share of received textures, geometry and cancelled bytes that was never displayed; 0
+        if nothing was received.
+    requests: number of requests. stalls: s in which the geometry of the current cell was missing.
+    uploads: bytes uploaded to texture memory. switches: changes of finest levels per minute.
     overruns: frames above the budget.
-    final: s after which, of a walker who stands where the walk begins, e has fallen to what
-        `SHARES` leave of that of nothing; None: not within `STANDS`.
+    final: s until `SHARES` of the initial e are gone, for a visitor who stands where the walk
+        begins; None: not within `STANDS`.
     """
 
     e: Summary
@@ -87,12 +87,12 @@ def measure(run: Run, world: World, standing: Run) -> Measures:
         uploads=run.uploads,
         switches=run.switches * 60 * world.rate / world.frames,
         overruns=run.overruns,
-        final=seconds_to(standing, nothing_there(world, 0)),
+        final=seconds_to(standing, empty_error(world, 0)),
     )
 
 
-def nothing_there(world: World, frame: int) -> float:
-    """The e of a frame where nothing has arrived."""
+def empty_error(world: World, frame: int) -> float:
+    """The e of a frame before any arrival."""
     rows = world.views.rows(int(world.view[frame]))
     return float(world.views.error[rows, 0].sum())
 
@@ -104,7 +104,7 @@ def _summary(
     *,
     high_is_good: bool = False,
 ) -> Summary:
-    """Of (F,) values; ``after`` is applied to the means."""
+    """The summary of (F,) values; ``after`` is applied to the means."""
 
     def mean(some: Floats) -> float:
         return after(float(some.mean())) if len(some) else math.nan
@@ -118,17 +118,17 @@ def _summary(
 
 
 def seconds_to(standing: Run, nothing: float) -> tuple[float | None, ...]:
-    """`Measures.final` of who stands, where e of nothing is as given."""
-    # A table of float32 may leave a little of an error that is none.
+    """`Measures.final` of a standing run, with the e before any arrival."""
+    # A table of float32 may leave a rounding error.
     rounding = nothing * float(np.finfo(np.float32).eps)
     reached = [standing.error <= (1 - share) * nothing + rounding for share in SHARES]
     return tuple(float(standing.time[r.argmax()]) if r.any() else None for r in reached)
 
 
-#: Frames that are looked at, and the seed by which they are drawn.
+#: Number of compared frames, and the seed of their choice.
 FRAMES, SEED = 12, 1
-#: Pixels of a picture (320 × 240), as wide as the walk's view is; pixels a degree of the eye: those
-#: of a screen of 3840 pixels, 0.7 m wide, 0.7 m away.
+#: Pixels of a picture (320 × 240) with the aspect of the walk; pixels per degree of the eye, for a
+#: screen of 3840 pixels, 0.7 m wide, 0.7 m away.
 PIXELS, PER_DEGREE = 76_800, 67.0
 _SAMPLES = 3
 
@@ -139,11 +139,11 @@ def require() -> None:
 
 
 class Flip:
-    """Looks at some frames of a world, the same in all runs through it.
+    """Compares some frames of a world, the same in all runs through it.
 
     Attributes
     ----------
-    frame: (n,) which. height, width: of the pictures.
+    frame: (n,) numbers of the frames. height, width: of the pictures.
     """
 
     def __init__(self, world: World, count: int = FRAMES, seed: int = SEED) -> None:
@@ -183,5 +183,5 @@ def flip(reference: Floats, test: Floats) -> float:
     difference, _, _ = flip_evaluator.evaluate(
         *shown, "LDR", applyMagma=False, parameters={"ppd": PER_DEGREE}
     )
-    # Its own mean is summed up by several threads, in any order.
+    # The mean of flip-evaluator is summed up by several threads in any order.
     return float(np.mean(difference, dtype=np.float64))

@@ -1,29 +1,27 @@
 """The link between a client and its server: requests that share a bandwidth, as a fluid.
 
-Bytes are real numbers and flow at the rate of the link, so that the link changes only at events:
-the first byte of a response, its last, the end of what was under way when a request was cancelled,
-the next step of a trace. Between two events all is linear, and nothing is approximated. Slow start,
-queues in routers and the server's own time are not modelled; `Conditions.latency` is all that
-passes before the first byte. Time is seconds from 0, on no clock.
+Bytes are real numbers and flow at the rate of the link, so the link changes only at events: the
+first byte of a response, its last, the last byte under way after a cancellation, the next step of a
+trace. Between two events all is linear, and nothing is approximated. Slow start, queues in routers
+and the server's own time are not modelled; `Conditions.latency` is the whole time before the first
+byte. Time is seconds from 0, without a clock.
 
-What a request costs: `Conditions.latency` until its first byte, then `Conditions.overhead` bytes of
-headers, then its body. Alone on the link it takes latency + 8 (overhead + size) / bandwidth.
+The cost of a request: `Conditions.latency` until its first byte, then `Conditions.overhead` bytes
+of headers, then its body. Alone on the link it takes latency + 8 (overhead + size) / bandwidth.
 
-`h1` (HTTP/1.1): so many connections, six in browsers, of one request each; those that are past
+`h1` (HTTP/1.1): a number of connections, six in browsers, of one request each; those that are past
 their first byte share the bandwidth equally. Further requests wait for a connection, those of the
-highest priority first. The connections are open at the beginning.
-`h2` (HTTP/2): one connection takes all requests at once, and all of the bandwidth goes to that of
-the highest priority among those past their latency, of two equal ones to the elder.
+highest priority first. The connections are open at the beginning. `h2` (HTTP/2): one connection
+takes all requests at once. All bandwidth goes to the request of the highest priority among those
+past their latency; of two equal ones to the elder.
 
-Cancelling: what the client holds stays, and so does, on the link, what the server has sent by then,
-that is what would arrive within half a latency; nobody wants it any more. On `h1` the connection is
-lost, and the one opened in its place costs its first request one more latency.
+Cancelling: the client keeps the bytes it has. The bytes that the server has already sent, which
+would arrive within half a latency, stay on the link and are wasted. On `h1` the connection is lost,
+and the first request on its replacement takes one more latency.
 
-Loss: at a share p of lost packets, goodput is 1 − p of the bandwidth, and with the probability p
-the request or the head of its response is itself lost, and the first byte comes one latency later.
-The draws are those of a seeded generator, one a request.
-
-A range of bytes that a client has asked for, as `Link` keeps it.
+Loss: at a share p of lost packets, goodput is 1 − p of the bandwidth; with probability p the
+request or the head of its response is lost, and the first byte comes one latency later. A seeded
+generator draws once per request.
 """
 
 from __future__ import annotations
@@ -39,24 +37,24 @@ from ptmtools.link import Conditions, Step
 
 @dataclass(eq=False, slots=True)
 class Request:
-    """For the client to read; only its link writes it.
+    """A range of bytes that a client has requested; only its link writes it.
 
     Attributes
     ----------
     size: bytes of the body.
     overhead: bytes of headers, which come before.
-    priority: the greater, the sooner.
-    tag: whatever the client wants to know it by.
-    number: how many requests were made before.
-    issued: when it was asked for, s. late: so many seconds later it goes out on its connection.
-    sent: when it went out, s, later than that if it had to wait for a connection; None before.
-    first_byte: when its response began to arrive, s; None before.
-    ended: when it was finished or cancelled, s; None before.
-    finished, cancelled: whether it has come whole; whether the client gave it up.
-    left: bytes that are yet to come, headers included.
-    kept: what ``left`` was when it was cancelled: what came later, nobody wanted.
-    starts, stops: when its response may begin to arrive, s; when, once it is cancelled, the last of
-        what was under way has arrived.
+    priority: greater values go first.
+    tag: an identifier of the client's choice.
+    number: number of requests made before.
+    issued: time of the request, s. late: delay of its sending on its connection, s.
+    sent: time of its sending, s, later if it had to wait for a connection; None before.
+    first_byte: start of the arrival of its response, s; None before.
+    ended: time of its end or cancellation, s; None before.
+    finished, cancelled: whether it has arrived completely; whether the client cancelled it.
+    left: bytes still to arrive, headers included.
+    kept: ``left`` at the time of the cancellation; later bytes are unwanted.
+    starts, stops: earliest arrival of its response, s; after a cancellation, arrival of the last
+        byte under way.
     """
 
     size: int
@@ -81,7 +79,7 @@ class Request:
 
     @property
     def arrived(self) -> float:
-        """Bytes that arrived while they were wanted, headers included."""
+        """Bytes that arrived before a cancellation, headers included."""
         return self.overhead + self.size - (self.kept if self.cancelled else self.left)
 
     @property
@@ -91,23 +89,23 @@ class Request:
 
     @property
     def unwanted(self) -> float:
-        """Bytes that arrived when it had been cancelled, headers included."""
+        """Bytes that arrived after its cancellation, headers included."""
         return self.kept - self.left if self.cancelled else 0.0
 
     @property
     def rank(self) -> tuple[float, int]:
-        """Requests with a lesser one go first."""
+        """Requests of a lesser rank go first."""
         return -self.priority, self.number
 
 
-#: So much of a latency is what the server sends on its way.
+#: Share of the latency that the bytes of the server are under way.
 _UNDER_WAY = 0.5
 _left, _rank = attrgetter("left"), attrgetter("rank")
 _starts, _stops = attrgetter("starts"), attrgetter("stops")
 
 
 class Link:
-    """A link, and what is on it.
+    """A link with its requests.
 
     Bytes are booked twice: ``carried`` is the integral of the rate over time, and equals
     ``bytes + overhead_bytes + wasted + partial``.
@@ -115,11 +113,12 @@ class Link:
     Attributes
     ----------
     now: s.
-    busy: s during which something was arriving, or would have been had the link not been down.
+    busy: s during which bytes were arriving, or would have been if the link had not been down.
     carried: all bytes that have arrived.
-    bytes, overhead_bytes: of bodies and of headers, of requests that have ended, before they ended.
-    wasted: bytes that arrived after their request had been cancelled, once the last of them has.
-    requests: how many there were.
+    bytes, overhead_bytes: bytes of bodies and of headers of ended requests, before they ended.
+    wasted: bytes that arrived after the cancellation of their request, counted when the last one
+        has arrived.
+    requests: number of requests.
     """
 
     def __init__(self, conditions: Conditions) -> None:
@@ -128,10 +127,10 @@ class Link:
         self.bytes = self.overhead_bytes = self.wasted = 0.0
         self.requests = 0
         self._shared = conditions.protocol == "h1"
-        #: Connections that are free: open ones, and those that are to be opened.
+        #: Free connections: open ones, and those still to be opened.
         self._open, self._closed = conditions.connections, 0
-        #: Without a connection, by rank; before the first byte, by its time; arriving, by rank;
-        #: cancelled ones of the latter two, by the end of what is under way.
+        #: Requests without a connection, by rank; before the first byte, by its time; arriving, by
+        #: rank; cancelled ones of the latter two, by the arrival of their last byte under way.
         self._queue: list[Request] = []
         self._away: list[Request] = []
         self._arriving: list[Request] = []
@@ -143,12 +142,12 @@ class Link:
 
     @property
     def partial(self) -> float:
-        """Bytes so far of what is still arriving: headers, bodies, and what is unwanted."""
+        """Bytes so far of arriving requests: headers, bodies, and unwanted bytes."""
         return sum(r.unwanted if r.cancelled else r.arrived for r in self._arriving)
 
     def request(self, size: int, priority: float, tag: object = None, late: float = 0.0) -> Request:
-        """Ask for ``size`` bytes now; ValueError if they are fewer than none. It goes out so many
-        seconds late, ``late``, on a connection that it has taken."""
+        """Requests ``size`` bytes now, on a connection that it occupies ``late`` seconds before
+        sending; ValueError for a negative size."""
         if size < 0:
             raise ValueError(f"a request of {size} bytes")
         request = Request(
@@ -163,7 +162,7 @@ class Link:
         return request
 
     def reprioritise(self, request: Request, priority: float) -> None:
-        """Change the priority of a request: at once, and on ``h1`` to no effect once it is sent."""
+        """Changes the priority of a request at once; on ``h1`` without effect once it is sent."""
         ranked = next((some for some in (self._queue, self._arriving) if request in some), None)
         if ranked is not None:
             ranked.remove(request)
@@ -172,7 +171,7 @@ class Link:
             insort(ranked, request, key=_rank)
 
     def cancel(self, request: Request) -> None:
-        """Give a request up now; nothing happens to one that has ended."""
+        """Cancels a request now; an ended one stays as it is."""
         if request.ended is not None:
             return
         request.kept, request.cancelled, request.ended = request.left, True, self.now
@@ -188,9 +187,9 @@ class Link:
             self._connect()
 
     def advance(self, until: float) -> Request | None:
-        """Let time pass until the next request is finished, which is returned, or ``until``, s.
+        """Advances time until the next request is finished, which is returned, or to ``until``, s.
 
-        Of requests that are finished at the same moment each call returns one. ValueError if
+        Each call returns one of the requests that finish at the same moment. ValueError if
         ``until`` is past or not finite.
         """
         if not self.now <= until < math.inf:
@@ -216,7 +215,8 @@ class Link:
                 self.now = following
 
     def _turn(self) -> None:
-        """What is due now: steps of the trace, first bytes, the end of what is unwanted."""
+        """Handles events that are due: steps of the trace, first bytes, the end of unwanted
+        bytes."""
         while self._step_ends <= self.now:
             self._next_step()
         while self._away and self._away[0].starts <= self.now:
@@ -227,7 +227,8 @@ class Link:
             self.wasted += request.unwanted
 
     def _flow(self, until: float) -> Request | None:
-        """What arrives by ``until``; at most until a request is whole, which then is returned."""
+        """Moves bytes up to ``until``, at most until a request is complete, which is then
+        returned."""
         receivers = self._arriving if self._shared else self._arriving[:1]
         nearest = min(receivers, key=_left)
         rate = self._rate / len(receivers)
@@ -236,7 +237,7 @@ class Link:
         whole = self.now + seconds <= until
         if not whole:
             seconds = until - self.now
-            amount = min(amount, rate * seconds)  # which rounding may take beyond what is left
+            amount = min(amount, rate * seconds)  # rounding may exceed the rest
         for request in receivers:
             if amount and request.first_byte is None:
                 request.first_byte = self.now
@@ -261,7 +262,7 @@ class Link:
         return request
 
     def _connect(self) -> None:
-        """Connections that are free take what waits; one that is to be opened needs a latency."""
+        """Gives free connections to waiting requests; opening one takes a latency."""
         while self._queue and self._open + self._closed:
             if self._open:
                 self._open -= 1

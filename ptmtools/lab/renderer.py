@@ -1,7 +1,7 @@
-"""Pictures of frames of a walk, with the levels that a client has, or with all.
+"""Renders frames of a walk with the levels that a client has, or with all.
 
-As for the tables, levels are chosen as for the screen of the walk, of 1080 lines unless it was
-recorded: a smaller picture is the same one made smaller. At 960 × 540 with two samples each way its
+As in the tables, the level of detail is that of the screen of the walk, of 1080 lines unless it was
+recorded: a smaller picture is the same one scaled down. At 960 × 540 with two samples each way the
 samples are the pixels of the screen.
 """
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Renderer:
-    """Draws pictures of ``height`` lines, as wide as the walk's view is, with ``samples`` each way
+    """Renders pictures of ``height`` lines with the aspect of the walk, with ``samples`` each way
     of every pixel."""
 
     def __init__(self, world: World, height: int, samples: int = 2) -> None:
@@ -42,17 +42,17 @@ class Renderer:
         self._lamps = lamps(world.served.surfaces.corner) if world.relief else np.zeros(0)
 
     def look(self, eye: Floats, direction: Floats) -> Sight:
-        """What is seen from an eye (3,) in a direction (3,)."""
+        """The surfaces seen from an eye (3,) in a direction (3,)."""
         return self._caster.look(self._camera, eye, direction)
 
     def colors(self, sight: Sight, loaded: Bools, column: Ints) -> Floats:
-        """(height, width, 3) 0 to 255, with the geometry of cells (C,) that is there and a column
-        (T,) of each texture."""
+        """(height, width, 3) 0 to 255, with the loaded geometry of cells (C,) and a column (T,) of
+        each texture."""
         return self._drawn(sight, self._shows, loaded, column)
 
     def full(self, sight: Sight) -> Floats:
-        """The same with everything there, in whatever form clients take it: all levels of the
-        pyramids and of octrees, or what the walk is compared with."""
+        """The full picture, whatever the form of the textures: all levels of the pyramids and of
+        octrees, or the reference of the walk."""
         relief = self._world.relief
         if relief and relief.reference:
             return self._picture(relief.reference.shown(relief.reference.look(sight)))
@@ -76,7 +76,7 @@ class Renderer:
         return self._picture(shown)
 
     def _picture(self, shown: Floats) -> Floats:
-        """(height, width, 3) of (n, 3) samples."""
+        """(height, width, 3) picture of (n, 3) samples."""
         each = (self.height, self.samples, self.width, self.samples, 3)
         result: Floats = shown.reshape(each).mean(axis=(1, 3))
         return result

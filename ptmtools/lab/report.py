@@ -1,4 +1,4 @@
-"""Runs as a table of text, as a JSON document, and as CSV, a row for each frame."""
+"""Reports runs as a table of text, as a JSON document, and as CSV with a row for each frame."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ptmtools.lab.campus.world import CampusWorld
-from ptmtools.lab.comparing import Played
+from ptmtools.lab.comparing import RunResult
 from ptmtools.lab.measures import FRAMES, PER_DEGREE, PIXELS, SHARES
 from ptmtools.lab.policies.paper import PaperOptions
 from ptmtools.lab.world import World
@@ -22,14 +22,14 @@ from ptmtools.link import Conditions
 from ptmtools.quantities import count, size
 
 FORMAT, SCHEMA = "ptmtools simulation", 1
-#: What a reader has to know of the table.
+#: Explanation of the table.
 INTRODUCTION = (
     "e says how far the picture is from the full one: the root mean square over red, green and",
     "blue (0 to 255), averaged over the pixels. 0 is the full picture, 1 a step of 8-bit colour.",
     "Waste is what was received and never on the screen. For who stands where the walk begins, e",
     "has halved after the seconds under 50%, and so on.",
 )
-#: Of the CSV.
+#: Columns of the CSV.
 COLUMNS = (
     *("policy", "bandwidth", "latency", "protocol", "memory", "walk", "time", "still"),
     *("e", "rmse", "missing", "quality", "texture_bytes", "received_bytes"),
@@ -38,7 +38,7 @@ _DIGITS = 6
 
 
 def table(
-    played: Sequence[Played],
+    played: Sequence[RunResult],
     worlds: Mapping[str, World],
     *,
     lit: bool = False,
@@ -91,7 +91,7 @@ def _walk_line(world: World) -> str:
 
 
 def rate_text(bandwidth: float | None) -> str:
-    """bit/s as people say them."""
+    """A bandwidth in bit/s with a decimal prefix."""
     if bandwidth is None:
         return "no limit of bandwidth"
     power, unit = next((p, u) for p, u in _UNITS if bandwidth >= p or p == 1)
@@ -99,7 +99,7 @@ def rate_text(bandwidth: float | None) -> str:
 
 
 def link_text(link: Conditions) -> str:
-    """What a link is like."""
+    """A link in words."""
     traced = ", by a trace" if link.trace else ""
     return f"{rate_text(link.bandwidth)}, {link.latency * 1000:g} ms, {link.protocol}{traced}"
 
@@ -111,12 +111,12 @@ def _final_head() -> str:
     return " ".join(f"{f'{share:.0%}':>6}" for share in SHARES)
 
 
-def _row(name: str, some: list[Played], *, flip: bool) -> str:
+def _row(name: str, some: list[RunResult], *, flip: bool) -> str:
     measures = [p.measures for p in some]
     e = [m.e.mean for m in measures]
     spread = f"{f'{min(e):.2f}–{max(e):.2f}':>13} " if len(some) > 1 else ""
     flips = [p.flip for p in some if p.flip is not None]
-    alike = f"{_mean(flips, '.4f'):>6} " if flip else ""
+    flip_text = f"{_mean(flips, '.4f'):>6} " if flip else ""
     stalled = _mean([m.stalls for m in measures], ".1f")
     final = []
     for k in range(len(SHARES)):
@@ -126,7 +126,7 @@ def _row(name: str, some: list[Played], *, flip: bool) -> str:
     return (
         f"  {name} {np.mean(e):6.2f} {spread}{_mean([m.e.p95 for m in measures]):>6} "
         f"{_mean([m.e.still for m in measures]):>6} {_mean([m.e.moving for m in measures]):>6} "
-        f"{_mean([m.rmse.mean for m in measures]):>6} {alike}"
+        f"{_mean([m.rmse.mean for m in measures]):>6} {flip_text}"
         f"{_mean([m.missing.mean for m in measures], '.1%'):>7} "
         f"{_mean([m.quality.mean for m in measures], '.1%'):>7} "
         f"{size(round(np.mean([m.bytes for m in measures]))):>9} "
@@ -137,21 +137,21 @@ def _row(name: str, some: list[Played], *, flip: bool) -> str:
 
 
 def _mean(values: list[float], form: str = ".2f") -> str:
-    """Of those that are numbers."""
+    """The mean of the numbers, without NaN."""
     known = [v for v in values if not np.isnan(v)]
     return format(np.mean(known), form) if known else "–"
 
 
 def document(
     database: str,
-    played: Sequence[Played],
+    played: Sequence[RunResult],
     worlds: Mapping[str, World],
     *,
     lit: bool = False,
     against: str | None = None,
     paper: PaperOptions | None = None,
 ) -> Any:
-    """All runs as JSON has them; the schema is published. Numbers have `_DIGITS` digits."""
+    """All runs as a JSON document of a published schema. Numbers have `_DIGITS` digits."""
     some = next(iter(worlds.values()))
     return {
         "format": FORMAT,
@@ -185,7 +185,7 @@ def _paper_document(options: PaperOptions) -> dict[str, Any]:
     }
 
 
-def _run_document(played: Played) -> dict[str, Any]:
+def _run_document(played: RunResult) -> dict[str, Any]:
     run, m = played.run, played.measures
     figures = {
         "policy": run.policy,
@@ -223,9 +223,9 @@ def _rounded(value: Any) -> Any:
     return round(value, _DIGITS) if isinstance(value, float) else value
 
 
-def as_csv(played: Sequence[Played]) -> str:
-    """A row for each frame of each run; an empty bandwidth is none, and what is not counted of a
-    client is empty."""
+def as_csv(played: Sequence[RunResult]) -> str:
+    """CSV with a row for each frame of each run. Empty are the bandwidth without a limit, and
+    measures that do not apply to a client."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(COLUMNS)

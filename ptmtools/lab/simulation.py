@@ -1,7 +1,7 @@
-"""One run: a client with a policy walks through a world over a link.
+"""Simulates one run: a client with a policy walks through a world over a link.
 
-Time goes from frame to frame. What arrives in between is handed to the client at once, and may make
-it ask for more; what is in texture memory changes only with a frame.
+Time proceeds from frame to frame. The client receives arrivals at once and may then make more
+requests; texture memory changes only with a frame.
 """
 
 from __future__ import annotations
@@ -16,34 +16,34 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.lab.allocation import picture
 from ptmtools.lab.client import DOCUMENTS, Client, Kind
 from ptmtools.lab.network import Link, Request
-from ptmtools.lab.policies import Declared
+from ptmtools.lab.policies import PolicyEntry
 from ptmtools.lab.world import World
 from ptmtools.link import Conditions
 
-#: Seconds from one look of a client in a browser to the next, unless something has arrived.
+#: Seconds between updates of a client in a browser, unless something has arrived.
 LOOK_SECONDS = 0.2
 
 
 @dataclass(frozen=True)
 class Run:
-    """What came of a run; F frames.
+    """Result of a run; F frames.
 
     Attributes
     ----------
-    policy, conditions, budget: what was run; the budget is bytes of texture memory.
+    policy, conditions, budget: policy, link, and bytes of texture memory.
     time: (F,) s. still: (F,).
     error: (F,) e, the mean over the pixels of the root mean square over R, G and B, 0 to 255.
     square: (F,) the mean of its square.
-    missing: (F,) share of the wanted levels on the screen that are not there.
+    missing: (F,) share of the wanted levels on the screen that are missing.
     quality: (F,) the paper's: levels downloaded over levels existing, of the textures of the
         visible set.
     memory: (F,) bytes of texture memory in use. fetched: (F,) bytes of bodies received so far.
-    column: (F, T) what of each texture is in texture memory. there: (F, C) whose geometry is there.
-    body, overhead, cancelled: bytes received: bodies, headers, what came after a cancellation.
-    documents: bytes of bodies that are neither textures nor geometry.
-    useful: bytes of textures and geometry that were on the screen.
-    uploads: bytes that went to texture memory. switches: changes of a texture's finest level.
-    requests: how many. stalls: frames in which the cell the walker is in was not there.
+    column: (F, T) resident column of each texture. loaded: (F, C) whether the geometry is loaded.
+    body, overhead, cancelled: bytes received: bodies, headers, arrivals after a cancellation.
+    documents: bytes of other bodies than textures and geometry.
+    useful: bytes of textures and geometry that were displayed.
+    uploads: bytes uploaded to texture memory. switches: changes of a texture's finest level.
+    requests: number of requests. stalls: frames without the geometry of the current cell.
     overruns: frames above the budget.
     """
 
@@ -72,10 +72,11 @@ class Run:
     overruns: int
 
 
-def simulate(world: World, policy: Declared, conditions: Conditions, budget: int) -> Run:
-    """Walks, with textures in the policy's form. The same arguments give the same run, bit for bit.
+def simulate(world: World, policy: PolicyEntry, conditions: Conditions, budget: int) -> Run:
+    """Simulates a walk, with textures in the policy's form. The same arguments give the same run,
+    bit for bit.
 
-    Raises InputError PTM-I701 if the world was not made ready for that form.
+    Raises InputError PTM-I701 if the world was not prepared for that form.
     """
     world = world.in_form(policy.form)
     link = Link(conditions)
@@ -88,13 +89,13 @@ def simulate(world: World, policy: Declared, conditions: Conditions, budget: int
     shown = np.zeros(stock.ends.shape, dtype=bool)
     drawn = np.zeros(stock.cell_count, dtype=bool)
     each = np.arange(stock.texture_count)
-    passing = _Passing(client, link)
+    clock = _Clock(client, link)
     for f in range(frames):
         for tick in range(1, client.ticks if f else 0):
             part = tick / client.ticks
-            passing.until(float((1 - part) * world.time[f - 1] + part * world.time[f]))
+            clock.until(float((1 - part) * world.time[f - 1] + part * world.time[f]))
             client.tick()
-        passing.frame(f)
+        clock.frame(f)
         column[f], loaded[f] = client.column, client.geometry.whole
         memory[f] = stock.memory[each, client.column].sum()
         rows = views.rows(int(world.view[f]))
@@ -104,7 +105,7 @@ def simulate(world: World, policy: Declared, conditions: Conditions, budget: int
         )  # fmt: skip
         quality[f] = _quality(client)
         arriving = sum(request.received for request in client.waiting)
-        fetched[f] = link.bytes - passing.page_bytes + arriving
+        fetched[f] = link.bytes - clock.page_bytes + arriving
         client.fetch()
     steps = np.diff(column, axis=0, prepend=0)
     before = column - steps
@@ -131,32 +132,32 @@ def simulate(world: World, policy: Declared, conditions: Conditions, budget: int
         useful=textures + float(stock.geometry_bytes[drawn].sum()),
         uploads=int(np.maximum(held[0] - held[1], 0).sum()),
         switches=int(np.count_nonzero(steps)),
-        requests=link.requests - passing.page,
+        requests=link.requests - clock.page,
         stalls=int((~loaded[np.arange(frames), world.cell]).sum()),
         overruns=int((memory > policy.limits(world, budget)).sum()),
     )
 
 
-class _Passing:
-    """Time passes for a client, which in a browser does not look in every frame, and finds files on
-    the way that it has not asked for.
+class _Clock:
+    """Time for a client. In a browser the client does not update in every frame, and some files are
+    pushed without its request.
 
     Attributes
     ----------
-    page, page_bytes: how many files of the page itself were asked for, and the bytes of those that
-        have come.
+    page, page_bytes: number of requested files of the page itself, and the bytes of those that have
+        arrived.
     """
 
     def __init__(self, client: Client, link: Link) -> None:
         self._client, self._link = client, link
         self._browser = client.world.browser
-        self._given = deque(self._browser.files if self._browser else ())
+        self._pushed = deque(self._browser.files if self._browser else ())
         self._begun, self._news, self._looked = False, False, -math.inf
         self._late: deque[tuple[float, Request]] = deque()
         self.page = self.page_bytes = 0
 
     def until(self, moment: float) -> None:
-        """Time passes, and the client handles what arrives."""
+        """Advances time; the client handles arrivals."""
         while True:
             due = self._late[0][0] if self._late else math.inf
             finished = self._arrival(min(due, moment))
@@ -174,8 +175,8 @@ class _Passing:
                 return
 
     def frame(self, frame: int) -> None:
-        """Time passes up to a frame, and the client looks: in a browser several times a second, and
-        if there is something new."""
+        """Advances time to a frame, and updates the client: in a browser several times a second,
+        and after arrivals."""
         now = float(self._client.world.time[frame])
         self.until(now)
         self._begun = True
@@ -191,17 +192,17 @@ class _Passing:
             self._client.fetch()
 
     def _arrival(self, moment: float) -> Request | None:
-        """The next of the client's files to arrive by then."""
-        while self._given and self._given[0].asked <= moment:
-            finished = self._flow(max(self._given[0].asked, self._link.now))
+        """The next file of the client to arrive by then."""
+        while self._pushed and self._pushed[0].asked <= moment:
+            finished = self._flow(max(self._pushed[0].asked, self._link.now))
             if finished:
                 return finished
-            given = self._given.popleft()
-            if given.kind == "page":
+            pushed = self._pushed.popleft()
+            if pushed.kind == "page":
                 self.page += 1
-                self._link.request(given.size, math.inf)
+                self._link.request(pushed.size, math.inf)
             else:
-                self._client.give(Kind[given.kind.upper()], given.number, given.size)
+                self._client.give(Kind[pushed.kind.upper()], pushed.number, pushed.size)
         return self._flow(moment)
 
     def _flow(self, moment: float) -> Request | None:

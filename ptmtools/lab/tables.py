@@ -1,17 +1,17 @@
-"""Tables along a walk: what each pair of cell and texture covers, and its error at each level.
+"""Tables along a walk: the share of each pair of cell and texture on the screen, and its error at
+each level.
 
-For every pixel of a frame the texture is sampled as OpenGL would, trilinearly, once with all of its
-levels and once for each level as the finest that is there. The difference, root mean square over R,
-G and B (0 to 255), is summed up by the pair. A run then only looks up: the error of a frame is the
-sum over its pairs, each at the level that the client holds. Nothing that is no texture is wrong
-once its cell is there; what is not there is grey.
+For every pixel of a frame the texture is sampled as in OpenGL, trilinearly, once with all levels
+and once for each level as the finest one. The difference, root mean square over R, G and B (0 to
+255), is summed up by pair. A run only looks up errors: that of a frame is the sum over its pairs,
+each at the client's level. Surfaces without texture have no error once their cell is loaded;
+missing cells are grey.
 
-The same casting of the rays serves textures in several forms (`ptmtools.lab.forms`). Of the
-levels of one pyramid each pixel samples every one once; a form whose steps are pyramids of their
-own (`Shows`) costs a sample of each.
+The same rays serve textures in several forms (`ptmtools.lab.forms`). A pixel samples each level of
+one pyramid once; a form whose steps are pyramids of their own (`Shows`) costs a sample of each.
 
-The level of detail is that of a screen of 1080 lines, whatever the item buffer has: a coarser
-buffer samples fewer pixels of the same picture.
+The level of detail is that of a screen of 1080 lines, whatever the size of the item buffer: a
+coarser buffer samples fewer pixels of the same picture.
 """
 
 from __future__ import annotations
@@ -33,22 +33,22 @@ from ptmtools.rendering.records import Pyramids, Shows, Sight, Triangles, triang
 
 @dataclass(frozen=True)
 class Views:
-    """What is on the screen, frame by frame; the rows of a frame are its pairs.
+    """Errors and coverage of the screen, frame by frame; the rows of a frame are its pairs.
 
     Attributes
     ----------
-    start: (F + 1,) where the rows of each frame begin.
-    cell, texture: (R,) int32 of each row; the texture is -1 for surfaces without. Behind the
-        textures come octrees, see `ptmtools.lab.relief`.
-    error, square: (R, L + 2) its part of the frame's mean of errors, and of squared errors, with as
-        the finest that is there: nothing, the mean colour, level 0, level 1, …; in other forms
-        their columns in place of levels.
-    need: (R, L) the share of the pixels for which a level is wanted, beside the coarser ones; for
-        surfaces without texture the first is the share that they cover.
+    start: (F + 1,) first row of each frame.
+    cell, texture: (R,) int32 of each row; the texture is -1 for surfaces without. Octrees come
+        after the textures, see `ptmtools.lab.relief`.
+    error, square: (R, L + 2) part of the frame's mean error, and mean squared error, with these as
+        the finest data: nothing, the mean colour, level 0, level 1, …; in other forms their columns
+        in place of levels.
+    need: (R, L) share of the pixels that want a level, besides the coarser ones; for surfaces
+        without texture the first is the share that they cover.
     sight: (R, L) the same in the item buffer that a client draws, with half as many pixels each
         way.
-    owner, depth: (V, n) int32, float32 of that item buffer's pixels: the cell that is on the
-        screen, -1 for none, and how far away it is along the view, metres.
+    owner, depth: (V, n) int32, float32 of that item buffer's pixels: the visible cell, -1 for none,
+        and its distance along the view, metres.
     """
 
     start: Ints
@@ -63,11 +63,11 @@ class Views:
 
     @property
     def frames(self) -> int:
-        """How many there are."""
+        """Number of frames."""
         return len(self.start) - 1
 
     def rows(self, frame: int) -> slice:
-        """Those of a frame."""
+        """The rows of a frame."""
         return slice(int(self.start[frame]), int(self.start[frame + 1]))
 
 
@@ -81,8 +81,8 @@ def look(
     *,
     full: Pyramids | None = None,
 ) -> Views:
-    """The tables of (F, 3) eyes and unit directions of view; errors are against what ``full`` would
-    show, which holds the same textures in other quality."""
+    """The tables of (F, 3) eyes and unit directions of view. The reference is ``full``, which holds
+    the same textures in other quality."""
     return look_at_forms(surfaces, pyramids, (), camera, eye, direction, progress, full=full)[0]
 
 
@@ -98,29 +98,29 @@ def look_at_forms(
     full: Pyramids | None = None,
     relief: Relief | None = None,
 ) -> list[Views]:
-    """The tables of `look`, and those of the same textures in other forms, against the same; with
-    octrees, and what else is lit, if there are any."""
+    """The tables of `look`, and those of the same textures in other forms, against the same
+    reference; with octrees and other relief, if any."""
     triangles, caster, seen = triangles_of(surfaces), Caster(surfaces), camera.sparse
     full = pyramids if full is None else full
     shown: list[Pyramids | Shows] = [pyramids, *forms]
     tallies = [_Tally(triangles, textures, full, seen) for textures in shown]
-    beside = ReliefTally(relief, surfaces, triangles, pyramids, seen) if relief else None
+    relief_tally = ReliefTally(relief, surfaces, triangles, pyramids, seen) if relief else None
     owner = np.empty((len(eye), int(seen.sum())), np.int32)
     depth = np.empty(owner.shape, np.float32)
     for k in range(len(eye)):
         progress(k, len(eye), "looking along the walk")
         sight = caster.look(camera, eye[k], direction[k])
-        plain = beside.add(sight) if beside else sight
+        plain = relief_tally.add(sight) if relief_tally else sight
         for tally in tallies:
             tally.add(plain)
         owner[k], depth[k] = _item_buffer(sight, triangles, seen)
     progress(len(eye), len(eye), "looking along the walk")
     views_of = [tally.views(owner, depth) for tally in tallies]
-    return [with_rows(views, beside.rows) for views in views_of] if beside else views_of
+    return [with_rows(views, relief_tally.rows) for views in views_of] if relief_tally else views_of
 
 
 class _Tally:
-    """Adds up frames."""
+    """Sums up errors of frames."""
 
     def __init__(
         self, triangles: Triangles, textures: Pyramids | Shows, full: Pyramids, seen: Bools
@@ -141,12 +141,12 @@ class _Tally:
         self._room = np.zeros((deepest + 7, 3))
         pixels = len(seen)
         self._pixels = (pixels, pixels, pixels, max(int(seen.sum()), 1))
-        #: Of no frame, and of each: its pairs, and its rows of each table.
+        #: Pairs, and rows of each table: first of no frame, then of each.
         self._nonzero = [np.zeros(0, np.int64)]
         self._rows = [[np.zeros((0, n), np.float32)] for n in columns]
 
     def add(self, sight: Sight) -> None:
-        """Makes the rows of the next frame."""
+        """Adds the rows of the next frame."""
         self._add(sight, *self._what, self._sums, self._room)
         nonzero = np.flatnonzero(self._sums.need[:, 0])
         self._nonzero.append(nonzero)
@@ -155,7 +155,7 @@ class _Tally:
             table[nonzero] = 0.0
 
     def views(self, owner: NDArray[np.int32], depth: Singles) -> Views:
-        """Those of all frames, with their item buffers."""
+        """The views of all frames, with their item buffers."""
         start = np.cumsum([len(pairs) for pairs in self._nonzero])
         cell, texture = self._pairs[np.concatenate(self._nonzero)].T
         error, square, need, sight = map(np.concatenate, self._rows)
@@ -165,7 +165,7 @@ class _Tally:
 def _item_buffer(
     sight: Sight, triangles: Triangles, seen: Bools
 ) -> tuple[NDArray[np.int32], Singles]:
-    """(n,) ``owner`` and ``depth`` of `Views`, of the pixels that are seen."""
+    """(n,) ``owner`` and ``depth`` of `Views`, for the ``seen`` pixels."""
     shows, rays = sight.triangle[seen], sight.ray[seen]
     owner, depth = np.full(len(shows), -1, np.int32), np.full(len(shows), np.inf, np.float32)
     hit = np.flatnonzero(shows >= 0)
@@ -178,28 +178,30 @@ def _item_buffer(
 
 
 def with_rows(views: Views, more: Rows) -> Views:
-    """The same with more rows, each behind those of its frame."""
-    of = np.repeat(np.arange(views.frames), np.diff(views.start))
-    order = np.argsort(np.concatenate([of, more.frame]), kind="stable")
+    """The views with more rows, each after those of its frame."""
+    frame = np.repeat(np.arange(views.frames), np.diff(views.start))
+    order = np.argsort(np.concatenate([frame, more.frame]), kind="stable")
 
     def both(name: str) -> Any:
         tables = [getattr(views, name), getattr(more, name)]
         wide = max(table.shape[-1] for table in tables)
         if tables[0].ndim > 1:
-            # Columns that a row does not have are never looked at.
+            # Columns beyond a row's own are never read.
             tables = [np.pad(t, ((0, 0), (0, wide - t.shape[1]))) for t in tables]
         return np.concatenate(tables)[order]
 
     names = ("cell", "texture", "error", "square", "need", "sight")
-    start = np.searchsorted(np.sort(np.concatenate([of, more.frame])), np.arange(views.frames + 1))
+    start = np.searchsorted(
+        np.sort(np.concatenate([frame, more.frame])), np.arange(views.frames + 1)
+    )
     return replace(views, start=start, **{name: both(name) for name in names})
 
 
 def limited(views: Views, count: Ints) -> Views:
-    """The same views of textures that lack their finest levels; ``count`` (T,) is how many levels
-    each has. What they cannot show stays an error."""
+    """The views with textures that lack their finest levels; ``count`` (T,) is the number of levels
+    of each. Missing levels stay an error."""
     deepest = int(count.max(initial=1))
-    # One more, of surfaces without texture, which is the last.
+    # One more, for surfaces without texture: the last.
     has = np.arange(deepest) < np.append(count, deepest)[views.texture, None]
     need, sight = (np.where(has, each[:, :deepest], 0) for each in (views.need, views.sight))
     error, square = (

@@ -1,11 +1,11 @@
-"""A walk: where a visitor's eye was, and where it looked, over time.
+"""A walk: position and view direction of a visitor's eye over time.
 
-Walks are made (`ptmtools.lab.path`) or recorded from visitors, at any rate and not always
-evenly. Both are the same JSON document, whose schema is published (docs/design/walkthrough.md).
+Walks are made (`ptmtools.lab.path`) or recorded from visitors, at any rate and not always evenly.
+Both are the same JSON document with a published schema (docs/design/walkthrough.md).
 
-How a walk was walked in a browser, so that a simulated client can walk it in the same way: when
-each frame was and for how long it kept the page busy, how old the item buffer was in it, how fine
-the screen, how large the files, and what the page had asked for before its first frame.
+A recording in a browser also holds its conditions, so that a simulated client can repeat it: the
+time of each frame and how long it kept the page busy, the age of the item buffer, the lines of the
+screen, the sizes of the files, and the requests of the page before its first frame.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError, LimitError, naming
 from ptmtools.files import open_regular
 
-#: What comes without a client's asking for it; ``page`` are the files of the page itself.
+#: Kinds of files that arrive without a client's request; ``page`` are the files of the page itself.
 KINDS = ("page", "index", "record", "geometry")
 
 
-class Given(NamedTuple):
-    """A file that came without the client's asking for it: s since navigation, one of `KINDS`, the
+class PushedFile(NamedTuple):
+    """A file that arrived without the client's request: s since navigation, one of `KINDS`, the
     number of the cell, bytes on the link."""
 
     asked: float
@@ -40,22 +40,22 @@ class Given(NamedTuple):
 
 
 class Waits:
-    """For how long things had to wait, by when they began to.
+    """Waiting times, by their beginning.
 
     Parameters
     ----------
-    waited: (m, 2) s, from when to when something did.
-    busy: (k, 2) s, from when to when whatever was there would have had to.
+    waited: (m, 2) s, intervals in which a request or response waited.
+    busy: (k, 2) s, intervals in which any would have waited.
     """
 
     def __init__(self, waited: Floats, busy: Floats | None = None) -> None:
         busy = np.zeros((0, 2)) if busy is None else busy
-        self._spans = _apart(np.concatenate([waited, busy]))
+        self._spans = _merged(np.concatenate([waited, busy]))
         self._ends = np.sort(waited[:, 1])
 
     def until(self, moment: float) -> float:
-        """When something that is there at a moment, s, has waited for long enough: at once, or,
-        where something had to wait, as soon as anything had."""
+        """The end of a wait that begins at a moment, s: at once, or, within an interval of waiting,
+        at the next recorded end."""
         row = int(np.searchsorted(self._spans[:, 0], moment, "right")) - 1
         if row < 0 or moment >= self._spans[row, 1]:
             return moment
@@ -65,19 +65,21 @@ class Waits:
 
 @dataclass(frozen=True)
 class Browser:
-    """
+    """Conditions of a recording in a browser.
+
     Attributes
     ----------
-    begun: s since navigation of the first sample of the walk.
-    lines: of the screen. budget: bytes of texture memory, what grows and is there twice included.
-    policy: that the page went by.
-    record_bytes, geometry_bytes: (C,) on the link.
-    files: by time.
-    cell: (n,) that the page took the eye to be in at each sample, -1 for none.
-    age: (n,) s of the item buffer that was at hand, -1 for none.
-    sent: when a request that is made goes out. taken: when what has come is taken.
+    begun: time of the first sample of the walk, s since navigation.
+    lines: lines of the screen.
+    budget: bytes of texture memory, including second copies of growing textures.
+    policy: the page's policy.
+    record_bytes, geometry_bytes: (C,) bytes on the link.
+    files: pushed files, by time.
+    cell: (n,) the page's cell at each sample, -1 for none.
+    age: (n,) age of the available item buffer, s, -1 for none.
+    sent: waits of requests until their sending. taken: waits of responses until their handling.
 
-    Raises InputError PTM-I801 for what no browser says.
+    Raises InputError PTM-I801 for values that no browser records.
     """
 
     begun: float
@@ -86,25 +88,25 @@ class Browser:
     policy: str
     record_bytes: Ints
     geometry_bytes: Ints
-    files: tuple[Given, ...]
+    files: tuple[PushedFile, ...]
     cell: Ints
     age: Floats
     sent: Waits
     taken: Waits
 
     def __post_init__(self) -> None:
-        cells, wrong = len(self.record_bytes), ""
+        cells, problem = len(self.record_bytes), ""
         least, most = self.cell.min(initial=-1), self.cell.max(initial=-1)
         if any(f.kind not in KINDS or f.number >= cells for f in self.files):
-            wrong = "a file that cannot be"
+            problem = "a file that cannot be"
         elif len(self.geometry_bytes) != cells or not -1 <= least <= most < cells:
-            wrong = f"a cell that is none of {cells}"
-        if wrong:
-            raise InputError("PTM-I801", f"the recording of a browser has {wrong}")
+            problem = f"a cell that is none of {cells}"
+        if problem:
+            raise InputError("PTM-I801", f"the recording of a browser has {problem}")
 
 
 def browser_of(recorded: Mapping[str, Any], time: Floats) -> Browser:
-    """What a document of a walk with samples at (n,) seconds says, as its schema has it; raises
+    """The conditions in the document of a walk with samples at (n,) seconds, by its schema; raises
     InputError PTM-I801."""
     samples = len(time)
     if len(recorded["frames"]) != samples:
@@ -117,7 +119,7 @@ def browser_of(recorded: Mapping[str, Any], time: Floats) -> Browser:
         np.array(recorded[k], dtype=np.float64).reshape(-1, 2) for k in ("sent", "taken")
     )
     time = recorded["begun"] + time
-    # It was busy since it last gave a sign, and before there was a client at all.
+    # The page was busy since its last recorded event, and before it had a client.
     signs = np.sort(np.concatenate([[0.0], time, taken[:, 1], sent[:, 0]]))
     since = signs[np.maximum(np.searchsorted(signs, taken[:, 0], "right") - 1, 0)]
     taken = np.column_stack([np.minimum(since, taken[:, 0]), taken[:, 1]])
@@ -129,7 +131,7 @@ def browser_of(recorded: Mapping[str, Any], time: Floats) -> Browser:
         policy=recorded["policy"],
         record_bytes=np.array(recorded["recordBytes"], dtype=np.int64),
         geometry_bytes=np.array(recorded["geometryBytes"], dtype=np.int64),
-        files=tuple(sorted(Given(*row) for row in recorded["files"])),
+        files=tuple(sorted(PushedFile(*row) for row in recorded["files"])),
         cell=frames[:, 0].astype(np.int64),
         age=frames[:, 1],
         sent=Waits(sent),
@@ -137,8 +139,8 @@ def browser_of(recorded: Mapping[str, Any], time: Floats) -> Browser:
     )
 
 
-def _apart(spans: Floats) -> Floats:
-    """(m, 2) spans of time, those that meet joined into one."""
+def _merged(spans: Floats) -> Floats:
+    """(m, 2) intervals of time, overlapping ones joined."""
     intervals: list[list[float]] = []
     for begin, end in sorted(spans.tolist()):
         if intervals and begin <= intervals[-1][1]:
@@ -149,17 +151,17 @@ def _apart(spans: Floats) -> Floats:
 
 
 FORMAT, SCHEMA = "ptmtools walk", 1
-#: A larger file is no walk, bytes: this is a day at 60 samples a second.
+#: Largest file of a walk, bytes: a day at 60 samples a second.
 LARGEST = 1 << 30
 #: Digits after the point in a file: 0.1 µm and 0.1 µs.
 DIGITS = 7
-#: How far the length of a direction may be from 1 to be kept as it is, and to be put right.
+#: Largest deviation of a direction's length from 1 that is kept, and that is corrected.
 _UNIT, _NEARLY = 1e-6, 1e-3
 
 
 @dataclass(frozen=True)
 class Walk:
-    """What a visitor's eye did.
+    """The motion of a visitor's eye.
 
     Attributes
     ----------
@@ -168,13 +170,13 @@ class Walk:
     direction: (n, 3) unit vectors, where the eye looks.
     field_of_view: vertical, radians.
     aspect: width of the picture by its height.
-    browser: how it was walked, if it was recorded in one; else None.
+    browser: conditions of a recording in a browser, or None.
 
     Raises
     ------
     InputError: PTM-I801 a number is not finite, the arrays do not fit together, there are fewer
-        than two samples, times do not increase from 0, a direction is no unit vector (up to 1e-3 it
-        is put right), or field of view or aspect are out of range.
+        than two samples, times do not increase from 0, a direction is no unit vector (deviations up
+        to 1e-3 are corrected), or field of view or aspect are out of range.
     """
 
     time: Floats
@@ -218,9 +220,10 @@ class Walk:
         return float(np.linalg.norm(np.diff(self.eye, axis=0), axis=1).sum())
 
     def at(self, times: Floats) -> tuple[Floats, Floats]:
-        """(m, 3) eyes and (m, 3) unit directions at (m,) times, seconds; beyond the ends as there.
+        """(m, 3) eyes and (m, 3) unit directions at (m,) times, seconds; beyond the ends those at
+        the ends.
 
-        Half-way between opposite directions it still looks in the first.
+        Half-way between opposite directions the first one holds.
         """
         times = np.clip(times, 0.0, self.duration)
         row = np.clip(np.searchsorted(self.time, times, "right") - 1, 0, len(self.time) - 2)
@@ -233,8 +236,8 @@ class Walk:
 
 
 def walk_text(walk: Walk) -> str:
-    """The document of a walk, a line for each sample, with `DIGITS` digits after the point; of one
-    that was recorded in a browser only where it led."""
+    """The document of a walk, a line for each sample, with `DIGITS` digits after the point; without
+    the conditions of a browser."""
     rows = np.column_stack([walk.time, walk.eye, walk.direction]).round(DIGITS) + 0.0  # no -0
     head = json.dumps(
         {
@@ -249,10 +252,10 @@ def walk_text(walk: Walk) -> str:
 
 
 def read_walk(path: str | os.PathLike[str]) -> Walk:
-    """The walk in a file.
+    """Reads a walk from a file.
 
     Raises InputError: PTM-I122 the file cannot be read; PTM-I801 it is no walk, does not match its
-    schema, or as `Walk` and `Browser`. LimitError PTM-L204: it is larger than any walk.
+    schema, or is refused by `Walk` or `Browser`. LimitError PTM-L204: it is larger than any walk.
     """
     try:
         with open_regular(Path(path)) as stream:
@@ -267,7 +270,7 @@ def read_walk(path: str | os.PathLike[str]) -> Walk:
 
 
 def parse_walk(data: bytes) -> Walk:
-    """The walk in a document; raises as `read_walk`."""
+    """Parses the document of a walk; raises as `read_walk`."""
     try:
         document = schemas.parse(data)
     except schemas.ShapeError as fault:
@@ -286,8 +289,8 @@ def parse_walk(data: bytes) -> Walk:
         raise InputError("PTM-I801", fault.message, place=fault.place) from None
     rows = np.array(document["samples"], dtype=np.float64).reshape(-1, 7)
     view = float(document["fieldOfView"]), float(document["aspect"])
-    told = document.get("browser")
-    browser = browser_of(told, rows[:, 0]) if told is not None else None
+    recorded = document.get("browser")
+    browser = browser_of(recorded, rows[:, 0]) if recorded is not None else None
     return Walk(rows[:, 0], rows[:, 1:4], rows[:, 4:], *view, browser)
 
 
@@ -298,7 +301,7 @@ def _no_walk(what: str) -> InputError:
 
 
 def _refuse(wrong: Any, code: str, message: str) -> None:
-    """Raises for the first sample that is wrong, if any is."""
+    """Raises for the first wrong sample, if any."""
     if wrong.any():
         place = f"samples[{int(wrong.argmax())}]"
         raise InputError(code, message, place=place)

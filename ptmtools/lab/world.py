@@ -1,6 +1,7 @@
-"""All that the runs of a walk share: what is served, what is on the screen, where the walker is.
+"""Data shared by all runs of a walk: the served files, the screen along the walk, and the walker's
+cells.
 
-Made once, which takes most of the time; a run then takes a second.
+Preparing it takes most of the time; a run then takes a second.
 """
 
 from __future__ import annotations
@@ -27,17 +28,17 @@ from ptmtools.rendering.records import Pyramids, Shows
 if TYPE_CHECKING:
     from ptmtools.lab.walk import Walk
 
-#: Frames a second that are looked at.
+#: Evaluated frames per second.
 RATE = 5.0
 #: Pixels of the item buffer that errors are summed over.
 PIXELS = (160, 90)
-#: Pixels of the item buffer of a browser, whatever the form of its screen.
+#: Pixels of the item buffer of a browser, whatever the aspect of its screen.
 _ITEM_PIXELS = 3600
 #: Frames of a walk at most: some five hours.
 MOST_FRAMES = 100_000
 #: Share of the walk that may lie in no cell.
 _ASTRAY = 0.05
-#: A viewpoint that in the last second moved less (metres) and turned less (cosine) is still.
+#: A viewpoint is still if it moved less (metres) and turned less (cosine) in the last second.
 STILL_SECONDS, _STILL_METRES, _STILL_COSINE = 1.0, 1e-3, np.cos(np.radians(1.0))
 
 
@@ -47,25 +48,25 @@ class World:
 
     Attributes
     ----------
-    served, pyramids: what is shown: of the `.ptm`s all levels.
-    catalogue: what clients know.
-    views, view: what is on the screen, and (F,) which of the views each frame has.
-    camera: of the item buffer.
+    served, pyramids: the served files, and all levels of the `.ptm`s.
+    catalogue: the catalogue of clients.
+    views, view: the tables of the screen, and (F,) the view of each frame.
+    camera: the camera of the item buffer.
     time: (F,) s. eye, direction: (F, 3).
-    cell: (F,) that the eye is in; where it is in none, the one before.
+    cell: (F,) cell of the eye; outside of cells the last one.
     still: (F,) whether the viewpoint has not moved for a second.
     rate: frames a second.
-    one_range: whether a client has one range of a file on the way at a time, as browsers must.
-    browser: how the walk was walked in one, or None. Times then are since navigation, and a frame
-        has the view of the item buffer that is at hand.
-    drawn: (F,) the frame in which that was drawn, -1 if there is none; None unless in a browser.
+    one_range: whether a client requests one range of a file at a time, as browsers must.
+    browser: conditions of a recording in a browser, or None. Times are then since navigation, and a
+        frame has the view of the available item buffer.
+    drawn: (F,) the frame in which that item buffer was drawn, -1 without one; None unless in a
+        browser.
     colored: whether clients know the mean colour of each texture; else it is grey until its first
-        level comes.
-    form: in which clients take textures, a name in `ptmtools.lab.forms.FORMS`.
-    shows: what the columns show, None for the levels of the pyramids.
-    relief: octrees, which come behind the textures, and what pictures are compared with; None:
-        there are none, and nothing else.
-    beside: the same in other forms, by name.
+        level arrives.
+    form: form of the textures, a name in `ptmtools.lab.forms.FORMS`.
+    shows: images of the columns, None for the levels of the pyramids.
+    relief: octrees, which come after the textures, and the reference of pictures; None: neither.
+    other_forms: the same world in other forms, by name.
     """
 
     served: Served
@@ -87,51 +88,51 @@ class World:
     form: str = PTM
     shows: Shows | None = None
     relief: Relief | None = None
-    beside: Mapping[str, World] = field(default_factory=dict)
+    other_forms: Mapping[str, World] = field(default_factory=dict)
 
     @property
     def frames(self) -> int:
-        """How many there are."""
+        """Number of frames."""
         return len(self.time)
 
     def still_after(self, seconds: float) -> Bools:
-        """(F,) the frames in which the viewpoint has not moved for so many seconds."""
+        """(F,) the frames in which the viewpoint has not moved for ``seconds``."""
         if seconds == STILL_SECONDS:
             return self.still
         return _still(self.time, self.eye, self.direction, seconds)
 
     def in_form(self, form: str) -> World:
-        """The same for clients that take textures in a form.
+        """The same world for clients with textures in a form.
 
-        Raises InputError PTM-I701 if it was not made ready for that.
+        Raises InputError PTM-I701 if it was not prepared for that form.
         """
         if form == self.form:
             return self
-        if form not in self.beside:
+        if form not in self.other_forms:
             raise InputError(
                 "PTM-I701",
-                f"textures are not at hand as {FORMS[form].about} here",
+                f"textures are not available as {FORMS[form].about} here",
                 remedy="walk with another policy, or by `ptm simulate`",
             )
-        return self.beside[form]
+        return self.other_forms[form]
 
     def changed(self, change: Callable[[World], World]) -> World:
-        """A change of this and of what is beside it."""
-        beside = {name: change(world) for name, world in self.beside.items()}
-        return replace(change(self), beside=beside)
+        """Applies a change to this world and to its other forms."""
+        other_forms = {name: change(world) for name, world in self.other_forms.items()}
+        return replace(change(self), other_forms=other_forms)
 
     def counted_by_paper(self) -> World:
-        """The same with RGB of three bytes in texture memory."""
+        """The same world with RGB of three bytes in texture memory."""
         columns = FORMS[self.form].columns.load()(self.served, True)
         return replace(self, catalogue=self.catalogue.with_memory(columns.memory))
 
     def frustum(self, frame: int) -> Frustum:
-        """What the camera of a frame takes in."""
+        """The view frustum of a frame."""
         aspect, angle = self.camera.aspect, self.camera.field_of_view
         return Frustum(self.eye[frame], self.direction[frame], angle, aspect)
 
     def standing(self, seconds: float) -> World:
-        """Who stays at the first frame of this, so long."""
+        """A visitor who stays at the first frame for this time."""
         rate = RATE if self.browser else self.rate
         count = int(np.ceil(seconds * rate)) + 1
         first = np.zeros(count, np.int64)
@@ -147,7 +148,7 @@ class World:
             rate=rate,
             browser=None,
             drawn=None,
-            beside={name: world.standing(seconds) for name, world in self.beside.items()},
+            other_forms={name: world.standing(seconds) for name, world in self.other_forms.items()},
         )
 
 
@@ -168,12 +169,12 @@ def prepare(
 
     Parameters
     ----------
-    pyramids: of this database, if they have been read already.
+    pyramids: those of this database, if already read.
     rate: frames a second. pixels: of the item buffer, across and down.
-    full: that pictures are compared with instead; see `look`.
-    views: of this walk, if they have been made already.
-    forms: other forms that clients may take textures in, as `read_forms` reads them.
-    relief: octrees, and another database to compare with, if it is lit (`relief_of`).
+    full: another reference of pictures; see `look`.
+    views: those of this walk, if already made.
+    forms: other forms of textures, as read by `read_forms`.
+    relief: octrees and another reference database (`relief_of`).
 
     Raises
     ------
@@ -225,7 +226,7 @@ def prepare(
             relief=relief,
         )  # fmt: skip
     catalogue = catalogue_of(served, textures.differences, textures.mean)
-    catalogue = catalogue.as_found(browser) if browser else catalogue
+    catalogue = catalogue.with_browser_sizes(browser) if browser else catalogue
     world = World(
         served=served,
         pyramids=textures,
@@ -244,17 +245,17 @@ def prepare(
         drawn=drawn,
         relief=relief,
     )
-    beside = {
+    other_forms = {
         name: replace(
             world,
             form=name,
             catalogue=world.catalogue.in_columns(FORMS[name].columns.load()(served, False)),
-            views=found,
+            views=form_views,
             shows=shown,
         )
-        for (name, shown), found in zip((forms or {}).items(), others, strict=True)
+        for (name, shown), form_views in zip((forms or {}).items(), others, strict=True)
     }
-    world = replace(world, beside=beside)
+    world = replace(world, other_forms=other_forms)
     if relief is None:
         return world
     from ptmtools.lab.relief.stock import with_octrees, without_octrees
@@ -265,8 +266,8 @@ def prepare(
         return world
     drawing = [form.name for form in FORMS.values() if form.octrees]
     fetched = with_octrees(catalogue, served, octrees)
-    more = {name: replace(world, form=name, catalogue=fetched, beside={}) for name in drawing}
-    return replace(world, beside={**world.beside, **more})
+    more = {name: replace(world, form=name, catalogue=fetched, other_forms={}) for name in drawing}
+    return replace(world, other_forms={**world.other_forms, **more})
 
 
 def relief_of(
@@ -277,8 +278,8 @@ def relief_of(
     lit: bool = True,
     progress: Progress = silent,
 ) -> Relief | None:
-    """The octrees of a database, and another of the same model with whose full picture pictures are
-    compared; both are ``lit`` (`relief.light.lit`) or neither, and then there are no octrees.
+    """The octrees of a database, and another one of the same model whose full picture is the
+    reference; both are ``lit`` (`relief.light.lit`) or neither, and then there are no octrees.
 
     Raises
     ------
@@ -292,7 +293,7 @@ def relief_of(
         return None
     reference = None
     if against is not None:
-        names = [[row["file"] for row in of.index["textures"]] for of in (served, against)]
+        names = [[row["file"] for row in each.index["textures"]] for each in (served, against)]
         if names[0] != names[1]:
             raise InputError(
                 "PTM-I700",
@@ -310,7 +311,7 @@ def relief_of(
 def read_forms(
     served: Served, pyramids: Pyramids, names: Iterable[str], progress: Progress = silent
 ) -> dict[str, Shows]:
-    """What textures show in the forms of those names, but for the `.ptm`s themselves.
+    """The images of textures in the named forms, without the `.ptm`s themselves.
 
     Raises DatabaseError, LimitError: see `Form.shows`.
     """
@@ -328,15 +329,15 @@ def _require_fitting(browser: Browser, served: Served) -> None:
 
 
 def _camera(walk: Walk, browser: Browser) -> Camera:
-    """With twice as many pixels each way as the viewer's item buffer has."""
+    """A camera with twice as many pixels each way as the viewer's item buffer."""
     tall = max(1, round(np.sqrt(_ITEM_PIXELS / walk.aspect)))
     wide = max(1, round(_ITEM_PIXELS / tall))
     return Camera(2 * wide, 2 * tall, walk.field_of_view, walk.aspect, browser.lines)
 
 
 def _drawn(time: Floats, age: Floats) -> Ints:
-    """(F,) the frame in which the item buffer was drawn that is at hand in each, -1 without one."""
-    # It is dated by the beginning of its frame, frames by their end.
+    """(F,) the frame in which the available item buffer of each frame was drawn, -1 without one."""
+    # The time of an item buffer is the beginning of its frame, that of a frame its end.
     frames: Ints = np.where(age < 0, -1, np.searchsorted(time, time - age, "right"))
     return frames
 

@@ -41,7 +41,7 @@ def test_files_against_single_bytes(acts: list[tuple[str, int]]) -> None:
             part = under_way[-1 - number % 2 * (len(under_way) - 1)]
             received = min(number // 2, part.end - part.begin - 1)
             last = part.end == asked
-            assert files.given_up(part, received) == last
+            assert files.give_up(part, received) == last
             if last:
                 under_way.remove(part)
                 held[part.begin : part.begin + received] = True
@@ -76,6 +76,6 @@ def test_the_last_byte_counts() -> None:
 def test_who_gives_up_before_anything_came_has_nothing_of_what_is_before_it() -> None:
     files = Files(Kind.TEXTURE, np.array([200]))
     files.ask(0, 100)
-    assert files.given_up(files.ask(0, 200), 0)
+    assert files.give_up(files.ask(0, 200), 0)
     assert files.loaded[0] == 0
     assert files.asked[0] == 100

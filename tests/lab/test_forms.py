@@ -160,7 +160,7 @@ def test_what_can_be_fetched_of_interlaced_images(interlaced_world: World) -> No
     assert (stock.record_bytes == own.record_bytes).all()
     assert stock.shapes is own.shapes
     papers = counted(interlaced_world, SimulateOptions(paper_bytes=True))
-    for form in (PTM, *interlaced_world.beside):
+    for form in (PTM, *interlaced_world.other_forms):
         whole = interlaced_world.in_form(form).catalogue.whole
         assert papers.in_form(form).catalogue.whole == pytest.approx(whole * 3 / 4)
 

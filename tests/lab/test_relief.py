@@ -20,7 +20,7 @@ from ptmtools.errors import DatabaseError, InputError
 from ptmtools.lab.client import Client, Kind, Range
 from ptmtools.lab.comparing import SimulateOptions, budget_of, play, require_hints
 from ptmtools.lab.network import Link, Request
-from ptmtools.lab.policies import POLICIES, Declared
+from ptmtools.lab.policies import POLICIES, PolicyEntry
 from ptmtools.lab.policies.apo import ApoClient
 from ptmtools.lab.relief.kernels import descend, lamp, stop_of
 from ptmtools.lab.relief.octrees import Octrees, no_octrees, read_octrees
@@ -357,7 +357,7 @@ def prepare_views(world: World) -> World:
         relief=world.relief,
     )  # fmt: skip
     view = np.zeros(len(world.view), np.int64)
-    return replace(world, views=views, view=view, beside={}).standing(20)
+    return replace(world, views=views, view=view, other_forms={}).standing(20)
 
 
 @pytest.mark.parametrize("levels", [1, 3, 12])
@@ -388,7 +388,7 @@ def test_columns_are_those_of_the_tables(world: World, form: str) -> None:
 
 
 @pytest.mark.parametrize("policy", [p for p in POLICIES.values() if p.needs is None])
-def test_all_policies_walk_through_lit_rooms(world: World, policy: Declared) -> None:
+def test_all_policies_walk_through_lit_rooms(world: World, policy: PolicyEntry) -> None:
     if policy.form not in ("ptm", "octree"):
         return
     run = simulate(world, policy, Conditions(1e6), 1 << 16)
@@ -428,7 +428,7 @@ def test_what_a_client_of_octrees_needs(made: Path, world: World) -> None:
     with pytest.raises(InputError, match=r"octree textures.*--apo.*PTM-I701"):
         require_hints(plain, [APO])
     with pytest.raises(InputError, match="PTM-I701"):
-        replace(world, beside={}).in_form("octree")
+        replace(world, other_forms={}).in_form("octree")
 
 
 def test_other_textures_are_no_comparison(made: Path, two_rooms: Path) -> None:

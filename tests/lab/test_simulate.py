@@ -13,7 +13,7 @@ import pytest
 from ptmtools import schemas
 from ptmtools.lab.comparing import SimulateOptions, play
 from ptmtools.lab.forms import PTM
-from ptmtools.lab.policies import POLICIES, Declared
+from ptmtools.lab.policies import POLICIES, PolicyEntry
 from ptmtools.lab.report import COLUMNS, table
 from ptmtools.lab.simulation import simulate
 from ptmtools.lab.walk import Walk, walk_text
@@ -191,7 +191,7 @@ def test_the_paper_counts_three_bytes(ptm: Ptm, two_rooms: Path, walk_file: Path
 
 
 @pytest.mark.parametrize("policy", ALL, ids=[policy.name for policy in ALL])
-def test_without_limits_all_ends_well(world: World, policy: Declared) -> None:
+def test_without_limits_all_ends_well(world: World, policy: PolicyEntry) -> None:
     stays = world.standing(20)
     # The paper's client shares memory out by coverage: it takes more than all textures.
     run = simulate(stays, policy, Conditions(None), 100 * stays.catalogue.whole)

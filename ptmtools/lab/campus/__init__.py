@@ -1,10 +1,9 @@
 """A walk through a campus with the client of its paper (notes, section 4; the paper's III and IV).
 
-A campus (`ptm campus`) is no database: there are no cells and no levels of a texture in one file,
-but meshes and textures as files of their own, which a client takes whole. So its client is no
-`Client` of `ptmtools.lab.policies`. Link, camera, walk and the error of the picture are the
-same as there, and `prepare_campus` compares with the full picture of a database of the same model,
-if one is given.
+A campus (`ptm campus`) is not a database: it has no cells, and no file with all levels of a
+texture. Meshes and textures are files that a client loads whole, so its client is not a `Client` of
+`ptmtools.lab.policies`. Link, camera, walk and the error of the picture are the same.
+`prepare_campus` compares with the full picture of a database of the same model, if one is given.
 """
 
 from __future__ import annotations

@@ -1,26 +1,25 @@
 """The client of the campus (the paper's III).
 
-1. The index; then the coarsest mesh of every object with textures of the least size, the nearest
-   object first.
-2. The K nearest objects are wanted in high detail: the finest mesh, then textures of the preset,
-   then the lightmap.
-3. So many threads each take the nearest object that lacks something that nobody has asked for yet,
-   and load its files one after the other. What was begun is finished, wherever the viewpoint is.
-4. How near objects are is `ptmtools.neighbours.campus.model`; they are sorted again when the
-viewpoint has
-   moved by `move` since.
-5. An object that is no longer among the K nearest is shown by its coarsest mesh at once. What was
-   downloaded stays in main memory, and is shown again without a request.
+1. It loads the index; then the coarsest mesh of every object with textures of the least size, the
+   nearest object first.
+2. It wants the K nearest objects in high detail: the finest mesh, then textures of the preset, then
+   the lightmap.
+3. Each of several threads takes the nearest object with files that are not yet requested, and loads
+   them one after the other. A thread finishes its object wherever the viewpoint moves.
+4. `ptmtools.neighbours.campus.model` defines the distance of an object. The client sorts objects
+   again when the viewpoint has moved by `move`.
+5. An object that leaves the K nearest is shown by its coarsest mesh at once. Downloaded files stay
+   in main memory and are shown again without a request.
 
-Read in: a mesh or a texture is shown as soon as it is there, so an object is refined file by file.
-A texture is one of a material, not of an object: it is shown wherever its material is, on coarse
-meshes too, in the finest size that is in graphics memory. Coarsest meshes and least textures stay
-there for good, as the paper's 28 MB do.
+Our reading: a mesh or a texture is shown as soon as it has arrived, so an object is refined file by
+file. A texture belongs to a material, not to an object: it is shown wherever its material is, also
+on coarse meshes, in the finest size in graphics memory. Coarsest meshes and least textures always
+stay there, as the paper's 28 MB do.
 
-Ours: a budget of graphics memory. The client goes through objects as they are sorted, once for what
-everybody shows and once for high detail, and passes over what has no room beside what came before;
-what has no room is not asked for either. Of meshes it knows the bytes of their files, which are
-more than they take.
+Our addition: a budget of graphics memory. The client goes through the sorted objects, once for low
+detail and once for high detail, and skips an object that does not fit into the rest of the budget;
+it does not request that object either. It knows only the file sizes of meshes, which exceed their
+graphics memory.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ from ptmtools.lab.campus.stock import Stock
 from ptmtools.lab.network import Link, Request
 from ptmtools.neighbours.campus.model import Quality, distances
 
-#: The number of the index among the files.
+#: Number of the index among the files.
 _INDEX = 0
 
 
@@ -45,13 +44,13 @@ class CampusClient:
 
     Attributes
     ----------
-    order: (m,) objects, the nearest first, as sorted last; empty before the index is there.
-    near: those that are wanted in high detail.
-    there: (n,) which files are in main memory.
+    order: (m,) objects as last sorted, the nearest first; empty before the index has arrived.
+    near: objects wanted in high detail.
+    loaded: (n,) which files are in main memory.
     shown: (n,) which files are in graphics memory.
     low, high: of each object, the files of either detail.
-    asked: (n,) which files were asked for. sorts: how often objects were sorted.
-    idle: spans of time, s, in which nothing was on the way; the last may have no end yet.
+    asked: (n,) which files were requested. sorts: number of sorts of the objects.
+    idle: intervals, s, without a pending request; the last may have no end yet.
     """
 
     def __init__(
@@ -71,10 +70,10 @@ class CampusClient:
         self._sizes = stock.stored if options.stored else stock.sent
         self._eye: Floats | None = None
         self._sorted_at: Floats | None = None
-        #: Files that there is room for, and the objects that may ask for each detail, in order.
+        #: Files that fit, and the objects that may request each detail, in order.
         self._room: Bools = np.zeros(files, dtype=np.bool_)
         self._wanted: list[deque[int]] = [deque(), deque()]
-        #: What each thread has on the way, and its files after that, by the number of the file.
+        #: By the number of a pending file: the request of a thread, and its further files.
         self._threads: dict[int, tuple[Request, deque[int]]] = {}
 
     @property
@@ -84,12 +83,12 @@ class CampusClient:
 
     @property
     def waiting(self) -> list[Request]:
-        """What is on the way."""
+        """Pending requests."""
         return [request for request, _ in self._threads.values()]
 
     @property
     def begun(self) -> bool:
-        """Whether all that is loaded first and has room is there."""
+        """Whether all low detail that fits has arrived."""
         base = [f for files in self.low for f in files if self._room[f]]
         return bool(len(self.order) and self.loaded[base].all())
 
@@ -98,13 +97,13 @@ class CampusClient:
         return bool(self.shown[list(self.high[number])].all())
 
     def look(self, eye: Floats) -> None:
-        """The viewpoint is at (3,); what is in graphics memory changes."""
+        """Moves the viewpoint to (3,) and updates graphics memory."""
         self._eye = np.array(eye, dtype=np.float64)
         self._sort()
         self.shown = self.loaded & self._room
 
     def arrived(self, request: Request) -> None:
-        """A request is finished: its thread goes on."""
+        """Handles a finished request: its thread goes on."""
         file = int(request.tag)  # type: ignore[call-overload]
         self.loaded[file] = True
         _, rest = self._threads.pop(file)
@@ -113,8 +112,7 @@ class CampusClient:
         self._continue(rest)
 
     def fetch(self) -> None:
-        """Threads that are free take the next objects; called in every frame, and whenever
-        something has arrived."""
+        """Gives the next objects to free threads; called in every frame and after every arrival."""
         if not self.asked[_INDEX]:
             self._continue(deque([_INDEX]))
         elif self.loaded[_INDEX]:
@@ -127,7 +125,7 @@ class CampusClient:
                 self.idle.append([self.link.now])
 
     def _sort(self) -> None:
-        """Objects by their distance, and what follows from it, if the viewpoint has moved."""
+        """Sorts objects by distance and updates their demands, if the viewpoint has moved."""
         if self._eye is None or not self.loaded[_INDEX]:
             return
         if self._sorted_at is not None:
@@ -151,22 +149,22 @@ class CampusClient:
     def _filled(
         self, objects: Iterable[int], files: list[tuple[int, ...]], left: int | None
     ) -> tuple[int | None, deque[int]]:
-        """What is left of a budget, None without one, and which objects found room in it."""
+        """The rest of a budget, None without one, and the objects that fit."""
         chosen: deque[int] = deque()
         for number in objects:
             new = [f for f in files[number] if not self._room[f]]
-            takes = int(self.stock.most[new].sum())
+            size = int(self.stock.most[new].sum())
             if left is not None:
-                if takes > left:
+                if size > left:
                     continue
-                left -= takes
+                left -= size
             self._room[new] = True
             chosen.append(number)
         return left, chosen
 
     def _job(self) -> deque[int] | None:
-        """The files of the nearest object that lacks some that nobody has asked for; low detail of
-        all objects comes before high detail of any."""
+        """The files of the nearest object that are not yet requested; low detail of all objects
+        comes before high detail of any."""
         for wanted, files in zip(self._wanted, (self.low, self.high), strict=True):
             while wanted:
                 lacking = deque(f for f in files[wanted[0]] if not self.asked[f])
@@ -176,7 +174,7 @@ class CampusClient:
         return None
 
     def _continue(self, files: deque[int]) -> None:
-        """A thread asks for the next of its files."""
+        """Requests the next file of a thread."""
         while files:
             file = files.popleft()
             if not self.asked[file]:

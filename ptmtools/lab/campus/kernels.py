@@ -11,12 +11,12 @@ from ptmtools.jit import plain_kernel
 from ptmtools.rendering.kernels import GREY, blend, distance, texel_under
 from ptmtools.rendering.records import Pyramids, Sight, Triangles
 
-#: Columns of a table: nothing, and each size of a texture.
+#: Columns of a table: grey, and each size of a texture.
 COLUMNS = 4
 
 
 class Sizes(NamedTuple):
-    """The textures in each size."""
+    """Textures in each size."""
 
     small: Pyramids
     middle: Pyramids
@@ -27,9 +27,9 @@ class Sizes(NamedTuple):
 def color_of(
     sight: Sight, i: int, triangles: Triangles, textures: Pyramids, color: Floats, work: Floats
 ) -> None:
-    """Writes to ``color`` (3,) what a pixel shows, 0 to 255: black where that is nothing.
+    """Writes the colour of a pixel to ``color`` (3,), 0 to 255; black if the pixel shows nothing.
 
-    ``work`` (4, 3) to work in.
+    ``work`` (4, 3) is scratch memory.
     """
     f = sight.triangle[i]
     if f < 0:
@@ -56,15 +56,15 @@ def add_shown(
     sums: Floats,
     work: Floats,
 ) -> None:
-    """Adds the errors of what one kind of mesh shows in the pixels of a frame.
+    """Adds the errors of the pixels of a frame as one kind of mesh shows them.
 
     Parameters
     ----------
-    owner: (n,) the object that each pixel belongs to, -1 for none.
+    owner: (n,) object of each pixel, -1 for none.
     exact: (n, 3) colours of the full picture.
-    place: (m, T + 1) the row of an object and a texture, the last without.
+    place: (m, T + 1) row of an object and a texture; the last is without texture.
     sums: (rows, `COLUMNS`) of root mean squares over R, G and B.
-    work: (5, 3) to work in.
+    work: (5, 3) scratch memory.
     """
     shown = work[4]
     for i in range(len(owner)):
@@ -90,6 +90,6 @@ def add_shown(
 def full_colors(
     sight: Sight, triangles: Triangles, textures: Pyramids, exact: Floats, work: Floats
 ) -> None:
-    """Writes the full picture to ``exact`` (n, 3); ``work`` (4, 3) to work in."""
+    """Writes the full picture to ``exact`` (n, 3); ``work`` (4, 3) is scratch memory."""
     for i in range(len(sight.triangle)):
         color_of(sight, i, triangles, textures, exact[i], work)

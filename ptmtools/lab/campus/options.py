@@ -11,11 +11,12 @@ from ptmtools.neighbours.campus.model import PRESETS, Quality
 from ptmtools.options import option
 from ptmtools.quantities import MemorySize, parse_bandwidth, parse_duration, parse_memory
 
-#: High detail for so many of the nearest objects (the paper's IV).
+#: Number of nearest objects in high detail (the paper's IV).
 NEAREST = 8
-#: Objects that are loaded at a time; the paper does not say (notes).
+#: Number of objects loaded at a time; the paper does not state it (notes).
 THREADS = 4
-#: Metres of the viewpoint after which objects are sorted again; the paper does not say (notes).
+#: Movement of the viewpoint, metres, after which objects are sorted again; the paper does not state
+#: it (notes).
 MOVE = 2.0
 
 
@@ -32,7 +33,7 @@ class Choice:
         return f"{self.quality.diffuse} and {self.quality.light}{cached}"
 
 
-#: Presets by how an option names them.
+#: Presets by their name in options.
 QUALITIES = {quality.name.lower().replace(" ", "-"): Choice(quality) for quality in PRESETS}
 
 
@@ -80,14 +81,14 @@ class CampusWalkOptions:
     def __post_init__(self) -> None:
         self.link()
         unknown = [name for name in self._presets() if name not in QUALITIES]
-        for name, sound, wanted in (
+        for name, valid, wanted in (
             ("preset", not unknown, ", ".join(QUALITIES)),
             ("memory", self._memory().share is None, "bytes, such as 64MiB, or inf"),
             ("nearest", self.nearest >= 0, "0 or more"),
             ("threads", self.threads >= 1, "1 or more"),
             ("move", self.move >= 0, "0 or more"),
         ):
-            if not sound:
+            if not valid:
                 raise InputError(
                     "PTM-I111",
                     f"{name} of {getattr(self, name)} is out of range",
@@ -96,7 +97,7 @@ class CampusWalkOptions:
 
     @property
     def qualities(self) -> list[Quality]:
-        """In the order given, each once."""
+        """Presets in the order given, each once."""
         return [QUALITIES[name].quality for name in self._presets()]
 
     @property
@@ -105,7 +106,7 @@ class CampusWalkOptions:
         return self._memory().bytes
 
     def link(self, trace: Trace | None = None) -> Conditions:
-        """The link, which changes over time as a trace says."""
+        """The link; with a trace it changes over time."""
         return Conditions(
             parse_bandwidth(self.bandwidth),
             parse_duration(self.latency),

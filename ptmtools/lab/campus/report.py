@@ -1,4 +1,5 @@
-"""Runs through a campus as Markdown: what each preset costs and shows, and its bytes over time."""
+"""Runs through a campus as Markdown: cost and quality of each preset, and received bytes over
+time."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ EVERY = 30.0
 
 
 def table(runs: Sequence[CampusRun]) -> list[str]:
-    """A column for each preset, a row for each measure."""
+    """Rows of measures, a column for each preset."""
     rows: list[tuple[str, Callable[[CampusRun], str]]] = [
         ("textures / lightmaps", lambda r: f"{r.quality.diffuse} / {r.quality.light}"),
         ("all coarsest meshes are there after, s", lambda r: _or(r.begun, "{:.1f}")),
@@ -35,7 +36,8 @@ def table(runs: Sequence[CampusRun]) -> list[str]:
 
 
 def received(runs: Sequence[CampusRun], every: float = EVERY) -> list[str]:
-    """MB received with each preset, by when; beside them what came since the row before."""
+    """MB received by time, a column for each preset; in brackets the increase since the row
+    before."""
     time = runs[0].time
     instants = [*np.arange(every, time[-1], every).tolist(), float(time[-1])]
     lines, before = _head("s", runs), [0.0] * len(runs)
@@ -49,7 +51,7 @@ def received(runs: Sequence[CampusRun], every: float = EVERY) -> list[str]:
 
 
 def document(campus: str, runs: Sequence[CampusRun]) -> dict[str, Any]:
-    """All runs as JSON has them, by its schema."""
+    """All runs as a JSON document of its schema."""
     return {
         "format": FORMAT,
         "schema": SCHEMA,

@@ -1,14 +1,12 @@
-"""Runs: a client with a preset walks through a campus over a link.
+"""Simulates runs: a client with a preset walks through a campus over a link.
 
-As in `ptmtools.lab.simulation`, time goes from frame to frame, what arrives in between is
-handed to the client at once, and what is in graphics memory changes only with a frame.
+As in `ptmtools.lab.simulation`, time proceeds from frame to frame. The client receives arrivals at
+once, and graphics memory changes only with a frame.
 
-The client of a campus as a policy beside those of a database of the same model: the same walks,
-links, pictures and measures.
-
-Its lightmaps are left out: the other clients have no light. What it may take is graphics memory
-for meshes and textures, that of the others is for textures alone. What is counted of levels of
-textures, or of cells, has no meaning here, and is NaN.
+The client of a campus is also a policy that is compared with those of a database of the same model
+on the same walks, links, pictures and measures. It then loads no lightmaps, since the other clients
+have no light. Its budget is graphics memory for meshes and textures; that of the others is for
+textures alone. Measures of texture levels or cells do not apply, and are NaN.
 """
 
 from __future__ import annotations
@@ -34,32 +32,32 @@ from ptmtools.neighbours.campus.model import SIZES, Quality
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress, silent
 
-#: Shorter pauses of the link, s, are no idle periods.
+#: Shortest interval without requests that counts as a pause, s.
 PAUSE = 1.0
 
 
 @dataclass(frozen=True)
 class CampusRun:
-    """What came of a run; F frames.
+    """Result of a run; F frames.
 
     Attributes
     ----------
-    quality, conditions, budget: what was run; the budget is bytes of graphics memory, or None.
+    quality, conditions, budget: preset, link, and bytes of graphics memory, or None.
     time: (F,) s.
     error: (F,) e, the mean over the pixels of the root mean square over R, G and B, 0 to 255; NaN
         in frames without tables.
     memory: (F,) bytes of graphics memory in use. fetched: (F,) bytes of bodies received so far.
-    lacking: (F,) how many of the objects that are wanted in high detail are not shown so; all of
-        them before the client has the index.
-    begun: s until all coarsest meshes and least textures were there, or None.
-    floor: bytes of graphics memory that these take.
-    delays: s from becoming one of the nearest to being shown in full, of each time that it came to
-        that. never: how often it did not, before the object was far again, or the walk over.
-    reused: of the preset's textures, the share that was there when an object that uses them became
-        one of the nearest for the first time; 0 without textures.
-    idle: (p, 2) spans of time, s, in which nothing was on the way.
-    body, overhead: bytes received of bodies and headers. requests: how many. sorts: how often
-        objects were sorted.
+    lacking: (F,) number of objects wanted in high detail and not shown in it; all of them before
+        the client has the index.
+    begun: s until all coarsest meshes and least textures had arrived, or None.
+    floor: bytes of graphics memory of these.
+    delays: s from becoming one of the nearest objects to being shown in full, of each time this
+        happened. never: how often the object was far again, or the walk over, before.
+    reused: share of the preset's textures that were loaded when an object that uses them first
+        became one of the nearest; 0 without textures.
+    idle: (p, 2) intervals, s, without a pending request.
+    body, overhead: bytes received of bodies and headers. requests: number of requests. sorts:
+        number of sorts of the objects.
     """
 
     quality: Quality
@@ -89,7 +87,7 @@ class CampusRun:
 
     @property
     def late(self) -> float:
-        """The share of the time in which at least one of the nearest is not shown in full."""
+        """Share of the time in which at least one of the nearest objects is not shown in full."""
         return float((self.lacking > 0).mean())
 
     @property
@@ -99,13 +97,13 @@ class CampusRun:
 
     @property
     def idle_share(self) -> float:
-        """Of the walk's time, that in which nothing was on the way; 0 of a walk of one frame."""
+        """Share of the walk without a pending request; 0 for a walk of one frame."""
         whole = float(self.time[-1])
         return float(np.diff(self.idle, axis=1).sum()) / whole if whole else 0.0
 
     @property
     def pauses(self) -> int:
-        """Idle spans of at least `PAUSE`."""
+        """Number of idle intervals of at least `PAUSE`."""
         return int((np.diff(self.idle, axis=1) >= PAUSE).sum())
 
 
@@ -119,7 +117,7 @@ def walk_campus(
     progress: Progress = silent,
 ) -> list[CampusRun]:
     """A walk through a campus with each preset of the options; see `prepare_campus` for ``served``
-    and for what is raised."""
+    and the exceptions."""
     world = prepare_campus(folder, walk, served, progress=progress)
     return [simulate_campus(world, quality, options, trace) for quality in options.qualities]
 
@@ -131,8 +129,8 @@ def simulate_campus(
     trace: Trace | None = None,
     conditions: Conditions | None = None,
 ) -> CampusRun:
-    """Walks. The same arguments give the same run, bit for bit. Other ``conditions`` take the place
-    of the link of the options and the trace."""
+    """Simulates a walk. The same arguments give the same run, bit for bit. ``conditions`` replace
+    the link of the options and the trace."""
     link = Link(conditions or options.link(trace))
     client = CampusClient(world.stock, link, quality, options)
     frames, columns = world.frames, _Columns(world.stock)
@@ -182,7 +180,7 @@ def simulate_campus(
 
 
 class _Columns:
-    """How objects and textures are shown, by what is in graphics memory."""
+    """Display state of objects and textures, by the files in graphics memory."""
 
     def __init__(self, stock: Stock) -> None:
         lods = [stock.meshes(number) for number in range(stock.objects)]
@@ -205,14 +203,14 @@ class _Columns:
 
 @dataclass
 class _Waits:
-    """How long objects that have become near wait for their high detail.
+    """Waiting times of objects for their high detail, after they become near.
 
     Attributes
     ----------
-    since: when each object that waits became one of the nearest, s.
-    lacking: how many of the nearest are not shown in full.
-    wanted, reused: textures of objects that became near for the first time, and those of them that
-        were there.
+    since: when each waiting object became one of the nearest, s.
+    lacking: number of the nearest objects not shown in full.
+    wanted, reused: number of textures of objects that became near for the first time, and of those
+        already loaded.
     """
 
     client: CampusClient
@@ -226,7 +224,7 @@ class _Waits:
     _met: set[int] = field(default_factory=set)
 
     def look(self, now: float) -> None:
-        """There is a frame."""
+        """Updates the waiting times for a frame."""
         near = frozenset(self.client.near)
         for number in near - self._near:
             self.since[number] = now
@@ -251,14 +249,14 @@ class _Waits:
 
 @dataclass(frozen=True)
 class CampusPolicy:
-    """A client of a campus, with a preset; ``name`` and ``about`` are for `--policy`."""
+    """A campus client with a preset; ``name`` and ``about`` are for `--policy`."""
 
     name: str
     about: str
     quality: Quality
 
 
-#: By name.
+#: Campus policies by name.
 CAMPUS_POLICIES = {
     f"campus-{name}": CampusPolicy(
         f"campus-{name}",
@@ -269,7 +267,7 @@ CAMPUS_POLICIES = {
 }
 
 
-def walk_beside(
+def measure_campus_walk(
     place: CampusWorld, world: World, policy: CampusPolicy, link: Conditions, budget: int | None
 ) -> tuple[Run, Measures]:
     """A run through a campus, and its measures; ``world`` is the same walk through the database."""

@@ -1,12 +1,13 @@
-"""What of a campus can be fetched: its files, what each weighs on the link and in graphics memory,
-and which of them each object needs.
+"""The files of a campus: their sizes on the link and in graphics memory, and the files of each
+object.
 
-On the link every file is a request. The index and the meshes count as gzip makes them, as other
-clients' do (docs/design/walkthrough.md); images as they lie. In graphics memory a mesh takes the
-bytes of its vertices and indices, a texture or lightmap four bytes a texel and a third for its mip
-levels, whatever its channel.
+Every file is one request. The index and the meshes count as compressed by gzip, as for other
+clients (docs/design/walkthrough.md); images count as stored. In graphics memory a mesh takes the
+bytes of its vertices and indices, and a texture or lightmap four bytes per texel and a third for
+its mip levels, whatever its channel.
 
-The meshes of a campus as surfaces, and its textures with their mip levels.
+`read_surfaces` reads the meshes as surfaces, and `read_textures` the textures with their mip
+levels.
 """
 
 from __future__ import annotations
@@ -53,16 +54,16 @@ _AGAIN = "write it again with `ptm campus`"
 
 @dataclass(frozen=True)
 class Stock:
-    """All files; number 0 is the index.
+    """Files of a campus; number 0 is the index.
 
     Attributes
     ----------
-    campus: what the index says.
-    names: (n,) of the files. sent: (n,) bytes on the link. stored: (n,) as they lie.
-    memory: (n,) of graphics memory; 0 of the index. most: (n,) what a client that knows only the
-        index takes for that, never less: of a mesh the bytes of its file.
+    campus: content of the index.
+    names: (n,) of the files. sent: (n,) bytes on the link. stored: (n,) bytes as stored.
+    memory: (n,) bytes of graphics memory; 0 for the index. most: (n,) upper bound of it that a
+        client knows from the index: of a mesh the bytes of its file.
     boxes, barycentres: (m, 6), (m, 3) of the objects, metres.
-    bases: of textures of the objects, by their number; those that have a diffuse channel.
+    bases: texture bases of the objects that have a diffuse channel, by number.
     """
 
     campus: Campus
@@ -77,7 +78,7 @@ class Stock:
 
     @property
     def objects(self) -> int:
-        """How many there are."""
+        """Number of objects."""
         return len(self.campus.objects)
 
     def meshes(self, number: int) -> tuple[int, ...]:
@@ -85,11 +86,11 @@ class Stock:
         return tuple(self._number[mesh.file] for mesh in self.campus.objects[number].meshes)
 
     def low(self, number: int) -> tuple[int, ...]:
-        """Files that an object needs at first: its coarsest mesh, textures of the least size."""
+        """Files of an object in low detail: its coarsest mesh and textures of the least size."""
         return (self.meshes(number)[0], *self.textures(number, SIZES[0]))
 
     def high(self, number: int, quality: Quality, lightmaps: bool) -> tuple[int, ...]:
-        """Files of its high detail: its finest mesh, textures and lightmap of a preset."""
+        """Files of an object in high detail: its finest mesh, textures and lightmap of a preset."""
         each = self.campus.objects[number]
         files = [self.meshes(number)[-1], *self.textures(number, quality.diffuse)]
         if lightmaps and each.lightmap is not None:
@@ -118,12 +119,11 @@ class Stock:
 
 
 def read_stock(folder: str | os.PathLike[str], only: str = "*") -> Stock:
-    """What can be fetched of a campus, of which no other objects exist than those whose names are
-    as ``only`` says, with * and ?.
+    """Reads the files of a campus, for the objects whose names match ``only``, with * and ?.
 
     Raises
     ------
-    InputError: PTM-I122 the index or a file is missing or cannot be read, or a file is not that of
+    InputError: PTM-I122 the index or a file is missing or cannot be read, or a file does not match
         the index; PTM-I302 no object has such a name; PTM-I821 the index is damaged.
     LimitError: PTM-L204 the index is too long.
     """
@@ -166,8 +166,8 @@ def read_stock(folder: str | os.PathLike[str], only: str = "*") -> Stock:
 
 
 def file_bytes(folder: Path, name: str, listed: tuple[int, int] | None = None) -> bytes:
-    """The bytes of a file of a campus, of which the index lists size and CRC-32. Its schema has no
-    names that lead out of the folder.
+    """Reads a file of a campus, of which the index lists size and CRC-32. The schema of the index
+    excludes names that lead out of the folder.
 
     Raises InputError PTM-I122.
     """
@@ -178,7 +178,7 @@ def file_bytes(folder: Path, name: str, listed: tuple[int, int] | None = None) -
 
 
 def _bytes(folder: Path, name: str, most: int) -> bytes:
-    """The bytes of a file, of which not many more than ``most`` are read."""
+    """Reads a file, at most ``most`` bytes and one more."""
     try:
         with open_below(folder, name) as stream:
             return stream.read(most + 1)
@@ -205,7 +205,7 @@ def _mipped(side: int) -> int:
 
 
 def _bases(campus: Campus) -> tuple[str, ...]:
-    """Those with colours of which some object has a material."""
+    """Bases with colours that some object uses."""
     used = {number for each in campus.objects for number in each.materials}
     named = [
         m.base
@@ -216,7 +216,7 @@ def _bases(campus: Campus) -> tuple[str, ...]:
 
 
 def _require_textures(folder: Path, stock: Stock) -> None:
-    """That the index lists each file which an object may want."""
+    """Checks that the index lists each file that an object may want."""
     campus = stock.campus
     for number, each in enumerate(campus.objects):
         if max(each.materials, default=-1) >= len(campus.materials):
@@ -237,8 +237,8 @@ def refused(file: Path, what: str) -> InputError:
 def read_surfaces(folder: Path, stock: Stock, level: int) -> Surfaces:
     """The meshes of all objects of one level, 0 or -1: the coarsest or the finest.
 
-    ``cell`` is the object, ``texture`` the number in `Stock.bases`. Light in the colours of
-    vertices is left out, and with it, where there is some, the colours of the model.
+    ``cell`` is the object, ``texture`` the number in `Stock.bases`. Light in vertex colours is left
+    out, and with it the vertex colours of the model.
 
     Raises InputError PTM-I122.
     """
@@ -262,8 +262,8 @@ def read_surfaces(folder: Path, stock: Stock, level: int) -> Surfaces:
     ]
 
     def spread(values: object, kind: type[np.generic], *shape: int) -> NDArray[Any]:
-        held = np.array(values, dtype=kind).reshape(len(rows), *shape)
-        return np.repeat(held, count, axis=0)
+        rows_of = np.array(values, dtype=kind).reshape(len(rows), *shape)
+        return np.repeat(rows_of, count, axis=0)
 
     corner = _joined([p.point[p.triangle] for _, p in rows], 3)
     lit = campus.lightmaps != "none" and any(len(o.meshes) > 1 for o in campus.objects)
@@ -287,7 +287,7 @@ def read_surfaces(folder: Path, stock: Stock, level: int) -> Surfaces:
 
 
 def read_textures(folder: Path, stock: Stock, size: int) -> Pyramids:
-    """The colours of all bases in one size, and their mip levels, made as `generateMipmap` does.
+    """The colours of all bases in one size, with mip levels as of `generateMipmap`.
 
     Raises InputError PTM-I122.
     """
@@ -308,12 +308,12 @@ def read_textures(folder: Path, stock: Stock, size: int) -> Pyramids:
 
 
 def mip_levels(image: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
-    """A square (s, s, 3), s a power of two, and its mip levels, the coarsest first: each texel is
-    the rounded mean of four."""
+    """A square image (s, s, 3), s a power of two, with its mip levels, the coarsest first: each
+    texel is the rounded mean of four."""
     levels = [image]
     while len(image) > 1:
-        held = image.astype(np.uint16)
-        total = held[::2, ::2] + held[1::2, ::2] + held[::2, 1::2] + held[1::2, 1::2]
+        wide = image.astype(np.uint16)
+        total = wide[::2, ::2] + wide[1::2, ::2] + wide[::2, 1::2] + wide[1::2, 1::2]
         image = ((total + 2) >> 2).astype(np.uint8)
         levels.append(image)
     return levels[::-1]
@@ -325,16 +325,16 @@ def _image(folder: Path, name: str, size: int) -> NDArray[np.uint8]:
         with pillow_faults():
             image = opened(io.BytesIO(file_bytes(folder, name)), limits)
             load(image)
-            held = np.asarray(image.convert("RGB"))
+            pixels = np.asarray(image.convert("RGB"))
     except PtmError as fault:
         raise refused(folder / name, fault.message) from None
-    if held.shape[:2] != (size, size):
+    if pixels.shape[:2] != (size, size):
         raise refused(folder / name, f"is not a square of {size} texels")
-    return np.ascontiguousarray(held)
+    return np.ascontiguousarray(pixels)
 
 
 def _brightness(primitive: Primitive, lit: bool) -> Floats:
-    """(m, 3) what multiplies the texel of each triangle, sRGB, without the material's colour."""
+    """(m, 3) sRGB factor of each triangle's texels, without the material's colour."""
     if primitive.color is None or lit:
         return np.ones((len(primitive.triangle), 3))
     colors: Floats = to_srgb(primitive.color)[primitive.triangle].mean(axis=1)

@@ -1,22 +1,20 @@
-"""All that the runs of a walk through a campus share.
-
-Tables along a walk through a campus: what is wrong with the picture, by what has been loaded.
+"""Data shared by the runs of a walk through a campus, with tables of the error of the picture.
 
 In each frame rays are cast at the meshes of the full picture, at all finest and at all coarsest
-meshes of the campus. A pixel belongs to the object whose finest mesh it shows, or if it shows none,
-the coarsest. What is wrong with it (root mean square over R, G and B, 0 to 255) is summed up by
-object and texture, once for finest and once for coarsest meshes, with nothing there (grey) and with
-the texture in each size. A run then only looks up: the part of an object is that of the mesh by
-which it is shown, each texture in the size at hand.
+meshes of the campus. A pixel belongs to the object whose finest mesh it shows, or, if it shows
+none, whose coarsest. Its error (root mean square over R, G and B, 0 to 255) is summed up by object
+and texture, for finest and for coarsest meshes, with nothing loaded (grey) and with the texture in
+each size. A run only looks up errors: by the mesh that shows an object, and by the resident size of
+each texture.
 
-An approximation, at silhouettes: a pixel that belongs to an object shows what the meshes of its
-kind show there when *all* objects are shown by that kind. Where a coarse mesh leaves open what the
-fine one covers, that is what lies behind by its coarse mesh, even if that object is shown by its
-fine one; and where it covers more, the pixel belongs to what is behind it and is shown by the kind
-of that. Nothing is there where nothing is hit: black, as in pictures of other clients.
+This is an approximation at silhouettes: a pixel of an object shows what the meshes of that kind
+show when *all* objects are shown by that kind. Where a coarse mesh leaves open what the fine one
+covers, the pixel shows the coarse mesh of the object behind, even if that object is shown by its
+fine one. Where the coarse mesh covers more, the pixel belongs to the object behind and follows the
+kind of that. A ray that hits nothing is black, as in pictures of other clients.
 
-Where the full picture shows something and neither mesh does, or the other way round, meshes differ
-from the full picture's: that part of the error is in every run (`Tables.least`).
+Where only the full picture, or only the meshes, show something, the meshes differ from the full
+picture: that part of the error is in every run (`Tables.least`).
 """
 
 from __future__ import annotations
@@ -40,21 +38,22 @@ from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.rendering.records import Pyramids, triangles_of
 
-#: How an object is shown.
+#: Display state of an object.
 NOTHING, COARSE, FINE = range(3)
 
 
 @dataclass(frozen=True)
 class Tables:
-    """What is on the screen; the rows of a frame are those from ``start[f]`` to ``start[f + 1]``.
+    """Errors of the frames; the rows of a frame are ``start[f]`` to ``start[f + 1]``.
 
     Attributes
     ----------
     start: (F + 1,).
     object, texture: (R,) int32; the texture is -1 for surfaces without.
     kind: (R,) int8, `COARSE` or `FINE`.
-    error: (R, 4) its part of the frame's mean: nothing there, and the texture in each size.
-    least: (F,) what no object has a part in.
+    error: (R, 4) part of the frame's mean error: with nothing loaded, and with the texture in each
+        size.
+    least: (F,) part of the error that belongs to no object.
     """
 
     start: Ints
@@ -65,29 +64,29 @@ class Tables:
     least: Floats
 
     def wrong(self, frame: int, mesh: Ints, column: Ints) -> float:
-        """e of a frame: (m,) how each object is shown, and (T,) each texture: 0 is nothing, then
-        the sizes."""
+        """e of a frame, for the display state of each object (m,) and the column of each texture
+        (T,): 0 is nothing, then the sizes."""
         rows = slice(int(self.start[frame]), int(self.start[frame + 1]))
         number, texture = self.object[rows], self.texture[rows]
         shown = mesh[number]
-        # Grey is grey, whatever mesh lacks: that of the finest stands for it.
+        # An object without a mesh is grey; the rows of its finest mesh stand for it.
         used = self.kind[rows] == np.where(shown == NOTHING, FINE, shown)
-        held = np.append(column, self.error.shape[1] - 1)[texture]
-        held = np.where(shown == NOTHING, 0, held)
-        part = np.take_along_axis(self.error[rows], held[:, None], axis=1)[:, 0]
+        loaded = np.append(column, self.error.shape[1] - 1)[texture]
+        loaded = np.where(shown == NOTHING, 0, loaded)
+        part = np.take_along_axis(self.error[rows], loaded[:, None], axis=1)[:, 0]
         return float(part[used].sum(dtype=np.float64) + self.least[frame])
 
 
 @dataclass(frozen=True)
-class Full:
-    """What the picture is compared with: surfaces with textures."""
+class FullPicture:
+    """The reference picture: surfaces with textures."""
 
     surfaces: Surfaces
     textures: Pyramids
 
 
 def look(
-    full: Full,
+    full: FullPicture,
     finest: Surfaces,
     coarsest: Surfaces,
     sizes: tuple[Pyramids, Pyramids, Pyramids],
@@ -127,8 +126,8 @@ def look(
             errors.append((sums[nonzero] / pixels).astype(np.float32))
             sums[nonzero] = 0.0
         start.append(start[-1] + len(rows[-1]) + len(rows[-2]))
-        nobody = exact[owner < 0]
-        least[f] = np.sqrt((nobody**2).mean(axis=1)).sum() / pixels
+        unowned = exact[owner < 0]
+        least[f] = np.sqrt((unowned**2).mean(axis=1)).sum() / pixels
     progress(len(eye), len(eye), "looking along the walk")
     number, texture, kind = np.concatenate(rows).T
     return Tables(
@@ -138,7 +137,7 @@ def look(
 
 
 def _owners(*seen: tuple[Ints, Surfaces]) -> Ints:
-    """(n,) the object of the first of the meshes that shows something."""
+    """(n,) the object of the first mesh that shows something."""
     result = np.full(len(seen[0][0]), -1, np.int64)
     for triangle, surfaces in seen:
         open_ = (result < 0) & (triangle >= 0)
@@ -152,9 +151,8 @@ class CampusWorld:
 
     Attributes
     ----------
-    stock: what can be fetched.
-    tables: of the errors, None if nobody asks for them. view: (F,) which of them each frame has, -1
-        for none.
+    stock: the files of the campus.
+    tables: errors, or None if not requested. view: (F,) table of each frame, -1 for none.
     time: (F,) s. eye: (F, 3) metres.
     rate: frames a second.
     """
@@ -168,18 +166,17 @@ class CampusWorld:
 
     @property
     def frames(self) -> int:
-        """How many there are."""
+        """Number of frames."""
         return len(self.time)
 
     @property
     def lacking(self) -> float:
-        """e of what its meshes never show, on average over the frames that have tables; 0 without
-        any."""
+        """Mean e that the meshes never show, over the frames with tables; 0 without any."""
         some = self.view[self.view >= 0]
         return 0.0 if self.tables is None else float(self.tables.least[some].mean())
 
     def standing(self, seconds: float, frame: int = 0) -> CampusWorld:
-        """Who stays at a frame of this, so long."""
+        """A visitor who stays at a frame for this time."""
         count = int(np.ceil(seconds * self.rate)) + 1
         held = np.full(count, frame)
         time = np.arange(count) / self.rate
@@ -202,14 +199,14 @@ def prepare_campus(
 
     Parameters
     ----------
-    served: a database of the same model; its full picture is what pictures are compared with. If
-        it is None, that is the campus with all finest meshes and largest textures: what
-        compression and a lesser size did to the images is then no error.
+    served: a database of the same model, whose full picture is the reference. If None, the
+        reference is the campus with all finest meshes and largest textures: the loss by compression
+        and smaller images is then not an error.
     pyramids: its textures, if they have been read already.
     rate: frames a second. pixels: of the pictures, across and down.
-    every: errors are tabulated of each frame whose number it divides, which takes most of the time;
+    every: tabulate the errors of each frame whose number it divides, which takes most of the time;
         0: of none.
-    only: names of the objects that there are, with * and ?.
+    only: names of the objects to keep, with * and ?.
 
     Raises
     ------
@@ -241,10 +238,10 @@ def prepare_campus(
         view[::every] = inverse.reshape(-1)
         finest, coarsest = (read_surfaces(folder, stock, level) for level in (-1, 0))
         small, middle, large = (read_textures(folder, stock, size) for size in SIZES)
-        full = Full(finest, large)
+        full = FullPicture(finest, large)
         if served is not None:
             textures = read_pyramids(served, progress) if pyramids is None else pyramids
-            full = Full(served.surfaces, textures)
+            full = FullPicture(served.surfaces, textures)
         camera = Camera(*pixels, walk.field_of_view, walk.aspect)
         sizes = small, middle, large
         tables = look(full, finest, coarsest, sizes, camera, seen[:, :3], seen[:, 3:], progress)

@@ -1,1 +1,1 @@
-"""How a walk is made from a database."""
+"""Makes a walk through the rooms of a database."""

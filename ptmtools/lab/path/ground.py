@@ -1,22 +1,19 @@
-"""Where an eye can be on a walk, as a graph: places, and steps between them.
+"""The ground of a walk as a graph: places of the eye, and steps between them.
 
-A step costs metres, and more of them where it is narrow or steep, or leads over furniture, so that
-the cheapest way is the one that somebody would take.
+A step costs metres, and more where it is narrow or steep or leads over furniture, so that the
+cheapest way is one that a visitor would take.
 
-What is in the way of a body or of an eye: rays against all that a model shows, glass and
-furniture included, but for door leaves that stand open.
+`Obstacles` blocks bodies and eyes: rays against the whole model, glass and furniture included,
+except open door leaves. Embree computes in single precision, here around the middle of the model.
 
-Embree computes in single precision, here around the middle of the model.
+`over_floors` places the eye over floors, on a grid. The eye region's floor (`Cells.eye_floor`) is
+as wide as a body around the possible positions of its middle, so it leads through the narrowest
+door. It also widens over lower floor: of surfaces one step apart the foot is on the existing one,
+which a ray straight down finds, and of several existing ones on the upper.
 
-Places on floors, on a grid, and steps between them.
-
-The eye region's floor (`Cells.eye_floor`) is as wide as a body around where its middle can be, so
-it leads through the narrowest door. It is widened over lower floor too: of surfaces one step apart
-the foot is on the one that is there, which a ray straight down tells, and of these on the upper.
-
-An eye never goes through a surface. A body does where there is no other way: what the subdivision
-takes for detail, such as a chair, does not keep the walker from a room beyond. Such steps are
-dear.
+An eye never goes through a surface. A body does where there is no other way: detail of the
+subdivision, such as a chair, does not keep the walker from a room beyond. Such steps have a high
+cost.
 """
 
 from __future__ import annotations
@@ -34,16 +31,14 @@ from ptmtools.scene.model import Scene
 
 @dataclass(frozen=True)
 class Ground:
-    """The places of an eye, and the steps between them.
+    """Places of the eye, and the steps between them.
 
     Attributes
     ----------
     eye: (n, 3) metres.
-    cell: (n,) the cell that each is in, or -1.
-    space: (n,) metres to what stands about, at most `footing.ABOUT`; 0 where the foot is
-        on nothing.
-    start, target, cost: steps as CSR over places: (n + 1,), (m,) where each leads to, and (m,)
-        what it costs.
+    cell: (n,) cell of each place, or -1.
+    space: (n,) metres to the nearest obstacle, at most `ABOUT`; 0 where nothing supports the foot.
+    start, target, cost: steps as CSR over places: (n + 1,), (m,) target places, and (m,) costs.
     """
 
     eye: Floats
@@ -55,15 +50,15 @@ class Ground:
 
     @staticmethod
     def of(eye: Floats, cell: Ints, space: Floats, steps: Ints, cost: Floats) -> Ground:
-        """From (k, 2) steps, each of which can be taken both ways, at (k,) costs."""
+        """From (k, 2) steps, walkable in both directions, and their (k,) costs."""
         both = np.concatenate([steps, steps[:, ::-1]])
         order = np.lexsort((both[:, 1], both[:, 0]))
         start = np.searchsorted(both[order, 0], np.arange(len(eye) + 1))
         return Ground(eye, cell, space, start, both[order, 1], np.tile(cost, 2)[order])
 
     def main_part(self, standing: Bools) -> Ground:
-        """What hangs together and reaches most of the (C,) cells that ``standing`` marks; of parts
-        that reach as many, the one with most places."""
+        """The connected part that reaches most of the (C,) ``standing`` cells; of equal parts the
+        one with most places."""
         from ptmtools.lab.path.ground_kernels import spread_parts
 
         if not len(self.eye):
@@ -85,19 +80,19 @@ class Ground:
         return Ground(self.eye[kept], self.cell[kept], self.space[kept], start, target, cost)
 
     def way_to_nearest(self, source: int, goal: Bools) -> Ints:
-        """The places on the cheapest way from one to the nearest of those that (n,) ``goal`` marks,
-        both ends included; none if no way leads to one."""
+        """The places on the cheapest way from ``source`` to the nearest of the (n,) ``goal``
+        places, both ends included; none without a way."""
         from ptmtools.lab.path.ground_kernels import nearest_goal
 
         return np.asarray(nearest_goal(self.start, self.target, self.cost, source, goal))
 
 
-#: Rays that are cast together: their arrays stay within the processor's cache.
+#: Rays cast together; their arrays fit the processor's cache.
 _RAYS = 1 << 16
 
 
 class Obstacles:
-    """The triangles of a scene that stand in the way."""
+    """The triangles of a scene that block a walker."""
 
     def __init__(self, scene: Scene, cells: Cells) -> None:
         from embreex.mesh_construction import TriangleMesh
@@ -114,13 +109,14 @@ class Obstacles:
             TriangleMesh(self._tree, np.ascontiguousarray(corners, dtype=np.float32))
 
     def crossed(self, start: Floats, end: Floats) -> Bools:
-        """(n,) whether something is between (n, 3) points and (n, 3) others, metres."""
+        """(n,) whether a surface lies between (n, 3) points and (n, 3) others, metres."""
         result: Bools = self.first(start, end - start, 1.0)[0] >= 0
         return result
 
     def first(self, points: Floats, along: Floats, reach: float = np.inf) -> tuple[Ints, Floats]:
-        """What rays from (n, 3) points along (n, 3) vectors meet first within a ``reach``: (n,) the
-        scene's triangle, or -1, and (n,) how far away, or the reach; in lengths of the vectors."""
+        """The first hits of rays from (n, 3) points along (n, 3) vectors within a ``reach``: (n,)
+        the scene's triangle, or -1, and (n,) the distance, or the reach; in lengths of the
+        vectors."""
         met, far = np.full(len(points), -1, dtype=np.int64), np.full(len(points), reach)
         for row in range(0, len(points) if self._tree is not None else 0, _RAYS):
             some = slice(row, row + _RAYS)
@@ -133,25 +129,25 @@ class Obstacles:
         return met, far
 
 
-#: Metres between places; and of the finer grid in cells that the first one misses, as a share.
+#: Metres between places; and the finer grid, as a share, in cells that the first one misses.
 GRID, _FINE = 0.25, 0.2
-#: Where the grid begins, as a share: not at round numbers, where walls are.
+#: Offset of the grid, as a share: not at round numbers, where walls are.
 _SHIFT = (5**0.5 - 1) / 2
-#: Metres from a place within which things stand about.
+#: Largest distance to an obstacle that matters, metres.
 ABOUT = 0.6
-#: The foot is on what is so near below or above a place, as a share of a step.
+#: Largest vertical distance of the surface under the foot from a place, as a share of a step.
 _UNDERFOOT = 0.2
-#: Heights of the body that things are looked for at, as shares of that of the eye.
+#: Heights at which the body is tested, as shares of that of the eye.
 BODY = (0.19, 0.62, 1.0)
-#: A step costs so many times its length: at most where things stand about, more where no body fits,
-#: where it goes up or down by more than half of a step, and through what an eye would see over.
+#: Factors of the length of a step in its cost: most beside obstacles, and added where no body fits,
+#: where it rises or falls by more than half a step, and through surfaces below the eye.
 _BESIDE, _NARROW, _STEEP, _THROUGH = 4.0, 10.0, 3.0, 20.0
-#: Level directions in which things are looked for.
+#: Level directions in which obstacles are searched.
 _STEP_RAYS = 8
 
 
 def over_floors(cells: Cells, obstacles: Obstacles, eye_height: float) -> Ground:
-    """Places an eye's height above floors, metres, and the steps between them."""
+    """Places an eye's height, metres, above floors, and the steps between them."""
     eyes, walker = cells.eyes, cells.walker
     point, firm = _surfaces(cells.eye_floor, GRID, eyes, obstacles, walker, eye_height)
     cell = cells.locate(point).astype(np.int64)
@@ -172,7 +168,7 @@ def over_floors(cells: Cells, obstacles: Obstacles, eye_height: float) -> Ground
 
 
 def _below(cells: Cells, missed: Bools, eye_height: float) -> Bools:
-    """(n,) which triangles of floor some eye is above in a leaf of the (C,) cells marked."""
+    """(n,) which triangles of floor lie below an eye in a leaf of the (C,) ``missed`` cells."""
     corner = cells.eye_floor + [0, eye_height, 0]
     low, high = corner.min(axis=1), corner.max(axis=1)
     result = np.zeros(len(corner), dtype=np.bool_)
@@ -191,8 +187,8 @@ def _surfaces(
     walker: Walker,
     eye_height: float,
 ) -> tuple[Floats, Bools]:
-    """(n, 3) eyes over columns of a grid, one for each surface that a foot can be on, and (n,)
-    whether it is there: not over an edge, or within a table."""
+    """(n, 3) eyes over columns of a grid, one for each surface that supports a foot, and (n,)
+    whether the surface exists there: false over an edge or within a table."""
     column, point = grid_points(floor, grid)
     eye = point + [0, eye_height, 0]
     inside = eyes.contains(eye)
@@ -205,13 +201,13 @@ def _surfaces(
 
 
 def grid_points(floor: Floats, grid: float) -> tuple[Ints, Floats]:
-    """What of columns on a ``grid``, metres, meets (m, 3, 3) triangles: (n, 2) the column, and
-    (n, 3) the point."""
+    """The intersections of columns on a ``grid``, metres, with (m, 3, 3) triangles: (n, 2) the
+    column, and (n, 3) the point."""
     plan = floor[:, :, [0, 2]] / grid - _SHIFT
     edge = np.roll(plan, -1, axis=1) - plan
     wide = edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0]
     row = np.flatnonzero(wide != 0)
-    # Along each line of the grid that a triangle meets, from the least to the greatest crossing.
+    # Along each grid line that a triangle meets, from the least to the greatest crossing.
     first = np.ceil(plan[row, :, 0].min(axis=1)).astype(np.int64)
     count = np.floor(plan[row, :, 0].max(axis=1)).astype(np.int64) - first + 1
     row, across = np.repeat(row, count), ranges(first, count)
@@ -226,7 +222,7 @@ def grid_points(floor: Floats, grid: float) -> tuple[Ints, Floats]:
     count = most[some].astype(np.int64) - first + 1
     column = np.column_stack([np.repeat(across, count), ranges(first, count)])
     row = np.repeat(row, count)
-    # By the shares of the corners.
+    # Heights, by barycentric coordinates.
     away = column[:, None] - plan[row]
     offset = edge[row][:, :, 0] * away[:, :, 1] - edge[row][:, :, 1] * away[:, :, 0]
     share = np.roll(offset, -1, axis=1) / wide[row, None]
@@ -236,8 +232,8 @@ def grid_points(floor: Floats, grid: float) -> tuple[Ints, Floats]:
 
 
 def _footholds(column: Ints, height: Floats, present: Bools, step: float) -> Ints:
-    """Which of the surfaces in each column a foot can be on: those that are there before those that
-    are not, the upper before the lower, and none less than a step from another."""
+    """The surfaces in each column that support a foot: existing ones before others, the upper
+    before the lower, and none less than a step from another."""
     left = np.lexsort((-height, ~present, column[:, 1], column[:, 0]))
     kept = [left[:0]]
     while len(left):
@@ -250,7 +246,7 @@ def _footholds(column: Ints, height: Floats, present: Bools, step: float) -> Int
 
 
 def _steps(point: Floats, walker: Walker, eyes: EyeRegion, obstacles: Obstacles) -> Ints:
-    """(k, 2) pairs of places from one of which an eye gets to the other in a step."""
+    """(k, 2) pairs of places between which an eye can move in a step."""
     reach = 1.5 * GRID
     box = np.floor(point[:, [0, 2]] / reach).astype(np.int64)
     box -= box.min(axis=0, initial=0) - 1
@@ -274,7 +270,7 @@ def _steps(point: Floats, walker: Walker, eyes: EyeRegion, obstacles: Obstacles)
 
 
 def _space(point: Floats, obstacles: Obstacles, eye_height: float) -> Floats:
-    """(n,) metres to the nearest thing on one level with the body, at most `ABOUT`."""
+    """(n,) metres to the nearest obstacle on one level with the body, at most `ABOUT`."""
     angle = 2 * np.pi * (np.arange(_STEP_RAYS) + 0.5) / _STEP_RAYS
     space = np.full(len(point), ABOUT)
     for height in BODY:
@@ -293,7 +289,7 @@ def _cost(
     walker: Walker,
     eye_height: float,
 ) -> Floats:
-    """(k,) what steps cost."""
+    """(k,) costs of steps."""
     start, end = point[steps[:, 0]], point[steps[:, 1]]
     room = space[steps].min(axis=1)
     cost = 1 + _BESIDE * (1 - room / ABOUT) ** 2 + _NARROW * (room < walker.radius)

@@ -12,8 +12,8 @@ from ptmtools.jit import kernel
 
 @kernel
 def nearest_goal(start: Ints, target: Ints, cost: Floats, source: int, goal: Bools) -> Ints:
-    """Dijkstra's algorithm from a ``source`` to the first place that (n,) ``goal`` marks: the
-    places on the way, or none."""
+    """Dijkstra's algorithm from a ``source`` to the nearest of the (n,) ``goal`` places: the places
+    on the way, or none."""
     count = len(start) - 1
     least = np.full(count, np.inf)
     before = np.full(count, -1, dtype=np.int64)
@@ -48,7 +48,8 @@ def nearest_goal(start: Ints, target: Ints, cost: Floats, source: int, goal: Boo
 
 @kernel
 def spread_parts(start: Ints, target: Ints, part: Ints) -> int:
-    """Numbers in (n,) ``part``, all -1 before, what hangs together; returns how many parts."""
+    """Writes the number of the connected part of each place to (n,) ``part``, all -1 before;
+    returns the number of parts."""
     waiting = np.empty(len(part), dtype=np.int64)
     parts = 0
     for first in range(len(part)):

@@ -1,11 +1,8 @@
-"""A walk through every room of a building that can be walked to.
+"""Makes a walk through every reachable room of a building.
 
-Where a walk begins: at a viewpoint, as a visitor's does.
-
-Places in leaves and portals, where eyes may be anywhere and there is no floor to go by: from the
-middle of each leaf to that of each portal, as near to the height of eyes as they go.
-
-A walk through what a database was built from.
+The walk begins at a viewpoint, as a visitor's does. If eyes may be anywhere and there is no floor,
+its places lie in leaves and portals: the ways lead from the middle of each leaf to that of each
+portal, as near to the height of eyes as possible.
 """
 
 from __future__ import annotations
@@ -32,15 +29,15 @@ from ptmtools.scene.model import Scene
 from ptmtools.store.layout import SERVED
 
 Triple = tuple[float, float, float]
-#: Of each viewpoint the cell, the position in metres, and the unit vector in which it looks.
+#: Cell, position in metres, and unit direction of each viewpoint.
 Viewpoints = Sequence[tuple[int, Triple, Triple]]
-#: A viewpoint is where a place of its cell is at most so far away, metres.
+#: Largest distance of a viewpoint from a place of its cell, metres.
 _NEAR = 1.0
 
 
 def beginning(ground: Ground, viewpoints: Viewpoints, seed: int) -> Leg | None:
-    """Standing at a viewpoint and looking as it does: of those that can be walked from the first
-    for seed 1, the next for seed 2, and so on around; None if there is none."""
+    """A stand at a viewpoint in its direction: at the first usable one for seed 1, the next for
+    seed 2, and so on around; None if there is none."""
     legs = []
     for cell, position, direction in viewpoints:
         away = np.linalg.norm(ground.eye - position, axis=1)
@@ -51,12 +48,12 @@ def beginning(ground: Ground, viewpoints: Viewpoints, seed: int) -> Leg | None:
     return legs[(seed - 1) % len(legs)] if legs else None
 
 
-#: The middle of a leaf or portal is moved by such shares of the way to the height of eyes.
+#: Shares of the way to the height of eyes by which the middle of a leaf or portal is moved.
 _SHARES = (1.0, 0.75, 0.5, 0.25, 0.0)
 
 
 def through_portals(cells: Cells, obstacles: Obstacles, eye_height: float) -> Ground:
-    """Places an eye's height, metres, above the lowest points of leaves, and in portals."""
+    """Places at the eye's height, metres, above the lowest points of leaves, and in portals."""
     leaf = np.array([_in_leaf(cells, i, eye_height) for i in range(cells.leaf_count)])
     portal = np.array([_in_portal(cells, k, leaf) for k in range(cells.portal_count)])
     eye = np.concatenate([leaf.reshape(-1, 3), portal.reshape(-1, 3)])
@@ -72,15 +69,15 @@ def _in_leaf(cells: Cells, leaf: int, eye_height: float) -> Floats:
     point = cells.leaf_points(leaf)
     middle = point.mean(axis=0)
     rise = np.array([0.0, point[:, 1].min() + eye_height - middle[1], 0.0])
-    tried = middle + np.array(_SHARES)[:, None] * rise
-    inside = cells.locate_leaf(tried) == leaf
+    candidates = middle + np.array(_SHARES)[:, None] * rise
+    inside = cells.locate_leaf(candidates) == leaf
     inside[-1] = True
-    return np.asarray(tried[inside.argmax()])
+    return np.asarray(candidates[inside.argmax()])
 
 
 def _in_portal(cells: Cells, portal: int, leaf: Floats) -> Floats:
-    """As near to the height of its two leaves' places as a portal goes; one that is level has all
-    of its points at one height."""
+    """The place in a portal nearest to the height of the places of its two leaves; all points of a
+    level portal have the same height."""
     corner = cells.portal(portal)
     middle = corner.mean(axis=0)
     normal = cells.portal_plane[portal, :3]
@@ -89,30 +86,30 @@ def _in_portal(cells: Cells, portal: int, leaf: Floats) -> Floats:
     up = np.array([0.0, 1.0, 0.0]) - normal[1] * normal
     side = np.cross(np.roll(corner, -1, axis=0) - corner, normal)
     for share in _SHARES:
-        tried = middle + share * rise * up
-        lateral = np.einsum("ij,ij->i", tried - corner, side)
+        candidate = middle + share * rise * up
+        lateral = np.einsum("ij,ij->i", candidate - corner, side)
         if (lateral >= 0).all() or (lateral <= 0).all():
-            return np.asarray(tried)
+            return np.asarray(candidate)
     return np.asarray(middle)
 
 
-#: The head is moved at least so often, in steps a second.
+#: Least steps of the head per second.
 _STEPS = 60
-#: He stands before a picture for so many times the average.
+#: Range of a stop before a picture, as factors of the average.
 _STANDS = (0.7, 1.3)
 
 
 @dataclass(frozen=True)
 class Path:
-    """A walk, and what it visits.
+    """A walk with the rooms that it visits.
 
     Attributes
     ----------
     walk: the walk.
-    rooms: cells in which one can stand.
-    visited: those of them that an eye of the walk is in, ascending.
-    unreachable: those of them that no way leads to at the height of eyes, ascending.
-    stops: how often he stands and looks.
+    rooms: number of cells in which a visitor can stand.
+    visited: visited cells among them, ascending.
+    unreachable: cells among them without a way at the height of eyes, ascending.
+    stops: number of stops before pictures.
     """
 
     walk: Walk
@@ -128,10 +125,11 @@ def make_path(
     options: PathOptions = PathOptions(),  # noqa: B008 - a frozen value
     viewpoints: Viewpoints = (),
 ) -> Path:
-    """A walk through all rooms of a building, from one of its ``viewpoints`` on, nearest next, with
-    stops before pictures; the same for the same seed.
+    """A walk through all rooms of a building, from one of its ``viewpoints``, always to the nearest
+    room, with stops before pictures; the same for the same seed.
 
-    Raises InputError: PTM-I111 eyes cannot be as high as asked for; PTM-I247 nobody can walk there.
+    Raises InputError: PTM-I111 the height of the eyes is out of range; PTM-I247 the building has no
+    walkable place.
     """
     random = np.random.default_rng(options.seed)
     eye_height = options.eye_height(cells.walker)
@@ -160,9 +158,9 @@ def make_path(
         ways, ahead = _smoothed(ground.eye, some, smoother), [leg.looks for leg in some]
         stood = options.stop * random.uniform(*_STANDS, sum(map(len, ahead)))
         legs, looks, stands = legs + ways, looks + ahead, np.append(stands, stood)
-        took = Motion.of(ways, ahead, stood, options.speed).duration  # but for turns between rounds
+        took = Motion.of(ways, ahead, stood, options.speed).duration  # without turns between rounds
         spent += took
-        # In a single room without pictures he stands where he is.
+        # In a single room without pictures the walker stays in place.
         if options.duration is None or spent >= options.duration or not took:
             break
     motion = Motion.of(legs, looks, stands, options.speed)
@@ -183,7 +181,7 @@ def _smoothed(eye: Floats, legs: list[Leg], smoother: Smoother) -> list[Floats]:
     """(n, 3) points of each leg."""
     points, fixed = [], []
     for leg in legs:
-        # With the middles of steps, so that what is between two points is looked at closely.
+        # With the middles of steps, for a finer test between two points.
         point = np.repeat(eye[leg.places], 2, axis=0)[:-1]
         point[1::2] = (point[:-1:2] + point[2::2]) / 2
         stays: Bools = np.zeros(len(point), dtype=np.bool_)
@@ -199,14 +197,15 @@ def _smoothed(eye: Floats, legs: list[Leg], smoother: Smoother) -> list[Floats]:
 def _sampled(
     motion: Motion, duration: float, options: PathOptions, cells: Cells, random: np.random.Generator
 ) -> Walk:
-    """The walk, at the rate asked for."""
+    """The walk, sampled at the rate of the options."""
     each = math.ceil(_STEPS / options.rate)
     last = max(int(duration * options.rate), 1)
     times = np.arange(last * each + 1) / (each * options.rate)
     direction = directions(motion, times, random)[::each]
     along, _ = motion.at(times[::each])
     eye = motion.way.position(along)
-    # Between two points of the way that eyes can be at, they nearly always can be; else at one.
+    # Points between two valid points of the way are nearly always valid; else the nearer one is
+    # taken.
     outside = np.flatnonzero(~cells.eyes.contains(eye))
     known = motion.way.along
     after = np.searchsorted(known, along[outside]).clip(1, len(known) - 1)
@@ -222,7 +221,7 @@ def _sampled(
 
 
 def path_through(artifacts: Artifacts, options: PathOptions) -> Path:
-    """A walk through the building, from one of the database's viewpoints on if it has any yet.
+    """A walk through the building of a database, from one of its viewpoints if it has any yet.
 
     Raises what `make_path` and `read_index` do.
     """

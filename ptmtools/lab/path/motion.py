@@ -1,15 +1,16 @@
-"""When the walker is where: he walks each leg at one speed, gaining it and losing it at its ends,
-stands where there is something to look at, and turns on the spot before he walks back.
+"""The motion of the walker along a way: position and view direction over time.
 
-Where the walker looks: ahead on his way, now and then to a side, and at pictures before which he
-stands. The head follows what is looked at as fast as a neck turns, and no faster.
+`Motion` gives the position: the walker takes each leg at one speed, with acceleration at its ends,
+stands before pictures, and turns on the spot before going back.
 
-A way along a grid becomes one that somebody would walk.
+`directions` gives the view: ahead on the way, now and then to a side, and at pictures during stops.
+The head follows its target no faster than a neck turns.
 
-Every point moves to the middle between two others of the way, far ones first, again and again, as
-long as the eye stays where eyes can be, nothing comes between neighbours, and the shoulders touch
-nothing that they did not touch before. What cannot move stays, so the way is at any moment one that
-can be walked. Fixed are the ends of legs and where a room is visited in passing.
+`Smoother` turns a way along a grid into a natural one. Every point moves to the middle between two
+others of the way, far ones first, repeatedly, as long as the eye stays in the eye region, nothing
+comes between neighbours, and the shoulders touch nothing new. A point that cannot move stays, so
+the way is walkable at any moment. The ends of legs, and the points where a room is visited in
+passing, are fixed.
 
 Tried and rejected: pulling the way tight like a string. It is shorter, and grazes each corner.
 """
@@ -28,10 +29,10 @@ from ptmtools.lab.path.ground import BODY, Obstacles
 
 #: m/s².
 ACCELERATION = 1.5
-#: Metres ahead on the way towards which he looks, and over which the heading is taken at least.
+#: Metres to the point ahead that the walker looks at, and least metres over which the heading is
+#: taken.
 _AHEAD, _LEAST = 1.2, 0.3
-#: What he turns by while he walks, and how fast he turns on the spot, as far as time is planned
-#: for; radians, and radians a second.
+#: Largest turn while walking, radians, and planned speed of turns on the spot, radians a second.
 _WALKING, _TURNING = np.radians(45), np.radians(80)
 
 
@@ -42,8 +43,8 @@ class Way:
     Attributes
     ----------
     point: (n, 3) metres.
-    along: (n,) metres on the way to each point.
-    low, high: (l,) where on it each leg begins and ends.
+    along: (n,) metres along the way to each point.
+    low, high: (l,) metres along the way at the beginning and end of each leg.
     """
 
     point: Floats
@@ -53,7 +54,7 @@ class Way:
 
     @staticmethod
     def of(legs: Sequence[Floats]) -> Way:
-        """Of (n, 3) points of each leg, which begins where the last one ended."""
+        """From (n, 3) points of each leg, which begins where the one before ends."""
         point = np.concatenate(legs)
         last = np.cumsum([len(leg) for leg in legs]) - 1
         along = np.cumsum(np.linalg.norm(np.diff(point, axis=0, prepend=point[:1]), axis=1))
@@ -61,12 +62,12 @@ class Way:
         return Way(point, along, np.append(0.0, high[:-1]), high)
 
     def position(self, along: Floats) -> Floats:
-        """(n, 3) points at (n,) metres on the way."""
+        """(n, 3) points at (n,) metres along the way."""
         return np.column_stack([np.interp(along, self.along, axis) for axis in self.point.T])
 
     def heading(self, along: Floats, leg: Ints) -> Floats:
-        """(n, 3) level unit vectors towards what is ahead at (n,) metres on the way, in (n,) legs;
-        0 in legs of no length."""
+        """(n, 3) level unit vectors ahead at (n,) metres along the way, in (n,) legs; 0 in legs of
+        no length."""
         ahead = np.minimum(along + _AHEAD, self.high[leg])
         behind = np.maximum(np.minimum(along, ahead - _LEAST), self.low[leg])
         towards = self.position(ahead) - self.position(behind)
@@ -78,15 +79,15 @@ class Way:
 
 @dataclass(frozen=True)
 class Motion:
-    """A way, with times.
+    """A way with times.
 
     Attributes
     ----------
     way: its (l,) legs.
-    begin, arrive, leave: (l,) seconds: when each leg begins, when it ends, and when the stand at
-        its end does.
-    looks: for each leg (k, 3) unit vectors to look along at its end.
-    until: for each leg (k,) seconds until when each of these is looked at.
+    begin, arrive, leave: (l,) times of each leg, seconds: its beginning, its end, and the end of
+        the stop after it.
+    looks: for each leg (k, 3) unit directions of view at its end.
+    until: for each leg (k,) end times of these, seconds.
     speed: m/s.
     """
 
@@ -100,8 +101,8 @@ class Motion:
 
     @staticmethod
     def of(legs: Sequence[Floats], looks: Sequence[Floats], stands: Floats, speed: float) -> Motion:
-        """Of legs, (n, 3) points each, at the ends of which something is looked along ``looks``,
-        (k, 3) each, one after the other, for ``stands`` seconds, an element for each look."""
+        """From legs of (n, 3) points, the (k, 3) directions of view ``looks`` at their ends, one
+        after the other, and ``stands``, the seconds of each."""
         way = Way.of(legs)
         low, high = way.low, way.high
         number = np.arange(len(legs))
@@ -134,7 +135,7 @@ class Motion:
         return float(self.leave[-1])
 
     def at(self, times: Floats) -> tuple[Floats, Ints]:
-        """(n,) metres on the way at (n,) times, seconds, and (n,) the leg."""
+        """(n,) metres along the way at (n,) times, seconds, and (n,) the leg."""
         leg = np.maximum(np.searchsorted(self.begin, times, "right") - 1, 0)
         since = np.clip(times, None, self.arrive[leg]) - self.begin[leg]
         length = (self.way.high - self.way.low)[leg]
@@ -142,14 +143,14 @@ class Motion:
 
 
 def _walking_time(length: Floats, speed: float) -> Floats:
-    """(n,) seconds that legs of (n,) metres take."""
+    """(n,) seconds for legs of (n,) metres."""
     ramp = speed**2 / ACCELERATION
     whole = length / speed + speed / ACCELERATION
     return np.where(length >= ramp, whole, 2 * np.sqrt(length / ACCELERATION))
 
 
 def _walked(since: Floats, length: Floats, speed: float) -> Floats:
-    """(n,) metres walked of (n,) metres after (n,) seconds: faster at first, slower at last."""
+    """(n,) metres walked of (n,) metres after (n,) seconds: slower at both ends."""
     time = _walking_time(length, speed)
     top = np.minimum(speed, np.sqrt(length * ACCELERATION))
     gain = top / ACCELERATION
@@ -168,17 +169,17 @@ def _angle(one: Floats, other: Floats) -> float:
 _YAW_RATE, _PITCH_RATE = math.radians(100), math.radians(35)
 #: Radians a second squared.
 _YAW_GAIN, _PITCH_GAIN = math.radians(400), math.radians(200)
-#: Near its aim the head turns by this share of what is left in a second.
+#: Share of the remaining angle by which the head turns per second near its target.
 _CLOSING = 4.0
-#: Seconds before arriving that the first picture is turned to.
+#: Seconds before arrival at which the head turns to the first picture.
 _EARLY = 0.6
-#: A glance is so far to a side, radians, so long, and the next one so much later, seconds.
+#: Angle of a glance to a side, radians, its length, and the range of the pause until the next,
+#: seconds.
 _GLANCE, _GLANCING, _PAUSE = math.radians(25), 1.2, (1.5, 4.5)
 
 
 def directions(motion: Motion, times: Floats, random: np.random.Generator) -> Floats:
-    """(n, 3) unit vectors in which the walker looks at (n,) times, seconds, evenly spaced and
-    close."""
+    """(n, 3) unit directions of view at (n,) times, seconds, evenly spaced and close."""
     aim = _aims(motion, times)
     yaw = np.arctan2(aim[:, 2], aim[:, 0]) + _glances(motion, times, random)
     pitch = np.arcsin(np.clip(aim[:, 1], -1.0, 1.0))
@@ -190,7 +191,7 @@ def directions(motion: Motion, times: Floats, random: np.random.Generator) -> Fl
 
 
 def _aims(motion: Motion, times: Floats) -> Floats:
-    """(n, 3) unit vectors to what is looked at, but for glances."""
+    """(n, 3) unit vectors to the targets of view, without glances."""
     along, leg = motion.at(times)
     aim = motion.way.heading(along, leg)
     for number, (looks, until) in enumerate(zip(motion.looks, motion.until, strict=True)):
@@ -203,7 +204,7 @@ def _aims(motion: Motion, times: Floats) -> Floats:
             done = until[-1] if len(looks) else arrive
             onward = motion.way.heading(motion.way.low[number + 1 :][:1], np.array([number + 1]))
             aim[slice(*np.searchsorted(times, [done, leave]))] = onward
-    # Where there is no way, and nothing to look at, he goes on looking as before.
+    # Without a way or a picture the direction stays as before.
     some = np.flatnonzero(aim.any(axis=1))
     if not len(some):
         return np.tile([1.0, 0.0, 0.0], (len(times), 1))
@@ -211,7 +212,7 @@ def _aims(motion: Motion, times: Floats) -> Floats:
 
 
 def _glances(motion: Motion, times: Floats, random: np.random.Generator) -> Floats:
-    """(n,) radians to a side, the one and the other in turn, while he walks."""
+    """(n,) radians of glances to alternating sides while walking."""
     count = int(times[-1] / (_GLANCING + _PAUSE[0])) + 1
     begin = np.cumsum(random.uniform(*_PAUSE, count) + _GLANCING)
     which = np.searchsorted(begin, times, "right") - 1
@@ -222,8 +223,8 @@ def _glances(motion: Motion, times: Floats, random: np.random.Generator) -> Floa
 
 
 def _followed(aim: Floats, step: float, rate: float, gain: float) -> Floats:
-    """(n,) angles that follow (n,) others, a ``step`` of seconds apart, at no more than a ``rate``,
-    which grows and shrinks by no more than a ``gain`` a second, all in radians."""
+    """(n,) angles that follow (n,) targets, ``step`` seconds apart, at most at a ``rate`` that
+    changes by at most ``gain`` a second, all in radians."""
     result = np.empty(len(aim))
     angle, turning = float(aim[0]), 0.0
     for row, wanted in enumerate(aim.tolist()):
@@ -236,7 +237,7 @@ def _followed(aim: Floats, step: float, rate: float, gain: float) -> Floats:
     return result
 
 
-#: How far apart the points are, along the way, to the middle between which one moves.
+#: Distances, in points along the way, to the two points between which a point moves.
 _REACHES = (4, 2, 4, 2, 3, 1, 2, 1)
 
 
@@ -250,24 +251,24 @@ class Smoother:
         self._below = [np.array([0, (1 - height) * eye_height, 0]) for height in BODY]
 
     def smooth(self, point: Floats, fixed: Bools, leg: Ints) -> Floats:
-        """(n, 3) points, of which those that (n,) ``fixed`` marks stay; none looks beyond the end
-        of its (n,) ``leg``, ascending."""
+        """(n, 3) smoothed points. Those of (n,) ``fixed`` stay, and no point depends on others
+        beyond the ends of its (n,) ``leg``, ascending."""
         begin, end = np.searchsorted(leg, leg), np.searchsorted(leg, leg, "right") - 1
         row = np.arange(len(point))
         hits, parted = self._body_hits(point), self._parted(point)
         for reach in _REACHES:
             step = np.minimum(reach, np.minimum(row - begin, end - row))
-            wanted = (point[row - step] + point[row + step]) / 2
+            target = (point[row - step] + point[row + step]) / 2
             moves = ~fixed & (step > 0)
             while moves.any():
-                tried = np.where(moves[:, None], wanted, point)
-                hit, apart = self._body_hits(tried), self._parted(tried)
-                bad = (moves & ~self._eyes.contains(tried)) | (apart & ~parted)
+                candidate = np.where(moves[:, None], target, point)
+                hit, apart = self._body_hits(candidate), self._parted(candidate)
+                bad = (moves & ~self._eyes.contains(candidate)) | (apart & ~parted)
                 bad |= (hit & ~hits).any(axis=1)
                 if not bad.any():
-                    point, hits, parted = tried, hit, apart
+                    point, hits, parted = candidate, hit, apart
                     break
-                # A point that stays never worsens, so one that moves is near.
+                # A point that stays never becomes invalid, so the cause is a near one that moves.
                 moves &= np.convolve(bad, np.ones(2 * reach + 1))[reach:-reach] == 0
         return point
 
@@ -278,8 +279,8 @@ class Smoother:
         return outside | self._obstacles.crossed(point, following)
 
     def _body_hits(self, point: Floats) -> Bools:
-        """(n, 2·heights) what of the body touches something at each point: by height from shoulder
-        to shoulder, and from there to the next point."""
+        """(n, 2·heights) contacts of the body at each point: by height from shoulder to shoulder,
+        and from the point to the next."""
         ahead = np.diff(point, axis=0, append=point[-1:])
         length = np.hypot(ahead[:, 0], ahead[:, 2])
         side = np.zeros_like(point)

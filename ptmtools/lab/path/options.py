@@ -47,25 +47,25 @@ class PathOptions:
     aspect: float = option(1.7778, "Width of the picture divided by its height.")
 
     def __post_init__(self) -> None:
-        wrong = None
+        problem = None
         if self.seed < 0:
-            wrong = f"--seed {self.seed} is below 0"
+            problem = f"--seed {self.seed} is below 0"
         elif self.duration is not None and not 1 <= self.duration <= DAY:
-            wrong = f"--duration {self.duration:g} is not between 1 and {DAY:g} seconds"
+            problem = f"--duration {self.duration:g} is not between 1 and {DAY:g} seconds"
         elif not 0.1 <= self.speed <= 10:
-            wrong = f"--speed {self.speed:g} is not between 0.1 and 10 m/s"
+            problem = f"--speed {self.speed:g} is not between 0.1 and 10 m/s"
         elif not 1 <= self.rate <= 240:
-            wrong = f"--rate {self.rate:g} is not between 1 and 240 samples a second"
+            problem = f"--rate {self.rate:g} is not between 1 and 240 samples a second"
         elif not 0 <= self.stop <= DAY:
-            wrong = f"--stop {self.stop:g} is not between 0 and {DAY:g} seconds"
+            problem = f"--stop {self.stop:g} is not between 0 and {DAY:g} seconds"
         elif not 0 < self.field_of_view < math.pi:
-            wrong = (
+            problem = (
                 f"a field of view of {degrees_text(self.field_of_view)}° is not between 0 and 180"
             )
         elif not 0 < self.aspect < math.inf:
-            wrong = f"an aspect of {self.aspect:g} is not above 0"
-        if wrong:
-            raise _out_of_range(wrong)
+            problem = f"an aspect of {self.aspect:g} is not above 0"
+        if problem:
+            raise _out_of_range(problem)
 
     def eye_height(self, walker: Walker) -> float:
         """Height of the eyes above the floor, metres, for the visitor of the cells.

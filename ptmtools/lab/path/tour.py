@@ -1,17 +1,16 @@
-"""In which order the rooms of a building are visited: always the nearest next, by way on foot.
+"""The order in which the rooms of a building are visited: always the nearest next, by way on foot.
 
-A room whose pictures are worth a stop is visited there; another one somewhere in its middle, unless
-the way to somewhere else leads through it.
+A room with pictures worth a stop is visited there; another one in its middle, unless a way to
+another place leads through it.
 
-What is worth stopping for: places from which much of an image is seen, near and from the front.
+`Views` finds the stops: places that show much of an image, near and from the front. From places in
+each room rays are cast all around. A ray counts if its hit is at viewing distance and faces it; its
+weight is the bytes of the image's file for the covered part of its surface. So a painting of a
+megabyte counts for more than plaster of a megabyte that covers all walls. No ray counts for more
+than a screen can show.
 
-From places in each room rays are cast all around. A ray counts if what it meets is as far away as
-one stands before a picture, and is faced; it counts for as many bytes as the image's file has for
-what the ray covers. So a painting of a megabyte counts for more than plaster of a megabyte that
-covers all walls. No ray counts for more than a screen can show.
-
-What was looked at is remembered by image and by where it hangs, in boxes of about a metre, so that
-the next stop is at another picture, of the same image or of another.
+Viewed pictures are remembered by image and position, in boxes of about a metre, so that the next
+stop is at another picture, of the same image or of another.
 """
 
 from __future__ import annotations
@@ -25,42 +24,41 @@ from ptmtools.arrays import Bools, Floats, Ints, areas, normals
 from ptmtools.lab.path.ground import Ground, Obstacles
 from ptmtools.scene.model import Scene
 
-#: How far away a picture is looked at, metres, and how much it is faced, as a cosine.
+#: Viewing distances of a picture, metres, and least cosine of the angle to its normal.
 NEAR, FAR, FACED = 0.8, 3.0, 0.75
-#: Directions of rays around, and how much the rows of them are up, as a slope.
+#: Number of ray directions around, and the slopes of their rows.
 _AROUND, _SLOPES = 36, (-0.25, 0.0, 0.25)
-#: So many directions to each side belong to a view.
+#: Directions to each side that belong to a view.
 _BESIDE = 2
-#: From so many places in a room views are tried.
-_TRIED = 48
-#: Metres that a place to stand has around it.
+#: Number of places in a room from which views are evaluated.
+_CANDIDATES = 48
+#: Least free space around a stop, metres.
 _SPACE = 0.35
-#: The side of a box by which what was looked at is remembered, metres.
+#: Side of the boxes of viewed pictures, metres.
 _BOX = 1.2
 #: A pixel of a screen of 1080 rows, as an angle.
 _PIXEL = 1e-3
-#: A view is worth a stop if it shows at least this share of what the best one of all does, and of
-#: what the first one in the room does.
+#: Least worth of a stop, as shares of the best view of all and of the first stop in the room.
 _LEAST, _LEAST_IN_ROOM = 0.05, 0.35
-#: Stops in a room each time round.
+#: Most stops in a room in each round.
 _STOPS = 3
 
 
 @dataclass(frozen=True)
 class Stop:
-    """Somewhere to stand, by its place on the ground, and the unit vector to look along."""
+    """A place on the ground to stop at, and the unit direction of view."""
 
     place: int
     direction: tuple[float, float, float]
 
 
 class Views:
-    """The views of a building, and what of them a visitor has not looked at yet."""
+    """The views of a building, and which parts of them a visitor has not yet viewed."""
 
     def __init__(
         self, scene: Scene, ground: Ground, obstacles: Obstacles, random: np.random.Generator
     ) -> None:
-        self._place = _tried(ground, random)
+        self._place = _candidates(ground, random)
         self._cell = ground.cell[self._place]
         angle = 2 * np.pi * np.arange(_AROUND) / _AROUND
         level = np.stack([np.cos(angle), np.zeros(_AROUND), np.sin(angle)], axis=1)
@@ -76,8 +74,8 @@ class Views:
         self._best = float(self._shown().max(initial=0.0))
 
     def round(self) -> dict[int, list[Stop]]:
-        """By cell, the stops of one time round: at what was not looked at before, and once all was,
-        again at all of it."""
+        """The stops of one round by cell: at pictures not yet viewed, or, once all were, at all of
+        them again."""
         if self._shown().max(initial=0.0) < _LEAST * self._best:
             self._new[:] = 1.0
         return {int(cell): stops for cell in np.unique(self._cell) if (stops := self._in(cell))}
@@ -101,8 +99,8 @@ class Views:
         return stops
 
     def _middle(self, eye: Floats, along: Floats, weight: Floats) -> Floats:
-        """(3,) unit vector to the middle of what rays show, (…, 3) and (…) weights; if that is
-        farther away, as a door between two pictures is, along the ray nearest to it."""
+        """(3,) unit vector to the middle of rays (…, 3) with (…) weights; if the hit there is too
+        far, as in a door between two pictures, the direction of the nearest ray."""
         middle = (weight[..., None] * along).sum(axis=(0, 1))
         middle = middle / np.linalg.norm(middle)
         _, far = self._obstacles.first(eye[None], middle[None], FAR)
@@ -112,20 +110,22 @@ class Views:
         return np.asarray(counted[(counted @ middle).argmax()])
 
     def _shown(self, rows: Ints | slice = slice(None)) -> Floats:
-        """(n, around) what views that have not been looked at show, in bytes."""
+        """(n, around) worth of views not yet viewed, in bytes."""
         ray = (self._worth[rows] * self._new[self._box[rows]]).sum(axis=2)
         return np.asarray(sum(np.roll(ray, k, axis=1) for k in range(-_BESIDE, _BESIDE + 1)))
 
 
-def _tried(ground: Ground, random: np.random.Generator) -> Ints:
-    """Places to look from: in each cell some of those with space around, evenly among them."""
+def _candidates(ground: Ground, random: np.random.Generator) -> Ints:
+    """Places of views: in each cell some of those with free space, evenly chosen."""
     spacious: Bools = ground.space >= _SPACE
     order = np.flatnonzero(spacious & (ground.cell >= 0))
     order = order[np.argsort(ground.cell[order], kind="stable")]
     _, first, count = np.unique(ground.cell[order], return_index=True, return_counts=True)
     parts = [order[:0]]
-    for begin, many in zip(first, count, strict=True):
-        chosen = (np.arange(min(many, _TRIED)) + random.random()) * many / min(many, _TRIED)
+    for begin, total in zip(first, count, strict=True):
+        chosen = (
+            (np.arange(min(total, _CANDIDATES)) + random.random()) * total / min(total, _CANDIDATES)
+        )
         parts.append(order[begin + chosen.astype(np.int64)])
     return np.concatenate(parts)
 
@@ -133,8 +133,8 @@ def _tried(ground: Ground, random: np.random.Generator) -> Ints:
 def _worth(
     scene: Scene, obstacles: Obstacles, eye: Floats, along: Floats
 ) -> tuple[Floats, Ints, int]:
-    """(n,) the bytes that each ray, from (n, 3) along (n, 3), counts for; (n,) the box of what it
-    meets; and how many boxes there are."""
+    """(n,) the worth in bytes of each ray, from (n, 3) along (n, 3); (n,) the box of its hit; and
+    the number of boxes."""
     image = np.array([material.image for material in scene.materials])[scene.triangle_material]
     corners = scene.corners
     length = np.array([len(one.load()) for one in scene.images] + [0], dtype=np.float64)
@@ -147,7 +147,7 @@ def _worth(
     faced = np.abs(np.einsum("ij,ij->i", front, along))
     faced = np.divide(faced, width, out=np.zeros(len(met)), where=width > 0)
     counts = (met >= 0) & (far >= NEAR) & (faced >= FACED)
-    # What of a surface a ray covers, by its solid angle, which is the same for all.
+    # The area covered by a ray, from its solid angle, which is the same for all.
     bytes_seen = density[image[met]] * far**2 / np.maximum(faced, FACED)
     worth = np.where(counts, np.minimum(bytes_seen, _PIXEL**-2), 0.0)
     at = np.floor((eye + far[:, None] * along) / _BOX).astype(np.int64)
@@ -157,19 +157,19 @@ def _worth(
     return worth, box.reshape(-1).astype(np.int64), len(boxes)
 
 
-#: Places in a row on the way that count as a visit of the room they are in.
+#: Consecutive places on the way that count as a visit of their room.
 _PASSED = 3
 
 
 @dataclass(frozen=True)
 class Leg:
-    """A way from one visit to the next, and what is looked at there.
+    """A way from one visit to the next, with the views at its end.
 
     Attributes
     ----------
     places: (n,) on the ground, both ends included.
-    passed: indices of ``places`` at which a room is visited in passing.
-    looks: (k, 3) unit vectors to look along at its end; none if nothing there is worth a stop.
+    passed: indices of ``places`` where a room is visited in passing.
+    looks: (k, 3) unit directions of view at its end; none without a stop.
     """
 
     places: Ints
@@ -178,12 +178,12 @@ class Leg:
 
     @staticmethod
     def at(place: int, *looks: tuple[float, float, float]) -> Leg:
-        """No way, and what is looked at from there."""
+        """A leg without a way, at a place with views."""
         return Leg(np.array([place]), (), np.array(looks, dtype=np.float64).reshape(-1, 3))
 
 
 def tour(ground: Ground, middles: dict[int, int], views: Views, first: Leg) -> Iterator[list[Leg]]:
-    """Round after round, without an end, the ``first`` leg before them.
+    """Endless rounds of legs; the ``first`` leg precedes them.
 
     Each round visits all cells that have ``middles``, see `middles_of`.
     """
@@ -195,8 +195,8 @@ def tour(ground: Ground, middles: dict[int, int], views: Views, first: Leg) -> I
 
 
 def middles_of(ground: Ground, standing: Bools) -> dict[int, int]:
-    """By each cell that (C,) ``standing`` marks and the ground reaches, a place in its middle: of
-    those with most space around the nearest to all."""
+    """A place in the middle of each (C,) ``standing`` cell that the ground reaches: of those with
+    most free space the nearest to the mean of all."""
     result = {}
     for cell in np.unique(ground.cell[ground.cell >= 0]):
         if standing[cell]:
@@ -209,7 +209,7 @@ def middles_of(ground: Ground, standing: Bools) -> dict[int, int]:
 def _round(
     ground: Ground, middles: dict[int, int], stops: dict[int, list[Stop]], at: int
 ) -> Iterator[Leg]:
-    """One time round, from the place ``at``."""
+    """One round, from the place ``at``."""
     looks: dict[int, list[tuple[float, ...]]] = {}
     for stop in (one for several in stops.values() for one in several):
         looks.setdefault(stop.place, []).append(stop.direction)
@@ -230,7 +230,7 @@ def _round(
 
 
 def _runs(cells: Ints) -> Iterator[tuple[int, int]]:
-    """Each cell that several places in a row are in, and the index of the middle one."""
+    """Each cell with several consecutive places, and the index of the middle one."""
     first = np.flatnonzero(np.diff(cells, prepend=-2))
     for begin, end in zip(first, [*first[1:], len(cells)], strict=True):
         if end - begin >= _PASSED and cells[begin] >= 0:

@@ -1,6 +1,6 @@
-"""What clients there are, as a table: what each goes by, and what it needs to know.
+"""The policies of clients as a table: the strategy of each, and the knowledge it needs.
 
-To add one: a module with a `Client`, or a policy of the `engine`, and a line here.
+To add one, add a module with a `Client`, or a policy of the `engine`, and a line here.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ptmtools.arrays import Ints
 from ptmtools.lab.client import Client
 from ptmtools.lab.forms import PTM
 from ptmtools.lab.network import Link
-from ptmtools.lab.policies import shares as around, shares as coverage
+from ptmtools.lab.policies import shares
 from ptmtools.lab.policies.apo import ApoClient
 from ptmtools.lab.policies.engine import EngineClient, Policy
 from ptmtools.lab.policies.oracle import Oracle
@@ -26,8 +26,8 @@ from ptmtools.lab.policies.whole_files import GpuiiClient, LruClient
 from ptmtools.lab.world import World
 
 
-class Knows(Enum):
-    """What a client must know, each beside what comes before it."""
+class Knowledge(Enum):
+    """Knowledge that a client needs; each includes those before it."""
 
     HINTS = "hints"
     CAMERA = "hints and camera"
@@ -36,29 +36,29 @@ class Knows(Enum):
 
 
 @dataclass(frozen=True)
-class Declared:
+class PolicyEntry:
     """A policy.
 
     Attributes
     ----------
     name, about: for `--policy`.
-    knows: what it needs.
-    client: makes a client of it, in a world, on a link, with a budget.
-    options: its own options, if it has some; see `configured`.
-    needs: a field that the records of cells must have, and how to get it; None: as they always are.
-    form: in which it takes textures, a name in `ptmtools.lab.forms.FORMS`.
+    knows: the knowledge it needs.
+    client: makes a client, in a world, on a link, with a budget.
+    options: its own options, if any; see `configured`.
+    needs: a field that the records of cells must have, and how to get it; None: no optional field.
+    form: form of its textures, a name in `ptmtools.lab.forms.FORMS`.
     """
 
     name: str
     about: str
-    knows: Knows
+    knows: Knowledge
     client: Callable[..., Client]
     needs: tuple[str, str] | None = None
     form: str = PTM
     options: PaperOptions | None = None
 
-    def configured(self, options: PaperOptions) -> Declared:
-        """The policy with other options, if it has some."""
+    def configured(self, options: PaperOptions) -> PolicyEntry:
+        """The policy with other options, if it has any."""
         if self.options is None:
             return self
         return replace(self, options=options, client=partial(self.client, options=options))
@@ -83,96 +83,98 @@ def _same(policy: Policy, *, statistics: bool = False) -> Callable[[World, Link,
 
 
 _LIST = (
-    Declared(
+    PolicyEntry(
         "paper",
         "client of Marvie & Bouatouch, §6.1 and §6.2",
-        Knows.CAMERA,
+        Knowledge.CAMERA,
         PaperClient,
         options=PaperOptions(),
     ),
-    Declared("lru", "whole files in order of use, with a cache", Knows.CAMERA, LruClient),
-    Declared(
+    PolicyEntry("lru", "whole files in order of use, with a cache", Knowledge.CAMERA, LruClient),
+    PolicyEntry(
         "gpuii",
         "client of Englert et al., §3.3: interlaced images by rings around the camera",
-        Knows.CAMERA,
+        Knowledge.CAMERA,
         GpuiiClient,
         form="interlaced",
     ),
-    Declared(
+    PolicyEntry(
         "ach",
         "average coverage hints, in the engine that most policies share",
-        Knows.CAMERA,
-        _same(coverage.Weighted(coverage.coverage_shares)),
+        Knowledge.CAMERA,
+        _same(shares.Weighted(shares.coverage_shares)),
     ),
-    Declared(
+    PolicyEntry(
         "ach-views",
         "coverage hints of the six views",
-        Knows.CAMERA,
-        _same(coverage.Weighted(coverage.by_views), statistics=True),
+        Knowledge.CAMERA,
+        _same(shares.Weighted(shares.by_views), statistics=True),
     ),
-    Declared(
+    PolicyEntry(
         "ach-texture",
         "coverage hints of textures (`ptm ach --per-texture`)",
-        Knows.CAMERA,
-        _same(coverage.Weighted(coverage.by_texture)),
+        Knowledge.CAMERA,
+        _same(shares.Weighted(shares.by_texture)),
         needs=("textureShares", "measure it with `ptm ach DB --per-texture`, then `ptm emit DB`"),
     ),
-    Declared(
+    PolicyEntry(
         "distance",
         "nearest cells first",
-        Knows.CAMERA,
-        _same(coverage.Weighted(coverage.distance_shares)),
+        Knowledge.CAMERA,
+        _same(shares.Weighted(shares.distance_shares)),
     ),
-    Declared(
+    PolicyEntry(
         "bbox",
         "screen area of boxes, without occlusion",
-        Knows.CAMERA,
-        _same(coverage.Weighted(coverage.by_box)),
+        Knowledge.CAMERA,
+        _same(shares.Weighted(shares.by_box)),
     ),
-    Declared("screen", "pixels of an item buffer", Knows.SCREEN, _same(Screen())),
-    Declared(
+    PolicyEntry("screen", "pixels of an item buffer", Knowledge.SCREEN, _same(Screen())),
+    PolicyEntry(
         "screen+distance",
         "screen, and near cells",
-        Knows.SCREEN,
-        _same(Screen(around.by_distance)),
+        Knowledge.SCREEN,
+        _same(Screen(shares.by_distance)),
     ),
-    Declared(
+    PolicyEntry(
         "screen+ach",
         "screen, and average coverage hints",
-        Knows.SCREEN,
-        _same(Screen(around.by_coverage)),
+        Knowledge.SCREEN,
+        _same(Screen(shares.by_coverage)),
     ),
-    Declared(
+    PolicyEntry(
         "screen+need",
         "screen, and the resolution needed in the cell",
-        Knows.SCREEN,
-        _same(Screen(around.by_need)),
+        Knowledge.SCREEN,
+        _same(Screen(shares.by_need)),
         needs=("need", "measure it with `ptm emit DB --need 16`"),
     ),
-    Declared("best", "policy of the viewer: screen, need and distance", Knows.SCREEN, _same(BEST)),
-    Declared(
+    PolicyEntry(
+        "best", "policy of the viewer: screen, need and distance", Knowledge.SCREEN, _same(BEST)
+    ),
+    PolicyEntry(
         "apo",
         "client of Lacoste et al., §4.2: octree textures level by level; other textures as in best",
-        Knows.SCREEN,
+        Knowledge.SCREEN,
         ApoClient,
         form="octree",
     ),
-    Declared(
+    PolicyEntry(
         "best+apo",
         "best, also for octree textures",
-        Knows.SCREEN,
+        Knowledge.SCREEN,
         _same(BEST),
         form="octree",
     ),
-    Declared("oracle", "knows the walk; greedy", Knows.FUTURE, _engine(Oracle)),
-    Declared(
+    PolicyEntry("oracle", "knows the walk; greedy", Knowledge.FUTURE, _engine(Oracle)),
+    PolicyEntry(
         "oracle-exchange",
         "knows the walk; also exchanges levels in memory",
-        Knows.FUTURE,
+        Knowledge.FUTURE,
         _engine(partial(Oracle, exchanging=True)),
     ),
 )
-#: By name.
+#: Policies by name.
 POLICIES = {policy.name: policy for policy in _LIST}
 
 __all__ = ["POLICIES", "Declared", "Knows"]

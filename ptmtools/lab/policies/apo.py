@@ -1,14 +1,14 @@
-"""`apo`: octree textures as their paper transmits them (Lacoste et al., §4.2), and all else as
-`best`.
+"""The client `apo`: octree textures as their paper transmits them (Lacoste et al., §4.2), other
+files as in `best`.
 
-An octree is fetched level by level, from the root on; what is there is shown at once. The
-transmission pauses when the deepest nodes are no larger than a pixel where the object is nearest,
-and goes on when one comes nearer, or when it is seen again.
+An octree is fetched level by level, from the root on, and shown at once as far as it has arrived.
+The transmission pauses when the deepest nodes are no larger than a pixel where the object is
+nearest; it goes on when the object comes nearer or is visible again.
 
-Read in, since the paper shows one object: of several in the frustum the one with the fewest levels
-is next, the nearest first. Octrees, and geometry and textures, share the link: each takes turns by
-the bytes that it has asked for, unless the other wants nothing. Texture memory is filled with
-octrees first, in the order of the levels, those in view before those that were.
+Our reading, since the paper shows one object: among several in the frustum the one with the fewest
+levels is next, the nearest first. Octrees share the link with geometry and textures: the two
+alternate by requested bytes, unless one needs nothing. Octrees are the first in texture memory, in
+the order of the levels, those in view before those seen earlier.
 """
 
 from __future__ import annotations
@@ -27,28 +27,27 @@ from ptmtools.rendering.rays import NEAR
 
 
 class ApoClient(EngineClient):
-    """See the module.
+    """The client of the module.
 
     Attributes
     ----------
-    octrees: (O,) the textures that are octrees.
-    distance: (O,) metres to the nearest shape in the frustum that each is around, infinite without
-        one. wanted: (O,) levels that the screen needs; of what is not in the frustum those that it
-        needed last.
+    octrees: (O,) numbers of the textures that are octrees.
+    distance: (O,) metres to the nearest shape of each in the frustum, infinite without one. wanted:
+        (O,) levels that the screen needs; outside the frustum those it needed last.
     """
 
     def __init__(self, world: World, link: Link, budget: int) -> None:
         stock = world.catalogue
         count = world.relief.octrees.number if world.relief else 0
-        # The last texture is what nothing mends.
+        # The last texture stands for errors that no download reduces.
         self.octrees: Ints = np.arange(count) + stock.texture_count - 1 - count
         self.distance: Floats = np.full(count, np.inf)
         self.wanted: Ints = np.zeros(count, np.int64)
         self._seen, self._target_levels = np.full(count, -1, np.int64), np.zeros(count, np.int64)
-        #: Texture memory of all, and the bytes by which octrees are ahead of all else.
+        #: All texture memory, and the bytes by which octrees are ahead of other requests.
         self._total, self._ahead = budget, 0
         differences = stock.differences.copy()
-        differences[self.octrees] = 0.0  # `best` is to leave them alone
+        differences[self.octrees] = 0.0  # so that `best` ignores them
         super().__init__(
             replace(world, catalogue=replace(stock, differences=differences)), link, budget, BEST
         )
@@ -79,7 +78,8 @@ class ApoClient(EngineClient):
         return True
 
     def _see(self) -> None:
-        """Finds what is in the frustum, how near, and how many levels of it the screen needs."""
+        """Updates which octrees are in the frustum, their distances, and the levels that the screen
+        needs."""
         stock, shapes = self.world.catalogue, self.world.catalogue.shapes
         self.distance = np.full(len(self.octrees), np.inf)
         if not len(self.octrees):
@@ -113,7 +113,7 @@ class ApoClient(EngineClient):
         return levels, left
 
     def _next(self) -> int | None:
-        """The octree in the frustum that is to be refined next."""
+        """The octree in the frustum to refine next."""
         candidates = [
             (self._levels_asked(octree), float(self.distance[o]), octree)
             for o, octree in enumerate(self.octrees.tolist())

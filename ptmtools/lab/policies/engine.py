@@ -1,18 +1,19 @@
-"""The engine that all policies but the paper's share: it fetches what is worth most for its bytes.
+"""The engine of most policies: it fetches the ranges of greatest worth per byte.
 
-A policy says what each level of each texture, and the geometry of each cell, is worth now. The
-engine chooses what should be in texture memory, to the last level that fits, and asks for what of
-that is missing, the greatest worth per byte first, in ranges of a fraction of a second, so that
-little is under way that may not be wanted any more. When nothing is missing it goes on with what is
-worth most beyond the budget, which stays in main memory.
+A policy computes the current worth of each level of each texture, and of the geometry of each cell.
+The engine chooses the levels for texture memory, to the last that fits, and requests the missing
+ones by worth per byte, in ranges of a fraction of a second, so that few bytes are under way that
+may become unwanted. When nothing is missing it continues with the most valuable levels beyond the
+budget, which stay in main memory.
 
-Records and geometry compete with textures by the same measure: a cell whose geometry is missing is
-grey, and worth the error of that. Both are asked for whole: browsers get no ranges of what a server
-compresses on its way. The first cell's geometry does not wait for its record: a latency less of
-grey is worth 5 % of the error of 150 s at half a megabit a second, and nothing at 56 kbit/s.
+Records and geometry compete with textures by the same measure: a cell without geometry is grey, and
+its worth is the error of that. Both are requested as a whole, since browsers get no ranges of
+responses that a server compresses. The first cell's geometry does not wait for its record: a
+latency less of grey is worth 5 % of the error of 150 s at half a megabit a second, and nothing at
+56 kbit/s.
 
-The item buffer that a client has at hand: one that it drew some frames ago, or, in a browser,
-the last that could be read back by then. It shows the geometry that was there as it was drawn.
+`ItemBuffers` gives the item buffer of a client: one that it drew some frames ago, or, in a browser,
+the last that could be read back by then. It shows the geometry that was loaded when it was drawn.
 """
 
 from __future__ import annotations
@@ -31,13 +32,13 @@ from ptmtools.lab.network import Link, Request
 from ptmtools.lab.world import World
 
 
-class Item(NamedTuple):
+class ItemBuffer(NamedTuple):
     """An item buffer.
 
     Attributes
     ----------
-    view: of `World.views`. frame: in which it was drawn.
-    there: (C,) whose geometry it shows. missing: cells of which it shows placeholders.
+    view: number in `World.views`. frame: the frame in which it was drawn.
+    loaded: (C,) cells with displayed geometry. missing: cells with displayed placeholders.
     """
 
     view: int
@@ -46,20 +47,21 @@ class Item(NamedTuple):
     missing: Ints
 
 
-class Items:
-    """Those of a client."""
+class ItemBuffers:
+    """The item buffers of a client."""
 
     def __init__(self, client: Client) -> None:
         self._client = client
         self._frame = 0
-        #: At each look, what was there; since when geometry is, and the cells that were gone by.
-        self._there: list[Bools] = []
+        #: At each frame of the client: loaded geometry; then times of its arrival, and the cells in
+        #: use over time.
+        self._loaded: list[Bools] = []
         self._since = np.full(client.world.catalogue.cell_count, math.inf)
         self._times: list[float] = []
         self._cells: list[int] = []
 
     def note(self) -> None:
-        """Something may have arrived, or the client gone by another cell."""
+        """Records arrivals and a change of the cell in use."""
         client, now = self._client, self._client.link.now
         self._since[client.geometry.whole & np.isinf(self._since)] = now
         if client.cell >= 0 and self._cells[-1:] != [client.cell]:
@@ -67,59 +69,59 @@ class Items:
             self._cells.append(client.cell)
 
     def look(self) -> None:
-        """The client looks."""
-        self._there.append(self._client.geometry.whole)
+        """Records the state at a frame of the client."""
+        self._loaded.append(self._client.geometry.whole)
         self.note()
 
     def glance(self, frame: int) -> bool:
-        """The client is at a frame; whether that has another item buffer than the one before."""
+        """Passes a frame; returns whether it has another item buffer than the frame before."""
         drawn, before = self._client.world.drawn, self._frame
         self._frame = frame
         return drawn is not None and drawn[before] != drawn[frame]
 
-    def at_hand(self, age: int) -> Item | None:
-        """The item buffer that is so many frames old, or a browser's last, or None."""
+    def available(self, age: int) -> ItemBuffer | None:
+        """The item buffer of ``age`` frames ago, or a browser's last, or None."""
         client, world = self._client, self._client.world
         stock = world.catalogue
         if world.drawn is None:
             frame = max(0, client.frame - age)
             known, whole = stock.visible[client.cell], client.geometry.whole
             missing = known[~whole[known]]
-            return Item(int(world.view[frame]), frame, self._there[frame], missing)
+            return ItemBuffer(int(world.view[frame]), frame, self._loaded[frame], missing)
         frame = int(world.drawn[self._frame])
         if frame < 0:
             return None
         loaded = self._since <= world.time[frame]
         entered = bisect_right(self._times, world.time[frame]) - 1
         known = stock.visible[self._cells[entered]] if entered >= 0 else np.zeros(0, np.int64)
-        return Item(int(world.view[self._frame]), frame, loaded, known[~loaded[known]])
+        return ItemBuffer(int(world.view[self._frame]), frame, loaded, known[~loaded[known]])
 
 
-#: A range takes so many seconds of the link, and at least so many bytes.
+#: Length of a range in seconds of the link, and least bytes of a range.
 RANGE_SECONDS, RANGE_BYTES = 0.2, 8000
 #: Requests at a time.
 CONNECTIONS = 6
-#: Bytes of the headers of a request, and the most that waiting counts, of links without a limit.
+#: Bytes of the headers of a request, and the greatest cost of waiting, bytes, on links without a
+#: limit.
 OVERHEAD, LONGEST_WAIT = 300, 1 << 20
-#: What a pixel is wrong by where there is nothing: the mean of what was measured, 0 to 255.
+#: Error of a pixel without geometry: the measured mean, 0 to 255.
 NOTHING = 64.0
-#: The record of a neighbouring cell is worth as much as so large a share of the screen.
+#: Worth of the record of a neighbouring cell, as a share of the screen.
 RECORD_SHARE = 0.005
-#: A level that is not wanted any more is held on to, at so small a share of its worth, which
-#: halves in so many seconds.
+#: Share of its worth at which a level stays when it is no longer wanted, and its half-life, s.
 HELD_ON, HELD_SECONDS = 1e-3, 7.0
 
 
 @dataclass(frozen=True)
 class Worth:
-    """What a policy says.
+    """Worth of levels and geometry, as a policy computes it.
 
     Attributes
     ----------
-    hold: (T, K) what each column adds on the screen now, beside those before it.
-    fetch: (T, K) what it adds now and soon.
-    geometry: (C,) what the geometry of a cell adds.
-    ahead: (T, K) what may be fetched beyond the budget; None: nothing.
+    hold: (T, K) that each column adds on the screen now to those before it.
+    fetch: (T, K) that it adds now and soon.
+    geometry: (C,) that the geometry of a cell adds.
+    ahead: (T, K) of fetching beyond the budget; None: no such fetching.
     exact: see `allocate`.
     """
 
@@ -131,14 +133,14 @@ class Worth:
 
 
 class Policy(Protocol):
-    """What a policy of the engine is."""
+    """A policy of the engine."""
 
     def __call__(self, client: EngineClient) -> Worth:
-        """What things are worth at the client's frame, by what the client may know."""
+        """Computes the worth at the client's frame from the client's knowledge."""
 
 
 class EngineClient(Client):
-    """A client that goes by a policy, which may need the statistics."""
+    """A client with a policy, which may need the statistics."""
 
     def __init__(
         self, world: World, link: Link, budget: int, policy: Policy, *, statistics: bool = False
@@ -149,20 +151,20 @@ class EngineClient(Client):
         self._target: Ints = np.zeros(stock.texture_count, np.int64)
         self._kept = np.zeros(stock.ends.shape)
         self._worth: Worth | None = None
-        self._items, self._looked = Items(self), -math.inf
-        #: With what is there twice while it grows.
+        self._items, self._looked = ItemBuffers(self), -math.inf
+        #: Budget including the second copy of a growing texture.
         self._all = budget
-        # Of a browser: what is kept free, and the cell in which it began.
+        # In a browser: bytes kept free, and the cell since whose entry.
         self._reserve, self._since = 0, -1
         self.frustum = world.frustum(0)
 
-    # What policies look at.
+    # Input of policies.
 
     def sight(self, age: int) -> Floats:
-        """(T, K) the share of the item buffer that wants each level, in columns, as it was drawn
-        so many frames ago: with the geometry that was there."""
+        """(T, K) the share of the item buffer that wants each level, in columns, as drawn ``age``
+        frames ago with the geometry of that time."""
         result = np.zeros(self.world.catalogue.ends.shape)
-        item, views = self._items.at_hand(age), self.world.views
+        item, views = self._items.available(age), self.world.views
         if item:
             rows = views.rows(item.view)
             gather(
@@ -171,11 +173,11 @@ class EngineClient(Client):
         return result
 
     def placeholders(self, age: int) -> Floats:
-        """(C,) the share of the item buffer, so many frames old, that shows placeholders: of cells
-        that may be seen and whose geometry is not there, the far faces of their boxes."""
+        """(C,) the share of the item buffer, ``age`` frames old, that shows placeholders: the far
+        faces of the boxes of visible cells without geometry."""
         stock, world = self.world.catalogue, self.world
         share = np.zeros(stock.cell_count)
-        item = self._items.at_hand(age)
+        item = self._items.available(age)
         if item and len(item.missing):
             loaded = item.loaded if world.browser else self.geometry.whole
             rays, _ = world.camera.rays(world.direction[item.frame : item.frame + 1])
@@ -187,7 +189,7 @@ class EngineClient(Client):
         return share
 
     def known(self) -> Ints:
-        """The cells that the one the client is in may see, itself first."""
+        """The visible set of the current cell, itself first."""
         return self.world.catalogue.visible[self.cell]
 
     def coverage(self) -> Floats:
@@ -195,12 +197,12 @@ class EngineClient(Client):
         return self.world.catalogue.coverage[self.cell]
 
     def loaded_shapes(self) -> Ints:
-        """The shapes with a texture of the cells whose geometry is there."""
+        """The textured shapes of the cells with loaded geometry."""
         stock = self.world.catalogue
         loaded = self.geometry.whole[stock.shapes.cell] & (stock.shapes.texture >= 0)
         return np.flatnonzero(loaded)
 
-    # What the engine does.
+    # The engine.
 
     def look(self, frame: int) -> None:
         """See `Client.look`."""
@@ -244,9 +246,9 @@ class EngineClient(Client):
             self._weigh()
 
     def _grow(self) -> bool:
-        """Whether more must be kept free for what is there twice while it grows: the greatest
-        texture less its finest level, at most half. From now on it is, for as long as the client
-        is in the cell, lest a level go in and out."""
+        """Reserves memory for the second copy of a texture while it grows: the largest texture
+        without its finest level, at most half of the memory. Returns whether the reserve grew; it
+        stays while the client is in the cell, lest a level go in and out."""
         column, memory = self.column, self.world.catalogue.memory
         need = int(memory[np.arange(len(column)), np.maximum(column - 1, 0)].max(initial=0))
         more = min(need, self._all // 2)
@@ -267,7 +269,7 @@ class EngineClient(Client):
             pass
 
     def _room(self) -> bool:
-        """Whether the link would run dry before a request made later could be answered."""
+        """Whether the link would run dry before a later request could be answered."""
         if len(self.waiting) >= CONNECTIONS:
             return False
         left = sum(request.left for request in self.waiting)
@@ -275,7 +277,7 @@ class EngineClient(Client):
         return left == 0 or 8 * left < ahead * self.estimate.bandwidth
 
     def _fetch_one(self) -> bool:
-        """Asks for the range that is worth most; False if there is none."""
+        """Requests the range of the greatest worth; False if there is none."""
         if not self.index:
             return self._whole(Kind.INDEX, 0, math.inf)
         if self._statistics and self._whole(Kind.STATISTICS, 0, math.inf):
@@ -310,8 +312,8 @@ class EngineClient(Client):
         return self._range(texture, int(stock.ends[texture, column]), best)
 
     def _asked(self) -> Ints:
-        """(T,) bytes of each texture from its beginning that are not to be asked for: with one
-        range a file at a time, all of what is on the way."""
+        """(T,) bytes from the beginning of each texture that are not to be requested: with one
+        range a file at a time, the whole file while one is pending."""
         asked = self.textures.asked
         if not self.world.one_range:
             return asked
@@ -319,8 +321,8 @@ class EngineClient(Client):
         return np.where(under_way, self.textures.size, asked)
 
     def _overhead(self) -> int:
-        """Bytes that a request costs besides its own: headers, and what its connection could have
-        brought while it waits. So of a fast link more levels are asked for at once."""
+        """Overhead of a request, bytes: headers, and the bytes that its connection could bring
+        while it waits. On a fast link a request thus covers more levels."""
         latency, bandwidth = self.estimate.latency, self.estimate.bandwidth
         waiting = latency * bandwidth / 8 / CONNECTIONS if latency else 0.0
         return OVERHEAD + int(min(waiting, LONGEST_WAIT))

@@ -1,7 +1,8 @@
-"""`oracle`: knows the walk. What anything adds is the error that it will take away, discounted.
+"""The policy `oracle`, which knows the walk: the worth of a level is the error that it will remove,
+discounted.
 
-Greedy like the others: the same engine, with the true tables instead of a guess. A lower bound by
-linear programming is apart (benchmarks/RESULTS.md).
+It is greedy like the others: the same engine, with the true tables instead of an estimate. A lower
+bound by linear programming is separate (benchmarks/RESULTS.md).
 """
 
 from __future__ import annotations
@@ -12,14 +13,15 @@ from ptmtools.arrays import Singles
 from ptmtools.lab.policies.engine import EngineClient, Worth
 from ptmtools.lab.world import World
 
-#: What is to come counts 1/e after so many seconds; what is far off, besides, so little.
+#: Seconds after which errors count 1/e, in the near and the far future, and the weight of the
+#: latter.
 SOON, LATER = 3.0, 60.0
 _LATER_SHARE, _SOON_HELD = 0.003, 1e-4
 
 
 class Oracle:
-    """A policy for one walk; ``exchanging`` takes steps that did not fit in exchange for others,
-    see `ptmtools.lab.allocation.exchange`."""
+    """A policy for one walk; with ``exchanging`` it exchanges steps, see
+    `ptmtools.lab.allocation.exchange`."""
 
     def __init__(self, world: World, soon: float = SOON, *, exchanging: bool = False) -> None:
         self._exchanging = exchanging
@@ -42,8 +44,8 @@ class Oracle:
 
 
 def _drops(world: World) -> tuple[Singles, Singles]:
-    """(F, T, K) by how much each column lessens the error of each frame, and (F, C) each cell's
-    geometry with all textures."""
+    """(F, T, K) the reduction of each frame's error by each column, and (F, C) the error without
+    each cell's geometry."""
     stock, views = world.catalogue, world.views
     count = views.frames
     columns = np.zeros((count, stock.texture_count, stock.ends.shape[1]), np.float32)
@@ -57,7 +59,7 @@ def _drops(world: World) -> tuple[Singles, Singles]:
 
 
 def _discounted(table: Singles, frames: float) -> Singles:
-    """Sums over what is to come, each frame of which counts less than the one before."""
+    """Discounted sums over future frames; each frame counts less than the one before."""
     result, kept = np.empty_like(table), np.exp(-1 / frames)
     total = np.zeros_like(table[0])
     for f in range(len(table) - 1, -1, -1):

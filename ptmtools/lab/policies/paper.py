@@ -1,27 +1,27 @@
-"""`paper`: the client of Marvie & Bouatouch, §6.1 and §6.2, as written.
+"""The client `paper`: that of Marvie & Bouatouch, §6.1 and §6.2, as written.
 
-In every frame it rendered (30 a second here; pictures are looked at five times a second):
+In every rendered frame (30 a second here; pictures are evaluated five times a second):
 
-1. Cells of the visible set are culled by their hulls, and their coverage hints normalised over what
-   is left. From the greatest hint down, a cell gets its part of the memory that is left, by its
-   hint over those of the cells not served yet, and shares it equally among its shapes in the
-   frustum. What they do not use is left for the next.
-2. A texture with N bytes so far that is offered a: T is its next level, or its present one if there
-   is no other. If S(T) > N + a it keeps a, else it keeps what is missing to S(T). S is the whole
+1. The cells of the visible set are culled by their hulls, and the coverage hints of the rest
+   normalised. From the greatest hint down, a cell gets its part of the remaining memory, by its
+   hint over those of the cells not yet served, and shares it equally among its shapes in the
+   frustum. Unused memory is left for the next cell.
+2. A texture that keeps N bytes so far is offered a: T is its next level, or its present one if
+   there is no other. If S(T) > N + a it keeps a, else it keeps the rest of S(T). S is the whole
    pyramid up to a level: the level alone would break the budget.
-3. Each texture adds or removes one level, or asks for one, if it may be had within δt: the latency,
-   and its bytes by the bandwidth of recent downloads.
-4. Where the viewpoint has been static for t_static, M_static and δt_static replace the budget and
+3. Each texture adds or removes one level, or requests one if its expected download, the latency and
+   its bytes by the bandwidth of recent downloads, ends within δt.
+4. While the viewpoint has been static for t_static, M_static and δt_static replace the budget and
    δt (`PaperOptions`).
 
-A client that enters a cell drops what its visible set does not use. The next cell, behind the first
-portal that the way of the last half second leads through within two seconds, is fetched ahead.
-Requests are made as soon as they are known, for the cell, then its visible set, then the next cell,
-then levels, which are asked for whole and never cancelled.
+A client that enters a cell drops textures that its visible set does not use. The next cell, behind
+the first portal that the motion of the last half second reaches within two seconds, is fetched
+ahead. Requests are made at once, for the cell, then its visible set, then the next cell, then
+levels, which are requested as a whole and never cancelled.
 
-Read in: a level is added only if it fits, and where the budget shrinks, levels are dropped until it
-is kept. By the letter levels are dropped one a frame while others are added at once, and a client
-that turns around, or walks on, would hold more than its budget.
+Our reading: a level is added only if it fits, and when the budget shrinks, levels are dropped until
+it is kept. By the letter levels are dropped one a frame while others are added at once, and a
+client that turns around, or walks on, would exceed its budget.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ from ptmtools.lab.world import STILL_SECONDS, World
 from ptmtools.options import option
 from ptmtools.quantities import MemorySize, parse_memory
 
-#: Frames a second that it renders.
+#: Rendered frames per second.
 FRAMES = 30
-#: Way that is taken for the way on, and how far ahead, s.
+#: Past motion that is extrapolated, and how far ahead, s.
 BEFORE, AHEAD = 0.5, 2.0
 #: Priorities of requests: levels, the next cell, the visible set, the cell.
 LEVEL, NEXT, VISIBLE, CURRENT = 1.0, 2.0, 3.0, 4.0
@@ -95,8 +95,8 @@ class PaperOptions:
         """(F,) bytes of texture memory in each frame; ``budget`` is that of a moving viewpoint."""
         static = budget
         if self.memory:
-            held, whole = self.memory.of(world.catalogue.whole), world.catalogue.whole
-            static = whole if held is None else held
+            static_memory, whole = self.memory.of(world.catalogue.whole), world.catalogue.whole
+            static = whole if static_memory is None else static_memory
         return np.where(world.still_after(self.static_after), static, budget)
 
 
@@ -132,7 +132,7 @@ class PaperClient(Client):
         self.tick()
 
     def tick(self) -> None:
-        """A frame is rendered: steps 1 to 3, and requests for levels."""
+        """Renders a frame: steps 1 to 3, and requests for levels."""
         if self.cell < 0:
             return
         stock, static = self.world.catalogue, bool(self._static[self.frame])
@@ -154,7 +154,7 @@ class PaperClient(Client):
                 self.ask(Kind.TEXTURE, t, end, LEVEL)
 
     def fetch(self) -> None:
-        """See `Client.fetch`: documents and geometry; levels are asked for by `tick`."""
+        """See `Client.fetch`: documents and geometry; `tick` requests levels."""
         if not self.files[Kind.INDEX].asked[0]:
             self._whole(Kind.INDEX, 0, CURRENT)
         if not self.index:
@@ -182,11 +182,11 @@ class PaperClient(Client):
         """See `Client.settle`: `tick` does it."""
 
     def known(self) -> Ints:
-        """The visible set of the cell that it goes by."""
+        """The visible set of the cell in use."""
         return self.world.catalogue.visible[self.cell]
 
     def _whole(self, kind: Kind, number: int, priority: float) -> None:
-        """Asks for a file, or finds it more urgent than before."""
+        """Requests a file, or raises the priority of its request."""
         files = self.files[kind]
         if not files.asked[number]:
             self.ask(kind, number, int(files.size[number]), priority)
@@ -197,7 +197,7 @@ class PaperClient(Client):
                     self.link.reprioritise(request, priority)
 
     def _enter(self) -> None:
-        """Drops what the visible set of a new cell does not use."""
+        """Drops textures that the visible set of a new cell does not use."""
         self._used[:] = False
         self._used[self.world.catalogue.in_sight[self.cell]] = True
         self.column[~self._used] = 0
@@ -217,7 +217,7 @@ class PaperClient(Client):
         )
 
     def _next(self) -> int:
-        """The cell behind the first portal that the way of late leads through soon, or -1."""
+        """The cell behind the first portal that the recent motion will soon reach, or -1."""
         world, f = self.world, self.frame
         before = max(0, f - round(BEFORE * world.rate))
         way = world.eye[f] - world.eye[before]
@@ -233,7 +233,8 @@ class PaperClient(Client):
 
 
 def _crossing(eye: Floats, way: Floats, polygon: Floats) -> float:
-    """Which share of a way leads to a convex polygon, or infinity if it does not lead through."""
+    """The share of a motion at which it reaches a convex polygon, or infinity if it does not pass
+    through."""
     turned = np.cross(polygon, np.roll(polygon, -1, axis=0)).sum(axis=0)
     facing = float(turned @ way)
     if facing == 0:

@@ -1,4 +1,5 @@
-"""Compiled steps of the paper's client: memory is shared out (§6.1), levels come and go (§6.2)."""
+"""Compiled steps of the paper's client: the division of memory (§6.1), and adding and removing
+levels (§6.2)."""
 
 from __future__ import annotations
 
@@ -25,20 +26,20 @@ def share_out(
 
     Parameters
     ----------
-    cells, weight: (n,) those in the frustum by descending hint, and their hints.
-    first_shape, texture, shown: (C + 1,), (S,), (S,) the shapes of cells; whether they have a
-        texture and are in the frustum.
-    memory, levels, column: (T, K), (T,), (T,): columns count from nothing.
+    cells, weight: (n,) cells in the frustum by descending hint, and their hints.
+    first_shape, texture, shown: (C + 1,), (S,), (S,) shapes of cells, their textures, and whether
+        they are textured and in the frustum.
+    memory, levels, column: (T, K), (T,), (T,): column 0 is nothing.
     """
     left, total = budget, weight.sum()
     for i in range(len(cells)):
         begin, end = first_shape[cells[i]], first_shape[cells[i] + 1]
-        mine = left * weight[i] / total if total > 0.0 else 0.0
+        part = left * weight[i] / total if total > 0.0 else 0.0
         total -= weight[i]
         waiting = 0
         for s in range(begin, end):
             waiting += shown[s]
-        rest = mine
+        rest = part
         for s in range(begin, end):
             if not shown[s]:
                 continue
@@ -52,7 +53,7 @@ def share_out(
             else:
                 rest -= max(0.0, wanted - share[t])
                 share[t] = max(share[t], wanted)
-        left -= mine - rest
+        left -= part - rest
 
 
 @kernel
@@ -65,10 +66,10 @@ def refresh(
     budget: int,
     column: Ints,
 ) -> Ints:
-    """Removes and adds a level of each texture, by what it keeps and has downloaded; returns the
-    textures that ask for their next level. ``column`` (T,) changes.
+    """Removes and adds a level of each texture, by its kept and downloaded bytes; returns the
+    textures whose next level is to be requested. ``column`` (T,) changes.
 
-    More levels are removed for as long as all of them exceed the budget, as when it has shrunk.
+    Further levels are removed while all together exceed the budget, as when it has shrunk.
     """
     asks = np.zeros(len(share), np.int64)
     count, used, removed = 0, budget + 1, True

@@ -1,36 +1,29 @@
-"""What lies around a client, as shares of pixels by texture and level: by distance, by coverage, by
-need; and what the geometry of cells is worth.
+"""Policies by shares of pixels, and the worth of the geometry of cells.
 
-`ach` and its kin, `distance` and `bbox`: clients that know the frustum and no item buffer.
+Shares by texture and level estimate the surroundings of a client, by distance, by coverage and by
+need. `Weighted` is for clients that know the frustum and no item buffer (`ach` and its variants,
+`distance`, `bbox`): it weights textures, the same for all of their levels.
 
-They share out by weights for each texture, the same for all of its levels.
-
-From how many pixels want a level to what it is worth.
-
-Two measures, by what a client knows of the textures:
+The worth of a level follows from the pixels that want it by one of two measures:
 
 * `by_pixels`: every level counts the same (the paper's view of it);
-* `by_difference`: a level counts by its difference to the one below. A pixel that wants level n and
-  has level k is wrong by about the sum of the differences between them.
+* `by_difference`: a level counts by its difference to the one below. The error of a pixel that
+  wants level n and has level k is about the sum of the differences between them.
 
-(Tried: the root mean square over the texels of a level in place of the mean. At 0.5 Mbit/s with
-10 % and 30 % of the texture memory, the error of the picture is 1.90 and 1.67 then, and 1.83 and
-1.62 so. What the missing levels make together, so that a coarse one under a missing fine one counts
-little: no better.)
+(Tried: the root mean square over the texels of a level in place of the mean. At 0.5 Mbit/s with 10
+% and 30 % of the texture memory, the error of the picture is then 1.90 and 1.67, with the mean 1.83
+and 1.62. Also tried: the joint difference of the missing levels, so that a coarse one under a
+missing fine one counts little: no better.)
 
-`screen` and its kin: what an item buffer of the view shows to be missing.
+`Screen` uses an item buffer of the view (`screen` and its variants). It has half as many pixels
+each way as the one that errors are summed over (80 × 45). It gives the texture of each pixel and
+the level it wants, or the cell of a placeholder; ``age`` is its age in frames. Surroundings, by
+distance, coverage or need, count a fifth: any weight from a twentieth to one does about as well.
 
-The item buffer has half as many pixels each way as the one that errors are summed over (80 × 45).
-It says which texture each pixel shows and which level it wants, or of which cell it shows the
-placeholder; ``age`` is how many frames old it is. What lies around, by distance, coverage or need,
-counts a fifth: any weight from a twentieth to one does about as well.
-
-`best`: what the viewer does (docs/formats/client.md).
-
-`Screen`, with what lies around by distance and by need, half and half. Distance is right about what
-one may walk up to, need about what one sees from where one can stand, and how fine; together they
-take 3 % off either alone at half a megabit a second (benchmarks/RESULTS.md). Without need
-in the records, distance alone.
+`BEST` is the policy of the viewer (docs/formats/client.md): `Screen` with surroundings by distance
+and by need, half and half. Distance is right about surfaces that one may approach, need about the
+resolution of those seen from standing positions; together they take 3 % off either alone at half a
+megabit a second (benchmarks/RESULTS.md). Without need in the records it uses distance alone.
 """
 
 from __future__ import annotations
@@ -44,16 +37,16 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.lab.catalogue import Catalogue
 from ptmtools.lab.policies.engine import NOTHING, EngineClient, Worth
 
-#: What is nearer counts as being as far as this, metres.
+#: Least distance, metres; nearer shapes count as this far.
 NEAREST = 0.5
-#: What a cell counts that is out of sight, or is seen from a neighbouring cell only, beside one in
+#: Weights of a cell out of sight, and of one seen only from a neighbouring cell, beside one in
 #: view.
 BEHIND, BEYOND = 0.2, 0.05
 
 
 def geometry_by_coverage(client: EngineClient) -> Floats:
-    """(C,) the worth of the geometry of cells: what a grey cell is wrong by, and how much of the
-    view it covers on average."""
+    """(C,) worth of the geometry of cells: the error of a grey cell times its mean share of the
+    view."""
     stock = client.world.catalogue
     known = client.known()
     ahead = client.frustum.meets_boxes(stock.low[known], stock.high[known])
@@ -63,15 +56,15 @@ def geometry_by_coverage(client: EngineClient) -> Floats:
 
 
 def geometry_by_placeholders(client: EngineClient, age: int) -> Floats:
-    """(C,) the same by how much of the item buffer, ``age`` frames old, shows a placeholder of each
-    cell; coverage says what is behind."""
+    """(C,) the same by the share of the item buffer, ``age`` frames old, that shows a placeholder
+    of each cell; coverage counts hidden cells."""
     share = np.zeros(client.world.catalogue.cell_count)
     share[client.known()] = BEHIND * client.coverage()
     return NOTHING * (np.maximum(share, _beyond(client)) + client.placeholders(age))
 
 
 def _beyond(client: EngineClient) -> Floats:
-    """(C,) what cells count for the neighbours from which they are seen."""
+    """(C,) weights of cells that are seen from neighbours."""
     stock = client.world.catalogue
     share = np.zeros(stock.cell_count)
     for neighbour in stock.adjacent[client.cell].tolist():
@@ -82,8 +75,8 @@ def _beyond(client: EngineClient) -> Floats:
 
 
 def by_coverage(client: EngineClient) -> Floats:
-    """(T, K) shares by average coverage: that of a cell is split equally among its textures, as the
-    record of the cell that the client is in names them."""
+    """(T, K) shares by average coverage: that of a cell is divided equally among its textures, as
+    listed in the record of the current cell."""
     stock = client.world.catalogue
     share = np.zeros(stock.texture_count)
     own = stock.records[client.cell]["textures"]
@@ -93,8 +86,7 @@ def by_coverage(client: EngineClient) -> Floats:
 
 
 def by_distance(client: EngineClient) -> Floats:
-    """(T, K) shares that fall with the square of the distance of the nearest shape; they sum to
-    1."""
+    """(T, K) shares by the inverse square of the distance of the nearest shape; they sum to 1."""
     stock = client.world.catalogue
     shapes, here = stock.shapes, client.loaded_shapes()
     far = client.frustum.distance(shapes.low[here], shapes.high[here])
@@ -104,7 +96,7 @@ def by_distance(client: EngineClient) -> Floats:
 
 
 def by_need(client: EngineClient) -> Floats:
-    """(T, K) the shares that the record of the cell has as its need."""
+    """(T, K) the need in the record of the cell."""
     stock = client.world.catalogue
     result = np.zeros(stock.ends.shape)
     for texture, first, *shares in stock.records[client.cell]["need"]:
@@ -114,7 +106,7 @@ def by_need(client: EngineClient) -> Floats:
 
 
 def every_level(client: EngineClient, share: Floats) -> Floats:
-    """(T, K) the same share (T,) for all levels that there are."""
+    """(T, K) the same share (T,) for all existing levels."""
     stock = client.world.catalogue
     column = np.arange(stock.ends.shape[1])
     return share[:, None] * ((column > 0) & (column <= stock.levels[:, None]))
@@ -149,20 +141,21 @@ def distance_shares(client: EngineClient, shapes: Ints) -> Floats:
 
 
 def by_box(client: EngineClient, shapes: Ints) -> Floats:
-    """The shares of the screen that the boxes of the shapes cover, whatever is before them."""
+    """The shares of the screen that the boxes of the shapes cover, without occlusion."""
     stock = client.world.catalogue
     covered = client.frustum.covered(stock.shapes.low[shapes], stock.shapes.high[shapes])
     return _summed(stock, shapes, covered)
 
 
 def coverage_shares(client: EngineClient, shapes: Ints) -> Floats:
-    """Average coverage of cells in the frustum, made to sum to 1, split equally among their shapes
-    in the frustum."""
+    """Average coverage of cells in the frustum, scaled to the sum 1 and divided equally among their
+    shapes in the frustum."""
     return _split(client, shapes, client.coverage())
 
 
 def by_views(client: EngineClient, shapes: Ints) -> Floats:
-    """As `by_coverage`, of the six views by how far they look the same way."""
+    """As `coverage_shares`, with the six views weighted by their agreement with the direction of
+    view."""
     row = client.world.catalogue.statistics[client.cell]
     along = client.frustum.direction
     weight = np.maximum([s * along[axis] for axis in range(3) for s in (1, -1)], 0) ** 2
@@ -171,7 +164,7 @@ def by_views(client: EngineClient, shapes: Ints) -> Floats:
 
 
 def by_texture(client: EngineClient, shapes: Ints) -> Floats:
-    """As `by_coverage`, split among textures by the shares that the record has of them."""
+    """As `coverage_shares`, divided among textures by their shares in the record."""
     stock = client.world.catalogue
     record = stock.records[client.cell]
     known, coverage = client.known(), client.coverage()
@@ -220,21 +213,21 @@ def by_difference(stock: Catalogue, shares: Floats) -> Floats:
     return shares * stock.differences
 
 
-#: What lies around counts so much beside what is on the screen, and of that so much for what is to
-#: be in texture memory now.
+#: Weight of the surroundings beside the screen, and the part of it that counts for texture memory
+#: now.
 AROUND, HELD = 0.2, 0.1
 
 
 @dataclass(frozen=True)
 class Screen:
-    """A policy.
+    """A policy by an item buffer.
 
     Attributes
     ----------
-    around: (T, K) shares of what lies around the client, or None.
-    share: what lies around counts so much beside what is on the screen.
-    weighing: of shares.
-    age: of the item buffer, frames.
+    around: (T, K) shares of the client's surroundings, or None.
+    share: weight of the surroundings beside the screen.
+    weighing: worth of shares.
+    age: age of the item buffer, frames.
     """
 
     around: Callable[[EngineClient], Floats] | None = None
@@ -258,12 +251,12 @@ class Screen:
         )
 
 
-#: Of what lies around beside what is on the screen; anything from a twentieth to a half does.
+#: Weight of the surroundings in `BEST`; anything from a twentieth to a half does.
 SHARE = 0.1
 
 
 def by_both(client: EngineClient) -> Floats:
-    """(T, K) shares of what lies around."""
+    """(T, K) shares of the surroundings by distance and need."""
     near = by_distance(client)
     if "need" not in client.world.catalogue.records[client.cell]:
         return near

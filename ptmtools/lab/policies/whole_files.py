@@ -1,29 +1,26 @@
-"""Clients that ask for files whole, and for documents and geometry as soon as they know of them.
+"""Clients that request files as a whole, and documents and geometry as soon as they know of them.
 
-`lru`: what is in the visible set is fetched whole in the order in which it is met, and what has
-not been seen for longest goes first.
+`lru` fetches the textures of visible shapes as a whole, in the order of their first sight, and
+removes the least recently seen. It is what files and a cache achieve, without any hint but the
+visible sets.
 
-What one gets from files and a cache, without any hint but the visible sets.
+`gpuii` fetches interlaced images as Englert et al. do ("Efficient Image Distribution on the Web",
+2014, §3.3). The next file is the most important one, by four criteria:
 
-`gpuii`: interlaced images, as Englert et al. load them ("Efficient Image Distribution on the
-Web", 2014, §3.3).
-
-What is loaded next is the file that is most important, by four criteria:
-
-1. Its image is visible: a shape that shows it reaches into the frustum, by its box. Nothing is said
-   of what hides what, and nothing else is loaded ahead.
-2. It needs another step: the texels of the image that its files make so far are wider or higher
-   than pixels on a shape that shows it, as far away as the nearest point of that shape's box.
+1. Its image is visible: the box of a shape with it intersects the frustum. Occlusion is ignored,
+   and nothing else is prefetched.
+2. It needs another step: the texels of the image so far are wider or higher than pixels on a shape
+   with it, at the distance of the nearest point of that shape's box.
 3. It is near: rings around the camera, the nearest first.
 4. Within a ring the lowest step first, "to get a consistent look".
 
-Files come whole, as many at a time as HTTP/1.1 has connections; what has been asked for is not
-given up. Where no image needs another step, nothing is asked for.
+Files arrive as a whole, as many at a time as HTTP/1.1 has connections, and requests are not
+cancelled. Where no image needs another step, nothing is requested.
 
-Read in: the width of a ring (`RING`); of what is equal in all of that the nearest image comes
-first. Texture memory, which the paper has only as "one step less", is filled with steps in that
-same order, and a step that finds no room is not loaded either; what is left holds what is there
-besides, as seen last.
+Our reading: the width of a ring (`RING`); of equal files the nearest image comes first. Texture
+memory, which the paper has only as "one step less", is filled with steps in the same order, and a
+step that does not fit is not loaded either; the rest of the memory holds other loaded steps, the
+last seen first.
 """
 
 from __future__ import annotations
@@ -40,12 +37,12 @@ from ptmtools.lab.world import World
 from ptmtools.rendering.rays import NEAR
 
 
-class WholeClient(Client, ABC):
-    """A client that does."""
+class WholeFileClient(Client, ABC):
+    """A client that requests whole files."""
 
     def documents(self) -> bool:
-        """Asks for the index, then for the record of the cell and the geometry of what that may
-        see; whether the index is there."""
+        """Requests the index, then the record of the cell and the geometry of its visible set;
+        returns whether the index has arrived."""
         self.whole(Kind.INDEX, 0)
         if not self.index:
             return False
@@ -56,14 +53,14 @@ class WholeClient(Client, ABC):
         return True
 
     def whole(self, kind: Kind, number: int) -> None:
-        """Asks for a file, behind all that was asked for before, unless it was."""
+        """Requests a file, after all earlier requests, unless it was requested."""
         files = self.files[kind]
         if not files.asked[number]:
             self.ask(kind, number, int(files.size[number]), -self.link.requests)
 
 
-class LruClient(WholeClient):
-    """See the module."""
+class LruClient(WholeFileClient):
+    """The client `lru` of the module."""
 
     def __init__(self, world: World, link: Link, budget: int) -> None:
         super().__init__(world, link, budget)
@@ -85,7 +82,7 @@ class LruClient(WholeClient):
         super().look(frame)
 
     def settle(self) -> None:
-        """See `Client.settle`: the finest level that fits, the latest seen first."""
+        """See `Client.settle`: the finest level that fits, the last seen first."""
         stock, have = self.world.catalogue, self.have
         self.column[:] = 0
         left = self.budget
@@ -104,18 +101,18 @@ class LruClient(WholeClient):
             self.whole(Kind.TEXTURE, self._queue.pop(0))
 
 
-#: Width of a ring around the camera, metres. Narrower ones make worse pictures, wider ones none
-#: that are better everywhere (docs/design/neighbours.md).
+#: Width of a ring around the camera, metres. Narrower rings make worse pictures, wider ones are not
+#: better everywhere (docs/design/neighbours.md).
 RING = 8.0
 
 
-class GpuiiClient(WholeClient):
-    """See the module; ``ring`` is the width of a ring, metres.
+class GpuiiClient(WholeFileClient):
+    """The client `gpuii` of the module; ``ring`` is the width of a ring, metres.
 
     Attributes
     ----------
-    distance: (T,) metres to the nearest shape in the frustum that shows each texture, infinite
-        without one. wanted: (T,) columns that the screen needs.
+    distance: (T,) metres to the nearest shape with each texture in the frustum, infinite without
+        one. wanted: (T,) columns that the screen needs.
     """
 
     def __init__(self, world: World, link: Link, budget: int, ring: float = RING) -> None:
@@ -125,7 +122,7 @@ class GpuiiClient(WholeClient):
         self.distance: Floats = np.full(count, np.inf)
         self.wanted: Ints = np.zeros(count, np.int64)
         self._seen = np.full(count, -1, np.int64)
-        #: Texture and column of each step that is visible and needed, the most important first.
+        #: Texture and column of each visible and needed step, the most important first.
         self._steps: list[tuple[int, int]] = []
         self._target: Ints = np.zeros(count, np.int64)
 
@@ -162,7 +159,7 @@ class GpuiiClient(WholeClient):
                 self.ask(Kind.TEXTURE, t, end, -self.link.requests)
 
     def _see(self) -> None:
-        """Finds what is visible, how near it is, and how far it is to be refined."""
+        """Updates the visible textures, their distances, and the columns that the screen needs."""
         stock, shapes = self.world.catalogue, self.world.catalogue.shapes
         frustum = self.world.frustum(self.frame)
         loaded = np.flatnonzero(self.geometry.whole[shapes.cell] & (shapes.texture >= 0))

@@ -1,8 +1,8 @@
-"""Octree textures on a walk (`ptm build-scene --apo`): pictures that are lit, so that relief shows,
-and octrees as what clients fetch beside textures.
+"""Octree textures on a walk (`ptm build-scene --apo`): lit pictures, which show relief, and octrees
+as files of clients beside textures.
 
-An octree is one more texture to whom fetches: a file that refines what is on the screen, whose
-columns (`Catalogue`) are its levels. So links, budgets, policies and measures need to know nothing
-of normals. It comes behind the textures, and behind all of them comes one without levels: what the
-simplified meshes themselves get wrong, which nothing that is fetched mends.
+To a client an octree is one more texture: a file that refines the screen, whose columns
+(`Catalogue`) are its levels. So links, budgets, policies and measures need no knowledge of normals.
+Octrees come after the textures, and after all of them comes one texture without levels: the errors
+of the simplified meshes themselves, which no download reduces.
 """

@@ -1,4 +1,4 @@
-"""Compiled sums of errors where an octree, or another geometry, is on the screen (see `tables`)."""
+"""Compiled sums of errors for octrees and for another geometry on the screen (see `tables`)."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def lamp(x: float, y: float, z: float) -> float:
 
 @plain_kernel
 def depth_of(sight: Sight, i: int, triangles: Triangles) -> float:
-    """How far away along the view the triangle is that a pixel shows; infinite without one."""
+    """Distance along the view to the triangle of a pixel; infinite without one."""
     f = sight.triangle[i]
     if f < 0:
         return np.inf
@@ -43,15 +43,15 @@ def depth_of(sight: Sight, i: int, triangles: Triangles) -> float:
 
 @plain_kernel
 def depths(sight: Sight, triangles: Triangles, depth: Floats) -> None:
-    """Writes `depth_of` each pixel to ``found`` (n,)."""
+    """Writes `depth_of` each pixel to ``depth`` (n,)."""
     for i in range(len(depth)):
         depth[i] = depth_of(sight, i, triangles)
 
 
 @plain_kernel
 def stop_of(sight: Sight, i: int, triangles: Triangles, depth: float, side: float) -> int:
-    """The depth of the nodes that are no larger than a pixel of the screen, in a cube of so long a
-    side: ⌈log₂(1 / D)⌉ of the smaller step D to a pixel beside or above (paper 2, §4.2)."""
+    """The depth of the nodes no larger than a pixel of the screen, in a cube of this ``side``:
+    ⌈log₂(1 / D)⌉ of the smaller step D to the next pixel beside or above (paper 2, §4.2)."""
     f = sight.triangle[i]
     ray, normal = sight.ray[i], triangles.normal[f]
     facing = normal[0] * ray[0] + normal[1] * ray[1] + normal[2] * ray[2]
@@ -73,8 +73,8 @@ def stop_of(sight: Sight, i: int, triangles: Triangles, depth: float, side: floa
 def descend(
     octrees: Octrees, o: int, x: float, y: float, z: float, stop: int, light: Floats
 ) -> int:
-    """Writes to ``light`` (L,) how much falls on a point (metres) by the normals of the nodes that
-    it lies in, from the root down to a depth or the last node; returns how many there are."""
+    """Writes to ``light`` (L,) the light on a point (metres) by the normals of the nodes around it,
+    from the root to depth ``stop`` or the last node; returns their number."""
     texel = octrees.texel[octrees.begin[o] : octrees.begin[o + 1]]
     low, side = octrees.low[o], octrees.side[o]
     x = min(max((x - low[0]) / side, 0.0), _LAST)
@@ -115,18 +115,17 @@ def add_relief(
     sums: Sums,
     stuck: Ints,
 ) -> None:
-    """Adds what the pixels of a frame show that are ``special`` (n,).
+    """Adds the errors of the ``special`` (n,) pixels of a frame.
 
     Parameters
     ----------
-    triangles: as they are lit when flat, by ``lamps`` (m,).
-    full: the textures, all there.
-    exact: (n, 3) what pixels are compared with if ``given``, else all levels of the octree, which
-        are written to it.
-    seen: (n,) as of `add_frame`.
-    sums: ``pair`` (m,) has that of the octree, whose columns have its levels in place of a
-        texture's.
-    stuck: (m,) the pair of what nothing mends.
+    triangles: with the flat lighting of ``lamps`` (m,).
+    full: the textures with all levels.
+    exact: (n, 3) the reference colours if ``given``, else the output for those of all octree
+        levels.
+    seen: (n,) as in `add_frame`.
+    sums: ``pair`` (m,) is that of the octree, whose columns are its levels in place of a texture's.
+    stuck: (m,) the pair of errors that no download reduces.
     """
     wide = sums.error.shape[1]
     grey, color, work, coarse = np.full(3, GREY), np.zeros(3), np.zeros((3, 3)), np.zeros(3)
@@ -165,7 +164,7 @@ def add_relief(
                 exact[i, k] = flat[k] * light[count - 1] / lamps[f]
         for n in range(octrees.levels[o] + 2):
             if n == 0 and t >= 0:
-                continue  # the row of the texture has it
+                continue  # in the row of the texture
             for k in range(3):
                 level = light[min(n - 2, count - 1)] / lamps[f] if n > 1 else 1.0
                 color[k] = flat[k] * level if n else GREY
@@ -188,8 +187,8 @@ def relieve(
     held: Ints,
     shown: Floats,
 ) -> None:
-    """Lights pixels ``shown`` (n, 3) of frames by the levels ``held`` (O,) of the octrees; what has
-    none stays lit as it is. ``there`` (C,) is the geometry."""
+    """Lights the pixels ``shown`` (n, 3) by the levels ``held`` (O,) of the octrees; pixels without
+    an octree keep their light. ``loaded`` (C,) is the loaded geometry."""
     light = np.zeros(DEEP)
     for i in range(len(shown)):
         f = sight.triangle[i]
@@ -211,15 +210,15 @@ def mark_special(
     sight: Sight, far: Floats, other: Floats, given: bool, of: NDArray[np.int32],
     texture: NDArray[np.int32], apart: float, special: Bools, plain: Ints,
 ) -> None:  # fmt: skip
-    """Marks the ``special`` (n,) pixels: those that show an octree's object, or of which the
-    geometries ``far`` and ``other`` (n,) away are ``apart`` by more than so large a share; writes
-    to ``plain`` (n,) what is left for other tables, which have the textures of octrees' objects."""
+    """Marks the ``special`` (n,) pixels: those of an octree's object, or whose depths ``far`` and
+    ``other`` (n,) in the two geometries differ by more than the share ``apart``. Writes to
+    ``plain`` (n,) the triangles for other tables, which have the textures of octrees' objects."""
     for i in range(len(special)):
         f = sight.triangle[i]
         octree = f >= 0 and of[f] >= 0
         differs = False
         if given and far[i] != other[i]:
-            # Also where one of them is infinite.
+            # Also if one of them is infinite.
             differs = not abs(far[i] - other[i]) <= apart * min(far[i], other[i])
         special[i] = octree or differs
         plain[i] = f if not special[i] or (octree and texture[f] >= 0) else -1

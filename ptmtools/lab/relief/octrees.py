@@ -1,4 +1,4 @@
-"""The octree textures of a served folder, as kernels and clients take them."""
+"""The octree textures of a served folder as arrays for kernels and clients."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _TEXEL = 4
 
 
 class Octrees(NamedTuple):
-    """Octree textures one after the other.
+    """Octree textures, one after the other.
 
     Attributes
     ----------
     texel: (N, 4) uint8. begin: (O + 1,) where each octree begins in it.
-    levels: (O,) how many each has.
+    levels: (O,) number of levels.
     low, side: (O, 3), (O,) of the cubes, metres.
     of: (m,) int32 the octree of each triangle of the surfaces, -1 without.
     """
@@ -39,15 +39,15 @@ class Octrees(NamedTuple):
 
     @property
     def number(self) -> int:
-        """How many there are."""
+        """Number of octrees."""
         return len(self.levels)
 
 
 def read_octrees(served: Served) -> Octrees:
-    """All of a served folder, which may have none.
+    """Reads the octree textures of a served folder, which may have none.
 
-    Raises DatabaseError: PTM-D005 a file is missing; PTM-D006 it is damaged, or not as the index
-    says.
+    Raises DatabaseError: PTM-D005 a file is missing; PTM-D006 it is damaged, or does not match the
+    index.
     """
     rows = _rows(served)
     if rows and (served.surfaces.octree < 0).all():
@@ -70,7 +70,7 @@ def read_octrees(served: Served) -> Octrees:
 
 
 def no_octrees(surfaces: Surfaces) -> Octrees:
-    """None at all."""
+    """An empty set of octrees."""
     of = np.full(len(surfaces.corner), -1, np.int32)
     no = np.zeros(0, np.int64)
     return Octrees(
@@ -79,7 +79,8 @@ def no_octrees(surfaces: Surfaces) -> Octrees:
 
 
 def octree_columns(served: Served) -> Columns:
-    """What can be fetched of each octree: a column is a level, its size the nodes along a side."""
+    """The columns of each octree: a column is a level, its size the number of nodes along a
+    side."""
     rows = []
     for row in _rows(served):
         across = 1 << np.arange(len(row["levels"]))
@@ -98,15 +99,15 @@ def _texels(served: Served, row: Mapping[str, Any]) -> NDArray[np.uint8]:
 
     file = served.file(row["file"])
     start = np.concatenate([[0], np.cumsum(row["levels"], dtype=np.int64)])
-    wrong = ""
+    problem = ""
     if not len(row["levels"]) == len(row["ends"]) == len(row["crc32"]):
-        wrong = "has levels, ends and checksums that do not fit together in hints.json"
+        problem = "has levels, ends and checksums that do not fit together in hints.json"
     elif start[-1] > 1 << 24 or (np.diff(row["ends"], prepend=0) <= 0).any():
-        wrong = "has more texels in hints.json than there can be, or ends that do not ascend"
-    if not wrong:
+        problem = "has more texels in hints.json than there can be, or ends that do not ascend"
+    if not problem:
         data = served.read(row["file"])
         try:
             return inflated(data, start, Stream(row["file"], row["ends"], row["crc32"]))
         except (InputError, zlib.error) as fault:
-            wrong = getattr(fault, "message", str(fault))
-    raise DatabaseError("PTM-D006", wrong, file=file, remedy=BUILD)
+            problem = getattr(fault, "message", str(fault))
+    raise DatabaseError("PTM-D006", problem, file=file, remedy=BUILD)

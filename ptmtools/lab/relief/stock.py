@@ -1,4 +1,4 @@
-"""Octree textures in a client's catalogue: textures behind the others (`Catalogue`)."""
+"""Octree textures in a client's catalogue: textures after the others (`Catalogue`)."""
 
 from __future__ import annotations
 
@@ -9,41 +9,44 @@ from ptmtools.lab.catalogue import LEAST, Catalogue, Columns, Shapes
 from ptmtools.lab.relief.octrees import Octrees, octree_columns
 from ptmtools.output.served import Served
 
-#: Points of each object at which the levels of its octree are compared, and where they are put.
+#: Number of points of each object at which the levels of its octree are compared, and the seed of
+#: their places.
 _POINTS, _SEED = 4096, 1
 
 
-#: Share of white that what is lit gives back, where the light on it is compared.
+#: Brightness of the lit surface in the comparison, 0 to 255.
 _BRIGHT = 255 * 0.7
 
 
 def without_octrees(stock: Catalogue, octrees: Octrees) -> Catalogue:
-    """What a client knows that draws none: nothing can be fetched of them.
+    """The catalogue of a client that draws no octrees, with nothing to fetch of them.
 
-    There are as many columns as the tables of the walk have.
+    It has as many columns as the tables of the walk.
     """
-    return _none(stock, octrees.number + 1, octrees)
+    return _with_empty(stock, octrees.number + 1, octrees)
 
 
 def with_octrees(stock: Catalogue, served: Served, octrees: Octrees) -> Catalogue:
-    """What a client knows that draws octrees; ``stock`` is of the textures alone."""
+    """The catalogue of a client that draws octrees; ``stock`` is that of the textures alone."""
     columns = octree_columns(served)
-    joined = stock.beside(columns, differences(served, octrees, columns), _shapes(served, octrees))
-    # Behind them what nothing mends, see the package.
-    return _none(joined, 1, octrees)
+    extended = stock.joined_with(
+        columns, differences(served, octrees, columns), _shapes(served, octrees)
+    )
+    # After them, errors that no download reduces; see the package.
+    return _with_empty(extended, 1, octrees)
 
 
-def _none(stock: Catalogue, count: int, octrees: Octrees) -> Catalogue:
-    """With so many textures more of which nothing can be fetched."""
+def _with_empty(stock: Catalogue, count: int, octrees: Octrees) -> Catalogue:
+    """The catalogue with ``count`` more textures without columns."""
     wide = 1 + int(octrees.levels.max(initial=1))
     last, table = np.zeros(count, np.int64), np.zeros((count, wide), np.int64)
     nothing = Columns(last, table, table, np.zeros((count, wide, 2), np.int64))
-    return stock.beside(nothing, np.zeros((count, wide)))
+    return stock.joined_with(nothing, np.zeros((count, wide)))
 
 
 def differences(served: Served, octrees: Octrees, columns: Columns) -> Floats:
-    """(O, K) of each level to the one before it, as pictures show it: on average over the object, 0
-    to 255. hints.json does not say them; who writes it could."""
+    """(O, K) mean difference of each level to the one before, over the object as displayed, 0 to
+    255. hints.json does not hold them; its writer could."""
     from ptmtools.lab.relief.kernels import DEEP, descend
 
     result = np.zeros(columns.ends.shape)
@@ -71,7 +74,7 @@ def differences(served: Served, octrees: Octrees, columns: Columns) -> Floats:
 
 
 def _shapes(served: Served, octrees: Octrees) -> Shapes:
-    """The shapes that show octrees, once more with these."""
+    """The shapes with octrees, once more with these as textures."""
     surfaces, first = served.surfaces, len(served.index["textures"])
     low, high = surfaces.boxes()
     shape, where = np.unique(surfaces.shape, return_index=True)

@@ -1,12 +1,11 @@
-"""The tables of a walk where octrees, or another geometry, are on the screen.
+"""Tables of a walk where octrees, or another geometry, are on the screen.
 
-The pixels of an octree's object are compared with what they should show, by the levels of the
-octree: their rows have it for a texture. Where the object has a texture, too, that has its own rows
-as everywhere, of the light on the simplified mesh; what both lack counts twice, and what one lacks
-once.
+The pixels of an octree's object are compared with their reference by the levels of the octree, in
+rows with the octree as texture. If the object also has a texture, that has its own rows as usual,
+with the light on the simplified mesh; an error of both counts twice, and an error of one once.
 
-With another database of the same model to compare with, pixels whose geometry differs are wrong by
-what they show, whatever is fetched: rows of the texture without levels.
+With another database of the same model as the reference, pixels of different geometry have a fixed
+error, whatever is fetched: in rows of the texture without levels.
 """
 
 from __future__ import annotations
@@ -24,33 +23,33 @@ from ptmtools.rendering.light import lamps
 from ptmtools.rendering.rays import Caster
 from ptmtools.rendering.records import Pyramids, Sight, Triangles, own_levels, triangles_of
 
-#: Depths that differ by a smaller share are those of the same surface.
+#: Largest relative difference of the depths of the same surface.
 APART = 1e-3
 
 
 @dataclass(frozen=True)
 class Reference:
-    """Another database of the same model: its full picture is what others are compared with."""
+    """Another database of the same model, whose full picture is the reference."""
 
     surfaces: Surfaces
     pyramids: Pyramids
 
     @cached_property
     def triangles(self) -> Triangles:
-        """As kernels take them."""
+        """Its triangles for kernels."""
         return triangles_of(self.surfaces)
 
     @cached_property
     def caster(self) -> Caster:
-        """Casts rays at it."""
+        """Its ray caster."""
         return Caster(self.surfaces)
 
     def look(self, sight: Sight) -> Sight:
-        """What is seen of it where something else is seen."""
+        """Its surfaces along the rays of ``sight``."""
         return sight._replace(triangle=self.caster.first(sight.eye, sight.ray))
 
     def shown(self, sight: Sight) -> Floats:
-        """(n, 3) its full picture of what is seen of it, 0 to 255."""
+        """(n, 3) its full picture of them, 0 to 255."""
         from ptmtools.rendering.kernels import shade
 
         whole, cells = own_levels(self.pyramids), int(self.surfaces.cell.max(initial=-1)) + 1
@@ -62,11 +61,11 @@ class Reference:
 
 @dataclass(frozen=True)
 class Relief:
-    """What is lit in a walk, and what it is compared with.
+    """Octrees of a lit walk, and its reference.
 
     Attributes
     ----------
-    octrees: of the database that is walked through, maybe none.
+    octrees: those of the walked database, maybe none.
     reference: None: the database's own full picture.
     """
 
@@ -75,12 +74,12 @@ class Relief:
 
 
 class Tally:
-    """Adds up frames.
+    """Sums up errors of frames.
 
     Parameters
     ----------
-    surfaces, triangles: that are walked through, as they are lit.
-    full: their textures. seen: (n,) which pixels a client's item buffer has.
+    surfaces, triangles: of the walked database, lit.
+    full: their textures. seen: (n,) the pixels of a client's item buffer.
     """
 
     def __init__(
@@ -96,7 +95,7 @@ class Tally:
         self._relief, self._triangles, self._full, self._seen = relief, triangles, full, seen
         self._lamps = lamps(surfaces.corner)
         octrees, first = relief.octrees, len(full.levels)
-        # Behind the textures come the octrees, and one without levels.
+        # After the textures come the octrees, and one texture without levels.
         wanted = np.where(octrees.of < 0, octrees.number, octrees.of) + first
         stuck = np.full(len(wanted), first + octrees.number)
         keys = np.stack([np.tile(triangles.cell, 2), np.concatenate([wanted, stuck])], axis=1)
@@ -111,7 +110,7 @@ class Tally:
         self._rows = [[np.zeros((0, n), np.float32)] for n in columns]
 
     def add(self, sight: Sight) -> Sight:
-        """Makes the rows of the next frame; returns what of it is left for other tables."""
+        """Adds the rows of the next frame; returns the rest of it for other tables."""
         from ptmtools.lab.relief.kernels import add_relief, depths, mark_special
 
         reference, octrees = self._relief.reference, self._relief.octrees
@@ -140,7 +139,7 @@ class Tally:
 
     @property
     def rows(self) -> Rows:
-        """Those of all frames."""
+        """The rows of all frames."""
         frame = np.repeat(np.arange(len(self._nonzero)), [len(pairs) for pairs in self._nonzero])
         pairs = self._pairs[np.concatenate([np.zeros(0, np.int64), *self._nonzero])]
         error, square, need, sight = map(np.concatenate, self._rows)

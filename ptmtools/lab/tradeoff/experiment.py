@@ -1,6 +1,6 @@
 """Cost against error: the price and the effect of a stage's options on the user's own scene.
 
-An `Experiment` of a stage lists the settings of its options that are worth a trial, runs each, and
+An `Experiment` of a stage lists settings of its options, runs each, and
 measures how far the result is from a reference that does not depend on the options. The evaluation
 is the same for all: the Pareto front of the settings, the fall of the error with the work (a fitted
 power), and the cheapest setting for a wanted error.
@@ -27,11 +27,11 @@ class Setting:
 
     Attributes
     ----------
-    name: as a user would say it, unique within a stage ("--samples 64 --face 8").
+    name: as a user gives it, unique within a stage ("--samples 64 --face 8").
     knobs: option → value, as the options of the stage have them.
     family: settings of one family differ in one thing, so that a power may be fitted to them;
         empty for those that stand alone.
-    sound: False for what is only there to compare with, and is never the best.
+    sound: False for a setting that only serves for comparison and is never the best.
     """
 
     name: str
@@ -41,17 +41,17 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Measured:
-    """What came of a setting.
+class Measurement:
+    """Measurement of a setting.
 
     Attributes
     ----------
     seconds: of one process, for the whole database.
     work: in the units that the experiment names; does not depend on the machine.
-    error: as the experiment names it; the mean over what was tried.
-    worst: the greatest error of them.
+    error: as the experiment defines it; the mean over the trials.
+    worst: the greatest error of the trials.
     more: other figures, by name.
-    note: how it was done, where that may differ.
+    note: the method, where it may differ.
     """
 
     seconds: float
@@ -67,7 +67,7 @@ class Experiment(Protocol):
 
     Attributes
     ----------
-    work, error: what is counted, and what the error is, with their units.
+    work, error: definitions of work and error, with their units.
     reference_error: the standard error of the reference itself, 0 where it is exact.
     """
 
@@ -76,24 +76,24 @@ class Experiment(Protocol):
     reference_error: float
 
     def settings(self) -> Sequence[Setting]:
-        """Those worth trying, cheap ones first."""
+        """Settings to try, cheap ones first."""
 
-    def measure(self, setting: Setting) -> Measured:
+    def measure(self, setting: Setting) -> Measurement:
         """Runs the stage with a setting."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A setting, what came of it, and whether no other setting is as good for less."""
+    """A setting, its measurement, and whether no cheaper setting is as good."""
 
     setting: Setting
-    measured: Measured
+    measured: Measurement
     best: bool = False
 
 
 @dataclass(frozen=True)
 class Trade:
-    """An experiment that has been run.
+    """A finished experiment.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Trade:
     work, error, reference_error: as in `Experiment`.
     trials: by cost.
     rates: family → exponent b of error ∝ work^b, by least squares over the logarithms of trials
-        that are above twice the error of the reference.
+        with more than twice the error of the reference.
     """
 
     stage: str
@@ -134,7 +134,7 @@ def run(stage: str, experiment: Experiment, progress: Progress = silent) -> Trad
 
 
 def pareto(trials: Sequence[Trial]) -> tuple[Trial, ...]:
-    """The trials by cost, the sound ones marked that have a smaller error than all cheaper ones."""
+    """The trials by cost; sound ones with a smaller error than all cheaper ones are marked."""
     ordered = sorted(trials, key=lambda t: (t.measured.seconds, t.measured.error))
     least = math.inf
     marked = []
@@ -163,7 +163,7 @@ def rates(trials: Sequence[Trial], above: float) -> dict[str, float]:
 
 
 def timed(work: Callable[[], Any]) -> tuple[Any, float]:
-    """What ``work`` returns, and the processor seconds of this process that it took."""
+    """The result of ``work``, and the processor seconds of this process for it."""
     start = time.process_time()
     result = work()
     return result, time.process_time() - start
@@ -171,7 +171,7 @@ def timed(work: Callable[[], Any]) -> tuple[Any, float]:
 
 @dataclass(frozen=True)
 class Subject:
-    """What experiments are made on: a database, and how much effort to spend.
+    """The database of experiments, and their effort.
 
     Attributes
     ----------

@@ -1,9 +1,8 @@
-"""The knobs of the stages whose price the walker pays, and the values that are worth trying.
+"""The knobs whose price a walk measures, with their values, and rebuilding a database with another
+option.
 
-A database built again with another option, in a folder of its own.
-
-What a setting costs is what all stages after the scene then take: those that the option concerns
-run again, and the others took what they take with the database's own options.
+The cost of a setting is the time of all stages after the scene: those that depend on the option run
+again in a copy, and the others count their time with the database's own options.
 """
 
 from __future__ import annotations
@@ -41,13 +40,13 @@ class Knob:
 
     Attributes
     ----------
-    stage, field: of whose options.
+    stage, field: the stage, and the field of its options.
     values: to try.
     worth: ``worth(value, own)``: whether to try a value beside the database's own. Pictures are
-        compared with what the database has, so of textures only what is coarser.
-    policy: who walks, if only some clients use what it makes; "" for whom the user asks for.
-    own: the property of the options that says what is in force; by default the field.
-    slow: values that take far longer, tried only if the knob is named.
+        compared with those of the database, so only coarser textures are tried.
+    policy: the client's policy, if only some clients use the result; "" for those of the user.
+    own: the property of the options with the value in force; by default the field.
+    slow: values that take far longer, only tried if the knob is named.
     of_longest: the values are shares of the longest side of a texture.
     """
 
@@ -62,11 +61,11 @@ class Knob:
 
     @property
     def option(self) -> str:
-        """As a user gives it, with its dashes."""
+        """The option as a user gives it, with its dashes."""
         option = next(each for each in fields(self.stage.options) if each.name == self.field)
         return f"--{option_name(option)}"
 
-    def said(self, value: Any) -> str:
+    def text(self, value: Any) -> str:
         """A value as a user gives it."""
         if isinstance(value, bool):
             return self.option if value else self.option.replace("--", "--no-", 1)
@@ -92,8 +91,8 @@ class Setting:
 
     Attributes
     ----------
-    own: that one, as `Knob.said` says it.
-    options: of its stage.
+    own: the database's value, in the form of `Knob.text`.
+    options: the options of its stage.
     """
 
     knob: Knob
@@ -104,7 +103,7 @@ class Setting:
     @property
     def name(self) -> str:
         """As a user gives it."""
-        return self.knob.said(self.value)
+        return self.knob.text(self.value)
 
 
 def settings(
@@ -114,26 +113,26 @@ def settings(
     *,
     quick: bool = False,
 ) -> Iterator[Setting]:
-    """What to try beside the ``own`` options of a database whose longest texture side is
-    ``longest`` texels: all knobs, or those of the ``named`` options, such as "max-side"; with
+    """Settings to try beside the ``own`` options of a database whose longest texture side is
+    ``longest`` texels: of all knobs, or of the ``named`` options, such as "max-side"; with
     ``quick``, one value of each."""
     for knob in KNOBS:
         if named and knob.option.removeprefix("--") not in named:
             continue
         options = own[knob.stage]
-        here = getattr(options, knob.own or knob.field)
+        current = getattr(options, knob.own or knob.field)
         values = (*knob.values, *(knob.slow if named else ()))
         if knob.of_longest:
             values = tuple(int(share * longest) for share in values if share * longest >= 1)
-        tried = [value for value in values if knob.worth(value, here)]
-        for value in tried[:1] if quick else tried:
-            with suppress(InputError):  # what the other options do not allow
+        chosen = [value for value in values if knob.worth(value, current)]
+        for value in chosen[:1] if quick else chosen:
+            with suppress(InputError):  # if the other options do not allow it
                 changed = replace(options, **{knob.field: value})
-                yield Setting(knob, value, knob.said(here), changed)
+                yield Setting(knob, value, knob.text(current), changed)
 
 
 def concerned(stage: Stage[Any], own: Mapping[Stage[Any], Options]) -> list[Stage[Any]]:
-    """A stage and those that read what it makes, in their order."""
+    """A stage and those that depend on its result, in their order."""
     result = [stage]
     for later in STAGES.values():
         if later in own and later not in result and set(later.read_with(own[later])) & set(result):
@@ -141,13 +140,13 @@ def concerned(stage: Stage[Any], own: Mapping[Stage[Any], Options]) -> list[Stag
     return result
 
 
-#: Seconds of one core that each stage took.
+#: Seconds of one core for each stage.
 Seconds = dict[str, float]
 Own = Mapping[Stage[Any], Options]
 
 
 def own_options(artifacts: Artifacts) -> Own:
-    """Those that the stages last ran with, but for those that make the scene, of which the first
+    """The options of the last run of each stage, without those of the scene, the first of which
     needs the model.
 
     Raises DatabaseError PTM-D004 if one has not run, PTM-D002 for options that no stage has.
@@ -157,14 +156,14 @@ def own_options(artifacts: Artifacts) -> Own:
 
 @contextmanager
 def copied(db: Path) -> Iterator[Path]:
-    """A copy of a database, to be changed, for a while."""
+    """A temporary copy of a database, to be changed."""
     with TemporaryDirectory(prefix="ptmtools-") as folder:
         yield Path(shutil.copytree(db, Path(folder) / "db"))
 
 
 def build_again(db: Path, options: Own, progress: Progress = silent) -> Seconds:
-    """Runs the stages whose options are given, whether or not they are current, in the order of
-    the options, by one worker: nothing is kept that would have been cheap to keep."""
+    """Runs the stages whose options are given, current or not, in the order of the options, by one
+    worker: nothing is reused."""
     result: Seconds = {}
     for stage, chosen in options.items():
         run = partial(run_stage, db, chosen, workers=1, rebuild=True, progress=progress)

@@ -1,8 +1,7 @@
-"""The outcome of experiments as a table of text, as CSV, and as pictures.
+"""Reports experiments as a table of text, as CSV and as plots, and the price of knobs on a walk in
+sentences.
 
-Error against cost, a panel for every stage; needs matplotlib (extra ``plot``).
-
-What knobs are worth to a walker, in words; the table of all settings below.
+A plot shows error against cost, a panel for every stage; it needs matplotlib (extra ``plot``).
 """
 
 from __future__ import annotations
@@ -14,12 +13,12 @@ from itertools import groupby
 from typing import Any
 
 from ptmtools.lab.report import rate_text
-from ptmtools.lab.tradeoff.experiment import Measured, Setting, Trade, Trial, pareto
-from ptmtools.lab.tradeoff.walk import FIRST, Seen, Tried, WalkTrade
+from ptmtools.lab.tradeoff.experiment import Measurement, Setting, Trade, Trial, pareto
+from ptmtools.lab.tradeoff.walk import FIRST, WalkOutcome, WalkTrade, WalkTrial
 from ptmtools.lazy import component
 from ptmtools.quantities import size
 
-#: Of the CSV.
+#: Columns of the CSV.
 COLUMNS = (
     *("stage", "setting", "cpu_s", "work", "work_unit"),
     *("error", "worst", "error_of", "best", "more"),
@@ -27,8 +26,8 @@ COLUMNS = (
 
 
 def table(trade: Trade, wanted: float | None = None) -> list[str]:
-    """Lines of text: every trial by cost, a star where no other is as good for less; the rates; and
-    the cheapest setting for the wanted error."""
+    """Lines of text: every trial by cost, with a star where no cheaper one is as good; the rates;
+    and the cheapest setting for the wanted error."""
     names = [t.setting.name for t in trade.trials]
     wide = max(map(len, [*names, "setting"]))
     lines = [
@@ -59,7 +58,8 @@ def table(trade: Trade, wanted: float | None = None) -> list[str]:
 
 
 def as_csv(trades: Sequence[Trade]) -> str:
-    """All trials of all stages: what is in `Measured`, other figures as ``name=value``."""
+    """All trials of all stages as CSV: the fields of `Measurement`, further figures as
+    ``name=value``."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(COLUMNS)
@@ -82,7 +82,7 @@ def require() -> None:
 
 
 def picture(trades: Sequence[Trade]) -> bytes:
-    """A PNG: every trial, families joined, settings that no other beats named.
+    """A PNG: every trial, families joined, with the names of the best settings.
 
     Raises `MissingComponentError` PTM-M100 without matplotlib.
     """
@@ -129,25 +129,25 @@ def _draw(axes: Any, trade: Trade) -> None:
     axes.legend(fontsize=7)
 
 
-#: Nobody sees less: of e, as a share of it, and in steps of 8-bit colour.
+#: Least visible change of e, as a share of it and in steps of 8-bit colour.
 _SHARE, _STEPS = 0.005, 0.01
-#: Of bytes nobody cares for less; seconds are no more exact than this share of them all.
+#: Least relevant share of bytes, and of seconds, which are no more exact.
 _BYTES, _SECONDS = 0.005, 0.1
 Case = tuple[str, float | None, str]
 
 
-def said(trade: WalkTrade) -> list[str]:
-    """A sentence for each knob, on the setting that `telling` takes."""
+def sentences(trade: WalkTrade) -> list[str]:
+    """A sentence for each knob, on the setting chosen by `representative`."""
     return [
-        sentence(telling(list(some), trade.own), trade)
+        sentence(representative(list(some), trade.own), trade)
         for _, some in groupby(trade.trials, lambda tried: tried.option)
     ]
 
 
-def telling(some: Sequence[Tried], own: Tried) -> Tried:
-    """Of the settings of a knob the one to tell of: where the picture is best, if that is better
-    than the database's own; else, of those that nobody can tell from it, the one that saves most
-    bytes, then seconds; else the one that loses least."""
+def representative(some: Sequence[WalkTrial], own: WalkTrial) -> WalkTrial:
+    """The setting of a knob to report: the best picture, if that is better than the database's own;
+    else, of those without a visible difference, the one that saves most bytes, then seconds; else
+    the one that loses least."""
     valid = [tried for tried in some if not tried.problem]
     if not valid:
         return some[0]
@@ -158,8 +158,8 @@ def telling(some: Sequence[Tried], own: Tried) -> Tried:
     return min(alike, key=lambda tried: (tried.served, tried.build))
 
 
-def sentence(tried: Tried, trade: WalkTrade) -> str:
-    """What a setting saves, and what the walker sees of it."""
+def sentence(tried: WalkTrial, trade: WalkTrade) -> str:
+    """The savings of a setting, and its visible effect."""
     if tried.problem:
         return f"{tried.name} cannot be tried: {tried.problem}."
     own = trade.own
@@ -185,7 +185,7 @@ def sentence(tried: Tried, trade: WalkTrade) -> str:
     return f"{tried.name} instead of {tried.own} {saved}; {seen}."
 
 
-def _saved(tried: Tried, own: Tried) -> str:
+def _saved(tried: WalkTrial, own: WalkTrial) -> str:
     parts = []
     more = tried.served / max(own.served, 1) - 1
     if abs(more) >= _BYTES:
@@ -207,12 +207,12 @@ def _percent(share: float) -> str:
     return f"{100 * share:,.{0 if share >= 0.0995 else 1}f} %"
 
 
-def _by(was: Seen, now: Seen) -> str:
+def _by(was: WalkOutcome, now: WalkOutcome) -> str:
     return f"by {_percent(abs(now.e / was.e - 1))} " if was.e else ""
 
 
 def _where(case: Case, cases: Sequence[Case]) -> str:
-    """Of a case what tells it from the others."""
+    """A case, by the parts that differ from other cases."""
     policy, bandwidth, memory = case
     text = f"at {rate_text(bandwidth)}"
     if len({c[2] for c in cases}) > 1:
@@ -220,24 +220,24 @@ def _where(case: Case, cases: Sequence[Case]) -> str:
     return f"{text} by {policy}" if len({c[0] for c in cases}) > 1 else text
 
 
-def _pairs(tried: Tried, own: Tried) -> list[tuple[Seen, Seen]]:
-    """What was seen of the database as it is, and with the setting, case by case."""
+def _pairs(tried: WalkTrial, own: WalkTrial) -> list[tuple[WalkOutcome, WalkOutcome]]:
+    """The outcomes of the database's own options and of the setting, case by case."""
     return [(was, now) for now in tried.seen if (was := own.by(now.case))]
 
 
-def _change(tried: Tried, own: Tried) -> float:
-    """Of e, as a share, on average over the cases."""
+def _change(tried: WalkTrial, own: WalkTrial) -> float:
+    """Mean change of e over the cases, as a share."""
     pairs = _pairs(tried, own)
     return sum((now.e - was.e) / max(was.e, _STEPS) for was, now in pairs) / max(len(pairs), 1)
 
 
-def _noticed(was: Seen, now: Seen) -> bool:
+def _noticed(was: WalkOutcome, now: WalkOutcome) -> bool:
     return abs(now.e - was.e) >= max(_SHARE * was.e, _STEPS)
 
 
 def settings_table(trade: WalkTrade, wanted: float | None = None) -> list[str]:
     """Lines of text: the sentences, then all settings, a block for each walker."""
-    lines = [*said(trade), ""]
+    lines = [*sentences(trade), ""]
     lines += [
         "e says how far the picture is from the full one of the database as it is: 0 to 255, on",
         "average over pixels and frames, and what 95 % of the frames do not exceed. build: seconds",
@@ -260,7 +260,7 @@ def settings_table(trade: WalkTrade, wanted: float | None = None) -> list[str]:
     return [*lines, "", *problems] if problems else lines
 
 
-_AS_IS = Tried("as it is", "", "", 0, 0)
+_AS_IS = WalkTrial("as it is", "", "", 0, 0)
 
 
 def _rows(trade: WalkTrade, case: Case, wide: int) -> Iterator[str]:
@@ -278,7 +278,7 @@ def _rows(trade: WalkTrade, case: Case, wide: int) -> Iterator[str]:
 
 
 def trades(trade: WalkTrade) -> list[Trade]:
-    """The same as other experiments have it, one for each walker: e against seconds of building."""
+    """The trade of each walker in the form of other experiments: e against seconds of building."""
     return [_trade(trade, case) for case in trade.cases]
 
 
@@ -292,6 +292,6 @@ def _trade(trade: WalkTrade, case: Case) -> Trade:
             if seen.first is not None:
                 more["first"] = seen.first
             setting = Setting(tried.name or _AS_IS.name, {})
-            measured = Measured(tried.build, tried.served, seen.e, seen.p95, more)
+            measured = Measurement(tried.build, tried.served, seen.e, seen.p95, more)
             trials.append(Trial(setting, measured))
     return Trade("walk", "bytes served", f"e ({where})", 0.0, pareto(trials), {})

@@ -1,23 +1,20 @@
-"""The experiments of the stages: settings that are worth a trial, and their errors.
+"""The experiments of the stages: their settings and errors.
 
-Subdivision.
+Subdivision: no subdivision is the right one to compare with, but a good one needs little of the
+building in a client's memory. The error of a setting is the share of the building's volume that is
+potentially visible from a viewer's cell, on average over all positions of the viewer.
 
-No subdivision is the right one to compare with; a good one needs little of the building in a
-client's memory. The error of a setting is the share of the building's volume that is potentially
-visible from a viewer's cell, on average over all places where the viewer may be.
-
-Coverage hints. The error of a setting is the total variation between its hints of a cell and those
+Coverage hints: the error of a setting is the total variation between its hints of a cell and those
 of a reference: more points than any setting, of an independent scramble, with rays. Some cells
 stand for all.
 
-Textures. All profiles return the pixels as exactly as asked (the profile raw always to the bit), so
-few bytes are the aim. The error of a setting is the bytes of all levels over those of the
-uncompressed finest level.
+Textures: all profiles return the pixels within the requested error (the profile raw always
+exactly), so few bytes are the aim. The error of a setting is the bytes of all levels over those of
+the uncompressed finest level.
 
-Visibility. The reference is the full search with a budget that hardly any portal exhausts. The
-error of a setting is its number of wrong pairs of cells over that of the right ones: pairs too
-many, or with sampled lines also missing ones, which is worse: a client that loads by such a set
-shows holes.
+Visibility: the reference is the full search with a budget that hardly any portal exhausts. The
+error of a setting is its number of wrong pairs of cells over that of the right ones: extra pairs,
+or with sampled lines also missing ones, which are worse: a client with such a set shows holes.
 """
 
 from __future__ import annotations
@@ -37,7 +34,7 @@ from ptmtools.coverage.item_buffer import VIEWS
 from ptmtools.coverage.options import MAX_SAMPLES, PRESETS, AchOptions
 from ptmtools.coverage.sampling import CellHints, Sampler
 from ptmtools.errors import MissingComponentError
-from ptmtools.lab.tradeoff.experiment import Measured, Setting, Subject, timed
+from ptmtools.lab.tradeoff.experiment import Measurement, Setting, Subject, timed
 from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS, SCENE, TEXTURES
 from ptmtools.scene.model import Scene, SourceImage
 from ptmtools.texture import EncodeOptions, encode, read_image
@@ -46,7 +43,7 @@ from ptmtools.visibility.model import Pvs
 from ptmtools.visibility.options import PvsOptions
 from ptmtools.visibility.pvs import compute_pvs
 
-#: Leaves of a subdivision that is only there to have everything compiled.
+#: Leaves of a subdivision that only serves for compilation.
 WARM = 4
 
 
@@ -65,7 +62,7 @@ class CellsTrade:
     def __init__(self, scene: Scene, options: SubdivideOptions) -> None:
         self._scene, self._options = scene, options
         few = subdivide(scene, replace(options, max_leaves=WARM))
-        compute_pvs(few, PvsOptions(method="fast"))  # now both are compiled
+        compute_pvs(few, PvsOptions(method="fast"))  # compiles both
 
     def settings(self) -> Sequence[Setting]:
         """See `Experiment.settings`."""
@@ -80,12 +77,12 @@ class CellsTrade:
             for factor in (4, 2, 1, 0.5)
         ]
 
-    def measure(self, setting: Setting) -> Measured:
+    def measure(self, setting: Setting) -> Measurement:
         """See `Experiment.measure`."""
         options = replace(self._options, **setting.knobs)
         cells, seconds = timed(lambda: subdivide(self._scene, options))
         mean, worst = compute_pvs(cells, PvsOptions(method="fast")).volume_at_hand
-        return Measured(
+        return Measurement(
             seconds=seconds,
             work=float(cells.leaf_count),
             error=mean,
@@ -94,11 +91,11 @@ class CellsTrade:
         )
 
 
-#: The seed of the reference, but for a user who takes the same.
+#: Seed of the reference, unless the user takes the same.
 REFERENCE_SEED = 2**31 - 1
-#: Its pixels a side: as good as more, since every point shifts them.
+#: Pixels a side of the reference: as good as more, since every point shifts them.
 REFERENCE_FACE = 4
-#: Points and pixels a side of other settings than the presets.
+#: Placement, points and pixels a side of settings besides the presets.
 GRID = (
     ("sobol", (32, 128, 512, 2048), 2),
     ("sobol", (8, 16, 64, 128, 256, 1024), 4),
@@ -111,7 +108,7 @@ GRID = (
 
 
 def prepare_coverage(subject: Subject) -> CoverageTrade:
-    """See `EXPERIMENTS`. Of the options what settings choose is left open."""
+    """See `EXPERIMENTS`. The options that settings choose are left open."""
     options = replace(subject.options(ACH), samples=None, face=None, placement=None, tolerance=None)
     artifacts = subject.artifacts
     tried, points = subject.cells_tried, subject.reference_points
@@ -133,8 +130,9 @@ class CoverageTrade:
         cells_tried: int = 16,
         reference_points: int = MAX_SAMPLES,
     ) -> None:
-        """``options``: what settings leave open, such as the backend and the weighting. `tried` are
-        the cells that stand for all, evenly spread; `truth` their hints by the reference, by cell.
+        """``options``: those that settings leave open, such as the backend and the weighting.
+        `tried` are the cells that stand for all, evenly spread; `truth` their reference hints, by
+        cell.
         """
         self._scene, self._cells, self._pvs, self._options = scene, cells, pvs, options
         self._most = reference_points
@@ -151,14 +149,14 @@ class CoverageTrade:
         )
         hints_of, _, _ = self.hints(reference)
         self.truth = {cell: hints.row.value for cell, hints in hints_of.items()}
-        # Bounds of its error; its standard error is about half of that. Cells with too few usable
-        # points have none.
+        # Bounds of the reference's error; its standard error is about half. Cells with too few
+        # usable points have none.
         bounds = np.array([hints.row.uncertain for hints in hints_of.values()], dtype=np.float64)
         bounds = bounds[np.isfinite(bounds)]
         self.reference_error = float(bounds.mean()) / 2 if len(bounds) else 0.0
 
     def settings(self) -> Sequence[Setting]:
-        """See `Experiment.settings`; those of fewer points than the reference."""
+        """See `Experiment.settings`; only those with fewer points than the reference."""
         presets = [Setting(f"--preset {name}", {"preset": name}) for name in PRESETS]
         grid = [
             Setting(
@@ -172,7 +170,7 @@ class CoverageTrade:
         points = {s.name: replace(self._options, **s.knobs).points for s in (*presets, *grid)}
         return [s for s in (*presets, *grid) if points[s.name] < self._most]
 
-    def measure(self, setting: Setting) -> Measured:
+    def measure(self, setting: Setting) -> Measurement:
         """See `Experiment.measure`."""
         options = replace(self._options, **setting.knobs)
         hints_of, seconds, backend = self.hints(options)
@@ -180,7 +178,7 @@ class CoverageTrade:
         points = np.array([hints.samples for hints in hints_of.values()])
         missed = np.array([hints.missed for hints in hints_of.values()])
         many = max(len(hints_of), 1)
-        return Measured(
+        return Measurement(
             seconds=seconds,
             work=float(points.sum()) * len(VIEWS) * options.side**2 / many,
             error=float(errors.sum()) / many,
@@ -203,15 +201,15 @@ class CoverageTrade:
     def hints(
         self, options: AchOptions, cells: Sequence[int] | None = None
     ) -> tuple[dict[int, CellHints], float, str]:
-        """The hints of some of the cells tried, by cell, or of all of them; processor seconds for
-        all cells of the scene; and the backend."""
+        """The hints of the given cells tried, or of all of them, by cell; processor seconds for all
+        cells of the scene; and the backend."""
         asked = [int(cell) for cell in (self.tried if cells is None else cells)]
         backend = choose(self._cells, self._pvs, options)
 
         def ready() -> Sampler:
             return Sampler(self._scene, self._cells, self._pvs, options, backend)
 
-        ready().renderer.close()  # what is loaded but once is no part of the cost
+        ready().renderer.close()  # loading once is no part of the cost
         sampler, before = timed(ready)
         try:
             if asked:
@@ -223,7 +221,7 @@ class CoverageTrade:
             sampler.renderer.close()
 
 
-#: So many images stand for all of them, each by a corner of so many texels a side.
+#: Number of images that stand for all, and texels a side of the corner used of each.
 TRIED, CORNER = 4, 512
 
 
@@ -253,7 +251,7 @@ class TexturesTrade:
                 {"profile": name} if profile.lossy else {"profile": name, "max_error": 0}
             )
             with suppress(MissingComponentError):
-                if self._pixels:  # compiles what is compiled
+                if self._pixels:  # compiles the kernels
                     encode(self._pixels[0][:8, :8], replace(options, **knobs))
                 self._settings.append(Setting(f"--profile {name}", knobs))
 
@@ -261,13 +259,13 @@ class TexturesTrade:
         """See `Experiment.settings`."""
         return self._settings
 
-    def measure(self, setting: Setting) -> Measured:
+    def measure(self, setting: Setting) -> Measurement:
         """See `Experiment.measure`."""
         options = replace(self._options, **setting.knobs)
         files, seconds = timed(lambda: [encode(pixels, options) for pixels in self._pixels])
         raw = np.array([pixels.nbytes for pixels in self._pixels])
         stored = np.array([len(data) for data in files])
-        return Measured(
+        return Measurement(
             seconds=seconds * self._times,
             work=float(sum(pixels.shape[0] * pixels.shape[1] for pixels in self._pixels)),
             error=float(stored.sum() / max(raw.sum(), 1)),
@@ -277,9 +275,9 @@ class TexturesTrade:
 
 #: The budget of the reference, which hardly any portal exhausts.
 AMPLE = 2_000_000
-#: Those that are tried, beside the one that the database was built with.
+#: Budgets to try, besides the database's own.
 BUDGETS = (200, 2_000, 20_000, 200_000)
-#: What settings do not say.
+#: Options that settings leave open.
 _BASE = PvsOptions()
 
 
@@ -296,11 +294,11 @@ class VisibilityTrade:
     reference_error = 0.0
 
     def __init__(self, cells: Cells, options: PvsOptions) -> None:
-        """``options``: of them only the budget counts; the rest is what settings say."""
+        """``options``: only the budget is used; settings give the rest."""
         self._cells, self._own = cells, options.budget
         ample = replace(_BASE, method="full", budget=max(AMPLE, options.budget))
         self._truth = compute_pvs(cells, ample).to_matrix()
-        compute_pvs(cells, replace(_BASE, method="sampled", lines=1))  # now it is compiled
+        compute_pvs(cells, replace(_BASE, method="sampled", lines=1))  # compiles it
 
     def settings(self) -> Sequence[Setting]:
         """See `Experiment.settings`."""
@@ -321,7 +319,7 @@ class VisibilityTrade:
             ),
         ]
 
-    def measure(self, setting: Setting) -> Measured:
+    def measure(self, setting: Setting) -> Measurement:
         """See `Experiment.measure`."""
         options = replace(_BASE, **setting.knobs)
         pvs, seconds = timed(lambda: compute_pvs(self._cells, options))
@@ -329,7 +327,7 @@ class VisibilityTrade:
         extra, missing = seen & ~self._truth, self._truth & ~seen
         size = max(int(self._truth.sum()), 1)
         each = (extra | missing).sum(axis=1) / np.maximum(self._truth.sum(axis=1), 1)
-        return Measured(
+        return Measurement(
             seconds=seconds,
             work=float(pvs.work.sum()),
             error=int((extra | missing).sum()) / size,

@@ -1,8 +1,8 @@
-"""What each knob is worth to somebody who walks through the building: the one currency.
+"""The effect of each knob on a visitor who walks through the building, as one common measure.
 
-A setting changes one option. The database is built again with it, in a copy, and walked through on
-the same way, over the same links, with as many bytes of texture memory. e of the walker is always
-against the full picture of the database as it was, whatever its textures have become.
+A setting changes one option. A copy of the database is built with it and walked through on the same
+way, over the same links, with the same bytes of texture memory. The reference of e is always the
+full picture of the original database, whatever the setting does to the textures.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ from ptmtools.progress import Progress, silent
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.records import Pyramids
 
-#: Of the way to the full picture, whose time is told.
+#: Share of the full picture whose time is reported.
 FIRST = 0.9
 
 
-#: Those that walk through whatever a build makes.
+#: Policies for any database.
 _OF_DATABASES = {name: policy for name, policy in POLICIES.items() if policy.form == PTM}
 
 
@@ -63,15 +63,16 @@ class WalkOptions(SimulateOptions):
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What a walker saw.
+class WalkOutcome:
+    """Outcome of a walk.
 
     Attributes
     ----------
-    policy, bandwidth, memory: who walked, over what (bit/s, None for no limit), with how much.
+    policy, bandwidth, memory: policy of the client, bandwidth of the link (bit/s, None for no
+        limit), texture memory.
     e, p95: mean over the walk, and what 95 % of the frames do not exceed; 0 to 255.
     fetched: bytes received on the walk.
-    first: s until `FIRST` of the first picture is there; None if it never is.
+    first: s until `FIRST` of the first picture has arrived; None if it never has.
     """
 
     policy: str
@@ -84,23 +85,23 @@ class Seen:
 
     @property
     def case(self) -> tuple[str, float | None, str]:
-        """What is compared with what."""
+        """The key of comparable outcomes."""
         return self.policy, self.bandwidth, self.memory
 
 
 @dataclass(frozen=True)
-class Tried:
-    """What came of a setting.
+class WalkTrial:
+    """Outcomes of a setting.
 
     Attributes
     ----------
-    name, own: the setting and what the database has instead, as a user gives them; both are empty
-        for the database as it is.
-    option: of the setting.
-    build: seconds of one core that all stages after the scene take.
-    served: bytes of what clients of the hints can fetch.
-    seen: by each walker.
-    problem: why the setting could not be tried; "" if it was.
+    name, own: the setting and the database's own value, as a user gives them; both are empty for
+        the unchanged database.
+    option: the option of the setting.
+    build: seconds of one core for all stages after the scene.
+    served: bytes that clients of the hints can fetch.
+    seen: the outcome of each case.
+    problem: why the setting cannot be tried; "" if it was.
     """
 
     name: str
@@ -108,11 +109,11 @@ class Tried:
     option: str
     build: float
     served: int
-    seen: tuple[Seen, ...] = ()
+    seen: tuple[WalkOutcome, ...] = ()
     problem: str = ""
 
-    def by(self, case: tuple[str, float | None, str]) -> Seen | None:
-        """What was seen in a case."""
+    def by(self, case: tuple[str, float | None, str]) -> WalkOutcome | None:
+        """The outcome of a case."""
         return next((seen for seen in self.seen if seen.case == case), None)
 
 
@@ -122,17 +123,17 @@ class WalkTrade:
 
     Attributes
     ----------
-    seconds: how long the walk is.
-    own: the database as it is. trials: the settings, in the order of their knobs.
+    seconds: duration of the walk.
+    own: the unchanged database. trials: the settings, in the order of their knobs.
     """
 
     seconds: float
-    own: Tried
-    trials: tuple[Tried, ...]
+    own: WalkTrial
+    trials: tuple[WalkTrial, ...]
 
     @property
     def cases(self) -> list[tuple[str, float | None, str]]:
-        """All that were compared, as `Seen.case` says them."""
+        """All cases, see `WalkOutcome.case`."""
         return [seen.case for seen in self.own.seen]
 
 
@@ -151,15 +152,15 @@ def try_settings(
 
     Parameters
     ----------
-    artifacts: of the database. options: who walks, over what.
+    artifacts: those of the database. options: clients and links.
     knobs, quick: see `settings`.
-    tell: is told what is tried and how long that may take, once that is known.
+    tell: receives a line on the settings and the expected time, once that is known.
 
     Raises
     ------
     DatabaseError: PTM-D004, PTM-D008 a stage has not run, or not by this release; those of
         `read_served`.
-    InputError: PTM-I700 the walk leads elsewhere; PTM-I701 a policy's hints are not there.
+    InputError: PTM-I700 the walk leads elsewhere; PTM-I701 a policy's hints are missing.
     """
     served = read_served(db)
     require_hints(served, options.policies)
@@ -167,13 +168,13 @@ def try_settings(
     chosen = list(settings(own, _longest(served), knobs, quick=quick))
     begin = time.perf_counter()
     original = prepare(served, walk, progress=progress)
-    looked = time.perf_counter() - begin
+    preparing = time.perf_counter() - begin
     progress(0, len(chosen), "trying settings")
     warm_building()
     with copied(db) as copy:
         seconds = build_again(copy, own)
     least = sum(
-        looked + sum(seconds[s.name] for s in concerned(setting.knob.stage, own))
+        preparing + sum(seconds[s.name] for s in concerned(setting.knob.stage, own))
         for setting in chosen
     )
     tell(f"{len(chosen)} settings on a walk of {walk.duration:.0f} s; about {minutes(least)}")
@@ -183,36 +184,38 @@ def try_settings(
     trials = []
     for done, setting in enumerate(chosen):
         with copied(db) as copy:
-            trials.append(_tried(copy, setting, own, seconds, walker))
+            trials.append(_try_setting(copy, setting, own, seconds, walker))
         progress(done + 1, len(chosen), "trying settings")
-    as_is = Tried("", "", "", sum(seconds.values()), served_bytes(original.catalogue), tuple(seen))
-    return WalkTrade(walk.duration, as_is, tuple(trials))
+    unchanged = WalkTrial(
+        "", "", "", sum(seconds.values()), served_bytes(original.catalogue), tuple(seen)
+    )
+    return WalkTrade(walk.duration, unchanged, tuple(trials))
 
 
 class _Walker:
-    """Walks the same way through databases that were built from the same model."""
+    """Walks the same way through databases built from the same model."""
 
     def __init__(self, walk: Walk, original: World, options: WalkOptions) -> None:
         self._walk, self._original, self._options = walk, original, options
         stock = counted(original, options)
-        # The same bytes for all, whatever share of theirs that is.
+        # The same bytes for all databases.
         self._memory = {
             str(max(budget_of(stock, m), 1)): m.text for m in dict.fromkeys(options.memories)
         }
 
     def world(self, served: Served) -> World:
-        """Of the same walk, as compared with the original."""
+        """The world of the same walk, compared with the original."""
         return compared(served, self._walk, self._original)
 
-    def walks(self, world: World, policy: str = "") -> list[Seen]:
-        """What clients of a policy, or those asked for, see."""
+    def walks(self, world: World, policy: str = "") -> list[WalkOutcome]:
+        """Outcomes of a policy, or of those of the options."""
         options = replace(
             self._options,
             policy=policy or self._options.policy,
             memory=",".join(self._memory),
         )
         return [
-            Seen(
+            WalkOutcome(
                 each.run.policy,
                 each.run.conditions.bandwidth,
                 self._memory[each.memory],
@@ -225,7 +228,9 @@ class _Walker:
         ]
 
 
-def _tried(copy: Path, setting: Setting, own: Own, seconds: Seconds, walker: _Walker) -> Tried:
+def _try_setting(
+    copy: Path, setting: Setting, own: Own, seconds: Seconds, walker: _Walker
+) -> WalkTrial:
     stage = setting.knob.stage
     try:
         options = {**own, stage: setting.options}
@@ -233,18 +238,20 @@ def _tried(copy: Path, setting: Setting, own: Own, seconds: Seconds, walker: _Wa
         world = walker.world(read_served(copy))
         seen = walker.walks(world, setting.knob.policy)
     except PtmError as fault:
-        return Tried(setting.name, setting.own, setting.knob.option, 0, 0, problem=fault.message)
+        return WalkTrial(
+            setting.name, setting.own, setting.knob.option, 0, 0, problem=fault.message
+        )
     build = sum({**seconds, **took}.values())
     bytes_ = served_bytes(world.catalogue)
-    return Tried(setting.name, setting.own, setting.knob.option, build, bytes_, tuple(seen))
+    return WalkTrial(setting.name, setting.own, setting.knob.option, build, bytes_, tuple(seen))
 
 
 def compared(served: Served, walk: Walk, original: World) -> World:
-    """The world of a walk through a database; its errors are against the textures of another
-    one's world, of the same model and the same walk.
+    """The world of a walk through a database, with the textures of ``original`` as the reference, a
+    world of the same model and walk.
 
-    Where only the finest levels of its textures are missing, the tables of the other one know what
-    is seen without them; with the same geometry, nothing is looked at again.
+    If only the finest levels of its textures are missing, the tables of the original hold the
+    errors without them; with the same geometry no rays are cast again.
     """
     own, full = read_pyramids(served), original.pyramids
     if not begins_with(full, own):
@@ -260,7 +267,7 @@ def compared(served: Served, walk: Walk, original: World) -> World:
 
 
 def begins_with(full: Pyramids, few: Pyramids) -> bool:
-    """Whether each texture of the one has the coarsest levels of that of the other, and no more."""
+    """Whether the textures of ``few`` are the coarsest levels of those of ``full``."""
     if len(few.levels) != len(full.levels) or (few.levels > full.levels).any():
         return False
     for t, count in enumerate(few.levels.tolist()):
@@ -286,11 +293,11 @@ def _longest(served: Served) -> int:
 
 
 def served_bytes(stock: Catalogue) -> int:
-    """All that clients of the hints can fetch."""
+    """Bytes that clients of the hints can fetch."""
     documents = stock.index_bytes + stock.statistics_bytes + int(stock.record_bytes.sum())
     return documents + int(stock.geometry_bytes.sum()) + int(stock.ends[:, -1].sum())
 
 
 def minutes(seconds: float) -> str:
-    """A duration as people say it."""
+    """A duration in seconds or minutes."""
     return f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.0f} minutes"

@@ -1,8 +1,8 @@
-"""Appearance-preserving octree textures (Lacoste et al.): a high-polygon mesh becomes a simplified
-one, and an octree of its normals that is a GPU data structure and a stream at once.
+"""Appearance-preserving octree textures (Lacoste et al.): a simplified mesh, and an octree of the
+normals of the original, which is both a GPU data structure and a stream.
 
-`make_apo` makes both of a mesh, `files_of` the files of a folder; `read_octree` and `read_mesh`
-read one back, or its first levels.
+`make_apo` makes both from a mesh, `files_of` the files of a folder; `read_octree` and `read_mesh`
+read them back, `read_octree` also the first levels alone.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
         read_mesh as read_mesh,
         read_octree as read_octree,
     )
-    from ptmtools.neighbours.apo.making import Made as Made, make_apo as make_apo
+    from ptmtools.neighbours.apo.making import ApoTexture as ApoTexture, make_apo as make_apo
     from ptmtools.neighbours.apo.model import ApoOptions as ApoOptions, Octree as Octree
 
 __getattr__ = lazy_exports(

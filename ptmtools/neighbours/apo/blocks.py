@@ -1,8 +1,8 @@
-"""From a mesh and its simplification to the octree of its normals (paper 2, §3.1).
+"""Builds the octree of normals from a mesh and its simplification (paper 2, §3.1).
 
-The simplified mesh is sampled in blocks of the octree, each a task that needs no other: so memory
-stays bounded and processors share the work. What a block holds does not depend on who does it.
-Blocks begin at the depth of their cells; the levels above are divided by the sums of these.
+The simplified mesh is sampled in blocks of the octree, each an independent task: memory stays
+bounded and processors share the work. The result of a block does not depend on the worker. Blocks
+begin at the depth of their cells; the levels above are divided by the sums of these.
 """
 
 from __future__ import annotations
@@ -29,8 +29,7 @@ from ptmtools.neighbours.apo.octree import (
 from ptmtools.neighbours.apo.sampling import Points, Source, areas, at, nearest, spread
 from ptmtools.progress import Progress, silent
 
-#: Depths of the cells that blocks are made of: 1/16 of the cube wide, or 1/1024 where a block would
-#: be too large.
+#: Depths of the cells of blocks: 1/16 of the cube wide, or 1/1024 where a block would be too large.
 DEPTHS = (4, 10)
 #: Samples of a block, unless a single cell has more.
 MOST = 1 << 19
@@ -38,7 +37,7 @@ MOST = 1 << 19
 
 @dataclass(frozen=True)
 class Surface:
-    """What is sampled, in the cube.
+    """The sampled surface, in the cube.
 
     Attributes
     ----------
@@ -49,7 +48,7 @@ class Surface:
     normal: Floats
 
     def cut_up(self, longest: float) -> Surface:
-        """The same of triangles none of whose edges is longer."""
+        """The surface with triangles cut until no edge is longer than ``longest``."""
         corner, normal, done = self.corner, self.normal, []
         while len(corner):
             edges = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2)
@@ -62,12 +61,12 @@ class Surface:
 
 @dataclass(frozen=True)
 class Work:
-    """What all blocks share.
+    """Data shared by all blocks.
 
     Attributes
     ----------
-    source, surface: where normals come from, and what is sampled. spacing: of samples.
-    bounds: of the leaves. top: depth of the cells.
+    source, surface: the source of normals, and the sampled surface. spacing: distance of samples.
+    bounds: bounds of the leaves. top: depth of the cells.
     """
 
     source: Source
@@ -87,13 +86,14 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Found:
-    """What a block holds.
+class BlockLevels:
+    """The part of the octree in a block.
 
     Attributes
     ----------
-    levels: from the cells down. cells: sums of each, as samples of the depth of the cells.
-    missed: samples that no ray found the source from.
+    levels: levels from the cells down. cells: sums of each cell, as samples of the depth of the
+        cells.
+    missed: samples whose rays do not hit the source.
     """
 
     levels: list[Level]
@@ -102,18 +102,18 @@ class Found:
 
 
 def build(work: Work, executor: Executor, progress: Progress = silent) -> tuple[list[Level], float]:
-    """The levels of the octree, from the root on, and the share of the samples that no ray found
-    the source from, whose normals are the simplified mesh's own.
+    """The levels of the octree, from the root on, and the share of samples whose rays do not hit
+    the source; these have the normals of the simplified mesh.
 
     Raises LimitError PTM-L400: too many texels.
     """
     work, blocks = divided(work)
-    results, held = [], 0
+    results, texels = [], 0
     for done, each in enumerate(executor.each(_block, work, blocks)):
         progress(done, len(blocks), "casting rays")
         results.append(each)
-        held += texel_count(each.levels)
-        check_count(held)
+        texels += texel_count(each.levels)
+        check_count(texels)
     progress(len(blocks), len(blocks), "casting rays")
     parts = [each.cells for each in results]
     cells = Samples(
@@ -123,7 +123,7 @@ def build(work: Work, executor: Executor, progress: Progress = silent) -> tuple[
         np.concatenate([part.square for part in parts]),
     )
     width = cells.value.shape[1]
-    # The cells themselves are divided by their own samples, whatever is done above them.
+    # Cells are divided by their own samples, independently of the levels above.
     above = divide(cells, 0, work.top, work.bounds)
     kept = above[work.top].code if len(above) > work.top else np.zeros(0, np.uint64)
     below = joined([pruned(each.levels, kept, 0) for each in results], width)
@@ -133,8 +133,8 @@ def build(work: Work, executor: Executor, progress: Progress = silent) -> tuple[
 
 
 def _halved(values: Floats, side: Ints) -> Floats:
-    """(2m, 3, 3) values of the corners of the halves of triangles, cut in the middle of the edges
-    ``side``: 0 is the first corner's."""
+    """(2m, 3, 3) corner values of the halves of triangles, cut in the middle of the edges ``side``;
+    0 is the first corner's edge."""
     each = np.arange(len(values))
     a, b, c = (values[each, (side + k) % 3] for k in range(3))
     middle = (a + b) / 2
@@ -148,11 +148,11 @@ def divided(work: Work) -> tuple[Work, list[Block]]:
         work = replace(work, top=min(depth, work.bounds.depth))
         pairs, samples = _counted(work)
         cells, place = np.unique(pairs[:, 1], return_inverse=True)
-        held = np.bincount(place, samples, len(cells))
-        if held.max() <= MOST:
+        counts = np.bincount(place, samples, len(cells))
+        if counts.max() <= MOST:
             break
-    # Runs of cells that hold about as many together.
-    first = np.flatnonzero(np.diff(np.cumsum(held) // MOST, prepend=-1))
+    # Runs of cells with about equal numbers of samples.
+    first = np.flatnonzero(np.diff(np.cumsum(counts) // MOST, prepend=-1))
     begin = cells[first]
     end = np.append(begin[1:], cells[-1] + 1)
     order = np.argsort(pairs[:, 1], kind="stable")
@@ -165,7 +165,8 @@ def divided(work: Work) -> tuple[Work, list[Block]]:
 
 
 def _counted(work: Work) -> tuple[Ints, Ints]:
-    """(p, 2) a triangle and the code of a cell in which it has samples, and (p,) how many."""
+    """(p, 2) pairs of a triangle and the code of a cell with samples of it, and (p,) the number of
+    samples."""
     corner, bits = work.surface.corner, 3 * work.top
     pairs, counts = [], []
     for chosen in _batches(corner, work.spacing):
@@ -178,14 +179,14 @@ def _counted(work: Work) -> tuple[Ints, Ints]:
 
 
 def _batches(corner: Floats, spacing: float) -> Iterator[Ints]:
-    """Triangles in runs of about `MOST` samples; thin ones have those of a row."""
+    """Runs of triangles with about `MOST` samples; thin triangles have those of a row."""
     edges = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2)
     each = np.maximum(areas(corner) / spacing**2, edges.max(axis=1) / spacing) + 1
     run = (np.cumsum(each) // MOST).astype(np.int64)
     yield from np.split(np.arange(len(corner)), np.flatnonzero(np.diff(run)) + 1)
 
 
-def _block(work: Work, block: Block) -> Found:
+def _block(work: Work, block: Block) -> BlockLevels:
     corner, normal = (v[block.triangles] for v in (work.surface.corner, work.surface.normal))
     points = spread(corner, work.spacing)
     q = at(corner, points)
@@ -201,20 +202,20 @@ def _block(work: Work, block: Block) -> Found:
     ones = np.ones(len(code), np.int64)
     samples = Samples(code, ones, value, square)
     levels = divide(samples, work.top, work.bounds.depth, work.bounds)
-    return Found(levels, _summed(samples, work), int((hits.triangle < 0).sum()))
+    return BlockLevels(levels, _summed(samples, work), int((hits.triangle < 0).sum()))
 
 
 def _values(work: Work, triangle: Ints, weight: Singles, own: Floats) -> Floats:
-    """(n, k) unit normals and colours of the source; where no ray has hit, the mesh's own normal
-    and mid-grey."""
+    """(n, k) unit normals and colours of the source; without a hit the mesh's own normal and
+    mid-grey."""
     hit, source = triangle >= 0, work.source
     result = np.full((len(triangle), 6 if source.paint else 3), 0.5)
     result[:, :3] = own
-    of, share = triangle[hit], weight[hit].astype(np.float64)
-    normal = np.einsum("ij,ijk->ik", share, source.normals[of].astype(np.float64))
+    hit_triangle, share = triangle[hit], weight[hit].astype(np.float64)
+    normal = np.einsum("ij,ijk->ik", share, source.normals[hit_triangle].astype(np.float64))
     result[hit, :3] = _unit(normal, own[hit])
     if source.paint:
-        result[hit, 3:] = source.paint.colors(of, share)
+        result[hit, 3:] = source.paint.colors(hit_triangle, share)
     return result
 
 
@@ -240,5 +241,5 @@ def _summed(samples: Samples, work: Work) -> Samples:
 
 
 def texel_count(levels: list[Level]) -> int:
-    """How many texels an octree takes."""
+    """Number of texels of an octree."""
     return sum(len(level.code) + int((level.children > 0).sum()) for level in levels)

@@ -1,4 +1,4 @@
-"""The check of a folder with an octree texture, and its description for `ptm info`."""
+"""Checks a folder with an octree texture, and describes it for `ptm info`."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _NAMES = (INDEX, NORMALS, COLORS, MESH, OBJ)
 
 
 def check_folder(folder: Path, limits: Limits) -> ValidationReport:
-    """Checks everything that needs no source model."""
+    """Checks the folder without its source model."""
     findings = Findings(FOLDER_CODES)
     try:
         present = sorted(os.listdir(folder))
@@ -62,7 +62,7 @@ def check_folder(folder: Path, limits: Limits) -> ValidationReport:
 
 
 def _size(folder: Path, name: str, findings: Findings) -> int | None:
-    """The bytes of a regular file; None, with an issue, if it cannot be read."""
+    """The bytes of a regular file; None, with a finding, if it cannot be read."""
     try:
         with open_below(folder, name) as file:
             return os.fstat(file.fileno()).st_size

@@ -1,15 +1,15 @@
-"""An octree texture and its mesh as a folder (docs/formats/apo.md; paper 2, §3.2 and §4).
+"""Writes and reads an octree texture and its mesh as a folder (docs/formats/apo.md; paper 2, §3.2
+and §4).
 
-Each level of a stream ends with a full flush of deflate: from there on nothing refers to what was
-before, so that every prefix of whole levels inflates, and every level alone. The flushes of all
-levels together cost some 5 bytes each.
+Each level of a stream ends with a full flush of deflate: later bytes do not refer to earlier ones,
+so that every prefix of whole levels inflates, and every level alone. The flushes of all levels
+together cost some 5 bytes each.
 
-The simplified mesh as a GLB of one primitive, and as an OBJ; and the GLB back.
+The simplified mesh is a GLB of one primitive, and an OBJ; `mesh_of` reads the GLB back.
+`read_octree` reads the octree from the folder, and `inflated` from the beginning of a stream.
 
-An octree texture back from its folder, or from the beginning of its stream.
-
-A folder may come from a stranger: the index is read by its schema and must not contradict itself,
-and sizes are held against what addresses allow before memory is taken for them.
+A folder may be untrusted: the index is checked against its schema and for contradictions, and sizes
+against the limit of addresses before memory is allocated.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError, LimitError, naming
 from ptmtools.files import open_below
 from ptmtools.glb import BINARY, INT, JSON, SHORT, BufferWriter, glb_chunks, one_mesh
-from ptmtools.neighbours.apo.making import Made, Simple
+from ptmtools.neighbours.apo.making import ApoTexture, Simple
 from ptmtools.neighbours.apo.model import ADDRESS_BITS, Octree
 from ptmtools.whole_folder import FolderForm
 
 
 def glb_of(mesh: Simple) -> bytes:
-    """A GLB: positions, normals, indices."""
+    """A GLB with positions, normals and indices."""
     buffer = BufferWriter()
     attributes = {
         "POSITION": buffer.positions(mesh.points),
@@ -48,7 +48,7 @@ def glb_of(mesh: Simple) -> bytes:
 
 
 def obj_of(mesh: Simple) -> bytes:
-    """The same as an OBJ."""
+    """The mesh as an OBJ."""
     point, triangle = mesh.points.astype(np.float32), mesh.triangles
     lines = ["# The simplified mesh of an octree texture; see apo.json."]
     lines += ["v " + " ".join(str(v) for v in row) for row in point]
@@ -94,7 +94,7 @@ FORM = FolderForm(INDEX, FORMAT, "ptm apo", lambda p: p in (INDEX, NORMALS, COLO
 
 
 def streamed(texels: NDArray[np.uint8], octree: Octree) -> tuple[bytes, dict[str, list[int]]]:
-    """The stream of (n, 4) texels of an octree, where each level ends in it, and checksums."""
+    """The stream of (n, 4) texels of an octree, with the end of each level and checksums."""
     deflate = zlib.compressobj(zlib.Z_BEST_COMPRESSION)
     parts: list[bytes] = []
     ends, checks, at = [], [], 0
@@ -110,54 +110,54 @@ def streamed(texels: NDArray[np.uint8], octree: Octree) -> tuple[bytes, dict[str
     return b"".join(parts), {"ends": ends, "crc32": checks}
 
 
-def files_of(made: Made) -> Iterator[tuple[str, bytes]]:
+def files_of(texture: ApoTexture) -> Iterator[tuple[str, bytes]]:
     """Name and contents of each file, the index last."""
-    octree, streams = made.octree, {}
+    octree, streams = texture.octree, {}
     wanted = {"normals": (NORMALS, octree.texels), "colors": (COLORS, octree.colors)}
-    for what, (name, texels) in wanted.items():
+    for channel, (name, texels) in wanted.items():
         if texels is not None:
             data, levels = streamed(texels, octree)
-            streams[what] = {"file": name, **levels}
+            streams[channel] = {"file": name, **levels}
             yield name, data
-    mesh = glb_of(made.mesh)
+    mesh = glb_of(texture.mesh)
     yield MESH, mesh
-    yield OBJ, obj_of(made.mesh)
-    document = json.dumps(_document(made, streams, mesh), indent=1, allow_nan=False)
+    yield OBJ, obj_of(texture.mesh)
+    document = json.dumps(_document(texture, streams, mesh), indent=1, allow_nan=False)
     yield INDEX, f"{document}\n".encode()
 
 
-def _document(made: Made, streams: dict[str, Any], mesh: bytes) -> dict[str, Any]:
-    octree = made.octree
+def _document(texture: ApoTexture, streams: dict[str, Any], mesh: bytes) -> dict[str, Any]:
+    octree = texture.octree
     return {
         "format": FORMAT,
         "schema": SCHEMA,
         "space": {
-            "origin": list(made.space.origin),
-            "unit": made.space.metres,
-            "up": made.space.up,
+            "origin": list(texture.space.origin),
+            "unit": texture.space.metres,
+            "up": texture.space.up,
         },
         "cube": {"low": octree.low.tolist(), "side": octree.side},
         "levels": np.diff(octree.start).tolist(),
         **streams,
         "mesh": {
             "file": MESH,
-            "faces": len(made.mesh.triangles),
+            "faces": len(texture.mesh.triangles),
             "bytes": len(mesh),
             "crc32": zlib.crc32(mesh),
         },
         "source": {
-            "triangles": made.source,
-            "deviation": made.deviation if math.isfinite(made.deviation) else None,
-            "missed": made.missed,
+            "triangles": texture.source,
+            "deviation": texture.deviation if math.isfinite(texture.deviation) else None,
+            "missed": texture.missed,
         },
-        "options": asdict(made.options),
+        "options": asdict(texture.options),
     }
 
 
 _AGAIN = "write it again with `ptm apo`"
 #: An index of 21 levels has 3 kB; more fields may be added.
 _INDEX_MOST = 1 << 20
-#: Deflate makes nothing larger than by this factor and so many bytes besides.
+#: Largest growth by deflate: a factor, and further bytes.
 _GROWTH, _BESIDES = 1.01, 64
 #: Bytes of a GLB of 4 million vertices.
 _MESH_MOST = 1 << 28
@@ -165,7 +165,7 @@ _MESH_MOST = 1 << 28
 
 @dataclass(frozen=True)
 class Stream:
-    """A file of texels: where each level ends, and its checksum."""
+    """A file of texels: the end of each level, and its checksum."""
 
     file: str
     ends: tuple[int, ...]
@@ -174,15 +174,15 @@ class Stream:
 
 @dataclass(frozen=True)
 class Index:
-    """What `apo.json` says.
+    """The content of `apo.json`.
 
     Attributes
     ----------
-    start: (L + 1,) the texel at which each level begins.
-    low, side: of the cube.
+    start: (L + 1,) first texel of each level.
+    low, side: corner and side of the cube.
     normals, colors: the streams; colours may be None.
     mesh: faces, bytes and checksum of the mesh's file.
-    document: all of it.
+    document: the whole document.
     """
 
     start: Ints
@@ -195,18 +195,18 @@ class Index:
 
     @property
     def levels(self) -> int:
-        """How many there are."""
+        """Number of levels."""
         return len(self.start) - 1
 
 
 def read_index(folder: str | os.PathLike[str]) -> Index:
-    """The index of an octree texture.
+    """Reads the index of an octree texture.
 
     Raises
     ------
-    InputError: PTM-I120 no octree texture there; PTM-I821 not as its schema says, of another
-        number, or it contradicts itself; PTM-I122 it cannot be read.
-    LimitError: PTM-L400 more texels than there are addresses; PTM-L204 too large for an index.
+    InputError: PTM-I120 the folder holds no octree texture; PTM-I821 the index violates its schema,
+        has another schema number, or contradicts itself; PTM-I122 it cannot be read.
+    LimitError: PTM-L400 more texels than addresses; PTM-L204 too large for an index.
     """
     file = Path(folder) / INDEX
     if not os.path.lexists(file):
@@ -262,21 +262,21 @@ def _stream(row: Mapping[str, Any]) -> Stream:
 
 
 def _check(index: Index) -> None:
-    wrong = ""
+    problem = ""
     streams = [(index.normals, NORMALS), *([(index.colors, COLORS)] if index.colors else [])]
     for stream, name in streams:
         if stream.file != name:
-            wrong = f"a stream is called {stream.file[:40]!r} instead of {name!r}"
+            problem = f"a stream is called {stream.file[:40]!r} instead of {name!r}"
         elif {len(stream.ends), len(stream.crc32)} != {index.levels}:
-            wrong = f"{name} has not as many levels as there are"
+            problem = f"{name} has another number of levels than the octree"
         elif ((size := np.diff(stream.ends, prepend=0)) <= 0).any():
-            wrong = f"the levels of {name} do not follow each other"
+            problem = f"the levels of {name} do not follow each other"
         elif (size > 4 * np.diff(index.start) * _GROWTH + _BESIDES).any():
-            wrong = f"a level of {name} takes more than its texels"
+            problem = f"a level of {name} takes more than its texels"
     if index.mesh["file"] != MESH:
-        wrong = f"the mesh is called {str(index.mesh['file'])[:40]!r} instead of {MESH!r}"
-    if wrong:
-        raise InputError("PTM-I821", wrong, remedy=_AGAIN)
+        problem = f"the mesh is called {str(index.mesh['file'])[:40]!r} instead of {MESH!r}"
+    if problem:
+        raise InputError("PTM-I821", problem, remedy=_AGAIN)
 
 
 def read_octree(folder: str | os.PathLike[str], levels: int | None = None) -> Octree:
@@ -284,7 +284,7 @@ def read_octree(folder: str | os.PathLike[str], levels: int | None = None) -> Oc
 
     Raises
     ------
-    InputError, LimitError: those of `read_index`; PTM-I111 there are not so many levels; PTM-I821 a
+    InputError, LimitError: those of `read_index`; PTM-I111 the octree has fewer levels; PTM-I821 a
         stream is damaged.
     """
     index = read_index(folder)
@@ -310,7 +310,7 @@ def _texels(
 
 
 def inflated(data: bytes, start: Ints, stream: Stream) -> NDArray[np.uint8]:
-    """(n, 4) texels of the first levels, of the beginning of a stream.
+    """(n, 4) texels of the first levels, from the beginning of a stream.
 
     Raises InputError PTM-I821: it is damaged, or too short.
     """
@@ -322,8 +322,8 @@ def inflated(data: bytes, start: Ints, stream: Stream) -> NDArray[np.uint8]:
         except zlib.error:
             part = b""
         if end > len(data) or len(part) != size or zlib.crc32(part) != stream.crc32[k]:
-            what = "ends before it is whole" if end > len(data) else "is damaged"
-            raise InputError("PTM-I821", what, place=f"level {k}", remedy=_AGAIN)
+            problem = "ends before it is whole" if end > len(data) else "is damaged"
+            raise InputError("PTM-I821", problem, place=f"level {k}", remedy=_AGAIN)
         parts.append(part)
         at = end
     return np.frombuffer(b"".join(parts), np.uint8).reshape(-1, 4)
@@ -339,12 +339,12 @@ def read_mesh(folder: str | os.PathLike[str]) -> Simple:
 
 
 def mesh_bytes(folder: str | os.PathLike[str]) -> bytes:
-    """The mesh's file. Raises InputError PTM-I122, LimitError PTM-L204."""
+    """Reads the file of the mesh. Raises InputError PTM-I122, LimitError PTM-L204."""
     return _bytes_of(folder, MESH, _MESH_MOST)
 
 
 def _bytes_of(folder: str | os.PathLike[str], name: str, most: int, *, whole: bool = True) -> bytes:
-    """A file, or with ``whole`` False its first ``most`` bytes."""
+    """Reads a file, or with ``whole`` False its first ``most`` bytes."""
     file = Path(folder) / name
     try:
         with open_below(folder, name) as stream:

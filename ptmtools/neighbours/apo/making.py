@@ -1,8 +1,8 @@
-"""From a model of many triangles to a simplified mesh and the octree of its normals.
+"""Makes a simplified mesh and the octree of its normals from a model of many triangles.
 
-The steps of paper 2, §3.1: the mesh is brought into a cube and simplified; the simplified mesh is
-sampled, and rays find what of the source each sample stands for; the octree is divided until the
-normals in a leaf are alike.
+The steps of paper 2, §3.1: the mesh is scaled into a cube and simplified; the simplified mesh is
+sampled, and rays find the source point of each sample; the octree is divided until the normals in a
+leaf are similar.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene, Space
 from ptmtools.simplification import Mesh, SimplifyOptions, simplify
 
-#: The longest edge of a triangle that is sampled as one, as a share of the cube: two cells of the
-#: blocks, so that a triangle lies in few of them.
+#: Longest edge of a sampled triangle, as a share of the cube: two cells of the blocks, so that a
+#: triangle lies in few blocks.
 _LONGEST = 0.125
 _TWICE = "faces that lie in the same place count once: a place has one normal"
 
@@ -45,18 +45,19 @@ class Simple:
 
 
 @dataclass(frozen=True)
-class Made:
-    """What `make_apo` makes.
+class ApoTexture:
+    """The simplified mesh and octree of `make_apo`.
 
     Attributes
     ----------
     mesh, octree: see their classes.
-    source: triangles of the source.
-    deviation: of the simplified mesh from the source, in its units, as the quadrics estimate it.
-    missed: share of the samples from which no ray found the source.
-    options: what it was made with.
-    space: how the model's coordinates became those of the mesh.
-    notes: what there is to say, one line each.
+    source: number of triangles of the source.
+    deviation: estimate by the quadrics of the distance of the simplified mesh from the source, in
+        its units.
+    missed: share of samples whose rays do not hit the source.
+    options: options of `make_apo`.
+    space: transformation of the model's coordinates to those of the mesh.
+    notes: messages, one line each.
     """
 
     mesh: Simple
@@ -71,23 +72,23 @@ class Made:
 
 def make_apo(
     scene: Scene, options: ApoOptions, executor: Executor, progress: Progress = silent
-) -> Made:
+) -> ApoTexture:
     """The simplified mesh and the octree texture of all triangles of a scene.
 
     Raises
     ------
     LimitError: PTM-L400 the octree has too many texels.
-    MissingComponentError: PTM-M100 ``method`` asks for pymeshlab, which cannot be loaded.
+    MissingComponentError: PTM-M100 ``method`` needs pymeshlab, which cannot be loaded.
     """
     points, triangles = welded(scene.points, scene.triangles)
-    triangles, kept = once(triangles)
+    triangles, kept = distinct(triangles)
     simplified = simplify(
         Mesh(points, triangles), SimplifyOptions(options.faces, method=options.method), progress
     )
     mesh = smooth(simplified.mesh.points, simplified.mesh.triangles)
     paint = paint_of(scene, kept) if options.color else None
     octree, missed = octree_around(mesh, points, triangles, options, paint, executor, progress)
-    return Made(
+    return ApoTexture(
         mesh,
         octree,
         len(triangles),
@@ -108,8 +109,8 @@ def octree_around(
     executor: Executor,
     progress: Progress = silent,
 ) -> tuple[Octree, float]:
-    """The octree of the normals of (T, 3) triangles between (P, 3) points, each of which is there
-    once, around what was made of them; and the share of its samples that no ray found them from.
+    """The octree of the normals of (T, 3) triangles between distinct (P, 3) points, around their
+    simplified ``mesh``; and the share of its samples whose rays do not hit them.
 
     Raises LimitError PTM-L400: it has too many texels.
     """
@@ -125,7 +126,7 @@ def octree_around(
     work = Work(
         source,
         surface,
-        # Closer than half a leaf of the greatest depth samples say nothing more.
+        # Samples closer than half a leaf of the greatest depth add nothing.
         max(
             spacing_for(surface.corner, options.density * len(triangles)),
             0.5 ** (options.depth + 1),
@@ -136,17 +137,17 @@ def octree_around(
     return octree_of(levels, cube), missed
 
 
-def once(triangles: NDArray[np.int32]) -> tuple[NDArray[np.int32], Ints]:
-    """Triangles of which none has the same corners as another, and their numbers: of a face with
-    two sides one is kept, since a place has one normal."""
+def distinct(triangles: NDArray[np.int32]) -> tuple[NDArray[np.int32], Ints]:
+    """Triangles without repeated sets of corners, and their numbers: of a two-sided face one is
+    kept, since a place has one normal."""
     _, first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
     kept = np.sort(first)
     return triangles[kept], kept
 
 
 def smooth(points: Floats, triangles: NDArray[np.int32]) -> Simple:
-    """A mesh with normals that are smooth at creases too: between rays that spread apart there a
-    part of the source would be left out."""
+    """A mesh with smooth normals, also at creases: diverging rays there would miss a part of the
+    source."""
     corner = corner_normals(points, triangles, 180.0)
     normals = np.zeros((len(points), 3), np.float32)
     normals[triangles.ravel()] = corner.reshape(-1, 3)  # equal at all corners of a point
@@ -154,7 +155,7 @@ def smooth(points: Floats, triangles: NDArray[np.int32]) -> Simple:
 
 
 def welded(points: Floats, triangles: NDArray[np.int32]) -> tuple[Floats, NDArray[np.int32]]:
-    """The same triangles over points each of which is there once."""
+    """The same triangles over distinct points."""
     rows = np.ascontiguousarray(points + 0.0).view([("", np.float64)] * 3).ravel()
     _, first, number = np.unique(rows, return_index=True, return_inverse=True)
     return points[first], number.reshape(-1)[triangles].astype(np.int32)

@@ -1,4 +1,4 @@
-"""The octree texture, and what it is made with."""
+"""The octree texture and its options."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.neighbours.apo.options import RANGES, check_range
 from ptmtools.options import option
 
-#: Bits of the address of a child, and so the most texels.
+#: Bits of the address of a child, which limit the number of texels.
 ADDRESS_BITS = 24
 
 
@@ -49,13 +49,12 @@ class ApoOptions:
 
 @dataclass(frozen=True)
 class Octree:
-    """An octree texture, whole or its first levels; docs/formats/apo.md has its texels.
+    """An octree texture, or its first levels; docs/formats/apo.md describes its texels.
 
     Attributes
     ----------
     texels: (n, 4) uint8, breadth first.
-    start: (L + 1,) int64, the texel at which each of the L levels begins, from the root on; the
-        last is n.
+    start: (L + 1,) int64, first texel of each of the L levels, from the root on; the last is n.
     low, side: corner (3,) and side of the cube, in the units of the mesh: p is at (p - low) / side.
     colors: (n, 4) uint8 sRGB and 255 at the addresses of `texels`, or None.
     """
@@ -68,5 +67,5 @@ class Octree:
 
     @property
     def levels(self) -> int:
-        """How many there are."""
+        """Number of levels."""
         return len(self.start) - 1

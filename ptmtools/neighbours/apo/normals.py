@@ -2,12 +2,12 @@
 
 A corner's normal is the mean of the normals of the triangles around its point that deviate from its
 own triangle's by no more than a crease angle, each weighted by its angle at the point (Thürmer and
-Wüthrich 1998), which makes the mean independent of how a face is cut into triangles. Weighting by
-area leans to long triangles, of which simplified meshes are full; Max's weights (1999) to the tiny
-ones that marching through cells leaves.
+Wüthrich 1998), which makes the mean independent of the triangulation of a face. Weights by area
+favour long triangles, of which simplified meshes are full; Max's weights (1999) the tiny ones of
+marching cubes.
 
-Angles are taken from a polynomial in the cosine: nothing but sums, products and square roots, so
-that bytes that are made of the normals are the same on every machine.
+Angles come from a polynomial in the cosine: only sums, products and square roots, so that bytes
+derived from the normals are the same on every machine.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, Ints
 from ptmtools.jit import kernel, plain_kernel
 
-#: Degrees between triangles that are smoothed over.
+#: Largest angle between smoothed triangles, degrees.
 CREASE = 40.0
-#: Around a point of more triangles than this all are smoothed over: to compare each with each takes
-#: the square of their number, and a fan of so many is a disc or the pole of a sphere.
+#: At a point with more triangles than this all are smoothed: comparing all pairs takes the square
+#: of their number, and such a fan is a disc or the pole of a sphere.
 FAN = 1000
 #: arccos x = √(1 − x) · polynomial for 0 ≤ x ≤ 1, within 2e-4 (Abramowitz and Stegun 4.4.45, but
 #: continuous at right angles).
@@ -34,10 +34,10 @@ def corner_normals(
     points: Floats, triangles: NDArray[np.integer], crease: float = CREASE
 ) -> Floats:
     """Unit normals (T, 3, 3) of the corners of (T, 3) triangles between (P, 3) points, smoothed
-    over what deviates by ``crease`` degrees at most.
+    over deviations of ``crease`` degrees at most.
 
-    Points at one place that have several numbers are several points: join them first. A triangle
-    without area has the normals of what is around it, and (0, 0, 1) where there is nothing.
+    Coincident points are different points: weld them first. A triangle without area has the normals
+    of its neighbours, or (0, 0, 1) without any.
     """
     triangle = np.ascontiguousarray(triangles, dtype=np.int64)
     out = np.empty((len(triangle), 3, 3))
@@ -50,7 +50,7 @@ def corner_normals(
 def plain_corner_normals(
     points: Floats, triangles: NDArray[np.integer], crease: float = CREASE
 ) -> Floats:
-    """What `corner_normals` computes, to be read and compared with."""
+    """The readable equivalent of `corner_normals`, for comparison."""
     triangle = np.asarray(triangles, dtype=np.int64)
     corners = points[triangle]
     edge = _units(np.roll(corners, -1, axis=1) - corners)
@@ -62,14 +62,14 @@ def plain_corner_normals(
     order, start = corners_by_point(triangle, len(points))
     for p in range(len(points)):
         around = order[start[p] : start[p + 1]]
-        of, side = np.divmod(around, 3)
-        for t, k in zip(of, side, strict=True):
-            near = np.asarray(_dot(normal[of], normal[t]) >= _least_cosine(crease))
-            if len(of) > FAN or flat[t]:
+        around_triangle, side = np.divmod(around, 3)
+        for t, k in zip(around_triangle, side, strict=True):
+            near = np.asarray(_dot(normal[around_triangle], normal[t]) >= _least_cosine(crease))
+            if len(around_triangle) > FAN or flat[t]:
                 near[:] = True
-            near |= of == t
+            near |= around_triangle == t
             total = np.zeros(3)
-            for other, turn in zip(of[near], side[near], strict=True):
+            for other, turn in zip(around_triangle[near], side[near], strict=True):
                 total += weight[other, turn] * normal[other]
             unit = _units(total)
             fallback = normal[t] if not flat[t] else np.array([0.0, 0.0, 1.0])
@@ -78,8 +78,8 @@ def plain_corner_normals(
 
 
 def corners_by_point(triangle: Ints, points: int) -> tuple[Ints, Ints]:
-    """The corners, 3 t + k, of (T, 3) triangles in the order of their points, and (P + 1,) where
-    those of each point begin."""
+    """The corners, 3 t + k, of (T, 3) triangles in the order of their points, and (P + 1,) the
+    first corner of each point."""
     order = np.argsort(triangle.ravel(), kind="stable")
     count = np.bincount(triangle.ravel(), minlength=points)
     return order, np.concatenate([[0], np.cumsum(count)])
@@ -94,7 +94,7 @@ def _dot(a: Floats, b: Floats) -> Floats:
 
 
 def _units(vectors: Floats) -> Floats:
-    """Of length one; zero where they are."""
+    """Vectors of length one; zero vectors stay."""
     length = np.sqrt(_dot(vectors, vectors))[..., None]
     return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0))
 

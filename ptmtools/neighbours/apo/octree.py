@@ -1,26 +1,25 @@
-"""The octree of samples of a normal field (paper 2, §3.1).
+"""The octree of samples of a normal field (paper 2, §3.1), and its texels.
 
 A node is divided while its samples deviate from their mean by more than the bound. The paper names
-the L2,1 metric of Cohen-Steiner et al. and a bound of 0.05; read as a root mean square of the
-length of the difference, that gives textures of the paper's size (as a mean square, a tenth of it).
+the L2,1 metric of Cohen-Steiner et al. and a bound of 0.05; as a root mean square of the length of
+the difference, that gives textures of the paper's size (as a mean square, a tenth of it).
 
 A node of fewer than `ENOUGH` samples is not divided: its children would hold one or two each, and
-where the surface runs between these there would be none. (Of a sphere with relief, 327,680
-triangles made 5,000, eight samples each: 2.54 MB and 2.18° of mean error with it; without it 3.92
+the surface between these would have none. (A sphere with relief, simplified from 327,680 triangles
+to 5,000, with eight samples each: 2.54 MB and 2.18° of mean error with this rule; without it 3.92
 MB and 1.93°, and 2.7 % of the surface between children instead of 1.0 %. At the same size fewer
-samples without this rule are worse: 2.37 MB and 2.65°.) A node whose
-normals cancel out is divided all the same: its mean would show on both sides of something thin.
+samples without this rule are worse: 2.37 MB and 2.65°.) A node whose normals cancel out is divided
+nevertheless: its mean would show on both sides of a thin part.
 
-Everything is done level by level on whole arrays. Samples are sorted by their Morton code, so that
-a node is a range of them, and its sums differences of running sums.
+All steps work level by level on whole arrays. Samples are sorted by their Morton code, so that a
+node is a range of them, and its sums are differences of running sums.
 
-The cube of an octree, and the order of its nodes.
+The Morton code of a node interleaves the bits of its place in the `Cube`: three bits a level, x the
+lowest, the root's level first. In the order of codes siblings are adjacent, and so are all nodes
+below a node: a range of sorted codes is a subtree.
 
-The Morton code of a node interleaves the bits of its place: three bits a level, x the lowest, the
-root's level first. In the order of codes siblings lie side by side, and so do all that is below a
-node: a range of sorted codes is a subtree.
-
-The nodes of an octree as texels, and back (docs/formats/apo.md; paper 2, §3.2).
+`octree_of` encodes the nodes as texels, and `fault_of` checks them (docs/formats/apo.md; paper 2,
+§3.2).
 """
 
 from __future__ import annotations
@@ -34,10 +33,10 @@ from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.errors import LimitError
 from ptmtools.neighbours.apo.model import ADDRESS_BITS, Octree
 
-#: The cube is larger than what it holds by this share, lest rounding to float32 leads out of it.
+#: Relative margin of the cube, so that points stay inside after rounding to float32.
 MARGIN = 2.0**-12
 
-#: Shifts and masks that put two zero bits behind each of 21.
+#: Shifts and masks that insert two zero bits after each of 21.
 _SPREAD = (
     (32, 0x1F00000000FFFF),
     (16, 0x1F0000FF0000FF),
@@ -51,7 +50,7 @@ Codes = NDArray[np.uint64]
 
 @dataclass(frozen=True)
 class Cube:
-    """Corner (3,) and side, in the units of the mesh."""
+    """Corner (3,) and side of a cube, in the units of the mesh."""
 
     low: Floats
     side: float
@@ -64,14 +63,14 @@ class Cube:
 
 
 def cube_around(points: Floats) -> Cube:
-    """The cube around (n, 3) points, which are not all the same."""
+    """The cube around (n, 3) points, which are not all equal."""
     low, high = points.min(axis=0), points.max(axis=0)
     side = float((high - low).max()) * (1 + MARGIN)
     return Cube((low + high) / 2 - side / 2, side)
 
 
 def codes_of(q: Floats, depth: int) -> Codes:
-    """(n,) of the nodes of a depth, up to 20, in which (n, 3) points of the cube lie."""
+    """(n,) codes of the nodes of a depth, up to 20, that contain (n, 3) points of the cube."""
     place = (q * float(1 << depth)).astype(np.uint64)
     x, y, z = (_spread(place[:, k]) for k in range(3))
     result: Codes = x | y << np.uint64(1) | z << np.uint64(2)
@@ -84,13 +83,13 @@ def _spread(value: Codes) -> Codes:
     return value
 
 
-#: A node of fewer samples is not divided.
+#: Least samples of a node to divide.
 ENOUGH = 8
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """How far the samples of a leaf may deviate; see `ApoOptions`."""
+    """Largest deviation of the samples of a leaf; see `ApoOptions`."""
 
     error: float
     color_error: float
@@ -103,8 +102,8 @@ class Samples:
 
     Attributes
     ----------
-    code: (n,) of the nodes of a depth that they lie in.
-    count: (n,) how many samples each is.
+    code: (n,) codes of their nodes of a depth.
+    count: (n,) number of samples of each.
     value: (n, k) sums of unit normals, and with k = 6 of colours, 0 to 1.
     square: (n,) sums of the squares of colours; 0 without.
     """
@@ -122,7 +121,7 @@ class Level:
     Attributes
     ----------
     code: (m,). value: (m, k) unit normals, and with k = 6 colours, 0 to 1.
-    children: (m,) uint8, bit c of those that there are; 0 for leaves.
+    children: (m,) uint8, bit c for existing child c; 0 for leaves.
     """
 
     code: Codes
@@ -131,8 +130,8 @@ class Level:
 
 
 def divide(samples: Samples, top: int, bottom: int, bounds: Bounds) -> list[Level]:
-    """The levels ``top`` to ``bottom``, with every node of ``top`` that holds samples; their codes
-    are of the depth ``bottom``. Nodes of the last level have no children."""
+    """The levels ``top`` to ``bottom``, with every node of ``top`` that holds samples; the codes of
+    these have the depth ``bottom``. Nodes of the last level have no children."""
     below = np.uint64(3 * (bottom - top))
     first = np.flatnonzero(np.diff(samples.code >> below, prepend=~np.uint64(0)))
     begin, end = first, np.append(first[1:], len(samples.code))
@@ -158,8 +157,8 @@ def divide(samples: Samples, top: int, bottom: int, bounds: Bounds) -> list[Leve
 
 
 def averaged(levels: list[Level]) -> list[Level]:
-    """The same with each inner node the mean of its children (paper 2, §3.1), normals brought back
-    to length 1; from the deepest level up."""
+    """The levels with each inner node the mean of its children (paper 2, §3.1), normals scaled to
+    length 1; from the deepest level up."""
     result = [levels[-1]] if levels else []
     for level in reversed(levels[:-1]):
         inner = level.children > 0
@@ -174,7 +173,7 @@ def averaged(levels: list[Level]) -> list[Level]:
 
 
 def pruned(levels: list[Level], kept: Codes, above: int) -> list[Level]:
-    """What of levels lies below the nodes ``kept``, sorted, of the level ``above`` these."""
+    """The parts of levels below the nodes ``kept``, sorted, of the level ``above`` these."""
     result = []
     for k, level in enumerate(levels):
         root = level.code >> np.uint64(3 * (k + above))
@@ -185,7 +184,7 @@ def pruned(levels: list[Level], kept: Codes, above: int) -> list[Level]:
 
 
 def joined(parts: list[list[Level]], width: int) -> list[Level]:
-    """Levels of parts that follow each other in the order of codes, as one."""
+    """Joins levels of parts that follow each other in the order of codes."""
     deepest = max(map(len, parts), default=0)
     empty = Level(np.zeros(0, np.uint64), np.zeros((0, width), np.float32), np.zeros(0, np.uint8))
     rows = [[part[k] if k < len(part) else empty for part in parts] for k in range(deepest)]
@@ -200,7 +199,7 @@ def joined(parts: list[list[Level]], width: int) -> list[Level]:
 
 
 def popcount(bits: NDArray[np.uint8]) -> Ints:
-    """(n,) how many bits are set."""
+    """(n,) number of set bits."""
     result: Ints = np.unpackbits(bits[:, None], axis=1).sum(axis=1, dtype=np.int64)
     return result
 
@@ -211,7 +210,7 @@ def _running(values: NDArray[np.generic]) -> NDArray[np.generic]:
 
 
 def _deviates(n: Ints, sums: Floats, square: Floats, bounds: Bounds) -> Bools:
-    """(m,) which nodes deviate more than they may.
+    """(m,) which nodes exceed the bounds.
 
     The mean of ‖v − m‖² over unit vectors v is 2 − 2 |mean of v| for the unit vector m along it.
     """
@@ -235,7 +234,7 @@ def _means(sums: Floats, n: Ints, otherwise: Singles | None = None) -> Singles:
 
 
 def _edges(codes: Codes, node: Codes, begin: Ints, end: Ints, left: int) -> Ints:
-    """(m, 9) where the samples of each child of nodes begin and end; ``left`` levels are below."""
+    """(m, 9) boundaries of the samples of each child of nodes; ``left`` levels are below."""
     if not len(node):
         return np.zeros((0, 9), np.int64)
     shift = np.uint64(3 * (left - 1)) if left else np.uint64(0)
@@ -249,13 +248,13 @@ _BYTE = np.array([1, 1 << 8, 1 << 16])
 
 
 def normal_bytes(normal: Singles) -> NDArray[np.uint8]:
-    """(n, 3) of (n, 3) unit normals."""
+    """(n, 3) bytes of (n, 3) unit normals."""
     result: NDArray[np.uint8] = np.rint((normal / 2 + 0.5).clip(0, 1) * 255).astype(np.uint8)
     return result
 
 
 def check_count(texels: int) -> None:
-    """Raises LimitError PTM-L400 if so many texels have no addresses."""
+    """Raises LimitError PTM-L400 if ``texels`` exceeds the number of addresses."""
     if texels > 1 << ADDRESS_BITS:
         raise LimitError(
             "PTM-L400",
@@ -299,14 +298,14 @@ def octree_of(levels: list[Level], cube: Cube) -> Octree:
 
 
 def addresses(inner: NDArray[np.bool_]) -> Ints:
-    """(n,) where each node of a level begins, in texels from the level's first."""
+    """(n,) address of each node of a level, in texels from the level's first."""
     size = 1 + inner.astype(np.int64)
     result: Ints = np.cumsum(size) - size
     return result
 
 
 def fault_of(octree: Octree) -> tuple[str, str] | None:
-    """(place, what is wrong) of an octree whose texels are not in order, or None."""
+    """The first fault of an octree's texels as (place, problem), or None."""
     texels, start = octree.texels, octree.start
     inner = np.array([texels[0, 3] > 0])
     for k in range(octree.levels):
@@ -318,7 +317,7 @@ def fault_of(octree: Octree) -> tuple[str, str] | None:
                 f"takes {end - start[k]} texels instead of {start[k + 1] - start[k]}",
             )
         if ((texels[at, 3] > 0) != inner).any():
-            return f"level {k}", "a node is a leaf, and its parent says that it is none"
+            return f"level {k}", "a node is a leaf, but its parent marks it as an inner node"
         if not inner.any():
             last = k == octree.levels - 1
             return None if last else (f"level {k + 1}", "is below leaves only")
@@ -328,7 +327,7 @@ def fault_of(octree: Octree) -> tuple[str, str] | None:
             for bits in (children, pointer[:, 3])
         )
         if (flags & ~present).any():
-            return f"level {k}", "a child that is not there is said to be an inner node"
+            return f"level {k}", "a missing child is marked as an inner node"
         below = flags[present]
         each = popcount(children)
         first = start[k + 1] + addresses(below)[np.cumsum(each) - each]

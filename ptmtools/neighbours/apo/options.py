@@ -1,6 +1,4 @@
-"""Options for the replacement of objects by octree textures; see
-`ptmtools.neighbours.apo.replacing`.
-"""
+"""Options for replacing objects by octree textures; see `ptmtools.neighbours.apo.replacing`."""
 
 from __future__ import annotations
 
@@ -10,7 +8,7 @@ from typing import ClassVar
 from ptmtools.errors import InputError
 from ptmtools.options import option
 
-#: The greatest depth: Morton codes of three times as many bits stay within 63.
+#: Greatest depth: Morton codes of three times as many bits fit into 63.
 DEEPEST = 20
 #: Option → (least, most).
 RANGES: dict[str, tuple[float, float]] = {
@@ -23,8 +21,8 @@ RANGES: dict[str, tuple[float, float]] = {
 
 
 def check_range(name: str, value: float, prefix: str = "") -> None:
-    """Raises InputError PTM-I111 for a value that is out of range; the command line calls the
-    option ``prefix`` and its name."""
+    """Raises InputError PTM-I111 for a value out of range; the option on the command line is
+    ``prefix`` and its name."""
     least, most = RANGES[name]
     if not least <= value <= most:
         raise InputError(

@@ -1,6 +1,6 @@
-"""Pictures of a simplified mesh with its octree texture, as a client shows it by its first levels.
+"""Renders a simplified mesh with its octree texture, as a client displays it with its first levels.
 
-OpenGL draws (`shader`) where it is present, Embree's rays (`rays`) elsewhere.
+OpenGL draws (`shader`) where it is available, Embree's rays (`rays`) elsewhere.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats
 from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.neighbours.apo.model import Octree
-from ptmtools.neighbours.apo.view import FIELD_OF_VIEW, Drawn, Look, View, view_of
+from ptmtools.neighbours.apo.view import FIELD_OF_VIEW, Frame, Look, View, view_of
 from ptmtools.options import option
 
-#: Pixels of a side, at most.
+#: Most pixels of a side.
 WIDEST = 4096
 
 
@@ -57,14 +57,14 @@ class RenderOptions:
 
 @dataclass(frozen=True)
 class Rendering:
-    """A picture, and what its pixels are of; ``renderer`` is the name of what drew it."""
+    """A picture with data of its pixels; ``renderer`` is the name of the renderer."""
 
-    drawn: Drawn
+    drawn: Frame
     renderer: str
 
     @property
     def picture(self) -> NDArray[np.uint8]:
-        """(h, w, 3)."""
+        """(h, w, 3) pixels."""
         return self.drawn.picture
 
 
@@ -76,10 +76,10 @@ def render(
     normals: Floats | None = None,
 ) -> Rendering:
     """A picture of the simplified mesh of (P, 3) points and (T, 3) triangles, in its own units;
-    ``normals`` (P, 3) are its own (else `corner_normals`), which show where no level is there.
+    ``normals`` (P, 3) are its own (else `corner_normals`), which are displayed without levels.
 
     Raises InputError PTM-I111 for options out of range, PTM-I247 for a mesh without extent, and
-    MissingComponentError PTM-M500 where OpenGL is asked for and absent.
+    MissingComponentError PTM-M500 if OpenGL is required and absent.
     """
     options = options or RenderOptions()
     if not len(points) or not np.ptp(points, axis=0).any():
@@ -108,7 +108,7 @@ def render_view(
     backend: str = "auto",
     normals: Floats | None = None,
 ) -> Rendering:
-    """The same from a given view, in the units of the mesh."""
+    """As `render`, from a given view, in the units of the mesh."""
     available = octree.levels if levels is None else min(levels, octree.levels)
     look = Look(available, what)
     corners = ((points - octree.low) / octree.side)[triangles]
@@ -146,7 +146,7 @@ def _own(points: Floats, triangles: NDArray[np.integer], normals: Floats | None)
 
 
 def _check(options: RenderOptions) -> None:
-    """Raises InputError PTM-I111 for what is out of range."""
+    """Raises InputError PTM-I111 for values out of range."""
     ranges = {
         "levels": (0, 64, options.levels if options.levels is not None else 1),
         "azimuth": (-360, 360, options.azimuth),

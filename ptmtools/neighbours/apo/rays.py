@@ -1,7 +1,7 @@
-"""What `shader` draws, by rays: Embree finds the triangle of each pixel, numpy does the rest.
+"""Renders like `shader`, by rays: Embree finds the triangle of each pixel, numpy does the rest.
 
-Derivatives are those of quads of two by two pixels, as graphics hardware has them: a pixel's own
-triangle, continued as a plane, under the other pixel of the quad in its row or column.
+Derivatives are those of quads of two by two pixels, as in graphics hardware: the plane of a pixel's
+own triangle, under the other pixel of the quad in its row or column.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ import numpy as np
 from ptmtools.arrays import Floats, Ints
 from ptmtools.neighbours.apo.model import Octree
 from ptmtools.neighbours.apo.traversal import look_up, stop_depth
-from ptmtools.neighbours.apo.view import Drawn, Look, View
+from ptmtools.neighbours.apo.view import Frame, Look, View
 
-#: Rays that are cast at a time.
+#: Rays cast at a time.
 _RAYS = 1 << 18
 
 
 def hits(corners: Floats, eyes: Floats, rays: Floats) -> Ints:
-    """(n,) the first of (T, 3, 3) triangles that each of (n, 3) rays from (n, 3) eyes meets, or -1.
+    """(n,) the first of (T, 3, 3) triangles hit by each of (n, 3) rays from (n, 3) eyes, or -1.
 
     Embree has float32: keep the coordinates near 1.
     """
@@ -41,34 +41,34 @@ def hits(corners: Floats, eyes: Floats, rays: Floats) -> Ints:
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What the pixels of a view show that show anything, n of them.
+class VisiblePixels:
+    """The n pixels of a view that show the mesh.
 
     Attributes
     ----------
-    row, column: (n,) of the pixels. triangle: (n,) first along their rays.
-    place: (n, 3) where they meet it.
-    beside, below: (n, 3) where the rays of the other pixel of its quad in its row, and in its
-        column, meet the plane of the triangle; not finite where they do not.
+    row, column: (n,) of the pixels. triangle: (n,) the first along their rays.
+    place: (n, 3) intersection with it.
+    across, below: (n, 3) intersections of the triangle's plane with the rays of the other pixel of
+        the quad in the row, and in the column; not finite without one.
     """
 
     row: Ints
     column: Ints
     triangle: Ints
     place: Floats
-    beside: Floats
+    across: Floats
     below: Floats
 
     @property
     def step(self) -> Floats:
         """(n,) the smaller of the distances to both."""
         with np.errstate(invalid="ignore"):
-            away = (np.linalg.norm(q - self.place, axis=1) for q in (self.beside, self.below))
+            away = (np.linalg.norm(q - self.place, axis=1) for q in (self.across, self.below))
             return np.asarray(np.nan_to_num(np.fmin(*away), nan=1.0, posinf=1.0))
 
 
-def seen(corners: Floats, view: View) -> Seen:
-    """What a view of (T, 3, 3) corners shows; both near 1, as Embree has float32."""
+def visible_pixels(corners: Floats, view: View) -> VisiblePixels:
+    """The pixels that show (T, 3, 3) corners in a view; both near 1, as Embree has float32."""
     row, column = (k.ravel() for k in np.indices((view.height, view.width)))
     rays = view.rays(column, row)
     triangle = hits(corners, np.broadcast_to(view.eye, rays.shape), rays)
@@ -85,13 +85,13 @@ def seen(corners: Floats, view: View) -> Seen:
             return np.asarray(view.eye + far[:, None] * ray)
 
     points = place(column, row), place(column ^ 1, row), place(column, row ^ 1)
-    return Seen(row, column, triangle, *points)
+    return VisiblePixels(row, column, triangle, *points)
 
 
-def draw(octree: Octree, corners: Floats, own: Floats, view: View, look: Look) -> Drawn:
-    """As `OctreeShader.draw`."""
+def draw(octree: Octree, corners: Floats, own: Floats, view: View, look: Look) -> Frame:
+    """See `OctreeShader.draw`."""
     shape = (view.height, view.width)
-    sight = seen(corners, view)
+    sight = visible_pixels(corners, view)
     row, column, triangle, q = sight.row, sight.column, sight.triangle, sight.place
     stop = stop_depth(sight.step)
     address, depths, places = np.full(shape, -2), np.zeros(shape, np.int64), np.zeros((*shape, 3))
@@ -106,11 +106,11 @@ def draw(octree: Octree, corners: Floats, own: Floats, view: View, look: Look) -
     colors = octree.colors[at] if octree.colors is not None and look.levels else None
     picture[row, column] = np.rint(255 * look.shown(normals, colors, view))
     address[row, column], depths[row, column], places[row, column] = at, stop, q
-    return Drawn(picture, address, places, depths)
+    return Frame(picture, address, places, depths)
 
 
 def weights(corners: Floats, places: Floats) -> Floats:
-    """(n, 3) of the corners (n, 3, 3) of triangles, at places (n, 3) in their planes."""
+    """(n, 3) weights of the corners (n, 3, 3) of triangles, at places (n, 3) in their planes."""
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     offset = places - corners[:, 0]
     aa, ab, bb = ((x * y).sum(axis=1) for x, y in ((a, a), (a, b), (b, b)))
@@ -122,7 +122,7 @@ def weights(corners: Floats, places: Floats) -> Floats:
 
 
 def interpolated(weight: Floats, normals: Floats) -> Floats:
-    """(n, 3) unit normals of (n, 3, 3) normals of corners with weights (n, 3)."""
+    """(n, 3) unit normals from (n, 3, 3) normals of corners with weights (n, 3)."""
     normal = (weight[:, :, None] * normals).sum(axis=1)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     return np.asarray(normal / np.where(length > 0, length, 1.0))

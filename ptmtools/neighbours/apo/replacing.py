@@ -1,18 +1,17 @@
-"""Objects of a building become simplified meshes, and octrees of the normals that they had.
+"""Replaces objects of a building by simplified meshes and octrees of their original normals.
 
-What paper 2 does with one mesh, done with the statues of a museum: whoever draws no octree shows
-the simplified mesh as any other, painted as before, and visibility and hints are computed of it.
+This applies paper 2, which has one mesh, to the statues of a museum. Clients without octrees
+display the simplified mesh like any other, with its original materials, and visibility and hints
+are computed from it.
 
 The mesh is simplified with its materials, sides, texture coordinates and colours, whose borders
-stay, so it may keep more triangles than one that is plain. Its points are brought back into the box
-of the object where they left it: a statue that stands on a floor must not reach through it.
+stay, so it may keep more triangles than a plain one. Points that leave the box of the object are
+moved back into it: a statue that stands on a floor must not reach through it.
 
-What becomes of a scene when objects of it are replaced by meshes of fewer triangles.
-
-Each new triangle stands for one of the object's own, whose material and sides it has, and in whose
-place it comes: so what is decided by the order of the triangles stays as it was. The tolerances
-stay too. They are those of the model's coordinates, and a simplified mesh does not leave the box of
-its object.
+Each new triangle stands for one of the object's own, has its material and sides, and takes its
+place in the order: results that depend on the order of the triangles do not change. Tolerances do
+not change either: they are those of the model's coordinates, and a simplified mesh does not leave
+the box of its object.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from ptmtools.cells.roles import matches
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import LimitError
 from ptmtools.executor import Executor
-from ptmtools.neighbours.apo.making import octree_around, once, smooth, welded
+from ptmtools.neighbours.apo.making import distinct, octree_around, smooth, welded
 from ptmtools.neighbours.apo.model import ApoOptions, Octree
 from ptmtools.neighbours.apo.options import ReplaceOptions
 from ptmtools.progress import Progress, silent
@@ -45,10 +44,10 @@ class Replacement:
 
     Attributes
     ----------
-    objects: (K,) int32, those that are replaced, ascending.
+    objects: (K,) int32, replaced objects, ascending.
     points: (P, 3) float64, metres. triangles: (F, 3) int32 indices into them.
-    source: (F,) int32, the triangle of the scene that each stands for, never descending: those that
-        fill a hole stand for one beside it, which may stand for itself, too.
+    source: (F,) int32, the triangle of the scene that each stands for, never descending: triangles
+        that fill a hole stand for one beside it, which may also stand for itself.
     uv: (F, 3, 2) float64. colors: (F, 3, 3) uint8 if the scene has colours, else None.
     """
 
@@ -60,9 +59,9 @@ class Replacement:
     colors: NDArray[np.uint8] | None = None
 
     def of(self, scene: Scene) -> Scene:
-        """The scene with these triangles; points that no triangle uses are dropped.
+        """The scene with these triangles; unused points are dropped.
 
-        Raises ValueError if they are not of this scene.
+        Raises ValueError if they do not fit the scene.
         """
         self._check(scene)
         kept = np.flatnonzero(~np.isin(scene.triangle_object, self.objects))
@@ -88,22 +87,22 @@ class Replacement:
 
     def _check(self, scene: Scene) -> None:
         if self.objects.max(initial=-1) >= len(scene.objects):
-            raise ValueError("an object is replaced that the scene lacks")
+            raise ValueError("a replaced object is not in the scene")
         if self.source.max(initial=-1) >= len(scene.triangles):
-            raise ValueError("a triangle stands for one that the scene lacks")
+            raise ValueError("a triangle stands for one that is not in the scene")
         if not np.isin(scene.triangle_object[self.source], self.objects).all():
             raise ValueError("a triangle stands for one of another object")
         if (self.colors is None) != (scene.colors is None):
-            raise ValueError("either the scene has colours, or what replaces its objects")
+            raise ValueError("only one of scene and replacement has colours")
 
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:
-        """What `from_arrays` makes it of again."""
+        """The arrays for `from_arrays`."""
         colors = {} if self.colors is None else {"colors": self.colors}
         return {n: v for n, v in vars(self).items() if n != "colors"} | colors
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Replacement:
-        """Raises KeyError or ValueError for what is none."""
+        """The replacement from arrays; raises KeyError or ValueError for invalid ones."""
         stored = Stored(arrays)
         points = stored.array("points", np.float64, None, 3, finite=True)
         triangles = stored.indices("triangles", np.int32, None, 3, high=len(points))
@@ -122,7 +121,7 @@ class Replacement:
 
 
 def joined(parts: list[Replacement]) -> Replacement:
-    """Replacements of different objects of one scene as one."""
+    """Joins replacements of different objects of one scene."""
     first = np.cumsum([0, *(len(part.points) for part in parts)])
     source = np.concatenate([part.source for part in parts])
     order = np.argsort(source, kind="stable")
@@ -138,25 +137,25 @@ def joined(parts: list[Replacement]) -> Replacement:
     )
 
 
-#: Objects that are named in one note.
+#: Most names in one note.
 _NAMED = 3
-#: A greater share of samples that found nothing of the original is told.
+#: A greater share of samples whose rays miss the original is reported.
 _MISSED = 0.01
-#: So is an object that is simplified by more than this share of its size.
+#: A greater deviation, as a share of the object's size, is reported.
 _FAR_OFF = 0.02
 
 
 @dataclass(frozen=True)
 class ReplacedObject:
-    """An object that has a simplified mesh and an octree texture.
+    """An object with a simplified mesh and an octree texture.
 
     Attributes
     ----------
-    object: index into `Scene.objects`. name: as it stands there.
+    object: index into `Scene.objects`. name: its name there.
     octree: its cube is in world metres.
-    source, faces: triangles before and after.
-    deviation: of the simplified mesh, metres, as the quadrics estimate it.
-    missed: share of the samples from which no ray found the original.
+    source, faces: numbers of triangles before and after.
+    deviation: estimate by the quadrics of the simplified mesh's distance, metres.
+    missed: share of samples whose rays do not hit the original.
     """
 
     object: int
@@ -170,14 +169,14 @@ class ReplacedObject:
 
 @dataclass(frozen=True)
 class Replaced:
-    """What `replaced` makes of a scene.
+    """The result of `replaced`.
 
     Attributes
     ----------
-    scene: with the simplified meshes; the very same where nothing is replaced.
-    replacement: what of it is new; None if nothing is.
-    octrees: of each object that was replaced, in the order of the objects.
-    notes: what there is to say, one line each.
+    scene: the scene with the simplified meshes; the same object if nothing is replaced.
+    replacement: the new triangles; None if nothing is replaced.
+    octrees: those of the replaced objects, in the order of the objects.
+    notes: messages, one line each.
     """
 
     scene: Scene
@@ -189,7 +188,7 @@ class Replaced:
 def replaced(
     scene: Scene, options: ReplaceOptions, executor: Executor, progress: Progress = silent
 ) -> Replaced:
-    """A scene whose objects of certain names are replaced.
+    """The scene with the objects of certain names replaced.
 
     Objects of one name are replaced one by one. Raises LimitError PTM-L400: an octree has too many
     texels.
@@ -221,7 +220,7 @@ def replaced(
         parts.append(part)
         octrees.append(_octree(scene, triangles[i], simplified, part, options, executor, progress))
     if light:
-        stay = _that_stay([scene.objects[i] for i in light], options.apo_faces)
+        stay = _unchanged_note([scene.objects[i] for i in light], options.apo_faces)
         notes.append(stay if parts else Warned(stay))
     notes += [
         f"{each.name}: from {each.missed:.1%} of the samples nothing of the original was found; "
@@ -236,7 +235,7 @@ def replaced(
 
 
 def _by_object(scene: Scene, chosen: Sequence[int]) -> dict[int, Ints]:
-    """The triangles of each of these objects, ascending."""
+    """The triangles of each of the ``chosen`` objects, ascending."""
     order = np.argsort(scene.triangle_object, kind="stable")
     begin, end = (
         np.searchsorted(scene.triangle_object[order], chosen, side) for side in ("left", "right")
@@ -244,7 +243,7 @@ def _by_object(scene: Scene, chosen: Sequence[int]) -> dict[int, Ints]:
     return {i: order[a:b] for i, a, b in zip(chosen, begin, end, strict=True)}
 
 
-def _that_stay(names: Sequence[str], faces: int) -> str:
+def _unchanged_note(names: Sequence[str], faces: int) -> str:
     named = ", ".join(names[:_NAMED]) + (", …" if len(names) > _NAMED else "")
     have, stay = ("has", "stays") if len(names) == 1 else ("have", "stay")
     return (
@@ -256,8 +255,8 @@ def _that_stay(names: Sequence[str], faces: int) -> str:
 def _simplified(
     scene: Scene, number: int, own: Ints, faces: int, progress: Progress
 ) -> tuple[Simplified, Replacement]:
-    """The simplified mesh of an object of which these are the triangles."""
-    what = f"simplifying {scene.objects[number]}"
+    """The simplified mesh of the object with the triangles ``own``."""
+    phase = f"simplifying {scene.objects[number]}"
     used, corners = np.unique(scene.triangles[own], return_inverse=True)
     points, material = scene.points[used], scene.triangle_material[own]
     images = np.array([m.image for m in scene.materials])
@@ -265,23 +264,23 @@ def _simplified(
     mesh = Mesh(
         points,
         corners.reshape(-1, 3).astype(np.int32),
-        # Where sides change there is a border like one of materials.
+        # A change of sides is a border, like one of materials.
         (2 * material + scene.two_sided[own]).astype(np.int32),
         scene.uv[own] if painted else None,
         None if scene.colors is None else scene.colors[own],
     )
     simplified = simplify(
-        mesh, SimplifyOptions(faces), lambda done, total, _: progress(done, total, what)
+        mesh, SimplifyOptions(faces), lambda done, total, _: progress(done, total, phase)
     )
-    left = simplified.mesh
-    uv = np.zeros((len(left.triangles), 3, 2)) if left.uv is None else left.uv
+    result = simplified.mesh
+    uv = np.zeros((len(result.triangles), 3, 2)) if result.uv is None else result.uv
     return simplified, Replacement(
         np.array([number], np.int32),
-        np.clip(left.points, points.min(axis=0), points.max(axis=0)),
-        left.triangles,
+        np.clip(result.points, points.min(axis=0), points.max(axis=0)),
+        result.triangles,
         own[simplified.source].astype(np.int32),
         uv,
-        left.colors,
+        result.colors,
     )
 
 
@@ -294,7 +293,7 @@ def _octree(
     executor: Executor,
     progress: Progress,
 ) -> ReplacedObject:
-    """The octree of the normals of an object around what replaces it."""
+    """The octree of the normals of an object around its replacement."""
     number = int(part.objects[0])
     name = scene.objects[number]
     wanted = ApoOptions(
@@ -305,7 +304,7 @@ def _octree(
     )
     used, corners = np.unique(scene.triangles[own], return_inverse=True)
     points, triangles = welded(scene.points[used], corners.reshape(-1, 3).astype(np.int32))
-    triangles, _ = once(triangles)
+    triangles, _ = distinct(triangles)
     try:
         octree, missed = octree_around(
             smooth(part.points, part.triangles), points, triangles, wanted, None, executor, progress

@@ -1,19 +1,18 @@
-"""Points spread evenly over triangles (paper 2, §3.1: the samples that the octree is built of).
+"""Samples of the simplified mesh, and their normals and colours from the source (paper 2, §3.1).
 
-Rows parallel to the longest edge, as far from each other as the points of a row: so thin triangles,
-which simplification leaves in flat places, get no more points than their area asks for, and no gaps
-along their length. (Tried: the middles of a regular division into n² similar triangles; in thin
-ones its points are many times farther apart one way than the other.)
+`spread` places points evenly on triangles. Rows parallel to the longest edge, as far apart as the
+points of a row, give thin triangles, which simplification leaves in flat places, no more points
+than their area requires, and no gaps along their length. (Tried: the middles of a regular division
+into n² similar triangles; in thin ones its points are many times farther apart one way than the
+other.)
 
-Colours at points of the source: materials, vertices and textures, as the model multiplies them.
+`nearest` finds the source point of each sample. Rays go both ways along the normal; the nearest hit
+that faces the same way counts. A surface that faces away is the other side of a thin part, or the
+far side of a hole, and is passed through.
 
-Not the paper's, which leaves colour for later. Texels are those of the finest level: where samples
-are farther apart, what lies between is not seen.
-
-From points of the simplified mesh to those of the source that they stand for (paper 2, §3.1).
-
-Rays go both ways along the normal; the nearest hit that faces the same way counts. A surface that
-faces away is the other side of something thin, or the far side of a hole, and is passed through.
+`Paint` has the colours at points of the source: materials, vertices and textures, multiplied as in
+the model. The paper leaves colour for later. Texels are those of the finest level: where samples
+are farther apart, texels between them are ignored.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.scene.model import Scene
 
-#: By so much points are moved apart where they are too many.
+#: Factor of the spacing while there are too many points.
 _FARTHER = 1.25
 
 
@@ -37,7 +36,7 @@ class Points(NamedTuple):
 
     Attributes
     ----------
-    triangle: (n,) which one each lies in, ascending. weight: (n, 3) of its corners; the sum is 1.
+    triangle: (n,) triangle of each point, ascending. weight: (n, 3) of its corners; the sum is 1.
     """
 
     triangle: Ints
@@ -45,24 +44,24 @@ class Points(NamedTuple):
 
 
 def areas(corner: Floats) -> Floats:
-    """(m,) of (m, 3, 3) triangles."""
+    """(m,) areas of (m, 3, 3) triangles."""
     cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     result: Floats = np.linalg.norm(cross, axis=1) / 2
     return result
 
 
 def longest_first(corner: Floats) -> Ints:
-    """(m,) the corner at which the longest edge of each of (m, 3, 3) triangles begins."""
+    """(m,) the first corner of the longest edge of each of (m, 3, 3) triangles."""
     edge = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2)
     result: Ints = edge.argmax(axis=1)
     return result
 
 
 def spacing_for(corner: Floats, count: float) -> float:
-    """How far apart ``count`` points of (m, 3, 3) triangles are.
+    """The distance between ``count`` points on (m, 3, 3) triangles.
 
-    By area, unless thin triangles, whose points are a row however thin they are, would then have
-    more than as many again: then farther.
+    It follows from the area, unless thin triangles, which have a row of points however thin they
+    are, would then have more than as many again: then it is larger.
     """
     area = areas(corner)
     longest = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).max(axis=1)
@@ -70,20 +69,20 @@ def spacing_for(corner: Floats, count: float) -> float:
     spacing = float(np.sqrt(area.sum() / count))
     if not spacing:
         return spacing
-    # At least one in each, so this ends.
+    # Each triangle has at least one point, so this ends.
     while _points(height, longest, spacing) > 2 * max(count, len(corner)):
         spacing *= _FARTHER
     return spacing
 
 
 def _points(height: Floats, longest: Floats, spacing: float) -> float:
-    """About how many points triangles have."""
+    """The approximate number of points of triangles."""
     rows = np.maximum(height / spacing, 1)
     return float((rows * np.maximum(longest / (2 * spacing), 1)).sum())
 
 
 def spread(corner: Floats, spacing: float) -> Points:
-    """Points of (m, 3, 3) triangles, about ``spacing`` apart; at least one in each."""
+    """Points on (m, 3, 3) triangles, about ``spacing`` apart; at least one on each."""
     count = len(corner)
     first = longest_first(corner)
     each = np.arange(count)
@@ -99,20 +98,20 @@ def spread(corner: Floats, spacing: float) -> Points:
     along = (column + 0.5) / columns[point_row]
     triangle, up = row_triangle[point_row], up[point_row]
     turned = np.stack([(1 - up) * (1 - along), (1 - up) * along, up], axis=1)
-    # Back to the order in which the triangles have their corners.
+    # Back to the order of the triangles' corners.
     place = (np.arange(3) - first[triangle][:, None]) % 3
     return Points(triangle, np.take_along_axis(turned, place, axis=1))
 
 
 def _counted(counts: Ints) -> tuple[Ints, Ints]:
-    """Of each of ``counts`` things: (n,) whose it is, and its number among those."""
+    """For each of ``counts`` items: (n,) its owner, and its number among the owner's."""
     owner = np.repeat(np.arange(len(counts)), counts)
     begin = np.cumsum(counts) - counts
     return owner, np.arange(len(owner)) - begin[owner]
 
 
 def at(values: Floats, points: Points) -> Floats:
-    """(n, k) what (m, 3, k) values of corners are at points."""
+    """(n, k) interpolation of (m, 3, k) values of corners at points."""
     result: Floats = np.einsum("ij,ijk->ik", points.weight, values[points.triangle])
     return result
 
@@ -125,7 +124,7 @@ class Paint:
     """
     Attributes
     ----------
-    corner: (T, 3, 3) uint8 sRGB, what the texel is multiplied with.
+    corner: (T, 3, 3) uint8 sRGB factors of the texels.
     uv: (T, 3, 2) float32, origin at the lower left. image: (T,) index into `images`, -1 for none.
     clamped: (T, 2) whether u and v stop at the edge of the image.
     images: (h, w, 3) uint8 each, rows from the top.
@@ -143,9 +142,9 @@ class Paint:
         image = self.image[triangle]
         for number in np.unique(image[image >= 0]).tolist():
             here = np.flatnonzero(image == number)
-            of, texels = triangle[here], self.images[number]
-            uv = np.einsum("ij,ijk->ik", weight[here], self.uv[of].astype(np.float64))
-            kept = np.where(self.clamped[of], np.clip(uv, 0, 1), uv - np.floor(uv))
+            triangle_, texels = triangle[here], self.images[number]
+            uv = np.einsum("ij,ijk->ik", weight[here], self.uv[triangle_].astype(np.float64))
+            kept = np.where(self.clamped[triangle_], np.clip(uv, 0, 1), uv - np.floor(uv))
             height, width = texels.shape[:2]
             column = np.minimum((kept[:, 0] * width).astype(np.int64), width - 1)
             row = np.minimum(((1 - kept[:, 1]) * height).astype(np.int64), height - 1)
@@ -154,8 +153,8 @@ class Paint:
 
 
 def paint_of(scene: Scene, kept: Ints) -> Paint:
-    """The paint of the triangles ``kept`` of a scene; decodes its images. Raises what reading an
-    image raises."""
+    """The paint of the triangles ``kept`` of a scene; decodes its images. Raises the errors of
+    reading an image."""
     from ptmtools.errors import naming
     from ptmtools.texture.images import load_image
     from ptmtools.texture.samples import in_eight_bits
@@ -182,24 +181,24 @@ def paint_of(scene: Scene, kept: Ints) -> Paint:
     )
 
 
-#: Rays begin so far behind their point, and go on so far behind what they pass through: sixteen
-#: roundings of a float32 within the cube, of which it is a share.
+#: Distance of the origin of a ray behind its point, and behind a surface it passes through: sixteen
+#: roundings of a float32 within the cube, as a share of the cube.
 STEP = 2.0**-20
-#: How far a ray goes, likewise. What is farther away is another part of the source.
+#: Length of a ray, as a share of the cube. Farther surfaces are other parts of the source.
 REACH = 0.1
-#: Surfaces that face away and are passed through before a ray is given up.
+#: Most surfaces facing away that a ray passes through.
 LAYERS = 4
 
 
 @dataclass(frozen=True)
 class Source:
-    """The mesh that the normals are taken from, in the cube of the octree.
+    """The mesh with the original normals, in the cube of the octree.
 
     Attributes
     ----------
     points: (V, 3) float32. triangles: (T, 3) int32.
     normals: (T, 3, 3) float32 unit normals of the corners.
-    paint: of the triangles, if colours are kept.
+    paint: colours of the triangles, if kept.
     """
 
     points: Singles
@@ -215,7 +214,7 @@ class Source:
 
     @cached_property
     def tree(self) -> Any:
-        """Embree's."""
+        """Embree's tree."""
         from embreex.mesh_construction import TriangleMesh
         from embreex.rtcore_scene import EmbreeScene
 
@@ -224,7 +223,7 @@ class Source:
         return tree
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without what is derived: Embree's tree cannot travel."""
+        """Without derived members: Embree's tree cannot be pickled."""
         return {name: value for name, value in vars(self).items() if name not in ("facing", "tree")}
 
 
@@ -243,7 +242,7 @@ class Hits:
 
 
 def nearest(source: Source, origin: Floats, normal: Floats) -> Hits:
-    """What (n, 3) points of the cube with (n, 3) unit normals stand for."""
+    """The source points of (n, 3) points of the cube with (n, 3) unit normals."""
     forth = _cast(source, origin, normal, normal, np.full(len(origin), REACH, np.float32))
     back = _cast(source, origin, -normal, normal, forth.distance)
     better = back.triangle >= 0
@@ -255,7 +254,8 @@ def nearest(source: Source, origin: Floats, normal: Floats) -> Hits:
 
 
 def _cast(source: Source, origin: Floats, along: Floats, normal: Floats, limit: Singles) -> Hits:
-    """The first hit along rays that faces the way of ``normal``, nearer than ``limit``."""
+    """The first hit of each ray on a surface that faces the way of ``normal``, nearer than
+    ``limit``."""
     count = len(origin)
     triangle, weight = np.full(count, -1, np.int64), np.zeros((count, 3), np.float32)
     distance = limit.copy()

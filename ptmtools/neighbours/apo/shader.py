@@ -1,10 +1,10 @@
 """The client's traversal as a fragment shader: normal mapping of the simplified mesh by the octree
 texture (Lacoste et al., section 3.2; docs/formats/apo.md).
 
-The array of texels lies row by row in a texture of four unsigned bytes, `WIDTH` wide; the
-fragment's place in the cube is interpolated, its derivatives from pixel to pixel say where to stop.
-There is no filtering: a look-up ends in one texel. OpenGL 3.3, by hardware or in software; without
-it, `rays` does the same.
+The array of texels lies row by row in a texture of four unsigned bytes, `WIDTH` wide. The
+fragment's place in the cube is interpolated, and its derivatives from pixel to pixel determine the
+depth to stop at. A look-up ends in one texel, without filtering. It needs OpenGL 3.3, by hardware
+or in software; `rays` does the same without it.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from ptmtools.arrays import Floats, Ints, Singles
 from ptmtools.coverage.backends.opengl import create_context
 from ptmtools.neighbours.apo.model import Octree
 from ptmtools.neighbours.apo.traversal import NEVER, WIDTH, rows_of
-from ptmtools.neighbours.apo.view import AMBIENT, FILL, KEY, Drawn, Look, View
+from ptmtools.neighbours.apo.view import AMBIENT, FILL, KEY, Frame, Look, View
 
-#: A farthest depth, where nothing has any.
+#: Least farthest depth, for a view without points.
 TINY = 2.0**-100
 
 LOOK_UP = f"""
@@ -148,9 +148,9 @@ void main() {{
 
 
 class OctreeShader:
-    """An octree on a graphics device; to be used and closed by the thread that made it.
+    """An octree on a graphics device; used and closed by the thread that made it.
 
-    Raises MissingComponentError PTM-M500 where there is no OpenGL.
+    Raises MissingComponentError PTM-M500 without OpenGL.
     """
 
     def __init__(self, octree: Octree, gpu: int | None = None) -> None:
@@ -173,7 +173,7 @@ class OctreeShader:
     def look_up(
         self, q: Singles, levels: int | None = None, stop: Ints | int | None = None
     ) -> tuple[Ints, Ints]:
-        """(n,) addresses and (n,) depths, as `traversal.look_up`; ``q`` is taken as float32."""
+        """(n,) addresses and (n,) depths, as `traversal.look_up`; ``q`` is converted to float32."""
         width = min(WIDTH, max(1, len(q)))
         height = max(1, -(-len(q) // width))
         places = np.zeros((height * width, 4), dtype=np.float32)
@@ -199,9 +199,9 @@ class OctreeShader:
                 each.release()
         return data[:, 0].astype(np.int64), data[:, 1].astype(np.int64)
 
-    def draw(self, corners: Floats, own: Floats, view: View, look: Look) -> Drawn:
-        """A picture of (T, 3, 3) corners in the cube with normals (T, 3, 3) of their own, which
-        show where there is no level. ``view`` is in the cube, too."""
+    def draw(self, corners: Floats, own: Floats, view: View, look: Look) -> Frame:
+        """A picture of (T, 3, 3) corners in the cube with their own normals (T, 3, 3), which are
+        displayed without levels. ``view`` is in the cube, too."""
         context, size = self._context, (view.width, view.height)
         program = context.program(vertex_shader=MESH, fragment_shader=SHADE)
         data = np.concatenate([corners, own], axis=2).astype(np.float32)
@@ -249,7 +249,7 @@ class OctreeShader:
             for each in (drawing, buffer, target, depth, address, place, shown, program):
                 each.release()
         picture = np.where((at == -2)[..., None], look.background, color[..., :3])
-        return Drawn(
+        return Frame(
             picture.astype(np.uint8),
             at,
             where[..., :3].astype(np.float64),
@@ -259,7 +259,7 @@ class OctreeShader:
     def _levels(self, levels: int | None) -> int:
         available = self._octree.levels if levels is None else min(levels, self._octree.levels)
         if available < 1:
-            raise ValueError("there is no level to look up in")
+            raise ValueError("the look-up needs at least one level")
         return available
 
     def _bind(self, program: Any, levels: int) -> None:
@@ -269,7 +269,7 @@ class OctreeShader:
         program["deepest"].value = levels - 1
 
     def close(self) -> None:
-        """Gives the context back."""
+        """Releases the context."""
         self._context.release()
 
     def __enter__(self) -> OctreeShader:

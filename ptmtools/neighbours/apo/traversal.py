@@ -1,9 +1,8 @@
-"""The normal of an octree texture at a point, as a client reads it (docs/formats/apo.md, "Looking
-a normal up"; Lacoste et al., section 3.2).
+"""The normal of an octree texture at a point, as a client reads it (docs/formats/apo.md, "Looking a
+normal up"; Lacoste et al., section 3.2).
 
-Points are followed one by one in a kernel; `plain_look_up` takes all of them down a level at a
-time.
-Addresses that lead out of the octree, as damaged files have them, are taken for absent children.
+A kernel follows points one by one; `plain_look_up` moves all of them down a level at a time.
+Addresses outside of the octree, as in damaged files, count as absent children.
 """
 
 from __future__ import annotations
@@ -17,20 +16,20 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.jit import plain_kernel
 from ptmtools.neighbours.apo.model import Octree
 
-#: Deeper than any octree: nothing stops there.
+#: A depth below any octree, which never stops a look-up.
 NEVER = 127
-#: Texels in a row of the 2-D texture that the array is laid out in for graphics hardware.
+#: Texels in a row of the 2-D texture of graphics hardware.
 WIDTH = 4096
 
 
 @dataclass(frozen=True)
-class Found:
-    """Where look-ups of n points end.
+class Nodes:
+    """The ends of look-ups of n points.
 
     Attributes
     ----------
-    address: (n,) of the texel whose normal is taken.
-    depth: (n,) of its node; 0 is the cube.
+    address: (n,) address of the texel with the normal.
+    depth: (n,) depth of its node; 0 is the cube.
     normals: (n, 3) unit normals.
     """
 
@@ -41,23 +40,23 @@ class Found:
 
 def look_up(
     octree: Octree, q: Floats, levels: int | None = None, stop: Ints | int | None = None
-) -> Found:
-    """The normals at (n, 3) points ``q`` of the cube with ``levels`` there (all of the octree's, if
-    None), at most to the depths ``stop``, one or (n,).
+) -> Nodes:
+    """The normals at (n, 3) points ``q`` of the cube with the first ``levels`` (all if None), at
+    most to the depths ``stop``, one or (n,).
 
-    Points outside the cube count as the nearest within it. ValueError if there is no level.
+    Points outside the cube count as the nearest within it. Raises ValueError without a level.
     """
-    inside, depth = _asked(octree, q, levels, stop)
+    inside, depth = _limits(octree, q, levels, stop)
     at, deep = np.empty(len(q), dtype=np.int64), np.empty(len(q), dtype=np.int64)
     _walk(np.ascontiguousarray(octree.texels), inside, depth, at, deep)
-    return Found(at, deep, unpacked(octree.texels[at]))
+    return Nodes(at, deep, unpacked(octree.texels[at]))
 
 
 def plain_look_up(
     octree: Octree, q: Floats, levels: int | None = None, stop: Ints | int | None = None
-) -> Found:
-    """What `look_up` computes, to be read and compared with."""
-    rest, limit = _asked(octree, q, levels, stop)
+) -> Nodes:
+    """The readable equivalent of `look_up`, for comparison."""
+    rest, limit = _limits(octree, q, levels, stop)
     texel = octree.texels.astype(np.int64)
     at, depth = np.zeros(len(q), dtype=np.int64), np.zeros(len(q), dtype=np.int64)
     going = np.arange(len(q))
@@ -78,20 +77,20 @@ def plain_look_up(
         going = going[on]
         at[going] = address_of[on]
         depth[going] += 1
-    return Found(at, depth, unpacked(octree.texels[at]))
+    return Nodes(at, depth, unpacked(octree.texels[at]))
 
 
 def stop_depth(step: Floats) -> Ints:
-    """⌈log₂(1 / D)⌉ of distances D >= 0 in the cube; `NEVER` for 0. Exact: it is −⌊log₂ D⌋, so the
-    exponent of D as a number in floating point."""
+    """⌈log₂(1 / D)⌉ of distances D >= 0 in the cube; `NEVER` for 0. Exact: it is −⌊log₂ D⌋, from
+    the floating-point exponent of D."""
     _, exponent = np.frexp(step)
     depth = np.where(step > 0, 1 - exponent, NEVER)
     return np.minimum(depth, NEVER).astype(np.int64)
 
 
 def rows_of(texels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """(n, 4) texels as (h, `WIDTH`, 4) rows of a texture, the end filled with zeros; texel a is in
-    row a div `WIDTH`."""
+    """(n, 4) texels as (h, `WIDTH`, 4) rows of a texture, padded with zeros; texel a is in row a
+    div `WIDTH`."""
     height = max(1, -(-len(texels) // WIDTH))
     out = np.zeros((height * WIDTH, 4), dtype=np.uint8)
     out[: len(texels)] = texels
@@ -104,13 +103,13 @@ def unpacked(texels: NDArray[np.uint8]) -> Floats:
     return np.asarray(vector / np.linalg.norm(vector, axis=1, keepdims=True))
 
 
-def _asked(
+def _limits(
     octree: Octree, q: Floats, levels: int | None, stop: Ints | int | None
 ) -> tuple[Floats, Ints]:
-    """Points within the cube, and (n,) how deep each may go."""
+    """Points clipped to the cube, and (n,) their depth limits."""
     deepest = (octree.levels if levels is None else min(levels, octree.levels)) - 1
     if deepest < 0:
-        raise ValueError("there is no level to look up in")
+        raise ValueError("the look-up needs at least one level")
     inside = np.clip(np.asarray(q, dtype=np.float64), 0.0, np.nextafter(1.0, 0.0))
     limit = np.full(len(q), deepest, dtype=np.int64)
     if stop is not None:
@@ -129,8 +128,7 @@ def _ones(mask: int) -> int:
 
 @plain_kernel
 def child_of(texel: NDArray[np.uint8], address: int, child: int) -> int:
-    """The address of a child, 0 to 7, of the node at an address of (n, 4) texels; -1 if there is
-    none."""
+    """The address of child 0 to 7 of the node at an address of (n, 4) texels; -1 if absent."""
     count = np.int64(len(texel))
     present = int(np.int64(texel[address, 3]))
     if present >> child & 1 == 0 or address + 1 >= count:

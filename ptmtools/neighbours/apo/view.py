@@ -1,4 +1,4 @@
-"""Camera and lights of a picture of an octree texture, and its result."""
+"""Camera and lights of a picture of an octree texture, and the rendered frame."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 
-#: Vertical, degrees.
+#: Vertical field of view, degrees.
 FIELD_OF_VIEW = 35.0
 
 
-#: Who looks up or down with less than this of his view level, looks straight up or down: what is
-#: level then is rounding.
+#: A direction with a smaller horizontal part counts as straight up or down; that part is rounding.
 _STRAIGHT = 2.0**-40
 
 
@@ -24,7 +23,7 @@ class View:
 
     Attributes
     ----------
-    eye, target: (3,) where it is, and what is in the middle of the picture.
+    eye, target: (3,) its position, and the point in the middle of the picture.
     width, height: pixels.
     field_of_view: vertical, degrees.
     """
@@ -37,8 +36,7 @@ class View:
 
     @property
     def axes(self) -> Floats:
-        """(3, 3) unit vectors right, up and forward; who looks straight up or down has x to the
-        right."""
+        """(3, 3) unit vectors right, up and forward; x is right for a view straight up or down."""
         ahead = self.target - self.eye
         ahead = ahead / np.linalg.norm(ahead)
         right = np.array([-ahead[2], 0.0, ahead[0]])
@@ -54,8 +52,8 @@ class View:
         return tall * self.width / self.height, tall
 
     def rays(self, column: Ints, row: Ints) -> Floats:
-        """(n, 3) rays, of which the component forward is 1, through middles of pixels; (0, 0) is
-        the upper left one."""
+        """(n, 3) rays with forward component 1 through the middles of pixels; (0, 0) is the upper
+        left one."""
         wide, tall = self.half
         right, up, ahead = self.axes
         across = ((column + 0.5) / self.width * 2 - 1)[..., None] * wide
@@ -82,35 +80,35 @@ def view_of(
     low, high = points.min(axis=0), points.max(axis=0)
     diameter = float(np.linalg.norm(high - low))
     if not diameter > 0:
-        raise ValueError("the points are one, of which there is no view")
+        raise ValueError("a single point has no view")
     turn, rise = np.radians(azimuth), np.radians(elevation)
-    from_there = np.array([np.sin(turn) * np.cos(rise), np.sin(rise), np.cos(turn) * np.cos(rise)])
+    towards_eye = np.array([np.sin(turn) * np.cos(rise), np.sin(rise), np.cos(turn) * np.cos(rise)])
     if distance <= 0:
         angle = np.arctan(np.tan(np.radians(field_of_view) / 2) * min(1.0, width / height))
         distance = float(0.5 / np.sin(angle))
     middle = (low + high) / 2
-    return View(middle + distance * diameter * from_there, middle, width, height, field_of_view)
+    return View(middle + distance * diameter * towards_eye, middle, width, height, field_of_view)
 
 
-#: Shares of white: everywhere, from the upper left, and from the lower right, which shows relief in
-#: the shade.
+#: Shares of white light: ambient, from the upper left, and from the lower right, which shows relief
+#: in the shade.
 AMBIENT, KEY, FILL = 0.2, 0.7, 0.2
 
 
-#: Towards the lights: right, up, and towards the camera.
+#: Directions of the lights: right, up, and towards the camera.
 _KEY, _FILL = (-0.5, 0.65, 0.6), (0.8, -0.3, 0.5)
 
 
 @dataclass(frozen=True)
 class Look:
-    """What is shown, and how.
+    """The content and style of a picture.
 
     Attributes
     ----------
-    levels: of the octree that are there; 0 shows the mesh's own normals.
+    levels: number of octree levels; 0 shows the mesh's own normals.
     what: "shaded", or "normals" as the octree stores them.
-    stone: share of red, green and blue that a surface without colour gives back.
-    near: nothing nearer than this share of the farthest is drawn.
+    stone: reflected shares of red, green and blue of a surface without colour.
+    near: nearest drawn depth, as a share of the farthest.
     """
 
     levels: int
@@ -120,17 +118,17 @@ class Look:
 
     @property
     def background(self) -> NDArray[np.uint8]:
-        """(3,) of pixels that show nothing; no unit normal is stored as black."""
+        """(3,) colour of empty pixels; no unit normal is stored as black."""
         return np.array([0, 0, 0] if self.what == "normals" else [58, 62, 70], dtype=np.uint8)
 
     def lights(self, view: View) -> tuple[Floats, Floats]:
-        """Unit vectors towards both lights, which go with the camera."""
+        """Unit vectors towards both lights, which move with the camera."""
         axes = view.axes * [[1], [1], [-1]]
         key, fill = (np.array(light) @ axes for light in (_KEY, _FILL))
         return key / np.linalg.norm(key), fill / np.linalg.norm(fill)
 
     def shown(self, normals: Floats, colors: NDArray[np.uint8] | None, view: View) -> Floats:
-        """(n, 3) shares of full light, of unit normals and the (n, 4) colours below them."""
+        """(n, 3) shares of full light, from unit normals and the (n, 4) colours below them."""
         if self.what == "normals":
             return normals / 2 + 0.5
         key, fill = self.lights(view)
@@ -140,15 +138,15 @@ class Look:
 
 
 @dataclass(frozen=True)
-class Drawn:
-    """A picture, and what its pixels are of.
+class Frame:
+    """A picture with data of its pixels.
 
     Attributes
     ----------
     picture: (h, w, 3) uint8.
-    address: (h, w) of the texel; -1 where the mesh's own normal is shown, -2 where nothing is.
-    place: (h, w, 3) in the cube; undefined where nothing is.
-    stop: (h, w) the depth at which pixels stop; undefined where nothing is.
+    address: (h, w) of the texel; -1 for the mesh's own normal, -2 for an empty pixel.
+    place: (h, w, 3) in the cube; undefined in empty pixels.
+    stop: (h, w) the depth at which look-ups stop; undefined in empty pixels.
     """
 
     picture: NDArray[np.uint8]
@@ -164,5 +162,5 @@ class Drawn:
     @property
     def deepest(self) -> int:
         """The depth beyond which nodes are smaller than the pixels of this view, so that a client
-        may stop the transmission (section 4.2); -1 if it shows nothing."""
+        may stop the transmission (section 4.2); -1 for an empty picture."""
         return int(self.stop[self.covered].max(initial=-1))

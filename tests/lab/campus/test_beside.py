@@ -12,7 +12,7 @@ from ptmtools import schemas
 from ptmtools.cli.main import main
 from ptmtools.errors import InputError
 from ptmtools.lab.campus import CampusWalkOptions, prepare_campus, simulate_campus
-from ptmtools.lab.campus.simulation import CAMPUS_POLICIES, walk_beside
+from ptmtools.lab.campus.simulation import CAMPUS_POLICIES, measure_campus_walk
 from ptmtools.lab.campus.world import CampusWorld
 from ptmtools.lab.walk import read_walk
 from ptmtools.lab.world import World
@@ -42,7 +42,7 @@ def place(rooms: Path, two_rooms: Path, walk_file: Path) -> CampusWorld:
 def test_the_same_walk(place: CampusWorld, world: World) -> None:
     assert np.array_equal(place.time, world.time)
     assert np.array_equal(place.eye, world.eye)
-    run, measures = walk_beside(place, world, CAMPUS_POLICIES["campus-medium"], SLOW, None)
+    run, measures = measure_campus_walk(place, world, CAMPUS_POLICIES["campus-medium"], SLOW, None)
     options = CampusWalkOptions("medium", "64k", lightmaps=False)
     alone = simulate_campus(place, options.qualities[0], options)
     assert np.array_equal(run.error, alone.error)
@@ -54,14 +54,16 @@ def test_the_same_walk(place: CampusWorld, world: World) -> None:
 
 def test_what_presets_and_memory_are_worth(place: CampusWorld, world: World) -> None:
     link = Conditions(4e6)
-    whole = {n: walk_beside(place, world, p, link, None) for n, p in CAMPUS_POLICIES.items()}
+    whole = {
+        n: measure_campus_walk(place, world, p, link, None) for n, p in CAMPUS_POLICIES.items()
+    }
     low, ultra, cached = (whole[f"campus-{n}"] for n in ("low", "ultra", "ultra-cached"))
     assert ultra[0].error[-1] < low[0].error[-1]
     assert low[1].bytes < ultra[1].bytes
     assert cached[1].bytes == 0
     assert ultra[1].final[0] is not None
     half = int(ultra[0].memory.max()) // 2
-    short, measures = walk_beside(place, world, CAMPUS_POLICIES["campus-ultra"], link, half)
+    short, measures = measure_campus_walk(place, world, CAMPUS_POLICIES["campus-ultra"], link, half)
     assert short.memory.max() <= half == short.budget
     assert measures.overruns == 0
     assert measures.e.mean > ultra[1].e.mean
@@ -70,7 +72,7 @@ def test_what_presets_and_memory_are_worth(place: CampusWorld, world: World) -> 
 def test_who_has_nothing(place: CampusWorld, world: World) -> None:
     """Over a link that brings nothing e stays what it is of nothing: no share is ever reached."""
     policy = CAMPUS_POLICIES["campus-low"]
-    run, measures = walk_beside(place, world, policy, Conditions(1.0), None)
+    run, measures = measure_campus_walk(place, world, policy, Conditions(1.0), None)
     assert measures.final == (None, None, None)
     assert run.error.min() > 5
 

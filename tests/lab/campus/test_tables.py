@@ -23,7 +23,7 @@ from ptmtools.lab.campus import (
     walk_campus,
 )
 from ptmtools.lab.campus.stock import mip_levels, read_surfaces, read_textures
-from ptmtools.lab.campus.world import COARSE, FINE, NOTHING, Full, Tables, look
+from ptmtools.lab.campus.world import COARSE, FINE, NOTHING, FullPicture, Tables, look
 from ptmtools.lab.walk import Walk
 from ptmtools.neighbours.campus import read_campus
 from ptmtools.neighbours.campus.meshes import read_mesh
@@ -200,14 +200,14 @@ def test_another_full_picture(folder: Path, world: CampusWorld) -> None:
     small, middle, large = (read_textures(folder, stock, size) for size in SIZES)
     sizes = small, middle, large
     poses, own = (CAMERA, EYES, LOOKS), tables(world)
-    same = look(Full(replace(finest), large), finest, coarsest, sizes, *poses)
+    same = look(FullPicture(replace(finest), large), finest, coarsest, sizes, *poses)
     mesh, column = np.full(stock.objects, COARSE), np.full(len(stock.bases), 2)
     for frame in range(4):
         found = same.wrong(frame, mesh, column)
         assert found == own.wrong(int(world.view[frame]), mesh, column)
     # What the campus does not have at all is wrong in every run.
     nothing = read_surfaces(folder, replace(stock, campus=replace(stock.campus, objects=())), 0)
-    empty = look(Full(finest, large), nothing, nothing, sizes, *poses)
+    empty = look(FullPicture(finest, large), nothing, nothing, sizes, *poses)
     none = np.zeros(0, np.int64)
     picture = Picture(folder, -1)
     for frame in range(4):

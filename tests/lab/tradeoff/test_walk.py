@@ -16,8 +16,14 @@ from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
 from ptmtools.lab.tables import look
 from ptmtools.lab.tradeoff.knobs import KNOBS, build_again, concerned, copied, own_options, settings
-from ptmtools.lab.tradeoff.report import said, sentence, settings_table as table, telling, trades
-from ptmtools.lab.tradeoff.walk import Seen, Tried, WalkTrade, begins_with, compared
+from ptmtools.lab.tradeoff.report import (
+    representative,
+    sentence,
+    sentences,
+    settings_table as table,
+    trades,
+)
+from ptmtools.lab.tradeoff.walk import WalkOutcome, WalkTrade, WalkTrial, begins_with, compared
 from ptmtools.lab.walk import Walk, read_walk
 from ptmtools.lab.world import World, prepare
 from ptmtools.output import EmitOptions
@@ -70,17 +76,17 @@ def built(db: Path, **changed):
     return read_served(db)
 
 
-def seen(e: float, bandwidth: float | None = 4e6, policy: str = "best", **more) -> Seen:
-    return replace(Seen(policy, bandwidth, "10%", e, 3 * e, 10**6, 1.5), **more)
+def seen(e: float, bandwidth: float | None = 4e6, policy: str = "best", **more) -> WalkOutcome:
+    return replace(WalkOutcome(policy, bandwidth, "10%", e, 3 * e, 10**6, 1.5), **more)
 
 
-OWN = Tried("", "", "", 20.0, 10**7, (seen(2.0, 512e3), seen(1.0)))
+OWN = WalkTrial("", "", "", 20.0, 10**7, (seen(2.0, 512e3), seen(1.0)))
 
 
-def tried(name: str, *es: float, build: float = 20.0, served: int = 10**7) -> Tried:
+def tried(name: str, *es: float, build: float = 20.0, served: int = 10**7) -> WalkTrial:
     option = name.split()[0]
     both = (seen(es[0], 512e3), seen(es[1]))
-    return Tried(name, f"{option} 0", option, build, served, both)
+    return WalkTrial(name, f"{option} 0", option, build, served, both)
 
 
 def test_a_sentence_tells_what_is_saved_and_what_is_seen() -> None:
@@ -105,16 +111,18 @@ def test_who_sees_nothing_is_told_so() -> None:
 
 def test_a_knob_of_some_clients_names_them() -> None:
     own = replace(OWN, seen=(*OWN.seen, seen(3.0, policy="ach")))
-    rough = Tried("--samples 1", "--samples 8", "--samples", 20, 10**7, (seen(3.3, policy="ach"),))
+    rough = WalkTrial(
+        "--samples 1", "--samples 8", "--samples", 20, 10**7, (seen(3.3, policy="ach"),)
+    )
     text = sentence(rough, WalkTrade(60.0, own, (rough,)))
     told = "the picture to the client ach is worse by 10 % at 4 Mbit/s (e 3.00 → 3.30)."
     assert text.endswith(told)
 
 
 def test_what_cannot_be_built_says_why() -> None:
-    failed = Tried("--cells leaf", "--cells room", "--cells", 0, 0, problem="is too much")
+    failed = WalkTrial("--cells leaf", "--cells room", "--cells", 0, 0, problem="is too much")
     trade = WalkTrade(60.0, OWN, (failed,))
-    assert said(trade) == ["--cells leaf cannot be tried: is too much."]
+    assert sentences(trade) == ["--cells leaf cannot be tried: is too much."]
     assert table(trade)[-1] == "--cells leaf: is too much"
 
 
@@ -128,7 +136,7 @@ def test_of_a_knob_the_best_is_told_then_what_saves_most_then_what_loses_least()
         ((worst, alike, cheap, bad), cheap),
         ((worst, bad), bad),
     ):
-        assert telling(some, OWN) is told
+        assert representative(some, OWN) is told
 
 
 def test_the_table_has_a_block_for_each_walker_and_the_cheapest() -> None:
