@@ -177,4 +177,4 @@ _LIST = (
 #: Policies by name.
 POLICIES = {policy.name: policy for policy in _LIST}
 
-__all__ = ["POLICIES", "Declared", "Knows"]
+__all__ = ["POLICIES", "Knowledge", "PolicyEntry"]

@@ -8,7 +8,7 @@ import io
 import pytest
 from hypothesis import given, strategies as st
 
-from ptmtools.lab.tradeoff.experiment import Measured, Setting, Trial, pareto, rates, run
+from ptmtools.lab.tradeoff.experiment import Measurement, Setting, Trial, pareto, rates, run
 from ptmtools.lab.tradeoff.report import as_csv, table
 
 
@@ -28,7 +28,7 @@ class Made:
     def measure(self, setting):
         steps = setting.knobs["steps"]
         seconds = steps * setting.knobs.get("times", 1)
-        return Measured(seconds, steps, steps**-0.5, 2 * steps**-0.5)
+        return Measurement(seconds, steps, steps**-0.5, 2 * steps**-0.5)
 
 
 def test_an_experiment():
@@ -61,7 +61,7 @@ def test_errors_below_twice_that_of_the_reference_fit_no_rate():
 )
 def test_the_front_is_what_no_other_sound_trial_beats(points):
     trials = [
-        Trial(Setting(str(i), {}, sound=sound), Measured(cost, 1, error, error))
+        Trial(Setting(str(i), {}, sound=sound), Measurement(cost, 1, error, error))
         for i, (cost, error, sound) in enumerate(points)
     ]
     found = pareto(trials)
@@ -77,7 +77,7 @@ def test_the_front_is_what_no_other_sound_trial_beats(points):
 
 
 def test_two_trials_of_a_family_have_no_rate():
-    trials = [Trial(Setting(str(n), {}, "f"), Measured(n, n, 1 / n, 1 / n)) for n in (1, 2)]
+    trials = [Trial(Setting(str(n), {}, "f"), Measurement(n, n, 1 / n, 1 / n)) for n in (1, 2)]
     assert rates(trials, 0) == {}
 
 

@@ -12,7 +12,7 @@ from ptmtools.errors import InputError, LimitError
 from ptmtools.executor import Executor
 from ptmtools.neighbours.apo import blocks
 from ptmtools.neighbours.apo.blocks import Surface
-from ptmtools.neighbours.apo.making import Made, make_apo, welded
+from ptmtools.neighbours.apo.making import ApoTexture, make_apo, welded
 from ptmtools.neighbours.apo.model import ApoOptions
 from ptmtools.neighbours.apo.normals import corner_normals
 from ptmtools.neighbours.apo.octree import fault_of
@@ -24,18 +24,18 @@ from tests.neighbours.apo.meshes import scene_of, sphere, square
 OPTIONS = ApoOptions(faces=500, depth=9, error=0.1)
 
 
-def made(points: np.ndarray, triangles: np.ndarray, options: ApoOptions = OPTIONS) -> Made:
+def made(points: np.ndarray, triangles: np.ndarray, options: ApoOptions = OPTIONS) -> ApoTexture:
     found = make_apo(scene_of(points, triangles), options, Executor())
     assert fault_of(found.octree) is None
     return found
 
 
 @pytest.fixture(scope="module")
-def ball() -> Made:
+def ball() -> ApoTexture:
     return made(*sphere(5, 0.03))
 
 
-def angles(found: Made, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def angles(found: ApoTexture, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Degrees between normals and those that the octree has at points of the simplified mesh."""
     q = (points - found.octree.low) / found.octree.side
     cosine = np.einsum("ij,ij->i", look_up(found.octree, q).normals, normals)
@@ -111,7 +111,9 @@ def test_size_and_place_change_nothing(scale: float, away: float) -> None:
     assert np.array_equal(here.octree.texels, there.octree.texels)
 
 
-def test_the_number_of_workers_changes_nothing(ball: Made, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_number_of_workers_changes_nothing(
+    ball: ApoTexture, monkeypatch: pytest.MonkeyPatch
+) -> None:
     scene = scene_of(*sphere(5, 0.03))
     with open_executor(2) as executor:
         other = make_apo(scene, OPTIONS, executor)

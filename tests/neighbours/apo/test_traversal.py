@@ -107,7 +107,7 @@ def test_points_outside_count_as_the_nearest_within() -> None:
 
 
 def test_there_must_be_a_level() -> None:
-    with pytest.raises(ValueError, match="no level"):
+    with pytest.raises(ValueError, match="at least one level"):
         look_up(octree_of(SMALL), np.zeros((1, 3)), levels=0)
 
 
