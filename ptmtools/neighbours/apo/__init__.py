@@ -24,7 +24,7 @@ __getattr__ = lazy_exports(
     __name__,
     {
         "ptmtools.neighbours.apo.files": "files_of read_mesh read_octree",
-        "ptmtools.neighbours.apo.making": "Made make_apo",
+        "ptmtools.neighbours.apo.making": "ApoTexture make_apo",
         "ptmtools.neighbours.apo.model": "ApoOptions Octree",
     },
 )
