@@ -40,12 +40,12 @@ from ptmtools.lab.policies import POLICIES, PolicyEntry
 from ptmtools.lab.policies.whole_files import GpuiiClient
 from ptmtools.lab.report import link_text
 from ptmtools.lab.simulation import simulate
-from ptmtools.lab.walk import read_walk
 from ptmtools.lab.world import World, prepare, read_forms
 from ptmtools.link import Conditions
 from ptmtools.output.served import read_served
 from ptmtools.quantities import size
 from ptmtools.rendering.pyramids import read_pyramids
+from ptmtools.walk import read_walk
 
 FOLDER = ROOT / "build/bench/neighbours"
 #: Those that take `.ptm`s, and the neighbouring systems; a row each.

@@ -25,11 +25,11 @@ from ptmtools.lab.comparing import budget_of
 from ptmtools.lab.forms import PTM
 from ptmtools.lab.policies import POLICIES
 from ptmtools.lab.simulation import simulate
-from ptmtools.lab.walk import Walk, read_walk
 from ptmtools.lab.world import RATE, World, prepare
 from ptmtools.link import Conditions
 from ptmtools.output.served import read_served
 from ptmtools.quantities import parse_memory
+from ptmtools.walk import Walk, read_walk
 
 #: The policies that take `.ptm`s.
 OURS = [name for name, policy in POLICIES.items() if policy.form == PTM]

@@ -44,13 +44,13 @@ from ptmtools.lab.forms import PTM
 from ptmtools.lab.measures import STANDS, measure
 from ptmtools.lab.policies import POLICIES
 from ptmtools.lab.simulation import simulate
-from ptmtools.lab.walk import read_walk
 from ptmtools.lab.world import World, prepare
 from ptmtools.link import Conditions
 from ptmtools.output.served import Served, read_served
 from ptmtools.quantities import parse_bandwidth, parse_memory
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.records import Pyramids
+from ptmtools.walk import read_walk
 
 BANDWIDTHS = ("56k", "512k", "4M", "16M")
 MEMORIES = ("4MiB", "10%", "30%")

@@ -30,12 +30,12 @@ from benchmarks.web_rivals.packages import KTX2
 from ptmtools.lab.allocation import allocate
 from ptmtools.lab.measures import flip
 from ptmtools.lab.renderer import Renderer
-from ptmtools.lab.walk import Walk
 from ptmtools.lab.world import World, prepare
 from ptmtools.output.served import Served
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.records import Pyramids
 from ptmtools.scene.model import Scene
+from ptmtools.walk import Walk
 
 WIDTH, HEIGHT, _SAMPLES = 320, 240, 3
 #: Of 4 × 4 texels.

@@ -127,8 +127,8 @@ def plot(
     """Draw the floor plan of DB, storey by storey: cells, portals, and the cells that
     are visible from --cell.
     """
-    from ptmtools.lab.walk import read_walk
     from ptmtools.output import plot_plan
+    from ptmtools.walk import read_walk
 
     walked = read_walk(walk) if walk is not None else None
     options = take(PlotOptions, values)

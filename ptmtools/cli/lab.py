@@ -31,7 +31,6 @@ from ptmtools.lab.path.making import Path as WalkPath, path_through
 from ptmtools.lab.path.options import PathOptions
 from ptmtools.lab.policies.paper import PaperOptions
 from ptmtools.lab.report import as_csv, document, table
-from ptmtools.lab.walk import Walk, read_walk, walk_text
 from ptmtools.lab.world import prepare, read_forms, relief_of
 from ptmtools.link import read_trace
 from ptmtools.options import arguments
@@ -42,6 +41,7 @@ from ptmtools.pipeline.command import open_database
 from ptmtools.quantities import count
 from ptmtools.rendering.light import lit
 from ptmtools.rendering.pyramids import read_pyramids
+from ptmtools.walk import Walk, read_walk, walk_text
 
 #: Rooms that are listed without ``-v``.
 SHOWN = 12

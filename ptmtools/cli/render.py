@@ -21,9 +21,9 @@ from ptmtools.cli.parameters import (
     with_console,
 )
 from ptmtools.errors import OutputError
-from ptmtools.lab.drawing import ViewOptions, draw_view
 from ptmtools.neighbours.apo.picture import RenderOptions
 from ptmtools.quantities import count
+from ptmtools.rendering.drawing import ViewOptions, draw_view
 
 
 @click.command("render", cls=Command)

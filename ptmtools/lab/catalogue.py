@@ -17,10 +17,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints, normals
-from ptmtools.lab.walk import Browser
 from ptmtools.output.served import Document, Served
 from ptmtools.scene.colors import gradients
 from ptmtools.texture.model import gpu_texel_bytes
+from ptmtools.walk import Browser
 
 
 class Columns(NamedTuple):

@@ -68,7 +68,7 @@ class Renderer:
         shown = np.empty((len(sight.ray), 3))
         shade(sight, self._triangles, shows, loaded, column, shown)
         if self._world.relief:
-            from ptmtools.lab.relief.kernels import relieve
+            from ptmtools.rendering.relief import relieve
 
             octrees, first = self._world.relief.octrees, len(self._world.pyramids.levels)
             held = column[first : first + octrees.number]

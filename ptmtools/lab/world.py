@@ -18,15 +18,15 @@ from ptmtools.lab.catalogue import Catalogue, catalogue_of
 from ptmtools.lab.forms import FORMS, PTM
 from ptmtools.lab.relief.tables import Relief
 from ptmtools.lab.tables import Views, look_at_forms
-from ptmtools.lab.walk import Browser
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress, silent
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.rays import Camera, Frustum
 from ptmtools.rendering.records import Pyramids, Shows
+from ptmtools.walk import Browser
 
 if TYPE_CHECKING:
-    from ptmtools.lab.walk import Walk
+    from ptmtools.walk import Walk
 
 #: Evaluated frames per second.
 RATE = 5.0
@@ -286,8 +286,8 @@ def relief_of(
     InputError: PTM-I700 the other database has other textures.
     DatabaseError: those of `read_octrees` and `read_pyramids`.
     """
-    from ptmtools.lab.relief.octrees import no_octrees, read_octrees
     from ptmtools.lab.relief.tables import Reference
+    from ptmtools.rendering.octrees import no_octrees, read_octrees
 
     if against is None and not lit:
         return None

@@ -7,17 +7,12 @@ multiplies colours as sRGB encodes them, as the rest of the simulator does.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, normals
 from ptmtools.output.served import Served
-
-if TYPE_CHECKING:
-    pass
-
 
 #: Share of the light that comes from everywhere, and a unit vector towards the lamp.
 AMBIENT = 0.3

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from ptmtools.cli.main import main
-from ptmtools.lab.walk import read_walk
+from ptmtools.walk import read_walk
 from tests.conftest import files_below
 
 TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data/two_rooms/two_rooms.obj"

@@ -18,8 +18,8 @@ from ptmtools.errors import InputError
 from ptmtools.lab.path.ground import GRID, Ground, Obstacles, grid_points, over_floors
 from ptmtools.lab.path.making import Path as Made, make_path
 from ptmtools.lab.path.options import PathOptions
-from ptmtools.lab.walk import Walk, parse_walk, walk_text
 from ptmtools.scene import Scene, ingest
+from ptmtools.walk import Walk, parse_walk, walk_text
 from tests.cells.buildings import Made as Building
 from tests.cells.made_buildings import HEIGHTS, TWO_ROOMS
 from tests.cells.made_doors import LEAF

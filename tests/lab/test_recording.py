@@ -16,9 +16,9 @@ from ptmtools.errors import InputError
 from ptmtools.lab.client import Client, Kind
 from ptmtools.lab.policies import POLICIES
 from ptmtools.lab.simulation import simulate
-from ptmtools.lab.walk import Waits, Walk, parse_walk
 from ptmtools.lab.world import World, prepare
 from ptmtools.link import Conditions
+from ptmtools.walk import Waits, Walk, parse_walk
 from tests.lab.worlds import SEEDS, any_world
 
 #: Seconds from navigation to the first frame.

@@ -22,19 +22,19 @@ from ptmtools.lab.comparing import SimulateOptions, budget_of, play, require_hin
 from ptmtools.lab.network import Link, Request
 from ptmtools.lab.policies import POLICIES, PolicyEntry
 from ptmtools.lab.policies.apo import ApoClient
-from ptmtools.lab.relief.kernels import descend, lamp, stop_of
-from ptmtools.lab.relief.octrees import Octrees, no_octrees, read_octrees
 from ptmtools.lab.relief.stock import without_octrees
 from ptmtools.lab.renderer import Renderer
 from ptmtools.lab.simulation import Run, simulate
-from ptmtools.lab.walk import read_walk
 from ptmtools.lab.world import World, prepare, relief_of
 from ptmtools.link import Conditions
 from ptmtools.neighbours.apo.traversal import look_up, stop_depth
 from ptmtools.output.served import Served, read_served
 from ptmtools.rendering.light import AMBIENT, lamps, lit
+from ptmtools.rendering.octrees import Octrees, no_octrees, read_octrees
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.rays import Camera
+from ptmtools.rendering.relief import descend, lamp, stop_of
+from ptmtools.walk import read_walk
 from tests.lab.conftest import Ptm
 from tests.lab.worlds import SEEDS, catalogue, raw
 from tests.neighbours.apo.building import Node, nodes, octree_of

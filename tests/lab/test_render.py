@@ -11,8 +11,8 @@ from PIL import Image
 
 from ptmtools.cli.main import main
 from ptmtools.errors import InputError
-from ptmtools.lab.drawing import ViewOptions, draw_view, eye_of
 from ptmtools.output.served import read_served
+from ptmtools.rendering.drawing import ViewOptions, draw_view, eye_of
 
 SMALL = ["--width", "96", "--height", "54"]
 

@@ -13,10 +13,10 @@ import pytest
 
 from ptmtools.errors import DatabaseError, LimitError
 from ptmtools.lab.report import rate_text
-from ptmtools.lab.walk import Walk
 from ptmtools.lab.world import prepare
 from ptmtools.output.served import read_served
 from ptmtools.rendering.pyramids import read_pyramids
+from ptmtools.walk import Walk
 
 Change = Callable[[Any], object]
 

@@ -16,9 +16,9 @@ from ptmtools.lab.forms import PTM
 from ptmtools.lab.policies import POLICIES, PolicyEntry
 from ptmtools.lab.report import COLUMNS, table
 from ptmtools.lab.simulation import simulate
-from ptmtools.lab.walk import Walk, walk_text
 from ptmtools.lab.world import World
 from ptmtools.link import Conditions
+from ptmtools.walk import Walk, walk_text
 from tests.lab.conftest import Ptm
 
 ALL = [p for p in POLICIES.values() if p.needs is None and p.form == PTM]

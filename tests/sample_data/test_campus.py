@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ptmtools.lab.walk import read_walk
 from ptmtools.scene import IngestOptions, ingest
+from ptmtools.walk import read_walk
 
 SAMPLE_DATA = Path(__file__).resolve().parents[2] / "sample_data"
 #: One building of each third of the way.

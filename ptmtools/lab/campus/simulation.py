@@ -25,12 +25,12 @@ from ptmtools.lab.campus.world import COARSE, FINE, NOTHING, CampusWorld, prepar
 from ptmtools.lab.measures import STANDS, Measures, measure, seconds_to
 from ptmtools.lab.network import Link
 from ptmtools.lab.simulation import Run
-from ptmtools.lab.walk import Walk
 from ptmtools.lab.world import World
 from ptmtools.link import Conditions, Trace
 from ptmtools.neighbours.campus.model import SIZES, Quality
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress, silent
+from ptmtools.walk import Walk
 
 #: Shortest interval without requests that counts as a pause, s.
 PAUSE = 1.0

@@ -29,7 +29,6 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, Ints, Singles
 from ptmtools.errors import InputError, LimitError
 from ptmtools.lab.campus.stock import Stock, read_stock, read_surfaces, read_textures
-from ptmtools.lab.walk import Walk
 from ptmtools.lab.world import MOST_FRAMES, PIXELS, RATE
 from ptmtools.neighbours.campus.model import SIZES
 from ptmtools.output.served import Served, Surfaces
@@ -37,6 +36,7 @@ from ptmtools.progress import Progress, silent
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.rendering.records import Pyramids, triangles_of
+from ptmtools.walk import Walk
 
 #: Display state of an object.
 NOTHING, COARSE, FINE = range(3)

@@ -20,13 +20,13 @@ from ptmtools.lab.path.ground import ABOUT, Ground, Obstacles, over_floors
 from ptmtools.lab.path.motion import Motion, Smoother, directions
 from ptmtools.lab.path.options import PathOptions
 from ptmtools.lab.path.tour import Leg, Views, middles_of, tour
-from ptmtools.lab.walk import DIGITS, Walk
 from ptmtools.output.names import HINTS
 from ptmtools.output.served import read_index
 from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.stages import APO, CELLS
 from ptmtools.scene.model import Scene
 from ptmtools.store.layout import SERVED
+from ptmtools.walk import DIGITS, Walk
 
 Triple = tuple[float, float, float]
 #: Cell, position in metres, and unit direction of each viewpoint.

@@ -5,17 +5,28 @@ from __future__ import annotations
 import numpy as np
 
 from ptmtools.arrays import Floats
-from ptmtools.lab.catalogue import LEAST, Catalogue, Columns, Shapes
-from ptmtools.lab.relief.octrees import Octrees, octree_columns
+from ptmtools.lab.catalogue import LEAST, Catalogue, Columns, Shapes, aligned
 from ptmtools.output.served import Served
+from ptmtools.rendering.octrees import Octrees
 
 #: Number of points of each object at which the levels of its octree are compared, and the seed of
 #: their places.
 _POINTS, _SEED = 4096, 1
-
-
+#: Bytes of a texel in texture memory.
+_TEXEL = 4
 #: Brightness of the lit surface in the comparison, 0 to 255.
 _BRIGHT = 255 * 0.7
+
+
+def octree_columns(served: Served) -> Columns:
+    """The columns of each octree: a column is a level, its size the number of nodes along a
+    side."""
+    rows = []
+    for row in served.index.get("octrees", ()):
+        across = 1 << np.arange(len(row["levels"]))
+        memory = np.cumsum(row["levels"]) * _TEXEL
+        rows.append((row["ends"], memory, np.stack([across, across], axis=1)))
+    return aligned(rows)
 
 
 def without_octrees(stock: Catalogue, octrees: Octrees) -> Catalogue:
@@ -47,7 +58,7 @@ def _with_empty(stock: Catalogue, count: int, octrees: Octrees) -> Catalogue:
 def differences(served: Served, octrees: Octrees, columns: Columns) -> Floats:
     """(O, K) mean difference of each level to the one before, over the object as displayed, 0 to
     255. hints.json does not hold them; its writer could."""
-    from ptmtools.lab.relief.kernels import DEEP, descend
+    from ptmtools.rendering.relief import DEEP, descend
 
     result = np.zeros(columns.ends.shape)
     random, surfaces = np.random.default_rng(_SEED), served.surfaces

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles
-from ptmtools.lab.relief.octrees import Octrees
 from ptmtools.output.served import Surfaces
 from ptmtools.rendering.light import lamps
+from ptmtools.rendering.octrees import Octrees
 from ptmtools.rendering.rays import Caster
 from ptmtools.rendering.records import Pyramids, Sight, Triangles, own_levels, triangles_of
 

@@ -31,7 +31,6 @@ from ptmtools.lab.tradeoff.knobs import (
     own_options,
     settings,
 )
-from ptmtools.lab.walk import Walk
 from ptmtools.lab.world import World, prepare
 from ptmtools.options import option
 from ptmtools.output.served import Served, Surfaces, read_served
@@ -40,6 +39,7 @@ from ptmtools.pipeline.warm_up import warm_building
 from ptmtools.progress import Progress, silent
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.records import Pyramids
+from ptmtools.walk import Walk
 
 #: Share of the full picture whose time is reported.
 FIRST = 0.9

@@ -127,7 +127,7 @@ def _ones(mask: int) -> int:
 
 
 @plain_kernel
-def child_of(texel: NDArray[np.uint8], address: int, child: int) -> int:
+def _child_of(texel: NDArray[np.uint8], address: int, child: int) -> int:
     """The address of child 0 to 7 of the node at an address of (n, 4) texels; -1 if absent."""
     count = np.int64(len(texel))
     present = int(np.int64(texel[address, 3]))
@@ -143,20 +143,29 @@ def child_of(texel: NDArray[np.uint8], address: int, child: int) -> int:
 
 
 @plain_kernel
+def child_at(
+    texel: NDArray[np.uint8], address: int, x: float, y: float, z: float
+) -> tuple[int, float, float, float]:
+    """The address of the child around a point of a node at an address of (n, 4) texels, -1 if it is
+    absent, and the coordinates of the point in the child; those of a cube are 0 to below 1."""
+    x, y, z = 2.0 * x, 2.0 * y, 2.0 * z
+    child = 0
+    if x >= 1.0:
+        child, x = child + 1, x - 1.0
+    if y >= 1.0:
+        child, y = child + 2, y - 1.0
+    if z >= 1.0:
+        child, z = child + 4, z - 1.0
+    return _child_of(texel, address, child), x, y, z
+
+
+@plain_kernel
 def _walk(texel: NDArray[np.uint8], q: Floats, limit: Ints, at: Ints, deep: Ints) -> None:
     for i in range(len(q)):
         x, y, z = q[i, 0], q[i, 1], q[i, 2]
         address, depth = 0, 0
         while depth < limit[i]:
-            x, y, z = 2 * x, 2 * y, 2 * z
-            child = 0
-            if x >= 1:
-                child, x = child + 1, x - 1
-            if y >= 1:
-                child, y = child + 2, y - 1
-            if z >= 1:
-                child, z = child + 4, z - 1
-            next_address = child_of(texel, address, child)
+            next_address, x, y, z = child_at(texel, address, x, y, z)
             if next_address < 0:
                 break
             address = next_address

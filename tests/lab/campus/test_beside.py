@@ -14,12 +14,12 @@ from ptmtools.errors import InputError
 from ptmtools.lab.campus import CampusWalkOptions, prepare_campus, simulate_campus
 from ptmtools.lab.campus.simulation import CAMPUS_POLICIES, measure_campus_walk
 from ptmtools.lab.campus.world import CampusWorld
-from ptmtools.lab.walk import read_walk
 from ptmtools.lab.world import World
 from ptmtools.link import Conditions
 from ptmtools.neighbours.campus import CampusOptions, make_campus
 from ptmtools.output.served import read_served
 from ptmtools.scene import IngestOptions
+from ptmtools.walk import read_walk
 from tests.lab.test_recording import document, parsed
 
 SLOW = Conditions(64_000.0)

@@ -9,7 +9,7 @@ import pytest
 
 from ptmtools import schemas
 from ptmtools.cli.main import main
-from ptmtools.lab.walk import Walk, walk_text
+from ptmtools.walk import Walk, walk_text
 
 
 @pytest.fixture(scope="module")

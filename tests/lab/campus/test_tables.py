@@ -24,11 +24,11 @@ from ptmtools.lab.campus import (
 )
 from ptmtools.lab.campus.stock import mip_levels, read_surfaces, read_textures
 from ptmtools.lab.campus.world import COARSE, FINE, NOTHING, FullPicture, Tables, look
-from ptmtools.lab.walk import Walk
 from ptmtools.neighbours.campus import read_campus
 from ptmtools.neighbours.campus.meshes import read_mesh
 from ptmtools.neighbours.campus.model import SIZES
 from ptmtools.rendering.rays import Camera
+from ptmtools.walk import Walk
 
 PIXELS = (16, 9)
 #: At each of them one looks at houses and the dome, past a house, down at the lawn, at nothing.

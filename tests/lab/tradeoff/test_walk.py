@@ -24,7 +24,6 @@ from ptmtools.lab.tradeoff.report import (
     trades,
 )
 from ptmtools.lab.tradeoff.walk import WalkOutcome, WalkTrade, WalkTrial, begins_with, compared
-from ptmtools.lab.walk import Walk, read_walk
 from ptmtools.lab.world import World, prepare
 from ptmtools.output import EmitOptions
 from ptmtools.output.served import read_served
@@ -33,6 +32,7 @@ from ptmtools.pipeline.build import run_stage
 from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.stages import EMIT, TEXTURES
 from ptmtools.rendering.pyramids import read_pyramids
+from ptmtools.walk import Walk, read_walk
 from tests.conftest import files_below
 
 TWO_ROOMS = Path(__file__).resolve().parents[3] / "sample_data/two_rooms/two_rooms.obj"

@@ -1,6 +1,6 @@
 """A walk: position and view direction of a visitor's eye over time.
 
-Walks are made (`ptmtools.lab.path`) or recorded from visitors, at any rate and not always evenly.
+`ptm path` makes walks, and the page records those of visitors, at any rate and not always evenly.
 Both are the same JSON document with a published schema (docs/design/walkthrough.md).
 
 A recording in a browser also holds its conditions, so that a simulated client can repeat it: the

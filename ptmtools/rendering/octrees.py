@@ -1,4 +1,4 @@
-"""The octree textures of a served folder as arrays for kernels and clients."""
+"""The octree textures of a served folder as arrays for kernels."""
 
 from __future__ import annotations
 
@@ -11,12 +11,8 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import DatabaseError, InputError
-from ptmtools.lab.catalogue import Columns, aligned
 from ptmtools.output.names import HINTS
 from ptmtools.output.served import BUILD, Served, Surfaces
-
-#: Bytes of a texel in texture memory.
-_TEXEL = 4
 
 
 class Octrees(NamedTuple):
@@ -76,17 +72,6 @@ def no_octrees(surfaces: Surfaces) -> Octrees:
     return Octrees(
         np.zeros((0, 4), np.uint8), np.zeros(1, np.int64), no, np.zeros((0, 3)), np.zeros(0), of
     )
-
-
-def octree_columns(served: Served) -> Columns:
-    """The columns of each octree: a column is a level, its size the number of nodes along a
-    side."""
-    rows = []
-    for row in _rows(served):
-        across = 1 << np.arange(len(row["levels"]))
-        memory = np.cumsum(row["levels"]) * _TEXEL
-        rows.append((row["ends"], memory, np.stack([across, across], axis=1)))
-    return aligned(rows)
 
 
 def _rows(served: Served) -> Sequence[Mapping[str, Any]]:

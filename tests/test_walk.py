@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ptmtools import schemas
+from ptmtools import schemas, walk as module
 from ptmtools.errors import InputError, LimitError
-from ptmtools.lab import walk as module
-from ptmtools.lab.walk import Walk, parse_walk, read_walk, walk_text
+from ptmtools.walk import Walk, parse_walk, read_walk, walk_text
 
 ROWS = [[0, 1, 1.6, -2, 1, 0, 0], [0.5, 1, 1.6, -1, 0, 0, 1], [1.75, 3, 1.7, -1, 0, 0.6, 0.8]]
 

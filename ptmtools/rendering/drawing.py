@@ -136,9 +136,9 @@ def draw_view(
     InputError: PTM-I111 there is no such viewpoint.
     DatabaseError, LimitError: those of `read_pyramids` and `read_octrees`.
     """
-    from ptmtools.lab.relief.octrees import read_octrees
     from ptmtools.rendering.kernels import shade
     from ptmtools.rendering.light import lamps, lit
+    from ptmtools.rendering.octrees import read_octrees
     from ptmtools.rendering.pyramids import read_pyramids
 
     eye = eye_of(served, options)
@@ -165,7 +165,7 @@ def draw_view(
     loaded = np.ones(served.cell_count, dtype=np.bool_)
     shade(sight, triangles, own_levels(pyramids), loaded, column, shown)
     if options.lit:
-        from ptmtools.lab.relief.kernels import relieve
+        from ptmtools.rendering.relief import relieve
 
         octrees = read_octrees(served)
         relieve(sight, triangles, lamps(surfaces.corner), octrees, loaded, octrees.levels, shown)
