@@ -44,7 +44,7 @@ def read_toy(path: str, data: bytes) -> int | None:
 def check_toy(database: ServedDatabase) -> Mapping[str, int]:
     cells = [path for path in database.contents if path.startswith("toys/")]
     if database.contents.get("toy.txt") != len(cells):
-        database.at("toy.txt").add("PTM-D730", "counts other cells than there are")
+        database.at("toy.txt").add("PTM-D699", "counts other cells than there are")
     return {"shapes": sum(database.contents[path] for path in cells)}
 
 
@@ -74,7 +74,7 @@ def test_a_toy_emitter(
     assert disagreements(db / "www") == []
     (db / "www/toys/3.txt").write_text("7 shapes\n")
     seal(db)
-    assert {issue.code for issue in validate_database(db).issues} == {"PTM-D730"}
+    assert {issue.code for issue in validate_database(db).issues} == {"PTM-D699"}
 
 
 @pytest.mark.usefixtures("toy")

@@ -710,8 +710,8 @@ def test_a_stale_stage(database: Path) -> None:
     [
         (lambda path: path.write_bytes(b"arrays"), set()),
         (lambda path: None, {"PTM-D651"}),
-        (lambda path: path.mkdir(), {"PTM-D654"}),
-        (lambda path: os.mkfifo(path), {"PTM-D654"}),
+        (lambda path: path.mkdir(), {"PTM-D651"}),
+        (lambda path: os.mkfifo(path), {"PTM-D651"}),
     ],
 )
 def test_files_that_are_not_served(database: Path, there: Damage, expected: set[str]) -> None:

@@ -153,7 +153,7 @@ class FileReader:
             at.add("PTM-D651", "missing")
             return reading
         except OSError as fault:
-            at.add("PTM-D654", f"cannot be read ({fault.strerror or fault})")
+            at.add("PTM-D651", f"cannot be read ({fault.strerror or fault})")
             return reading
         reading.size = size
         reading.intact = self.outputs.get(name) == digest

@@ -54,7 +54,7 @@ def served_files(folder: Path, findings: Findings) -> list[str]:
             continue
         except OSError as fault:
             message = f"cannot be read ({fault.strerror or fault})"
-            findings.at(f"{SERVED}/{below}").add("PTM-D654", message)
+            findings.at(f"{SERVED}/{below}").add("PTM-D651", message)
             continue
         for entry in entries:
             path = f"{below}{entry.name}"

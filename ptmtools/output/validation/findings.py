@@ -16,10 +16,9 @@ CODES: dict[str, tuple[Severity, str]] = {
         "error",
         "the manifest is missing or damaged, or records options that a stage cannot have",
     ),
-    "PTM-D651": ("error", "a file of the database is missing"),
+    "PTM-D651": ("error", "a file of the database is missing or cannot be read"),
     "PTM-D652": ("error", "the hash of a file differs from the manifest: the file was changed"),
     "PTM-D653": ("warning", "a file in a folder of ptmtools that no stage wrote"),
-    "PTM-D654": ("error", "a file cannot be read"),
     "PTM-D655": ("warning", "the database is not finished: the stage `emit` has not run"),
     "PTM-D656": (
         "error",
@@ -36,7 +35,7 @@ CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D692": ("error", "ach values are outside 0 to 1, do not sum to 1, or are not aligned"),
     "PTM-D699": (
         "error",
-        "the manifest, the root file, the cells and the records contradict each other",
+        "the manifest, the root file, the cells, the GLBs and the records contradict each other",
     ),
     "PTM-D700": ("error", "the hints do not match their schemas, or contradict each other"),
     "PTM-D703": (
@@ -51,12 +50,11 @@ CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D710": ("error", "a texture file is damaged, or its fallback or interlaced image differs"),
     "PTM-D713": TOO_LARGE,
     "PTM-D720": ("error", "the arrays of a stage cannot be read, or do not fit other stages"),
-    "PTM-D730": ("error", "the GLBs do not match the cells"),
     "PTM-D731": ("error", "a GLB is damaged, or not in the emission pattern"),
 }
 
 #: Codes of changed files: a build detects these by itself.
-SEEN_BY_BUILD = frozenset(f"PTM-D{n}" for n in (651, 652, 654, 655, 656))
+SEEN_BY_BUILD = frozenset(f"PTM-D{n}" for n in (651, 652, 655, 656))
 #: Codes that no build can repair: foreign files, the memory limit, and properties of the model.
 NOT_BUILT = frozenset(f"PTM-D{n}" for n in (653, 657, 675, 703, 708, 713))
 

@@ -48,7 +48,7 @@ def check_files(database: ServedDatabase) -> Mapping[str, int]:
         expected = {posixpath.splitext(posixpath.basename(url))[0] for url in urls}
     for stem in sorted(expected ^ present):
         message = "is missing" if stem in expected else "belongs to no cell"
-        database.at(f"{GLTF_FOLDER}/{stem}.glb").add("PTM-D730", message)
+        database.at(f"{GLTF_FOLDER}/{stem}.glb").add("PTM-D699", message)
     textures = hints.index["textures"] if hints else None
     for stem in sorted(present):
         path = f"{GLTF_FOLDER}/{stem}.glb"
