@@ -243,23 +243,25 @@ class _Builder:
             media, suffix, data = _picture_file(self._options.poster)
             poster = self._add("poster", suffix, media, data)
         if self._options.pictures:
-            for drawn, small in self._drawn():
-                poster = poster or self._add("poster", ".jpg", JPEG, drawn)
-                for number, (row, data) in enumerate(zip(rows, small, strict=False)):
-                    row["thumbnail"] = self._add(f"vp-{number:03}", ".jpg", JPEG, data)
+            drawn, small = self._drawn()
+            if drawn and not poster:
+                poster = self._add("poster", ".jpg", JPEG, drawn)
+            for number, (row, data) in enumerate(zip(rows, small, strict=False)):
+                row["thumbnail"] = self._add(f"vp-{number:03}", ".jpg", JPEG, data)
         return rows, poster and f"{DATA}/{poster}"
 
-    def _drawn(self) -> Iterator[tuple[bytes, list[bytes]]]:
-        """The poster and the small pictures; nothing where Embree is missing."""
+    def _drawn(self) -> tuple[bytes, list[bytes]]:
+        """The poster and the small pictures; empty where Embree is missing."""
         from ptmtools.site.pictures import pictures
 
         self._progress(0, 1, "pictures")
         try:
-            yield pictures(self._served)
+            return pictures(self._served)
         except ImportError:
             self._notes.append(
                 "no poster or thumbnails: embreex, which renders them, is not installed"
             )
+            return b"", []
         except LimitError:
             raise
         except InputError as fault:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -41,7 +42,6 @@ COARSE = 64
 #: The list of our files, and its format.
 LIST, FORMAT, SCHEMA = ".ptm-site.json", "ptmtools site files", 1
 HEADERS = "_headers"
-_PIECE = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -199,11 +199,8 @@ def _reading(file: Path) -> Iterator[None]:
 
 
 def _file_digest(file: Path) -> str:
-    digest = hashlib.sha256()
     with open_regular(file) as stream:
-        for piece in iter(lambda: stream.read(_PIECE), b""):
-            digest.update(piece)
-    return digest.hexdigest()
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def _held(root: Path, name: str) -> str | None:
@@ -224,12 +221,10 @@ def _write(root: Path, name: str, entry: Entry, digest: str) -> None:
         return
 
     def copy(file: IO[bytes]) -> None:
-        copied = hashlib.sha256()
         with _reading(source), open_regular(source) as stream:
-            for piece in iter(lambda: stream.read(_PIECE), b""):
-                copied.update(piece)
-                file.write(piece)
-        if copied.hexdigest() != digest:
+            shutil.copyfileobj(stream, file)
+        file.seek(0)
+        if hashlib.file_digest(file, "sha256").hexdigest() != digest:  # type: ignore[arg-type]
             raise damaged(source, "it changed while it was copied")
 
     write_with(target, copy, force=True)

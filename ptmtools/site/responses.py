@@ -11,18 +11,13 @@ headers for other origins from 416, and opens a file by its name after its state
 
 from __future__ import annotations
 
-import asyncio
-import hashlib
+import io
 import os
 import re
-from collections import defaultdict
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import suppress
-from functools import partial
+from collections.abc import Iterator
 from typing import BinaryIO
 from urllib.parse import quote
 
-from anyio.to_thread import run_sync
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
@@ -33,6 +28,10 @@ from ptmtools.output.emission import compressed
 from ptmtools.site.content import Entry, state_of
 from ptmtools.site.lookup import Lookup, name_of
 from ptmtools.site.throttle import Paced, Throttle, Visits
+from ptmtools.store.layout import sha256
+
+#: Name of a file → its tag, and its gzip copy.
+Copies = dict[str, tuple[str, bytes]]
 
 FOREVER = "public, max-age=31536000, immutable"
 #: May be kept, and is revalidated before each use.
@@ -70,79 +69,64 @@ def app_of(
     visits: records every request.
     origin: whose pages may read the files besides those of this server: an origin, or ``*``.
     """
-    methods = ["GET", "HEAD"] + (["OPTIONS"] if origin else [])
-    route = Route("/{path:path}", _answer(files, origin), methods=methods)
-    return Paced(Starlette(routes=[route]), throttle or Throttle(), visits)
-
-
-def _answer(files: Lookup, origin: str | None) -> Callable[[Request], Awaitable[Response]]:
-    """The endpoint."""
-    copies = Copies()
+    methods = ["GET", "HEAD"]
     common = {"X-Content-Type-Options": "nosniff"}
     if origin:
+        methods.append("OPTIONS")
         # The same for all requests, so that no cache holds the wrong answer.
         common |= {
             "Access-Control-Allow-Origin": origin,
             "Access-Control-Expose-Headers": _SHOWN,
             "Timing-Allow-Origin": origin,
         }
+    copies: Copies = {}
 
-    async def answer(request: Request) -> Response:
+    def answer(request: Request) -> Response:
         if request.method == "OPTIONS":
             return Response(status_code=204, headers=common | _SHARED)
         name = name_of(request.scope["raw_path"])
+        failed = common | {"Cache-Control": FRESH}
         try:
-            entry = await run_sync(files, name) if name is not None else None
-            content = Content.of(entry) if entry else None
+            if entry := files(name) if name is not None else None:
+                return _response(request, entry, copies, common)
         except BlockingIOError as later:
-            headers = common | {"Cache-Control": FRESH, "Retry-After": "2"}
-            return Response(f"{later}\n", 503, headers, "text/plain")
+            return Response(f"{later}\n", 503, failed | {"Retry-After": "2"}, "text/plain")
         except OSError:
-            entry = content = None
-        if entry is None or content is None:
-            headers = common | {"Cache-Control": FRESH}
-            return Response("not found\n", 404, headers, "text/plain")
-        try:
-            return await _response(request, entry, content, copies, common)
-        except BaseException:
-            content.close()
-            raise
+            pass
+        return Response("not found\n", 404, failed, "text/plain")
 
-    return answer
+    # Starlette calls it in a thread of its own.
+    route = Route("/{path:path}", answer, methods=methods)
+    return Paced(Starlette(routes=[route]), throttle or Throttle(), visits)
 
 
-async def _response(
-    request: Request, entry: Entry, content: Content, copies: Copies, common: dict[str, str]
-) -> Response:
-    """The response to a request for an existing file. The stream closes ``content`` in the end."""
-    request_headers = request.headers
+def _response(request: Request, entry: Entry, copies: Copies, common: dict[str, str]) -> Response:
+    """The response to a request for an existing file; raises as `opened`."""
+    asked = request.headers
+    file, size, tag = opened(entry)
     headers = common | {
         "Content-Type": entry.media,
         "Cache-Control": FOREVER if entry.forever else FRESH,
+        "Accept-Ranges": "bytes",
     }
-    part, size = None, content.size
+    part = None
     # Ranges are defined for GET alone; those of If-Range need the very same bytes.
-    if (
-        request.method == "GET"
-        and request_headers.get("If-Range", content.tag).strip() == content.tag
-    ):
-        part = asked_range(request_headers.get("Range"), size)
-    sent = content
+    if request.method == "GET" and asked.get("If-Range", tag).strip() == tag:
+        part = asked_range(asked.get("Range"), size)
     if entry.compressed:
         headers["Vary"] = "Accept-Encoding"
-        if part is None and accepts_gzip(request_headers.get("Accept-Encoding")):
-            sent = await copies.of(entry.name, content) or content
-    headers["ETag"] = sent.tag
-    if sent is content:
-        headers["Accept-Ranges"] = "bytes"
-    else:
-        content.close()
-        headers["Content-Encoding"] = "gzip"
-    if names_tag(", ".join(request_headers.getlist("If-None-Match")), sent.tag):
-        sent.close()
+        packs = part is None and accepts_gzip(asked.get("Accept-Encoding"))
+        if packs and (copy := _copy(copies, entry.name, file, size, tag)):
+            file.close()
+            file, size, tag = io.BytesIO(copy), len(copy), f'{tag[:-1]}-gzip"'
+            del headers["Accept-Ranges"]
+            headers["Content-Encoding"] = "gzip"
+    headers["ETag"] = tag
+    begin, end = part or (0, size)
+    if names_tag(", ".join(asked.getlist("If-None-Match")), tag):
+        file.close()
         return Response(status_code=304, headers=headers)
     status = 200
-    begin, end = part or (0, sent.size)
     if part and begin < end:
         status, headers["Content-Range"] = 206, f"bytes {begin}-{end - 1}/{size}"
     elif part:
@@ -150,9 +134,9 @@ async def _response(
         headers["Cache-Control"] = FRESH
     headers["Content-Length"] = str(end - begin)
     if request.method == "HEAD" or begin == end:
-        sent.close()
+        file.close()
         return Response(status_code=status, headers=headers)
-    return StreamingResponse(sent.pieces(begin, end), status, headers)
+    return StreamingResponse(_pieces(file, begin, end), status, headers)
 
 
 def asked_range(header: str | None, size: int) -> tuple[int, int] | None:
@@ -185,86 +169,42 @@ def accepts_gzip(accept_encoding: str | None) -> bool:
     return chosen.strip("0.") != ""
 
 
-class Content:
-    """Bytes to be sent, in memory or in an open file.
+def opened(entry: Entry) -> tuple[BinaryIO, int, str]:
+    """The bytes of an entry as an open file, their number, and a strong entity tag, of these bytes
+    and no others: a name that changes with the content, a hash, or the time of the file.
 
-    Attributes
-    ----------
-    size: bytes. tag: a strong entity tag, of these bytes and no others.
+    Raises OSError if its file is gone, BlockingIOError if it was replaced.
     """
-
-    def __init__(self, source: bytes | BinaryIO, tag: str | None = None) -> None:
-        self._source = source
-        if isinstance(source, bytes):
-            self.size = len(source)
-            self.tag = tag or f'"{hashlib.sha256(source).hexdigest()[:20]}"'
-        else:
-            state = os.fstat(source.fileno())
-            self.size = state.st_size
-            self.tag = tag or f'"{state.st_mtime_ns:x}-{state.st_size:x}"'
-
-    @classmethod
-    def of(cls, entry: Entry) -> Content:
-        """The bytes of an entry. A name that changes with the content serves as tag.
-
-        Raises OSError if its file is gone, BlockingIOError if it was replaced.
-        """
-        tag = f'"{quote(entry.name, safe="/%")}"' if entry.forever else None
-        if isinstance(entry.source, bytes):
-            return cls(entry.source, tag)
+    file: BinaryIO
+    if isinstance(entry.source, bytes):
+        file, size = io.BytesIO(entry.source), len(entry.source)
+        tag = "" if entry.forever else sha256(entry.source)[:20]
+    else:
         file = open_regular(entry.source)
-        if entry.state and entry.state != state_of(os.fstat(file.fileno())):
+        state = os.fstat(file.fileno())
+        if entry.state not in (None, state_of(state)):
             file.close()
             raise BlockingIOError(
                 f"{entry.name}: the database has been built again; load the page again"
             )
-        return cls(file, tag)
-
-    def read(self, begin: int, end: int) -> bytes | memoryview:
-        """The bytes [begin, end); fewer if the file has been cut since."""
-        if isinstance(self._source, bytes):
-            return memoryview(self._source)[begin:end]
-        self._source.seek(begin)
-        return self._source.read(end - begin)
-
-    async def pieces(self, begin: int, end: int) -> AsyncIterator[bytes | memoryview]:
-        """The bytes [begin, end) in pieces; a file is read in another thread, then closed."""
-        try:
-            for at in range(begin, end, _PIECE):
-                yield await run_sync(self.read, at, min(at + _PIECE, end))
-        finally:
-            self.close()
-
-    def close(self) -> None:
-        """Close the file."""
-        if not isinstance(self._source, bytes):
-            self._source.close()
+        size, tag = state.st_size, f"{state.st_mtime_ns:x}-{state.st_size:x}"
+    return file, size, f'"{quote(entry.name, safe="/%") if entry.forever else tag}"'
 
 
-class Copies:
-    """Gzip copies, compressed at the first request and kept."""
-
-    def __init__(self) -> None:
-        self._kept: dict[str, tuple[str, Content | None]] = {}
-        self._locks: defaultdict[str, asyncio.Lock] = defaultdict(asyncio.Lock)
-
-    async def of(self, name: str, content: Content) -> Content | None:
-        """The copy of a file of that name, or None where it would be no smaller."""
-        if content.size > _MOST:
-            return None
-        async with self._locks[name]:
-            tag, copy = self._kept.get(name, ("", None))
-            if tag != content.tag:
-                # A client that leaves does not wait for a large copy.
-                copy = await run_sync(partial(_copy, content), abandon_on_cancel=True)
-                self._kept[name] = content.tag, copy
-            return copy
+def _pieces(file: BinaryIO, begin: int, end: int) -> Iterator[bytes]:
+    """The bytes [begin, end) of a file, fewer if it has been cut since; closes it."""
+    with file:
+        file.seek(begin)
+        while begin < end and (piece := file.read(min(_PIECE, end - begin))):
+            yield piece
+            begin += len(piece)
 
 
-def _copy(content: Content) -> Content | None:
-    packed = b""
-    with suppress(OSError, ValueError):  # closed meanwhile, after its client left
-        packed = compressed(bytes(content.read(0, content.size)))
-    if not packed or len(packed) >= content.size:
-        return None
-    return Content(packed, f'{content.tag[:-1]}-gzip"')
+def _copy(copies: Copies, name: str, file: BinaryIO, size: int, tag: str) -> bytes:
+    """The gzip copy of a file, kept from the first request; b"" where it would be no smaller."""
+    if size > _MOST:
+        return b""
+    if name not in copies or copies[name][0] != tag:
+        packed = compressed(file.read())
+        copies[name] = tag, packed if len(packed) < size else b""
+    return copies[name][1]

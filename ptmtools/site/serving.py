@@ -150,21 +150,9 @@ def _listening(host: str, port: int) -> socket.socket:
     try:
         return socket.create_server((host, port), family=family)
     except (OSError, OverflowError, UnicodeError) as fault:
-        raise _refused(f"{host}:{port}", fault) from None
-
-
-def _refused(place: str, fault: Exception) -> InputError:
-    if isinstance(fault, OSError) and fault.errno == errno.EADDRINUSE:
-        return InputError(
-            "PTM-I920",
-            "the port is taken by another program",
-            file=place,
-            remedy="give another one with --port, or none for any free one",
-        )
-    reason = getattr(fault, "strerror", None) or fault
-    return InputError(
-        "PTM-I920",
-        f"cannot be listened on ({reason})",
-        file=place,
-        remedy="give an address of this machine with --host, and a port from 1024 to 65535",
-    )
+        reason = f"cannot be listened on ({getattr(fault, 'strerror', None) or fault})"
+        remedy = "give an address of this machine with --host, and a port from 1024 to 65535"
+        if getattr(fault, "errno", None) == errno.EADDRINUSE:
+            reason = "the port is taken by another program"
+            remedy = "give another one with --port, or none for any free one"
+        raise InputError("PTM-I920", reason, file=f"{host}:{port}", remedy=remedy) from None

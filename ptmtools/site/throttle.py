@@ -16,7 +16,6 @@ from __future__ import annotations
 import asyncio
 import math
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -129,25 +128,9 @@ class Visit:
     whole: bool = False
 
 
-class Visits:
-    """Requests in the order of their arrival. The server's thread adds to it, others read it."""
-
-    def __init__(self) -> None:
-        self._visits: list[Visit] = []
-
-    def __iter__(self) -> Iterator[Visit]:
-        return iter(tuple(self._visits))
-
-    def __len__(self) -> int:
-        return len(self._visits)
-
-    def add(self, visit: Visit) -> None:
-        """Add a visit; it may change until it has ended."""
-        self._visits.append(visit)
-
-    def clear(self) -> None:
-        """Forget all visits."""
-        self._visits.clear()
+class Visits(list[Visit]):
+    """Requests in the order of their arrival. The server's thread adds to it, others read it; a
+    visit may change until it has ended."""
 
     @property
     def bytes(self) -> int:
@@ -172,12 +155,12 @@ class Paced:
             await self._app(scope, receive, send)
             return
         now = time.monotonic()
-        range_header = _field(scope["headers"], b"range")
+        asked = dict(scope["headers"]).get(b"range")
         path = scope["raw_path"].decode("ascii")
-        text = None if range_header is None else range_header.decode("latin-1")
+        text = None if asked is None else asked.decode("latin-1")
         visit = Visit(scope["method"], path, text, now)
         if self._visits is not None:
-            self._visits.add(visit)
+            self._visits.append(visit)
         flow = self.link.open(now)
 
         async def paced(message: Message) -> None:
@@ -198,7 +181,7 @@ class Paced:
         await _until(flow.ready)
         while left:
             left -= await self._piece(flow, left)
-        length = _field(message["headers"], b"content-length")
+        length = dict(message["headers"]).get(b"content-length")
         visit.length = None if length is None else int(length)
         visit.status, visit.header_bytes = message["status"], head
         visit.first_byte = time.monotonic()
@@ -223,10 +206,6 @@ class Paced:
         piece, through = self.link.book(flow, left, time.monotonic())
         await _until(through)
         return piece
-
-
-def _field(headers: list[tuple[bytes, bytes]], name: bytes) -> bytes | None:
-    return next((value for key, value in headers if key == name), None)
 
 
 async def _until(moment: float) -> None:

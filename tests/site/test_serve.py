@@ -23,7 +23,7 @@ from ptmtools.cli.main import main
 from ptmtools.site import lookup
 from ptmtools.site.content import Entry, SiteOptions
 from ptmtools.site.lookup import Lookup
-from ptmtools.site.responses import Content
+from ptmtools.site.responses import opened
 from ptmtools.site.serving import url_of
 from ptmtools.store.manifest import SCHEMA, Manifest, StageRecord
 from tests.site.client import NOISE, PAGE, client_of
@@ -261,7 +261,7 @@ def test_a_database_that_is_built_again(tmp_path: Path) -> None:
         entry = find(name)
         assert entry
         with pytest.raises((BlockingIOError, FileNotFoundError)):
-            Content.of(entry)
+            opened(entry)
     after = data_of(find)
     assert textures_in(after).isdisjoint(textures_in(before))
     shutil.rmtree(made)
