@@ -1,8 +1,8 @@
-"""Compiles all kernels for ``ptm warm-up``: builds a small building and lightens a small statue.
+"""Compiles all kernels for ``ptm warm-up``: builds a small building, and simplifies it as a statue.
 
 The building has the features that run all kernels: doors in a row, whose edges meet in one line
 (near ties), a solid that stands in a room, and an image large enough for the coder to fit weights.
-The statue becomes an octree texture, and the same mesh with texture coordinates is simplified.
+Its faces also become an octree texture, and are simplified with their texture coordinates.
 """
 
 from __future__ import annotations
@@ -26,8 +26,6 @@ PLAN = """
 """
 #: Side of the image, texels.
 TEXELS = 256
-#: Squares along each side of the statue's mesh.
-SQUARES = 12
 
 
 def warm_building() -> None:
@@ -75,30 +73,13 @@ def warm_statue() -> None:
     from ptmtools.neighbours.apo.making import make_apo
     from ptmtools.neighbours.apo.model import ApoOptions
     from ptmtools.neighbours.apo.traversal import look_up
-    from ptmtools.scene.model import Material, Scene
-    from ptmtools.scene.orientation import tolerance_of
+    from ptmtools.scene import IngestOptions, ingest
     from ptmtools.simplification import Mesh, SimplifyOptions, simplify
 
-    # A square with waves, seen from above.
-    x, z = np.meshgrid(*[np.arange(SQUARES + 1) / SQUARES] * 2, indexing="ij")
-    points = np.stack([x, np.sin(9 * x) * np.sin(9 * z) / 9, z], axis=-1).reshape(-1, 3)
-    a = (np.arange(SQUARES)[:, None] * (SQUARES + 1) + np.arange(SQUARES)).ravel()
-    b, c, d = a + 1, a + SQUARES + 2, a + SQUARES + 1
-    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]).astype(np.int32)
-    uv = points[triangles][:, :, [0, 2]]
-    count = len(triangles)
-    none = np.zeros(count, np.int32)
-    scene = Scene(
-        points,
-        triangles,
-        uv,
-        none,
-        none,
-        np.ones(count, bool),
-        ("waves",),
-        (Material("stone"),),
-        tolerance_of(points, triangles),
-    )
-    replaced = make_apo(scene, ApoOptions(faces=count // 4, depth=3), Executor())
+    with TemporaryDirectory() as folder:
+        scene = ingest(write_building(Path(folder)), IngestOptions())
+        faces = len(scene.triangles) // 4
+        replaced = make_apo(scene, ApoOptions(faces=faces, depth=3), Executor())
     look_up(replaced.octree, np.full((1, 3), 0.5))
-    simplify(Mesh(points, triangles, none, uv), SimplifyOptions(count // 4))
+    mesh = Mesh(scene.points, scene.triangles, scene.triangle_material, scene.uv)
+    simplify(mesh, SimplifyOptions(faces))
