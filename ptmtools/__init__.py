@@ -41,14 +41,11 @@ if TYPE_CHECKING:
         emit as emit,
         plot_plan as plot_plan,
     )
-    from ptmtools.pipeline import (
-        Artifacts as Artifacts,
-        BuildReport as BuildReport,
-        TextureOptions as TextureOptions,
-        build_scene as build_scene,
-        run_stage as run_stage,
-        validate as validate,
-    )
+    from ptmtools.pipeline.build import build_scene as build_scene, run_stage as run_stage
+    from ptmtools.pipeline.encoding import TextureOptions as TextureOptions
+    from ptmtools.pipeline.report import BuildReport as BuildReport
+    from ptmtools.pipeline.stage import Artifacts as Artifacts
+    from ptmtools.pipeline.validation import validate as validate
     from ptmtools.scene import IngestOptions as IngestOptions, Scene as Scene, ingest as ingest
     from ptmtools.store.folder import DatabaseFolder as DatabaseFolder
     from ptmtools.texture import (
@@ -84,7 +81,11 @@ __getattr__ = lazy_exports(
             "PtmError"
         ),
         "ptmtools.output": "EmitOptions PlotOptions emit plot_plan",
-        "ptmtools.pipeline": "Artifacts BuildReport TextureOptions build_scene run_stage validate",
+        "ptmtools.pipeline.build": "build_scene run_stage",
+        "ptmtools.pipeline.encoding": "TextureOptions",
+        "ptmtools.pipeline.report": "BuildReport",
+        "ptmtools.pipeline.stage": "Artifacts",
+        "ptmtools.pipeline.validation": "validate",
         "ptmtools.scene": "IngestOptions Scene ingest",
         "ptmtools.store.folder": "DatabaseFolder",
         "ptmtools.texture": (

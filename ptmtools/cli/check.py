@@ -28,10 +28,10 @@ from ptmtools.diagnostics import FOLDER_CODES, ValidationReport
 from ptmtools.errors import CheckError
 from ptmtools.output import PlotOptions
 from ptmtools.output.validation.findings import NOT_BUILT, SEEN_BY_BUILD
-from ptmtools.pipeline import Artifacts, shoot_segments, validate as check
 from ptmtools.pipeline.command import build_command, open_database
+from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS
-from ptmtools.pipeline.validation import kind_of
+from ptmtools.pipeline.validation import kind_of, shoot_segments, validate as check
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Limits
 from ptmtools.visibility import SegmentReport

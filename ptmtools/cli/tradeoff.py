@@ -30,8 +30,8 @@ from ptmtools.lab.tradeoff.experiment import Subject, Trade, run
 from ptmtools.lab.tradeoff.knobs import KNOBS
 from ptmtools.lab.tradeoff.report import as_csv, picture, require, table
 from ptmtools.lab.tradeoff.walk import WalkOptions, WalkTrade, try_settings
-from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.command import open_database
+from ptmtools.pipeline.stage import Artifacts
 from ptmtools.walk import Walk, read_walk
 
 #: Fewest sample points of the reference, so that settings with fewer remain.

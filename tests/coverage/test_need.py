@@ -21,7 +21,7 @@ from ptmtools.coverage.required_levels import (
 )
 from ptmtools.coverage.sampling import Sampler
 from ptmtools.errors import InputError
-from ptmtools.pipeline import build_scene
+from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import CELLS, PVS, SCENE

@@ -9,7 +9,7 @@ import pytest
 
 from ptmtools.lab.catalogue import LEAST, catalogue_of
 from ptmtools.output.served import Served, read_served
-from ptmtools.pipeline import build_scene
+from ptmtools.pipeline.build import build_scene
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.texture import read_header
 

@@ -12,7 +12,7 @@ import pytest
 from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.options import AchOptions
 from ptmtools.executor import Executor
-from ptmtools.pipeline import build_scene
+from ptmtools.pipeline.build import build_scene
 from ptmtools.store.archive import pack_arrays
 from ptmtools.visibility import Pvs, PvsOptions, compute_pvs
 from tests.conftest import files_below

@@ -12,9 +12,10 @@ from typing import Any
 import pytest
 
 from ptmtools.cli.main import main
-from ptmtools.pipeline import build_scene, database_status
+from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages import CELLS, EMIT, PVS, SCENE, STAGES, TEXTURES
+from ptmtools.pipeline.status import database_status
 from ptmtools.store.folder import DatabaseFolder
 
 TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data" / "two_rooms"

@@ -18,9 +18,12 @@ from ptmtools.errors import DatabaseError
 from ptmtools.neighbours.apo.options import ReplaceOptions
 from ptmtools.output.gltf import pack, unpack
 from ptmtools.output.names import HINTS
-from ptmtools.pipeline import Artifacts, build_scene, database_status, plan_build, validate
+from ptmtools.pipeline.build import build_scene
+from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import ACH, APO, CELLS, EMIT, SCENE, STAGES
 from ptmtools.pipeline.stages.apo import octree_files
+from ptmtools.pipeline.status import database_status, plan_build
+from ptmtools.pipeline.validation import validate
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import OCTREE_LIST, arrays_of, sha256

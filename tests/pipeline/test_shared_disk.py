@@ -11,8 +11,14 @@ import pytest
 from ptmtools import parallel
 from ptmtools.errors import OutputError, WorkerError
 from ptmtools.executor import Executor
-from ptmtools.pipeline import TextureOptions, build_scene
-from ptmtools.pipeline.encoding import ImageTask, _sees, encoded_on_disk, shared_disk
+from ptmtools.pipeline.build import build_scene
+from ptmtools.pipeline.encoding import (
+    ImageTask,
+    TextureOptions,
+    _sees,
+    encoded_on_disk,
+    shared_disk,
+)
 from ptmtools.store.layout import sha256
 from ptmtools.store.writer import DatabaseWriter
 

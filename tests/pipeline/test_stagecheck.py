@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 from ptmtools.coverage.model import Ach
-from ptmtools.pipeline import validate
 from ptmtools.pipeline.stages import PVS, STAGES
-from ptmtools.pipeline.validation import check_stages
+from ptmtools.pipeline.validation import check_stages, validate
 from ptmtools.store.archive import pack_arrays
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import sha256

@@ -14,8 +14,8 @@ from PIL import Image, PngImagePlugin
 from ptmtools import parallel
 from ptmtools.executor import Executor
 from ptmtools.parallel import Workers
-from ptmtools.pipeline import TextureOptions, build_scene, run_stage
-from ptmtools.pipeline.encoding import bare_png
+from ptmtools.pipeline.build import build_scene, run_stage
+from ptmtools.pipeline.encoding import TextureOptions, bare_png
 from ptmtools.pipeline.stage import Run
 from ptmtools.pipeline.stages import CELLS, TEXTURES
 from ptmtools.pipeline.stages.textures import TexturesJob, texture_names

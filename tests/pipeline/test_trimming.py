@@ -11,10 +11,11 @@ from PIL import Image
 
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.errors import InputError
-from ptmtools.pipeline import TextureOptions, build_scene, run_stage, validate
-from ptmtools.pipeline.encoding import encoded_image
+from ptmtools.pipeline.build import build_scene, run_stage
+from ptmtools.pipeline.encoding import TextureOptions, encoded_image
 from ptmtools.pipeline.stages import CELLS, TEXTURES
 from ptmtools.pipeline.status import plan_build
+from ptmtools.pipeline.validation import validate
 from ptmtools.texture import read_header, read_image
 from ptmtools.visibility.options import PvsOptions
 

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from ptmtools.cli.main import main
-from ptmtools.pipeline import build_scene
+from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.report import Visitor
 from ptmtools.pipeline.stages import CELLS, PVS
 from ptmtools.store.folder import DatabaseFolder

@@ -22,7 +22,7 @@ from ptmtools.lab.path.options import PathOptions
 from ptmtools.lab.path.tour import Leg, Views, middles_of, tour
 from ptmtools.output.names import HINTS
 from ptmtools.output.served import read_index
-from ptmtools.pipeline import Artifacts
+from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import APO, CELLS
 from ptmtools.scene.model import Scene
 from ptmtools.store.layout import SERVED

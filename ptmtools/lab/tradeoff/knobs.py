@@ -19,9 +19,8 @@ from typing import Any
 from ptmtools.errors import InputError
 from ptmtools.lab.tradeoff.experiment import timed
 from ptmtools.options import option_name
-from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.build import run_stage
-from ptmtools.pipeline.stage import Options, Stage
+from ptmtools.pipeline.stage import Artifacts, Options, Stage
 from ptmtools.pipeline.stages import ACH, CELLS, EMIT, PVS, STAGES, TEXTURES
 from ptmtools.progress import Progress, silent
 

@@ -22,7 +22,7 @@ from ptmtools.lab.tradeoff.stages import (
     TexturesTrade,
     VisibilityTrade,
 )
-from ptmtools.pipeline import build_scene
+from ptmtools.pipeline.build import build_scene
 from ptmtools.scene.model import SourceImage
 from ptmtools.texture import EncodeOptions
 from ptmtools.visibility.options import PvsOptions

@@ -27,9 +27,9 @@ from ptmtools.lab.tradeoff.walk import WalkOutcome, WalkTrade, WalkTrial, begins
 from ptmtools.lab.world import World, prepare
 from ptmtools.output import EmitOptions
 from ptmtools.output.served import read_served
-from ptmtools.pipeline import Artifacts, build_scene
-from ptmtools.pipeline.build import run_stage
+from ptmtools.pipeline.build import build_scene, run_stage
 from ptmtools.pipeline.command import open_database
+from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import EMIT, TEXTURES
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.walk import Walk, read_walk
