@@ -124,7 +124,9 @@ class Files:
     def __init__(self, kind: Kind, size: Ints) -> None:
         self.kind, self.size = kind, size
         self.asked, self.loaded = np.zeros(len(size), np.int64), np.zeros(len(size), np.int64)
-        self._waiting: dict[int, deque[list[int]]] = {}
+        #: By number, the ends of the ranges that were requested and not yet counted, in order, and
+        #: whether each has arrived.
+        self._waiting: dict[int, dict[int, bool]] = {}
 
     @property
     def whole(self) -> Bools:
@@ -136,35 +138,18 @@ class Files:
         """Marks a file as requested up to ``end``; returns the range to request."""
         result = Range(self.kind, number, int(self.asked[number]), end)
         self.asked[number] = end
-        self._waiting.setdefault(number, deque()).append([end, 0])
+        self._waiting.setdefault(number, {})[end] = False
         return result
 
     def arrived(self, part: Range) -> None:
         """Marks a range as arrived; ranges before it may be missing."""
         waiting = self._waiting[part.number]
-        for entry in waiting:
-            if entry[0] == part.end:
-                entry[1] = 1
-        self._pass(part.number)
-
-    def give_up(self, part: Range, received: int) -> bool:
-        """Gives up the last range of a file after ``received`` bytes; returns False and changes
-        nothing if it was not the last."""
-        waiting = self._waiting[part.number]
-        if waiting[-1][0] != part.end:
-            return False
-        self.asked[part.number] = part.begin + received
-        waiting.pop()
-        if received:
-            waiting.append([part.begin + received, 1])
-            self._pass(part.number)
-        return True
-
-    def _pass(self, number: int) -> None:
-        """Updates the bytes that have arrived without a gap."""
-        waiting = self._waiting[number]
-        while waiting and waiting[0][1]:
-            self.loaded[number] = waiting.popleft()[0]
+        waiting[part.end] = True
+        for end in [*waiting]:
+            if not waiting[end]:
+                break
+            del waiting[end]
+            self.loaded[part.number] = end
 
 
 class Client(ABC):

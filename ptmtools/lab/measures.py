@@ -43,9 +43,9 @@ class Measures:
     ----------
     e: see `Run.error`. rmse: root of the mean squared error. missing, quality: see `Run`; the
         ``p95`` of the quality is what 95 % of the frames reach.
-    bytes: received of bodies. overhead, cancelled: received of headers, and after cancellations.
-    waste: the share of received textures, geometry and cancelled bytes that was never displayed; 0
-        if nothing was received.
+    bytes, overhead: received of bodies and of headers.
+    waste: the share of received textures and geometry that was never displayed; 0 if nothing was
+        received.
     requests: number of requests. stalls: s in which the geometry of the current cell was missing.
     uploads: bytes uploaded to texture memory. switches: changes of finest levels per minute.
     overruns: frames above the budget.
@@ -59,7 +59,6 @@ class Measures:
     quality: Summary
     bytes: int
     overhead: int
-    cancelled: int
     waste: float
     requests: int
     stalls: float
@@ -72,7 +71,7 @@ class Measures:
 def measure(run: Run, world: World, standing: Run) -> Measures:
     """The measures of a run through a world; ``standing`` is the same client in
     `World.standing` for `STANDS`."""
-    received = run.body - run.documents + run.cancelled
+    received = run.body - run.documents
     return Measures(
         e=_summary(run, run.error),
         rmse=_summary(run, run.square, math.sqrt),
@@ -80,7 +79,6 @@ def measure(run: Run, world: World, standing: Run) -> Measures:
         quality=_summary(run, run.quality, high_is_good=True),
         bytes=round(run.body),
         overhead=round(run.overhead),
-        cancelled=round(run.cancelled),
         waste=max(0.0, 1 - run.useful / received) if received else 0.0,
         requests=run.requests,
         stalls=run.stalls / world.rate,

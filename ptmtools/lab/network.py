@@ -1,10 +1,10 @@
 """The link between a client and its server: requests that share a bandwidth, as a fluid.
 
 Bytes are real numbers and flow at the rate of the link, so the link changes only at events: the
-first byte of a response, its last, the last byte under way after a cancellation, the next step of a
-trace. Between two events all is linear, and nothing is approximated. Slow start, queues in routers
-and the server's own time are not modelled; `Conditions.latency` is the whole time before the first
-byte. Time is seconds from 0, without a clock.
+first byte of a response, its last, the next step of a trace. Between two events all is linear, and
+nothing is approximated. Slow start, queues in routers and the server's own time are not modelled;
+`Conditions.latency` is the whole time before the first byte. Time is seconds from 0, without a
+clock. No client cancels requests, so the link cannot either.
 
 The cost of a request: `Conditions.latency` until its first byte, then `Conditions.overhead` bytes
 of headers, then its body. Alone on the link it takes latency + 8 (overhead + size) / bandwidth.
@@ -14,10 +14,6 @@ their first byte share the bandwidth equally. Further requests wait for a connec
 highest priority first. The connections are open at the beginning. `h2` (HTTP/2): one connection
 takes all requests at once. All bandwidth goes to the request of the highest priority among those
 past their latency; of two equal ones to the elder.
-
-Cancelling: the client keeps the bytes it has. The bytes that the server has already sent, which
-would arrive within half a latency, stay on the link and are wasted. On `h1` the connection is lost,
-and the first request on its replacement takes one more latency.
 
 Loss: at a share p of lost packets, goodput is 1 − p of the bandwidth; with probability p the
 request or the head of its response is lost, and the first byte comes one latency later. A seeded
@@ -49,12 +45,9 @@ class Request:
     issued: time of the request, s. late: delay of its sending on its connection, s.
     sent: time of its sending, s, later if it had to wait for a connection; None before.
     first_byte: start of the arrival of its response, s; None before.
-    ended: time of its end or cancellation, s; None before.
-    finished, cancelled: whether it has arrived completely; whether the client cancelled it.
+    ended: time of its end, s; None before.
     left: bytes still to arrive, headers included.
-    kept: ``left`` at the time of the cancellation; later bytes are unwanted.
-    starts, stops: earliest arrival of its response, s; after a cancellation, arrival of the last
-        byte under way.
+    starts: earliest arrival of its response, s.
     """
 
     size: int
@@ -67,20 +60,16 @@ class Request:
     sent: float | None = None
     first_byte: float | None = None
     ended: float | None = None
-    finished: bool = False
-    cancelled: bool = False
     left: float = math.nan
-    kept: float = math.nan
     starts: float = math.inf
-    stops: float = math.inf
 
     def __post_init__(self) -> None:
         self.left = float(self.overhead + self.size)
 
     @property
     def arrived(self) -> float:
-        """Bytes that arrived before a cancellation, headers included."""
-        return self.overhead + self.size - (self.kept if self.cancelled else self.left)
+        """Bytes that have arrived, headers included."""
+        return self.overhead + self.size - self.left
 
     @property
     def received(self) -> float:
@@ -88,53 +77,42 @@ class Request:
         return max(0.0, self.arrived - self.overhead)
 
     @property
-    def unwanted(self) -> float:
-        """Bytes that arrived after its cancellation, headers included."""
-        return self.kept - self.left if self.cancelled else 0.0
-
-    @property
     def rank(self) -> tuple[float, int]:
         """Requests of a lesser rank go first."""
         return -self.priority, self.number
 
 
-#: Share of the latency that the bytes of the server are under way.
-_UNDER_WAY = 0.5
-_left, _rank = attrgetter("left"), attrgetter("rank")
-_starts, _stops = attrgetter("starts"), attrgetter("stops")
+_left, _rank, _starts = attrgetter("left"), attrgetter("rank"), attrgetter("starts")
 
 
 class Link:
     """A link with its requests.
 
     Bytes are booked twice: ``carried`` is the integral of the rate over time, and equals
-    ``bytes + overhead_bytes + wasted + partial``.
+    ``bytes + overhead_bytes + partial``.
 
     Attributes
     ----------
     now: s.
     busy: s during which bytes were arriving, or would have been if the link had not been down.
     carried: all bytes that have arrived.
-    bytes, overhead_bytes: bytes of bodies and of headers of ended requests, before they ended.
-    wasted: bytes that arrived after the cancellation of their request, counted when the last one
-        has arrived.
+    bytes, overhead_bytes: bytes of bodies and of headers of ended requests.
     requests: number of requests.
     """
 
     def __init__(self, conditions: Conditions) -> None:
         self.conditions = conditions
         self.now = self.busy = self.carried = 0.0
-        self.bytes = self.overhead_bytes = self.wasted = 0.0
+        self.bytes = self.overhead_bytes = 0.0
         self.requests = 0
         self._shared = conditions.protocol == "h1"
-        #: Free connections: open ones, and those still to be opened.
-        self._open, self._closed = conditions.connections, 0
+        #: Free connections.
+        self._free = conditions.connections
         #: Requests without a connection, by rank; before the first byte, by its time; arriving, by
-        #: rank; cancelled ones of the latter two, by the arrival of their last byte under way.
+        #: rank.
         self._queue: list[Request] = []
         self._away: list[Request] = []
         self._arriving: list[Request] = []
-        self._unwanted: list[Request] = []
         self._random = Random(conditions.seed)
         self._steps = conditions.trace.steps if conditions.trace else (Step(math.inf),)
         self._step, self._step_ends = -1, 0.0
@@ -142,8 +120,8 @@ class Link:
 
     @property
     def partial(self) -> float:
-        """Bytes so far of arriving requests: headers, bodies, and unwanted bytes."""
-        return sum(r.unwanted if r.cancelled else r.arrived for r in self._arriving)
+        """Bytes so far of arriving requests: headers and bodies."""
+        return sum(r.arrived for r in self._arriving)
 
     def request(self, size: int, priority: float, tag: object = None, late: float = 0.0) -> Request:
         """Requests ``size`` bytes now, on a connection that it occupies ``late`` seconds before
@@ -158,7 +136,7 @@ class Link:
             insort(self._queue, request, key=_rank)
             self._connect()
         else:
-            self._send(request, self._latency)
+            self._send(request)
         return request
 
     def reprioritise(self, request: Request, priority: float) -> None:
@@ -169,22 +147,6 @@ class Link:
         request.priority = priority
         if ranked is not None:
             insort(ranked, request, key=_rank)
-
-    def cancel(self, request: Request) -> None:
-        """Cancels a request now; an ended one stays as it is."""
-        if request.ended is not None:
-            return
-        request.kept, request.cancelled, request.ended = request.left, True, self.now
-        if request.sent is None:
-            self._queue.remove(request)
-            return
-        self.bytes += request.received
-        self.overhead_bytes += request.arrived - request.received
-        request.stops = self.now + _UNDER_WAY * self._latency
-        insort(self._unwanted, request, key=_stops)
-        if self._shared:
-            self._closed += 1
-            self._connect()
 
     def advance(self, until: float) -> Request | None:
         """Advances time until the next request is finished, which is returned, or to ``until``, s.
@@ -201,30 +163,20 @@ class Link:
                 until,
                 self._step_ends,
                 self._away[0].starts if self._away else math.inf,
-                self._unwanted[0].stops if self._unwanted else math.inf,
             )
             whole = self._flow(following) if self._arriving else None
-            if whole and not whole.cancelled:
-                return self._finished(whole)
             if whole:
-                self._unwanted.remove(whole)
-                self.wasted += whole.kept
-            elif last:
+                return self._finished(whole)
+            if last:
                 return None
-            else:
-                self.now = following
+            self.now = following
 
     def _turn(self) -> None:
-        """Handles events that are due: steps of the trace, first bytes, the end of unwanted
-        bytes."""
+        """Handles events that are due: steps of the trace, first bytes."""
         while self._step_ends <= self.now:
             self._next_step()
         while self._away and self._away[0].starts <= self.now:
             insort(self._arriving, self._away.pop(0), key=_rank)
-        while self._unwanted and self._unwanted[0].stops <= self.now:
-            request = self._unwanted.pop(0)
-            (self._arriving if request.starts <= self.now else self._away).remove(request)
-            self.wasted += request.unwanted
 
     def _flow(self, until: float) -> Request | None:
         """Moves bytes up to ``until``, at most until a request is complete, which is then
@@ -251,27 +203,24 @@ class Link:
         return nearest
 
     def _finished(self, request: Request) -> Request:
-        request.finished, request.ended = True, self.now
+        request.ended = self.now
         if request.first_byte is None:
             request.first_byte = self.now
         self.bytes += request.size
         self.overhead_bytes += request.overhead
         if self._shared:
-            self._open += 1
+            self._free += 1
             self._connect()
         return request
 
     def _connect(self) -> None:
-        """Gives free connections to waiting requests; opening one takes a latency."""
-        while self._queue and self._open + self._closed:
-            if self._open:
-                self._open -= 1
-                self._send(self._queue.pop(0), self._latency)
-            else:
-                self._closed -= 1
-                self._send(self._queue.pop(0), 2 * self._latency)
+        """Gives free connections to waiting requests."""
+        while self._queue and self._free:
+            self._free -= 1
+            self._send(self._queue.pop(0))
 
-    def _send(self, request: Request, latency: float) -> None:
+    def _send(self, request: Request) -> None:
+        latency = self._latency
         if self._loss and self._random.random() < self._loss:
             latency += self._latency
         request.sent = self.now + request.late

@@ -201,7 +201,7 @@ def _run_document(played: RunResult) -> dict[str, Any]:
         "quality": m.quality.mean,
         "bytes": m.bytes,
         "overheadBytes": m.overhead,
-        "cancelledBytes": m.cancelled,
+        "cancelledBytes": 0,  # no client cancels requests
         "waste": m.waste,
         "requests": m.requests,
         "stalled": m.stalls,

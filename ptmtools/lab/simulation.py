@@ -39,7 +39,7 @@ class Run:
         visible set.
     memory: (F,) bytes of texture memory in use. fetched: (F,) bytes of bodies received so far.
     column: (F, T) resident column of each texture. loaded: (F, C) whether the geometry is loaded.
-    body, overhead, cancelled: bytes received: bodies, headers, arrivals after a cancellation.
+    body, overhead: bytes received of bodies and headers.
     documents: bytes of other bodies than textures and geometry.
     useful: bytes of textures and geometry that were displayed.
     uploads: bytes uploaded to texture memory. switches: changes of a texture's finest level.
@@ -62,7 +62,6 @@ class Run:
     loaded: Bools
     body: float
     overhead: float
-    cancelled: float
     documents: int
     useful: float
     uploads: int
@@ -127,7 +126,6 @@ def simulate(world: World, policy: PolicyEntry, conditions: Conditions, budget: 
         loaded=loaded,
         body=float(fetched[-1]),
         overhead=link.overhead_bytes,
-        cancelled=link.wasted,
         documents=sum(int(client.files[kind].loaded.sum()) for kind in DOCUMENTS),
         useful=textures + float(stock.geometry_bytes[drawn].sum()),
         uploads=int(np.maximum(held[0] - held[1], 0).sum()),

@@ -31,13 +31,12 @@ CONDITIONS = st.builds(
     seed=st.integers(0, 3),
 )
 
-#: What a client does: asks for bytes at a priority; waits; gives up, or finds more or less urgent,
-#: the n-th request.
+#: Acts of a client: it requests bytes at a priority, waits, or changes the priority of the n-th
+#: request.
 Act = tuple[str, int, int] | tuple[str, float]
 ACTS = st.lists(
     st.tuples(st.just("ask"), st.integers(0, 100_000), st.integers(0, 3))
     | st.tuples(st.just("wait"), st.floats(0, 2))
-    | st.tuples(st.just("cancel"), st.integers(0, 30))
     | st.tuples(st.just("rank"), st.integers(0, 30), st.integers(0, 3)),
     max_size=40,
 )
@@ -56,8 +55,6 @@ class Client:
             match act:
                 case "ask", size, priority:
                     self.asked.append(self.link.request(size, priority, len(self.asked)))
-                case "cancel", number if self.asked:
-                    self.link.cancel(self.asked[number % len(self.asked)])
                 case "rank", number, priority if self.asked:
                     self.link.reprioritise(self.asked[number % len(self.asked)], priority)
                 case "wait", seconds:
@@ -88,16 +85,15 @@ class Ticked:
     left: float
     priority: float
     sent: float
-    stops: float = float("inf")
     ended: float | None = None
 
 
 def by_small_steps(
-    conditions: Conditions, asks: list[tuple[float, int, int, float]], tick: float, end: float
+    conditions: Conditions, asks: list[tuple[float, int, int]], tick: float, end: float
 ) -> list[Ticked]:
     """A link without loss and without a limit of connections, by Euler's method.
 
-    ``asks``: when, how many bytes, at which priority, when given up.
+    ``asks``: time, bytes and priority of each request.
     """
 
     def at(time: float) -> Step:
@@ -110,13 +106,12 @@ def by_small_steps(
         return steps[-1]
 
     requests = []
-    for when, size, priority, given_up in asks:
+    for when, size, priority in asks:
         latency = conditions.latency + at(when).latency
-        stops = given_up + (conditions.latency + at(given_up).latency) / 2
-        requests.append(Ticked(conditions.overhead + size, priority, when + latency, stops))
+        requests.append(Ticked(conditions.overhead + size, priority, when + latency))
     for i in range(round(end / tick)):
         now = i * tick
-        ready = [r for r in requests if r.ended is None and r.sent <= now < r.stops]
+        ready = [r for r in requests if r.ended is None and r.sent <= now]
         if not ready:
             continue
         limits = [b for b in (conditions.bandwidth, at(now).bandwidth) if b is not None]

@@ -1,4 +1,4 @@
-"""What a client keeps of its files, whatever comes first and whatever it gives up."""
+"""The bytes that a client has of its files, in any order of their arrival."""
 
 from __future__ import annotations
 
@@ -14,16 +14,14 @@ from ptmtools.link import Conditions
 from tests.lab.worlds import catalogue, raw, standing
 
 ACTS = st.lists(
-    st.tuples(st.just("ask"), st.integers(1, 40))
-    | st.tuples(st.just("arrive"), st.integers(0, 9))
-    | st.tuples(st.just("give up"), st.integers(0, 40)),
+    st.tuples(st.just("ask"), st.integers(1, 40)) | st.tuples(st.just("arrive"), st.integers(0, 9)),
     max_size=30,
 )
 
 
 @given(ACTS)
 def test_files_against_single_bytes(acts: list[tuple[str, int]]) -> None:
-    """Whole ranges count, and those that were given up as far as they came."""
+    """Whole ranges count."""
     files = Files(Kind.TEXTURE, np.array([1000, 200]))
     held = np.zeros(200, dtype=bool)
     under_way: list[Range] = []
@@ -37,16 +35,6 @@ def test_files_against_single_bytes(acts: list[tuple[str, int]]) -> None:
             part = under_way.pop(number % len(under_way))
             files.arrived(part)
             held[part.begin : part.end] = True
-        elif act == "give up" and under_way:
-            part = under_way[-1 - number % 2 * (len(under_way) - 1)]
-            received = min(number // 2, part.end - part.begin - 1)
-            last = part.end == asked
-            assert files.give_up(part, received) == last
-            if last:
-                under_way.remove(part)
-                held[part.begin : part.begin + received] = True
-                asked = part.begin + received
-            assert files.asked[1] == asked
         assert files.loaded[1] == (200 if held.all() else held.argmin())
         assert files.whole.tolist() == [False, held.all()]
         assert files.loaded[1] <= files.asked[1]
@@ -71,11 +59,3 @@ def test_the_last_byte_counts() -> None:
             assert client.have[t] == level
             client.textures.loaded[t] = end
             assert client.have[t] == level + 1
-
-
-def test_who_gives_up_before_anything_came_has_nothing_of_what_is_before_it() -> None:
-    files = Files(Kind.TEXTURE, np.array([200]))
-    files.ask(0, 100)
-    assert files.give_up(files.ask(0, 200), 0)
-    assert files.loaded[0] == 0
-    assert files.asked[0] == 100

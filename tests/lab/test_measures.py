@@ -33,7 +33,6 @@ def run_of(error: list[float], still: list[bool]) -> Run:
         loaded=np.ones((count, 1), dtype=bool),
         body=1000.0,
         overhead=30.0,
-        cancelled=100.0,
         documents=200,
         useful=450.0,
         uploads=7,
@@ -66,14 +65,14 @@ def test_means(world: Any) -> None:
 
 def test_costs(world: Any) -> None:
     m = measure(RUN, world, RUN)
-    assert (m.bytes, m.overhead, m.cancelled, m.requests, m.uploads) == (1000, 30, 100, 3, 7)
-    # Of 800 bytes of textures and geometry, and 100 that were cancelled, 450 were of use.
-    assert m.waste == pytest.approx(0.5)
+    assert (m.bytes, m.overhead, m.requests, m.uploads) == (1000, 30, 3, 7)
+    # Of 800 bytes of textures and geometry, 450 were displayed.
+    assert m.waste == pytest.approx(0.4375)
     assert (m.stalls, m.switches, m.overruns) == (1.0, 180.0, 1)
 
 
 def test_nothing_received_is_nothing_wasted(world: Any) -> None:
-    bare = replace(RUN, body=200.0, cancelled=0.0, useful=0.0)
+    bare = replace(RUN, body=200.0, useful=0.0)
     assert measure(bare, world, RUN).waste == 0
 
 

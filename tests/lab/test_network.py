@@ -34,7 +34,7 @@ def test_every_byte_is_accounted_for(conditions: Conditions, acts: list[Act]) ->
     client = Client(link := Link(conditions))
     before = 0.0
     for _ in client.play(acts):
-        held = link.bytes + link.overhead_bytes + link.wasted + link.partial
+        held = link.bytes + link.overhead_bytes + link.partial
         assert close(held, link.carried)
         if not conditions.trace:
             assert conditions.bandwidth is not None
@@ -46,14 +46,9 @@ def test_every_byte_is_accounted_for(conditions: Conditions, acts: list[Act]) ->
 
 
 @given(CONDITIONS, ACTS)
-def test_what_is_not_cancelled_comes_whole_and_not_too_early(
-    conditions: Conditions, acts: list[Act]
-) -> None:
+def test_requests_come_whole_and_not_too_early(conditions: Conditions, acts: list[Act]) -> None:
     client = run(conditions, acts)
-    assert client.finished == [r for r in client.finished if r.finished and not r.cancelled]
-    assert len({id(r) for r in client.finished}) == len(client.finished)
-    assert all(r.finished != r.cancelled for r in client.asked)
-    assert len(client.finished) == sum(r.finished for r in client.asked)
+    assert len({id(r) for r in client.finished}) == len(client.finished) == len(client.asked)
     assert conditions.bandwidth is not None
     for r in client.finished:
         assert r.sent is not None
@@ -81,16 +76,13 @@ def test_connections(conditions: Conditions, acts: list[Act]) -> None:
 
 
 @given(CONDITIONS, ACTS)
-def test_cancelled_requests_keep_what_had_arrived(conditions: Conditions, acts: list[Act]) -> None:
+def test_what_has_arrived_stays(conditions: Conditions, acts: list[Act]) -> None:
     client = Client(link := Link(conditions))
     held: dict[Request, float] = {}
     for _ in client.play(acts):
         for r in client.asked:
-            if r.cancelled:
-                assert r.received == held[r]
-            else:
-                assert 0 <= r.received <= r.size
-                held[r] = r.received
+            assert held.get(r, 0) <= r.received <= r.size
+            held[r] = r.received
     assert link.advance(link.now + 1e3) is None
     assert link.partial == 0
 
@@ -101,7 +93,7 @@ def played(conditions: Conditions, acts: list[Act]) -> list[Any]:
     return [
         [(r.tag, r.sent, r.first_byte, r.ended, r.received) for r in client.asked],
         [r.tag for r in client.finished],
-        (link.now, link.busy, link.carried, link.bytes, link.overhead_bytes, link.wasted),
+        (link.now, link.busy, link.carried, link.bytes, link.overhead_bytes),
     ]
 
 
@@ -133,7 +125,7 @@ def test_looking_more_often_changes_nothing(
         max_size=4,
     ).map(lambda steps: Trace((*steps, Step(0.3, 4e5)))),
     st.lists(
-        st.tuples(st.floats(0, 2), st.integers(1, 40_000), st.integers(0, 99), st.floats(0, 3)),
+        st.tuples(st.floats(0, 2), st.integers(1, 40_000), st.integers(0, 99)),
         min_size=1,
         max_size=6,
         unique_by=(lambda ask: ask[2]),
@@ -141,26 +133,19 @@ def test_looking_more_often_changes_nothing(
 )
 @settings(max_examples=30)
 def test_as_by_small_steps(
-    protocol: str, trace: Trace | None, asks: list[tuple[float, int, int, float]]
+    protocol: str, trace: Trace | None, asks: list[tuple[float, int, int]]
 ) -> None:
-    """The sharing, the trace and what a cancelled request still takes, against Euler's method."""
+    """The sharing and the trace, against Euler's method."""
     conditions = Conditions(8e5, 0.1, 300, protocol, trace=trace)
-    asks = [(at, size, rank, at + after) for at, size, rank, after in sorted(asks)]
+    asks = sorted(asks)
     tick, end = 5e-4, 8.0
     reference = by_small_steps(conditions, asks, tick, end)
     link = Link(conditions)
     requests: list[Request] = []
-    for when, number, cancels in sorted(
-        [(ask[0], i, False) for i, ask in enumerate(asks)]
-        + [(ask[3], i, True) for i, ask in enumerate(asks)],
-        key=lambda event: (event[0], event[2], event[1]),
-    ):
+    for when, size, rank in asks:
         while link.advance(when):
             pass
-        if cancels:
-            link.cancel(requests[number])
-        else:
-            requests.append(link.request(asks[number][1], asks[number][2]))
+        requests.append(link.request(size, rank))
     while link.advance(end):
         pass
     # A tick's worth for each of at most six changes of who shares.
@@ -226,61 +211,6 @@ def test_h2_takes_what_becomes_more_urgent_at_once() -> None:
     assert link.advance(1.0) is second
     assert link.now == pytest.approx(0.15)
     assert link.advance(1.0) is first
-
-
-@pytest.mark.parametrize("protocol", ["h1", "h2"])
-def test_cancelling(protocol: str) -> None:
-    """What is there stays, half a latency of bytes is wasted, and h1 opens another connection."""
-    link = Link(Conditions(MEGABIT, 0.1, 300, protocol, connections=1))
-    request = link.request(100_000, 1.0)
-    assert link.advance(0.3) is None
-    assert request.received == pytest.approx(0.2 * 125_000 - 300)
-    link.cancel(request)
-    link.cancel(request)
-    following = link.request(1250, 1.0)
-    assert link.advance(10.0) is following
-    assert request.received == link.bytes - 1250 == pytest.approx(0.2 * 125_000 - 300)
-    assert (request.cancelled, request.finished, request.ended) == (True, False, 0.3)
-    assert link.wasted == pytest.approx(0.05 * 125_000)
-    opened = 0.1 if protocol == "h1" else 0.0
-    assert link.now == pytest.approx(0.3 + opened + 0.1 + 1550 / 125_000)
-
-
-def test_cancelling_before_the_first_byte() -> None:
-    """Early enough, the server has sent nothing; later, what it has sent comes all the same."""
-    for given_up, wasted in ((0.04, 0.0), (0.08, 0.03 * 125_000)):
-        link = Link(Conditions(MEGABIT, 0.1, 300))
-        request = link.request(100_000, 1.0)
-        assert link.advance(given_up) is None
-        link.cancel(request)
-        assert link.advance(10.0) is None
-        assert (request.received, link.bytes, link.overhead_bytes) == (0, 0, 0)
-        assert link.wasted == pytest.approx(wasted)
-        assert link.busy == pytest.approx(wasted / 125_000)
-
-
-@pytest.mark.parametrize("protocol", ["h1", "h2"])
-def test_cancelling_what_is_all_under_way(protocol: str) -> None:
-    """It arrives to its end, and then leaves the link to the others."""
-    link = Link(Conditions(MEGABIT, 0.1, 0, protocol))
-    request, other = link.request(1250, 2.0), link.request(1250, 1.0)
-    assert link.advance(0.105) is None
-    link.cancel(request)
-    kept = request.received
-    assert link.advance(1.0) is other
-    assert link.now == pytest.approx(0.12)
-    assert link.wasted == pytest.approx(1250 - kept)
-    assert link.carried == pytest.approx(2500)
-
-
-def test_cancelling_what_waits_costs_nothing() -> None:
-    link = Link(Conditions(MEGABIT, 0.1, 0, connections=1))
-    first, second = link.request(12_500, 1.0), link.request(12_500, 1.0)
-    link.cancel(second)
-    third = link.request(12_500, 1.0)
-    assert [link.advance(9.0) for _ in range(3)] == [first, third, None]
-    assert third.ended == pytest.approx(0.4)
-    assert link.wasted == 0
 
 
 @given(PROTOCOL, st.floats(0, 1), st.lists(st.integers(0, 10**9), min_size=1, max_size=6))

@@ -80,10 +80,7 @@ class Witness:
             part = request.tag
             assert isinstance(part, Range)
             if part.begin == there[part.number]:
-                received = part.end - part.begin if request.finished else 0
-                if request.cancelled:
-                    received = int(request.received)
-                there[part.number] += received
+                there[part.number] += part.end - part.begin if request.ended is not None else 0
         return there
 
 
@@ -104,7 +101,7 @@ def test_what_no_client_may_do(policy: str, seed: int, conditions: Conditions, b
     # The link.
     link = seen.link
     arriving = sum(r.received for r in seen.asked if r.ended is None)
-    known = run.body - arriving + run.overhead + run.cancelled
+    known = run.body - arriving + run.overhead
     assert math.isclose(link.carried, known + link.partial, abs_tol=1e-6)
     assert math.isclose(run.body, sum(r.received for r in seen.asked))
     assert run.requests == len(seen.asked)
@@ -133,15 +130,14 @@ def _check_changes(run: Run, world: World) -> None:
 
 
 def _check_once(seen: Witness) -> None:
-    """Each byte is asked for once, but for those of requests that were cancelled."""
+    """Each byte is asked for once."""
     ranges: dict[tuple[Kind, int], list[tuple[int, int]]] = {}
     for request in seen.asked:
         part = request.tag
         assert isinstance(part, Range)
         assert request.size == part.end - part.begin > 0
         assert part.end <= seen.client.files[part.kind].size[part.number]
-        came = int(request.received) if request.cancelled else request.size
-        ranges.setdefault((part.kind, part.number), []).append((part.begin, part.begin + came))
+        ranges.setdefault((part.kind, part.number), []).append((part.begin, part.end))
     for parts in ranges.values():
         parts.sort()
         assert all(a[1] <= b[0] for a, b in itertools.pairwise(parts))
@@ -207,7 +203,7 @@ def test_a_run_counted_by_hand(policy: str) -> None:
     # The index and the record; ach-views goes by the statistics, too.
     documents = 500 + 300 + 700 * (policy == "ach-views")
     assert (run.documents, run.body, run.useful) == (documents, documents + files, files)
-    assert (run.overhead, run.cancelled) == (300 * run.requests, 0)
+    assert run.overhead == 300 * run.requests
     assert run.memory[-1] == run.uploads == sum(sum(t.memory) for t in textures)
     assert run.quality[-1] == 1
     # Geometry comes after the index, and for who waits for it also after the record.

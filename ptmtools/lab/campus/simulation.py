@@ -314,7 +314,6 @@ def _run(
         loaded=np.zeros((frames, 0), np.bool_),
         body=run.body,
         overhead=run.overhead,
-        cancelled=0.0,
         documents=0,
         useful=nan,
         uploads=0,

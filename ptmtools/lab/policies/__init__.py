@@ -1,4 +1,4 @@
-"""The policies of clients as a table: the strategy of each, and the knowledge it needs.
+"""The policies of clients as a table: the strategy of each.
 
 To add one, add a module with a `Client`, or a policy of the `engine`, and a line here.
 """
@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from enum import Enum
 from functools import partial
 
 import numpy as np
@@ -26,15 +25,6 @@ from ptmtools.lab.policies.whole_files import GpuiiClient, LruClient
 from ptmtools.lab.world import World
 
 
-class Knowledge(Enum):
-    """Knowledge that a client needs; each includes those before it."""
-
-    HINTS = "hints"
-    CAMERA = "hints and camera"
-    SCREEN = "hints, camera and an item buffer"
-    FUTURE = "the future"
-
-
 @dataclass(frozen=True)
 class PolicyEntry:
     """A policy.
@@ -42,7 +32,6 @@ class PolicyEntry:
     Attributes
     ----------
     name, about: for `--policy`.
-    knows: the knowledge it needs.
     client: makes a client, in a world, on a link, with a budget.
     options: its own options, if any; see `configured`.
     needs: a field that the records of cells must have, and how to get it; None: no optional field.
@@ -51,7 +40,6 @@ class PolicyEntry:
 
     name: str
     about: str
-    knows: Knowledge
     client: Callable[..., Client]
     needs: tuple[str, str] | None = None
     form: str = PTM
@@ -84,97 +72,62 @@ def _same(policy: Policy, *, statistics: bool = False) -> Callable[[World, Link,
 
 _LIST = (
     PolicyEntry(
-        "paper",
-        "client of Marvie & Bouatouch, §6.1 and §6.2",
-        Knowledge.CAMERA,
-        PaperClient,
-        options=PaperOptions(),
+        "paper", "client of Marvie & Bouatouch, §6.1 and §6.2", PaperClient, options=PaperOptions()
     ),
-    PolicyEntry("lru", "whole files in order of use, with a cache", Knowledge.CAMERA, LruClient),
+    PolicyEntry("lru", "whole files in order of use, with a cache", LruClient),
     PolicyEntry(
         "gpuii",
         "client of Englert et al., §3.3: interlaced images by rings around the camera",
-        Knowledge.CAMERA,
         GpuiiClient,
         form="interlaced",
     ),
     PolicyEntry(
         "ach",
         "average coverage hints, in the engine that most policies share",
-        Knowledge.CAMERA,
         _same(shares.Weighted(shares.coverage_shares)),
     ),
     PolicyEntry(
         "ach-views",
         "coverage hints of the six views",
-        Knowledge.CAMERA,
         _same(shares.Weighted(shares.by_views), statistics=True),
     ),
     PolicyEntry(
         "ach-texture",
         "coverage hints of textures (`ptm ach --per-texture`)",
-        Knowledge.CAMERA,
         _same(shares.Weighted(shares.by_texture)),
         needs=("textureShares", "measure it with `ptm ach DB --per-texture`, then `ptm emit DB`"),
     ),
+    PolicyEntry("distance", "nearest cells first", _same(shares.Weighted(shares.distance_shares))),
     PolicyEntry(
-        "distance",
-        "nearest cells first",
-        Knowledge.CAMERA,
-        _same(shares.Weighted(shares.distance_shares)),
+        "bbox", "screen area of boxes, without occlusion", _same(shares.Weighted(shares.by_box))
     ),
+    PolicyEntry("screen", "pixels of an item buffer", _same(Screen())),
+    PolicyEntry("screen+distance", "screen, and near cells", _same(Screen(shares.by_distance))),
     PolicyEntry(
-        "bbox",
-        "screen area of boxes, without occlusion",
-        Knowledge.CAMERA,
-        _same(shares.Weighted(shares.by_box)),
-    ),
-    PolicyEntry("screen", "pixels of an item buffer", Knowledge.SCREEN, _same(Screen())),
-    PolicyEntry(
-        "screen+distance",
-        "screen, and near cells",
-        Knowledge.SCREEN,
-        _same(Screen(shares.by_distance)),
-    ),
-    PolicyEntry(
-        "screen+ach",
-        "screen, and average coverage hints",
-        Knowledge.SCREEN,
-        _same(Screen(shares.by_coverage)),
+        "screen+ach", "screen, and average coverage hints", _same(Screen(shares.by_coverage))
     ),
     PolicyEntry(
         "screen+need",
         "screen, and the resolution needed in the cell",
-        Knowledge.SCREEN,
         _same(Screen(shares.by_need)),
         needs=("need", "measure it with `ptm emit DB --need 16`"),
     ),
-    PolicyEntry(
-        "best", "policy of the viewer: screen, need and distance", Knowledge.SCREEN, _same(BEST)
-    ),
+    PolicyEntry("best", "policy of the viewer: screen, need and distance", _same(BEST)),
     PolicyEntry(
         "apo",
         "client of Lacoste et al., §4.2: octree textures level by level; other textures as in best",
-        Knowledge.SCREEN,
         ApoClient,
         form="octree",
     ),
-    PolicyEntry(
-        "best+apo",
-        "best, also for octree textures",
-        Knowledge.SCREEN,
-        _same(BEST),
-        form="octree",
-    ),
-    PolicyEntry("oracle", "knows the walk; greedy", Knowledge.FUTURE, _engine(Oracle)),
+    PolicyEntry("best+apo", "best, also for octree textures", _same(BEST), form="octree"),
+    PolicyEntry("oracle", "knows the walk; greedy", _engine(Oracle)),
     PolicyEntry(
         "oracle-exchange",
         "knows the walk; also exchanges levels in memory",
-        Knowledge.FUTURE,
         _engine(partial(Oracle, exchanging=True)),
     ),
 )
 #: Policies by name.
 POLICIES = {policy.name: policy for policy in _LIST}
 
-__all__ = ["POLICIES", "Knowledge", "PolicyEntry"]
+__all__ = ["POLICIES", "PolicyEntry"]
