@@ -20,7 +20,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ptmtools.files import open_regular
+from ptmtools.errors import OutputError
+from ptmtools.files import open_regular, write_bytes
 
 #: Ticks of the clocks of file times, ns: most are 1 to 10 ms; those of some disks, recognised by
 #: whole seconds, are 2 s.
@@ -41,21 +42,23 @@ class Digests:
         self._file = None if folder is None else folder / f"{name}.json"
         self._known: dict[str, tuple[Stamp, str]] = {}
         self._written: dict[str, tuple[Stamp, str]] = {}
-        self._used: set[str] = set()
         self._changed = False
-        with suppress(OSError, ValueError, TypeError, RecursionError):
-            self._load()
+        with suppress(OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+            document: Any = json.loads(self._file.read_bytes()) if self._file else {}
+            if document["format"] == _FORMAT:
+                self._known = {
+                    str(name): ((int(a), int(b), int(c), int(d)), str(digest))
+                    for name, (a, b, c, d, digest) in document["files"].items()
+                }
 
     def of(self, path: Path) -> str:
         """Hex digest of a regular file.
 
         Raises OSError if it cannot be read.
         """
-        name = os.path.abspath(path)
         stamp = _stamp(path)
-        known = self._known.get(name)
+        known = self._known.get(os.path.abspath(path))
         if known is not None and known[0] == stamp:
-            self._used.add(name)
             return known[1]
         before = time.time_ns()
         with open_regular(path) as file:
@@ -79,16 +82,12 @@ class Digests:
         rows = {
             name: [*stamp, digest]
             for name, (stamp, digest) in sorted(self._known.items())
-            if name in self._used or os.path.exists(name)
+            if os.path.exists(name)
         }
-        part = self._file.with_name(f".{self._file.name}.{os.getpid()}.part")
-        with suppress(OSError):
+        data = json.dumps({"format": _FORMAT, "files": rows}).encode()
+        with suppress(OSError, OutputError):
             self._file.parent.mkdir(parents=True, exist_ok=True)
-            try:
-                part.write_text(json.dumps({"format": _FORMAT, "files": rows}))
-                part.replace(self._file)
-            finally:
-                part.unlink(missing_ok=True)
+            write_bytes(self._file, data, force=True)
             _forget_old(self._file.parent)
         self._changed = False
 
@@ -96,20 +95,9 @@ class Digests:
         """Caches the digest of a file read at the time ``before``, unless the file may have changed
         since."""
         if stamp == _stamp(path) and _settled(stamp, before):
-            name = os.path.abspath(path)  # differs from ``path`` if a link precedes a ``..``
-            self._known[name] = (stamp, digest)
-            self._used.add(name)
+            # This differs from ``path`` if a link precedes a ``..``.
+            self._known[os.path.abspath(path)] = (stamp, digest)
             self._changed = True
-
-    def _load(self) -> None:
-        if self._file is None:
-            return
-        document: Any = json.loads(self._file.read_bytes())
-        if document["format"] == _FORMAT:
-            self._known = {
-                str(name): ((int(a), int(b), int(c), int(d)), str(digest))
-                for name, (a, b, c, d, digest) in document["files"].items()
-            }
 
 
 def _stamp(path: Path) -> Stamp:

@@ -18,8 +18,9 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from threading import Lock as Turn
+from threading import Lock
 
 from ptmtools.errors import DatabaseError, InputError, OutputError
 from ptmtools.files import open_regular, writing
@@ -39,12 +40,12 @@ class DatabaseWriter(DatabaseFolder):
     def __init__(self, path: Path, manifest: Callable[[], Manifest], created: list[Path]) -> None:
         """``manifest`` is called with the lock held; ``created`` are the folders created for the
         database, outermost first."""
-        self._lock, self._created, self._turn = acquire(path), created, Turn()
+        self._release, self._created, self._turn = acquire(path), created, Lock()
         try:
             recover(path)
             super().__init__(path, manifest())
         except BaseException:
-            self._lock.release()
+            self._release()
             raise
 
     @staticmethod
@@ -98,7 +99,7 @@ class DatabaseWriter(DatabaseFolder):
         with suppress(OSError):
             discard(self.path, also_finished=kind is None or (not committed and hopeless))
         self.digests.save()
-        self._lock.release()
+        self._release()
         if not committed:
             _remove_empty(self._created)
 
@@ -182,22 +183,9 @@ class Holder:
         return self.host == socket.gethostname()
 
 
-class Lock:
-    """The lock of a folder, until `release`."""
-
-    def __init__(self, file: Path, descriptor: int) -> None:
-        self._file = file
-        self._descriptor = descriptor
-
-    def release(self) -> None:
-        """Removes the lock file, then releases the lock."""
-        with suppress(OSError):
-            self._file.unlink()
-        os.close(self._descriptor)
-
-
-def acquire(folder: Path) -> Lock:
-    """Takes the lock of a folder that exists.
+def acquire(folder: Path) -> Callable[[], None]:
+    """Takes the lock of a folder that exists; returns the function that removes the lock file, then
+    releases the lock.
 
     Raises
     ------
@@ -216,7 +204,7 @@ def acquire(folder: Path) -> Lock:
             with suppress(OSError):  # on a full disk it stays empty
                 os.ftruncate(descriptor, 0)
                 os.pwrite(descriptor, json.dumps(process).encode(), 0)
-            return Lock(file, descriptor)
+            return partial(_release, file, descriptor)
         os.close(descriptor)
     owner = holder(folder)
     raise DatabaseError(
@@ -225,6 +213,12 @@ def acquire(folder: Path) -> Lock:
         file=folder,
         remedy="wait until it has finished",
     )
+
+
+def _release(file: Path, descriptor: int) -> None:
+    with suppress(OSError):
+        file.unlink()
+    os.close(descriptor)
 
 
 def holder(folder: Path) -> Holder | None:
