@@ -38,6 +38,12 @@ _ILLEGAL = re.compile(r"[^A-Za-z0-9_]+")
 _LONGEST = 48
 
 
+def plain_name(name: str, default: str) -> str:
+    """The name of an object in ASCII letters, digits and _; ``default`` where nothing is left."""
+    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
+    return _ILLEGAL.sub("_", plain).strip("_")[:_LONGEST] or default
+
+
 def cell_name(cell: int) -> str:
     """ "c0000"; more digits where they are needed."""
     return f"c{cell:04d}"
@@ -67,9 +73,7 @@ class DefNames:
 
     def take(self, name: str) -> str:
         """A name for the object ``name``, used nowhere else in the file."""
-        plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
-        base = _ILLEGAL.sub("_", plain).strip("_")[:_LONGEST] or "shape"
-        preferred = f"{self._prefix}_{base}"
+        preferred = f"{self._prefix}_{plain_name(name, 'shape')}"
         unique, count = preferred, self._taken.get(preferred, 1)
         while unique in self._taken:
             count += 1

@@ -291,6 +291,13 @@ def test_names_and_digests_of_images(database: Path, row: dict[str, Any]) -> Non
             assert len(images_of(artifacts)) == 1
 
 
+def test_images_whose_textures_would_have_one_name(database: Path) -> None:
+    rows = [ROW, {**ROW, "name": "A.jpg"}]
+    replaced(database, IMAGE_LIST, json.dumps({"images": rows}).encode())
+    with pytest.raises(DatabaseError, match="PTM-D006"):
+        images_of(Artifacts(DatabaseFolder.open(database)))
+
+
 @pytest.mark.parametrize("place", ["manifest.json", "stages/scene.npz", "stages/images.json"])
 def test_pipes_in_place_of_files_are_not_waited_for(database: Path, place: str) -> None:
     (database / place).unlink()

@@ -18,17 +18,11 @@ from ptmtools.pipeline.build import build_scene, run_stage
 from ptmtools.pipeline.encoding import TextureOptions, bare_png
 from ptmtools.pipeline.stage import Run
 from ptmtools.pipeline.stages import CELLS, TEXTURES
-from ptmtools.pipeline.stages.textures import TexturesJob, texture_names
+from ptmtools.pipeline.stages.textures import TexturesJob
 from ptmtools.store.writer import DatabaseWriter
 from ptmtools.texture import read_image
 
 TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data/two_rooms/two_rooms.obj"
-
-
-def test_names_are_unique_without_regard_to_case() -> None:
-    assert texture_names(("a.png", "b.tar.png", "c")) == ["a", "b.tar", "c"]
-    assert texture_names(("a.png", "A.jpg", "a_png.tif")) == ["a_png", "A_jpg", "a_png_2"]
-    assert texture_names((".png",)) == ["png"]
 
 
 @pytest.mark.parametrize("mode", ["1", "L", "LA", "P", "RGB", "RGBA"])

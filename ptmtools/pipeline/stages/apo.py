@@ -12,7 +12,6 @@ from __future__ import annotations
 import json
 import math
 import re
-import unicodedata
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -20,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from ptmtools.diagnostics import warnings_in
 from ptmtools.lazy import Lazy
 from ptmtools.neighbours.apo.options import ReplaceOptions
-from ptmtools.output.names import OCTREE_FOLDER
+from ptmtools.output.names import OCTREE_FOLDER, plain_name
 from ptmtools.pipeline.stage import Artifacts, Job, Stage
 from ptmtools.pipeline.stages.scene import SCENE
 from ptmtools.quantities import count, size
@@ -36,10 +35,7 @@ if TYPE_CHECKING:
     from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
 
-_ILLEGAL = re.compile(r"[^A-Za-z0-9_]+")
 _FILE = re.compile(rf"{OCTREE_FOLDER}/[A-Za-z0-9_]+\.bin")
-#: Longer object names come from generators and are cut.
-_LONGEST = 48
 
 
 class ReplacingJob(Job):
@@ -111,9 +107,8 @@ def octree_files(objects: Iterable[str]) -> list[str]:
     taken: set[str] = set()
     files = []
     for name in objects:
-        plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
-        stem = _ILLEGAL.sub("_", plain).strip("_")[:_LONGEST] or "object"
-        unique, number = stem, 1
+        stem = unique = plain_name(name, "object")
+        number = 1
         while unique.casefold() in taken:
             number += 1
             unique = f"{stem}_{number}"

@@ -51,6 +51,8 @@ def image_rows(artifacts: Artifacts) -> list[Mapping[str, Any]]:
             texts = isinstance(row["files"], list) and all(isinstance(f, str) for f in row["files"])
             if not texts or not isinstance(row["plain"], bool):
                 raise TypeError("an image without a list of files")
+        if len({row["name"].partition(".")[0].casefold() for row in rows}) < len(rows):
+            raise ValueError("two images whose textures would have the same name")
         return rows
 
     return artifacts.cached(IMAGE_LIST, read)

@@ -13,9 +13,8 @@ from __future__ import annotations
 
 import io
 import json
-import re
 import time
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import takewhile
@@ -52,29 +51,9 @@ FOLDER = "textures"
 IMAGES_PER_MESSAGE = 4
 
 
-def texture_names(images: Iterable[str]) -> list[str]:
-    """The name of each texture without suffix, unique without regard to case: the image's stem,
-    and with its suffix where two images share a stem."""
-    names = [image.rpartition(".") for image in images]
-    stems = [stem or suffix for stem, _, suffix in names]
-    uses = Counter(stem.casefold() for stem in stems)
-    taken: set[str] = set()
-    unique = []
-    for (_, _, suffix), stem in zip(names, stems, strict=True):
-        shared = uses[stem.casefold()] > 1
-        base = f"{stem}_{re.sub('[^A-Za-z0-9]', '', suffix)}" if shared else stem
-        name, number = base, 1
-        while name.casefold() in taken:
-            number += 1
-            name = f"{base}_{number}"
-        taken.add(name.casefold())
-        unique.append(name)
-    return unique
-
-
 def texture_files(images: Iterable[str]) -> list[str]:
-    """The `.ptm` of each image, by its name, relative to the served folder."""
-    return [f"{FOLDER}/{name}.ptm" for name in texture_names(images)]
+    """The `.ptm` of each image, named by its stem, relative to the served folder."""
+    return [f"{FOLDER}/{image.rpartition('.')[0]}.ptm" for image in images]
 
 
 def detail_file(texture: str) -> str:
@@ -290,12 +269,31 @@ class TexturesJob(Job):
         Raises as `encode`.
         """
         assert self._transaction
-        start = time.perf_counter()
-        total = len(self._names)
+        start, transaction = time.perf_counter(), self._transaction
+        total, images, fewer = len(self._names), images_of(self.run), self._fewer
         wanted = takewhile(lambda _: stop is None or not stop.is_set(), tuple(self._left))
-        for files in self._staged(self._transaction, executor, wanted):
-            self.run.progress(total - len(self._left), total, "textures")
-            self._transaction.finish(self._task(self._left.popleft()), files)
+        with shared_disk(transaction, self.run.db.path, self.options, executor) as disk:
+            results: Iterator[Sequence[bytes | tuple[str, str]]]
+            if disk is None:
+                sources = ((images[i].name, images[i].load(), fewer[i]) for i in wanted)
+                results = executor.each(encoded_image, self.options, sources, releases_lock=True)
+            else:
+                chunk = max(1, min(IMAGES_PER_MESSAGE, len(self._left) // (8 * executor.workers)))
+                tasks = (
+                    ImageTask(images[i].name, images[i].sha256, str(i), fewer[i]) for i in wanted
+                )
+                results = executor.each(
+                    encoded_on_disk, disk, tasks, releases_lock=True, chunk=chunk
+                )
+            for result in results:
+                files = self._files(self._names[self._left[0]])
+                for name, output in zip(files, result, strict=True):
+                    if isinstance(output, bytes):
+                        transaction.put(name, output)
+                    else:
+                        transaction.take(name, Path(output[0]), output[1])
+                self.run.progress(total - len(self._left), total, "textures")
+                transaction.finish(self._task(self._left.popleft()), files)
         self.run.progress(total - len(self._left), total, "textures")
         self._seconds += time.perf_counter() - start
 
@@ -309,31 +307,6 @@ class TexturesJob(Job):
         name = self._names[i]
         depends = [self._work.recipe, _coding(self._work), name, self._work.inputs[name]]
         return sha256(json.dumps(depends, sort_keys=True).encode())
-
-    def _staged(
-        self, transaction: Transaction, executor: Executor, wanted: Iterator[int]
-    ) -> Iterator[list[str]]:
-        """The files of each image, once they are staged. The order is that of `_left`, so each
-        belongs to its first entry."""
-        images, fewer = images_of(self.run), self._fewer
-        with shared_disk(transaction, self.run.db.path, self.options, executor) as disk:
-            if disk is None:
-                sources = ((images[i].name, images[i].load(), fewer[i]) for i in wanted)
-                for data in executor.each(encoded_image, self.options, sources, releases_lock=True):
-                    files = self._files(self._names[self._left[0]])
-                    for name, content in zip(files, data, strict=True):
-                        transaction.put(name, content)
-                    yield files
-                return
-            chunk = max(1, min(IMAGES_PER_MESSAGE, len(self._left) // (8 * executor.workers)))
-            tasks = (ImageTask(images[i].name, images[i].sha256, str(i), fewer[i]) for i in wanted)
-            for written in executor.each(
-                encoded_on_disk, disk, tasks, releases_lock=True, chunk=chunk
-            ):
-                files = self._files(self._names[self._left[0]])
-                for name, (file, digest) in zip(files, written, strict=True):
-                    transaction.take(name, Path(file), digest)
-                yield files
 
     def _headers(self, transaction: Transaction) -> Iterator[PtmHeader]:
         """The headers of all textures, staged or committed."""
