@@ -425,10 +425,10 @@ class Job:
             artifact = stage.compute.load()(*reads, options, run.progress, executor)
         run.keep(stage, artifact)
         transaction.put_arrays(stage.name, artifact.to_arrays())
-        notes = tuple(stage.notes(artifact, options))
-        return replace(
-            work,
-            counts=stage.counts(artifact),
-            notes=tuple(map(str, notes)),
-            warnings=warnings_in(notes),
-        )
+        return described(work, stage.counts(artifact), stage.notes(artifact, options))
+
+
+def described(work: StageRecord, counts: Counts, notes: Iterable[str]) -> StageRecord:
+    """The record of a run with its counts and notes; those of type `Warned` are its warnings."""
+    notes = tuple(notes)
+    return replace(work, counts=counts, notes=tuple(map(str, notes)), warnings=warnings_in(notes))

@@ -16,11 +16,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from ptmtools.diagnostics import warnings_in
 from ptmtools.lazy import Lazy
 from ptmtools.neighbours.apo.options import ReplaceOptions
 from ptmtools.output.names import OCTREE_FOLDER, plain_name
-from ptmtools.pipeline.stage import Artifacts, Job, Stage
+from ptmtools.pipeline.stage import Artifacts, Job, Stage, described
 from ptmtools.pipeline.stages.scene import SCENE
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import OCTREE_LIST, SERVED, arrays_of
@@ -97,8 +96,7 @@ class ReplacingJob(Job):
             "triangles": len(result.scene.triangles),
             "deviation": max((row["deviation"] for row in rows), default=0.0),
         }
-        notes = tuple(map(str, result.notes))
-        return replace(work, counts=counts, notes=notes, warnings=warnings_in(result.notes))
+        return described(work, counts, result.notes)
 
 
 def octree_files(objects: Iterable[str]) -> list[str]:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from ptmtools.diagnostics import warnings_in
 from ptmtools.output.options import EmitOptions
 from ptmtools.pipeline.encoding import fallback_level, read_detail
-from ptmtools.pipeline.stage import Artifacts, Job, Stage
+from ptmtools.pipeline.stage import Artifacts, Job, Stage, described
 from ptmtools.pipeline.stages.ach import ACH
 from ptmtools.pipeline.stages.apo import APO, octree_records
 from ptmtools.pipeline.stages.cells import CELLS
@@ -63,7 +62,7 @@ class EmissionJob(Job):
             "viewpoints": len(report.viewpoints),
             "visit": asdict(report.visit),
         }
-        return replace(work, counts=counts, notes=report.notes, warnings=warnings_in(report.notes))
+        return described(work, counts, report.notes)
 
     def _need(self, textures: Iterable[TextureRecord]) -> Need | None:
         """The required levels of the textures, if the options ask for them."""

@@ -131,36 +131,27 @@ def _left_out(header: PtmHeader, options: TextureOptions) -> list[tuple[int, int
     return sizes[len(sizes) - header.trimmed : kept_levels(*sizes[-1], options)[-1] + 1]
 
 
-def unresolved_counts(headers: Iterable[PtmHeader], options: TextureOptions) -> dict[str, int]:
-    """The counts of ``--trim``, none without it: the textures with levels left out, and the decoded
-    bytes by which their finest levels are smaller."""
+def _trimmed(
+    names: Iterable[str], headers: Iterable[PtmHeader], options: TextureOptions
+) -> tuple[dict[str, int], list[str]]:
+    """The counts of ``--trim``: the textures with levels left out, and the decoded bytes by which
+    their finest levels are smaller. And a note on each, with the bytes saved, estimated from the
+    bytes for a texel of the finest level kept. Nothing without ``--trim``."""
     if not options.trim:
-        return {}
-    counts = {"unresolved": 0, "unresolved_bytes": 0}
-    for header in headers:
+        return {}, []
+    counts, notes = {"unresolved": 0, "unresolved_bytes": 0}, []
+    for name, header in zip(names, headers, strict=True):
         if sizes := _left_out(header, options):
             (width, height), finest = sizes[-1], header.levels[-1]
+            kept = finest.width * finest.height
             counts["unresolved"] += 1
-            texels = width * height - finest.width * finest.height
-            counts["unresolved_bytes"] += texels * header.texel_bytes
-    return counts
-
-
-def notes_on_trim(
-    names: Iterable[str], headers: Sequence[PtmHeader], options: TextureOptions
-) -> Iterator[str]:
-    """The textures with levels left out, and the bytes saved, estimated from the bytes for a texel
-    of the finest level kept."""
-    for name, header in zip(names, headers, strict=True):
-        sizes = _left_out(header, options) if options.trim else []
-        if sizes:
-            (width, height), finest = sizes[-1], header.levels[-1]
-            texels = sum(w * h for w, h in sizes)
-            saved = finest.length * texels // (finest.width * finest.height)
-            yield (
+            counts["unresolved_bytes"] += (width * height - kept) * header.texel_bytes
+            saved = finest.length * sum(w * h for w, h in sizes) // kept
+            notes.append(
                 f"--trim leaves out {count(len(sizes), 'level')} of {name}: {finest.width} x "
                 f"{finest.height} of {width} x {height}, about {size(saved)} less"
             )
+    return counts, notes
 
 
 class TexturesJob(Job):
@@ -225,14 +216,9 @@ class TexturesJob(Job):
             self.encode(self.run.workers.executor)
         if transaction := self._transaction:
             headers = list(self._headers(transaction))
-            record = replace(
-                self._work,
-                counts={**counts_of(headers), **unresolved_counts(headers, self.options)},
-                notes=(
-                    *notes_on_size(self._names, headers, self.options.max_side),
-                    *notes_on_trim(self._names, headers, self.options),
-                ),
-            )
+            counts, notes = _trimmed(self._names, headers, self.options)
+            notes = [*notes_on_size(self._names, headers, self.options.max_side), *notes]
+            record = replace(self._work, counts={**counts_of(headers), **counts}, notes=notes)
             self.run.settle(self.stage, transaction, record)
         self.run.end(self.stage, self._why, self._seconds, self._tasks)
 
