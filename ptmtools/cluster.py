@@ -19,7 +19,7 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import CancelledError, Future
 from contextlib import contextmanager, nullcontext, suppress
 from functools import cache
@@ -27,17 +27,13 @@ from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from itertools import chain
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from ptmtools.errors import WorkerError
-from ptmtools.executor import AHEAD, Executor, Outcome, chunks, in_order, outcome, results
+from ptmtools.executor import AHEAD, Executor, Outcome, Task, chunks, in_order, outcome, results
 from ptmtools.lazy import component
 from ptmtools.progress import announce
 from ptmtools.version import __version__
-
-S = TypeVar("S")
-T = TypeVar("T")
-R = TypeVar("R")
 
 #: Seconds to wait for the scheduler, and for a first worker.
 PATIENCE = 15
@@ -97,24 +93,13 @@ class Cluster(Executor):
             self._counted = time.monotonic()
         return max(1, min(self._threads, self._limit or self._threads))
 
-    def each(
-        self,
-        function: Callable[[S, T], R],
-        shared: S,
-        tasks: Iterable[T],
-        *,
-        releases_lock: bool = False,
-        chunk: int = 1,
-    ) -> Iterator[R]:
-        """See `Executor.each`."""
+    def _each(
+        self, function: Task, shared: Any, tasks: Iterable[Any], releases_lock: bool, chunk: int
+    ) -> Iterator[Any]:
         return results(self._outcomes(function, shared, chunks(tasks, chunk), not releases_lock))
 
     def _outcomes(
-        self,
-        function: Callable[[Any, Any], Any],
-        shared: Any,
-        rest: Iterator[list[Any]],
-        alone: bool,
+        self, function: Task, shared: Any, rest: Iterator[list[Any]], alone: bool
     ) -> Iterator[Outcome]:
         sent: deque[list[Any]] = deque()  # chunks whose results have not come
         value: Any = None

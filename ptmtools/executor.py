@@ -34,18 +34,13 @@ from itertools import islice
 from typing import Any, Generic, Self, TypeVar
 
 S = TypeVar("S")
-
-
 T = TypeVar("T")
-
-
 R = TypeVar("R")
-
+#: A function of a shared value and a task.
+Task = Callable[[Any, Any], Any]
 
 #: Tasks or chunks per worker that are submitted ahead: one in progress and one that waits.
 AHEAD = 2
-
-
 #: The results of the first tasks of a chunk, and the exception of the next task, if any.
 Outcome = tuple[list[Any], Exception | None]
 
@@ -94,8 +89,13 @@ class Executor:
 
         Raises what a task raises; WorkerError PTM-W004 if a worker ends while it runs one.
         """
-        for task in tasks:
-            yield function(shared, task)
+        return self._each(function, shared, tasks, releases_lock, chunk)
+
+    def _each(
+        self, function: Task, shared: Any, tasks: Iterable[Any], releases_lock: bool, chunk: int
+    ) -> Iterator[Any]:
+        """See `each`."""
+        return (function(shared, task) for task in tasks)
 
     def submit(
         self, function: Callable[[S, T], R], shared: S, task: T, *, long: bool = True
@@ -154,7 +154,7 @@ def results(outcomes: Iterable[Outcome]) -> Iterator[Any]:
             raise fault
 
 
-def outcome(function: Callable[[Any, Any], Any], shared: object, tasks: Iterable[Any]) -> Outcome:
+def outcome(function: Task, shared: object, tasks: Iterable[Any]) -> Outcome:
     """Runs a chunk in a worker, up to the first exception."""
     done: list[Any] = []
     try:

@@ -33,6 +33,7 @@ from ptmtools.executor import (
     R,
     S,
     T,
+    Task,
     _portable,
     chunks,
     in_order,
@@ -89,13 +90,13 @@ class Local(Executor):
 
     Parameters
     ----------
-    workers: 0 is one for each processor.
+    workers: number of threads or processes.
     threads: False runs everything in processes, while another thread of this process keeps the
         interpreter's lock.
     """
 
-    def __init__(self, workers: int = 0, *, threads: bool = True) -> None:
-        self._workers = workers or processors()
+    def __init__(self, workers: int, *, threads: bool = True) -> None:
+        self._workers = workers
         self.remote = not threads
         # Threads and processes start when there is a first task for them.
         self._threads = ThreadPoolExecutor(self._workers, "ptmtools")
@@ -109,23 +110,13 @@ class Local(Executor):
     def workers(self) -> int:
         return self._workers
 
-    def each(
-        self,
-        function: Callable[[S, T], R],
-        shared: S,
-        tasks: Iterable[T],
-        *,
-        releases_lock: bool = False,
-        chunk: int = 1,
-    ) -> Iterator[R]:
-        """See `Executor.each`."""
-        if self._workers == 1 and not self.remote:
-            yield from super().each(function, shared, tasks)
-            return
+    def _each(
+        self, function: Task, shared: Any, tasks: Iterable[Any], releases_lock: bool, chunk: int
+    ) -> Iterator[Any]:
         ahead = AHEAD * self._workers
         if releases_lock and not self.remote:
 
-            def submit(task: T) -> Future[R]:
+            def submit(task: Any) -> Future[Any]:
                 return self._threads.submit(function, shared, task)
 
             # After an error the caller may change what running threads still read: wait for them.
@@ -133,7 +124,7 @@ class Local(Executor):
             return
         with _shared_file(shared) as file:
 
-            def send(some: list[T]) -> Future[Outcome]:
+            def send(some: list[Any]) -> Future[Outcome]:
                 return self._threads.submit(self._call, file, function, some)
 
             yield from results(in_order(send, chunks(tasks, chunk), lambda: ahead))
@@ -142,7 +133,7 @@ class Local(Executor):
         self, function: Callable[[S, T], R], shared: S, task: T, *, long: bool = True
     ) -> Pending[R]:
         """See `Executor.submit`."""
-        if self._workers == 1 or not long:
+        if not long:
             return super().submit(function, shared, task)
         return in_background(function, shared, task)
 
@@ -153,7 +144,7 @@ class Local(Executor):
             process.close()
         self._threads.shutdown()
 
-    def _call(self, file: _File, function: Callable[[S, T], R], tasks: list[T]) -> Outcome:
+    def _call(self, file: _File, function: Task, tasks: list[Any]) -> Outcome:
         process = self._idle.get()
         try:
             return process.call(_over_file, file, function, tasks)
@@ -229,7 +220,7 @@ def _shared_file(shared: object) -> Iterator[_File]:
 _last: tuple[_File, Any] | None = None
 
 
-def _over_file(file: _File, function: Callable[[Any, Any], Any], tasks: list[Any]) -> Outcome:
+def _over_file(file: _File, function: Task, tasks: list[Any]) -> Outcome:
     """In a worker process: runs a chunk over the value in a file. Its arrays can be written; pages
     that the worker changes are its own."""
     global _last
