@@ -16,13 +16,13 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 
 from ptmtools.errors import InputError, LimitError, OutputError
 from ptmtools.parallel import ordered
-from ptmtools.texture.coder import Coder, Tile
+from ptmtools.texture.coder import Coder, Coding, Tile
 from ptmtools.texture.container import (
     DESCRIPTION_MAX,
     EXACT,
@@ -180,7 +180,7 @@ def encode_to(
             remedy="open it for writing",
         )
     rows = ImageRows(image)
-    coding = _Coding(checked_coder(options, rows), options, threads)
+    encoding = _Encoding(checked_coder(options, rows), options, threads)
     described = pack_description(description)
     if len(described) > DESCRIPTION_MAX:
         raise LimitError(
@@ -193,7 +193,7 @@ def encode_to(
     file.write(bytes(head_size(len(kept))))
     file.write(described)
     single, tiled = _levels(rows, kept, options.tile)
-    tiles = coding.single([_whole(level) for level in single], more=bool(tiled))
+    tiles = encoding.single([_whole(level) for level in single], more=bool(tiled))
     del single
     coarsest, below, memory = tiles[0].texels, tiles[-1].texels, tiles[-1].memory
     above = [
@@ -208,7 +208,7 @@ def encode_to(
     while tiled:
         # The finest of them may be the image itself, of which nothing is kept.
         level = tiled.pop(0)
-        group, below, difference = coding.tiled(file, level, below, memory, finest=not tiled)
+        group, below, difference = encoding.tiled(file, level, below, memory, finest=not tiled)
         groups.append(group)
         above.append((difference, _texels_of(level)))
     end = file.tell()
@@ -220,7 +220,7 @@ def encode_to(
 
 
 @dataclass(frozen=True)
-class _Coding:
+class _Encoding:
     """How the levels of one image are coded."""
 
     coder: Coder
@@ -244,21 +244,17 @@ class _Coding:
     def _chain(self, base: Tile, levels: list[Samples], factor: float) -> list[Tile]:
         tiles = [base]
         for level in levels:
-            tiles.append(self._tile(level, tiles[-1].texels, tiles[-1].memory, factor))
+            coding = Coding(self.options.max_error, tiles[-1].memory, self.threads)
+            tiles.append(self._tile(level, tiles[-1].texels, coding, factor))
         return tiles
 
     def tiled(
-        self,
-        file: IO[bytes],
-        level: Samples | ImageRows,
-        below: Samples,
-        memory: object,
-        finest: bool,
+        self, file: IO[bytes], level: Samples | ImageRows, below: Samples, memory: Any, finest: bool
     ) -> tuple[tuple[int, int], Samples, float]:
         """Writes index and tiles of a level of several. Length of the group, CRC-32 of the index;
         the texels as a decoder has them, none of the finest level; and the `difference_between`
         them and those below."""
-        side = self.options.tile
+        side, coding = self.options.tile, Coding(self.options.max_error, memory)
         height, width = level.shape[:2]
         across, down = tile_counts(width, height, side)
         texels = below[:0]
@@ -277,7 +273,7 @@ class _Coding:
             box, strip = job
             piece = np.ascontiguousarray(strip[:, box.x0 : box.x1])
             under = np.ascontiguousarray(below[box.below.slices])
-            tile = self._tile(piece, under, memory, 1.0 if finest else EXACT_FACTOR, 1)
+            tile = self._tile(piece, under, coding, 1.0 if finest else EXACT_FACTOR)
             return box, tile, difference_between(tile.texels, under)
 
         start = file.tell()
@@ -295,28 +291,20 @@ class _Coding:
         file.seek(end)
         return (end - start, zlib.crc32(index)), texels, difference
 
-    def _tile(
-        self,
-        level: Samples,
-        below: Samples,
-        memory: object,
-        factor: float,
-        threads: int | None = None,
-    ) -> Tile:
+    def _tile(self, level: Samples, below: Samples, coding: Coding, factor: float) -> Tile:
         """One tile; with an allowed error, exactly if that takes at most ``factor`` times the
         bytes."""
-        encode_tile, max_error = self.coder.encode_tile, self.options.max_error
-        threads = threads or self.threads
-        if not max_error:
-            return encode_tile(level, below, 0, memory, threads)
+        encode_tile = self.coder.encode_tile
+        if not coding.max_error:
+            return encode_tile(level, below, coding)
         # Profiles that know the mean of a block can be exact only where it is the mean.
         exact = None
         if np.array_equal(mean_below(level), below):
-            exact = encode_tile(level, below, 0, memory, threads)
+            exact = encode_tile(level, below, replace(coding, max_error=0))
             exact = replace(exact, data=bytes([EXACT]) + exact.data)
             if factor == math.inf:
                 return exact
-        within = encode_tile(level, below, max_error, memory, threads)
+        within = encode_tile(level, below, coding)
         if exact and len(exact.data) - 1 <= factor * len(within.data):
             return exact
         return replace(within, data=bytes([WITHIN]) + within.data)

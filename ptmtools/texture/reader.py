@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, LimitError, naming
 from ptmtools.parallel import ordered
-from ptmtools.texture.coder import Tile
+from ptmtools.texture.coder import Coder, Coding, Tile
 from ptmtools.texture.coders.group import damaged
 from ptmtools.texture.container import (
     EXACT,
@@ -35,6 +35,7 @@ from ptmtools.texture.pyramid import Box, covering, tiles_under
 from ptmtools.texture.sources import Ranges, Source, ranges_of
 
 if TYPE_CHECKING:
+    from ptmtools.texture.coder import Shape
     from ptmtools.texture.detail import Detail
 
 
@@ -81,7 +82,10 @@ class PtmReader:
         #: Where the file ends, once a source of unknown size has come to its end.
         self._end: int | None = None
         self.header: PtmHeader = read_header(ranges.read(0, HEAD_MAX))
-        self._coder = PROFILES[self.header.profile].coder
+
+    @property
+    def _coder(self) -> Coder:
+        return PROFILES[self.header.profile].coder
 
     def __enter__(self) -> PtmReader:
         return self
@@ -254,9 +258,10 @@ class PtmReader:
                 if below is None:
                     tile = Tile(b"", self._coder.decode_base(data, shape, self.dtype))
                 else:
-                    tile = self._decode(data, below.texels, shape, below.memory, self._threads)
+                    coding = Coding(header.max_error, below.memory, self._threads)
+                    tile = self._decode(data, below.texels, shape, coding)
             return _State(tile.texels[box.slices], box, tile.memory)
-        index = self._index(level, place)
+        index, coding = self._index(level, place), Coding(header.max_error, below.memory)
         texels = np.empty((box.y1 - box.y0, box.x1 - box.x0, header.components), self.dtype)
 
         def decoded(job: tuple[int, Box]) -> tuple[Box, Samples]:
@@ -267,7 +272,7 @@ class PtmReader:
             data = self._checked(offset, length, crc32, where)
             size = (area.y1 - area.y0, area.x1 - area.x0, header.components)
             with naming(place=where):
-                tile = self._decode(data, under, size, below.memory)
+                tile = self._decode(data, under, size, coding)
             return area, tile.texels
 
         jobs = tiles_under(level.width, level.height, header.tile, box)
@@ -281,22 +286,15 @@ class PtmReader:
             texels[shared.within(box).slices] = part[shared.within(area).slices]
         return _State(texels, box, below.memory)
 
-    def _decode(
-        self,
-        data: bytes,
-        below: Samples,
-        shape: tuple[int, int, int],
-        memory: Any,
-        threads: int = 1,
-    ) -> Tile:
+    def _decode(self, data: bytes, below: Samples, shape: Shape, coding: Coding) -> Tile:
         """Decodes one tile, after the byte that says whether it uses an allowed error."""
-        max_error = self.header.max_error
-        if max_error:
-            if data[:1] not in (bytes([EXACT]), bytes([WITHIN])):
+        if coding.max_error:
+            if data[:1] == bytes([EXACT]):
+                coding = replace(coding, max_error=0)
+            elif data[:1] != bytes([WITHIN]):
                 raise damaged("it is neither exact nor within the error")
-            max_error = max_error if data[0] == WITHIN else 0
             data = data[1:]
-        return self._coder.decode_tile(data, below, shape, max_error, memory, threads)
+        return self._coder.decode_tile(data, below, shape, coding)
 
     def _index(self, level: Level, place: str) -> NDArray[np.int64]:
         """Offset, length and CRC-32 (n, 3) of every tile of a level."""

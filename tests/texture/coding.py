@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.texture.coder import Coding
 from ptmtools.texture.pyramid import build_pyramid
 
 Samples = NDArray[Any]
@@ -37,8 +38,9 @@ def coded_groups(
     same(below, coarsest)
     learned = known = None
     for level in levels:
-        tile = profile.encode_tile(level, below, max_error, learned, threads)
-        back = profile.decode_tile(tile.data, below, level.shape, max_error, known, threads)
+        tile = profile.encode_tile(level, below, Coding(max_error, learned, threads))
+        coding = Coding(max_error, known, threads)
+        back = profile.decode_tile(tile.data, below, level.shape, coding)
         same(back.texels, np.asarray(tile.texels))
         if max_error:
             assert np.abs(back.texels.astype(int) - level).max() <= max_error

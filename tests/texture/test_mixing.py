@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from ptmtools.errors import InputError
+from ptmtools.texture.coder import Coding
 from ptmtools.texture.coders import mixing_tables as tables
 from ptmtools.texture.coders.mixing import _split, decode_mixing, encode_mixing
 from ptmtools.texture.profiles import small
@@ -54,16 +55,17 @@ def test_threads_change_no_byte(components, size, max_error):
     """Odd heights too, whose last blocks look at the odd row of the plane before."""
     level = _image(*size, components)
     below = mean_below(level)
-    data, texels, memory = encode_mixing(level, below, max_error)
+    data, texels, memory = encode_mixing(level, below, Coding(max_error))
     for threads in (2, 4):
-        again, _, same = encode_mixing(level, below, max_error, threads=threads)
+        coding = Coding(max_error, threads=threads)
+        again, _, same = encode_mixing(level, below, coding)
         assert again == data
         assert all(
             np.array_equal(a, b)
             for one, two in zip(memory, same, strict=True)
             for a, b in zip(one, two, strict=True)
         )
-        back, _ = decode_mixing(data, below, level.shape, max_error, threads=threads)
+        back, _ = decode_mixing(data, below, level.shape, coding)
         assert np.array_equal(back, texels)
 
 
@@ -71,8 +73,9 @@ def test_memory_is_not_changed_and_makes_a_difference():
     level = _image(48, 48, 3)
     below = mean_below(level)
     fresh, _, memory = encode_mixing(level, below)
-    first = encode_mixing(level, below, memory=memory)[0]
-    assert encode_mixing(level, below, memory=memory)[0] == first
+    coding = Coding(memory=memory)
+    first = encode_mixing(level, below, coding)[0]
+    assert encode_mixing(level, below, coding)[0] == first
     assert len(first) < len(fresh)
 
 
@@ -80,8 +83,8 @@ def test_reading_leaves_the_memory_that_writing_left():
     levels = build_pyramid(_image(40, 44, 3))
     seen, written, read = levels[0], None, None
     for level in levels[1:]:
-        tile = small.encode_tile(level, seen, memory=written)
-        back = small.decode_tile(tile.data, seen, level.shape, memory=read)
+        tile = small.encode_tile(level, seen, Coding(memory=written))
+        back = small.decode_tile(tile.data, seen, level.shape, Coding(memory=read))
         seen, written, read = back.texels, tile.memory, back.memory
     for one, two in zip(written, read, strict=True):
         assert all(np.array_equal(a, b) for a, b in zip(one, two, strict=True))
@@ -139,7 +142,7 @@ def test_the_reference_decoder_agrees(height, width, components, max_error):
     seen, memory = levels[0], None
     states = [ReferenceState() for _ in range(components)]
     for level in levels[1:]:
-        data, texels, memory = encode_mixing(level, seen, max_error, memory)
+        data, texels, memory = encode_mixing(level, seen, Coding(max_error, memory))
         streams = map(bytes, _split(data, components if level.shape[1] >= 66 else 1))
         back = decode_reference(list(streams), seen, level.shape, max_error, states)
         assert np.array_equal(back, texels)

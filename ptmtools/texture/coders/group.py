@@ -21,10 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
+from ptmtools.texture.coder import Coding
 from ptmtools.texture.pyramid import level_sizes
 
 if TYPE_CHECKING:
-    from ptmtools.texture.coder import Samples, Shape, Tile
+    from ptmtools.texture.coder import Data, Samples, Shape, Tile
 
 
 def damaged(what: str) -> InputError:
@@ -39,7 +40,7 @@ def damaged(what: str) -> InputError:
 class Reader:
     """Bytes from the front; asking for more than there are raises InputError PTM-I112."""
 
-    def __init__(self, data: bytes | memoryview) -> None:
+    def __init__(self, data: Data) -> None:
         self._left = memoryview(data)
 
     def take(self, size: int) -> memoryview:
@@ -113,7 +114,7 @@ def pack_levels(
     """Levels, coarsest first, each refining the one before it and the first ``below``."""
     parts, memory = [], None
     for level in levels:
-        tile = encode_tile(level, below, memory=memory)
+        tile = encode_tile(level, below, Coding(memory=memory))
         parts += [len(tile.data).to_bytes(_LENGTH, "little"), tile.data]
         below, memory = level, tile.memory
     return b"".join(parts)
@@ -129,7 +130,7 @@ def unpack_levels(
     memory = None
     for shape in shapes:
         data = reader.take(reader.number(_LENGTH))
-        tile = decode_tile(data, below, shape, memory=memory)
+        tile = decode_tile(data, below, shape, Coding(memory=memory))
         below, memory = tile.texels, tile.memory
     reader.end()
     return below
@@ -188,7 +189,7 @@ def bareiss(rows: list[list[int]]) -> tuple[list[int], int]:
     return numerators, determinant
 
 
-def inflate(data: bytes | memoryview, length: int) -> bytes:
+def inflate(data: Data, length: int) -> bytes:
     """Inflates exactly ``length`` bytes and never unpacks more. Raises InputError PTM-I112."""
     unpacker = zlib.decompressobj(-15)
     try:
@@ -200,9 +201,7 @@ def inflate(data: bytes | memoryview, length: int) -> bytes:
     return out
 
 
-def decode_differences(
-    data: bytes | memoryview, below: NDArray[np.uint8], shape: tuple[int, int, int]
-) -> NDArray[np.uint8]:
+def decode_differences(data: Data, below: NDArray[np.uint8], shape: Shape) -> NDArray[np.uint8]:
     """The level (h, w, c) that deflated differences refine ``below`` to."""
     height, width, components = shape
     bh, bw, _ = below.shape
@@ -220,15 +219,9 @@ def decode_differences(
 
 #: Bits of a table and its size: the frequencies of a table in use sum to this.
 TABLE_BITS = 11
-
-
 TABLE_SIZE = 1 << TABLE_BITS
-
-
 #: Symbols of this number escape to a 16-bit value, but for tables without escape.
 ESCAPE = 255
-
-
 #: Results of a pass over a group: TRUNCATED if its stream ended early, IMPOSSIBLE if no encoder
 #: writes it.
 OK, TRUNCATED, IMPOSSIBLE = 0, 1, 2

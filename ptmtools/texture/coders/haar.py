@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders import rans as tables
+from ptmtools.texture.coders import haar_kernels as kernels, rans as tables
 from ptmtools.texture.coders.group import Reader, damaged, plane_order, references
 from ptmtools.texture.coders.haar_layout import (
     ACTIVITY_WEIGHTS,
@@ -27,7 +27,7 @@ from ptmtools.texture.coders.haar_layout import (
 from ptmtools.texture.coders.rans import Sink, check_end, empty_sink, encode_symbols, read_stream
 
 if TYPE_CHECKING:
-    from ptmtools.texture.coders.haar_kernels import Source
+    from ptmtools.texture.coder import Data, Shape
 
 
 #: Flag bits: weights are sent; from bit 4 on, component i is coded by rank.
@@ -60,15 +60,11 @@ def encode(level: Bytes, below: Bytes) -> bytes:
     )
 
 
-def decode(
-    data: bytes | memoryview, below: Bytes, shape: tuple[int, int, int], version_1: bool = False
-) -> Bytes:
+def decode(data: Data, below: Bytes, shape: Shape, version_1: bool = False) -> Bytes:
     """The inverse of `encode`, or the decoder of files of version 1.
 
     Raises InputError PTM-I112 for what no encoder writes.
     """
-    from ptmtools.texture.coders import haar_kernels as kernels
-
     components = shape[2]
     reader = Reader(data)
     flags = reader.number(1)
@@ -131,8 +127,6 @@ class _Ranks:
 
 def _sparse_values(blocks: Bytes) -> Sets:
     """For each component, its distinct values if they are few for their range; else None."""
-    from ptmtools.texture.coders import haar_kernels as kernels
-
     components = blocks.shape[2]
     used = np.zeros((components, 256), np.uint8)
     kernels.mark_values(blocks, used)
@@ -151,11 +145,9 @@ def _pass(
     sent: NDArray[np.int32] | None,
     ranks: _Ranks,
     sink: Sink | None,
-    source: Source | None,
+    source: kernels.Source | None,
 ) -> int:
     """Calls `haar_kernels.haar_pass`."""
-    from ptmtools.texture.coders import haar_kernels as kernels
-
     components = level.shape[2]
     others = references(components)
     return kernels.haar_pass(

@@ -19,11 +19,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.texture.coder import PLAIN, Coding
+from ptmtools.texture.coders import mixing_decisions as decisions, mixing_kernels as kernels
 from ptmtools.texture.coders.group import Reader, damaged, pack_varints, plane_order
-from ptmtools.texture.coders.mixing_tables import LOGIT_TOP, MAGNITUDES, magnitude, squash
+from ptmtools.texture.coders.mixing_decisions import BATCH, FEATURES, LOGIT_TOP, SAMPLE, SQUASH
+from ptmtools.texture.coders.mixing_kernels import (
+    MAGNITUDE,
+    MAGNITUDES,
+    POSITIONS,
+    SECOND,
+    Canvas,
+    Place,
+    State,
+    Tables,
+)
 
 if TYPE_CHECKING:
-    from ptmtools.texture.coders.mixing_kernels import Canvas, Place, State, Tables
+    from ptmtools.texture.coder import Data, Shape
 
 
 #: Slots of a hashed context, entries of a match: powers of two, by the number of texels.
@@ -32,26 +44,22 @@ VALUE_BITS = (8, 18)
 
 
 #: The state of all planes behind a level. Coding changes it in place: give it a copy.
-Memory = tuple["State", ...]
+Memory = tuple[State, ...]
 
 
 def copied(memory: Memory) -> Memory:
-    return tuple(type(state)(*(array.copy() for array in state)) for state in memory)
+    return tuple(State(*(array.copy() for array in state)) for state in memory)
 
 
 def fresh_state() -> State:
     """The state of a plane before anything is coded."""
-    from ptmtools.texture.coders import mixing_decisions as decisions
-    from ptmtools.texture.coders.mixing_decisions import BATCH, FEATURES, SAMPLE
-    from ptmtools.texture.coders.mixing_kernels import POSITIONS, SECOND, State
-
     # A context's level of magnitude is that of a sum of nine residuals: its lowest, and a bit more.
-    lowest = np.searchsorted(magnitude(), np.arange(MAGNITUDES))
+    lowest = np.searchsorted(MAGNITUDE, np.arange(MAGNITUDES))
     scale = np.zeros((POSITIONS, MAGNITUDES, SECOND, 2), np.int32)
     scale[..., 0] = (lowest * 16384 + 41500)[None, :, None]
     weights = np.zeros(decisions.INPUTS, np.int32)
     weights[: decisions.CONSTANT] = 42600, 19661, 9830, 3277, 3277, 3277, 3277, 13107, 13107, 13107
-    cells = squash()[np.minimum(np.arange(decisions.CELLS) * 256, 2 * LOGIT_TOP)]
+    cells = SQUASH[np.minimum(np.arange(decisions.CELLS) * 256, 2 * LOGIT_TOP)]
     chances = np.full(decisions.CHANCES, 49152, np.int32)
     chances[: decisions.TRUST] = np.tile(cells, decisions.NODE_ROWS)
     return State(
@@ -69,10 +77,6 @@ def fresh_state() -> State:
 
 def level_tables(texels: int) -> Tables:
     """Tables learned for one plane of one level of that many ``texels`` and dropped after it."""
-    from ptmtools.texture.coders import mixing_decisions as decisions
-    from ptmtools.texture.coders.mixing_decisions import FEATURES
-    from ptmtools.texture.coders.mixing_kernels import Tables
-
     bits = max(texels - 1, 0).bit_length()
     slots = min(max(bits - 1, SLOT_BITS[0]), SLOT_BITS[1])
     values = min(max(bits, VALUE_BITS[0]), VALUE_BITS[1])
@@ -94,26 +98,21 @@ PAD = 4
 
 
 def encode_mixing(
-    level: Level, below: Level, max_error: int = 0, memory: Memory | None = None, threads: int = 1
+    level: Level, below: Level, coding: Coding = PLAIN
 ) -> tuple[bytes | None, Level, Memory]:
     """``level`` (h, w, c), given ``below`` (h >> 1, w >> 1, c): its stream, the texels that a
     decoder will have, and what was learned. The stream is None if it grows beyond its buffer."""
-    coded = _Pass(level, below, level.shape, max_error, memory, None)
-    coded.run(threads)
+    coded = _Pass(level, below, level.shape, coding, None)
+    coded.run(coding.threads)
     return coded.stream(), coded.texels(), coded.memory
 
 
 def decode_mixing(
-    data: bytes | memoryview,
-    below: Level,
-    shape: tuple[int, int, int],
-    max_error: int = 0,
-    memory: Memory | None = None,
-    threads: int = 1,
+    data: Data, below: Level, shape: Shape, coding: Coding = PLAIN
 ) -> tuple[Level, Memory]:
     """The inverse of `encode_mixing`. Raises InputError PTM-I112 for what no encoder writes."""
-    coded = _Pass(None, below, shape, max_error, memory, data)
-    coded.run(threads)
+    coded = _Pass(None, below, shape, coding, data)
+    coded.run(coding.threads)
     for stream in coded.streams:
         stream.check()
     return coded.texels(), coded.memory
@@ -126,7 +125,7 @@ def encode_even(level: Level, below: Level) -> bytes:
     return stream.closed()
 
 
-def decode_even(data: bytes | memoryview, below: Level, shape: tuple[int, int, int]) -> Level:
+def decode_even(data: Data, below: Level, shape: Shape) -> Level:
     """The inverse of `encode_even`. Raises InputError PTM-I112 for what no encoder writes."""
     stream = _Stream(data)
     level = _even(None, below, shape, stream)
@@ -135,12 +134,10 @@ def decode_even(data: bytes | memoryview, below: Level, shape: tuple[int, int, i
 
 
 def _even(level: Level | None, below: Level, shape: tuple[int, ...], stream: _Stream) -> Level:
-    from ptmtools.texture.coders.mixing_decisions import code_even
-
     height, width, components = shape
     canvas, places = _canvas(level, below, height, width, list(range(components)))
     for place in places:
-        code_even(
+        decisions.code_even(
             level is not None, height, width, place, canvas.cells, canvas.parents, canvas.goal,
             _ways(), stream.coder, stream.buffer,
         )  # fmt: skip
@@ -149,7 +146,7 @@ def _even(level: Level | None, below: Level, shape: tuple[int, ...], stream: _St
 
 @cache
 def _ways() -> NDArray[np.int64]:
-    """See `even.code_even`."""
+    """See `mixing_decisions.code_even`."""
     ways = np.zeros((4, 772), np.int64)
     sums = np.ones(1, np.int64)
     for left in range(4):
@@ -167,15 +164,14 @@ class _Pass:
         level: Level | None,
         below: Level,
         shape: tuple[int, ...],
-        max_error: int,
-        memory: Memory | None,
-        data: bytes | memoryview | None,
+        coding: Coding,
+        data: Data | None,
     ) -> None:
         height, width, components = shape
         self.shape = shape
         self.order = plane_order(components).tolist()
-        self.step = 2 * max_error + 1
-        self.memory = copied(memory) if memory else tuple(fresh_state() for _ in self.order)
+        self.step = 2 * coding.max_error + 1
+        self.memory = copied(coding.memory or (fresh_state(),) * components)
         self.tables = [level_tables(height * width) for _ in range(components)]
         self.canvas, self.places = _canvas(level, below, height, width, self.order)
         self.strips = max((width // 2 + STRIP - 1) // STRIP, 1)
@@ -209,12 +205,10 @@ class _Pass:
                     future.result()
 
     def _task(self, c: int, strip: int) -> None:
-        from ptmtools.texture.coders.mixing_kernels import code_strip
-
         height, width, _ = self.shape
         stream = self.streams[c if len(self.streams) > 1 else 0]
         end = min((strip + 1) * STRIP, width // 2)
-        code_strip(
+        kernels.code_strip(
             self.encoding, height, width, strip * STRIP, end, self.step, min(c, 2),
             self.places[c], self.canvas, self.memory[c], self.tables[c],
             stream.coder, stream.buffer,
@@ -244,8 +238,6 @@ def _canvas(
     level: Level | None, below: Level, height: int, width: int, order: list[int]
 ) -> tuple[Canvas, list[Place]]:
     """Planes with a border of 2 blocks, 3 to the right and below: parents are repeated there."""
-    from ptmtools.texture.coders import mixing_kernels as kernels
-
     if below.size == 0:
         below = np.full((max(height >> 1, 1), max(width >> 1, 1), len(order)), 128, np.uint8)
     border = (PAD // 2, PAD // 2 + 1)
@@ -261,13 +253,13 @@ def _canvas(
     planes, tall, stride = texels.shape
     size, across = tall * stride, stride // 2
     lists = (kernels.TEXELS_AT, kernels.PARENTS_AT, kernels.COLOUR_AT)
-    offsets = np.zeros((len(lists), kernels.POSITIONS, 8), np.int64)
+    offsets = np.zeros((len(lists), POSITIONS, 8), np.int64)
     for row, positions in enumerate(lists):
         for k, near in enumerate(positions):
             step = across if row == 1 else stride
             offsets[row, k, : len(near)] = [dy * step + dx for dy, dx in near]
     places = [
-        kernels.Place(
+        Place(
             texels=c * size + PAD * stride + PAD,
             parents=c * size // 4 + PAD // 2 * across + PAD // 2,
             stride=stride,
@@ -281,13 +273,13 @@ def _canvas(
         for c in range(planes)
     ]
     flats = np.zeros(parents.size, np.uint8)
-    return kernels.Canvas(cells, parents.reshape(-1), flats, goal, offsets), places
+    return Canvas(cells, parents.reshape(-1), flats, goal, offsets), places
 
 
 class _Stream:
     """The arithmetic coder and its bytes: those to read, or a buffer to write."""
 
-    def __init__(self, data: bytes | memoryview | int) -> None:
+    def __init__(self, data: Data | int) -> None:
         self.buffer = np.frombuffer(bytearray(data), np.uint8)
         first = 0 if isinstance(data, int) else 4
         window = int.from_bytes(self.buffer[:first].tobytes().ljust(4, b"\0"), "big")
@@ -315,7 +307,7 @@ class _Stream:
         return low, 4
 
 
-def _split(data: bytes | memoryview, streams: int) -> list[memoryview]:
+def _split(data: Data, streams: int) -> list[memoryview]:
     """Lengths of all streams but the last, then the streams."""
     reader = Reader(data)
     lengths = [reader.varint() for _ in range(streams - 1)]

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.texture.coders import rans_kernels as kernels
 from ptmtools.texture.coders.group import (
     ESCAPE,
     OK,
@@ -62,10 +63,8 @@ Frequencies = NDArray[np.int64]
 
 def normalise(counts: NDArray[np.int64]) -> Frequencies:
     """Frequencies (t, 256) of the rows of ``counts`` (t, 256): see `rans_kernels.normalise`."""
-    from ptmtools.texture.coders import rans_kernels as frequencies
-
     frequency = np.zeros_like(counts)
-    frequencies.normalise(counts, frequency, np.empty(256, np.int64))
+    kernels.normalise(counts, frequency, np.empty(256, np.int64))
     return frequency
 
 
@@ -142,11 +141,9 @@ def choose(counts: NDArray[np.int64], plain: int, family: Family) -> tuple[Frequ
     Tables from number ``plain`` on have no escape: one that is built in is used only where it holds
     every symbol that occurs.
     """
-    from ptmtools.texture.coders import rans_kernels as frequencies
-
     exact = normalise(counts)
     kinds = np.zeros(len(counts), np.int64)
-    frequencies.choose_kinds(
+    kernels.choose_kinds(
         counts, exact, *family, _log_table(), plain, SENT, kinds, np.empty(256, np.int64)
     )
     frequency = exact.copy()
@@ -155,7 +152,7 @@ def choose(counts: NDArray[np.int64], plain: int, family: Family) -> tuple[Frequ
     # Numbers take four nibbles at most.
     most = 2 * (2 * len(kinds) + 257 * int(np.count_nonzero(kinds == SENT)))
     packed = np.zeros(most, np.uint8)
-    size = frequencies.write_tables(kinds, _FIRST_KIND, SENT, exact, packed)
+    size = kernels.write_tables(kinds, _FIRST_KIND, SENT, exact, packed)
     return frequency, size.to_bytes(2, "little") + packed[:size].tobytes()
 
 
@@ -166,14 +163,12 @@ def parse(reader: Reader, tables: int, family: Family, version_1: bool = False) 
 
     Raises InputError PTM-I112 for tables that no encoder writes.
     """
-    from ptmtools.texture.coders import rans_kernels as frequencies
-
     kinds = np.zeros(tables, np.int64)
     if version_1:
         kinds[:] = reader.numbers("u1", tables)
     packed = reader.numbers("u1", reader.number(2))
     frequency = np.zeros((tables, 256), np.int64)
-    error = frequencies.read_tables(
+    error = kernels.read_tables(
         packed, version_1, kinds, _FIRST_KIND, SENT, family.tables, frequency, np.zeros(2, np.int64)
     )
     if error:
@@ -186,24 +181,19 @@ def row_tables(frequency: Frequencies) -> tuple[NDArray[np.uint32], NDArray[np.u
     in use, one after the other, and where each table (t,) begins. Those not in use share one of
     zeros, which only a damaged stream asks for.
     """
-    from ptmtools.texture.coders import rans_kernels as frequencies
-
     used = frequency.any(axis=1)
     begins = np.where(used, np.cumsum(used) * TABLE_SIZE, 0).astype(np.uint64)
     table = np.empty((1 + int(used.sum())) * TABLE_SIZE, np.uint32)
     table[:TABLE_SIZE] = 0
-    frequencies.fill_row_tables(frequency, begins, table)
+    kernels.fill_row_tables(frequency, begins, table)
     return table, begins
 
 
 def single_tables(frequency: Frequencies) -> NDArray[np.uint32]:
     """For `rans_kernels.decode_single`: a third of the size; zeros where not in use."""
-    from ptmtools.texture.coders import rans_kernels as frequencies
-    from ptmtools.texture.coders.rans_kernels import SINGLE_SIZE
-
-    table = np.zeros((len(frequency), SINGLE_SIZE), np.uint32)
+    table = np.zeros((len(frequency), kernels.SINGLE_SIZE), np.uint32)
     slots = table[:, : TABLE_SIZE // 4].view(np.uint8)
-    frequencies.fill_single_tables(frequency, slots, table[:, TABLE_SIZE // 4 :])
+    kernels.fill_single_tables(frequency, slots, table[:, TABLE_SIZE // 4 :])
     return table.reshape(-1)
 
 
@@ -231,8 +221,6 @@ def empty_sink(n: int, count: int) -> Sink:
 
 def encode_symbols(sink: Sink, plain: int, family: Family) -> tuple[bytes, bytes]:
     """The tables, chosen by `choose`, and the stream of a full sink."""
-    from ptmtools.texture.coders import rans_kernels as kernels
-
     symbols, contexts, counts = sink
     frequency, packed = choose(counts, plain, family)
     words = np.empty(len(symbols) + 8, np.uint16)
@@ -251,8 +239,6 @@ def read_stream(reader: Reader, longest_row: int) -> Stream:
 
     Raises InputError PTM-I112 if the bytes are none.
     """
-    from ptmtools.texture.coders import rans_kernels as kernels
-
     escapes = reader.numbers("<u2", reader.number(4))
     data = reader.rest()
     limit = len(data) // 2

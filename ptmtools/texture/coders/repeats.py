@@ -10,12 +10,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders import rans as tables
+from ptmtools.texture.coders import (
+    rans as tables,
+    repeats_blocks as blocks,
+    repeats_kernels as kernels,
+)
 from ptmtools.texture.coders.group import Reader, plane_order
 from ptmtools.texture.coders.rans import Sink, check_end, empty_sink, encode_symbols, read_stream
+from ptmtools.texture.coders.rans_kernels import split_numbers
 
 if TYPE_CHECKING:
-    from ptmtools.texture.coders.repeats_blocks import Source
+    from ptmtools.texture.coder import Data, Shape
 
 #: Weights in 1/64 of W, N, NW and NE, each less the block's mean, in predictions of p, q and r.
 WEIGHTS = np.array([[20, 24, -10, -7], [2, 27, -12, -2], [13, -7, -6, -39]], np.int64)
@@ -32,28 +37,20 @@ Bytes = NDArray[np.uint8]
 
 def find(level: Bytes, below: Bytes) -> Sink:
     """The symbols that refine ``below`` (h >> 1, w >> 1, c) to ``level`` (h, w, c)."""
-    from ptmtools.texture.coders import repeats_kernels as kernels
-    from ptmtools.texture.coders.rans_kernels import split_numbers
-    from ptmtools.texture.coders.repeats_blocks import COUNT, TABLES
-
-    blocks = below.shape[0] * below.shape[1]
-    edge = level.shape[0] * level.shape[1] - 4 * blocks
-    numbers = np.empty(kernels.MOST_SYMBOLS * blocks + 5 * edge, np.uint32)
+    count = below.shape[0] * below.shape[1]
+    edge = level.shape[0] * level.shape[1] - 4 * count
+    numbers = np.empty(kernels.MOST_SYMBOLS * count + 5 * edge, np.uint32)
     state = np.zeros(9, np.int64)
     _pass(_packed(level), _packed(below), level.shape, numbers, None, state)
-    sink = empty_sink(int(state[COUNT]), TABLES)
-    split_numbers(numbers[: state[COUNT]], *sink)
+    sink = empty_sink(int(state[blocks.COUNT]), blocks.TABLES)
+    split_numbers(numbers[: state[blocks.COUNT]], *sink)
     return sink
 
 
 def new_texels(sink: Sink) -> int:
     """Number of texels, among the first three of each block, that were not among the guesses."""
-    from ptmtools.texture.coders.repeats_blocks import GUESS, TEXEL
-    from ptmtools.texture.coders.repeats_kernels import DIFFERENCES
-
-    blocks = sink.counts[GUESS:TEXEL, DIFFERENCES].sum()
-    texels = sink.counts[TEXEL : TEXEL + 36, 5].sum()
-    return int(3 * blocks + texels)
+    new = sink.counts[blocks.GUESS : blocks.TEXEL, kernels.DIFFERENCES].sum()
+    return int(3 * new + sink.counts[blocks.TEXEL : blocks.TEXEL + 36, 5].sum())
 
 
 def write(sink: Sink) -> bytes:
@@ -61,20 +58,17 @@ def write(sink: Sink) -> bytes:
     return b"".join(encode_symbols(sink, len(sink.counts), tables.built_in()))
 
 
-def decode(data: bytes | memoryview, below: Bytes, shape: tuple[int, int, int]) -> Bytes:
+def decode(data: Data, below: Bytes, shape: Shape) -> Bytes:
     """The inverse of `find` and `write`. Raises InputError PTM-I112 for what no encoder writes."""
-    from ptmtools.texture.coders import repeats_kernels as kernels
-    from ptmtools.texture.coders.repeats_blocks import ESCAPES_END, TABLES, Source
-
     reader = Reader(data)
-    frequency = tables.parse(reader, TABLES, tables.built_in())
+    frequency = tables.parse(reader, blocks.TABLES, tables.built_in())
     stream = read_stream(reader, kernels.MOST_SYMBOLS)
     escaped = len(stream.escapes)
     state = np.zeros(9, np.int64)
-    state[ESCAPES_END] = escaped
+    state[blocks.ESCAPES_END] = escaped
     level = np.empty(shape[:2], np.uint32)
     words = np.concatenate([stream.escapes, stream.words])
-    source = Source(tables.single_tables(frequency), words, escaped + stream.limit)
+    source = blocks.Source(tables.single_tables(frequency), words, escaped + stream.limit)
     check_end(_pass(level, _packed(below), shape, None, source, state))
     if shape[2] != 3:
         return level.astype(f"<u{shape[2]}").view(np.uint8).reshape(shape)
@@ -88,12 +82,10 @@ def _pass(
     below: NDArray[np.uint32],
     shape: tuple[int, ...],
     sink: NDArray[np.uint32] | None,
-    source: Source | None,
+    source: blocks.Source | None,
     state: NDArray[np.int64],
 ) -> int:
     """Calls `repeats_kernels.repeats_pass` with the tables that it fills."""
-    from ptmtools.texture.coders import repeats_kernels as kernels
-
     height, width, components = shape
     bits = min(max(below.size.bit_length(), 6), MOST_BITS)
     return kernels.repeats_pass(
@@ -117,8 +109,6 @@ def _pass(
 
 def _packed(level: Bytes) -> NDArray[np.uint32]:
     """Texels (h, w, c) as one number each."""
-    from ptmtools.texture.coders import repeats_kernels as kernels
-
     level = np.ascontiguousarray(level)
     if level.shape[2] != 3:
         return level.view(f"<u{level.shape[2]}")[:, :, 0].astype(np.uint32)

@@ -25,7 +25,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders import rans as tables, texel_layout as layout
+from ptmtools.texture.coders import (
+    rans as tables,
+    texel_kernels as kernels,
+    texel_layout as layout,
+)
 from ptmtools.texture.coders.group import OK, Reader, damaged, plane_order, references
 from ptmtools.texture.coders.rans import Sink, check_end, empty_sink, encode_symbols, read_stream
 from ptmtools.texture.coders.texel_layout import (
@@ -39,8 +43,7 @@ from ptmtools.texture.profiles.raw import sample_bytes
 from ptmtools.texture.samples import SampleKind, from_ordered, kind_of, to_ordered
 
 if TYPE_CHECKING:
-    from ptmtools.texture.coder import Samples, Shape
-    from ptmtools.texture.coders.texel_kernels import Source
+    from ptmtools.texture.coder import Data, Samples, Shape
 
 #: Forms of a group.
 RAW, PLAIN, CODED, CODED_WITH_WEIGHTS = 0, 1, 2, 3
@@ -77,7 +80,7 @@ def encode(level: Samples, below: Samples, max_error: int = 0) -> tuple[bytes, S
     return bytes([form]) + body, texels
 
 
-def decode(data: bytes | memoryview, below: Samples, shape: Shape, max_error: int = 0) -> Samples:
+def decode(data: Data, below: Samples, shape: Shape, max_error: int = 0) -> Samples:
     """The inverse of `encode`. Raises InputError PTM-I112 for what no encoder writes."""
     reader = Reader(data)
     form = reader.number(1)
@@ -119,12 +122,10 @@ class _Group:
         plain: Numbers,
         limits: NDArray[np.int64],
         sink: Sink | None = None,
-        source: Source | None = None,
+        source: kernels.Source | None = None,
     ) -> int:
         """Calls `texel_kernels.texel_pass`, with empty arrays for the direction that it does not
         take."""
-        from ptmtools.texture.coders import texel_kernels as kernels
-
         components = numbers.shape[2]
         others = references(components)
         exact = {"float16": kernels.HALF, "float32": kernels.SINGLE}.get(
@@ -179,9 +180,7 @@ def _codings(level: Samples, below: Samples, max_error: int) -> list[Coded]:
 def _coding(
     group: _Group, level: Samples, numbers: Numbers, weights: Weights | None
 ) -> Coded | None:
-    from ptmtools.texture.coders.texel_kernels import TABLES
-
-    sink = empty_sink(level.size * group.numbering.symbols, TABLES)
+    sink = empty_sink(level.size * group.numbering.symbols, kernels.TABLES)
     plain, limits = np.zeros(level.size + 2, np.uint32), np.zeros(2, np.int64)
     window = _window(group, numbers)
     if group.max_error:
@@ -191,7 +190,7 @@ def _coding(
     used, bits = limits.tolist()
     size = (bits + 7) // 8
     sink = sink._replace(symbols=sink.symbols[:used], contexts=sink.contexts[:used])
-    packed, stream = encode_symbols(sink, TABLES, layout.table_family())
+    packed, stream = encode_symbols(sink, kernels.TABLES, layout.table_family())
     body = b"".join(
         [
             group.numbering.packed(),
@@ -220,8 +219,6 @@ def _window(group: _Group, numbers: Numbers) -> int:
 
 
 def _decode(reader: Reader, below: Samples, shape: Shape, max_error: int, sent: bool) -> Samples:
-    from ptmtools.texture.coders import texel_kernels as kernels
-
     kind = kind_of(below.dtype)
     means = to_ordered(below).astype(np.uint32)
     numbering = read_numbering(reader, shape[2], kind.top)
@@ -262,11 +259,9 @@ def _read_weights(reader: Reader, components: int) -> Weights:
 
 def _enlarged(numbers: Numbers, shape: tuple[int, ...]) -> Numbers:
     """The level below at twice its size, planes apart, with a frame."""
-    from ptmtools.texture.coders.texel_kernels import BEFORE, BEHIND
-
     sides = []
     for side, half in zip(shape[:2], numbers.shape[:2], strict=True):
-        at = np.arange(-BEFORE, side + (side & 1) + BEHIND) >> 1
+        at = np.arange(-kernels.BEFORE, side + (side & 1) + kernels.BEHIND) >> 1
         sides.append(np.clip(at, 0, half - 1))
     rows, columns = sides
     # Columns first: there are fewer rows then, and whole rows are copied quickly.

@@ -28,15 +28,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coder import Tile
-from ptmtools.texture.coders import haar, repeats
-from ptmtools.texture.coders.group import Reader, damaged, pack_levels, shapes_to, unpack_levels
+from ptmtools.texture.coder import PLAIN, Coding, Tile
+from ptmtools.texture.coders import haar, repeats, texel
+from ptmtools.texture.coders.group import (
+    Reader,
+    damaged,
+    decode_differences,
+    inflate,
+    pack_levels,
+    shapes_to,
+    unpack_levels,
+)
 from ptmtools.texture.profiles import raw
 from ptmtools.texture.profiles.raw import group_length
 from ptmtools.texture.pyramid import build_pyramid
 
 if TYPE_CHECKING:
-    from ptmtools.texture.coder import Samples, Shape
+    from ptmtools.texture.coder import Data, Samples, Shape
 
 #: Coders 1 to 3 are those of files of version 1.
 STORED, HAAR_1, DEFLATED_1, DIFFERENCES_1, HAAR, REPEATS, PYRAMID = range(7)
@@ -64,7 +72,7 @@ def encode_base(level: Samples) -> bytes:
     return min(nested, bytes([STORED]) + raw.encode_base(level), key=len)
 
 
-def decode_base(data: bytes | memoryview, shape: Shape, dtype: np.dtype[Any]) -> Samples:
+def decode_base(data: Data, shape: Shape, dtype: np.dtype[Any]) -> Samples:
     """The inverse of `encode_base`. Raises InputError PTM-I112."""
     reader = Reader(data)
     coder = reader.number(1)
@@ -73,43 +81,27 @@ def decode_base(data: bytes | memoryview, shape: Shape, dtype: np.dtype[Any]) ->
         return unpack_levels(decode_tile, reader, _nothing(shapes[0], dtype), shapes)
     body = reader.rest()
     if coder == DEFLATED_1:
-        from ptmtools.texture.coders.group import inflate
-
         return raw.decode_base(inflate(body, shape[0] * shape[1] * shape[2]), shape, dtype)
     if coder == STORED:
         return raw.decode_base(body, shape, dtype)
     raise damaged(f"coder {coder} is unknown for the coarsest level")
 
 
-def encode_tile(
-    level: Samples, below: Samples, max_error: int = 0, memory: Any = None, threads: int = 1
-) -> Tile:
+def encode_tile(level: Samples, below: Samples, coding: Coding = PLAIN) -> Tile:
     """One byte that names the coder, then what it wrote."""
-    if level.dtype == np.uint8 and max_error == 0:
+    if level.dtype == np.uint8 and coding.max_error == 0:
         coded = _encode_best(level, below)
         if len(coded) > 1 + group_length((level.shape[0], level.shape[1], level.shape[2])):
             coded = bytes([STORED]) + raw.encode_tile(level, below).data
         return Tile(coded, level)
-    from ptmtools.texture.coders import texel
-
-    data, texels = texel.encode(level, below, max_error)
-    return Tile(data, texels)
+    return Tile(*texel.encode(level, below, coding.max_error))
 
 
-def decode_tile(
-    data: bytes | memoryview,
-    below: Samples,
-    shape: Shape,
-    max_error: int = 0,
-    memory: Any = None,
-    threads: int = 1,
-) -> Tile:
+def decode_tile(data: Data, below: Samples, shape: Shape, coding: Coding = PLAIN) -> Tile:
     """The inverse of `encode_tile`. Raises InputError PTM-I112."""
-    if below.dtype == np.uint8 and max_error == 0:
+    if below.dtype == np.uint8 and coding.max_error == 0:
         return Tile(b"", _decode_bytes(data, below, shape))
-    from ptmtools.texture.coders import texel
-
-    return Tile(b"", texel.decode(data, below, shape, max_error))
+    return Tile(b"", texel.decode(data, below, shape, coding.max_error))
 
 
 def _encode_best(level: Bytes, below: Bytes) -> bytes:
@@ -139,7 +131,7 @@ def _probe(level: Bytes, below: Bytes) -> tuple[Bytes, Bytes]:
     return piece, np.concatenate([below[y : y + rows] for y in starts])
 
 
-def _decode_bytes(data: bytes | memoryview, below: Bytes, shape: Shape) -> Bytes:
+def _decode_bytes(data: Data, below: Bytes, shape: Shape) -> Bytes:
     reader = Reader(data)
     coder, body = reader.number(1), reader.rest()
     if coder == REPEATS:
@@ -147,12 +139,8 @@ def _decode_bytes(data: bytes | memoryview, below: Bytes, shape: Shape) -> Bytes
     if coder in (HAAR, HAAR_1):
         return haar.decode(body, below, shape, coder == HAAR_1)
     if coder == DIFFERENCES_1:
-        from ptmtools.texture.coders.group import decode_differences
-
         return decode_differences(body, below, shape)
     if coder == DEFLATED_1:
-        from ptmtools.texture.coders.group import inflate
-
         return raw.decode_tile(inflate(body, group_length(shape)), below, shape).texels
     if coder == STORED:
         return raw.decode_tile(body, below, shape).texels

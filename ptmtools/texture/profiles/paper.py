@@ -18,7 +18,7 @@ import numpy as np
 
 from ptmtools.errors import InputError
 from ptmtools.lazy import component
-from ptmtools.texture.coder import Tile
+from ptmtools.texture.coder import PLAIN, Coding, Tile
 from ptmtools.texture.coders.group import Reader, damaged
 from ptmtools.texture.profiles import raw
 from ptmtools.texture.profiles.raw import (
@@ -31,7 +31,7 @@ from ptmtools.texture.profiles.raw import (
 )
 
 if TYPE_CHECKING:
-    from ptmtools.texture.coder import Samples, Shape
+    from ptmtools.texture.coder import Data, Samples, Shape
 
 #: Forms of a group: as in `raw`, where JPEG is longer or there are no blocks; with JPEGs.
 RAW, JPEG = 0, 1
@@ -47,19 +47,13 @@ def encode_base(level: Samples) -> bytes:
     return raw.encode_base(level)
 
 
-def decode_base(data: bytes | memoryview, shape: Shape, dtype: np.dtype[Any]) -> Samples:
+def decode_base(data: Data, shape: Shape, dtype: np.dtype[Any]) -> Samples:
     """The inverse of `encode_base`. Raises InputError PTM-I112."""
     _codecs(dtype)
     return raw.decode_base(data, shape, dtype)
 
 
-def encode_tile(
-    level: Samples,
-    below: Samples,
-    max_error: int = 0,
-    memory: Any = None,
-    threads: int = 1,
-) -> Tile:
+def encode_tile(level: Samples, below: Samples, coding: Coding = PLAIN) -> Tile:
     """One byte that names the form; residual array, edge texels, three JPEGs."""
     codecs = _codecs(level.dtype)
     plain = bytes([RAW]) + raw.encode_tile(level, below).data
@@ -82,14 +76,7 @@ def encode_tile(
     return Tile(min(plain, coded, key=len), level)
 
 
-def decode_tile(
-    data: bytes | memoryview,
-    below: Samples,
-    shape: Shape,
-    max_error: int = 0,
-    memory: Any = None,
-    threads: int = 1,
-) -> Tile:
+def decode_tile(data: Data, below: Samples, shape: Shape, coding: Coding = PLAIN) -> Tile:
     """The inverse of `encode_tile`. Raises InputError PTM-I112."""
     codecs = _codecs(below.dtype)
     reader = Reader(data)

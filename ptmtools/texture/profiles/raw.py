@@ -26,12 +26,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coder import Tile
+from ptmtools.texture.coder import PLAIN, Coding, Tile
 from ptmtools.texture.coders.group import Reader, damaged
 from ptmtools.texture.samples import from_ordered, kind_of, round_to, to_ordered
 
 if TYPE_CHECKING:
-    from ptmtools.texture.coder import Samples, Shape
+    from ptmtools.texture.coder import Data, Samples, Shape
 
 #: Correction codes 0, 1, 2 stand for 0, -1, +1 units in the last place; this one for an escape.
 ESCAPE = 3
@@ -42,7 +42,7 @@ def encode_base(level: Samples) -> bytes:
     return sample_bytes(level)
 
 
-def decode_base(data: bytes | memoryview, shape: Shape, dtype: np.dtype[Any]) -> Samples:
+def decode_base(data: Data, shape: Shape, dtype: np.dtype[Any]) -> Samples:
     """The inverse of `encode_base`. Raises InputError PTM-I112 if the length is wrong."""
     reader = Reader(data)
     level = reader.texels(shape, dtype)
@@ -50,22 +50,13 @@ def decode_base(data: bytes | memoryview, shape: Shape, dtype: np.dtype[Any]) ->
     return level
 
 
-def encode_tile(
-    level: Samples, below: Samples, max_error: int = 0, memory: Any = None, threads: int = 1
-) -> Tile:
+def encode_tile(level: Samples, below: Samples, coding: Coding = PLAIN) -> Tile:
     """Residual array, partial level, escapes. Always exact, whatever error is allowed."""
     residual, escapes = residuals(level, below)
     return Tile(pack_pairs(residual) + sample_bytes(*_partial_level(level)) + escapes, level)
 
 
-def decode_tile(
-    data: bytes | memoryview,
-    below: Samples,
-    shape: Shape,
-    max_error: int = 0,
-    memory: Any = None,
-    threads: int = 1,
-) -> Tile:
+def decode_tile(data: Data, below: Samples, shape: Shape, coding: Coding = PLAIN) -> Tile:
     """The inverse of `encode_tile` (paper Eq. 3). Raises InputError PTM-I112."""
     reader = Reader(data)
     codes = read_pairs(reader, below)
@@ -106,9 +97,7 @@ def residuals(level: Samples, below: Samples) -> tuple[NDArray[np.uint8], bytes]
     return np.minimum(codes, ESCAPE).astype(np.uint8), _pack_numbers(codes[escaped] - ESCAPE)
 
 
-def place_last(
-    level: Samples, below: Samples, codes: NDArray[np.uint8], escapes: bytes | memoryview
-) -> None:
+def place_last(level: Samples, below: Samples, codes: NDArray[np.uint8], escapes: Data) -> None:
     """Fills in s of every block of ``level``. Raises InputError PTM-I112 for wrong escapes."""
     p, q, r, s = corners(level, below)
     if not kind_of(level.dtype).is_float:
@@ -200,7 +189,7 @@ def _pack_numbers(numbers: NDArray[Any]) -> bytes:
     return (nibbles[::2] | nibbles[1::2] << 4).tobytes()
 
 
-def _unpack_numbers(data: bytes | memoryview, n: int, bits: int) -> NDArray[np.uint64]:
+def _unpack_numbers(data: Data, n: int, bits: int) -> NDArray[np.uint64]:
     """Exactly n numbers of at most ``bits`` bits. Raises InputError PTM-I112."""
     pairs = np.frombuffer(data, np.uint8)
     nibbles = np.stack([pairs & 15, pairs >> 4], axis=1).reshape(-1)

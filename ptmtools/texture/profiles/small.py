@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptmtools.texture.coder import Tile
+from ptmtools.texture.coder import PLAIN, Coding, Tile
+from ptmtools.texture.coders import mixing, texel
 from ptmtools.texture.coders.group import Reader, damaged, pack_levels, shapes_to, unpack_levels
+from ptmtools.texture.profiles import raw
 from ptmtools.texture.pyramid import build_pyramid
 
 if TYPE_CHECKING:
-    from ptmtools.texture.coder import Samples, Shape
+    from ptmtools.texture.coder import Data, Samples, Shape
 
 #: The first byte of a group.
 MIXED, STORED, TEXEL, EVEN = range(4)
@@ -30,63 +32,38 @@ def encode_base(level: Samples) -> bytes:
     return coarsest.tobytes() + pack_levels(encode_tile, coarsest, finer)
 
 
-def decode_base(data: bytes | memoryview, shape: Shape, dtype: np.dtype[Any]) -> Samples:
+def decode_base(data: Data, shape: Shape, dtype: np.dtype[Any]) -> Samples:
     """The inverse of `encode_base`. Raises InputError PTM-I112."""
     coarsest, *finer = shapes_to(shape)
     reader = Reader(data)
     return unpack_levels(decode_tile, reader, reader.texels(coarsest, dtype), finer)
 
 
-def encode_tile(
-    level: Samples,
-    below: Samples,
-    max_error: int = 0,
-    memory: Any = None,
-    threads: int = 1,
-) -> Tile:
+def encode_tile(level: Samples, below: Samples, coding: Coding = PLAIN) -> Tile:
     """One byte that names the coder, then what it wrote."""
     if level.dtype != np.uint8:
-        from ptmtools.texture.coders import texel
-
-        data, texels = texel.encode(level, below, max_error)
+        data, texels = texel.encode(level, below, coding.max_error)
         return Tile(bytes([TEXEL]) + data, texels)
-    from ptmtools.texture.coders import mixing
-
-    stream, texels, learned = mixing.encode_mixing(level, below, max_error, memory, threads)
-    if max_error == 0 and (stream is None or 16 * len(stream) > _NOISY * level.nbytes):
+    stream, texels, learned = mixing.encode_mixing(level, below, coding)
+    if coding.max_error == 0 and (stream is None or 16 * len(stream) > _NOISY * level.nbytes):
         even = mixing.encode_even(level, below)
         if stream is None or len(even) < len(stream):
-            return Tile(bytes([EVEN]) + even, level, memory)
+            return Tile(bytes([EVEN]) + even, level, coding.memory)
     if stream is None or len(stream) > level.nbytes:
-        return Tile(bytes([STORED]) + level.tobytes(), level, memory)
+        return Tile(bytes([STORED]) + level.tobytes(), level, coding.memory)
     return Tile(bytes([MIXED]) + stream, texels, learned)
 
 
-def decode_tile(
-    data: bytes | memoryview,
-    below: Samples,
-    shape: Shape,
-    max_error: int = 0,
-    memory: Any = None,
-    threads: int = 1,
-) -> Tile:
+def decode_tile(data: Data, below: Samples, shape: Shape, coding: Coding = PLAIN) -> Tile:
     """The inverse of `encode_tile`. Raises InputError PTM-I112."""
     reader = Reader(data)
     coder, eight_bits = reader.number(1), below.dtype == np.uint8
     if coder == STORED:
-        level = reader.texels(shape, below.dtype)
-        reader.end()
-        return Tile(b"", level, memory)
+        return Tile(b"", raw.decode_base(reader.rest(), shape, below.dtype), coding.memory)
     if coder == TEXEL and not eight_bits:
-        from ptmtools.texture.coders import texel
-
-        return Tile(b"", texel.decode(reader.rest(), below, shape, max_error))
-    if eight_bits and (coder == MIXED or (coder == EVEN and max_error == 0)):
-        from ptmtools.texture.coders import mixing
-
-        body = reader.rest()
-        if coder == EVEN:
-            return Tile(b"", mixing.decode_even(body, below, shape), memory)
-        texels, learned = mixing.decode_mixing(body, below, shape, max_error, memory, threads)
-        return Tile(b"", texels, learned)
+        return Tile(b"", texel.decode(reader.rest(), below, shape, coding.max_error))
+    if coder == MIXED and eight_bits:
+        return Tile(b"", *mixing.decode_mixing(reader.rest(), below, shape, coding))
+    if coder == EVEN and eight_bits and coding.max_error == 0:
+        return Tile(b"", mixing.decode_even(reader.rest(), below, shape), coding.memory)
     raise damaged(f"coder {coder} is unknown here")
