@@ -4,14 +4,8 @@ For every cell, K points spread uniformly over its volume; at each, six square v
 each pixel, the cell of the surface that shows. ``ACH_j`` is the number of pixels of cell j over
 that of all cells of the PVS, so a row sums to 1.
 
-The paper takes 8 points and large views. The points decide (docs/design/coverage.md), so by default
-there are hundreds of them, with views of a few pixels.
-
 The paper draws "all the objects of its PVS". Here all objects are drawn, so that a pixel can show a
-cell outside the PVS, which is an error of the PVS or a crack in the model. Such pixels are checked
-again, left out of the hints and reported as missed mass (`tally`).
-
-`choose` picks the backend that draws the item buffers.
+cell outside the PVS, which is an error of the PVS or a crack in the model (`tally`).
 """
 
 from __future__ import annotations

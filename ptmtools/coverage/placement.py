@@ -1,34 +1,14 @@
-"""Placement of the sample points of a cell, spread over its volume.
+"""Placement of the sample points of a cell, spread over its volume (paper §5).
 
-The paper takes "samples per cell whose COPs are uniformly distributed inside the cell" (§5).
-Position matters far more than resolution (docs/design/coverage.md), so there is a choice of
-placements:
+``docs/design/coverage.md`` describes the placements ``sobol``, ``kd`` and ``uniform``. The error
+falls as K^-0.8 with the first, as K^-0.5 with the last; ``kd`` is best below sixteen points.
+All come with a shift of their views' pixels by less than half a pixel, spread as evenly.
 
-``sobol``
-    A scrambled Sobol' sequence in the cell's bounding box, restricted to the points in the cell.
-    Any number of points is evenly spread, and more can be added: the error falls as K^-0.8. Where
-    the cell fills little of the box, as a thin slanting one does, the sequence fills the tetrahedra
-    of its leaves instead, with a fourth dimension for the choice among them.
-``kd``
-    The volume is halved again and again along its longest axis into as many parts of equal volume
-    as there are points, and the point nearest to the centroid of each part is taken: best below
-    some sixteen points.
-``uniform``
-    Independent random points, as in the paper: K^-0.5.
-
-All come with a shift of their views' pixels by less than half a pixel, spread as evenly: with the
-same few pixel centres at every point no number of points would be enough.
-
-A cell is a union of disjoint convex leaves. Points lie where eyes can be: in its standing leaves,
-and there in the eye region (`ptmtools.cells.model`). They depend on
-nothing but its shape and the seed: not on other cells, the unit, the number of workers or the
-version of a library.
-
-The Sobol' sequence. Direction numbers are those of Joe and Kuo (2008), "Constructing Sobol
+Direction numbers of the Sobol' sequence are those of Joe and Kuo (2008), "Constructing Sobol
 sequences with better two-dimensional projections"; scrambling is Owen's nested uniform one (1995):
 every digit is turned over or not by a hash of the digits before it, so each point alone is uniform
-and aligned blocks of the sequence stay nets. Only integers are used, so the points are the same on
-every machine and for every version of every library.
+and aligned blocks of the sequence stay nets. Only integers are used, so the points depend on the
+shape of the cell and the seed alone, not on a machine, a library, the unit or other cells.
 """
 
 from __future__ import annotations

@@ -1,20 +1,18 @@
 """Required levels of textures: the share of a cell's views by level of detail, and the levels that
 no eye resolves.
 
-From sample points of the cell, as those of the coverage hints (in the eye region, at eye height and
-up to the ceiling), rays are cast over the whole sphere, weighted by solid angle. Where one meets a
-textured surface, OpenGL's isotropic level of detail is log2 ρ, with ρ the larger of the lengths, in
-texels, that a pixel's width and height span in the texture; the pixel is that in the middle of an
-upright picture, so directions are alike. Of the two levels that are then blended, the finer one is
-*wanted*. A surface with ρ ≤ 1, at most one texel a pixel, wants the finest level.
+From sample points of the cell, as those of the coverage hints, rays are cast over the whole sphere,
+weighted by solid angle. Where one meets a textured surface, OpenGL's isotropic level of detail is
+log2 ρ, with ρ the larger of the lengths, in texels, that a pixel's width and height span in the
+texture; the pixel is that in the middle of an upright picture, so directions are alike. Of the two
+levels that are then blended, the finer one is *wanted*. (Tried: the band of ±30° that a level view
+of 60° shows, instead of the sphere. It leaves out the floor at one's feet, which wants the finest
+level.)
 
-Tried: the band of ±30° that a level view of 60° shows, instead of the sphere. It leaves out the
-floor at one's feet, which wants the finest level, and with it a share that `ach` counts.
-
-Levels that no eye resolves are never drawn from. A pixel's *footprint* on a surface is the area
-that it covers there, in texels. Graphics cards draw from the levels ⌊λ⌋ and ⌊λ⌋ + 1, counted from
-the finest, 0, with λ = log2(Pmax / N), where Pmax and Pmin are the lengths of the footprint across
-and down a pixel, the larger and the smaller one, and N the least of ⌈Pmax / Pmin⌉ and 16
+Levels that no eye resolves are never drawn from (``docs/design/codec.md``, "Leaving levels out").
+Graphics cards draw from the levels ⌊λ⌋ and ⌊λ⌋ + 1, counted from the finest, 0, with
+λ = log2(Pmax / N), where Pmax and Pmin are the lengths of a pixel's footprint on the surface, in
+texels, the larger and the smaller one, and N the least of ⌈Pmax / Pmin⌉ and 16
 (EXT_texture_filter_anisotropic; 1 where the filter is isotropic). So Pmax / N is at least Pmin / 2
 and at least Pmax / 16, and from below:
 
@@ -25,11 +23,8 @@ and at least Pmax / 16, and from below:
 - a metre on the surface is at least σ2 texels and, in one direction, σ1, the singular values of the
   texels' gradient; Pmax is at least σ1 / √2 times the metres that a pixel covers.
 
-That is within 2.3 octaves of λ itself where an eye gets as near as the boxes say.
-
 (Tried: the pixel in the middle of the picture, and λ = log2(Pmin). The corners of a picture have
-smaller pixels, 0.42 of it in both directions, and where a footprint is not quite square N is 2:
-eyes that were drawn at random in a room needed levels that were trimmed.)
+smaller pixels, and eyes that were drawn at random in a room needed levels that were trimmed.)
 """
 
 from __future__ import annotations

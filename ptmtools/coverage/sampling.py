@@ -1,11 +1,9 @@
 """The hints of one cell: the choice and number of its sample points, and the estimate with its
-error.
+error (``docs/design/coverage.md``, "Statistics").
 
 A hint is a ratio, the pixels of one cell over all pixels, both summed over the sample points. Its
 standard error comes from eight groups of points, by the linearised ratio (Cochran, *Sampling
-Techniques*, 1977, §6.4). Where the groups are independently scrambled (``--tolerance``) it is
-accurate; where they are stretches of one sequence, which complement one another, it is too large by
-a factor of about two; with eight single points it is sometimes too small.
+Techniques*, 1977, §6.4). With eight single points it is sometimes too small.
 
 The error of a whole row is its total variation, half the sum of absolute differences. The distances
 of the groups' own hints from the mean estimate its distribution: a mean of R groups is closer to

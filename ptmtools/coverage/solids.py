@@ -1,8 +1,5 @@
 """Decides which sample points are usable: those outside solids and clear of surfaces.
 
-A point too near to a surface sees hardly anything else, and one inside a statue sees the
-statue's inside; either would spoil the average (the paper's §5 does not treat them).
-
 *Near* is exact: the distance from the point to the nearest triangle.
 
 *Inside* is defined for closed surfaces only. The scene's triangles are welded by position
@@ -13,10 +10,8 @@ of times, so that the parity of the crossings along a ray does not depend on the
   decided what lies behind it (the mesh of a whole building is often one group), or
 - its faces consistently point inwards: a shell that is meant to be seen from within.
 
-So the faces of a statue need not point the right way, a table top or a sheet of paper has no
-inside, a wall modelled twice with opposite orientation is closed and empty, and an open surface
-bounds nothing. Rejected: the parity of all crossings (each open or single sheet inverts it), and
-the generalised winding number (wrong wherever faces are oriented at random, as in most OBJ files).
+Rejected: the parity of all crossings (each open or single sheet inverts it), and the generalised
+winding number (wrong wherever faces are oriented at random, as in most OBJ files).
 """
 
 from __future__ import annotations

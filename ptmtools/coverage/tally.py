@@ -6,8 +6,7 @@ cell outside the PVS, or missing, the pixel is in doubt and checked again in two
 1. a ray through it is cast. A rasteriser rounds corners to 1/256 pixel, and past a rounded edge it
    sees what no straight line reaches;
 2. the point that the ray hits, moved a little towards the viewer, is located in the BSP tree.
-   Geometry that reaches into a cell by less than a plane's tolerance is not cut off there, and
-   belongs to the cell that it mostly lies in, but is seen in this one.
+   Geometry that reaches into a cell by less than a plane's tolerance is not cut off there.
 
 Pixels still outside the PVS after that are missed mass: left out of the hints and reported.
 """

@@ -1,17 +1,10 @@
 """Decides near ties of the portal flow: whether a line can pass a sequence of portals, in
-double-double arithmetic. Portals are first made exactly plane, by moving their vertices along one
-axis, and shrunk by `Tolerance.noise`: the last digits of coordinates are noise, and in a building
-that is turned the edges of doors that meet in a line no longer do, by 1e-16 of its extent.
+double-double arithmetic (``docs/design/visibility.md``, "Near ties").
 
-Tried and dropped: integers of any length for cases that double-double cannot decide, which were
-    needed for one sequence in a hundred and changed no set of any model
-    (docs/design/visibility.md).
-
-A near tie is a sequence of portals that a search rejected by less than the rounding of its
-arithmetic (`clipping_kernels`). A second search that accepts all near ties shows which results
-depend on them, mostly none. `SequenceTest` decides those that matter. If a line can pass one, the
-search is repeated with it accepted, as long as this produces new ones. If there are too many, or a
-budget ends, all are accepted: looser, but still conservative.
+Portals are first made exactly plane, by moving their vertices along one axis, and shrunk by
+`Tolerance.noise`. A search is repeated with the sequences accepted that a line can pass, as long as
+this produces new near ties. If there are too many, or a budget ends, all are accepted: looser, but
+still conservative.
 """
 
 from __future__ import annotations

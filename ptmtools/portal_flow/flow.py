@@ -1,36 +1,16 @@
 """Conservative portal-sequence flow: the portals that a straight line may cross after each (§3).
 
-The method is Teller & Séquin's (SIGGRAPH 1991) in the depth-first form of Quake's ``vis``. A line
-that leaves a leaf crosses a sequence of portals. The search keeps, for each sequence, the rest of
-the *source* portal and of the portal *passed* last; the planes that separate the two bound every
-line through both, so the next portal is clipped by them, and in turn the planes between the next
-portal and the passed one clip the source. An empty polygon ends the sequence.
-
-Over the textbook:
-
-* Bits stand for directed portals, not leaves, so that p sees q exactly if q's way back sees p's:
-  each finished portal prunes all later ones in both directions, and the result is symmetric as
-  it stands.
-* A separating plane is found by turning about an edge (one pass over the other polygon) and
-  accepted by measuring both polygons against it: ill-conditioned edges cost tightness only.
-* At each step the separators are also tried on every portal that is still possible and not yet
-  seen; if none is left, the whole subtree is.
-* A search that grows long shoots one line at each portal that is still possible. Portals that a
-  line crosses are seen without a search; few are left to refute, even in an open hall.
-* Rejections by less than the rounding of the arithmetic are decided again in double-double
-  (`double_double`).
-* Each source portal has a budget of operations, not of seconds. When it is spent, open branches
-  are not followed; the part of the possible set that their separators leave counts as seen.
+The method is Teller & Séquin's (SIGGRAPH 1991) in the depth-first form of Quake's ``vis``.
+``docs/design/visibility.md`` explains its steps, the rounding, near ties and the budget.
 
 Portals are done in ascending order of how much they might see, in batches of fixed length: a
 batch reads only the results of the batches before it, hence the same answer for any number of
-workers.
+workers. The searches are tasks of an executor. They share `Searching`; each borrows its storage
+from it.
 
 Tried and dropped (e1m1: 9.6 s, 163.7 portals seen on average): a first round with a small budget
 to tighten the start of the second (9.8 s); counting q as seen by p because q's way back was not
 shown to miss p's (7.4 s, but 164.8 portals); shooting the lines first instead of late (12.9 s).
-
-The searches are tasks of an executor. They share `Searching`; each borrows its storage from it.
 """
 
 from __future__ import annotations

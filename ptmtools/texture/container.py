@@ -13,6 +13,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 from ptmtools.errors import InputError, LimitError
 from ptmtools.texture.model import (
@@ -230,23 +231,31 @@ def _damaged_head(what: str) -> InputError:
 
 
 _TAGGED = struct.Struct("<4sI")
-_CHROMATICITIES = struct.Struct("<8I")
+#: Tag → attribute of `Description`, number and kind of the integers, and their range.
+_TAGS = {
+    b"SRGB": ("srgb", 1, "B", range(4)),
+    b"GAMA": ("gamma", 1, "I", range(1 << 32)),
+    b"CHRM": ("chromaticities", 8, "I", range(1 << 32)),
+    b"ORIE": ("orientation", 1, "B", range(1, 9)),
+}
+_PLAIN = Description()
 
 
 def pack_description(description: Description) -> bytes:
     """Its bytes; none if it says nothing. Raises InputError PTM-I111 for impossible values."""
-    _check(description)
-    values: list[tuple[bytes, bytes]] = []
-    if description.icc is not None:
-        values.append((b"ICCP", description.icc))
-    if description.srgb is not None:
-        values.append((b"SRGB", bytes([description.srgb])))
-    if description.gamma is not None:
-        values.append((b"GAMA", description.gamma.to_bytes(4, "little")))
-    if description.chromaticities is not None:
-        values.append((b"CHRM", _CHROMATICITIES.pack(*description.chromaticities)))
-    if description.orientation != 1:
-        values.append((b"ORIE", bytes([description.orientation])))
+    values = [] if description.icc is None else [(b"ICCP", description.icc)]
+    for tag, (name, count, letter, allowed) in _TAGS.items():
+        value = getattr(description, name)
+        if value == getattr(_PLAIN, name):
+            continue
+        numbers = value if count > 1 else (value,)
+        if len(numbers) != count or not all(isinstance(n, int) and n in allowed for n in numbers):
+            raise InputError(
+                "PTM-I111",
+                f"these values for colour and orientation are impossible: {description!r:.200}",
+                remedy="see ptmtools.texture.Description for the ranges",
+            )
+        values.append((tag, struct.pack(f"<{count}{letter}", *numbers)))
     return b"".join(_TAGGED.pack(tag, len(value)) + value for tag, value in values)
 
 
@@ -256,43 +265,16 @@ def parse_description(data: bytes) -> Description:
     tags = dict(values)
     if len(tags) < len(values):
         raise _impossible("a tag is repeated")
-    srgb, gamma = tags.get(b"SRGB"), tags.get(b"GAMA")
-    points, orientation = tags.get(b"CHRM"), tags.get(b"ORIE", b"\1")
-    if (
-        (srgb is not None and (len(srgb) != 1 or srgb[0] > 3))
-        or (gamma is not None and len(gamma) != 4)
-        or (points is not None and len(points) != _CHROMATICITIES.size)
-        or len(orientation) != 1
-        or not 1 <= orientation[0] <= 8
-    ):
-        raise _impossible("one of its values is out of range")
-    return Description(
-        icc=tags.get(b"ICCP"),
-        srgb=None if srgb is None else srgb[0],
-        gamma=None if gamma is None else int.from_bytes(gamma, "little"),
-        chromaticities=None if points is None else _CHROMATICITIES.unpack(points),
-        orientation=orientation[0],
-    )
-
-
-def _check(description: Description) -> None:
-    """Raises for values that no file can hold."""
-
-    def within(value: int | None, low: int, high: int) -> bool:
-        return value is None or (isinstance(value, int) and low <= value <= high)
-
-    points = description.chromaticities
-    if not (
-        within(description.srgb, 0, 3)
-        and within(description.gamma, 0, (1 << 32) - 1)
-        and within(description.orientation, 1, 8)
-        and (points is None or (len(points) == 8 and all(within(p, 0, 2**32 - 1) for p in points)))
-    ):
-        raise InputError(
-            "PTM-I111",
-            f"these values for colour and orientation are impossible: {description!r:.200}",
-            remedy="see ptmtools.texture.Description for the ranges",
-        )
+    fields: dict[str, Any] = {"icc": tags.get(b"ICCP")}
+    for tag in _TAGS.keys() & tags.keys():
+        name, count, letter, allowed = _TAGS[tag]
+        layout = struct.Struct(f"<{count}{letter}")
+        fits = len(tags[tag]) == layout.size
+        numbers = layout.unpack(tags[tag]) if fits else ()
+        if not fits or not all(n in allowed for n in numbers):
+            raise _impossible("one of its values is out of range")
+        fields[name] = numbers if count > 1 else numbers[0]
+    return Description(**fields)
 
 
 def _values(data: bytes) -> Iterator[tuple[bytes, bytes]]:

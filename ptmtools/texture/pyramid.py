@@ -1,24 +1,12 @@
-"""Mipmap levels by the mean of 2×2 blocks (paper Eq. 1), for any size and kind of sample.
+"""Mipmap levels by the mean of 2×2 blocks (paper Eq. 1), for any size and kind of sample, and the
+tiles of a level. Specified in ``docs/formats/ptm.md`` and ``docs/formats/ptm-kinds.md``.
 
 Level n-1 is max(1, side >> 1) wide and high, as in OpenGL and WebGPU, so that a decoded level can
 be uploaded as it is. An odd last row or column belongs to no 2×2 block and does not reach the
-level below.
+level below. Levels stop where the shorter side is 1.
 
-Levels stop where the shorter side is 1. (Rejected: to go on halving the longer side, which saves
-at most half a kilobyte at 4096 × 16, and needs blocks of two texels in every coder.)
-
-Integers: the floor of the mean. Floats: the sum of the four as float64, in the order
-(p + q) + (r + s), times ¼, rounded once to the stored type. No sum of finite samples overflows in
-float64 and none underflows: the largest is below 2^130 and every float32 is a whole multiple of
-2^-149. So the mean of finite samples is finite. The sum is exact unless magnitudes in a block
-differ by more than 2^26 (float32; never for float16); it is then off by a few units of float64's
-last place, the same on every machine. The mean over a NaN, or over both infinities, is the quiet
-NaN 0x7E00 or 0x7FC00000.
-
-Tiles (``docs/formats/ptm.md``): a level with a side of more than twice the tile's is cut into as
-many whole tiles as go into it each way; the last of a row or column takes what is left over, so
-that none is a sliver. Tiles begin at multiples of their side, which is even, so a tile refines a
-rectangle of the level below that no other tile refines.
+Means of floats are taken in float64: no sum of finite samples overflows there, so the mean of
+finite samples is finite, and the same on every machine.
 """
 
 from __future__ import annotations

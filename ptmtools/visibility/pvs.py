@@ -1,17 +1,11 @@
 """Potentially visible sets of cells (paper §3): the portal flow over leaves, lifted to cells.
 
-A viewer anywhere in a cell sees at most the cells of its row. The flow, its argument and its
-budget are in `flow`.
+A viewer anywhere in a cell sees at most the cells of its row. The flow and its budget are in
+`flow`. Sampled sets come from random lines alone and are a lower bound, not conservative; lines are
+walked as in `cells.sight`, which spreads them evenly.
 
-Sampled sets come from random lines alone: leaves that a straight line crosses on its way through
-the portals see each other, all others count as hidden. So these sets are a lower bound, not
-conservative: a client that loads by them shows holes. They serve for comparison. Lines are walked
-as in `cells.sight`, which spreads them evenly; random ones, in any number, show more.
-
-Leaks are openings that show more than they should. A cell that sees several times as many cells as
-most do sees them through something: a window onto a courtyard, as intended, or an unintended gap
-    under a wall. The smallest opening between cells through which it sees at least half of its
-    visible cells is named.
+Leaks are openings that show more than they should. Of a cell that sees several times as many cells
+as most do, the smallest opening between cells is named through which it sees at least half of them.
 """
 
 from __future__ import annotations

@@ -3,19 +3,15 @@
 A segment that begins where an eye can be, ends in a leaf and is blocked by no structural triangle
 proves that the cell of its start sees the cell of its end, so the pair must be in the PVS, and that
 the leaf must not have been dropped. The converse proves nothing: the check detects missing pairs,
-never superfluous ones.
+never superfluous ones. ``docs/design/visibility.md`` ("The check") describes the four kinds of
+segments.
 
-Segments come in four kinds, a quarter each, because segments uniform in volume are nearly all
-blocked and say most about the largest cells: ends uniform in volume; ends in leaves drawn with
-equal weight; short ones, log-uniform in length; and ones laid through a random point of a random
-portal, the sharpest kind.
-
-Embree computes in float32 around the middle of the model (3 µm in a building of 50 m), real
-models have cracks between polygons that were meant to touch, and an end may lie on the wrong side
-of a wall by a rounding. A miss is therefore shot again as `COPIES` parallel copies, each displaced
-by the jitter; a copy counts if its own ends lie in cells that do not see each other and nothing
-blocks it. The miss is believed if at least half of the copies count, else it is a hairline. Asking
-for all copies would let a narrow opening that is truly missing pass as a hairline.
+Embree computes in float32 around the middle of the model, real models have cracks between polygons
+that were meant to touch, and an end may lie on the wrong side of a wall by a rounding. A miss is
+therefore shot again as `COPIES` parallel copies, each displaced by the jitter; a copy counts if its
+own ends lie in cells that do not see each other and nothing blocks it. The miss is believed if at
+least half of the copies count, else it is a hairline. Asking for all copies would let a narrow
+opening that is truly missing pass as a hairline.
 """
 
 from __future__ import annotations

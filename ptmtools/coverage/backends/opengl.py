@@ -2,16 +2,12 @@
 
 Every fragment writes its triangle's number into R32UI pixels. The views of many sample points lie
 side by side in one large target, which is cleared and read once; each is a draw with a viewport of
-its own. Measured and rejected: one instanced draw for all points, tiles distinguished in the shader
-(in a 2 mm cell beside walls of 10 m adding a tile's place to a position costs whole pixels);
-occlusion queries (slower), layered cube rendering (slower, or wrong in moderngl), a histogram in a
-compute shader (bit for bit the same, and needs OpenGL 4.3).
+its own. Depth is linear, w / far; the projection has no far plane, and its near plane only clips.
 
-- The sample point is subtracted in float64's precision: it and the vertices are two floats each.
-- Depth is linear, w / far. A perspective depth of 24 bits with a small near plane loses pictures
-  that hang 1 mm off a wall at 5 to 20 m; linear ones resolve 6e-8 of the farthest depth.
-- The projection has no far plane, and its near plane only clips.
-- Only surfaces that can show are drawn (`OpenGLRenderer.lists`).
+Measured and rejected: one instanced draw for all points, tiles distinguished in the shader (in a
+2 mm cell beside walls of 10 m adding a tile's place to a position costs whole pixels); occlusion
+queries (slower), layered cube rendering (slower, or wrong in moderngl), a histogram in a compute
+shader (bit for bit the same, and needs OpenGL 4.3).
 """
 
 from __future__ import annotations

@@ -2,10 +2,9 @@
 
 The planes are coded in the order green, red, blue, alpha; other kinds in their own order. Each may
 look at the two before it. A plane is cut into vertical strips 32 blocks wide: strip i of a plane
-needs strip i - 1 of the same and strip i + 1 of the plane before it, and nothing else, so the
-planes run after each other in a pipeline, on as many threads as there are planes. Where the height
-is odd, the last row of blocks also looks at the odd row of the plane before it, which comes after
-the last strip: then one plane runs after the other.
+needs strip i - 1 of the same and strip i + 1 of the plane before it, so the planes run after each
+other in a pipeline, on as many threads as there are planes. Where the height is odd, one plane runs
+after the other.
 
 The state that the coder learns (`State`) starts the same for every plane and is copied for tiles.
 """

@@ -1,20 +1,14 @@
 """The texel coder: samples of 16 bits, floats, and any integers with an error allowed.
 
-A group is one byte that names its form, then the data of that form:
-
-- *raw*: as in profile `raw`; only without error.
-- *plain*: all texels of the level, without the level below: no group takes more than this and one
-  byte.
-- *coded*, with built-in or with sent weights: every texel predicted from the level below and the
-  texels before it, the residual as a token (coded with rANS by the activity around it) and plain
-  bits. ``texel_kernels`` has the pass, ``docs/formats/ptm-kinds.md`` the format.
+A group is one byte that names its form (raw, plain, coded with built-in or with sent weights), then
+the data of that form. ``texel_kernels`` has the pass, ``docs/formats/ptm-kinds.md`` the format.
 
 Whole pyramids over what zstd -19 makes of the finest level alone: photographs of 16 bits 0.82, as
 float32 0.90, half-float environment maps 0.66 … 0.80, Radiance files 0.68 … 0.83, 8 bits widened to
-16 or divided by 255 0.69 … 0.80, heights as float32 0.69; over OpenEXR (the shorter of ZIP and PIZ)
-0.64 … 0.93. Repetitions that are not flat are not detected: a pattern of 16² random floats costs 90
-times what zstd needs. With an error of 1, 2, 4, 8, 12 Kodak images of 8 bits take 0.74, 0.58, 0.41,
-0.25 of their lossless size; JPEG-LS 0.87, 0.69, 0.50, 0.34 for the finest level alone.
+16 or divided by 255 0.69 … 0.80, heights as float32 0.69. Repetitions that are not flat are not
+detected: a pattern of 16² random floats costs 90 times what zstd needs. With an error of 1, 2, 4,
+8, 12 Kodak images of 8 bits take 0.74, 0.58, 0.41, 0.25 of their lossless size; JPEG-LS 0.87, 0.69,
+0.50, 0.34 for the finest level alone.
 """
 
 from __future__ import annotations

@@ -3,20 +3,15 @@ that predict a texel, the built-in weights and the built-in tables. They are par
 
 An encoder may fit the predictors' weights to one group, the same on every machine: least squares
 over a sample of block rows, one system of ten to twelve unknowns for each plane and each of p, q,
-r, s. Each sample is divided by the spread of its neighbours first, so that smooth and rough parts,
-dark and bright ones weigh the same: the cost is bits, the logarithm of an error. The normal
-equations are sums of whole numbers and solved exactly (`group.fitted`).
+r, s, solved exactly (`group.fitted`). Each sample is divided by the spread of its neighbours first:
+the cost is bits, the logarithm of an error. The candidates include the weights that continue drawn
+and computed images exactly (the texel above, the one to the left, the plane through both): a depth
+map of 512² texels takes 44 kB with them, 98 kB without. On photographs they never win.
 
-The candidates include the weights that continue drawn and computed images exactly (the texel
-above, the one to the left, the plane through both): a depth map of 512² texels takes 44 kB with
-them, 98 kB without. On photographs they never win.
-
-Where only some values occur in a plane, numbers replace them. Each component of a group is numbered
-by itself. Mostly a value is its own number. Where all values lie on a lattice (8 bits widened to
-16, halves widened to singles, constant alpha) they are counted along it; where they are few
-(palettes, 8 bits taken through a transfer function to floats) the sorted list of them is sent.
-Where most values have low bits that are 0 (singles that were halves or came from a Radiance file,
-and their means) a bit per number says whether they are.
+Where only some values occur in a plane, numbers replace them (``docs/formats/ptm-kinds.md``,
+"Numbering"): a lattice (8 bits widened to 16, halves widened to singles), a list of few values
+(palettes, 8 bits taken through a transfer function to floats), or a bit per number that says
+whether its low bits are 0 (singles that were halves or came from a Radiance file).
 """
 
 from __future__ import annotations

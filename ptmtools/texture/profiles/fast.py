@@ -1,23 +1,15 @@
 """Profile `fast`: static entropy coding; each tile by the coder that suits it.
 
-Images of 8 bits, without error:
+Images of 8 bits, without error, are coded as *Haar* differences (photographs, most textures;
+`coders.haar`), as *repeats* (flat areas, patterns, drawings, few colours, and atlases that mix
+these with photographs; `coders.repeats`), or *stored* as in `raw`, so that no group is longer than
+that and one byte. A sixteenth of the blocks decides which to try; trying both everywhere gained
+0.7 % on photographs and 5 % on the textures of models and took twice the time or more. A coarsest
+level of any size is coded as the *pyramid* of its own. `coders.texel` codes other kinds of sample
+and near-lossless images.
 
-- *Haar* (photographs, most textures; `coders.haar`) predicts the three Haar differences of every
-  block, row by row. It decodes fastest.
-- *Repeats* (flat areas, patterns, drawings, few colours, and atlases that mix these with
-  photographs; `coders.repeats`) first looks for blocks and texels that were seen before. A
-  sixteenth of the blocks decides which of the two to try; trying both everywhere, and taking
-  repeats where it is 3 % smaller, gained 0.7 % on photographs and 5 % on the textures of models and
-  took twice the time or more.
-- *Stored* (noise): as in `raw`, so that no group is longer than that and one byte.
-- A coarsest level of any size is coded as the *pyramid* of its own.
-
-Other kinds of sample and near-lossless images are coded by `coders.texel`.
-
-Whole pyramids over PNG of the finest level alone: 12 Kodak images 0.733, 7 textures of 1024² 0.818,
-17 textures of architectural models 0.82; the largest of any file 1.03. With deflate in the place of
-repeats the last two were 0.871 and 1.104. Mapping repeats first and decoding new texels by rows
-afterwards, which would be faster, detects too few: surroundings have to be known texel by texel
+Rejected: deflate in the place of repeats (models' textures 0.871 of PNG instead of 0.818); mapping
+repeats first and decoding new texels by rows afterwards, which would be faster but detects too few
 (office atlas 2.2 instead of 0.68).
 """
 

@@ -1,22 +1,18 @@
 """Profile `raw`: the layout of the paper (§4.1, §4.3), uncompressed.
 
-The coarsest level whole, in row-major order. Then for each level a group: the residual array, two
-bits for every component of every 2×2 block, and the partial level, which is the level in row-major
-order without the lower right texel s of each block. The paper leaves bit order, texel order and odd
-sizes open; ``docs/formats/ptm-kinds.md`` and ``docs/formats/ptm.md`` fix them. Samples are little
-endian.
+The coarsest level whole, then for each level a group: the residual array, two bits for every
+component of every 2×2 block, and the partial level, which is the level without the lower right
+texel s of each block. The paper leaves bit order, texel order and odd sizes open;
+``docs/formats/ptm.md`` and ``docs/formats/ptm-kinds.md`` fix them. Samples are little endian.
 
-Integers: the two bits are the remainder of the block's sum by 4 and give s exactly (Eq. 3). Over a
-whole pyramid they cost 1/12 = 8.33 % of an image of 8 bits, which is 1/16 = 6.25 % of the pyramid
-(the paper's "6 %"), and 1/24 = 4.17 % of one of 16 bits, 1/32 = 3.13 % of the pyramid.
+Integers: the two bits are the remainder of the block's sum by 4 and give s exactly (Eq. 3).
 
 Floats: s = 4·I - p - q - r (§4.1) is not exact, because I was rounded: a unit in the last place of
 I is up to four of s. The formula is evaluated in float64 and rounded once; the two bits say by
-how many units it is off, -1, 0 or 1, or that an escape behind the partial level says it. Texels
-where the formula alone is wrong: 75 % of general data, 46 % of normal noise around 0 (evaluated in
-the stored type itself, as the paper has it: 78 % and 60 %). Bits per s where samples of a block are
-of like magnitude: 3.0; in nibbles of three bits 4.0, in bytes 8.0. The order 4·I - ((p + q) + r)
-was the best of three on data spanning 1e-38 … 1e38 by 1 %; they tie elsewhere.
+how many units it is off, -1, 0 or 1, or that an escape behind the partial level says it. Bits per s
+where samples of a block are of like magnitude: 3.0; in nibbles of three bits 4.0, in bytes 8.0. The
+order 4·I - ((p + q) + r) was the best of three on data spanning 1e-38 … 1e38 by 1 %; they tie
+elsewhere.
 """
 
 from __future__ import annotations
