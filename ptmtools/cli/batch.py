@@ -86,12 +86,11 @@ def many_files(function: Callable[..., Any]) -> Callable[..., Any]:
         skip_existing: bool,
         workers: int,
         limits: Limits,
-        as_json: bool,
         **values: Any,
     ) -> Any:
         if force and skip_existing:
             raise click.UsageError("give either --force or --skip-existing, not both")
-        return function(Batch(console, force, skip_existing, workers, limits, as_json), **values)
+        return function(Batch(console, force, skip_existing, workers, limits), **values)
 
     return command
 
@@ -249,7 +248,6 @@ class Batch:
     skip_existing: bool
     workers: int
     limits: Limits
-    as_json: bool
 
     def skips(self, target: Path | None) -> bool:
         """Whether to keep an existing result; raises OutputError PTM-O001 without an option."""
@@ -268,8 +266,8 @@ class Batch:
         """Runs ``work(job, threads)`` for every job, several at a time; returns the exit status of
         the first failure, and the reports of the other jobs, in order.
 
-        Prints the ``lines`` of each report, or with ``as_json`` all reports at the end; warnings go
-        to stderr. The other jobs continue after a failure. A single job has all the threads; each
+        Prints the ``lines`` of each report, or all reports as JSON at the end; warnings go to
+        stderr. The other jobs continue after a failure. A single job has all the threads; each
         of several has one.
         """
         from ptmtools.parallel import ordered
@@ -299,9 +297,9 @@ class Batch:
                 reports.append(result)
                 if result.get("warning"):
                     console.warn(f"{result['file']}: {result['warning']}")
-                for line in lines(result) if not self.as_json else ():
+                for line in lines(result) if not console.as_json else ():
                     console.print(line)
-        if self.as_json:
+        if console.as_json:
             console.json(reports)
         return status, reports
 

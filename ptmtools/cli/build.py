@@ -7,10 +7,9 @@ import shlex
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import asdict
 from functools import partial
-from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,7 +29,6 @@ from ptmtools.cli.parameters import (
     take,
     with_console,
 )
-from ptmtools.lazy import Lazy
 from ptmtools.output.emitters import GLTF
 from ptmtools.pipeline.build import build_scene as build, run_stage
 from ptmtools.pipeline.command import build_command, open_database
@@ -45,33 +43,14 @@ if TYPE_CHECKING:
     from ptmtools.pipeline.status import StagePlan
 
 
-@dataclass(frozen=True)
-class ReportKind:
-    """The report of ``ptm STAGE DB --report``.
-
-    Attributes
-    ----------
-    help: the text of ``--help``.
-    reads: the stages whose artifacts the report describes.
-    report: computes it, a dataclass, from those artifacts.
-    lines: formats it as lines of text.
-    """
-
-    help: str
-    reads: tuple[Stage[Any], ...]
-    report: Lazy[Callable[..., Any]]
-    lines: Lazy[Callable[..., Iterable[str]]]
-
-
-REPORTS = {
-    PVS: ReportKind(
-        "Print the sizes of the sets, the most expensive portals, and openings through which "
-        "suspiciously much is visible.",
-        (CELLS, PVS),
-        Lazy("ptmtools.visibility.report:report"),
-        Lazy("ptmtools.visibility.report:report_lines"),
-    )
-}
+#: ``--report`` of the stage `PVS`, as ``wanted``.
+report_option = option(
+    "--report",
+    "wanted",
+    is_flag=True,
+    help="Print the sizes of the sets, the most expensive portals, and openings through which "
+    "suspiciously much is visible.",
+)
 #: Textures that are listed without ``-v``.
 SHOWN_TEXTURES = 5
 
@@ -109,7 +88,6 @@ def _from_model(last: Stage[Any] | None) -> Callable[..., None]:
         console: Console,
         model: str,
         db: str,
-        as_json: bool,
         dry_run: bool,
         rebuild: bool,
         workers: int,
@@ -127,8 +105,9 @@ def _from_model(last: Stage[Any] | None) -> Callable[..., None]:
         if dry_run:
             from ptmtools.pipeline.status import plan_build
 
-            plans = plan_build(model, db, *options, force=force)
-            print_plan(console, plans[: len(stages)], as_json)
+            plans = plan_build(model, db, *options, force=force)[: len(stages)]
+            document = {"schema": 1, "stages": [asdict(plan) for plan in plans]}
+            console.result(document, plan_lines(plans, every=console.verbose))
             return
         with console.progress() as progress:
             report = build(
@@ -141,9 +120,9 @@ def _from_model(last: Stage[Any] | None) -> Callable[..., None]:
                 force=force,
                 rebuild=rebuild,
                 progress=progress,
-                tell=partial(_print_stage, console, as_json),
+                tell=partial(_print_stage, console),
             )
-        print_report(console, report, as_json)
+        print_report(console, report)
 
     return command
 
@@ -159,7 +138,6 @@ def _of_database(stage: Stage[Any]) -> Callable[..., None]:
     def command(
         console: Console,
         db: str,
-        as_json: bool,
         workers: int,
         scheduler: str | None,
         wanted: bool = False,
@@ -172,51 +150,44 @@ def _of_database(stage: Stage[Any]) -> Callable[..., None]:
                 workers=workers,
                 scheduler=scheduler,
                 progress=progress,
-                tell=partial(_print_stage, console, as_json),
+                tell=partial(_print_stage, console),
             )
-        if not wanted:
-            print_report(console, report, as_json)
-            return
-        kind, artifacts = REPORTS[stage], Artifacts(open_database(db))
-        details = kind.report.load()(*(artifacts[read] for read in kind.reads))
-        if as_json:
-            console.json(asdict(details))
-            return
-        print_report(console, report, as_json)
-        for line in kind.lines.load()(details, verbose=console.verbose):
-            console.print(line)
+        if not (wanted and console.as_json):
+            print_report(console, report)
+        if wanted:
+            from ptmtools.visibility.report import report as describe, report_lines
 
-    if stage in REPORTS:
-        return option("--report", "wanted", is_flag=True, help=REPORTS[stage].help)(command)
-    return command
+            artifacts = Artifacts(open_database(db))
+            details = describe(artifacts[CELLS], artifacts[PVS])
+            console.result(asdict(details), report_lines(details, verbose=console.verbose))
+
+    return report_option(command) if stage is PVS else command
 
 
 @click.command("status", cls=Command)
 @database_argument
 @json_option
 @with_console
-def status(console: Console, db: str, as_json: bool) -> None:
+def status(console: Console, db: str) -> None:
     """Show which stages of DB are done, stale or damaged, and which process is writing it."""
     from ptmtools.pipeline.status import database_status
 
     state = database_status(db)
-    if as_json:
-        console.json({"schema": 1, **asdict(state)})
-        return
     model = f"database of {state.model}" if state.model else "no stage has finished yet"
-    console.print(f"{db}: {model}")
+    lines = [f"{db}: {model}"]
     for stage in state.stages:
         summary = STAGES[stage.stage].summarize(stage.counts) if stage.counts else ""
         files = f"{count(stage.files, 'file')}, {size(stage.bytes)}" if stage.files else ""
         line = f"{stage.stage:<9}{stage.state:>8}   {files:<22} {stage.why or summary}"
-        console.print(line.rstrip())
+        lines.append(line.rstrip())
     if state.writer:
-        console.print(f"locked by {state.writer}, which is writing it")
+        lines.append(f"locked by {state.writer}, which is writing it")
     if state.interrupted:
         kept = f"; the next one keeps {count(state.waiting, 'finished texture')}"
-        console.print(f"a run was interrupted{kept if state.waiting else ''}")
+        lines.append(f"a run was interrupted{kept if state.waiting else ''}")
     if not state.finished and not state.writer:
-        console.print(f"not finished: run `{build_command(db)}`")
+        lines.append(f"not finished: run `{build_command(db)}`")
+    console.result({"schema": 1, **asdict(state)}, lines)
 
 
 @click.command("warm-up", cls=Command)
@@ -238,27 +209,23 @@ def warm_up(console: Console) -> None:
     console.print(f"compiled in {seconds:.1f} s" if fresh else "nothing to compile")
 
 
-def print_plan(console: Console, plans: Sequence[StagePlan], as_json: bool) -> None:
-    """Prints what a build would do."""
-    if as_json:
-        console.json({"schema": 1, "stages": [asdict(plan) for plan in plans]})
-        return
+def plan_lines(plans: Iterable[StagePlan], *, every: bool) -> Iterator[str]:
+    """The text of a plan, with ``every`` texture."""
     for plan in plans:
         reasons = list(plan.reasons)
         if plan.textures and plan.plan == "run":
-            shown = plan.textures if console.verbose else plan.textures[:SHOWN_TEXTURES]
+            shown = plan.textures if every else plan.textures[:SHOWN_TEXTURES]
             more = len(plan.textures) - len(shown)
             names = ", ".join(shown) + (f" and {more:,} more" if more else "")
             reasons.append(f"encode {count(len(plan.textures), 'texture')}: {names}")
         first = reasons[0] if reasons else ""
-        console.print(f"{plan.stage:<9}{_PLANNED[plan.plan]:>10}   {first}".rstrip())
-        for line in reasons[1:]:
-            console.print(f"{'':<22}{line}")
+        yield f"{plan.stage:<9}{_PLANNED[plan.plan]:>10}   {first}".rstrip()
+        yield from (f"{'':<22}{line}" for line in reasons[1:])
 
 
-def _print_stage(console: Console, as_json: bool, stage: StageReport) -> None:
+def _print_stage(console: Console, stage: StageReport) -> None:
     """Prints the report of a stage as soon as it has finished."""
-    if as_json:
+    if console.as_json:
         return
     done = f"{stage.seconds:7.1f} s" if stage.ran else "unchanged"
     summary = STAGES[stage.stage].summarize(stage.counts)
@@ -272,9 +239,9 @@ def _print_stage(console: Console, as_json: bool, stage: StageReport) -> None:
         console.print(f"note: {note}")
 
 
-def print_report(console: Console, report: BuildReport, as_json: bool) -> None:
+def print_report(console: Console, report: BuildReport) -> None:
     """Prints the totals of a run, its notes and the next steps; see also `_print_stage`."""
-    if as_json:
+    if console.as_json:
         console.json(asdict(report))
         return
     memory = f", peak memory {size(report.peak_memory)}" if report.peak_memory else ""
@@ -284,8 +251,8 @@ def print_report(console: Console, report: BuildReport, as_json: bool) -> None:
         console.print(f"note: {note}")
     if further and not console.verbose:
         console.print(f"{count(len(further), 'more note')}; -v lists them")
-    if report.visitor:
-        print_visitor(console, report.visitor)
+    for line in visitor_lines(report.visitor):
+        console.print(line)
     if any(stage.stage == EMIT.name for stage in report.stages):
         _print_next_steps(console, report.database)
 
@@ -315,10 +282,10 @@ def _is_runner_up(note: str) -> bool:
     return note.endswith(f"[{RUNNER_UP}]")
 
 
-def print_visitor(console: Console, visitor: Visitor) -> None:
-    """Prints what a visitor of the database downloads."""
-    for head, line in zip_longest(["visitor"], visitor.lines(), fillvalue=""):
-        console.print(f"{head:<9} {line}".rstrip())
+def visitor_lines(visitor: Visitor | None) -> Iterator[str]:
+    """The text on the downloads of a visitor of the database, if they are known."""
+    for number, line in enumerate(visitor.lines() if visitor else ()):
+        yield f"{'' if number else 'visitor':<9} {line}".rstrip()
 
 
 def _tasks(stage: StageReport) -> str:

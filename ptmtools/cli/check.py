@@ -21,6 +21,7 @@ from ptmtools.cli.parameters import (
     limit_option,
     option,
     options_of,
+    output_option,
     take,
     with_console,
 )
@@ -79,7 +80,6 @@ def validate(
     strict: bool,
     limits: Limits,
     workers: int,
-    as_json: bool,
 ) -> None:
     """Check a database, another folder written by ptm, or a .ptm file.
 
@@ -93,28 +93,22 @@ def validate(
         shot = shoot_segments(target, segments, progress) if segments else None
     failed = report.error_count + (report.warning_count if strict else 0)
     failed += len(shot.missed) if shot else 0
-    if as_json:
-        console.json(_document(target, report, shot, failed == 0))
-    else:
-        _print_findings(console, target, report, shot)
-        if shot and shot.tried < segments:
-            console.warn(
-                f"only {shot.tried:,} of {segments:,} segments begin at a possible eye and end in "
-                "a cell"
-            )
-    if failed:
-        repair = _repair(target, report)
-        raise CheckError(
-            "PTM-C001",
-            f"{count(failed, 'finding')}",
-            file=target,
-            remedy=f"repair it with `{repair}`" if repair else None,
+    document = _document(target, report, shot, failed == 0)
+    console.result(document, _lines(target, report, shot, every=console.verbose))
+    if shot and shot.tried < segments and not console.as_json:
+        console.warn(
+            f"only {shot.tried:,} of {segments:,} segments begin at a possible eye and end in a "
+            "cell"
         )
+    if failed:
+        repair = document["repair"]
+        remedy = f"repair it with `{repair}`" if repair else None
+        raise CheckError("PTM-C001", count(failed, "finding"), file=target, remedy=remedy)
 
 
 @click.command("plot", cls=Command)
 @database_argument
-@option("-o", "--output", type=click.Path(), required=True, help="PNG to write.")
+@output_option("PNG to write.", required=True)
 @options_of(PlotOptions)
 @option(
     "--walk", type=click.Path(), metavar="FILE", help="Also draw this walk, which `ptm path` wrote."
@@ -168,13 +162,13 @@ def _document(
     }
 
 
-def _print_findings(
-    console: Console, target: str, report: ValidationReport, shot: SegmentReport | None
-) -> None:
-    """Prints the findings, the worst of each file first; of many findings, the worst of each file
-    and the number of the others."""
+def _lines(
+    target: str, report: ValidationReport, shot: SegmentReport | None, *, every: bool
+) -> list[str]:
+    """The findings as text, the worst of each file first; of many findings, unless ``every`` one
+    is wanted, the worst of each file and the number of the others."""
     lines = [str(issue) for issue in report.issues]
-    if len(lines) > SHOWN and not console.verbose:
+    if len(lines) > SHOWN and not every:
         files = [list(issues) for _, issues in groupby(report.issues, lambda issue: issue.file)]
         files.sort(key=lambda issues: issues[0].severity != "error")
         more = [sum(issue.count for issue in issues) - 1 for issues in files]
@@ -197,13 +191,11 @@ def _print_findings(
             f"{shot.missed_segments:,} between cells that are not in each other's visible sets, "
             f"{shot.hairlines:,} too close to an edge to decide"
         )
-    lines += [f"note: {note}" for note in report.notes]
-    for line in lines:
-        console.print(line)
-    console.print(
+    totals = (
         f"{target}: {count(report.files, 'file')}, {size(report.bytes)}; "
         f"{count(report.error_count, 'error')}, {count(report.warning_count, 'warning')}"
     )
+    return [*lines, *(f"note: {note}" for note in report.notes), totals]
 
 
 def _repair(target: str, report: ValidationReport) -> str | None:

@@ -6,7 +6,7 @@ import errno
 import math
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -37,11 +37,13 @@ class Console:
     ----------
     quiet: print errors only.
     verbose: print all notes, and tracebacks of errors.
+    as_json: print the result as JSON.
     to_stderr: stdout carries a file, and results go to stderr.
     """
 
     quiet: bool = False
     verbose: bool = False
+    as_json: bool = False
     to_stderr: bool = False
     #: The progress bars on the terminal, if any.
     _bars: Bars | None = None
@@ -51,6 +53,14 @@ class Console:
         if not self.quiet:
             with self.above_progress():
                 click.echo(printable(text), err=self.to_stderr)
+
+    def result(self, document: Any, lines: Iterable[str]) -> None:
+        """Prints the result of a command: its JSON document, or its lines."""
+        if self.as_json:
+            self.json(document)
+            return
+        for line in lines:
+            self.print(line)
 
     def warn(self, text: str) -> None:
         """Prints a line on stderr about a problem that does not stop the command."""

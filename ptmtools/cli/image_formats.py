@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,7 @@ from ptmtools.cli.parameters import (
     limit_option,
     option,
     options_of,
+    output_option,
     take,
     with_console,
 )
@@ -62,7 +64,6 @@ def compare(
     profiles: tuple[str, ...],
     repeat: int,
     limits: Limits,
-    as_json: bool,
 ) -> None:
     """Compare the size and speed of .ptm with other lossless image formats.
 
@@ -82,40 +83,32 @@ def compare(
         with naming(source):
             texels = load_image(source, limits).array()
             measured.append(measure(texels, contenders, repeat))
-        if not as_json:
+        if not console.as_json:
             height, width, components = texels.shape
             what = f"{width} x {height}, {count(components, 'component')} of {texels.dtype}"
-            _print_table(console, f"{source}: {what}, {size(texels.nbytes)}", measured[-1])
+            for line in _table(f"{source}: {what}, {size(texels.nbytes)}", measured[-1]):
+                console.print(line)
     sums = total(measured)
-    if as_json:
-        console.json(
-            {
-                "images": [
-                    {"image": source, "codecs": [asdict(one) for one in each]}
-                    for source, each in zip(sources, measured, strict=True)
-                ],
-                "total": [asdict(one) for one in sums],
-            }
-        )
-    elif len(sources) > 1:
-        console.print("")
-        _print_table(console, f"all {len(sources)} images", sums)
+    each = [[asdict(one) for one in rows] for rows in measured]
+    tables = [{"image": name, "codecs": codecs} for name, codecs in zip(sources, each, strict=True)]
+    lines = ["", *_table(f"all {len(sources)} images", sums)] if len(sources) > 1 else []
+    console.result({"images": tables, "total": [asdict(one) for one in sums]}, lines)
 
 
-def _print_table(console: Console, title: str, rows: list[Measured]) -> None:
-    """Prints sizes, also as multiples of the finest level as PNG, and speeds."""
+def _table(title: str, rows: list[Measured]) -> Iterator[str]:
+    """The lines of a table of sizes, also as multiples of the finest level as PNG, and speeds."""
     png = next((one.finest_bytes for one in rows if one.codec == "PNG"), None)
-    console.print(title)
-    console.print(
+    yield title
+    yield (
         f"{'':<20}{'finest level':>14}{'/ PNG':>8}{'all levels':>14}{'/ PNG':>8}"
         f"{'encode':>12}{'decode':>12}"
     )
     for one in rows:
         if one.problem:
-            console.print(f"{one.codec:<20}{one.problem}")
+            yield f"{one.codec:<20}{one.problem}"
             continue
         finest = "–" if one.finest_bytes is None else f"{one.finest_bytes:,}"
-        console.print(
+        yield (
             f"{one.codec:<20}{finest:>14}{_ratio(one.finest_bytes, png):>8}"
             f"{one.all_bytes:>14,}{_ratio(one.all_bytes, png):>8}"
             f"{_speed(one.raw_bytes, one.encode_seconds):>12}"
@@ -133,7 +126,7 @@ def _speed(done: int, seconds: float) -> str:
 
 @click.command("interlace", cls=Command)
 @click.argument("image", metavar="IMAGE", type=click.Path())
-@option("-o", "--output", "folder", type=click.Path(), required=True, help="Folder to write.")
+@output_option("Folder to write.", "folder", required=True)
 @options_of(InterlaceOptions)
 @force_option("Replace a folder that this command wrote.")
 @limit_option
@@ -145,7 +138,6 @@ def interlace(
     folder: str,
     force: bool,
     limits: Limits,
-    as_json: bool,
     **values: Any,
 ) -> None:
     """Split an image into files that sharpen it step by step (GPU image interlacing).
@@ -166,29 +158,24 @@ def interlace(
     write_folder(folder, written, force=force)
     interlaced = written.interlaced
     image_bytes = os.path.getsize(image) if os.path.isfile(image) else None
-    if as_json:
-        console.json(
-            {
-                "image": image,
-                "image_bytes": image_bytes,
-                "folder": folder,
-                "notes": list(written.notes),
-                "manifest": interlaced.document(),
-            }
-        )
-        return
+    document = {
+        "image": image,
+        "image_bytes": image_bytes,
+        "folder": folder,
+        "notes": list(written.notes),
+        "manifest": interlaced.document(),
+    }
     first = interlaced.parts[0]
     compared = ""
     if image_bytes:
         share, name = interlaced.bytes / image_bytes, os.path.basename(image)
         compared = f": {share:.1%} of {name} ({size(image_bytes)})"
-    console.print(
+    line = (
         f"{folder}: {interlaced.width} x {interlaced.height}, "
         f"{count(len(interlaced.parts), 'file')}, {size(interlaced.bytes)}{compared}; first file "
         f"{first.width} x {first.height}, {size(first.bytes)}"
     )
-    for note in written.notes:
-        console.print(f"  {note}")
+    console.result(document, [line, *(f"  {note}" for note in written.notes)])
 
 
 @click.command("deinterlace", cls=Command)
@@ -199,12 +186,7 @@ def interlace(
     metavar="K",
     help="Read and join the first K files only. Default: all.",
 )
-@option(
-    "-o",
-    "--output",
-    type=click.Path(),
-    help="Image to write (.png, .npy or .tif). Default: DIR.png, beside the folder.",
-)
+@output_option("Image to write (.png, .npy or .tif). Default: DIR.png, beside the folder.")
 @force_option("Replace an existing file.")
 @limit_option
 @with_console

@@ -19,7 +19,7 @@ from ptmtools.cli.batch import (
     many_files,
     standard_input,
 )
-from ptmtools.cli.parameters import Command, Numbers, option, options_of, take
+from ptmtools.cli.parameters import Command, Numbers, option, options_of, output_option, take
 from ptmtools.errors import InputError, OutputError, naming
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Description, EncodeOptions
@@ -28,12 +28,9 @@ from ptmtools.texture.profiles import PROFILES
 
 @click.command("encode", cls=Command)
 @click.argument("images", metavar="IMAGE...", nargs=-1, required=True, type=click.Path())
-@option(
-    "-o",
-    "--output",
-    type=click.Path(),
-    help="File to write, or - for stdout; a folder for several images or if it ends with /. "
-    "Default: beside each image.",
+@output_option(
+    "File to write, or - for stdout; a folder for several images or if it ends with /. "
+    "Default: beside each image."
 )
 @options_of(EncodeOptions)
 @option(
@@ -111,7 +108,7 @@ def encode(
             yield f"  {note}"
 
     status, reports = batch.each(jobs, work, lines)
-    if not batch.as_json and (hint := _hint_on_lossy(reports, options)):
+    if not batch.console.as_json and (hint := _hint_on_lossy(reports, options)):
         batch.console.print(hint)
     return status
 
@@ -169,12 +166,9 @@ def _share(part: int, whole: int) -> str:
     metavar="X,Y,W,H",
     help="Decode only W x H texels of the level, from column X and row Y on.",
 )
-@option(
-    "-o",
-    "--output",
-    type=click.Path(),
-    help="Image to write (.png, .npy, .tif, .hdr, .exr); - for stdout; a folder for several "
-    "files or if it ends with /. Default: a .png beside each file, or an .npy for floats.",
+@output_option(
+    "Image to write (.png, .npy, .tif, .hdr, .exr); - for stdout; a folder for several "
+    "files or if it ends with /. Default: a .png beside each file, or an .npy for floats."
 )
 @many_files
 def decode(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import shlex
 from collections import Counter
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -16,7 +17,7 @@ from ptmtools.cli.batch import STANDARD, no_name, standard_input
 from ptmtools.cli.console import Console
 from ptmtools.cli.parameters import Command, json_option, options_of, take, with_console
 from ptmtools.errors import InputError, naming
-from ptmtools.pipeline.validation import FolderKind, kind_of
+from ptmtools.pipeline.validation import kind_of
 from ptmtools.quantities import count, size
 from ptmtools.scene.options import SUFFIXES, IngestOptions
 from ptmtools.texture.model import Description, PtmHeader, gpu_texel_bytes
@@ -24,6 +25,7 @@ from ptmtools.texture.model import Description, PtmHeader, gpu_texel_bytes
 if TYPE_CHECKING:
     from ptmtools.cells.open_doors import Enclosure
     from ptmtools.scene.inspection import Guess, Inspection
+    from ptmtools.scene.model import Scene
 
 #: Shown for a stage whose record has another recipe.
 _OLD = "computed by another release of ptmtools"
@@ -36,7 +38,7 @@ _SHOWN = 5
 @options_of(IngestOptions)
 @json_option
 @with_console
-def info(console: Console, target: str, as_json: bool, **values: Any) -> None:
+def info(console: Console, target: str, **values: Any) -> None:
     """Describe a model before a build, a database, or the levels of a .ptm file (- for stdin).
 
     The options apply to models, which are read as by build-scene. Only the head of a .ptm is read.
@@ -45,27 +47,18 @@ def info(console: Console, target: str, as_json: bool, **values: Any) -> None:
         raise no_name()
     if target != STANDARD and Path(target).is_dir():
         if kind := kind_of(Path(target)):
-            _info_folder(console, Path(target), kind, as_json)
+            lines, record = kind.describe.load()(Path(target))
+            console.result(record, [f"{Path(target)}: {kind.about}", *lines])
         else:
-            _info_database(console, target, as_json)
+            _info_database(console, target)
     elif Path(target).suffix.lower() in SUFFIXES:
-        _info_model(console, target, take(IngestOptions, values), as_json)
+        _info_model(console, target, take(IngestOptions, values))
     else:
-        _info_ptm(console, target, as_json)
+        _info_ptm(console, target)
 
 
-def _info_folder(console: Console, folder: Path, kind: FolderKind, as_json: bool) -> None:
-    lines, record = kind.describe.load()(folder)
-    if as_json:
-        console.json(record)
-        return
-    console.print(f"{folder}: {kind.about}")
-    for line in lines:
-        console.print(line)
-
-
-def _info_database(console: Console, target: str, as_json: bool) -> None:
-    from ptmtools.cli.build import print_visitor
+def _info_database(console: Console, target: str) -> None:
+    from ptmtools.cli.build import visitor_lines
     from ptmtools.options import arguments
     from ptmtools.pipeline.command import build_command, open_database
     from ptmtools.pipeline.report import Visitor
@@ -77,47 +70,35 @@ def _info_database(console: Console, target: str, as_json: bool) -> None:
     old = [n for n, s in STAGES.items() if n in stages and stages[n].recipe != s.recipe]
     if old:
         console.warn(f"{target}: {', '.join(old)}: {_OLD}; run `{build_command(target)}`")
-    if as_json:
-        console.json(
-            {
-                "model": db.manifest.model,
-                "stages": {
-                    name: {
-                        "recipe": record.recipe,
-                        "parameters": record.parameters,
-                        "counts": record.counts,
-                        "notes": record.notes,
-                        "warnings": record.warnings,
-                        "files": len(record.outputs),
-                    }
-                    for name, record in stages.items()
-                },
-                "outdated": old,
-                "visitor": visitor and asdict(visitor),
-            }
-        )
-        return
-    console.print(f"{target}: database of {db.manifest.model}")
+    shown = "recipe", "parameters", "counts", "notes", "warnings"
+    document = {
+        "model": db.manifest.model,
+        "stages": {
+            name: {key: getattr(record, key) for key in shown} | {"files": len(record.outputs)}
+            for name, record in stages.items()
+        },
+        "outdated": old,
+        "visitor": visitor and asdict(visitor),
+    }
+    lines = [f"{target}: database of {db.manifest.model}"]
     for name, stage in STAGES.items():
         if name not in stages:
             continue
         record = stages[name]
-        console.print(f"{name:<9} {_OLD if name in old else stage.summarize(record.counts)}")
+        lines.append(f"{name:<9} {_OLD if name in old else stage.summarize(record.counts)}")
+        details: list[str] = []
         with suppress(ValueError):
             if words := arguments([stage.recorded(record)]):
-                console.print(f"{'':<9}   options: {shlex.join(words)}")
-        for warning in record.warnings:
-            console.print(f"{'':<9}   warning: {warning}")
+                details.append(f"options: {shlex.join(words)}")
+        details += [f"warning: {warning}" for warning in record.warnings]
         if console.verbose:
-            for key, value in record.parameters.items():
-                console.print(f"{'':<9}   {key} = {value}")
-            for note in [note for note in record.notes if note not in record.warnings]:
-                console.print(f"{'':<9}   note: {note}")
-    if visitor:
-        print_visitor(console, visitor)
+            details += [f"{key} = {value}" for key, value in record.parameters.items()]
+            details += [f"note: {note}" for note in record.notes if note not in record.warnings]
+        lines += [f"{'':<9}   {detail}" for detail in details]
+    console.result(document, [*lines, *visitor_lines(visitor)])
 
 
-def _info_ptm(console: Console, target: str, as_json: bool) -> None:
+def _info_ptm(console: Console, target: str) -> None:
     from ptmtools.texture.container import HEAD_MAX, read_header, whole_levels
     from ptmtools.texture.sources import open_file
 
@@ -132,28 +113,25 @@ def _info_ptm(console: Console, target: str, as_json: bool) -> None:
         description = _description(file.read(length), crc32)
     whole = whole_levels(header, file_bytes)
     levels = _levels(header)
-    if as_json:
-        console.json(
-            {
-                **asdict(header),
-                "description": None if description is None else _described(description),
-                "levels": levels,
-                "file_bytes": file_bytes,
-                "whole_levels": whole,
-            }
-        )
-        return
+    fields = None if description is None else _described(description)
+    document = {
+        **asdict(header),
+        "description": fields,
+        "levels": levels,
+        "file_bytes": file_bytes,
+        "whole_levels": whole,
+    }
     exact = "lossless" if not header.max_error else f"errors up to {header.max_error}"
     trimmed = f", {count(header.trimmed, 'finer level')} left out" if header.trimmed else ""
-    console.print(
+    lines = [
         f"{target}: {header.width} x {header.height}, {count(header.components, 'component')} of "
         f"{header.kind}, profile {header.profile}, {exact}{trimmed}, {size(file_bytes)}"
-    )
-    if description is None:
-        console.print("the description is damaged or incomplete")
-    elif fields := _described(description):
-        console.print("; ".join(f"{name} {value}" for name, value in fields.items()))
-    console.print(
+    ]
+    if fields is None:
+        lines.append("the description is damaged or incomplete")
+    elif fields:
+        lines.append("; ".join(f"{name} {value}" for name, value in fields.items()))
+    lines.append(
         "level       size       tiles         bytes   share  bits/texel      up to here"
         "   in GPU memory  RGB as RGBA"
     )
@@ -162,11 +140,12 @@ def _info_ptm(console: Console, target: str, as_json: bool) -> None:
         across, down = level["tiles"]
         tiles = f"{across} x {down}" if across * down > 1 else "1"
         cut = "" if n < whole else "   cut off"
-        console.print(
+        lines.append(
             f"{n:>5}  {extent:>14} {tiles:>8} {level['length']:>13,} {level['share']:>7.2%} "
             f"{level['bits_per_texel']:>11.2f} {level['end']:>15,} {level['gpu_bytes']:>15,} "
             f"{level['gpu_bytes_padded']:>12,}{cut}"
         )
+    console.result(document, lines)
 
 
 def _levels(header: PtmHeader) -> list[dict[str, Any]]:
@@ -216,7 +195,7 @@ def _described(description: Description) -> dict[str, Any]:
     return fields
 
 
-def _info_model(console: Console, target: str, options: IngestOptions, as_json: bool) -> None:
+def _info_model(console: Console, target: str, options: IngestOptions) -> None:
     """Raises what `ptmtools.scene.ingest` raises."""
     from ptmtools.cells.open_doors import enclosure
     from ptmtools.parallel import processors
@@ -225,40 +204,56 @@ def _info_model(console: Console, target: str, options: IngestOptions, as_json: 
     with console.progress() as progress:
         model = inspect(Path(target), options, progress, workers=processors())
     around = enclosure(model.scene)
-    if as_json:
-        console.json(_record(model, around))
-        return
-    scene, many = model.scene, console.verbose
     by = f", written by {model.generator}" if model.generator else ""
-    console.print(f"{target}: {model.format}, {size(model.bytes)}{by}")
+    head = f"{target}: {model.format}, {size(model.bytes)}{by}"
+    rows = _rows(model, around, every=console.verbose)
+    lines = (f"{name:<10} {text}" for name, text in rows)
+    console.result(_record(model, around), [head, *lines])
+
+
+def _rows(model: Inspection, around: Enclosure, *, every: bool) -> Iterator[tuple[str, str]]:
+    """The headings and texts of the description of a model; with ``every`` object, image, door and
+    note."""
+    from ptmtools.scene.notes import line, warnings
+
+    def some(names: list[str]) -> str:
+        shown = names if every else names[:_SHOWN]
+        more = f" and {len(names) - len(shown):,} more" if len(names) > len(shown) else ""
+        return ", ".join(shown) + more
+
+    scene = model.scene
+    space = scene.space
     for name, outcome in model.extensions.items():
-        _row(console, "extension", f"{name}: {outcome}")
-    _row(console, "triangles", f"{len(scene.triangles):,} in {count(len(scene.objects), 'object')}")
-    named = [f"{name} {triangles:,}" for name, triangles in model.objects.items()]
-    _row(console, "", f"largest: {_some(named, many)}")
-    _row(console, "materials", _materials(model))
-    _row(console, "images", _images(model))
-    sizes = [f"{i.name} {i.width} x {i.height}" for i in model.images]
-    if sizes:
-        _row(console, "", _some(sizes, many))
-    _print_space(console, model)
-    _row(console, "closed", _closed(around))
-    doors = f"{len(around.doors)} recognised"
-    _row(console, "doors", f"{doors}: {_some(list(around.doors), many)}" if around.doors else doors)
+        yield "extension", f"{name}: {outcome}"
+    yield "triangles", f"{len(scene.triangles):,} in {count(len(scene.objects), 'object')}"
+    yield "", f"largest: {some([f'{name} {faces:,}' for name, faces in model.objects.items()])}"
+    yield "materials", _materials(model)
+    yield "images", _images(model)
+    if model.images:
+        yield "", some([f"{i.name} {i.width} x {i.height}" for i in model.images])
+    width, height, depth = _size(scene)
+    yield "size", f"{width:.3g} x {depth:.3g} m, {height:.3g} m high"
+    yield "unit", f"{space.metres:g} m ({'guessed' if space.unit_guessed else 'given'})"
+    yield "up axis", f"{space.up} ({'guessed' if space.up_guessed else 'given'})"
+    yield "looks like", _guess(model.best)
+    for place, other in enumerate(model.others):
+        if place == 0 or other.rival:
+            yield "or like", _guess(other)
+    yield "closed", _closed(around)
+    names = f": {some(list(around.doors))}" if around.doors else ""
+    yield "doors", f"{len(around.doors)} recognised{names}"
     if scene.storeys:
-        named = [f"{storey.name} at {storey.height:.3g} m" for storey in scene.storeys]
-        _row(console, "storeys", _some(named, many))
-    _print_notes(console, scene.notes)
+        yield "storeys", some([f"{s.name} at {s.height:.3g} m" for s in scene.storeys])
+    for warning in warnings(scene.notes):
+        yield "warning", warning
+    for note in scene.notes if every else ():
+        yield "note", line(note)
 
 
-def _row(console: Console, name: str, text: str) -> None:
-    console.print(f"{name:<10} {text}")
-
-
-def _some(names: list[str], many: bool) -> str:
-    shown = names if many else names[:_SHOWN]
-    more = f" and {len(names) - len(shown):,} more" if len(names) > len(shown) else ""
-    return ", ".join(shown) + more
+def _size(scene: Scene) -> list[float]:
+    """Width, height and depth in metres."""
+    extent: list[float] = (scene.points.max(axis=0) - scene.points.min(axis=0)).tolist()
+    return extent
 
 
 def _materials(model: Inspection) -> str:
@@ -280,20 +275,6 @@ def _images(model: Inspection) -> str:
     return f"{files}; {size(total)}, {texels / 1e6:,.1f} million texels"
 
 
-def _print_space(console: Console, model: Inspection) -> None:
-    scene = model.scene
-    space = scene.space
-    width, height, depth = (scene.points.max(axis=0) - scene.points.min(axis=0)).tolist()
-    _row(console, "size", f"{width:.3g} x {depth:.3g} m, {height:.3g} m high")
-    guessed = "guessed" if space.unit_guessed else "given"
-    _row(console, "unit", f"{space.metres:g} m ({guessed})")
-    _row(console, "up axis", f"{space.up} ({'guessed' if space.up_guessed else 'given'})")
-    _row(console, "looks like", _guess(model.best))
-    for place, other in enumerate(model.others):
-        if place == 0 or other.rival:
-            _row(console, "or like", _guess(other))
-
-
 def _guess(guess: Guess) -> str:
     why = f" ({', '.join(guess.reasons)})" if guess.reasons else ""
     return f"{guess.unit}, {guess.up} up: {guess.size}{why}"
@@ -308,16 +289,6 @@ def _closed(around: Enclosure) -> str:
     return f"looks open: {around.leaving:.1%} of the sight lines from its rooms leave it{roof}"
 
 
-def _print_notes(console: Console, notes: Any) -> None:
-    from ptmtools.scene.notes import line, warnings
-
-    for warning in warnings(notes):
-        _row(console, "warning", warning)
-    if console.verbose:
-        for note in notes:
-            _row(console, "note", line(note))
-
-
 def _record(model: Inspection, around: Enclosure) -> dict[str, Any]:
     scene = model.scene
     return {
@@ -330,7 +301,7 @@ def _record(model: Inspection, around: Enclosure) -> dict[str, Any]:
         "materials": [vars(material) for material in scene.materials],
         "images": [asdict(image) for image in model.images],
         "space": vars(scene.space),
-        "size": (scene.points.max(axis=0) - scene.points.min(axis=0)).tolist(),
+        "size": _size(scene),
         "looks": [asdict(guess) for guess in (model.best, *model.others)],
         "enclosure": asdict(around) | {"closed": around.closed},
         "storeys": [vars(storey) for storey in scene.storeys],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from ptmtools.cli.parameters import (
     json_option,
     option,
     options_of,
+    output_option,
     take,
     with_console,
 )
@@ -27,7 +29,7 @@ from ptmtools.lab.campus.options import CampusWalkOptions
 from ptmtools.lab.campus.world import prepare_campus
 from ptmtools.lab.comparing import SimulateOptions, counted, play, require_hints
 from ptmtools.lab.measures import require as require_flip
-from ptmtools.lab.path.making import Path as WalkPath, path_through
+from ptmtools.lab.path.making import path_through
 from ptmtools.lab.path.options import PathOptions
 from ptmtools.lab.policies.paper import PaperOptions
 from ptmtools.lab.report import as_csv, document, table
@@ -47,27 +49,23 @@ from ptmtools.walk import Walk, read_walk, walk_text
 SHOWN = 12
 #: Duration of the default walk of ``ptm simulate``, s.
 DURATION = 150.0
+#: The heading of the options on what is simulated, and an option under it.
+WALKS = "Walk and reference"
+reference = partial(option, heading=WALKS)
 #: ``--trace``, as ``trace_file``.
-trace_option = option(
-    "--trace",
-    "trace_file",
-    type=click.Path(),
-    heading="Walk and reference",
-    metavar="FILE",
-    help="File with the changes of the link over time, JSON or CSV.",
+trace_option = file_option(
+    "trace", "File with the changes of the link over time, JSON or CSV.", WALKS
 )
 
 
 @click.command("path", cls=Command)
 @database_argument
-@option("-o", "--output", type=click.Path(), required=True, help="Walk to write, a JSON file.")
+@output_option("Walk to write, a JSON file.", required=True)
 @options_of(PathOptions)
 @force_option()
 @json_option
 @with_console
-def path_command(
-    console: Console, db: str, output: str, force: bool, as_json: bool, **values: Any
-) -> None:
+def path_command(console: Console, db: str, output: str, force: bool, **values: Any) -> None:
     """Make a walk through every room of DB: on floors and through doors, with stops at pictures.
 
     The walk begins at a viewpoint. The same seed makes the same walk.
@@ -78,29 +76,7 @@ def path_command(
     with naming(db):
         path = path_through(artifacts, options)
     write_bytes(output, walk_text(path.walk).encode(), force=force)
-    if as_json:
-        console.json(_path_document(path))
-        return
-    console.print(
-        f"{output}: {len(path.visited):,} of {count(path.rooms, 'room')}, "
-        f"{path.walk.length:.0f} m in {path.walk.duration:.0f} s, {count(path.stops, 'stop')}"
-    )
-    left = path.rooms - len(path.visited) - len(path.unreachable)
-    if left and options.duration is not None:
-        console.print(f"a longer --duration visits {count(left, 'more room')}")
-    if not path.walk.length:
-        console.print("the walk stays in one place: no other is reachable")
-    if path.unreachable:
-        shown = path.unreachable if console.verbose else path.unreachable[:SHOWN]
-        more = ", …; -v lists all" if len(shown) < len(path.unreachable) else ""
-        console.print(
-            f"not reachable on foot, at eye height: {count(len(path.unreachable), 'room')}, cell "
-            f"{', '.join(map(str, shown))}{more}"
-        )
-
-
-def _path_document(path: WalkPath) -> dict[str, Any]:
-    return {
+    document = {
         "rooms": path.rooms,
         "visited": list(path.visited),
         "unreachable": list(path.unreachable),
@@ -109,37 +85,43 @@ def _path_document(path: WalkPath) -> dict[str, Any]:
         "duration": path.walk.duration,
         "samples": len(path.walk.time),
     }
+    lines = [
+        f"{output}: {len(path.visited):,} of {count(path.rooms, 'room')}, "
+        f"{path.walk.length:.0f} m in {path.walk.duration:.0f} s, {count(path.stops, 'stop')}"
+    ]
+    left = path.rooms - len(path.visited) - len(path.unreachable)
+    if left and options.duration is not None:
+        lines.append(f"a longer --duration visits {count(left, 'more room')}")
+    if not path.walk.length:
+        lines.append("the walk stays in one place: no other is reachable")
+    if path.unreachable:
+        shown = path.unreachable if console.verbose else path.unreachable[:SHOWN]
+        more = ", …; -v lists all" if len(shown) < len(path.unreachable) else ""
+        lines.append(
+            f"not reachable on foot, at eye height: {count(len(path.unreachable), 'room')}, cell "
+            f"{', '.join(map(str, shown))}{more}"
+        )
+    console.result(document, lines)
 
 
 @click.command("walk-campus", cls=Command)
 @click.argument("campus", type=click.Path())
-@option(
-    "--walk",
-    "walk_file",
-    heading="Walk and reference",
-    type=click.Path(),
-    required=True,
-    metavar="FILE",
-    help="Walk that `ptm path` wrote.",
-)
-@option(
+@file_option("walk", "Walk that `ptm path` wrote.", WALKS, required=True)
+@reference(
     "--db",
-    heading="Walk and reference",
     type=click.Path(),
     help="Database of the same model. Its fully loaded picture replaces that of the campus as "
     "the reference.",
 )
 @options_of(CampusWalkOptions)
-@option(
+@reference(
     "--every",
-    heading="Walk and reference",
     type=click.IntRange(0),
     default=5,
     help="Measure the picture of every Nth frame, of five per second; 0 for none.",
 )
-@option(
+@reference(
     "--only",
-    heading="Walk and reference",
     default="*",
     metavar="NAMES",
     help="Keep only these objects (names; * and ? are wildcards).",
@@ -155,7 +137,6 @@ def walk_campus(
     every: int,
     only: str,
     trace_file: str | None,
-    as_json: bool,
     **values: Any,
 ) -> None:
     """Simulate a walk through CAMPUS, which `ptm campus` wrote, with each preset: downloads, late
@@ -173,48 +154,39 @@ def walk_campus(
     with console.progress() as progress:
         world = prepare_campus(campus, walk, served, every=every, only=only, progress=progress)
     runs = [simulate_campus(world, quality, options, trace) for quality in options.qualities]
-    if as_json:
-        console.json(report.document(campus, runs))
-        return
-    console.print(
+    head = (
         f"{walk.length:.0f} m in {walk.duration:.0f} s, {world.stock.objects:,} objects, "
         f"{options.bandwidth}bit/s, {options.latency}\n"
     )
-    for line in (*report.table(runs), "", *report.received(runs)):
-        console.print(line)
+    lines = head, *report.table(runs), "", *report.received(runs)
+    console.result(report.document(campus, runs), lines)
 
 
 @click.command("simulate", cls=Command)
 @database_argument
-@option(
-    "--walk",
-    "walk_files",
-    heading="Walk and reference",
-    type=click.Path(),
+@file_option(
+    "walk",
+    f"Walk that `ptm path` wrote. Repeatable. Default: a new walk of {DURATION:.0f} s.",
+    WALKS,
     multiple=True,
-    metavar="FILE",
-    help=f"Walk that `ptm path` wrote. Repeatable. Default: a new walk of {DURATION:.0f} s.",
 )
-@option(
+@reference(
     "--seed",
     "seeds",
-    heading="Walk and reference",
     type=click.IntRange(0),
     multiple=True,
     help="Seed of the new walk without --walk; 1 by default. Repeatable.",
 )
 @options_of(SimulateOptions, PaperOptions)
-@option(
+@reference(
     "--against",
-    heading="Walk and reference",
     type=click.Path(),
     metavar="DB",
     help="Another database of the same model, such as one without --max-error. Its fully loaded "
     "picture replaces that of DB as the reference.",
 )
-@option(
+@reference(
     "--campus",
-    heading="Walk and reference",
     type=click.Path(),
     metavar="DIR",
     help="Campus of the same model, which `ptm campus` wrote, for the policies campus-….",
@@ -236,13 +208,10 @@ def walk_campus(
     default="e",
     help="Measure to plot.",
 )
-@option(
-    "--frames",
-    "frames_folder",
-    heading="Output",
-    type=click.Path(),
+@file_option(
+    "frames",
+    "Also draw frames of the first policy, bandwidth, memory and walk, as PNGs.",
     metavar="DIR",
-    help="Also draw frames of the first policy, bandwidth, memory and walk, as PNGs.",
 )
 @option(
     "--every",
@@ -263,7 +232,7 @@ def walk_campus(
 def simulate(
     console: Console,
     db: str,
-    walk_files: tuple[str, ...],
+    walk_file: tuple[str, ...],
     seeds: tuple[int, ...],
     against: str | None,
     campus: str | None,
@@ -272,11 +241,10 @@ def simulate(
     csv_file: str | None,
     plot_file: str | None,
     measure: str,
-    frames_folder: str | None,
+    frames_file: str | None,
     every: float,
     strip_file: str | None,
     force: bool,
-    as_json: bool,
     **values: Any,
 ) -> None:
     """Simulate clients that walk through DB over a modelled link, and measure their pictures.
@@ -288,14 +256,14 @@ def simulate(
     with_paper = any(policy.options for policy in options.policies)
     if paper != PaperOptions() and not with_paper:
         raise click.UsageError(f"{arguments([paper])[0]} needs --policy paper")
-    if walk_files and seeds:
+    if walk_file and seeds:
         raise click.UsageError("give either --walk or --seed")
     files = [file for file in (csv_file, plot_file, strip_file) if file]
     for file in files:
         check_writable(file, force=force)
     if len({Path(file).resolve() for file in files}) < len(files):
         raise click.UsageError("two pictures or tables have the same file name")
-    frames_to = Path(frames_folder) if frames_folder else None
+    frames_to = Path(frames_file) if frames_file else None
     if frames_to:
         _check_folder(frames_to, force)
     if plot_file:
@@ -304,7 +272,7 @@ def simulate(
         require_flip()
     _check_campus(options, campus, drawn=bool(frames_to or strip_file))
     trace = read_trace(trace_file) if trace_file else None
-    walks = {file: read_walk(file) for file in walk_files} or _new_walks(db, seeds)
+    walks = {file: read_walk(file) for file in walk_file} or _new_walks(db, seeds)
     served, other = read_served(db), read_served(against) if against else None
     if options.lit:
         served, other = lit(served), lit(other) if other else None
@@ -339,14 +307,12 @@ def simulate(
             write_bytes(frames_to / name, data, force=force)
     if strip_file:
         write_bytes(strip_file, figures.strip(first, played[0], paper), force=force)
-    if as_json:
-        own = paper if with_paper else None
-        console.json(document(db, played, worlds, lit=options.lit, against=against, paper=own))
-        return
+    own = paper if with_paper else None
+    lines = table(played, worlds, lit=options.lit, against=against, campuses=campuses)
     if given := arguments([paper]):
-        console.print(f"policy paper with {' '.join(given)}")
-    for line in table(played, worlds, lit=options.lit, against=against, campuses=campuses):
-        console.print(line)
+        lines.insert(0, f"policy paper with {' '.join(given)}")
+    result = document(db, played, worlds, lit=options.lit, against=against, paper=own)
+    console.result(result, lines)
 
 
 def _check_campus(options: SimulateOptions, campus: str | None, *, drawn: bool) -> None:

@@ -261,6 +261,17 @@ def take(cls: type[T], values: Mapping[str, Any]) -> T:
     return cls(**given)
 
 
+def given_options(*classes: type) -> set[str]:
+    """The options of these classes that the command line contains, without their dashes."""
+    context = click.get_current_context()
+    names = [option_name(field) for cls in classes for field in fields(cls)]
+    return {
+        name
+        for name in names
+        if context.get_parameter_source(_variable(name)) == ParameterSource.COMMANDLINE
+    }
+
+
 def _variable(option: str) -> str:
     """The keyword argument of a command for an option."""
     return option.replace("-", "_")
@@ -337,22 +348,27 @@ def with_console(function: Function) -> Function:
     return command
 
 
-#: ``--json``, as ``as_json``.
-json_option = option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
+#: ``--json``, as `Console.as_json`.
+json_option = option(
+    "--json",
+    is_flag=True,
+    expose_value=False,
+    callback=lambda context, parameter, given: setattr(context.obj, "as_json", given),
+    help="Print the report as JSON.",
+)
 
 database_argument = click.argument("db", type=click.Path())
 
 
-def file_option(name: str, text: str) -> Decorator:
-    """``--NAME FILE`` for a further file to write, as ``NAME_file``."""
-    return option(
-        f"--{name}",
-        f"{name}_file",
-        heading="Output",
-        type=click.Path(),
-        metavar="FILE",
-        help=text,
-    )
+def output_option(text: str, variable: str = "output", **settings: Any) -> Decorator:
+    """``-o``, the main file or folder to write."""
+    return option("-o", "--output", variable, type=click.Path(), help=text, **settings)
+
+
+def file_option(name: str, text: str, heading: str = "Output", **settings: Any) -> Decorator:
+    """``--NAME FILE`` for a further file or folder, as ``NAME_file``."""
+    settings = {"metavar": "FILE", "type": click.Path(), "help": text, **settings}
+    return option(f"--{name}", f"{name}_file", heading=heading, **settings)
 
 
 def force_option(text: str = "Replace existing files.") -> Decorator:
@@ -410,14 +426,11 @@ def limit_option(function: Function) -> Function:
 def new_database_option(function: Function) -> Function:
     """Adds ``-o DB`` to a command with a model; by default the database lies beside the model."""
 
-    @option(
-        "-o",
-        "--output",
-        "db",
-        type=click.Path(),
-        metavar="DB",
-        help="Folder of the database to write. Default: beside the model, such as museum.db for "
+    @output_option(
+        "Folder of the database to write. Default: beside the model, such as museum.db for "
         "museum.obj.",
+        "db",
+        metavar="DB",
     )
     @wraps(function)
     def command(*arguments: Any, model: str, db: str | None, **values: Any) -> Any:

@@ -20,6 +20,7 @@ from ptmtools.cli.parameters import (
     json_option,
     option,
     options_of,
+    output_option,
     take,
     with_console,
 )
@@ -105,23 +106,14 @@ def _open_in_browser(url: str) -> bool:
 
 @click.command("publish", cls=Command)
 @database_argument
-@option(
-    "-o",
-    "--output",
-    "folder",
-    type=click.Path(),
-    required=True,
-    help="Folder of the site to write.",
-)
+@output_option("Folder of the site to write.", "folder", required=True)
 @options_of(SiteOptions, PublishOptions)
 @force_option(
     "Write into a folder that is not a site, and replace files with the same names in it."
 )
 @json_option
 @with_console
-def publish(
-    console: Console, db: str, folder: str, force: bool, as_json: bool, **values: Any
-) -> None:
+def publish(console: Console, db: str, folder: str, force: bool, **values: Any) -> None:
     """Write DB as a web site: a folder that any web server can serve.
 
     A second run rewrites only the files that have changed.
@@ -131,22 +123,16 @@ def publish(
         site = site_of(db, site_options, progress)
         done = write(site, folder, options, force=force, progress=progress)
     weight = weight_of(site)
-    if as_json:
-        changed = {name: list(names) for name, names in asdict(done).items()}
-        console.json({**changed, "notes": list(site.notes), "bytes": asdict(weight)})
-        return
-    for note in site.notes:
+    changed = {name: list(names) for name, names in asdict(done).items()}
+    for note in site.notes if not console.as_json else ():
         console.warn(note)
     removed = f", {count(len(done.removed), 'file')} removed" if done.removed else ""
-    console.print(
+    lines = (
         f"{folder}: {count(len(done.written), 'file')} written, "
-        f"{len(done.unchanged):,} unchanged{removed}"
-    )
-    console.print(
+        f"{len(done.unchanged):,} unchanged{removed}",
         f"download: page {size(weight.page)}; with the first room {size(weight.first_room)} "
-        f"(textures up to {COARSE} texels a side)"
-    )
-    console.print(
+        f"(textures up to {COARSE} texels a side)",
         f"each further room {size(weight.mean_room)} on average, at most "
-        f"{size(weight.worst_room)} (cell {weight.worst_cell}); everything {size(weight.whole)}"
+        f"{size(weight.worst_room)} (cell {weight.worst_cell}); everything {size(weight.whole)}",
     )
+    console.result({**changed, "notes": list(site.notes), "bytes": asdict(weight)}, lines)

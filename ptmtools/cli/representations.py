@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 import os
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import click
-from click.core import ParameterSource
 
 from ptmtools.cli.batch import no_name
 from ptmtools.cli.console import Console
 from ptmtools.cli.parameters import (
     Command,
     force_option,
+    given_options,
     jobs_option,
     json_option,
     option,
     options_of,
+    output_option,
     take,
     with_console,
 )
-from ptmtools.cli.render import check_picture, draw_octree, octree_line
+from ptmtools.cli.render import check_picture, draw_octree
 from ptmtools.neighbours.apo.model import ApoOptions
 from ptmtools.neighbours.apo.picture import RenderOptions
 from ptmtools.neighbours.campus.options import CampusOptions
@@ -33,13 +34,10 @@ from ptmtools.scene.options import IngestOptions
 
 @click.command("apo", cls=Command)
 @click.argument("mesh", metavar="MESH", type=click.Path())
-@option(
-    "-o",
-    "--output",
+@output_option(
+    "Folder to write. Default: beside the mesh, such as bust.apo for bust.ply.",
     "folder",
-    type=click.Path(),
     metavar="DIR",
-    help="Folder to write. Default: beside the mesh, such as bust.apo for bust.ply.",
 )
 @options_of(ApoOptions, IngestOptions)
 @option("--render", "view", type=click.Path(), hidden=True, help="Now `ptm render`.")
@@ -55,7 +53,6 @@ def apo(
     view: str | None,
     force: bool,
     workers: int,
-    as_json: bool,
     **values: Any,
 ) -> None:
     """Convert a mesh with many triangles to a simplified mesh and an octree texture of its normals.
@@ -72,7 +69,8 @@ def apo(
         console.warn("note: --render of `ptm apo` is now `ptm render DIR -o VIEW.png`")
         check_picture(view, force=force)
     if exists:
-        _refuse_conversion()
+        for wrong in sorted(given_options(ApoOptions, IngestOptions)):
+            raise click.UsageError(f"--{wrong} is for the conversion of a mesh, not for a folder")
     else:
         check_file(Path(mesh))
     options = take(RenderOptions, values)
@@ -80,20 +78,19 @@ def apo(
     if not exists:
         _convert(console, mesh, target, values, workers, force)
     index = read_index(target)
-    picture = draw_octree(target, view, options, force=force) if view is not None else None
-    if as_json:
-        console.json({**index.document, **({"picture": picture} if picture else {})})
-        return
-    if picture:
-        console.print(octree_line(target, picture))
+    document, lines = dict(index.document), list[str]()
+    if view is not None:
+        document["picture"], line = draw_octree(target, view, options, force=force)
+        lines.append(line)
     if not exists:
         source, mesh_file = index.document["source"], index.mesh
         whole = sum(stream.ends[-1] for stream in (index.normals, index.colors) if stream)
-        console.print(
+        lines.append(
             f"{target}: {source['triangles']:,} triangles → {mesh_file['faces']:,} faces, "
             f"{size(mesh_file['bytes'])}; octree of {count(index.levels, 'level')}, "
             f"{int(index.start[-1]):,} texels, {size(whole)}"
         )
+    console.result(document, lines)
 
 
 def _convert(
@@ -120,27 +117,9 @@ def _convert(
         console.warn(warning)
 
 
-def _refuse_conversion() -> None:
-    """Raises UsageError for options of the conversion, which a folder has behind it."""
-    context = click.get_current_context()
-    for each in (*fields(ApoOptions), *fields(IngestOptions)):
-        name = each.name
-        if context.get_parameter_source(name) == ParameterSource.COMMANDLINE:
-            raise click.UsageError(
-                f"--{name.replace('_', '-')} is for the conversion of a mesh, not for a folder"
-            )
-
-
 @click.command("campus", cls=Command)
 @click.argument("model", type=click.Path())
-@option(
-    "-o",
-    "--output",
-    "folder",
-    type=click.Path(),
-    required=True,
-    help="Folder of the campus to write.",
-)
+@output_option("Folder of the campus to write.", "folder", required=True)
 @options_of(CampusOptions, IngestOptions)
 @force_option("Replace a folder that ptm campus wrote.")
 @jobs_option
@@ -152,7 +131,6 @@ def campus(
     folder: str,
     force: bool,
     workers: int,
-    as_json: bool,
     **values: Any,
 ) -> None:
     """Convert MODEL to a campus: each object in several levels of detail with its own lightmap,
@@ -172,7 +150,7 @@ def campus(
             model, folder, options, reading, executor, force=force, progress=progress
         )
     scene_notes = exterior_notes(result.scene.notes)
-    if as_json:
+    if console.as_json:
         seconds = {name: round(value, 3) for name, value in result.seconds.items()}
         notes = [line(note) for note in scene_notes]
         console.json(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,8 +33,10 @@ from ptmtools.lab.tradeoff.report import as_csv, picture, require, table
 from ptmtools.lab.tradeoff.walk import WalkOptions, WalkTrade, try_settings
 from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.stage import Artifacts
-from ptmtools.walk import Walk, read_walk
+from ptmtools.walk import read_walk
 
+#: An option under the heading of this command.
+experiment = partial(option, heading="Experiments")
 #: Fewest sample points of the reference, so that settings with fewer remain.
 LEAST_POINTS = 64
 #: The experiment on a walk, beside those of the stages.
@@ -44,56 +47,43 @@ DURATION, QUICK = 60.0, 30.0
 
 @click.command("tradeoff", cls=Command)
 @database_argument
-@option(
+@experiment(
     "--stage",
     "stages",
-    heading="Experiments",
     type=click.Choice([WALK, *EXPERIMENTS]),
     multiple=True,
     help=f"Run only this experiment: the effect of settings on a walk ({WALK}), or the accuracy of "
     "one stage. Repeatable. Default: all.",
 )
-@option(
-    "--walk",
-    "walk_file",
-    heading="Experiments",
-    type=click.Path(),
-    metavar="FILE",
-    help=f"Walk that `ptm path` wrote. Default: a new one of {DURATION:.0f} s, with --quick of "
+@file_option(
+    "walk",
+    f"Walk that `ptm path` wrote. Default: a new one of {DURATION:.0f} s, with --quick of "
     f"{QUICK:.0f} s.",
+    "Experiments",
 )
 @options_of(WalkOptions)
-@option(
+@experiment(
     "--knob",
     "knobs",
-    heading="Experiments",
     type=click.Choice([knob.option.removeprefix("--") for knob in KNOBS]),
     multiple=True,
     help="Try only this option on the walk, also with its slow values. Repeatable. Default: all.",
 )
-@option(
-    "--quick",
-    heading="Experiments",
-    is_flag=True,
-    help="Try one value of each option, on a shorter walk.",
-)
-@option(
+@experiment("--quick", is_flag=True, help="Try one value of each option, on a shorter walk.")
+@experiment(
     "--error",
     "wanted",
-    heading="Experiments",
     type=click.FloatRange(0, min_open=True),
     help="Also name the cheapest setting of each stage within this error.",
 )
-@option(
+@experiment(
     "--cells-tried",
-    heading="Experiments",
     type=click.IntRange(1),
     default=16,
     help="Cells in which coverage hints are tested, a sample of all.",
 )
-@option(
+@experiment(
     "--reference",
-    heading="Experiments",
     type=click.IntRange(LEAST_POINTS, MAX_SAMPLES),
     default=MAX_SAMPLES,
     metavar="POINTS",
@@ -118,7 +108,6 @@ def tradeoff(
     csv_file: str | None,
     plot_file: str | None,
     force: bool,
-    as_json: bool,
     **values: Any,
 ) -> None:
     """Measure the cost and the benefit of settings on the scene of DB, which is not changed.
@@ -145,9 +134,11 @@ def tradeoff(
         for stage in stages:
             progress(0, 1, f"preparing {stage}")
             if stage == WALK:
+                duration = QUICK if quick else DURATION
+                walk = walk or path_through(artifacts, PathOptions(duration=duration)).walk
                 walked.append(
                     try_settings(
-                        Path(db), artifacts, walk or _new_walk(artifacts, quick), options, knobs,
+                        Path(db), artifacts, walk, options, knobs,
                         quick=quick, progress=progress, tell=console.warn,
                     )
                 )  # fmt: skip
@@ -159,26 +150,14 @@ def tradeoff(
         write_bytes(csv_file, as_csv(every).encode(), force=force)
     if plot_file:
         write_bytes(plot_file, picture(every), force=force)
-    if as_json:
-        first = [_walk_document(walk) for walk in walked]
-        console.json([*first, *(_document(trade, wanted) for trade in trades)])
-        return
+    first = [
+        {"stage": WALK, "sentences": sentences.sentences(trade), **asdict(trade)}
+        for trade in walked
+    ]
     blocks = [sentences.settings_table(walk, wanted) for walk in walked]
-    for lines in [*blocks, *(table(trade, wanted) for trade in trades)]:
-        for line in lines:
-            console.print(line)
-        console.print("")
-
-
-def _new_walk(artifacts: Artifacts, quick: bool) -> Walk:
-    """A walk of the default duration."""
-    options = PathOptions(duration=QUICK if quick else DURATION)
-    return path_through(artifacts, options).walk
-
-
-def _walk_document(trade: WalkTrade) -> dict[str, Any]:
-    """The trials on a walk as JSON, with their sentences."""
-    return {"stage": WALK, "sentences": sentences.sentences(trade), **asdict(trade)}
+    blocks += [table(trade, wanted) for trade in trades]
+    document = [*first, *(_document(trade, wanted) for trade in trades)]
+    console.result(document, (line for lines in blocks for line in (*lines, "")))
 
 
 def _document(trade: Trade, wanted: float | None) -> dict[str, Any]:
