@@ -1,4 +1,4 @@
-"""Collects the distinct images of a scene, their names and transparent texels; merges masks.
+"""Collects the distinct images of a scene, their names and transparent texels.
 
 Ingest reads and decodes each image that some face uses once, several in parallel: damage is
 reported here and not hours later, and only decoding shows whether an alpha channel contains values
@@ -6,9 +6,6 @@ below 255. The store keeps the digest, a function that reads the bytes again, an
 transparent texels, packed in bits. An image that declares more texels than the limit ends the
 ingest before memory is allocated. Only formats that can become textures are opened: Pillow would
 start an interpreter for PostScript.
-
-A mask (``map_d``) becomes the alpha channel of the image that it belongs to, because neither VRML
-nor the GLB cells support a second image.
 """
 
 from __future__ import annotations
@@ -29,12 +26,11 @@ from typing import TYPE_CHECKING, Any, BinaryIO, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Ints
 from ptmtools.errors import InputError, LimitError, MissingComponentError, naming
 from ptmtools.progress import Progress
 from ptmtools.scene.model import SourceImage
 from ptmtools.scene.notes import Findings
-from ptmtools.scene.source import FileRange, Source, SourceMaterial, Texture
+from ptmtools.scene.source import FileRange, Texture
 from ptmtools.texture.images.picture import check_bytes, check_size
 from ptmtools.texture.model import Description, Limits
 
@@ -335,100 +331,3 @@ def _holes(opened: Image.Image, channel: str | None) -> _Bits | None:
     strips = (opened.crop((0, y, width, min(y + step, height))) for y in tops)
     bits = np.concatenate([np.packbits(transparent(strip), axis=1) for strip in strips])
     return bits if bits.any() else None
-
-
-_BANDS = {"r": 0, "g": 1, "b": 2}
-
-
-@dataclass(frozen=True)
-class MaskedBytes:
-    """The bytes of a PNG in the size of an image, with its colours, or white without an image; its
-    alpha is that of the image times the opacities of a mask.
-
-    ``channel`` of the mask as in `Texture`, ``limit`` as in `ImageStore`. Raises the errors of
-    reading, and InputError or LimitError for images that cannot be decoded or have no 8 or 16 bits.
-    """
-
-    read: Callable[[], bytes] | None
-    mask: Callable[[], bytes]
-    channel: str
-    limit: int
-
-    def __call__(self) -> bytes:
-        from ptmtools.texture.images.png import png_bytes
-
-        opacity = _opacities(integers(self.mask(), self.limit)[0], self.channel)
-        if self.read is None:
-            white = np.full_like(opacity, 255)
-            return png_bytes(np.stack([white, opacity], axis=2))
-        texels, description = integers(self.read(), self.limit)
-        alpha = _resized(opacity, texels.shape[1], texels.shape[0]) / 255
-        components = texels.shape[2]
-        if components in (2, 4):
-            alpha *= texels[..., -1]
-            components -= 1
-        else:
-            alpha *= np.iinfo(texels.dtype).max
-        alpha = np.rint(alpha).astype(texels.dtype)[..., None]
-        return png_bytes(np.concatenate([texels[..., :components], alpha], axis=2), description)
-
-
-def _opacities(texels: NDArray[Any], channel: str) -> NDArray[np.uint8]:
-    """(h, w) opacities of a mask: its matte if it has one and ``channel`` allows it, otherwise one
-    of its colours or its luminance."""
-    if texels.dtype != np.uint8:
-        texels = (texels >> 8).astype(np.uint8)
-    matte = texels.shape[2] in (2, 4)
-    if matte and channel in ("", "m"):
-        return np.asarray(texels[..., -1])
-    colors = texels[..., :-1] if matte else texels
-    if colors.shape[2] == 1:
-        return np.asarray(colors[..., 0])
-    if channel in _BANDS:
-        return np.asarray(colors[..., _BANDS[channel]])
-    # ITU-R 601, as in Pillow.
-    return np.asarray(np.rint(colors @ np.array([0.299, 0.587, 0.114])).astype(np.uint8))
-
-
-def _resized(opacity: NDArray[np.uint8], width: int, height: int) -> NDArray[np.float64]:
-    from PIL import Image
-
-    if opacity.shape != (height, width):
-        image = Image.fromarray(opacity).resize((width, height), Image.Resampling.BILINEAR)
-        opacity = np.asarray(image)
-    return opacity.astype(np.float64)
-
-
-def merge_masks(source: Source, used: Ints, store: ImageStore, findings: Findings) -> Source:
-    """The source with the masks of the ``used`` materials merged into their images.
-
-    Raises LimitError PTM-L104.
-    """
-    materials = list(source.materials)
-    for index in used.tolist():
-        materials[index] = _merge_mask(materials[index], store, findings)
-    return replace(source, materials=tuple(materials))
-
-
-def _merge_mask(material: SourceMaterial, store: ImageStore, findings: Findings) -> SourceMaterial:
-    mask, texture = material.mask, material.texture
-    if mask is None:
-        return material
-    without = replace(material, mask=None)
-    holes = store.mask_has_holes(mask)
-    if holes is None:  # an unreadable mask must not hide anything
-        return replace(without, see_through=True)
-    alpha = None if texture is None else store.has_alpha(texture)
-    own = texture is not None and texture.read == mask.read and mask.channel in ("", "m")
-    if (alpha and own) or not holes:  # the mask is the alpha of the image, or opaque
-        return without
-    colors = None if alpha is None or texture is None else texture.read
-    read = MaskedBytes(colors, mask.read, mask.channel, store.limit)
-    merged = replace(texture or mask, read=read, what=mask.what, place=mask.place)
-    for part in (texture, mask):
-        if part is not None:
-            store.mark_as_input(part)
-    if store.has_alpha(merged) is None:  # the store has recorded the miss
-        return replace(without, see_through=True)
-    findings.note("PTM-N215", f"{mask.what}: baked into an image as its alpha", mask.place)
-    return replace(without, texture=merged)

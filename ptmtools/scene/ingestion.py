@@ -18,18 +18,18 @@ from numpy.typing import NDArray
 from ptmtools.errors import InputError, LimitError
 from ptmtools.files import open_regular
 from ptmtools.progress import Progress, silent
+from ptmtools.scene.baking import LARGEST, bake, emitted_wraps, near_origin
 from ptmtools.scene.faces import KeptFaces, keep_faces
 from ptmtools.scene.facing import TURNED_AWAY, share_turned_away
-from ptmtools.scene.images import ImageStore, merge_masks
+from ptmtools.scene.images import ImageStore
 from ptmtools.scene.model import Camera, Material, Scene, Space, Storey
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.options import IngestOptions
 from ptmtools.scene.orientation import tolerance_of
 from ptmtools.scene.source import MAX_VERTICES, Source, SourceMaterial
 from ptmtools.scene.space import DeclaredSpace, parse_unit, rotated, settle, to_world
-from ptmtools.scene.texels import drop_alpha, uses_holes
+from ptmtools.scene.texels import uses_holes
 from ptmtools.scene.up_axis import NamedFaces
-from ptmtools.scene.wrapping import LARGEST, bake_mirrors, emitted_wraps, near_origin
 from ptmtools.tolerance import PLANE_SHARE
 
 #: Default colours: of faces without an image, and of images.
@@ -116,18 +116,14 @@ def ingest(
     store = ImageStore(findings, options.limit << 20)
     grouped = np.argsort(triangle_material, kind="stable")
     faces = np.split(grouped, np.cumsum(np.bincount(triangle_material))[:-1])
-    source = merge_masks(source, used_material, store, findings)
-    source, uv = bake_mirrors(source, used_material, faces, uv, store, findings)
-    textures = [source.materials[index].texture for index in used_material.tolist()]
-    store.examine((texture for texture in textures if texture is not None), workers, progress)
-    source = drop_alpha(source, used_material, faces, uv, store)
+    used = [source.materials[index] for index in used_material.tolist()]
+    baked, uv = bake(used, faces, uv, store, findings, progress, workers=workers)
     colors = None if source.colors is None else source.colors[kept.source]
     if colors is not None and (colors == 255).all():
         colors = None
     materials = []
-    for done, (index, rows) in enumerate(zip(used_material.tolist(), faces, strict=True)):
+    for done, (material, rows) in enumerate(zip(baked, faces, strict=True)):
         progress(done, len(faces), "materials")
-        material = source.materials[index]
         if colors is not None and (colors[rows] != 255).any():
             # Merged into the colours of corners, so that a face has one tint only.
             tint = np.array(material.color or WHITE)
@@ -173,7 +169,7 @@ def ingest(
         space=space,
         notes=findings.notes,
         files=tuple(findings.folder.sought),
-        shines=tuple(source.materials[i].shine for i in used_material.tolist()),
+        shines=tuple(material.shine for material in used),
     )
 
 

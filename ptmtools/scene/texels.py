@@ -1,4 +1,4 @@
-"""Tests whether the faces of a material use transparent texels, and drops alpha that is ignored.
+"""Tests whether the faces of a material use transparent texels.
 
 Atlases often have alpha below 255 only in regions that no face uses, so neither the whole image nor
 the bounding boxes of faces decide. A summed-area table excludes, for all triangles at once, those
@@ -8,24 +8,14 @@ used texels of a row are one run, in which the table counts holes. (Rejected: te
 texel. A thousand large triangles beside the holes of an image of 4096², files of 50 KB, take a
 quarter of an hour. Rasterising with Pillow: its polygons omit texels at slivers and corners, which
 is an error to the wrong side.)
-
-Materials whose mode ignores alpha get an image without alpha if their faces use holes: an atlas
-that opaque and blended materials share remains one image.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, Ints
-from ptmtools.scene.images import ImageStore, integers
 from ptmtools.scene.model import Wrap
-from ptmtools.scene.source import Source, Texture
-from ptmtools.scene.wrapping import emitted_wraps
 
 #: A triangle over more repetitions of the image than this is assumed to use every texel.
 _MANY_TILES = 16
@@ -164,54 +154,3 @@ def _touches(
         return count
 
     return bool((before(end[reached]) > before(first[reached])).any())
-
-
-@dataclass(frozen=True)
-class OpaqueBytes:
-    """The bytes of a PNG of an image without its alpha.
-
-    ``limit`` as in `ImageStore`. Raises the errors of reading, and InputError or LimitError for
-    images that cannot be decoded or have no 8 or 16 bits.
-    """
-
-    read: Callable[[], bytes]
-    limit: int
-
-    def __call__(self) -> bytes:
-        from ptmtools.texture.images.png import png_bytes
-
-        texels, description = integers(self.read(), self.limit)
-        colors = texels.shape[2] - (texels.shape[2] in (2, 4))
-        return png_bytes(texels[..., :colors], description)
-
-
-def drop_alpha(
-    source: Source, used: Ints, faces: Sequence[Ints], uv: Floats, store: ImageStore
-) -> Source:
-    """The source with opaque images for materials that ignore alpha and use holes.
-
-    ``used`` are numbers of materials, and ``faces`` the rows of ``uv``, (T, 3, 2), of each. VRML
-    always applies the alpha of textures, so it requires such an image; a material that blends the
-    same image keeps the original. Raises LimitError PTM-L104.
-    """
-    materials = list(source.materials)
-    ignoring: list[tuple[int, Texture, str]] = []
-    visible: set[str] = set()
-    for index, rows in zip(used.tolist(), faces, strict=True):
-        texture = materials[index].texture
-        if texture is None or not materials[index].ignores_alpha:
-            continue
-        image = store.holes(texture)
-        if image is None:
-            continue
-        sha256, holes = image
-        ignoring.append((index, texture, sha256))
-        if sha256 not in visible and uses_holes(holes, uv[rows], *emitted_wraps(texture)):
-            visible.add(sha256)
-    for index, texture, sha256 in ignoring:
-        if sha256 in visible:
-            opaque = replace(texture, read=OpaqueBytes(texture.read, store.limit))
-            store.mark_as_input(texture)
-            if store.has_alpha(opaque) is not None:
-                materials[index] = replace(materials[index], texture=opaque)
-    return replace(source, materials=tuple(materials))

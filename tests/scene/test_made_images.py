@@ -12,10 +12,10 @@ import pytest
 from PIL import Image
 
 from ptmtools.scene import IngestOptions, Scene, ingest
+from ptmtools.scene.baking import bake
 from ptmtools.scene.images import ImageStore
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.source import FileRange, Source, SourceMaterial, Texture
-from ptmtools.scene.wrapping import bake_mirrors
 from tests.scene.conftest import Put, noise, png
 
 Textured = Callable[..., Path]
@@ -109,9 +109,8 @@ def mirrored(put: Put, uv: list[list[float]], limit: int) -> tuple[Source, np.nd
         materials=(SourceMaterial("paint", texture=texture),),
     )
     store = ImageStore(findings, limit)
-    used = np.array([0])
-    source, found = bake_mirrors(source, used, [np.array([0])], corners, store, findings)
-    return replace(source, uv=found), corners, findings
+    materials, found = bake(source.materials, [np.array([0])], corners, store, findings)
+    return replace(source, uv=found, materials=tuple(materials)), corners, findings
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given, strategies as st
 
-from ptmtools.scene.wrapping import FAR, near_origin
+from ptmtools.scene.baking import FAR, near_origin
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 40), st.sampled_from([1, 500, 3e3, 1e7, 1e12]))

@@ -1,5 +1,1 @@
-"""Reads USD through usd-core in a child process.
-
-`reader` contains the entry point `read_usd`; `layers` opens a stage, `source` traverses it, `mesh`
-cuts meshes into triangles, and `material` reads materials and colours.
-"""
+"""Reads USD through usd-core in a child process; the entry point is `reader.read_usd`."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -45,20 +45,14 @@ class Surface:
 
     Attributes
     ----------
-    color: sRGB; white with an image, None without a supported colour.
-    opacity, see_through, ignores_alpha, cutoff: see `ptmtools.scene.source.SourceMaterial`.
+    material: its colour is white with an image, None without a supported colour.
     image: the image of its colour.
     coords: the primvar with the image's coordinates, "" without one.
     matrix: (2, 3) transformation of the coordinates.
     colors: the primvar with the colours, "" without one.
     """
 
-    name: str
-    color: Color | None = None
-    opacity: float = 1.0
-    see_through: bool = False
-    ignores_alpha: bool = False
-    cutoff: float | None = None
+    material: SourceMaterial
     image: NamedImage | None = None
     coords: str = ""
     matrix: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
@@ -91,45 +85,35 @@ class MaterialReader:
         shader, *_ = material.ComputeSurfaceSource()
         if not shader or shader.GetIdAttr().Get(TIME) != "UsdPreviewSurface":
             self._findings.miss("PTM-N214", f"{name}: no UsdPreviewSurface, ignored", place)
-            return Surface(name)
-        opacity, see_through, from_image = self._opacity(shader, name, place)
+            return Surface(SourceMaterial(name))
+        opacity, varies, from_image = self._opacity(shader, name, place)
+        plain = SourceMaterial(name, opacity=opacity, see_through=varies or from_image is not None)
         value, source, output = _resolved(shader.GetInput("diffuseColor"))
         if source is None:
-            color = tint(_numbers(value, _DIFFUSE))
             self._findings.note("PTM-N215", f"{name}: colour factor converted to sRGB", place)
-            return Surface(name, color, opacity, see_through or from_image is not None)
+            return Surface(replace(plain, color=tint(_numbers(value, _DIFFUSE))))
         kind = str(source.GetIdAttr().Get(TIME))
         if kind.startswith("UsdPrimvarReader_float"):
             colors = str(_resolved(source.GetInput("varname"))[0] or "")
-            see_through |= from_image is not None
-            return Surface(name, _WHITE, opacity, see_through, colors=colors)
+            return Surface(replace(plain, color=_WHITE), colors=colors)
         if kind != "UsdUVTexture":
             self._findings.miss("PTM-N214", f"{name}: colours of {kind} ignored", place)
-            return Surface(name, None, opacity, see_through or from_image is not None)
+            return Surface(plain)
         file = _resolved(source.GetInput("file"))[0]
-        if from_image is not None and from_image != (_path_of(file), "a"):
+        own_alpha = from_image == (_path_of(file), "a")
+        if own_alpha:
+            plain = replace(plain, see_through=varies)
+        elif from_image is not None:
             message = f"{name}: image of opacities ignored, the material is transparent"
             self._findings.note("PTM-N215", message, place)
-            see_through = True
         if output not in ("rgb", "rgba"):
             self._findings.note("PTM-N215", f"{name}: colour output {output} ignored", place)
         image = self._image(source, file, name, place)
         if image is None:
-            return Surface(name, None, opacity, see_through)
-        coords, matrix = self._coords(source, name, place)
-        own_alpha = from_image == (_path_of(file), "a")
+            return Surface(plain)
         cutoff = _threshold(shader) if own_alpha else 0.0
-        return Surface(
-            name,
-            _WHITE,
-            opacity,
-            see_through,
-            ignores_alpha=not own_alpha,
-            cutoff=cutoff or None,
-            image=image,
-            coords=coords,
-            matrix=tuple((float(a), float(b), float(c)) for a, b, c in matrix.tolist()),
-        )
+        material = replace(plain, color=_WHITE, ignores_alpha=not own_alpha, cutoff=cutoff or None)
+        return Surface(material, image, *self._coords(source, name, place))
 
     def _opacity(self, shader: Any, name: str, place: str) -> tuple[float, bool, Any]:
         """The opacity; whether it varies or is tested, other than by the colour's image; and the
@@ -198,7 +182,9 @@ class MaterialReader:
             self._findings.note("PTM-N215", f"{path}: wrap mode black becomes clamp", place)
         return _WRAPS.get(mode, "clamp")
 
-    def _coords(self, texture: Any, name: str, place: str) -> tuple[str, Floats]:
+    def _coords(
+        self, texture: Any, name: str, place: str
+    ) -> tuple[str, tuple[tuple[float, float, float], ...]]:
         """The primvar with a texture's coordinates, and their (2, 3) transformation."""
         matrix, transformed = np.eye(3), False
         source = _resolved(texture.GetInput("st"))[1]
@@ -209,9 +195,10 @@ class MaterialReader:
             source = _resolved(source.GetInput("in"))[1]
         if transformed:
             self._findings.note("PTM-N215", f"{name}: UsdTransform2d baked into its faces", place)
-        if source is None or source.GetIdAttr().Get(TIME) != "UsdPrimvarReader_float2":
-            return "", matrix[:2]
-        return str(_resolved(source.GetInput("varname"))[0] or ""), matrix[:2]
+        coords = ""
+        if source is not None and source.GetIdAttr().Get(TIME) == "UsdPrimvarReader_float2":
+            coords = str(_resolved(source.GetInput("varname"))[0] or "")
+        return coords, tuple((a, b, c) for a, b, c in matrix[:2].tolist())
 
 
 def _threshold(shader: Any) -> float:
@@ -328,43 +315,32 @@ class Painter:
         self, prim: Any, shape: Shape, key: Any, surface: Surface | None, two_sided: bool
     ) -> tuple[SourceMaterial, NamedImage | None, NDArray[np.uint8] | None]:
         """The material of a surface on this mesh, and the colours of its corners."""
-        surface = surface or Surface("default")
-        color, opacity, see_through = surface.color, surface.opacity, surface.see_through
-        corners = None
-        if surface.colors or (color is None and surface.image is None):
+        surface = surface or Surface(SourceMaterial("default"))
+        material, corners = replace(surface.material, two_sided=two_sided), None
+        if surface.colors or (material.color is None and surface.image is None):
             color, corners = self._display(prim, shape, key, surface.colors or "displayColor")
+            material = replace(material, color=color)
             if not surface.colors:
                 displayed, varies = self._display_opacity(prim)
-                opacity, see_through = opacity * displayed, see_through or varies
-        return (
-            SourceMaterial(
-                name=surface.name,
-                color=color,
-                opacity=opacity,
-                see_through=see_through,
-                ignores_alpha=surface.ignores_alpha,
-                cutoff=surface.cutoff,
-                two_sided=two_sided,
-            ),
-            surface.image,
-            corners,
-        )
+                material = replace(
+                    material,
+                    opacity=material.opacity * displayed,
+                    see_through=material.see_through or varies,
+                )
+        return material, surface.image, corners
 
     def _display(
         self, prim: Any, shape: Shape, key: Any, name: str
     ) -> tuple[Color | None, NDArray[np.uint8] | None]:
         """The colour of a mesh, and the colours of its corners, from a primvar."""
-        primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
-        if not primvar or not primvar.HasValue() or not primvar.Get(TIME):
+        primvar = _primvar(prim, name)
+        if not primvar or not primvar.Get(TIME):
             return None, None
         cached = (key, key_of(primvar.GetAttr().GetPrim()), name)
         if cached not in self._colors:
-            values = at_corners(primvar, shape)
+            values = self._at_corners(primvar, name, 3, prim, shape)
             colors: tuple[Color | None, NDArray[np.uint8] | None] = None, None
-            if values is None or values.shape[2] != 3:
-                message = f"{name}: does not match the mesh, ignored"
-                self._findings.miss("PTM-N214", message, str(prim.GetPath()))
-            else:
+            if values is not None:
                 self._findings.note("PTM-N215", f"{name}: colour factor converted to sRGB")
                 constant = primvar.GetInterpolation() == UsdGeom.Tokens.constant
                 colors = (tint(values[0, 0]), None) if constant else (_WHITE, encoded(values))
@@ -373,10 +349,9 @@ class Painter:
 
     def _display_opacity(self, prim: Any) -> tuple[float, bool]:
         """The displayed opacity of a mesh, and whether it varies."""
-        primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("displayOpacity")
-        if not primvar or not primvar.HasValue():
-            return 1.0, False
-        values = np.clip(np.nan_to_num(array(primvar.Get(TIME), np.float64), nan=1.0), 0, 1)
+        primvar = _primvar(prim, "displayOpacity")
+        stored = array(primvar.Get(TIME) if primvar else None, np.float64)
+        values = np.clip(np.nan_to_num(stored, nan=1.0), 0, 1)
         if not len(values):
             return 1.0, False
         if (values == values[0]).all():
@@ -387,21 +362,17 @@ class Painter:
 
     def _coordinates(self, prim: Any, shape: Shape, key: Any, surface: Surface) -> Floats:
         """(T, 3, 2) coordinates of a surface's image on a mesh."""
-        primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(surface.coords)
+        primvar = _primvar(prim, surface.coords)
         owner = key_of(primvar.GetAttr().GetPrim()) if primvar else None
         cached = (key, owner, surface.coords, surface.matrix)
         if cached not in self._coords:
-            place = str(prim.GetPath())
             values = None
-            if not surface.coords or not primvar or not primvar.HasValue():
-                bare = f"faces of textured material {surface.name} have no texture coordinates"
-                self._findings.note("PTM-N229", bare, place, len(shape.face))
+            if primvar is None:
+                name = surface.material.name
+                bare = f"faces of textured material {name} have no texture coordinates"
+                self._findings.note("PTM-N229", bare, str(prim.GetPath()), len(shape.face))
             else:
-                values = at_corners(primvar, shape)
-                if values is None or values.shape[2] != 2:
-                    message = f"{surface.coords}: does not match the mesh, ignored"
-                    self._findings.miss("PTM-N214", message, place)
-                    values = None
+                values = self._at_corners(primvar, surface.coords, 2, prim, shape)
             if values is None:
                 values = np.zeros((len(shape.face), 3, 2))
             else:
@@ -410,6 +381,23 @@ class Painter:
                     values = values @ matrix[:, :2].T + matrix[:, 2]
             self._coords[cached] = values
         return self._coords[cached]
+
+    def _at_corners(
+        self, primvar: Any, name: str, size: int, prim: Any, shape: Shape
+    ) -> Floats | None:
+        """(T, 3, size) values of a primvar; None, and a miss, if they do not match the mesh."""
+        values = at_corners(primvar, shape)
+        if values is None or values.shape[2] != size:
+            message = f"{name}: does not match the mesh, ignored"
+            self._findings.miss("PTM-N214", message, str(prim.GetPath()))
+            return None
+        return values
+
+
+def _primvar(prim: Any, name: str) -> Any | None:
+    """A primvar of a prim or its parents; None if it has no value."""
+    primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name) if name else None
+    return primvar if primvar and primvar.HasValue() else None
 
 
 def key_of(prim: Any) -> str:

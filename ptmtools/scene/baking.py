@@ -1,0 +1,290 @@
+"""Bakes into images and coordinates what emitted files cannot express.
+
+Neither VRML nor the GLB cells support a second image, so a mask (``map_d``) becomes the alpha
+channel of the image that it belongs to. VRML always applies the alpha of a texture, so a material
+whose mode ignores alpha gets an image without it, if its faces use transparent texels: an atlas
+that opaque and blended materials share remains one image.
+
+Mirrored repetition is in no emitted form either. Most surfaces with such a texture lie within one
+repetition; there the coordinates are mirrored instead, exactly. Otherwise the image is doubled,
+with its mirror image beside it, and repeats normally.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.errors import InputError
+from ptmtools.progress import Progress, silent
+from ptmtools.scene.images import ImageStore, integers
+from ptmtools.scene.model import Wrap
+from ptmtools.scene.notes import Findings
+from ptmtools.scene.source import SourceMaterial, SourceWrap, Texture
+from ptmtools.scene.texels import uses_holes
+
+_BANDS = {"r": 0, "g": 1, "b": 2}
+
+
+def bake(
+    materials: Sequence[SourceMaterial],
+    faces: Sequence[Ints],
+    uv: Floats,
+    store: ImageStore,
+    findings: Findings,
+    progress: Progress = silent,
+    *,
+    workers: int = 1,
+) -> tuple[list[SourceMaterial], Floats]:
+    """The materials without masks, mirrored repetition and visible alpha that they ignore, and the
+    changed coordinates.
+
+    What cannot be baked is a miss: a mask is dropped and its material transparent, a texture
+    repeats unmirrored. ``workers`` threads decode the images. Raises LimitError PTM-L104.
+
+    Parameters
+    ----------
+    faces: for each material its rows of ``uv``, (T, 3, 2).
+    """
+    baked = [_merge_mask(material, store, findings) for material in materials]
+    copied = False
+    for number, rows in enumerate(faces):
+        texture = baked[number].texture
+        if texture is not None and "mirror" in (texture.wrap_s, texture.wrap_t):
+            texture, coords = _bake_mirror(texture, uv[rows], store, findings)
+            baked[number] = replace(baked[number], texture=texture)
+            uv, copied = uv if copied else uv.copy(), True
+            uv[rows] = coords
+    textures = (material.texture for material in baked)
+    store.examine((texture for texture in textures if texture is not None), workers, progress)
+    return _drop_alpha(baked, faces, uv, store), uv
+
+
+@dataclass(frozen=True)
+class MaskedBytes:
+    """The bytes of a PNG in the size of an image, with its colours, or white without an image; its
+    alpha is that of the image times the opacities of a mask.
+
+    ``channel`` of the mask as in `Texture`, ``limit`` as in `ImageStore`. Raises the errors of
+    reading, and InputError or LimitError for images that cannot be decoded or have no 8 or 16 bits.
+    """
+
+    read: Callable[[], bytes] | None
+    mask: Callable[[], bytes]
+    channel: str
+    limit: int
+
+    def __call__(self) -> bytes:
+        from ptmtools.texture.images.png import png_bytes
+
+        opacity = _opacities(integers(self.mask(), self.limit)[0], self.channel)
+        if self.read is None:
+            white = np.full_like(opacity, 255)
+            return png_bytes(np.stack([white, opacity], axis=2))
+        texels, description = integers(self.read(), self.limit)
+        alpha = _resized(opacity, texels.shape[1], texels.shape[0]) / 255
+        colors = _colors(texels)
+        own = colors.shape[2] < texels.shape[2]
+        alpha *= texels[..., -1] if own else np.iinfo(texels.dtype).max
+        alpha = np.rint(alpha).astype(texels.dtype)[..., None]
+        return png_bytes(np.concatenate([colors, alpha], axis=2), description)
+
+
+def _colors(texels: NDArray[Any]) -> NDArray[Any]:
+    """(h, w, 1 or 3) texels without their alpha."""
+    return texels[..., : texels.shape[2] - (texels.shape[2] in (2, 4))]
+
+
+def _opacities(texels: NDArray[Any], channel: str) -> NDArray[np.uint8]:
+    """(h, w) opacities of a mask: its matte if it has one and ``channel`` allows it, otherwise one
+    of its colours or its luminance."""
+    if texels.dtype != np.uint8:
+        texels = (texels >> 8).astype(np.uint8)
+    colors = _colors(texels)
+    if colors.shape[2] < texels.shape[2] and channel in ("", "m"):
+        return np.asarray(texels[..., -1])
+    if colors.shape[2] == 1:
+        return np.asarray(colors[..., 0])
+    if channel in _BANDS:
+        return np.asarray(colors[..., _BANDS[channel]])
+    # ITU-R 601, as in Pillow.
+    return np.asarray(np.rint(colors @ np.array([0.299, 0.587, 0.114])).astype(np.uint8))
+
+
+def _resized(opacity: NDArray[np.uint8], width: int, height: int) -> NDArray[np.float64]:
+    from PIL import Image
+
+    if opacity.shape != (height, width):
+        image = Image.fromarray(opacity).resize((width, height), Image.Resampling.BILINEAR)
+        opacity = np.asarray(image)
+    return opacity.astype(np.float64)
+
+
+def _merge_mask(material: SourceMaterial, store: ImageStore, findings: Findings) -> SourceMaterial:
+    mask, texture = material.mask, material.texture
+    if mask is None:
+        return material
+    without = replace(material, mask=None)
+    holes = store.mask_has_holes(mask)
+    if holes is None:  # an unreadable mask must not hide anything
+        return replace(without, see_through=True)
+    alpha = None if texture is None else store.has_alpha(texture)
+    own = texture is not None and texture.read == mask.read and mask.channel in ("", "m")
+    if (alpha and own) or not holes:  # the mask is the alpha of the image, or opaque
+        return without
+    colors = None if alpha is None or texture is None else texture.read
+    read = MaskedBytes(colors, mask.read, mask.channel, store.limit)
+    merged = replace(texture or mask, read=read, what=mask.what, place=mask.place)
+    for part in (texture, mask):
+        if part is not None:
+            store.mark_as_input(part)
+    if store.has_alpha(merged) is None:  # the store has recorded the miss
+        return replace(without, see_through=True)
+    findings.note("PTM-N215", f"{mask.what}: baked into an image as its alpha", mask.place)
+    return replace(without, texture=merged)
+
+
+@dataclass(frozen=True)
+class MirroredBytes:
+    """The bytes of a PNG of an image and its mirror images, ``across``, ``down`` or both.
+
+    ``limit`` and errors as of `MaskedBytes`; also InputError PTM-I125 if the result would be too
+    large.
+    """
+
+    read: Callable[[], bytes]
+    across: bool
+    down: bool
+    limit: int
+
+    def __call__(self) -> bytes:
+        from ptmtools.texture.images.png import png_bytes
+
+        texels, description = integers(self.read(), self.limit)
+        height, width, _ = texels.shape
+        if 4 * height * width * (1 + self.across) * (1 + self.down) > self.limit:
+            raise InputError("PTM-I125", "too large for its mirror images; repeated unmirrored")
+        if self.across:
+            texels = np.concatenate([texels, texels[:, ::-1]], axis=1)
+        if self.down:
+            texels = np.concatenate([texels, texels[::-1]], axis=0)
+        return png_bytes(texels, description)
+
+
+def _bake_mirror(
+    texture: Texture, uv: Floats, store: ImageStore, findings: Findings
+) -> tuple[Texture, Floats]:
+    """The texture without mirrored repetition, and its (n, 3, 2) coordinates."""
+    wraps: list[SourceWrap] = [texture.wrap_s, texture.wrap_t]
+    doubled, coords = [False, False], uv.copy()
+    for axis in (0, 1):
+        if wraps[axis] != "mirror":
+            continue
+        folded = _folded(uv[..., axis])
+        if folded is None:
+            wraps[axis], doubled[axis] = "repeat", True
+            coords[..., axis] /= 2
+        else:
+            wraps[axis], coords[..., axis] = "clamp", folded
+    baked = replace(texture, wrap_s=wraps[0], wrap_t=wraps[1])
+    if any(doubled):
+        coords[..., 1] += 0.5 * doubled[1]  # the origin is the lower left, the image is above
+        baked = replace(
+            baked, read=MirroredBytes(texture.read, doubled[0], doubled[1], store.limit)
+        )
+        store.mark_as_input(texture)  # also if it fails: another image may succeed
+        if store.has_alpha(texture) is None or store.has_alpha(baked) is None:
+            wrap_s, wrap_t = emitted_wraps(texture)
+            return replace(texture, wrap_s=wrap_s, wrap_t=wrap_t), uv
+    findings.note("PTM-N215", f"{texture.what}: mirrored repetition baked in", texture.place)
+    return baked, coords
+
+
+def _folded(coordinate: Floats) -> Floats | None:
+    """(T, 3) coordinates of triangles mirrored into [0, 1]; None if a triangle crosses the edge of
+    a repetition."""
+    lowest = np.floor(coordinate.min(axis=1, initial=np.inf))
+    # A triangle that ends at an edge lies in the repetition before it.
+    if (coordinate.max(axis=1, initial=-np.inf) > lowest + 1).any():
+        return None
+    place = coordinate - lowest[:, None]
+    return np.asarray(np.where(lowest[:, None] % 2 == 1, 1 - place, place))
+
+
+def emitted_wraps(texture: Texture | None) -> tuple[Wrap, Wrap]:
+    """The wrap modes of a texture without mirrored repetition; "repeat" without a texture."""
+    wrap_s, wrap_t = (texture.wrap_s, texture.wrap_t) if texture else ("repeat", "repeat")
+    return "repeat" if wrap_s == "mirror" else wrap_s, "repeat" if wrap_t == "mirror" else wrap_t
+
+
+@dataclass(frozen=True)
+class OpaqueBytes:
+    """The bytes of a PNG of an image without alpha; ``limit`` and errors as of `MaskedBytes`."""
+
+    read: Callable[[], bytes]
+    limit: int
+
+    def __call__(self) -> bytes:
+        from ptmtools.texture.images.png import png_bytes
+
+        texels, description = integers(self.read(), self.limit)
+        return png_bytes(_colors(texels), description)
+
+
+def _drop_alpha(
+    materials: list[SourceMaterial], faces: Sequence[Ints], uv: Floats, store: ImageStore
+) -> list[SourceMaterial]:
+    """The materials with opaque images for those that ignore alpha and use transparent texels; a
+    material that blends the same image keeps the original."""
+    ignoring: list[tuple[int, Texture, str]] = []
+    visible: set[str] = set()
+    for number, rows in enumerate(faces):
+        texture = materials[number].texture
+        if texture is None or not materials[number].ignores_alpha:
+            continue
+        image = store.holes(texture)
+        if image is None:
+            continue
+        sha256, holes = image
+        ignoring.append((number, texture, sha256))
+        if sha256 not in visible and uses_holes(holes, uv[rows], *emitted_wraps(texture)):
+            visible.add(sha256)
+    for number, texture, sha256 in ignoring:
+        if sha256 in visible:
+            opaque = replace(texture, read=OpaqueBytes(texture.read, store.limit))
+            store.mark_as_input(texture)
+            if store.has_alpha(opaque) is not None:
+                materials[number] = replace(materials[number], texture=opaque)
+    return materials
+
+
+#: Coordinates up to this distance from the origin, in repetitions, are unchanged. Projected map
+#: coordinates are far from it. Emitted files store single precision, which at 1,024 repetitions
+#: still separates the texels of an image of 4,096, and at five million has two steps a repetition.
+FAR = 1024.0
+#: Larger coordinates have no fractions in single precision.
+LARGEST = 2.0**24
+
+
+def near_origin(uv: Floats, group: Ints, repeats: Bools) -> Floats:
+    """(T, 3, 2) finite coordinates, shifted near the origin by even numbers of repetitions, which
+    also preserves mirrored repetition.
+
+    Parameters
+    ----------
+    group: (T,) faces of one group are shifted together.
+    repeats: (T, 2) whether the texture repeats along each axis, equal within a group.
+    """
+    if not (uv.max(initial=0.0) > FAR or uv.min(initial=0.0) < -FAR):
+        return uv
+    far, uv = (np.abs(uv).max(axis=1) > FAR) & repeats, uv.copy()
+    order = np.argsort(group, kind="stable")
+    for rows in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
+        for axis in np.flatnonzero(far[rows].any(axis=0)):
+            uv[rows, :, axis] -= 2 * np.floor(np.median(uv[rows, :, axis]) / 2)
+    return uv
