@@ -58,11 +58,11 @@ GROUPS: dict[str, dict[str, Entry]] = {
     "Images": {
         "encode": Entry("Encode images as .ptm files.", "images:encode"),
         "decode": Entry("Decode .ptm files to images.", "images:decode"),
-        "compare": Entry("Compare .ptm with other image formats.", "image_formats:compare"),
+        "compare": Entry("Compare .ptm with other image formats.", "images:compare"),
         "interlace": Entry(
-            "Split an image into a series of files, from coarse to fine.", "image_formats:interlace"
+            "Split an image into a series of files, from coarse to fine.", "images:interlace"
         ),
-        "deinterlace": Entry("Join the files of an interlaced image.", "image_formats:deinterlace"),
+        "deinterlace": Entry("Join the files of an interlaced image.", "images:deinterlace"),
     },
     "Other representations": {
         "apo": Entry(
