@@ -28,17 +28,17 @@ from numpy.typing import NDArray
 
 from ptmtools.errors import DatabaseError, InputError, LimitError
 from ptmtools.lab.catalogue import Columns, aligned, columns_of
-from ptmtools.lazy import Lazy
 from ptmtools.neighbours.interlace.model import Interlaced
 from ptmtools.neighbours.interlace.reading import check_joined, read_manifest, read_part
 from ptmtools.neighbours.interlace.steps import join
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress
-from ptmtools.rendering.pyramids import rgb
+from ptmtools.rendering.pyramids import mip_levels, mip_sizes, packed, rgb
 from ptmtools.rendering.records import Pyramids, Shows
 from ptmtools.texture.model import Limits, gpu_texel_bytes
 
-__all__ = ["FORMS", "PTM", "Form"]
+#: The form of a database without other files.
+PTM = "ptm"
 
 
 @dataclass(frozen=True)
@@ -58,32 +58,10 @@ class Form:
 
     name: str
     about: str
-    columns: Lazy[Callable[[Served, bool], Columns]]
-    shows: Lazy[Callable[[Served, Pyramids, Progress], Shows]] | None = None
+    columns: Callable[[Served, bool], Columns]
+    shows: Callable[[Served, Pyramids, Progress], Shows] | None = None
     needs: tuple[str, str] | None = None
     octrees: bool = False
-
-
-_LIST = (
-    Form("ptm", "levels of `.ptm`s", Lazy("ptmtools.lab.forms:level_columns")),
-    Form(
-        "interlaced",
-        "interlaced images",
-        Lazy("ptmtools.lab.forms:interlaced_columns"),
-        Lazy("ptmtools.lab.forms:shows"),
-        ("interlace", "write them with `ptm emit DB --format vrml,gltf,interlace`"),
-    ),
-    Form(
-        "octree",
-        "levels of `.ptm`s and of octree textures",
-        Lazy("ptmtools.lab.forms:level_columns"),
-        needs=("octrees", "build it with `ptm build-scene --apo`"),
-        octrees=True,
-    ),
-)
-#: Forms by name, and the reference form.
-FORMS = {form.name: form for form in _LIST}
-PTM = "ptm"
 
 
 def level_columns(served: Served, paper: bool) -> Columns:
@@ -130,50 +108,11 @@ def shows(served: Served, own: Pyramids, progress: Progress) -> Shows:
         steps.append(len(joined))
     first = np.cumsum([0, *steps[:-1]]) if steps else np.zeros(0, np.int64)
     each = np.array(steps, dtype=np.int64)
-    pyramids = _packed(chains)
+    pyramids = packed(chains)
     wide = int(each.max(initial=0)) + 1
     row = first[:, None] + np.clip(np.arange(wide) - 1, 0, each[:, None] - 1)
     held = np.where(np.arange(wide) > 0, pyramids.levels[row], 0)
     return Shows(pyramids, row, held, each, own.mean)
-
-
-def mip_sizes(width: int, height: int) -> Iterator[tuple[int, int]]:
-    """Sizes of an image and of its mip levels, the finest first."""
-    yield width, height
-    while max(width, height) > 1:
-        width, height = max(1, width >> 1), max(1, height >> 1)
-        yield width, height
-
-
-def mip_levels(image: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
-    """An (h, w, 3) image, of powers of two, with its mip levels, the coarsest first: rounded means
-    of 2 × 2 texels."""
-    levels = [image]
-    while max(image.shape[:2]) > 1:
-        for axis in (0, 1):
-            if image.shape[axis] == 1:
-                image = np.repeat(image, 2, axis=axis)
-        total = np.full((image.shape[0] >> 1, image.shape[1] >> 1, 3), 2, np.uint16)
-        for y, x in np.ndindex(2, 2):
-            total += image[y::2, x::2]
-        image = (total >> 2).astype(np.uint8)
-        levels.append(image)
-    return levels[::-1]
-
-
-def _packed(chains: list[list[NDArray[np.uint8]]]) -> Pyramids:
-    levels = np.array([len(chain) for chain in chains], dtype=np.int64)
-    start = np.zeros((len(chains), int(levels.max(initial=1))), np.int64)
-    size = np.zeros((*start.shape, 2), np.int64)
-    texel = np.empty(sum(level.size for chain in chains for level in chain), np.uint8)
-    at = 0
-    for r, chain in enumerate(chains):
-        for n, level in enumerate(chain):
-            start[r, n], size[r, n] = at, level.shape[1::-1]
-            texel[at : at + level.size] = level.ravel()
-            at += level.size
-        chain.clear()
-    return Pyramids(texel, start, size, levels, np.zeros((len(chains), 3)), np.zeros(start.shape))
 
 
 def _images(served: Served, texture: int) -> Iterator[NDArray[np.uint8]]:
@@ -207,3 +146,24 @@ def _manifest(served: Served, texture: int) -> tuple[Path, Interlaced]:
 def _damaged(fault: InputError | LimitError) -> DatabaseError:
     code = "PTM-D005" if fault.code in ("PTM-I120", "PTM-I122") else "PTM-D006"
     return DatabaseError(code, fault.message, file=fault.file, place=fault.place, remedy=_AGAIN)
+
+
+_LIST = (
+    Form("ptm", "levels of `.ptm`s", level_columns),
+    Form(
+        "interlaced",
+        "interlaced images",
+        interlaced_columns,
+        shows,
+        ("interlace", "write them with `ptm emit DB --format vrml,gltf,interlace`"),
+    ),
+    Form(
+        "octree",
+        "levels of `.ptm`s and of octree textures",
+        level_columns,
+        needs=("octrees", "build it with `ptm build-scene --apo`"),
+        octrees=True,
+    ),
+)
+#: Forms by name.
+FORMS = {form.name: form for form in _LIST}

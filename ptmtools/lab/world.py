@@ -123,7 +123,7 @@ class World:
 
     def counted_by_paper(self) -> World:
         """The same world with RGB of three bytes in texture memory."""
-        columns = FORMS[self.form].columns.load()(self.served, True)
+        columns = FORMS[self.form].columns(self.served, True)
         return replace(self, catalogue=self.catalogue.with_memory(columns.memory))
 
     def frustum(self, frame: int) -> Frustum:
@@ -249,7 +249,7 @@ def prepare(
         name: replace(
             world,
             form=name,
-            catalogue=world.catalogue.in_columns(FORMS[name].columns.load()(served, False)),
+            catalogue=world.catalogue.in_columns(FORMS[name].columns(served, False)),
             views=form_views,
             shows=shown,
         )
@@ -316,7 +316,7 @@ def read_forms(
     Raises DatabaseError, LimitError: see `Form.shows`.
     """
     known = (FORMS[name] for name in dict.fromkeys(names))
-    return {f.name: f.shows.load()(served, pyramids, progress) for f in known if f.shows}
+    return {f.name: f.shows(served, pyramids, progress) for f in known if f.shows}
 
 
 def _require_fitting(browser: Browser, served: Served) -> None:

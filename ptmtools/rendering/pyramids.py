@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -44,17 +45,12 @@ def read_pyramids(
 
 def _pyramids(served: Served, progress: Progress, only: Collection[int] | None = None) -> Pyramids:
     rows = served.index["textures"]
-    deepest = max((len(row["ends"]) for row in rows), default=1)
-    start, levels = np.zeros((len(rows), deepest), np.int64), np.zeros(len(rows), np.int64)
-    size, mean = np.zeros((len(rows), deepest, 2), np.int64), np.zeros((len(rows), 3))
-    differences = np.zeros((len(rows), deepest))
-    parts: list[NDArray[np.uint8]] = []
-    at = 0
+    chains: list[list[NDArray[np.uint8]]] = [[] for _ in rows]
+    mean, differences = np.zeros((len(rows), 3)), [[0.0] for _ in rows]
     for t in range(len(rows)):
         if only is not None and t not in only:
             continue
         progress(t, len(rows), "decoding textures")
-        below = None
         file = served.texture_file(t)
         with reader.open(file, limits=_LIMITS) as ptm:
             held = [level.end for level in ptm.header.levels[: ptm.whole]]
@@ -65,20 +61,56 @@ def _pyramids(served: Served, progress: Progress, only: Collection[int] | None =
                 raise DatabaseError(
                     "PTM-D006", "is not the texture that the index has", file=file, remedy=BUILD
                 )
-            for n, samples in enumerate(ptm.levels()):
-                level = rgb(samples)
-                if below is None:
-                    mean[t] = level.reshape(-1, 3).mean(axis=0)
-                else:
-                    texels = level.shape[0] * level.shape[1]
-                    differences[t, n] = difference_between(level, below) / texels
-                start[t, n], size[t, n] = at, (level.shape[1], level.shape[0])
-                levels[t] = n + 1
-                at += level.size
-                parts.append(level.ravel())
-                below = level
-    texel = np.concatenate(parts) if parts else np.zeros(0, np.uint8)
-    return Pyramids(texel, start, size, levels, mean, differences)
+            chains[t] = [rgb(samples) for samples in ptm.levels()]
+        mean[t] = chains[t][0].reshape(-1, 3).mean(axis=0)
+        for below, level in pairwise(chains[t]):
+            texels = level.shape[0] * level.shape[1]
+            differences[t].append(difference_between(level, below) / texels)
+    result = packed(chains)
+    for row, values in zip(result.differences, differences, strict=True):
+        row[: len(values)] = values
+    return result._replace(mean=mean)
+
+
+def packed(chains: list[list[NDArray[np.uint8]]]) -> Pyramids:
+    """Textures of (h, w, 3) levels, the coarsest first, without means and differences. Empties each
+    list as soon as it is copied."""
+    levels = np.array([len(chain) for chain in chains], dtype=np.int64)
+    start = np.zeros((len(chains), int(levels.max(initial=1))), np.int64)
+    size = np.zeros((*start.shape, 2), np.int64)
+    texel = np.empty(sum(level.size for chain in chains for level in chain), np.uint8)
+    at = 0
+    for t, chain in enumerate(chains):
+        for n, level in enumerate(chain):
+            start[t, n], size[t, n] = at, level.shape[1::-1]
+            texel[at : at + level.size] = level.ravel()
+            at += level.size
+        chain.clear()
+    return Pyramids(texel, start, size, levels, np.zeros((len(chains), 3)), np.zeros(start.shape))
+
+
+def mip_sizes(width: int, height: int) -> Iterator[tuple[int, int]]:
+    """Sizes of an image and of its mip levels, the finest first."""
+    yield width, height
+    while max(width, height) > 1:
+        width, height = max(1, width >> 1), max(1, height >> 1)
+        yield width, height
+
+
+def mip_levels(image: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
+    """An (h, w, 3) image, of powers of two, with its mip levels, the coarsest first: rounded means
+    of 2 × 2 texels."""
+    levels = [image]
+    while max(image.shape[:2]) > 1:
+        for axis in (0, 1):
+            if image.shape[axis] == 1:
+                image = np.repeat(image, 2, axis=axis)
+        total = np.full((image.shape[0] >> 1, image.shape[1] >> 1, 3), 2, np.uint16)
+        for y, x in np.ndindex(2, 2):
+            total += image[y::2, x::2]
+        image = (total >> 2).astype(np.uint8)
+        levels.append(image)
+    return levels[::-1]
 
 
 def rgb(samples: NDArray[Any]) -> NDArray[np.uint8]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.lab.comparing import SimulateOptions, budget_of, counted, play
-from ptmtools.lab.forms import PTM, mip_levels, mip_sizes
+from ptmtools.lab.forms import PTM
 from ptmtools.lab.measures import Flip
 from ptmtools.lab.policies import POLICIES
 from ptmtools.lab.renderer import Renderer
@@ -26,7 +26,7 @@ from ptmtools.link import Conditions
 from ptmtools.neighbours.interlace import deinterlace, read_manifest
 from ptmtools.output.served import read_served
 from ptmtools.rendering.kernels import GREY
-from ptmtools.rendering.pyramids import read_pyramids
+from ptmtools.rendering.pyramids import mip_levels, mip_sizes, read_pyramids
 from ptmtools.rendering.records import Shows, own_levels
 from ptmtools.texture import decode
 from tests.lab.conftest import Ptm

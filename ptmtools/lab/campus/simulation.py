@@ -11,7 +11,6 @@ textures alone. Measures of texture levels or cells do not apply, and are NaN.
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, field, replace
 from math import nan
 
@@ -21,16 +20,13 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.lab.campus.client import CampusClient
 from ptmtools.lab.campus.options import QUALITIES, CampusWalkOptions
 from ptmtools.lab.campus.stock import Stock
-from ptmtools.lab.campus.world import COARSE, FINE, NOTHING, CampusWorld, prepare_campus
+from ptmtools.lab.campus.world import COARSE, FINE, NOTHING, CampusWorld
 from ptmtools.lab.measures import STANDS, Measures, measure, seconds_to
 from ptmtools.lab.network import Link
 from ptmtools.lab.simulation import Run
 from ptmtools.lab.world import World
 from ptmtools.link import Conditions, Trace
 from ptmtools.neighbours.campus.model import SIZES, Quality
-from ptmtools.output.served import Served
-from ptmtools.progress import Progress, silent
-from ptmtools.walk import Walk
 
 #: Shortest interval without requests that counts as a pause, s.
 PAUSE = 1.0
@@ -105,21 +101,6 @@ class CampusRun:
     def pauses(self) -> int:
         """Number of idle intervals of at least `PAUSE`."""
         return int((np.diff(self.idle, axis=1) >= PAUSE).sum())
-
-
-def walk_campus(
-    folder: str | os.PathLike[str],
-    walk: Walk,
-    options: CampusWalkOptions = CampusWalkOptions(),  # noqa: B008 - a frozen value
-    served: Served | None = None,
-    *,
-    trace: Trace | None = None,
-    progress: Progress = silent,
-) -> list[CampusRun]:
-    """A walk through a campus with each preset of the options; see `prepare_campus` for ``served``
-    and the exceptions."""
-    world = prepare_campus(folder, walk, served, progress=progress)
-    return [simulate_campus(world, quality, options, trace) for quality in options.qualities]
 
 
 def simulate_campus(

@@ -42,6 +42,7 @@ from ptmtools.neighbours.campus.model import (
 )
 from ptmtools.neighbours.campus.reading import LONGEST, read_campus
 from ptmtools.output.served import Surfaces, on_link
+from ptmtools.rendering.pyramids import mip_levels, packed
 from ptmtools.rendering.records import Pyramids
 from ptmtools.scene.colors import to_srgb
 from ptmtools.texture.images.opening import load, opened, pillow_faults
@@ -291,32 +292,8 @@ def read_textures(folder: Path, stock: Stock, size: int) -> Pyramids:
 
     Raises InputError PTM-I122.
     """
-    deepest = size.bit_length()
-    count = len(stock.bases)
-    start, levels = np.zeros((count, deepest), np.int64), np.full(count, deepest, np.int64)
-    sides = np.zeros((count, deepest, 2), np.int64)
-    parts: list[NDArray[np.uint8]] = []
-    at = 0
-    for base in range(count):
-        image = _image(folder, stock.names[stock.diffuse(base, size)], size)
-        for n, level in enumerate(mip_levels(image)):
-            start[base, n], sides[base, n] = at, len(level)
-            at += level.size
-            parts.append(level.ravel())
-    texel = np.concatenate(parts) if parts else np.zeros(0, np.uint8)
-    return Pyramids(texel, start, sides, levels, np.zeros((count, 3)), np.zeros((count, deepest)))
-
-
-def mip_levels(image: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
-    """A square image (s, s, 3), s a power of two, with its mip levels, the coarsest first: each
-    texel is the rounded mean of four."""
-    levels = [image]
-    while len(image) > 1:
-        wide = image.astype(np.uint16)
-        total = wide[::2, ::2] + wide[1::2, ::2] + wide[::2, 1::2] + wide[1::2, 1::2]
-        image = ((total + 2) >> 2).astype(np.uint8)
-        levels.append(image)
-    return levels[::-1]
+    names = [stock.names[stock.diffuse(base, size)] for base in range(len(stock.bases))]
+    return packed([mip_levels(_image(folder, name, size)) for name in names])
 
 
 def _image(folder: Path, name: str, size: int) -> NDArray[np.uint8]:

@@ -175,10 +175,10 @@ class CampusWorld:
         some = self.view[self.view >= 0]
         return 0.0 if self.tables is None else float(self.tables.least[some].mean())
 
-    def standing(self, seconds: float, frame: int = 0) -> CampusWorld:
-        """A visitor who stays at a frame for this time."""
+    def standing(self, seconds: float) -> CampusWorld:
+        """A visitor who stays at the first frame for this time."""
         count = int(np.ceil(seconds * self.rate)) + 1
-        held = np.full(count, frame)
+        held = np.zeros(count, np.int64)
         time = np.arange(count) / self.rate
         return replace(self, view=self.view[held], time=time, eye=self.eye[held])
 

@@ -6,7 +6,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from ptmtools.arrays import Floats
-from ptmtools.lab.campus import CampusWorld, Stock
+from ptmtools.lab.campus.stock import Stock
+from ptmtools.lab.campus.world import CampusWorld
 from ptmtools.neighbours.campus.model import (
     CHANNELS,
     DIFFUSE,

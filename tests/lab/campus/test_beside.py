@@ -11,9 +11,9 @@ import pytest
 from ptmtools import schemas
 from ptmtools.cli.main import main
 from ptmtools.errors import InputError
-from ptmtools.lab.campus import CampusWalkOptions, prepare_campus, simulate_campus
-from ptmtools.lab.campus.simulation import CAMPUS_POLICIES, measure_campus_walk
-from ptmtools.lab.campus.world import CampusWorld
+from ptmtools.lab.campus.options import CampusWalkOptions
+from ptmtools.lab.campus.simulation import CAMPUS_POLICIES, measure_campus_walk, simulate_campus
+from ptmtools.lab.campus.world import CampusWorld, prepare_campus
 from ptmtools.lab.world import World
 from ptmtools.link import Conditions
 from ptmtools.neighbours.campus import CampusOptions, make_campus

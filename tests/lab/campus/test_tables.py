@@ -15,18 +15,23 @@ from PIL import Image
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError
-from ptmtools.lab.campus import (
-    CampusWalkOptions,
+from ptmtools.lab.campus.options import CampusWalkOptions
+from ptmtools.lab.campus.simulation import CampusRun, simulate_campus
+from ptmtools.lab.campus.stock import read_stock, read_surfaces, read_textures
+from ptmtools.lab.campus.world import (
+    COARSE,
+    FINE,
+    NOTHING,
     CampusWorld,
+    FullPicture,
+    Tables,
+    look,
     prepare_campus,
-    read_stock,
-    walk_campus,
 )
-from ptmtools.lab.campus.stock import mip_levels, read_surfaces, read_textures
-from ptmtools.lab.campus.world import COARSE, FINE, NOTHING, FullPicture, Tables, look
 from ptmtools.neighbours.campus import read_campus
 from ptmtools.neighbours.campus.meshes import read_mesh
 from ptmtools.neighbours.campus.model import SIZES
+from ptmtools.rendering.pyramids import mip_levels
 from ptmtools.rendering.rays import Camera
 from ptmtools.walk import Walk
 
@@ -240,13 +245,18 @@ def test_what_files_weigh(folder: Path) -> None:
     assert stock.memory[0] == 0
 
 
+def walk_campus(folder: Path, options: CampusWalkOptions) -> list[CampusRun]:
+    world = prepare_campus(folder, WALK)
+    return [simulate_campus(world, quality, options) for quality in options.qualities]
+
+
 def test_a_walk_with_every_preset(folder: Path) -> None:
-    runs = walk_campus(folder, WALK, CampusWalkOptions(bandwidth="inf", latency="1ms"))
+    runs = walk_campus(folder, CampusWalkOptions(bandwidth="inf", latency="1ms"))
     low, medium, high, ultra, cached = runs
     # Without a limit of the bandwidth all is there after a few requests.
     assert low.e > medium.e == high.e > ultra.e
     assert cached.e <= ultra.e
-    assert walk_campus(folder, WALK, CampusWalkOptions("low", memory="1"))[0].e > low.e
+    assert walk_campus(folder, CampusWalkOptions("low", memory="1"))[0].e > low.e
 
 
 def test_a_campus_that_is_not_whole(folder: Path, tmp_path: Path) -> None:
@@ -271,7 +281,7 @@ def test_materials_that_no_object_has_need_no_textures(folder: Path, tmp_path: P
     index["materials"].append(dict(index["materials"][0], base="nothing", channels=["d"]))
     (made / "campus.json").write_text(json.dumps(index))
     assert "nothing" not in read_stock(made).bases
-    (one,), (two,) = (walk_campus(each, WALK, CampusWalkOptions("low")) for each in (made, folder))
+    (one,), (two,) = (walk_campus(each, CampusWalkOptions("low")) for each in (made, folder))
     assert np.array_equal(one.error, two.error)
 
 
