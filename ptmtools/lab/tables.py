@@ -24,7 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles
-from ptmtools.lab.relief.tables import Relief, Rows, Tally as ReliefTally
+from ptmtools.lab.relief.tables import Relief, Tally as ReliefTally
+from ptmtools.lab.rows import Rows, RowSums
 from ptmtools.output.served import Surfaces
 from ptmtools.progress import Progress, silent
 from ptmtools.rendering.rays import Camera, Caster
@@ -79,27 +80,13 @@ def look(
     direction: Floats,
     progress: Progress = silent,
     *,
-    full: Pyramids | None = None,
-) -> Views:
-    """The tables of (F, 3) eyes and unit directions of view. The reference is ``full``, which holds
-    the same textures in other quality."""
-    return look_at_forms(surfaces, pyramids, (), camera, eye, direction, progress, full=full)[0]
-
-
-def look_at_forms(
-    surfaces: Surfaces,
-    pyramids: Pyramids,
-    forms: Sequence[Shows],
-    camera: Camera,
-    eye: Floats,
-    direction: Floats,
-    progress: Progress = silent,
-    *,
+    forms: Sequence[Shows] = (),
     full: Pyramids | None = None,
     relief: Relief | None = None,
 ) -> list[Views]:
-    """The tables of `look`, and those of the same textures in other forms, against the same
-    reference; with octrees and other relief, if any."""
+    """The tables of (F, 3) eyes and unit directions of view: of ``pyramids``, and of the same
+    textures in other ``forms``; with octrees and other relief, if any. The reference is ``full``,
+    which holds the same textures in other quality, or ``pyramids``."""
     triangles, caster, seen = triangles_of(surfaces), Caster(surfaces), camera.sparse
     full = pyramids if full is None else full
     shown: list[Pyramids | Shows] = [pyramids, *forms]
@@ -115,8 +102,8 @@ def look_at_forms(
             tally.add(plain)
         owner[k], depth[k] = _item_buffer(sight, triangles, seen)
     progress(len(eye), len(eye), "looking along the walk")
-    views_of = [tally.views(owner, depth) for tally in tallies]
-    return [with_rows(views, relief_tally.rows) for views in views_of] if relief_tally else views_of
+    more = [relief_tally.rows()] if relief_tally else []
+    return [_views([tally.rows(), *more], owner, depth) for tally in tallies]
 
 
 class _Tally:
@@ -125,10 +112,8 @@ class _Tally:
     def __init__(
         self, triangles: Triangles, textures: Pyramids | Shows, full: Pyramids, seen: Bools
     ) -> None:
-        from ptmtools.rendering.kernels import Sums, add_columns, add_frame
+        from ptmtools.rendering.kernels import add_columns, add_frame
 
-        keys = np.stack([triangles.cell, triangles.texture], axis=1)
-        self._pairs, pair = np.unique(keys, axis=0, return_inverse=True)
         self._add: Callable[..., None]
         if isinstance(textures, Shows):
             self._add, deepest = add_columns, textures.row.shape[1] - 1
@@ -136,30 +121,15 @@ class _Tally:
         else:
             self._add, deepest = add_frame, textures.start.shape[1]
             self._what = seen, triangles, textures, full, textures is full
-        columns = (deepest + 2, deepest + 2, deepest, deepest)
-        self._sums = Sums(pair.reshape(-1), *(np.zeros((len(self._pairs), n)) for n in columns))
+        keys = np.stack([triangles.cell, triangles.texture], axis=1)
+        self._sums = RowSums(keys, deepest, seen)
         self._room = np.zeros((deepest + 7, 3))
-        pixels = len(seen)
-        self._pixels = (pixels, pixels, pixels, max(int(seen.sum()), 1))
-        #: Pairs, and rows of each table: first of no frame, then of each.
-        self._nonzero = [np.zeros(0, np.int64)]
-        self._rows = [[np.zeros((0, n), np.float32)] for n in columns]
+        self.rows = self._sums.rows
 
     def add(self, sight: Sight) -> None:
         """Adds the rows of the next frame."""
-        self._add(sight, *self._what, self._sums, self._room)
-        nonzero = np.flatnonzero(self._sums.need[:, 0])
-        self._nonzero.append(nonzero)
-        for rows, table, pixels in zip(self._rows, self._sums[1:], self._pixels, strict=True):
-            rows.append((table[nonzero] / pixels).astype(np.float32))
-            table[nonzero] = 0.0
-
-    def views(self, owner: NDArray[np.int32], depth: Singles) -> Views:
-        """The views of all frames, with their item buffers."""
-        start = np.cumsum([len(pairs) for pairs in self._nonzero])
-        cell, texture = self._pairs[np.concatenate(self._nonzero)].T
-        error, square, need, sight = map(np.concatenate, self._rows)
-        return Views(start, cell, texture, error, square, need, sight, owner, depth)
+        self._add(sight, *self._what, self._sums.sums, self._room)
+        self._sums.end_frame(self._sums.sums.need[:, 0] != 0)
 
 
 def _item_buffer(
@@ -177,24 +147,22 @@ def _item_buffer(
     return owner, depth
 
 
-def with_rows(views: Views, more: Rows) -> Views:
-    """The views with more rows, each after those of its frame."""
-    frame = np.repeat(np.arange(views.frames), np.diff(views.start))
-    order = np.argsort(np.concatenate([frame, more.frame]), kind="stable")
+def _views(parts: Sequence[Rows], owner: NDArray[np.int32], depth: Singles) -> Views:
+    """The views with the rows of all parts, frame by frame, and their item buffers."""
+    frame = np.concatenate([rows.frame for rows in parts])
+    order = np.argsort(frame, kind="stable")
 
-    def both(name: str) -> Any:
-        tables = [getattr(views, name), getattr(more, name)]
+    def joined(*tables: NDArray[Any]) -> Any:
         wide = max(table.shape[-1] for table in tables)
         if tables[0].ndim > 1:
             # Columns beyond a row's own are never read.
-            tables = [np.pad(t, ((0, 0), (0, wide - t.shape[1]))) for t in tables]
+            tables = tuple(np.pad(t, ((0, 0), (0, wide - t.shape[1]))) for t in tables)
         return np.concatenate(tables)[order]
 
-    names = ("cell", "texture", "error", "square", "need", "sight")
-    start = np.searchsorted(
-        np.sort(np.concatenate([frame, more.frame])), np.arange(views.frames + 1)
-    )
-    return replace(views, start=start, **{name: both(name) for name in names})
+    start = np.searchsorted(frame[order], np.arange(len(owner) + 1))
+    _, cell, texture, *tables = (joined(*each) for each in zip(*parts, strict=True))
+    error, square, need, sight = tables
+    return Views(start, cell, texture, error, square, need, sight, owner, depth)
 
 
 def limited(views: Views, count: Ints) -> Views:

@@ -17,7 +17,7 @@ from ptmtools.errors import InputError, LimitError
 from ptmtools.lab.catalogue import Catalogue, catalogue_of
 from ptmtools.lab.forms import FORMS, PTM
 from ptmtools.lab.relief.tables import Relief
-from ptmtools.lab.tables import Views, look_at_forms
+from ptmtools.lab.tables import Views, look
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress, silent
 from ptmtools.rendering.pyramids import read_pyramids
@@ -221,8 +221,8 @@ def prepare(
     if views is None:
         eyes, looks = seen[:, :3], seen[:, 3:]
         shows = [*(forms or {}).values()]
-        views, *others = look_at_forms(
-            served.surfaces, textures, shows, camera, eyes, looks, progress, full=full,
+        views, *others = look(
+            served.surfaces, textures, camera, eyes, looks, progress, forms=shows, full=full,
             relief=relief,
         )  # fmt: skip
     catalogue = catalogue_of(served, textures.differences, textures.mean)

@@ -20,7 +20,7 @@ from ptmtools.lab.policies import POLICIES
 from ptmtools.lab.renderer import Renderer
 from ptmtools.lab.report import table
 from ptmtools.lab.simulation import simulate
-from ptmtools.lab.tables import look, look_at_forms
+from ptmtools.lab.tables import look
 from ptmtools.lab.world import World, read_forms
 from ptmtools.link import Conditions
 from ptmtools.neighbours.interlace import deinterlace, read_manifest
@@ -58,10 +58,11 @@ def test_the_levels_of_a_ptm_as_a_form_of_their_own(seed: int) -> None:
     made, eyes = room(random), pose(random)
     other = Room(made.surfaces, [[255 - level for level in rows] for rows in made.levels]).pyramids
     for full in (None, other):
-        views, same = look_at_forms(
-            made.surfaces, made.pyramids, [own_levels(made.pyramids)], CAMERA, *eyes, full=full
-        )
-        alone = look(made.surfaces, made.pyramids, CAMERA, *eyes, full=full)
+        views, same = look(
+            made.surfaces, made.pyramids, CAMERA, *eyes, forms=[own_levels(made.pyramids)],
+            full=full,
+        )  # fmt: skip
+        (alone,) = look(made.surfaces, made.pyramids, CAMERA, *eyes, full=full)
         for name in ("start", "cell", "texture", "error", "square", "need", "sight"):
             assert getattr(views, name).tobytes() == getattr(same, name).tobytes(), name
             assert getattr(views, name).tobytes() == getattr(alone, name).tobytes(), name
@@ -84,7 +85,7 @@ def test_columns_against_slow_ones(seed: int) -> None:
     mean = random.uniform(0, 255, (3, 3))
     shows = Shows(pyramids, row, held, last, mean)
     eye, direction = pose(random)
-    _, views = look_at_forms(made.surfaces, made.pyramids, [shows], CAMERA, eye, direction)
+    _, views = look(made.surfaces, made.pyramids, CAMERA, eye, direction, forms=[shows])
     rays, axes = CAMERA.rays(direction)
     expected: dict[tuple[int, int], NDArray[np.float64]] = {}
     for ray in rays.reshape(-1, 3):

@@ -350,10 +350,10 @@ def test_relief_comes_with_the_bytes(world: World) -> None:
 
 def prepare_views(world: World) -> World:
     """Who stands there for 20 s, with what is really on the screen."""
-    from ptmtools.lab.tables import look_at_forms
+    from ptmtools.lab.tables import look
 
-    (views,) = look_at_forms(
-        world.served.surfaces, world.pyramids, [], world.camera, world.eye, world.direction,
+    (views,) = look(
+        world.served.surfaces, world.pyramids, world.camera, world.eye, world.direction,
         relief=world.relief,
     )  # fmt: skip
     view = np.zeros(len(world.view), np.int64)

@@ -181,7 +181,7 @@ def test_tables_against_slow_ones(seed: int) -> None:
         need += np.pad(wants, (0, deepest - len(wants))) / len(flat)
         if CAMERA.sparse[i]:
             sight += np.pad(wants, (0, deepest - len(wants))) / CAMERA.sparse.sum()
-    views = look(surfaces, made.pyramids, CAMERA, eye[None], direction[None])
+    (views,) = look(surfaces, made.pyramids, CAMERA, eye[None], direction[None])
     assert set(zip(views.cell.tolist(), views.texture.tolist(), strict=True)) == set(tables)
     for r, key in enumerate(zip(views.cell.tolist(), views.texture.tolist(), strict=True)):
         found = (views.error[r], views.square[r], views.need[r], views.sight[r])

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, Singles
+from ptmtools.arrays import Bools, Floats
+from ptmtools.lab.rows import RowSums
 from ptmtools.output.served import Surfaces
 from ptmtools.rendering.light import lamps
 from ptmtools.rendering.octrees import Octrees
@@ -90,8 +90,6 @@ class Tally:
         full: Pyramids,
         seen: Bools,
     ) -> None:
-        from ptmtools.rendering.kernels import Sums
-
         self._relief, self._triangles, self._full, self._seen = relief, triangles, full, seen
         self._lamps = lamps(surfaces.corner)
         octrees, first = relief.octrees, len(full.levels)
@@ -99,15 +97,10 @@ class Tally:
         wanted = np.where(octrees.of < 0, octrees.number, octrees.of) + first
         stuck = np.full(len(wanted), first + octrees.number)
         keys = np.stack([np.tile(triangles.cell, 2), np.concatenate([wanted, stuck])], axis=1)
-        self._pairs, pair = np.unique(keys, axis=0, return_inverse=True)
-        pair, self._stuck = pair.reshape(2, -1).astype(np.int64)
-        deepest = int(octrees.levels.max(initial=1))
-        columns = (deepest + 2, deepest + 2, deepest, deepest)
-        self._sums = Sums(pair, *(np.zeros((len(self._pairs), n)) for n in columns))
-        pixels = len(seen)
-        self._pixels = (pixels, pixels, pixels, max(int(seen.sum()), 1))
-        self._nonzero: list[Ints] = []
-        self._rows = [[np.zeros((0, n), np.float32)] for n in columns]
+        self._rows = RowSums(keys, int(octrees.levels.max(initial=1)), seen)
+        pair, self._stuck = self._rows.pair.reshape(2, -1)
+        self._sums = self._rows.sums._replace(pair=pair)
+        self.rows = self._rows.rows
 
     def add(self, sight: Sight) -> Sight:
         """Adds the rows of the next frame; returns the rest of it for other tables."""
@@ -130,31 +123,5 @@ class Tally:
             sight, self._triangles, self._lamps, octrees, self._full, exact, given, special,
             self._seen, self._sums, self._stuck,
         )  # fmt: skip
-        nonzero = np.flatnonzero(self._sums.error.any(axis=1))
-        self._nonzero.append(nonzero)
-        for rows, table, pixels in zip(self._rows, self._sums[1:], self._pixels, strict=True):
-            rows.append((table[nonzero] / pixels).astype(np.float32))
-            table[nonzero] = 0.0
+        self._rows.end_frame(np.asarray(self._sums.error.any(axis=1)))
         return sight._replace(triangle=plain)
-
-    @property
-    def rows(self) -> Rows:
-        """The rows of all frames."""
-        frame = np.repeat(np.arange(len(self._nonzero)), [len(pairs) for pairs in self._nonzero])
-        pairs = self._pairs[np.concatenate([np.zeros(0, np.int64), *self._nonzero])]
-        error, square, need, sight = map(np.concatenate, self._rows)
-        cell, texture = pairs.astype(np.int32).T
-        return Rows(frame, cell, texture, error, square, need, sight)
-
-
-@dataclass(frozen=True)
-class Rows:
-    """Rows of `Views`, and (R,) the frame of each, ascending."""
-
-    frame: Ints
-    cell: NDArray[np.int32]
-    texture: NDArray[np.int32]
-    error: Singles
-    square: Singles
-    need: Singles
-    sight: Singles

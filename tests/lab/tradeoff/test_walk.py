@@ -182,7 +182,7 @@ def test_what_lacks_levels_is_predicted_by_the_tables_of_the_original(db, walk, 
     assert not begins_with(own, original.pyramids)
     assert own.levels.max() < original.pyramids.levels.max()
     unique, first = np.unique(original.view, return_index=True)
-    again = look(
+    (again,) = look(
         coarse.surfaces, own, original.camera, original.eye[first], original.direction[first],
         full=original.pyramids,
     )  # fmt: skip
