@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,8 +34,7 @@ class Emitter:
     reader: function from (path in the served folder, bytes) of one file to its content for
         `check`, None if the check needs nothing of it; called from several threads. Raises
         FileError. None if only the hashes of the files are checked.
-    check: function from a `ServedDatabase` to the counts of the manifest that it knows, by name;
-        None as `reader`.
+    check: function that checks the references of a `ServedDatabase`'s files; None as `reader`.
     """
 
     name: str
@@ -43,7 +42,7 @@ class Emitter:
     owns: tuple[str, ...]
     writer: Lazy[Callable[[Any], Iterator[File]]]
     reader: Lazy[Callable[[str, bytes], object | None]] | None = None
-    check: Lazy[Callable[[Any], Mapping[str, int]]] | None = None
+    check: Lazy[Callable[[Any], None]] | None = None
     entry: str = ""
     cell_files: str = ""
     texture_files: str = ""

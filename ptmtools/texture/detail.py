@@ -132,14 +132,3 @@ def detail_of(coarsest: Samples, above: Iterable[tuple[float, int]]) -> Detail:
     shown = np.clip(np.nan_to_num(mean * scale), 0, _WHITE)
     red, green, blue = np.floor(np.broadcast_to(shown, 3) + 0.5).astype(int).tolist()
     return Detail((0.0, *(float(f"{v:.{DIGITS}g}") for v in means)), (red, green, blue))
-
-
-def detail_of_levels(levels: Iterable[Samples]) -> tuple[Detail, Samples]:
-    """The `Detail` of levels (h, w, c), given coarsest first; and the finest level."""
-    following = iter(levels)
-    coarsest = finest = next(following)
-    above = []
-    for level in following:
-        above.append((difference_between(level, finest), level.shape[0] * level.shape[1]))
-        finest = level
-    return detail_of(coarsest, above), finest

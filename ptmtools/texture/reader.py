@@ -3,7 +3,7 @@
 Of a tiled level only the tiles that are asked for are read and decoded, and of the levels below it
 only what lies under those: a window of a level costs about its own size, whatever the level's.
 
-`decode`, `check` and `examine` take a whole `.ptm` in one call.
+`decode` and `check` take a whole `.ptm` in one call.
 """
 
 from __future__ import annotations
@@ -36,8 +36,6 @@ from ptmtools.texture.sources import Ranges, Source, ranges_of
 
 if TYPE_CHECKING:
     from ptmtools.texture.coder import Shape
-    from ptmtools.texture.detail import Detail
-
 
 Samples = NDArray[Any]
 _LIMITS = Limits()
@@ -380,22 +378,17 @@ def check(data: bytes, limits: Limits = _LIMITS) -> list[str]:
     Decodes every level, which also detects a group with a correct checksum and wrong contents.
     """
     try:
-        return examine(data, limits)[0]
+        return faults_of(data, limits)
     except LimitError as error:
         return [str(error)]
 
 
-def examine(
-    data: bytes, limits: Limits = _LIMITS
-) -> tuple[list[str], tuple[Detail, NDArray[Any]] | None]:
-    """The faults as `check`, the detail of its levels, and the finest level; None for both if there
-    is a fault.
+def faults_of(data: bytes, limits: Limits = _LIMITS) -> list[str]:
+    """The faults as `check`.
 
     Raises LimitError, those of `ptmtools.texture.open` and `PtmReader.level`: nothing is wrong as
     far as the checksums tell.
     """
-    from ptmtools.texture.detail import detail_of_levels
-
     problems: list[str] = []
     try:
         with open(data, limits=limits) as ptm:
@@ -409,9 +402,10 @@ def examine(
             problems += ptm.wrong_checksums()
             if not problems:
                 ptm.description()
-                return [], detail_of_levels(ptm.levels())
+                for _ in ptm.levels():
+                    pass
     except LimitError:
         raise
     except InputError as error:
         problems.append(str(error))
-    return problems, None
+    return problems

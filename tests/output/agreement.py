@@ -1,25 +1,29 @@
-"""Compares the forms of one emitted database with each other: VRML, GLB and hints.
+"""Compares the files of one emitted database with each other: VRML, GLB, hints and textures.
 
-`ptm validate` checks each form by itself; only the emitters can make two forms differ, so their
-tests compare them here. Files that cannot be read are left out.
+`ptm validate` checks each file by itself and its references; only the emitters can make two files
+differ, so their tests compare them here. Files that cannot be read are left out.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ptmtools import schemas
 from ptmtools.output.gltf import WRAPS, flipped, linear
 from ptmtools.output.gltf_reader import ReadGlb, ReadMaterial, ReadPrimitive, read_glb
 from ptmtools.output.model import FileError
 from ptmtools.output.vrml_reader import Document, Node, parse
 from ptmtools.scene.colors import to_srgb
+from ptmtools.texture import read_header
 from ptmtools.tolerance import PARALLEL_COSINE
+from tests.output.relations import relations, root_file
+from tests.output.texture_agreement import bundles, materials, octrees, textures
 
 #: Slack of a colour that went through the decimals of VRML.
 COLOR_SLACK = 1e-5
@@ -28,21 +32,72 @@ LEVEL_SLACK = 0.6 / 255
 
 
 def disagreements(www: Path) -> list[str]:
-    """The differences between the forms, each as "KIND: where and what". KIND is "cell" (record
-    and VRML file), "viewpoint" (index and root), "triangles" or "material" (GLB and VRML file)."""
-    index = _json(www / "hints.json")
-    cells = {p.stem: d for p in sorted(www.glob("cells/*.wrl")) if (d := _document(p))}
+    """The differences, each as "KIND: where and what". KIND is "cell" (record and VRML file),
+    "viewpoint" (index and root), "triangles" or "material" (GLB and VRML file); "root" (root and
+    VRML files); "relation", "openings", "overlap", "shares" or "statistics" (records); "texture",
+    "set" or "bundle" (texture and other files); "octree" (octree texture and GLBs)."""
+    index = _json(www / "hints.json", schemas.HINTS)
+    paths = sorted(www.glob("cells/*.wrl"))
+    cells = {path.stem: document for path in paths if (document := _document(path))}
+    root = _document(www / "root.wrl")
+    glbs = {p.stem: glb for p in sorted(www.glob("gltf/*.glb")) if (glb := _glb(p))}
     lines: list[str] = []
-    if index is not None:
-        lines += _cells(www, index, cells)
-        root = _document(www / "root.wrl")
+    if root is not None:
+        lines += root_file(root, [path.stem for path in paths], cells)
+    statistics = _json(www / "hints/statistics.json", schemas.STATISTICS)
+    with suppress(KeyError, TypeError):
+        records = {
+            cell["name"]: record
+            for cell in (index["cells"] if index else ())
+            if (record := _json(www / f"hints/{cell['name']}.json", schemas.CELL)) is not None
+        }
+        lines += _cells(records, index, cells)
+        lines += relations(index, records, statistics)
+        lines += textures(www, index, statistics)
+        lines += bundles(www, index, records)
+        lines += octrees(www, index, glbs)
+        for name, glb in glbs.items():
+            lines += materials(name, glb, index)
         if root is not None:
             lines += _viewpoints(index, root)
-    for name, document in cells.items():
-        path = www / f"gltf/{name}.glb"
-        with suppress(FileError, OSError):
-            lines += _shapes(name, read_glb(path.read_bytes()), document.of_type("Shape"))
+    for name in sorted(cells.keys() & glbs.keys()):
+        lines += _shapes(name, glbs[name], cells[name].of_type("Shape"))
     return lines
+
+
+def wrong_counts(db: Path) -> set[str]:
+    """The counts in the manifest, as "STAGE.NAME", that are not those of the served files."""
+    stages = json.loads((db / "manifest.json").read_bytes())["stages"]
+    sizes = {stage: _sizes(db, record["outputs"]) for stage, record in stages.items()}
+    headers = [read_header(path.read_bytes()) for path in sorted(db.glob("www/textures/*.ptm"))]
+    finest = [(header.levels[-1], header.texel_bytes) for header in headers]
+    counts: dict[str, dict[str, int]] = {
+        "textures": {
+            "textures": len(headers),
+            "ptm_bytes": sum(n for f, n in sizes["textures"].items() if f.endswith(".ptm")),
+            "raw_bytes": sum(level.width * level.height * texel for level, texel in finest),
+        },
+        "emit": {},
+    }
+    documents = [d for path in sorted(db.glob("www/**/*.wrl")) if (d := _document(path))]
+    if documents:
+        nodes = [node for document in documents for node in document.nodes]
+        index = [n.at("geometry")["coordIndex"] for n in nodes if n.type == "Shape"]
+        counts["emit"] = {
+            "shapes": len(index),
+            "triangles": sum(len(corners) // 4 for corners in index),
+            "viewpoints": sum(node.type == "Viewpoint" for node in nodes),
+        }
+    wrong = set()
+    for stage, own in counts.items():
+        own |= {"files": len(sizes[stage]), "bytes": sum(sizes[stage].values())}
+        listed = stages[stage]["counts"]
+        wrong |= {f"{stage}.{name}" for name in own if listed.get(name, own[name]) != own[name]}
+    return wrong
+
+
+def _sizes(db: Path, names: Iterable[str]) -> dict[str, int]:
+    return {name: (db / name).stat().st_size for name in names}
 
 
 def kinds(www: Path) -> set[str]:
@@ -50,10 +105,10 @@ def kinds(www: Path) -> set[str]:
     return {line.partition(":")[0] for line in disagreements(www)}
 
 
-def _json(path: Path) -> Any:
+def _json(path: Path, schema: str) -> Any:
     try:
-        return json.loads(path.read_bytes())
-    except (OSError, ValueError, RecursionError):
+        return schemas.read(path.read_bytes(), schema)
+    except (OSError, schemas.ShapeError):
         return None
 
 
@@ -64,15 +119,24 @@ def _document(path: Path) -> Document | None:
         return None
 
 
+def _glb(path: Path) -> ReadGlb | None:
+    try:
+        return read_glb(path.read_bytes())
+    except (OSError, FileError):
+        return None
+
+
 # Hints and VRML files
 
 
-def _cells(www: Path, index: Any, documents: Mapping[str, Document]) -> Iterator[str]:
+def _cells(
+    records: Mapping[str, Any], index: Any, documents: Mapping[str, Document]
+) -> Iterator[str]:
     with suppress(KeyError, TypeError):
         known = [cell["name"] for cell in index["cells"]]
         images = [{row["file"], row["fallback"]} - {None} for row in index["textures"]]
         for name in known:
-            record, document = _json(www / f"hints/{name}.json"), documents.get(name)
+            record, document = records.get(name), documents.get(name)
             nodes = document.of_type("PTMCell") if document else []
             if record is None or document is None or len(nodes) != 1 or nodes[0].lacks:
                 continue

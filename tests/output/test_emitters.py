@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -41,11 +41,10 @@ def read_toy(path: str, data: bytes) -> int | None:
     return int(number) if what in ("shapes\n", "cells\n") else None
 
 
-def check_toy(database: ServedDatabase) -> Mapping[str, int]:
+def check_toy(database: ServedDatabase) -> None:
     cells = [path for path in database.contents if path.startswith("toys/")]
     if database.contents.get("toy.txt") != len(cells):
         database.at("toy.txt").add("PTM-D699", "counts other cells than there are")
-    return {"shapes": sum(database.contents[path] for path in cells)}
 
 
 @pytest.fixture

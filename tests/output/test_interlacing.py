@@ -18,6 +18,7 @@ from ptmtools.neighbours.interlace.steps import scaled
 from ptmtools.output import EmitOptions, validate_database
 from ptmtools.texture import decode
 from ptmtools.texture.images import Picture
+from tests.output.agreement import disagreements
 
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_data"
 FORMATS = "vrml,gltf,interlace"
@@ -122,7 +123,7 @@ def edited(change: Callable[[dict], object]) -> Callable[[Path], None]:
         (lambda folder: (folder / "3.png").unlink(), {"D651", "D803"}),
         (lambda folder: (folder / "interlace.json").unlink(), {"D651", "D671"}),
         (lambda folder: (folder / "interlace.json").write_text("{"), {"D652", "D800"}),
-        (edited(lambda d: d["original"].update(width=257)), {"D652", "D710"}),
+        (edited(lambda d: d["original"].update(width=257)), {"D652"}),
         (edited(lambda d: d.update(min=64)), {"D652", "D808"}),
         (lambda folder: shutil.copytree(folder, folder.with_name("zz")), {"D653", "D710"}),
         (lambda folder: (folder / "4.png").write_bytes(b""), {"D653"}),
@@ -142,8 +143,14 @@ def test_the_set_of_another_texture(db: Path) -> None:
     one, other = (f for f in sorted(folder.iterdir()) if (f / "2.png").exists())
     shutil.rmtree(one)
     shutil.copytree(other, one)
-    found = [i for i in validate_database(db, workers=1).issues if i.code == "PTM-D710"]
-    assert [i.file for i in found] == [f"www/interlace/{one.name}/interlace.json"]
+    (line,) = disagreements(db / "www")
+    assert line.startswith(f"set: textures/{one.name}.ptm: ")
+
+
+def test_a_set_of_another_size(db: Path) -> None:
+    folder = min((db / "www/interlace").iterdir())
+    edited(lambda d: d["original"].update(width=d["original"]["width"] + 1))(folder)
+    assert disagreements(db / "www") == [f"set: textures/{folder.name}.ptm: another size"]
 
 
 def test_a_set_of_other_texels(db: Path) -> None:
@@ -159,8 +166,8 @@ def test_a_set_of_other_texels(db: Path) -> None:
             (folder / name).write_bytes(data if isinstance(data, bytes) else data.encode())
         edited(lambda d, old=old: d.update(original=old))(folder)
         assert read_manifest(folder).original == manifest.original
-    found = [i for i in validate_database(db, workers=1).issues if i.code == "PTM-D710"]
-    assert [i.message for i in found] == ["1 texels differ from those of the texture"] * 4
+    lines = disagreements(db / "www")
+    assert [line.rpartition(": ")[2] for line in lines] == ["1 texels differ"] * 4
 
 
 def test_sets_that_the_index_does_not_name(db: Path) -> None:

@@ -22,7 +22,7 @@ from ptmtools.output import EmitOptions, emit, validate_database, validate_ptm
 from ptmtools.output.validation.findings import CODES
 from ptmtools.texture import EncodeOptions, Limits, decode, encode, read_header
 from ptmtools.visibility.model import Pvs
-from tests.output.agreement import disagreements, kinds
+from tests.output.agreement import disagreements, kinds, wrong_counts
 from tests.output.damage import (
     KINDS,
     Damage,
@@ -31,7 +31,6 @@ from tests.output.damage import (
     copied,
     expect,
     hinted,
-    is_planted,
     linked,
     put,
     removed,
@@ -106,7 +105,7 @@ def test_cells_of_several_leaves(roomy: Path) -> None:
         ("leaf_start cell", r"leafStart +\[ 0, 8", "leafStart [ 8, 0"),
         ("leaf_start", r"leafStart +\[ 0, 8", "leafStart [ 0, -8"),
         ("leaf_start cell", r"leafPoint +\[ \d[^]]*\]", "leafPoint [ ]"),
-        ("outside_hull cell", r"leafPoint +\[ (\d+)", "leafPoint [ 99"),
+        ("cell", r"leafPoint +\[ (\d+)", "leafPoint [ 99"),
     ],
 )
 def test_faults_of_leaves(
@@ -116,9 +115,9 @@ def test_faults_of_leaves(
     shutil.copytree(roomy, db)
     replaced(C0, pattern, new)(db)
     seal(db)
-    kind, *differences = expected.split()
-    expect(validate_database(db).issues, kind)
-    assert kinds(db / "www") == set(differences)
+    differences = {word for word in expected.split() if word == "cell"}
+    expect(validate_database(db).issues, expected.removesuffix("cell"))
+    assert kinds(db / "www") == differences
 
 
 @pytest.mark.parametrize("format", ["vrml", "gltf"])
@@ -275,9 +274,14 @@ TWO_SHAPES = (r"\n    coord C[^\n]*", ""), (r"(.*coordIndex \[ )\d+", r"\g<1>99"
 #: A bomb: a thousand times as long as it is.
 LONG = gzip.compress(bytes(1 << 22))
 
-#: The codes that the check reports, and the kinds of differences between VRML files and hints
-#: (`tests.output.agreement`), for each fault. The manifest is written afterwards, so that no hash
-#: reveals the fault. Where a fault makes two files contradict each other, both are named.
+#: Kinds of differences between files (`tests.output.agreement`).
+DIFFERENCES = frozenset(
+    ["cell", "viewpoint", "root", "relation", "openings", "overlap"]
+    + ["shares", "statistics", "texture", "bundle"]
+)
+#: The codes that the check reports, and the kinds of differences between files, for each fault. The
+#: manifest is written afterwards, so that no hash reveals the fault. Where a fault makes two files
+#: contradict each other, both are named.
 FAULTS: list[tuple[str, Damage]] = [
     ("D657 no_file", linked("textures/a.png", "/etc/hostname")),
     ("D657", linked("more", "/etc")),
@@ -328,7 +332,7 @@ FAULTS: list[tuple[str, Damage]] = [
     ("lacks", replaced(ROOT, r"NavigationInfo [^\n]*\n", "")),
     ("lacks", replaced(ROOT, r"fieldOfView [.\d]+", "")),
     ("lacks", replaced(ROOT, "ptm:database 1", "ptm:database 2")),
-    ("lacks", replaced(ROOT, r"bboxSize [^}]*", "")),
+    ("lacks root", replaced(ROOT, r"bboxSize [^}]*", "")),
     ("lacks", replaced(C0, "MFFloat  ach", "MFFloat  share")),
     ("lacks coord_index", all_of(*(replaced(C0, *change) for change in TWO_SHAPES))),
     (
@@ -343,13 +347,16 @@ FAULTS: list[tuple[str, Damage]] = [
     ("no_file cell", replaced(C0, r"\.\./textures/a\.ptm", "../textures/A.ptm")),
     ("no_file cell", replaced(HINTS, r'"textures/a\.png"', '"textures/c.png"')),
     ("no_file cell", replaced(C0, r"\.\./textures/a\.png", "../textures/%61.pn%67%00")),
-    ("no_file", removed(C1)),
+    ("no_file root", removed(C1)),
     ("malformed_url cell", replaced(C0, r"\.\./textures/a\.ptm", "../textures/a.ptm?x")),
     ("malformed_url cell", replaced(C0, r"\.\./textures/a\.ptm", "../textures/a b.ptm")),
     ("malformed_url cell", replaced(C0, r"\.\./textures/a\.ptm", "../textures/%ff.ptm")),
     ("malformed_url cell", replaced(C0, r"\.\./textures/a\.ptm", "")),
-    ("twice D708 index", hinted(lambda d: d["textures"].append(d["textures"][0]))),
-    ("twice index cell viewpoint", hinted(lambda d: d["cells"][2].update(name="c0001"))),
+    ("twice D708 statistics", hinted(lambda d: d["textures"].append(d["textures"][0]))),
+    (
+        "twice index cell viewpoint openings relation",
+        hinted(lambda d: d["cells"][2].update(name="c0001")),
+    ),
     ("twice cell", replaced(C0, r"\.\./textures/a\.png", "../textures/a.ptm")),
     ("D675 D677", all_of(copied(A, "textures/A.ptm"), copied("textures/a.png", "textures/A.png"))),
     ("D675", put("Cells/c0000.txt")),
@@ -378,24 +385,24 @@ FAULTS: list[tuple[str, Damage]] = [
     ("hull", replaced(C0, r"hullPoint +\[ 0 0 -2", "hullPoint   [ 2 2 0")),
     ("hull", replaced(C0, r"hullIndex +\[ \d[^]]*\]", "hullIndex [ ]")),
     ("outside_hull root", replaced(C0, r"(point \[ [^]]*?)4 0 ", r"\g<1>5 0 ")),
-    ("own_first cell", replaced(C0, VISIBLE, r"visibleUrl [ \2, \1, \3 ]")),
+    ("cell", replaced(C0, VISIBLE, r"visibleUrl [ \2, \1, \3 ]")),
     (
-        "own_first ach_length visibility hidden_neighbour cell",
+        "ach_length cell",
         replaced(C0, VISIBLE, "visibleUrl [ ]"),
     ),
     ("ach_length cell", replaced(C0, rf"ach +\[ [.\d]+{S}([.\d]+){S}[.\d]+", r"ach [ 0.8, \1")),
-    ("ach_range cell", replaced(C0, r"\n  ach +\[ [^]]*\]", "\n ach [ 1.5, -0.25, -0.25 ]")),
-    ("ach_sum cell", replaced(C0, r"ach +\[ [.\d]+", "ach [ 0.69998")),
-    ("adjacency cell", replaced(C0, r'adjacentUrl \[ "c0001.wrl" \]', "adjacentUrl [ ]")),
-    ("visibility ach_length cell", replaced(C0, VISIBLE, r"visibleUrl [ \1, \2 ]")),
+    ("cell", replaced(C0, r"\n  ach +\[ [^]]*\]", "\n ach [ 1.5, -0.25, -0.25 ]")),
+    ("cell", replaced(C0, r"ach +\[ [.\d]+", "ach [ 0.69998")),
+    ("cell", replaced(C0, r'adjacentUrl \[ "c0001.wrl" \]', "adjacentUrl [ ]")),
+    ("ach_length cell", replaced(C0, VISIBLE, r"visibleUrl [ \1, \2 ]")),
     (
-        "hidden_neighbour no_file adjacency cell",
+        "no_file cell",
         replaced(C0, 'adjacentUrl \\[ "c0001', 'adjacentUrl [ "c0009'),
     ),
-    ("order visibility cell", replaced(C0, VISIBLE, r"visibleUrl [ \1, \2, \2 ]")),
-    ("order cell", replaced(C0, VISIBLE, r"visibleUrl [ \1, \3, \2 ]")),
-    ("order cell", replaced(C0, 'adjacentUrl \\[ "c0001', 'adjacentUrl [ "c0000.wrl", "c0001')),
-    ("cell_name cell", replaced(C0, r'cellName +"c0000"', 'cellName "c0002"')),
+    ("cell", replaced(C0, VISIBLE, r"visibleUrl [ \1, \2, \2 ]")),
+    ("cell", replaced(C0, VISIBLE, r"visibleUrl [ \1, \3, \2 ]")),
+    ("cell", replaced(C0, 'adjacentUrl \\[ "c0001', 'adjacentUrl [ "c0000.wrl", "c0001')),
+    ("cell", replaced(C0, r'cellName +"c0000"', 'cellName "c0002"')),
     ("root", replaced(ROOT, r'Inline \{ url \[ "cells/c0002[^\n]*\n', "")),
     ("root", replaced(ROOT, r'(Inline \{ url \[ "cells/c0002[^\n]*\n)', r"\1\1")),
     ("root", replaced(ROOT, r"bboxSize 4 4 4", "bboxSize 4 3 4")),
@@ -416,10 +423,10 @@ FAULTS: list[tuple[str, Damage]] = [
     ("D700", appended(HINTS, b"}")),
     ("D700", put(HINTS, b"[" * 100_000)),
     ("D700", put(R0, b"[]")),
-    ("D700 cell", cell(0, lambda c: c["ach"].__setitem__(0, 1.5))),
+    ("D700", cell(0, lambda c: c["ach"].__setitem__(0, 1.5))),
     ("D700", cell(0, lambda c: c["leaves"][0]["faces"][0].append(99))),
-    ("D700", cell(0, lambda c: c["portals"][0].update(neighbour=3))),
-    ("D700", cell(0, lambda c: c["textures"][2].append(2))),
+    ("D700 openings", cell(0, lambda c: c["portals"][0].update(neighbour=3))),
+    ("D700 relation", cell(0, lambda c: c["textures"][2].append(2))),
     ("D700", cell(2, lambda c: c.pop("floor"))),
     ("D700", counted(2, lambda c: c["views"].pop())),
     ("D700", counted(1, lambda c: c["p95"].__setitem__(0, None))),
@@ -430,40 +437,40 @@ FAULTS: list[tuple[str, Damage]] = [
     ("D700", hinted(lambda d: d.update(record="hints/c0000.json"))),
     ("index cell", cell(1, lambda c: c.update(name="c0007"))),
     ("cell", cell(1, lambda c: c["ach"].reverse())),
-    ("index cell", cell(1, lambda c: c["textures"][0].pop())),
+    ("cell relation", cell(1, lambda c: c["textures"][0].pop())),
     ("leaves index cell", cell(1, lambda c: c["leaves"][0]["points"][0].reverse())),
-    ("own_first index cell", cell(1, lambda c: c["visible"].reverse())),
+    ("own_first cell relation", cell(1, lambda c: c["visible"].reverse())),
     ("record_ach statistics cell", cell(1, lambda c: c["ach"].pop())),
     ("record_ach", cell(1, lambda c: c["textures"].pop())),
     ("order cell", cell(1, lambda c: c["adjacent"].reverse())),
-    ("adjacency portals cell", cell(1, lambda c: c["adjacent"].pop())),
+    ("cell openings relation", cell(1, lambda c: c["adjacent"].pop())),
     ("record_ach", cell(1, lambda c: c["ach"].__setitem__(0, 0.6 + 1e-8))),
     ("D703", counted(2, lambda c: c.update(missed=2e-4))),
-    ("D704", hinted(lambda d: d["textures"][0].update(sha256="0" * 64), STATISTICS)),
+    ("texture", hinted(lambda d: d["textures"][0].update(sha256="0" * 64), STATISTICS)),
     ("D704", hinted(lambda d: d["textures"][0]["ends"].pop())),
     ("D704", hinted(lambda d: d["textures"][0].update(texelBytes=1))),
     ("D704", hinted(lambda d: d["textures"][0].update(gpuTexelBytes=3))),
-    ("D704", hinted(lambda d: d["textures"][0]["differences"].pop())),
-    ("D704", hinted(lambda d: d["textures"][0]["differences"].sort(reverse=True))),
-    ("D704", hinted(lambda d: d["textures"][1]["color"].reverse())),
+    ("D704 texture", hinted(lambda d: d["textures"][0]["differences"].pop())),
+    ("texture", hinted(lambda d: d["textures"][0]["differences"].sort(reverse=True))),
+    ("texture", hinted(lambda d: d["textures"][1]["color"].reverse())),
     ("D700", hinted(lambda d: d["textures"][1]["color"].__setitem__(0, 256))),
     ("D700", hinted(lambda d: d["textures"][1]["differences"].__setitem__(1, -1))),
     ("D704", hinted(lambda d: d["textures"][0]["ends"].__setitem__(1, 1))),
     ("D704", hinted(lambda d: d["textures"][0].update(width=23))),
     ("D704", hinted(lambda d: d["textures"][0].update(components=4))),
-    ("D704", hinted(lambda d: d["textures"][0].update(fallbackLevel=0))),
+    ("D704 texture", hinted(lambda d: d["textures"][0].update(fallbackLevel=0))),
     ("D704", hinted(lambda d: d["textures"][0].update(fallbackLevel=99))),
     ("D704", hinted(lambda d: d["textures"][0].update(fallbackLevel=None))),
-    ("D704", coarser(1)),
-    ("D704 fallback_differs first_look", recoded(lambda texels: texels[:, ::-1])),
-    ("portals", cell(1, lambda c: c["portals"].pop())),
-    ("portals", portal(lambda row: row.update(area=99.0))),
+    ("D704 texture", coarser(1)),
+    ("bundle texture", recoded(lambda texels: texels[:, ::-1])),
+    ("openings", cell(1, lambda c: c["portals"].pop())),
+    ("openings", portal(lambda row: row.update(area=99.0))),
     ("portals", portal(lambda row: moved(row, 0, 0, 0.1))),
     ("portals", portal(lambda row: shifted(row, 5.0))),
-    ("portals", portal(lambda row: row["polygon"].append(row["polygon"][0]))),
+    ("openings", portal(lambda row: row["polygon"].append(row["polygon"][0]))),
     ("portals", portal(lambda row: row["polygon"].reverse())),
-    ("portals", cell(0, lambda c: c["portals"][0]["polygon"].reverse())),
-    ("portals", cell(0, lambda c: c["portals"][0].update(area=1.0))),
+    ("portals openings", cell(0, lambda c: c["portals"][0]["polygon"].reverse())),
+    ("openings", cell(0, lambda c: c["portals"][0].update(area=1.0))),
     ("viewpoint_place viewpoint", hinted(lambda d: d["viewpoints"][0].update(cell=2))),
     ("viewpoint", hinted(lambda d: d["viewpoints"][0].update(name="VP_7"))),
     (
@@ -476,20 +483,23 @@ FAULTS: list[tuple[str, Damage]] = [
     ("statistics", counted(0, lambda c: c["seen"].__setitem__(1, 0))),
     ("statistics", counted(1, lambda c: c["p95"].pop())),
     ("statistics", counted(2, lambda c: c["views"][3].__setitem__(0, 0.5))),
-    ("statistics", textured([[[0, 0.5]]] * 3)),
+    ("shares", textured([[[0, 0.5]]] * 3)),
     ("record_ach", textured([[[0, 0.8]], [[0, 0.1]]])),
     ("D708 first_look", unused),
     ("leaves index cell", cell(1, lambda c: c["leaves"][0]["points"][0].__setitem__(1, -1.0))),
     ("leaves", cell(1, lambda c: c["leaves"][0]["faces"].pop())),
     ("leaves", cell(1, lambda c: c["leaves"][0]["faces"][0].reverse())),
     ("leaves", cell(1, lambda c: [loop.reverse() for loop in c["leaves"][0]["faces"]])),
-    ("leaves portals viewpoint_place index cell", misplaced),
-    ("D710 D704", flipped),
-    ("D710 D704", appended(A, b"x")),
-    ("D710 D704", rewritten(A, lambda data: data[:-1])),
-    ("D710 first_look", put(A, b"")),
-    ("fallback_differs", repainted),
-    ("fallback_differs", lambda db: Image.new("RGB", (300, 200)).save(db / "www/textures/a.png")),
+    ("portals viewpoint_place index cell overlap", misplaced),
+    ("D710", flipped),
+    ("D710 texture", appended(A, b"x")),
+    ("D710 texture", rewritten(A, lambda data: data[:-1])),
+    ("D710 bundle", put(A, b"")),
+    ("texture", repainted),
+    (
+        "fallback_differs texture",
+        lambda db: Image.new("RGB", (300, 200)).save(db / "www/textures/a.png"),
+    ),
     ("fallback_unreadable", put("textures/b.png", b"\x89PNG")),
     ("fallback_unreadable", put("textures/b.png", b"")),
     ("fallback_unreadable", rewritten("textures/b.png", lambda data: data[:-20])),
@@ -517,20 +527,20 @@ FAULTS: list[tuple[str, Damage]] = [
     ("other_schema", hinted(lambda d: d.update(schema=3, cells="of another kind"))),
     ("first_look", hinted(lambda d: d.pop("firstLook"))),
     ("first_look", cell(0, lambda c: c.pop("firstLook"))),
-    ("first_look", cell(0, lambda c: c["firstLook"].pop())),
-    ("first_look", cell(0, lambda c: c["firstLook"].reverse())),
+    ("first_look bundle", cell(0, lambda c: c["firstLook"].pop())),
+    ("bundle", cell(0, lambda c: c["firstLook"].reverse())),
     ("first_look", cell(0, lambda c: c["firstLook"].append(c["firstLook"][-1]))),
     ("first_look", cell(0, lambda c: c["firstLook"][0].__setitem__(1, 99))),
     ("D700", cell(0, lambda c: c["firstLook"][0].__setitem__(0, 2))),
-    ("first_look", rewritten("hints/c0001.bin", lambda data: data[:-1])),
-    ("first_look", appended("hints/c0001.bin", b"x")),
-    ("first_look", rewritten("hints/c0001.bin", lambda data: data[:9] + b"x" + data[10:])),
+    ("first_look bundle", rewritten("hints/c0001.bin", lambda data: data[:-1])),
+    ("first_look bundle", appended("hints/c0001.bin", b"x")),
+    ("bundle", rewritten("hints/c0001.bin", lambda data: data[:9] + b"x" + data[10:])),
     ("no_file", removed("hints/c0001.bin")),
     ("needs", needed([[1, 0, 0.2], [0, 0, 0.3]])),
     ("needs", needed([[0, 0, 0.2], [0, 0, 0.3]])),
     ("needs", needed([[0, 3, 0.2, 0.1, 0.1]])),
-    ("needs", needed([[0, 0, 0.1, 0.2]])),
-    ("needs", needed([[0, 0, 0.5], [1, 0, 0.52]])),
+    ("shares", needed([[0, 0, 0.1, 0.2]])),
+    ("shares", needed([[0, 0, 0.5], [1, 0, 0.52]])),
     ("D700", needed([[2, 0, 0.1]])),
     ("D700", needed([[0, 0, 0]])),
     ("D700", needed([[0, 0]])),
@@ -538,10 +548,10 @@ FAULTS: list[tuple[str, Damage]] = [
     ("index", hinted(lambda d: d.update(record="cells/{name}.wrl"))),
     ("twice index", hinted(lambda d: d.update(record="hints/{name}/../statistics.json"))),
     ("twice index", hinted(lambda d: d.update(record="{name}/../hints.json"))),
-    ("index", cell(0, lambda c: c["textures"][1].pop())),
+    ("relation", cell(0, lambda c: c["textures"][1].pop())),
     ("index", hinted(lambda d: d["cells"][1]["box"].__setitem__(3, -0.5))),
-    ("index", hinted(lambda d: d["cells"].pop(), STATISTICS)),
-    ("index", hinted(lambda d: d["textures"].pop(), STATISTICS)),
+    ("statistics", hinted(lambda d: d["cells"].pop(), STATISTICS)),
+    ("statistics", hinted(lambda d: d["textures"].pop(), STATISTICS)),
     ("index", hinted(lambda d: d.update(geometry={"gltf": "cells/{name}.wrl"}))),
     ("index", hinted(lambda d: d["geometry"].clear())),
     ("no_file", hinted(lambda d: d["geometry"].update(usd="usd/{name}.usd"))),
@@ -560,21 +570,23 @@ def test_each_planted_fault_is_found(
     damage(database)
     seal(database)
     report = validate_database(database)
-    differences = {word for word in expected.split() if word in ("cell", "viewpoint")}
+    differences = {word for word in expected.split() if word in DIFFERENCES}
     expect(report.issues, " ".join(word for word in expected.split() if word not in differences))
     assert kinds(database / "www") == differences, disagreements(database / "www")
     assert report.ok == all(CODES[i.code][0] == "warning" for i in report.issues)
 
 
-def test_symmetry_in_the_hints_alone(database: Path, seal: Damage) -> None:
-    """Relations that a client of the hints relies on are checked there, too."""
+def test_symmetry_in_the_hints_alone(database: Path) -> None:
+    """Relations that a client of the hints relies on are compared there, too."""
     cell(0, lambda c: c["visible"].remove(2))(database)
     cell(0, lambda c: c["adjacent"].append(2))(database)
-    seal(database)
-    issues = validate_database(database).issues
-    for kind, number in (("adjacency", 2), ("visibility", 0), ("hidden_neighbour", 0)):
-        files = {issue.file for issue in issues if is_planted(issue, kind)}
-        assert f"www/hints/c000{number}.json" in files, kind
+    lines = disagreements(database / "www")
+    for line in (
+        "relation: 2: 0 is visible, but not the reverse",
+        "relation: 0: 2 is adjacent, but not the reverse",
+        "relation: 0: {2} adjacent, but not visible",
+    ):
+        assert line in lines
 
 
 def test_fields_of_later_releases_are_passed_over(database: Path, seal: Damage) -> None:
@@ -664,40 +676,26 @@ def with_stage(db: Path, name: str, **record: object) -> None:
     path.write_text(json.dumps(document))
 
 
-GOOD_COUNTS = {
-    "textures": {"textures": 2, "ptm_bytes": None, "raw_bytes": 16 * 24 * 3 + 9 * 5 * 4},
-    "emit": {"files": 12, "bytes": None, "shapes": None, "triangles": None, "viewpoints": 3},
-}
-
-
-@pytest.mark.parametrize("stage", GOOD_COUNTS)
+@pytest.mark.parametrize("stage", ["textures", "emit"])
 def test_counts(database: Path, stage: str) -> None:
     served = database / "www"
-    counts = dict(GOOD_COUNTS[stage])
+    counts = {"textures": 2, "raw_bytes": 16 * 24 * 3 + 9 * 5 * 4}
     if stage == "textures":
         counts["ptm_bytes"] = sum(p.stat().st_size for p in served.glob("textures/*.ptm"))
     else:
         text = "".join(p.read_text() for p in served.glob("cells/*.wrl"))
-        files = (p for p in served.rglob("*.*") if p.parent.name != "textures")
+        files = [p for p in served.rglob("*.*") if p.parent.name != "textures"]
+        counts = {"files": len(files), "viewpoints": 3, "shapes": text.count(" Shape {")}
         counts["bytes"] = sum(p.stat().st_size for p in files)
-        counts["shapes"] = text.count(" Shape {")
         counts["triangles"] = sum(
             index.count("-1") for index in re.findall(r" coordIndex [^]]*", text)
         )
     with_stage(database, stage, counts=counts)
-    assert findings(database) == []
-    large = validate_database(database, limits=Limits(decoded_bytes=300))
-    assert "PTM-D699" not in {issue.code for issue in large.issues}, (
-        "what is not read is not counted"
-    )
+    assert wrong_counts(database) == set()
     for name, count in counts.items():
         with_stage(database, stage, counts={name: count + 1})
-        (issue,) = validate_database(database).issues
-        assert (issue.code, issue.place) == ("PTM-D699", f"stages.{stage}.counts.{name}")
+        assert wrong_counts(database) == {f"{stage}.{name}"}
         with_stage(database, stage, counts={name: count})
-    appended("textures/b.ptm" if stage == "textures" else ROOT, b"\n")(database)
-    with_stage(database, stage, counts=dict.fromkeys(counts, -1))
-    assert "PTM-D699" not in codes(database), "where a file is not as it was, nothing is counted"
 
 
 def test_a_stale_stage(database: Path) -> None:

@@ -1,8 +1,9 @@
-"""The check of a database on disk, or of one `.ptm`: everything that a client may rely on.
+"""The check of a database on disk, or of one `.ptm`: what can be damaged or hurt a client.
 
-Each file is read once, compared with its hash in the manifest, and then with the other files, by
-the checks of the forms (`Emitter.check`). No issue ends the check: unreadable files are left out of
-the comparisons that need them.
+Each file is read once, compared with its hash in the manifest, and checked by itself; then the
+checks of the forms (`Emitter.check`) follow the references between the files. That different forms
+of one cell agree is a matter of the emitters and their tests. No issue ends the check: unreadable
+files are left out.
 
 Several threads read files, since decoding textures and hashing, most of the work, release the
 interpreter lock. Their issues are gathered in the order of the files.
@@ -24,18 +25,14 @@ from ptmtools.diagnostics import Findings, Place, ValidationReport, one_line
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.files import open_regular
 from ptmtools.output.emitter import GZIP, Emitter
-from ptmtools.output.emitters import (
-    all_emitters,
-    chosen_emitters,
-    owner_of,
-)
+from ptmtools.output.emitters import all_emitters, chosen_emitters, owner_of
 from ptmtools.output.model import FileError
 from ptmtools.output.names import HINTS, OCTREE_FOLDER, TEXTURE_FOLDER
 from ptmtools.output.options import EmitOptions
 from ptmtools.output.validation.files import ServedDatabase, check_gzip, check_names, served_files
 from ptmtools.output.validation.findings import CODES
 from ptmtools.output.validation.hints import gather
-from ptmtools.output.validation.textures import ReadTexture, check_ptm, read_png, read_texture
+from ptmtools.output.validation.textures import read_png, read_ptm
 from ptmtools.progress import Progress, silent
 from ptmtools.quantities import count
 from ptmtools.store.layout import MANIFEST, SERVED
@@ -45,9 +42,8 @@ from ptmtools.texture.model import Limits
 _LISTED = 3
 #: Bytes hashed at a time, of a file beyond the limit.
 _PIECE = 1 << 20
-#: The stages that write served files, and the record of a stage that has not run.
-_TEXTURES, _EMIT = "textures", "emit"
-_NO_RECORD: dict[str, dict[str, Any]] = {"parameters": {}, "outputs": {}, "counts": {}}
+#: The stage that writes the forms.
+_EMIT = "emit"
 _LIMITS = Limits()
 
 
@@ -99,7 +95,7 @@ def validate_ptm(path: str | os.PathLike[str], *, limits: Limits = _LIMITS) -> V
             file=file,
             remedy="check the name and the permissions",
         ) from fault
-    check_ptm(data, limits, at)
+    read_ptm(data, limits, at)
     return ValidationReport(findings.issues(), 1, len(data))
 
 
@@ -111,13 +107,11 @@ class FileReading:
     ----------
     findings: faults of the file by itself.
     size: bytes; None if it could not be read.
-    intact: whether its hash is that of the manifest and its format is sound.
-    content: a `ReadTexture` of a `.ptm`, the result of `Checker.read` of an emitter's file.
+    content: as in `ServedDatabase.contents`.
     """
 
     findings: Findings
     size: int | None = None
-    intact: bool = False
     content: object | None = None
 
 
@@ -156,17 +150,15 @@ class FileReader:
             at.add("PTM-D651", f"cannot be read ({fault.strerror or fault})")
             return reading
         reading.size = size
-        reading.intact = self.outputs.get(name) == digest
         if self.outputs and name not in self.outputs:
             at.add("PTM-D653", "no stage wrote this file")
         elif self.outputs.get(name, digest) != digest:
             at.add("PTM-D652", "the hash differs from the manifest's")
         if data is None:
-            reading.intact = False
             at.add("PTM-D713", f"{size} bytes")
         elif name.startswith(f"{SERVED}/"):
             with np.errstate(all="ignore"):  # which each thread has of its own
-                self._parse(reading, name, data, digest, at)
+                reading.content = self._parse(name, data, at)
         return reading
 
     def _content(self, name: str) -> tuple[int, bytes | None, str]:
@@ -181,24 +173,22 @@ class FileReader:
                 digest.update(piece)
             return size, None, digest.hexdigest()
 
-    def _parse(self, reading: FileReading, name: str, data: bytes, digest: str, at: Place) -> None:
+    def _parse(self, name: str, data: bytes, at: Place) -> object | None:
         stem, suffix = os.path.splitext(name)
         path = name.removeprefix(f"{SERVED}/")
         emitter = owner_of(path)
         if suffix == GZIP:
             check_gzip(data, self._neighbour(stem), at)
-        elif suffix == ".png" and emitter is None and not self._is_served(f"{stem}.ptm"):
-            read_png(data, self.limits, at)
+        elif suffix == ".png" and emitter is None:
+            return read_png(data, self.limits, at)
         elif suffix == ".ptm":
-            fallback = self._neighbour(f"{stem}.png")
-            reading.content = read_texture(data, digest, fallback, self.limits, at)
-            reading.intact &= reading.content is not None
+            return read_ptm(data, self.limits, at)
         elif emitter and emitter.reader:
             try:
-                reading.content = emitter.reader.load()(path, data)
+                return emitter.reader.load()(path, data)
             except FileError as fault:
                 at.add(fault.code, fault.message, fault.place)
-            reading.intact &= reading.content is not None
+        return None
 
     def _is_served(self, name: str) -> bool:
         return name.removeprefix(f"{SERVED}/") in self.served
@@ -225,20 +215,14 @@ class _Check:
         self._stages: dict[str, dict[str, Any]] = {}
         #: Name relative to the database → hash in the manifest.
         self._outputs: dict[str, str] = {}
-        #: Bytes of the intact files.
-        self._sizes: dict[str, int] = {}
-        self._strays = False
 
     def run(self, progress: Progress, workers: int) -> None:
         self._read_manifest()
         served = served_files(self._folder / SERVED, self.findings)
         check_names(served, self.findings)
-        database = ServedDatabase(
-            self._folder / SERVED, served, self.findings, self._limits, all_emitters()
-        )
+        database = ServedDatabase(self._folder / SERVED, served, self.findings, self._limits)
         ours = {path for path in served if self._is_ours(path)}
         self._note_foreign([path for path in served if path not in ours])
-        self._strays = any(f"{SERVED}/{path}" not in self._outputs for path in ours)
         self._read_files(ours, database, progress, workers)
         if _EMIT not in self._stages and not any(e.entry in ours for e in all_emitters()):
             database.at(HINTS).add("PTM-D655", f"the stage `{_EMIT}` has not run")
@@ -250,12 +234,9 @@ class _Check:
                 if not (name.endswith("/") or name in ours or f"{SERVED}/{name}" in self._outputs):
                     database.at(name).add("PTM-D651", "missing")
         database.hints = gather(database)
-        counts: dict[str, int] = {}
         for emitter in present:
             if emitter.check:
-                counts |= emitter.check.load()(database)
-        self._check_counts(_TEXTURES, _texture_counts(self._sizes, database))
-        self._check_counts(_EMIT, counts)
+                emitter.check.load()(database)
         for path in sorted(ours - database.named):
             if path.startswith((f"{TEXTURE_FOLDER}/", f"{OCTREE_FOLDER}/")):
                 database.at(path).add("PTM-D677", "no other file names it")
@@ -298,10 +279,9 @@ class _Check:
 
     def _chosen(self, present: Sequence[Emitter]) -> Sequence[Emitter]:
         """The emitters that the manifest names; if it names none, those present or the default."""
-        format = self._stages.get(_EMIT, _NO_RECORD)["parameters"].get("format")
         try:
-            return chosen_emitters(str(format))
-        except ValueError:
+            return chosen_emitters(str(self._stages[_EMIT]["parameters"]["format"]))
+        except (KeyError, ValueError):
             return present or chosen_emitters(EmitOptions().format)
 
     def _read_files(
@@ -318,33 +298,6 @@ class _Check:
                 continue
             self.files += 1
             self.bytes += reading.size
-            path = names[i].removeprefix(f"{SERVED}/")
-            if reading.intact:
-                self._sizes[names[i]] = reading.size
-            if isinstance(reading.content, ReadTexture):
-                database.textures[path] = reading.content
-            elif reading.content is not None:
-                database.contents[path] = reading.content
+            if reading.content is not None:
+                database.contents[names[i].removeprefix(f"{SERVED}/")] = reading.content
         progress(len(names), len(names), "files")
-
-    def _check_counts(self, stage: str, counts: Mapping[str, int]) -> None:
-        """Compares a stage's counts in the manifest with those of its files, if all of these are
-        intact and there are no others."""
-        record = self._stages.get(stage, _NO_RECORD)
-        if self._strays or record["outputs"].keys() - self._sizes.keys():
-            return
-        sizes = [self._sizes[name] for name in record["outputs"]]
-        for name, actual in {"files": len(sizes), "bytes": sum(sizes), **counts}.items():
-            if record["counts"].get(name, actual) != actual:
-                message = f"is {record['counts'][name]!r}, but the files have {actual}"
-                self._manifest.at(f"stages.{stage}.counts.{name}").add("PTM-D699", message)
-
-
-def _texture_counts(sizes: Mapping[str, int], database: ServedDatabase) -> dict[str, int]:
-    headers = [texture.header for texture in database.textures.values()]
-    finest = [(header.levels[-1], header.texel_bytes) for header in headers]
-    return {
-        "textures": len(headers),
-        "ptm_bytes": sum(sizes.get(f"{SERVED}/{path}", 0) for path in database.textures),
-        "raw_bytes": sum(level.width * level.height * texel for level, texel in finest),
-    }

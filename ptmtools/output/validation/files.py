@@ -16,8 +16,6 @@ from urllib.parse import unquote_to_bytes
 
 from ptmtools.diagnostics import Findings, Issue, Place
 from ptmtools.files import open_regular
-from ptmtools.output.emitter import Emitter
-from ptmtools.output.validation.textures import ReadTexture
 from ptmtools.store.layout import SERVED
 from ptmtools.texture.model import Limits
 
@@ -123,14 +121,12 @@ class ReadHints:
     index: the object in `hints.json`.
     paths: for each cell the path of its record in the served folder, present or not.
     records: for each cell its record, or None if it is missing or invalid.
-    statistics: rows aligned with the index, or None.
     images: the files of each texture.
     """
 
     index: Row
     paths: Sequence[str]
     records: Sequence[Row | None]
-    statistics: Row | None
     images: Sequence[Images]
 
     def urls(self, form: str) -> list[str] | None:
@@ -155,9 +151,8 @@ class ServedDatabase:
     folder: the served folder.
     files: all paths.
     limits: of the check.
-    emitters: all forms.
-    contents: the result of the form's reader for each file that could be read.
-    textures: each `.ptm` that could be read.
+    contents: for each file that could be read its header if it is a `.ptm`, (width, height) of a
+        fallback image, and the result of the form's reader of other files.
     hints: None without a readable index.
     named: the files that some URL names.
     """
@@ -168,12 +163,10 @@ class ServedDatabase:
         files: Iterable[str],
         findings: Findings,
         limits: Limits = _LIMITS,
-        emitters: Sequence[Emitter] = (),
     ) -> None:
-        self.folder, self.limits, self.emitters = folder, limits, emitters
+        self.folder, self.limits = folder, limits
         self.files = set(files)
         self.contents: dict[str, Any] = {}
-        self.textures: dict[str, ReadTexture] = {}
         self.hints: ReadHints | None = None
         self.named: set[str] = set()
         self._findings = findings

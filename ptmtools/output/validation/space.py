@@ -1,4 +1,4 @@
-"""Convex bodies, and the check of the hints in space: leaves, portals between them, viewpoints.
+"""Convex bodies, and the check of the hints in space: leaves, portals and viewpoints.
 
 All in float64 with the distances of `Tolerance`. A body is its planes: (f, 4) outward unit normals
 and offsets, so that n·x + d is the distance of x in front of a plane.
@@ -6,9 +6,7 @@ and offsets, so that n·x + d is the distance of x in front of a plane.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import chain
 from typing import Any
 
@@ -16,19 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.diagnostics import Place
-from ptmtools.tolerance import TIE_SHARE, Tolerance
+from ptmtools.tolerance import Tolerance
 
 Row = Mapping[str, Any]
+Points = NDArray[np.float64]
+Planes = NDArray[np.float64]
 
-
-@dataclass(frozen=True)
-class _Leaf:
-    """A leaf of the hints: its cell, its place in the record, (n, 3) points; planes if valid."""
-
-    cell: int
-    place: Place
-    points: Points
-    planes: Planes | None
+#: Largest number of corners of a cell: the time of `convex_hull` grows by their square.
+MOST_CORNERS = 1 << 14
+#: Distances computed at a time.
+_BATCH = 1 << 22
 
 
 def check_space(
@@ -36,138 +31,61 @@ def check_space(
 ) -> None:
     """Checks the leaves and portals of the records, whose places are ``places``, and the viewpoints
     of the index, whose place is ``at``; all indices must be in range."""
-    read = [
-        (i, places[i].at(f"leaves[{k}]"), leaf, np.array(leaf["points"], np.float64))
+    leaves = [
+        (i, k, leaf, np.array(leaf["points"], np.float64))
         for i, record in enumerate(records)
         for k, leaf in enumerate(record["leaves"] if record is not None else ())
     ]
-    if not read:
+    if not leaves:
         return
-    tolerance = Tolerance.for_points(np.concatenate([points for *_, points in read]))
-    leaves: list[_Leaf] = []
-    for cell, place, leaf, points in read:
-        try:
-            planes = solid_planes(points, leaf["faces"], tolerance)
-        except SolidError as fault:
-            place.add("PTM-D683", str(fault))
-            planes = None
-        leaves.append(_Leaf(cell, place, points, planes))
-    _check_apart(leaves, tolerance)
+    tolerance = Tolerance.for_points(np.concatenate([points for *_, points in leaves]))
     bodies: list[list[Planes]] = [[] for _ in records]
-    for each in leaves:
-        if each.planes is not None:
-            bodies[each.cell].append(each.planes)
-    _check_portals(records, bodies, tolerance, places)
+    for i, k, leaf, points in leaves:
+        try:
+            bodies[i].append(solid_planes(points, leaf["faces"], tolerance))
+        except SolidError as fault:
+            places[i].add("PTM-D683", str(fault), f"leaves[{k}]")
+    for i, record in enumerate(records):
+        for k, portal in enumerate(record["portals"] if record is not None else ()):
+            polygon = np.array(portal["polygon"], np.float64)
+            if message := _portal_fault(polygon, bodies[i], tolerance):
+                places[i].add("PTM-D699", message, f"portals[{k}]")
     for i, view in enumerate(viewpoints):
-        inside = _inside(bodies[view["cell"]], np.array([view["position"]], np.float64), tolerance)
-        if bodies[view["cell"]] and not inside:
+        around, eye = bodies[view["cell"]], np.array([view["position"]], np.float64)
+        if around and min(farthest(planes, eye)[0] for planes in around) > tolerance.plane:
             message = f"does not lie in cell {view['cell']}"
             at.add("PTM-D699", message, f"viewpoints[{i}].position")
 
 
-def _check_apart(leaves: Sequence[_Leaf], tolerance: Tolerance) -> None:
-    """The centroid of a leaf lies in no other leaf."""
-    middles = np.array([leaf.points.mean(axis=0) for leaf in leaves])
-    order = np.argsort(middles[:, 0], kind="stable")
-    along = middles[order, 0]
-    for k, leaf in enumerate(leaves):
-        if leaf.planes is None:
-            continue
-        low, high = leaf.points.min(axis=0), leaf.points.max(axis=0)
-        near = order[np.searchsorted(along, low[0]) : np.searchsorted(along, high[0], "right")]
-        near = near[((middles[near] >= low) & (middles[near] <= high)).all(axis=1)]
-        within = near[farthest(leaf.planes, middles[near]) < -tolerance.rounding]
-        for other in within[within != k].tolist():
-            leaf_place = f"{leaf.place.file}: {leaf.place.place}"
-            leaves[other].place.add("PTM-D683", f"lies in {leaf_place}")
-
-
-def _check_portals(
-    records: Sequence[Row | None],
-    bodies: Sequence[Sequence[Planes]],
-    tolerance: Tolerance,
-    places: Sequence[Place],
-) -> None:
-    openings: list[Counter[tuple[Any, ...]]] = [Counter() for _ in records]
-    for i, record in enumerate(records):
-        if record is None:
-            continue
-        neighbours = {portal["neighbour"] for portal in record["portals"]}
-        if neighbours != set(record["adjacent"]):
-            places[i].add("PTM-D699", "do not lead to exactly the adjacent cells", "portals")
-        for k, portal in enumerate(record["portals"]):
-            polygon = tuple(map(tuple, portal["polygon"]))
-            openings[i][(portal["neighbour"], polygon, portal["area"])] += 1
-            # The portals of the other direction are these in reverse.
-            if i < portal["neighbour"] and (
-                fault := _portal_fault(portal, bodies[i], bodies[portal["neighbour"]], tolerance)
-            ):
-                places[i].add("PTM-D699", fault, f"portals[{k}]")
-    for i, of_cell in enumerate(openings):
-        for (neighbour, polygon, area), count in of_cell.items():
-            reverse = openings[neighbour][(i, polygon[::-1], area)]
-            if records[neighbour] is not None and reverse != count:
-                message = f"a portal to cell {neighbour} is not in its record in reverse"
-                places[i].add("PTM-D699", message, "portals")
-
-
-def _portal_fault(
-    portal: Row, here: Sequence[Planes], beyond: Sequence[Planes], tolerance: Tolerance
-) -> str:
-    """The fault of a portal between two cells, given by their leaves; "" if there is none."""
-    polygon = np.array(portal["polygon"], np.float64)
+def _portal_fault(polygon: Points, bodies: Sequence[Planes], tolerance: Tolerance) -> str:
+    """The fault of a portal of the cell with these leaves; "" if there is none."""
     try:
         plane = polygon_plane(polygon, tolerance)
     except SolidError as fault:
         return str(fault)
-    area = polygon_area(polygon)
-    slack = tolerance.plane * tolerance.extent
-    if not portal["area"] <= area * (1 + TIE_SHARE) + slack:
-        return "has an area larger than its polygon"
+    arms = polygon - polygon[0]
+    area = float(np.linalg.norm(np.cross(arms[1:-1], arms[2:]).sum(axis=0)) / 2)
     # A sliver, whose plane is arbitrary, need only lie in the body.
     if area <= 2 * tolerance.plane * float(np.linalg.norm(np.ptp(polygon, axis=0))):
         plane = None
-    for bodies, inwards, cell in ((here, 1.0, "this cell"), (beyond, -1.0, "its neighbour")):
-        # Invalid leaves are reported elsewhere.
-        if bodies and not any(_in_face(b, polygon, plane, inwards, tolerance) for b in bodies):
-            return f"does not lie in a face of {cell}, or faces the wrong way"
+    # Invalid leaves are reported elsewhere.
+    if bodies and not any(_in_face(planes, polygon, plane, tolerance) for planes in bodies):
+        return "does not lie in a face of this cell, or faces the wrong way"
     return ""
 
 
 def _in_face(
-    planes: Planes,
-    polygon: Points,
-    plane: NDArray[np.float64] | None,
-    inwards: float,
-    tolerance: Tolerance,
+    planes: Planes, polygon: Points, plane: NDArray[np.float64] | None, tolerance: Tolerance
 ) -> bool:
-    """Whether a polygon lies in a face of a body, with its normal times ``inwards`` pointing into
-    the body; for a sliver, without a plane, whether it lies in the body."""
-    if not farthest(planes, polygon).max() <= tolerance.plane:
+    """Whether a polygon lies in a face of a body, with its normal pointing into the body; for a
+    sliver, without a plane, whether it lies in the body."""
+    distance = polygon @ planes[:, :3].T + planes[:, 3]
+    if not distance.max() <= tolerance.plane:
         return False
     if plane is None:
         return True
-    distance = np.abs(polygon @ planes[:, :3].T + planes[:, 3]).max(axis=0)
-    turned = planes[:, :3] @ plane[:3] * inwards <= -tolerance.cosine
-    return bool((turned & (distance <= tolerance.plane)).any())
-
-
-def _inside(bodies: Sequence[Planes], points: Points, tolerance: Tolerance) -> bool:
-    return any((farthest(planes, points) <= tolerance.plane).all() for planes in bodies)
-
-
-Points = NDArray[np.float64]
-
-
-Planes = NDArray[np.float64]
-
-
-#: Largest number of corners of a cell: the time of `convex_hull` grows by their square.
-MOST_CORNERS = 1 << 14
-
-
-#: Distances computed at a time.
-_BATCH = 1 << 22
+    turned = planes[:, :3] @ plane[:3] <= -tolerance.cosine
+    return bool((turned & (np.abs(distance).max(axis=0) <= tolerance.plane)).any())
 
 
 class SolidError(Exception):
@@ -230,12 +148,6 @@ def polygon_plane(polygon: Points, tolerance: Tolerance) -> Planes | None:
     if not inside.min(initial=0.0) >= -tolerance.plane:
         raise SolidError("is not convex")
     return plane
-
-
-def polygon_area(polygon: Points) -> float:
-    """m²."""
-    arms = polygon - polygon[0]
-    return float(np.linalg.norm(np.cross(arms[1:-1], arms[2:]).sum(axis=0)) / 2)
 
 
 def farthest(planes: Planes, points: Points) -> Points:

@@ -1,164 +1,142 @@
-"""The check of textures: each by itself, against its fallback image and its row in the hints."""
+"""The check of the textures and the octree textures (docs/formats/apo.md), and of their rows in the
+hints."""
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ptmtools.diagnostics import Place
-from ptmtools.errors import LimitError, PtmError
+from ptmtools.errors import InputError, LimitError, PtmError
+from ptmtools.output.names import HINTS
+from ptmtools.output.validation.files import ReadHints, ServedDatabase
 from ptmtools.texture.model import gpu_texel_bytes
 
 if TYPE_CHECKING:
     from ptmtools.texture import Limits, PtmHeader
-    from ptmtools.texture.detail import Detail
-
-    Samples = NDArray[Any]
 
 _PNG = b"\x89PNG\r\n\x1a\n"
-#: Relative slack of `differences` of levels, which are rounded, and summed in another order here.
-_DIFFERENCE_SLACK = 0.01
 #: Of the first chunk of a PNG: its length and kind, width and height.
 _IHDR = struct.Struct(">I4sII")
+#: Texels of an octree take less than this many bytes, however they are deflated: the texels are
+#: fewer than the addresses.
+_MOST_BYTES = 1 << 27
 
 
-@dataclass(frozen=True)
-class ReadTexture:
-    """The properties of a `.ptm` that the hints repeat.
-
-    Attributes
-    ----------
-    header: of the file.
-    sha256: hex digest of its bytes.
-    detail: of its levels; None if they could not be decoded.
-    fallback_level: the level with the size of the fallback image; None without an image or such a
-        level.
-    """
-
-    header: PtmHeader
-    sha256: str
-    detail: Detail | None = None
-    fallback_level: int | None = None
-
-
-def read_texture(
-    data: bytes, digest: str, fallback: bytes | None, limits: Limits, at: Place
-) -> ReadTexture | None:
-    """A `.ptm` and its fallback image, if it has one; None, with PTM-D710, if the header is
-    damaged. A PNG with the size of no level is not decoded."""
-    from ptmtools.texture import decode, read_header
-
-    shown = check_ptm(data, limits, at)
-    detail, texels = shown or (None, None)
-    try:
-        header = read_header(data)
-    except PtmError:
-        return None
-    if fallback is None:
-        return ReadTexture(header, digest, detail)
-    png, size = f"{at.file.removesuffix('.ptm')}.png", _png_size(fallback)
-    level = next((n for n, v in enumerate(header.levels) if (v.width, v.height) == size), None)
-    if size is not None and level is None:
-        message = f"{png} is {size[0]} x {size[1]}, which is not the size of any level"
-        at.add("PTM-D710", message)
-        return ReadTexture(header, digest, detail)
-    other = read_png(fallback, limits, at.findings.at(png))
-    if level is not None and texels is not None and other is not None:
-        if level < len(header.levels) - 1:
-            texels = decode(data, level, limits)
-        if not _same_image(texels, other):
-            at.add("PTM-D710", f"differs from {png}", f"level {level}")
-    return ReadTexture(header, digest, detail, level)
-
-
-def check_ptm(data: bytes, limits: Limits, at: Place) -> tuple[Detail, Samples] | None:
-    """Checks every group of a `.ptm`. Returns the detail of its levels and the texels of the
-    finest; None after a fault."""
-    from ptmtools.texture.reader import examine
+def read_ptm(data: bytes, limits: Limits, at: Place) -> PtmHeader | None:
+    """Decodes every group of a `.ptm`; its header, None with PTM-D710 if that is damaged."""
+    from ptmtools.texture import read_header
+    from ptmtools.texture.reader import faults_of
 
     try:
-        faults, shown = examine(data, limits)
+        faults = faults_of(data, limits)
     except LimitError as limit:
         # Exceeding the caller's limit is no damage; exceeding the format's is.
         at.add("PTM-D713" if limit.code == "PTM-L103" else "PTM-D710", limit.message)
+    else:
+        for fault in faults:
+            at.add("PTM-D710", fault.partition(" [PTM-")[0])
+    try:
+        return read_header(data)
+    except PtmError:
         return None
-    for fault in faults:
-        at.add("PTM-D710", fault.partition(" [PTM-")[0])
-    return shown
 
 
-def read_png(data: bytes, limits: Limits, at: Place) -> Samples | None:
-    """The texels of a PNG, (h, w, c); None, with PTM-D710 or PTM-D713, if it cannot be read."""
+def read_png(data: bytes, limits: Limits, at: Place) -> tuple[int, int] | None:
+    """Decodes a PNG; its width and height, None with PTM-D710 if it is none."""
     from ptmtools.texture import load_image
 
-    if _png_size(data) is None:
+    if not data.startswith(_PNG) or len(data) < len(_PNG) + _IHDR.size:
+        at.add("PTM-D710", "is not a PNG")
+        return None
+    length, kind, width, height = _IHDR.unpack_from(data, len(_PNG))
+    if (length, kind) != (13, b"IHDR"):
         at.add("PTM-D710", "is not a PNG")
         return None
     try:
-        return load_image(data, limits).array()
+        load_image(data, limits)
     except PtmError as fault:
         code = "PTM-D713" if isinstance(fault, LimitError) else "PTM-D710"
         at.add(code, f"cannot be read ({fault.message})")
-        return None
+    return width, height
 
 
-def check_record(record: Mapping[str, Any], texture: ReadTexture, at: Place) -> None:
-    """Compares a row of `textures` in `hints.json` with its `.ptm`."""
-    header = texture.header
+def check_record(
+    record: Mapping[str, Any], header: PtmHeader, image: tuple[int, int] | None, at: Place
+) -> None:
+    """Compares a row of `textures` in `hints.json` with its `.ptm` and with the width and height of
+    its fallback image."""
     finest = header.levels[-1]
-    faults = _differing(
-        record,
-        {
-            "components": header.components,
-            "width": finest.width,
-            "height": finest.height,
-            "texelBytes": header.texel_bytes,
-            "gpuTexelBytes": gpu_texel_bytes(header.texel_bytes, header.components),
-            "ends": [level.end for level in header.levels],
-        },
-    )
-    if texture.detail:
-        faults += _differing(record, {"color": list(texture.detail.color)})
-        actual = texture.detail.differences
-        listed = record.get("differences", actual)
-        if len(listed) != len(actual) or not np.allclose(listed, actual, _DIFFERENCE_SLACK, 0):
-            faults.append("differences are not those of the levels in the file")
-    fallback, level = record["fallback"], record["fallbackLevel"]
-    if (fallback is None) != (level is None):
-        faults.append("only one of fallback and fallbackLevel is null")
-    elif fallback is not None and texture.fallback_level not in (None, level):
-        faults.append(f"the fallback image is level {texture.fallback_level}, not {level}")
-    for fault in faults:
-        at.add("PTM-D704", fault)
+    actual = {
+        "components": header.components,
+        "width": finest.width,
+        "height": finest.height,
+        "texelBytes": header.texel_bytes,
+        "gpuTexelBytes": gpu_texel_bytes(header.texel_bytes, header.components),
+        "ends": [level.end for level in header.levels],
+    }
+    for name, value in actual.items():
+        if record.get(name, value) != value:
+            at.add("PTM-D704", f"{name} is {value} in the file")
+    if "differences" in record and len(record["differences"]) != len(header.levels):
+        at.add("PTM-D704", "differences are not those of the levels in the file")
+    if (record["fallback"] is None) != (record["fallbackLevel"] is None):
+        at.add("PTM-D704", "only one of fallback and fallbackLevel is null")
+    elif image is not None:
+        sizes = [(level.width, level.height) for level in header.levels]
+        level = sizes.index(image) if image in sizes else None
+        if level is None:
+            message = f"is {image[0]} x {image[1]}, which is not the size of any level"
+            at.add("PTM-D710", f"{record['fallback']} {message}")
+        elif level != record["fallbackLevel"]:
+            message = f"the fallback image is level {level}, not {record['fallbackLevel']}"
+            at.add("PTM-D704", message)
 
 
-def _differing(row: Mapping[str, Any], actual: Mapping[str, Any]) -> list[str]:
-    """The fields of a row that differ from the file."""
-    return [f"{name} is {v} in the file" for name, v in actual.items() if row.get(name, v) != v]
+def check_octrees(hints: ReadHints, database: ServedDatabase) -> None:
+    """Checks each octree texture: its row, its length, its levels and the order of its texels."""
+    rows = hints.index.get("octrees", ())
+    files = database.resolve_each(HINTS, "octrees", [row["file"] for row in rows])
+    for i, (row, file) in enumerate(zip(rows, files, strict=True)):
+        if fault := _row_fault(row):
+            database.at(HINTS, f"octrees[{i}]").add("PTM-D700", fault)
+        elif file:
+            _check_octree(row, database.head(file, row["ends"][-1] + 1), database.at(file))
 
 
-def _png_size(data: bytes) -> tuple[int, int] | None:
-    if not data.startswith(_PNG) or len(data) < len(_PNG) + _IHDR.size:
-        return None
-    length, kind, width, height = _IHDR.unpack_from(data, len(_PNG))
-    return (width, height) if (length, kind) == (13, b"IHDR") else None
+def _row_fault(row: Mapping[str, Any]) -> str:
+    """The fault of a row by itself; "" if there is none."""
+    from ptmtools.neighbours.apo.model import ADDRESS_BITS
+
+    levels, ends = row["levels"], row["ends"]
+    if not len(levels) == len(ends) == len(row["crc32"]):
+        return "levels, ends and crc32 are not aligned"
+    if min(b - a for a, b in zip([0, *ends], ends, strict=False)) <= 0:
+        return "ends are not in ascending order"
+    if sum(levels) > 1 << ADDRESS_BITS or ends[-1] > _MOST_BYTES:
+        return f"has {sum(levels):,} texels in {ends[-1]:,} bytes, more than an octree can have"
+    return ""
 
 
-def _same_image(one: Samples, other: Samples) -> bool:
-    if one.shape[2] != other.shape[2]:
-        one, other = _rgba(one), _rgba(other)
-    return one.dtype == other.dtype and np.array_equal(one, other)
+def _check_octree(row: Mapping[str, Any], data: bytes, at: Place) -> None:
+    """Inflates the levels of a row, each by itself, and checks that they form an octree."""
+    from ptmtools.neighbours.apo.files import Stream, inflated
+    from ptmtools.neighbours.apo.model import Octree
+    from ptmtools.neighbours.apo.octree import fault_of
 
-
-def _rgba(texels: Samples) -> Samples:
-    """Texels of integers, (h, w, 1 to 4), as red, green, blue and alpha."""
-    count = texels.shape[2]
-    top = np.iinfo(texels.dtype).max if texels.dtype.kind == "u" else 1
-    colour = texels[:, :, :3] if count > 2 else np.repeat(texels[:, :, :1], 3, axis=2)
-    alpha = texels[:, :, count - 1 :] if count in (2, 4) else np.full_like(colour[:, :, :1], top)
-    return np.concatenate([colour, alpha], axis=2)
+    start = np.concatenate([[0], np.cumsum(row["levels"], dtype=np.int64)])
+    if len(data) != row["ends"][-1]:
+        less = len(data) < row["ends"][-1]
+        at.add("PTM-D710", f"ends {'before' if less else 'after'} the last level")
+    try:
+        texels = inflated(data, start, Stream(row["file"], row["ends"], row["crc32"]))
+    except InputError as error:
+        at.add("PTM-D710", error.message, error.place or "")
+        return
+    octree = Octree(texels, start, np.array(row["cube"]["low"]), row["cube"]["side"])
+    if fault := fault_of(octree):
+        place, message = fault
+        at.add("PTM-D710", message, place)
