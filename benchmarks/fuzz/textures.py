@@ -188,7 +188,7 @@ class Images:
         store = ImageStore(Findings(self._file), LIMITS.decoded_bytes)
         texture = Texture(HeldBytes(data), "a/../b.png", "map_Kd", "a.mtl:1")
         decoded = store.add(texture)
-        store.mask_has_holes(texture)
+        store.record(texture, texture.channel)
         assert all("/" not in image.name for image in store.images)
         return "no image" if decoded is None else "in a scene"
 

@@ -130,20 +130,21 @@ def _merge_mask(material: SourceMaterial, store: ImageStore, findings: Findings)
     if mask is None:
         return material
     without = replace(material, mask=None)
-    holes = store.mask_has_holes(mask)
-    if holes is None:  # an unreadable mask must not hide anything
+    opacities = store.record(mask, mask.channel)
+    if opacities is None:  # an unreadable mask must not hide anything
         return replace(without, see_through=True)
-    alpha = None if texture is None else store.has_alpha(texture)
+    image = None if texture is None else store.record(texture)
     own = texture is not None and texture.read == mask.read and mask.channel in ("", "m")
-    if (alpha and own) or not holes:  # the mask is the alpha of the image, or opaque
+    # The mask is the alpha of the image, or opaque.
+    if (image is not None and image.alpha and own) or opacities.bits is None:
         return without
-    colors = None if alpha is None or texture is None else texture.read
+    colors = None if image is None or texture is None else texture.read
     read = MaskedBytes(colors, mask.read, mask.channel, store.limit)
     merged = replace(texture or mask, read=read, what=mask.what, place=mask.place)
     for part in (texture, mask):
         if part is not None:
             store.mark_as_input(part)
-    if store.has_alpha(merged) is None:  # the store has recorded the miss
+    if store.record(merged) is None:
         return replace(without, see_through=True)
     findings.note("PTM-N215", f"{mask.what}: baked into an image as its alpha", mask.place)
     return replace(without, texture=merged)
@@ -198,7 +199,7 @@ def _bake_mirror(
             baked, read=MirroredBytes(texture.read, doubled[0], doubled[1], store.limit)
         )
         store.mark_as_input(texture)  # also if it fails: another image may succeed
-        if store.has_alpha(texture) is None or store.has_alpha(baked) is None:
+        if store.record(texture) is None or store.record(baked) is None:
             wrap_s, wrap_t = emitted_wraps(texture)
             return replace(texture, wrap_s=wrap_s, wrap_t=wrap_t), uv
     findings.note("PTM-N215", f"{texture.what}: mirrored repetition baked in", texture.place)
@@ -247,18 +248,17 @@ def _drop_alpha(
         texture = materials[number].texture
         if texture is None or not materials[number].ignores_alpha:
             continue
-        image = store.holes(texture)
-        if image is None:
+        image = store.record(texture)
+        if image is None or (holes := image.holes) is None:
             continue
-        sha256, holes = image
-        ignoring.append((number, texture, sha256))
-        if sha256 not in visible and uses_holes(holes, uv[rows], *emitted_wraps(texture)):
-            visible.add(sha256)
+        ignoring.append((number, texture, image.sha256))
+        if image.sha256 not in visible and uses_holes(holes, uv[rows], *emitted_wraps(texture)):
+            visible.add(image.sha256)
     for number, texture, sha256 in ignoring:
         if sha256 in visible:
             opaque = replace(texture, read=OpaqueBytes(texture.read, store.limit))
             store.mark_as_input(texture)
-            if store.has_alpha(opaque) is not None:
+            if store.record(opaque) is not None:
                 materials[number] = replace(materials[number], texture=opaque)
     return materials
 

@@ -78,7 +78,7 @@ class VerifiedBytes:
 
 
 @dataclass(frozen=True)
-class _ImageRecord:
+class ImageRecord:
     """Properties of an image: digest, Pillow's name of its format, whether it has an alpha channel,
     and its transparent texels as bits packed along rows; or the reason why it cannot be decoded.
     """
@@ -107,7 +107,7 @@ class ImageStore:
     def __init__(self, findings: Findings, limit: int) -> None:
         self._findings = findings
         self.limit = limit
-        self._examined: dict[tuple[Callable[[], bytes], str | None], _ImageRecord] = {}
+        self._examined: dict[tuple[Callable[[], bytes], str | None], ImageRecord] = {}
         self._index: dict[str, int] = {}
         self._images: list[SourceImage] = []
         self._files: list[set[str]] = []
@@ -142,9 +142,9 @@ class ImageStore:
         progress(len(pending), len(pending), "images")
 
     def add(self, texture: Texture) -> tuple[int, NDArray[np.bool_] | None] | None:
-        """The number of a texture's image, and its `holes`; None, and a miss, if it cannot be
-        decoded."""
-        record = self._record(texture)
+        """The number of a texture's image, and its `ImageRecord.holes`; None, and a miss, if it
+        cannot be decoded."""
+        record = self.record(texture)
         if record is None:
             return None
         index = self._index.setdefault(record.sha256, len(self._images))
@@ -170,27 +170,9 @@ class ImageStore:
         if file := self._whole_file(texture):
             self._inputs.add(file)
 
-    def mask_has_holes(self, mask: Texture) -> bool | None:
-        """Whether some texel of a mask (``map_d``) is not opaque; None, and a miss, if it cannot be
-        decoded."""
-        record = self._record(mask, mask.channel)
-        return None if record is None else record.bits is not None
-
-    def has_alpha(self, texture: Texture) -> bool | None:
-        """Whether an image has an alpha channel; None, and a miss, if it cannot be decoded."""
-        record = self._record(texture)
-        return None if record is None else record.alpha
-
-    def holes(self, texture: Texture) -> tuple[str, NDArray[np.bool_]] | None:
-        """The digest of an image, and (H, W), rows from the top, the texels that are not opaque;
-        None if all are, or, with a miss, if it cannot be decoded."""
-        record = self._record(texture)
-        if record is None or (holes := record.holes) is None:
-            return None
-        return record.sha256, holes
-
-    def _record(self, texture: Texture, channel: str | None = None) -> _ImageRecord | None:
-        """The result of `_examine`, cached; None, and a miss, if the image cannot be decoded."""
+    def record(self, texture: Texture, channel: str | None = None) -> ImageRecord | None:
+        """The properties of an image, or with a ``channel`` (`Texture`) those of a mask; None, and
+        a miss, if it cannot be decoded."""
         key = texture.read, channel
         if key not in self._examined:
             with _unwarned():
@@ -217,7 +199,7 @@ class ImageStore:
         return f"{unique}.{_suffix(kind)}"
 
 
-def _examine(texture: Texture, limit: int, channel: str | None = None) -> _ImageRecord:
+def _examine(texture: Texture, limit: int, channel: str | None = None) -> ImageRecord:
     """Reads and decodes an image; ``channel`` as in `_holes`.
 
     Raises LimitError PTM-L104.
@@ -236,10 +218,10 @@ def _examine(texture: Texture, limit: int, channel: str | None = None) -> _Image
     except LimitError:
         raise
     except InputError as error:
-        return _ImageRecord(fault=error.message)
+        return ImageRecord(fault=error.message)
     except OSError as error:
-        return _ImageRecord(fault=error.strerror or str(error))
-    return _ImageRecord(
+        return ImageRecord(fault=error.strerror or str(error))
+    return ImageRecord(
         hashlib.sha256(data).hexdigest(),
         opened.format or "",
         opened.has_transparency_data,

@@ -16,14 +16,13 @@ import numpy as np
 
 from ptmtools import schemas
 from ptmtools.errors import DatabaseError
-from ptmtools.scene.model import Camera, Storey, fields_of
+from ptmtools.scene.model import FACE_ARRAYS, Camera, Storey, fields_of
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.sandbox import run_in_sandbox, unreadable
 from ptmtools.scene.source import FileRange, Source, SourceMaterial, SourceWrap, Texture
 from ptmtools.store.archive import Stored, pack_arrays, unpack_arrays
 
 _ARRAYS = "source.npz"
-_NAMES = ("points", "triangles", "uv", "triangle_object", "triangle_material")
 _FAULTS = (ArithmeticError, LookupError, OSError, TypeError, ValueError, DatabaseError)
 
 
@@ -61,7 +60,7 @@ def pack_source(
     The materials of ``source`` have no textures; ``images`` are their images by number of material.
     ``files`` names the other files that the model consists of, missing ones included.
     """
-    arrays = {name: getattr(source, name) for name in _NAMES}
+    arrays = {name: getattr(source, name) for name in FACE_ARRAYS}
     if source.colors is not None:
         arrays["colors"] = source.colors
     Path(scratch, _ARRAYS).write_bytes(pack_arrays(arrays))

@@ -20,6 +20,8 @@ from ptmtools.scene.orientation import tolerance_of
 from ptmtools.store.archive import Stored
 from ptmtools.tolerance import Tolerance
 
+#: Names of the arrays that the output of a reader and a scene have in common.
+FACE_ARRAYS = ("points", "triangles", "uv", "triangle_object", "triangle_material")
 Wrap = Literal["repeat", "clamp"]
 #: The role of an object by its class in the model: structure, never structure, a door leaf, or ""
 #: if its shape and name decide.
@@ -121,21 +123,6 @@ class Camera:
     field_of_view: float = np.pi / 4
 
 
-def perspective_camera(
-    name: str, position: NDArray[np.float64], direction: NDArray[np.float64], field_of_view: float
-) -> Camera | None:
-    """A camera of a model, whose direction may have any length; None unless it is a perspective
-    camera with finite values."""
-    with np.errstate(all="ignore"):
-        length = float(np.linalg.norm(direction))
-    finite = bool(np.isfinite(position).all()) and np.isfinite(length) and length > 0
-    if not (finite and 0 < field_of_view < np.pi):
-        return None
-    x, y, z = position.tolist()
-    dx, dy, dz = (direction / length).tolist()
-    return Camera(name, (x, y, z), (dx, dy, dz), float(field_of_view))
-
-
 @dataclass(frozen=True)
 class Storey:
     """A storey named by the model, and the height of its floor in world metres."""
@@ -229,21 +216,12 @@ class Scene:
             **({"kinds": self.kinds} if self.kinds else {}),
             **({"storeys": [vars(s) for s in self.storeys]} if self.storeys else {}),
         }
-        colors = {} if self.colors is None else {"colors": self.colors}
         text = json.dumps(about, sort_keys=True, ensure_ascii=False)
-        return (
-            colors
-            | self.tolerance.to_arrays()
-            | {
-                "points": self.points,
-                "triangles": self.triangles,
-                "uv": self.uv,
-                "triangle_object": self.triangle_object,
-                "triangle_material": self.triangle_material,
-                "two_sided": self.two_sided,
-                "about": np.frombuffer(text.encode(), dtype=np.uint8),
-            }
-        )
+        arrays = {name: getattr(self, name) for name in (*FACE_ARRAYS, "two_sided")}
+        if self.colors is not None:
+            arrays["colors"] = self.colors
+        arrays["about"] = np.frombuffer(text.encode(), dtype=np.uint8)
+        return arrays | self.tolerance.to_arrays()
 
     @staticmethod
     def from_arrays(

@@ -8,8 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ptmtools.errors import InputError
-from ptmtools.scene.model import Note
+from ptmtools.scene.model import Camera, Note
 from ptmtools.scene.reference import Folder
 
 #: Codes of warnings in the order of printing, the most serious first: orientation and unit, which
@@ -32,9 +35,9 @@ WARNINGS = (
 )
 #: The second best up axis: not a warning, but printed without ``-v``.
 RUNNER_UP = "PTM-N238"
-#: Irrelevant for models that are viewed from outside, such as statues and campus buildings: their
-#: faces are supposed to be turned away from the rooms.
-INTERIOR_ONLY = frozenset({"PTM-N235"})
+#: Inside out: irrelevant for models that are viewed from outside, such as statues and campus
+#: buildings, whose faces are supposed to be turned away from the rooms.
+INSIDE_OUT = "PTM-N235"
 
 
 class Findings:
@@ -84,6 +87,26 @@ class Findings:
             self.note("PTM-N208", f"{what}: found as {self.folder.label(result.path)}", place)
         return result.path
 
+    def camera(
+        self,
+        name: str,
+        place: str,
+        position: NDArray[np.float64],
+        direction: NDArray[np.float64],
+        field_of_view: float,
+    ) -> list[Camera]:
+        """The camera of a model, whose direction may have any length; none, and a note, unless it
+        is a perspective camera with finite values."""
+        with np.errstate(all="ignore"):
+            length = float(np.linalg.norm(direction))
+        finite = bool(np.isfinite(position).all()) and np.isfinite(length) and length > 0
+        if not (finite and 0 < field_of_view < np.pi):
+            self.note("PTM-N215", f"camera {name} has no perspective, skipped", place)
+            return []
+        x, y, z = position.tolist()
+        dx, dy, dz = (direction / length).tolist()
+        return [Camera(name, (x, y, z), (dx, dy, dz), float(field_of_view))]
+
     def records(self) -> list[tuple[str, str, str, int, bool]]:
         """All notes for `add_records` in another process: code, message, place, count, and whether
         the note is a miss."""
@@ -115,7 +138,7 @@ class Findings:
 
 def exterior_notes(notes: Iterable[Note]) -> list[Note]:
     """The notes that are relevant for a model that is viewed from outside."""
-    return [note for note in notes if note.code not in INTERIOR_ONLY]
+    return [note for note in notes if note.code != INSIDE_OUT]
 
 
 def line(note: Note, more: int = 0) -> str:

@@ -241,13 +241,7 @@ def read_obj(
             )
 
     cut = triangulate(points[corner_point], start)
-    if cut.tangled:
-        findings.note(
-            "PTM-N211",
-            "polygons with crossing edges or too many corners cut into fans of triangles",
-            path.name,
-            cut.tangled,
-        )
+    cut.note(findings, path.name)
     coord = corner_coord[cut.corner]
     uv = np.zeros((len(coord), 3, 2))
     uv[coord >= 0] = coords[coord[coord >= 0]]

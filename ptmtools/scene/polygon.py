@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.scene.notes import Findings
 from ptmtools.tolerance import ROUNDING_SHARE
 
 #: Budget of clipping steps (one tested corner, about 3 ns): constant, and per corner of an outline.
@@ -42,6 +43,12 @@ class Triangulation:
     corner: NDArray[np.int64]
     polygon: NDArray[np.int64]
     tangled: int
+
+    def note(self, findings: Findings, place: str) -> None:
+        """Notes tangled polygons."""
+        if self.tangled:
+            message = "polygons with crossing edges or too many corners cut into fans of triangles"
+            findings.note("PTM-N211", message, place, self.tangled)
 
 
 def triangulate(corners: NDArray[np.float64], start: NDArray[np.int64]) -> Triangulation:

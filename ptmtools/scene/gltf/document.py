@@ -288,10 +288,8 @@ _SUPPORTED: dict[Support, str] = {
     """,
 }
 KNOWN = {name: support for support, names in _SUPPORTED.items() for name in names.split()}
-#: A command that removes an extension from a model.
-_REMEDIES = {
-    "EXT_texture_avif": "npx @gltf-transform/cli png --formats '*' IN.glb OUT.glb",
-}
+#: How to remove an extension from a model.
+_REMEDIES = {"EXT_texture_avif": "run `npx @gltf-transform/cli png --formats '*' IN.glb OUT.glb`"}
 _WORDS: dict[Support, str] = {
     "read": "read",
     "silent": "does not change what is drawn",
@@ -311,12 +309,11 @@ def check_extensions(tree: dict[str, object], findings: Findings) -> None:
     if not isinstance(required, list) or not isinstance(used, list):
         raise ValueError("extensions are not a list")
     for name in sorted({str(name) for name in required} - KNOWN.keys()):
-        remedy = _REMEDIES.get(name, _ANY)
         raise InputError(
             "PTM-I243",
             f"requires the unsupported glTF extension {name}",
             file=findings.model,
-            remedy=remedy if remedy == _ANY else f"run `{remedy}`",
+            remedy=_REMEDIES.get(name, _ANY),
         )
     for name in sorted({str(name) for name in used}):
         if KNOWN.get(name, "noted") == "noted":

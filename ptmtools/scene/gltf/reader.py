@@ -26,7 +26,7 @@ from ptmtools.scene.colors import encoded
 from ptmtools.scene.gltf.document import Document, check_extensions, damaged, open_document
 from ptmtools.scene.gltf.draco import EXTENSION as DRACO, Decoded, decode_primitives
 from ptmtools.scene.gltf.material import MaterialReader, MaterialUse, TextureOf
-from ptmtools.scene.model import Camera, perspective_camera
+from ptmtools.scene.model import Camera
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.rows import Rows
 from ptmtools.scene.source import MAX_VERTICES, Source, too_many_triangles
@@ -145,11 +145,7 @@ def cameras(
         definition = tree["cameras"][entry["camera"]]
         name = str(entry.get("name") or definition.get("name") or f"camera {len(result)}")
         yfov = definition.get("perspective", {}).get("yfov", 0.0)
-        camera = perspective_camera(name, matrix[:3, 3], -matrix[:3, 2], yfov)
-        if camera is None:
-            findings.note("PTM-N215", f"camera {name} has no perspective, skipped", f"node {node}")
-        else:
-            result.append(camera)
+        result += findings.camera(name, f"node {node}", matrix[:3, 3], -matrix[:3, 2], yfov)
     return tuple(result)
 
 
@@ -179,17 +175,6 @@ class _Draw:
     @property
     def mode(self) -> int:
         return int(self.primitive.get("mode", _TRIANGLES))
-
-
-@dataclass(frozen=True)
-class _Mesh:
-    """The arrays of a primitive: (n, 3) points and (m, 3) triangles over them; (m, 3, 2) texture
-    coordinates from the lower left and (m, 3, 3) colours of corners, if it has any."""
-
-    points: Floats
-    triangles: Ints
-    uv: Floats
-    colors: NDArray[np.uint8] | None
 
 
 def read_gltf(
@@ -234,7 +219,7 @@ def _read(
     for draw, use, draco in zip(draws, uses, compressed, strict=True):
         try:
             values = _Values(document, draw, draco, decoded)
-            mesh = _mesh(values, draw, use, findings)
+            points, triangles, uv, colors = _mesh(values, draw, use, findings)
             placed = instances(document, draw.node)
             key = (True, draco["bufferView"]) if draco else (False, draw.attributes["POSITION"])
             if key not in grids:
@@ -249,9 +234,7 @@ def _read(
             frames = world_of[draw.node] @ placed
             scale = np.linalg.norm(frames[:, :3, :3], axis=1)
             step = max(step, grid * float(scale[np.isfinite(scale)].max(initial=0.0)))
-        rows.add(
-            frames, mesh.points, mesh.triangles, mesh.uv, use.index, mesh.colors, first[draw.node]
-        )
+        rows.add(frames, points, triangles, uv, use.index, colors, first[draw.node])
     return rows.source(
         materials=materials.materials,
         cameras=cameras(tree, world_of, findings),
@@ -381,7 +364,11 @@ class _Values:
         return index
 
 
-def _mesh(values: _Values, draw: _Draw, use: MaterialUse, findings: Findings) -> _Mesh:
+def _mesh(
+    values: _Values, draw: _Draw, use: MaterialUse, findings: Findings
+) -> tuple[Floats, Ints, Floats, NDArray[np.uint8] | None]:
+    """The arrays of a primitive: (n, 3) points and (m, 3) triangles over them; (m, 3, 2) texture
+    coordinates from the lower left and (m, 3, 3) colours of corners, if it has any."""
     points = values.attribute("POSITION")
     if points is None:
         raise KeyError("POSITION")
@@ -397,7 +384,7 @@ def _mesh(values: _Values, draw: _Draw, use: MaterialUse, findings: Findings) ->
         colors = encoded(raw[:, :3] * use.light)[triangles]
         if use.see_through and not (raw[:, 3:] == 1).all():
             findings.note("PTM-N215", "opacities of vertices dropped", draw.place)
-    return _Mesh(points, triangles, uv[triangles], colors)
+    return points, triangles, uv[triangles], colors
 
 
 def _triangles(index: Ints, mode: int) -> Ints:

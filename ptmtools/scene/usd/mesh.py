@@ -121,13 +121,7 @@ def cut(prim: Any, findings: Findings, model: Path) -> Shape:
     corner = np.arange(len(vertex))[np.repeat(kept, counts)]
     start = np.concatenate([[0], np.cumsum(counts[face])])
     triangulation = triangulate(points[vertex[corner]], start)
-    if triangulation.tangled:
-        findings.note(
-            "PTM-N211",
-            "polygons with crossing edges or too many corners cut into fans of triangles",
-            place,
-            triangulation.tangled,
-        )
+    triangulation.note(findings, place)
     result = corner[triangulation.corner]
     if UsdGeom.Gprim(prim).GetOrientationAttr().Get(TIME) == UsdGeom.Tokens.leftHanded:
         result = result[:, ::-1]

@@ -20,7 +20,7 @@ from pxr import Tf, Usd, UsdGeom
 from ptmtools.arrays import Floats
 from ptmtools.errors import InputError
 from ptmtools.scene.messages import NamedImage
-from ptmtools.scene.model import Camera, perspective_camera
+from ptmtools.scene.model import Camera
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.rows import Rows
 from ptmtools.scene.sandbox import unreadable
@@ -40,22 +40,6 @@ from ptmtools.scene.usd.mesh import Shape, array, cut, inconsistent, is_cut, tri
 _HIDDEN = (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
 
 
-@dataclass(frozen=True)
-class Placed:
-    """A mesh and its instances.
-
-    Attributes
-    ----------
-    prim: an instance proxy within an instance.
-    name: see `Traversal`.
-    frames: (k, 4, 4) local to world of each instance, for row vectors.
-    """
-
-    prim: Any
-    name: str
-    frames: Floats
-
-
 @dataclass
 class Group:
     """The meshes and point instancers below a prim, each with its name and (4, 4) transformation to
@@ -65,13 +49,17 @@ class Group:
     triangles: int = 0
     places: int = 0
 
-    def placed(self, frames: Floats, prefix: str = "") -> Iterator[Placed]:
-        """The meshes of the group at (k, 4, 4) frames."""
+    def placed(self, frames: Floats, prefix: str = "") -> Iterator[tuple[Any, str, Floats]]:
+        """The prims of the group's meshes, an instance proxy within an instance; their names, see
+        `Traversal`; and (k, 4, 4) local to world of each instance, for row vectors.
+
+        ``frames`` are the (k, 4, 4) of the group.
+        """
         for name, matrix, part in self.parts:
             with np.errstate(all="ignore"):
                 own = matrix @ frames
             if not isinstance(part, list):
-                yield Placed(part, prefix + name, own)
+                yield part, prefix + name, own
                 continue
             for group, instances in part:
                 with np.errstate(all="ignore"):
@@ -252,17 +240,17 @@ def _make(
     painter = Painter(MaterialReader(findings, path), findings)
     shapes: dict[str, Shape] = {}
     rows = Rows()
-    for placed in group.placed(np.eye(4)[None]):
-        key = key_of(placed.prim)
+    for prim, name, frames in group.placed(np.eye(4)[None]):
+        key = key_of(prim)
         if key not in shapes:
-            shapes[key] = cut(placed.prim, findings, path)
+            shapes[key] = cut(prim, findings, path)
         shape = shapes[key]
         if len(shape.corner):
-            material, uv, colors = painter.paint(placed.prim, shape, key)
-            frames = placed.frames.transpose(0, 2, 1)  # the library's are for row vectors
+            material, uv, colors = painter.paint(prim, shape, key)
             first = len(rows.names)
-            rows.names += [placed.name] * len(frames)
-            rows.add(frames, shape.points, shape.triangles, uv, material, colors, first)
+            rows.names += [name] * len(frames)
+            columns = frames.transpose(0, 2, 1)  # the library's are for row vectors
+            rows.add(columns, shape.points, shape.triangles, uv, material, colors, first)
     if not rows.names:
         raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with meshes")
     source = rows.source(
@@ -284,9 +272,5 @@ def _cameras(definitions: list[tuple[str, Floats, Any]], findings: Findings) -> 
         # Both lengths are in the same unit, a tenth of the stage's.
         if perspective and height > 0 < distance and math.isfinite(height / distance):
             view = 2 * math.atan(height / (2 * distance))
-        camera = perspective_camera(name, matrix[3, :3], 0.0 - matrix[2, :3], view)
-        if camera is None:
-            findings.note("PTM-N215", f"camera {name} has no perspective, skipped", name)
-        else:
-            cameras.append(camera)
+        cameras += findings.camera(name, name, matrix[3, :3], 0.0 - matrix[2, :3], view)
     return tuple(cameras)
