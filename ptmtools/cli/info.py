@@ -181,18 +181,15 @@ def _description(data: bytes, crc32: int) -> Description | None:
 
 def _described(description: Description) -> dict[str, Any]:
     """The fields of a description that are set."""
-    fields: dict[str, Any] = {}
-    if description.icc is not None:
-        fields["icc_bytes"] = len(description.icc)
-    if description.srgb is not None:
-        fields["srgb_intent"] = description.srgb
-    if description.gamma is not None:
-        fields["gamma"] = description.gamma / 100_000
-    if description.chromaticities is not None:
-        fields["chromaticities"] = [value / 100_000 for value in description.chromaticities]
-    if description.orientation != 1:
-        fields["orientation"] = description.orientation
-    return fields
+    own = description
+    fields = {
+        "icc_bytes": None if own.icc is None else len(own.icc),
+        "srgb_intent": own.srgb,
+        "gamma": None if own.gamma is None else own.gamma / 100_000,
+        "chromaticities": own.chromaticities and [part / 100_000 for part in own.chromaticities],
+        "orientation": None if own.orientation == 1 else own.orientation,
+    }
+    return {name: value for name, value in fields.items() if value is not None}
 
 
 def _info_model(console: Console, target: str, options: IngestOptions) -> None:

@@ -16,13 +16,16 @@ from dataclasses import Field, fields
 from functools import partial, wraps
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, get_args, get_origin
 
 import click
 from click.core import ParameterSource
 
 from ptmtools.cli.console import Console
 from ptmtools.options import Option as Declared, default_of, degrees_text, option_name, option_of
+
+if TYPE_CHECKING:
+    from ptmtools.texture.model import Limits
 
 T = TypeVar("T")
 Function = Callable[..., Any]
@@ -404,23 +407,22 @@ def _address(context: click.Context, parameter: click.Parameter, value: str | No
     return value
 
 
-def limit_option(function: Function) -> Function:
-    """Adds ``--limit``, as the `Limits` ``limits``."""
+def _limits(context: click.Context, parameter: click.Parameter, value: int) -> Limits:
+    from ptmtools.texture.model import Limits
 
-    @option(
-        "--limit",
-        type=click.IntRange(1, 1 << 20),
-        default=1024,
-        metavar="MIB",
-        help="Largest decoded size of an image.",
-    )
-    @wraps(function)
-    def command(*arguments: Any, limit: int, **values: Any) -> Any:
-        from ptmtools.texture.model import Limits
+    return Limits(decoded_bytes=value << 20)
 
-        return function(*arguments, limits=Limits(decoded_bytes=limit << 20), **values)
 
-    return command
+#: ``--limit``, as the `Limits` ``limits``.
+limit_option: Decorator = option(
+    "--limit",
+    "limits",
+    type=click.IntRange(1, 1 << 20),
+    default=1024,
+    metavar="MIB",
+    callback=_limits,
+    help="Largest decoded size of an image.",
+)
 
 
 def new_database_option(function: Function) -> Function:

@@ -24,9 +24,8 @@ from numpy.typing import NDArray
 from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.options import IFC, SUFFIXES, TRIMESH, USD
-from ptmtools.scene.rows import Rows
 from ptmtools.scene.sandbox import run_in_sandbox, serve
-from ptmtools.scene.source import MAX_VERTICES, Source, SourceMaterial, too_many_triangles
+from ptmtools.scene.source import MAX_VERTICES, Rows, Source, SourceMaterial, too_many_triangles
 
 
 def convert(path: Path, scratch: Path) -> list[tuple[Path, str]]:

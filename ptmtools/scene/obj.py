@@ -27,7 +27,6 @@ from ptmtools.scene.model import Shine, Wrap
 from ptmtools.scene.mtl import MapStatement, MtlMaterial, read_mtl
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.polygon import triangulate
-from ptmtools.scene.rows import vertex_colors
 from ptmtools.scene.source import (
     MAX_VERTICES,
     FileRange,
@@ -35,6 +34,7 @@ from ptmtools.scene.source import (
     SourceMaterial,
     Texture,
     too_many_triangles,
+    vertex_colors,
 )
 
 #: The next file of a mtllib statement, up to its suffix, or the rest of the statement.

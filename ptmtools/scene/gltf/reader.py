@@ -28,8 +28,7 @@ from ptmtools.scene.gltf.draco import EXTENSION as DRACO, Decoded, decode_primit
 from ptmtools.scene.gltf.material import MaterialReader, MaterialUse, TextureOf
 from ptmtools.scene.model import Camera
 from ptmtools.scene.notes import Findings
-from ptmtools.scene.rows import Rows
-from ptmtools.scene.source import MAX_VERTICES, Source, too_many_triangles
+from ptmtools.scene.source import MAX_VERTICES, Rows, Source, too_many_triangles
 
 _INSTANCING = "EXT_mesh_gpu_instancing"
 _DEFAULTS = {

@@ -32,9 +32,8 @@ from ptmtools.errors import InputError
 from ptmtools.scene.messages import pack_source
 from ptmtools.scene.model import Kind, Storey
 from ptmtools.scene.notes import Findings
-from ptmtools.scene.rows import Rows
 from ptmtools.scene.sandbox import serve, unreadable
-from ptmtools.scene.source import Source, SourceMaterial, too_many_triangles
+from ptmtools.scene.source import Rows, Source, SourceMaterial, too_many_triangles
 
 _PLAIN, _DIRECT = "opencascade", "passthrough"
 _THREADS = 1

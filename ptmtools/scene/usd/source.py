@@ -22,9 +22,8 @@ from ptmtools.errors import InputError
 from ptmtools.scene.messages import NamedImage
 from ptmtools.scene.model import Camera
 from ptmtools.scene.notes import Findings
-from ptmtools.scene.rows import Rows
 from ptmtools.scene.sandbox import unreadable
-from ptmtools.scene.source import Source, too_many_triangles
+from ptmtools.scene.source import Rows, Source, too_many_triangles
 from ptmtools.scene.usd.layers import (
     LIBRARY,
     TIME,
