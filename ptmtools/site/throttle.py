@@ -33,22 +33,11 @@ _HEAD = len("HTTP/1.1 206 Partial Content\r\ndate: Mon, 23 Nov 2026 03:29:48 GMT
 
 
 @dataclass(frozen=True)
-class Throttle:
-    """Conditions of the link.
+class Throttle(Conditions):
+    """The bandwidth and the latency of the link, without latency by default; the other conditions
+    do not count."""
 
-    Attributes
-    ----------
-    bandwidth: bit/s of all responses together, or None for no limit.
-    latency: s from a request to the first byte of its response.
-
-    Raises InputError PTM-I111 for an impossible value.
-    """
-
-    bandwidth: float | None = None
     latency: float = 0.0
-
-    def __post_init__(self) -> None:
-        Conditions(bandwidth=self.bandwidth, latency=self.latency)  # checks both
 
 
 class Flow:
