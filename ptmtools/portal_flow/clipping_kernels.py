@@ -1,8 +1,7 @@
 """Clipping and separating convex polygons in space, compiled.
 
-Polygons live in numbered slots of one scratch array: ``polygon`` (S, V, 3) and ``size`` (S,); the
-last slot is spare. Planes live in rows, ``plane`` (R, P, 4): a unit normal n and an offset d; kept
-is the side in front, n·x + d >= 0.
+A directed portal 2k crosses portal k along its normal, 2k + 1 against it. Kept is the side in front
+of a plane, n·x + d >= 0.
 """
 
 from __future__ import annotations
@@ -10,8 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.jit import plain_kernel as kernel
+from ptmtools.jit import inlined_kernel, plain_kernel as kernel
+from ptmtools.portal_flow.storage import Geometry, Polygons
 
+#: A unit normal and an offset.
+Plane = tuple[float, float, float, float]
 #: Results of clipping. NEAR_TIE is EMPTY, but the polygon ends within `NEAR` slacks of where it
 #: would have been kept.
 NEAR_TIE, EMPTY, WHOLE, CUT = -1, 0, 1, 2
@@ -22,23 +24,15 @@ SHORTEST_EDGE = 16.0
 
 
 @kernel
-def clip(
-    polygon: Floats,
-    size: Ints,
-    slot: int,
-    distance: Floats,
-    n0: float,
-    n1: float,
-    n2: float,
-    offset: float,
-    slack: float,
-) -> int:
-    """Keeps the part of a polygon at n·x + offset >= 0, and ``slack`` more; in place.
+def clip(c: Polygons, slot: int, plane: Plane) -> int:
+    """Keeps the part of a polygon in front of a plane, and the slack more; in place.
 
-    EMPTY or NEAR_TIE if nothing reaches further in front than ``slack``. A polygon that would
+    EMPTY or NEAR_TIE if nothing reaches further in front than the slack. A polygon that would
     outgrow its slot stays WHOLE.
     """
-    count = size[slot]
+    polygon, distance, slack = c.vertex, c.distance, c.slack
+    n0, n1, n2, offset = plane
+    count = c.size[slot]
     low, high = np.inf, -np.inf
     for i in range(count):
         d = n0 * polygon[slot, i, 0] + n1 * polygon[slot, i, 1] + n2 * polygon[slot, i, 2] + offset
@@ -66,56 +60,46 @@ def clip(
                 x = polygon[slot, i, a]
                 polygon[spare, m, a] = x + t * (polygon[slot, j, a] - x)
             m += 1
-    copy(polygon, size, spare, slot, m)
+    copy(c, spare, slot, m)
     return CUT
 
 
 @kernel
-def copy(polygon: Floats, size: Ints, source: int, target: int, count: int) -> None:
+def copy(c: Polygons, source: int, target: int, count: int) -> None:
     """Puts the first ``count`` vertices of one slot into another."""
     for i in range(count):
         for a in range(3):
-            polygon[target, i, a] = polygon[source, i, a]
-    size[target] = count
+            c.vertex[target, i, a] = c.vertex[source, i, a]
+    c.size[target] = count
 
 
 @kernel
-def load(point: Floats, start: Ints, k: int, polygon: Floats, size: Ints, slot: int) -> None:
+def load(c: Polygons, slot: int, point: Floats, start: Ints, k: int) -> None:
     """Puts the polygon of portal k into a slot."""
     first = start[k]
     count = start[k + 1] - first
     for i in range(count):
         for a in range(3):
-            polygon[slot, i, a] = point[first + i, a]
-    size[slot] = count
+            c.vertex[slot, i, a] = point[first + i, a]
+    c.size[slot] = count
 
 
 @kernel
 def separators_through(
-    polygon: Floats,
-    size: Ints,
-    a: int,
-    n0: float,
-    n1: float,
-    n2: float,
-    sign: float,
-    b: int,
-    flip: bool,
-    plane: Floats,
-    row: int,
-    count: int,
-    slack: float,
+    c: Polygons, normal: Floats, a: int, q: int, b: int, flip: bool, row: int, count: int
 ) -> int:
-    """Appends to plane row ``row`` the separating planes through the edges of polygon ``a``.
+    """Appends to a row the planes that separate polygons ``a`` and ``b`` through the edges of a.
 
-    (n0, n1, n2) is a's own normal, counter-clockwise; times ``sign`` it points towards polygon
-    ``b``. The plane through an edge turns about it: outward in a's plane + t · towards b. The
-    least t that has all of b on the far side gives the tightest separator. It is accepted by
-    measuring both polygons against it, so a badly conditioned edge can only cost tightness. With
-    ``flip`` the kept side is a's (a is the nearer to the target), else b's. Returns the number of
-    planes in the row.
+    Polygon a is the rest of directed portal q, which leads towards b. The plane through an edge
+    turns about it: outward in a's plane + t · towards b. The least t that has all of b on the far
+    side gives the tightest separator. It is accepted by measuring both polygons against it, so a
+    badly conditioned edge can only cost tightness. With ``flip`` the kept side is a's (a is the
+    nearer to the target), else b's. Returns the number of planes in the row.
     """
-    size_a, size_b = size[a], size[b]
+    polygon, plane, slack = c.vertex, c.plane, c.slack
+    size_a, size_b = c.size[a], c.size[b]
+    n0, n1, n2 = normal[q >> 1, 0], normal[q >> 1, 1], normal[q >> 1, 2]
+    sign = 1.0 if q & 1 == 0 else -1.0
     for i in range(size_a):
         if count == plane.shape[1]:
             break
@@ -164,49 +148,24 @@ def separators_through(
 
 
 @kernel
-def separate(
-    polygon: Floats,
-    size: Ints,
-    a: int,
-    k: int,
-    sign_a: float,
-    b: int,
-    j: int,
-    sign_b: float,
-    normal: Floats,
-    plane: Floats,
-    row: int,
-    slack: float,
-) -> int:
+def separate(c: Polygons, normal: Floats, a: int, p: int, b: int, q: int, row: int) -> int:
     """Plane row ``row`` := all planes that separate a from b; kept is the side of b, and beyond.
 
-    Polygon a lies in portal k and b in portal j; ``sign_a`` times k's normal points towards b,
-    ``sign_b`` times j's towards a. Returns the number of planes.
+    Polygon a is left of directed portal p, which leads towards b, and b of q, which leads towards
+    a. Returns the number of planes.
     """
-    n0, n1, n2 = normal[k, 0], normal[k, 1], normal[k, 2]
-    count = separators_through(polygon, size, a, n0, n1, n2, sign_a, b, False, plane, row, 0, slack)
-    n0, n1, n2 = normal[j, 0], normal[j, 1], normal[j, 2]
-    return separators_through(
-        polygon, size, b, n0, n1, n2, sign_b, a, True, plane, row, count, slack
-    )
+    count = separators_through(c, normal, a, p, b, False, row, 0)
+    return separators_through(c, normal, b, q, a, True, row, count)
 
 
 @kernel
-def clip_all(
-    polygon: Floats,
-    size: Ints,
-    slot: int,
-    distance: Floats,
-    plane: Floats,
-    row: int,
-    count: int,
-    slack: float,
-) -> int:
+def clip_all(c: Polygons, slot: int, row: int, count: int) -> int:
     """Clips a polygon by the planes of a row; the status of `clip`."""
-    status = WHOLE
+    plane, status = c.plane, WHOLE
     for i in range(count):
-        n0, n1, n2 = plane[row, i, 0], plane[row, i, 1], plane[row, i, 2]
-        now = clip(polygon, size, slot, distance, n0, n1, n2, plane[row, i, 3], slack)
+        now = clip(
+            c, slot, (plane[row, i, 0], plane[row, i, 1], plane[row, i, 2], plane[row, i, 3])
+        )
         if now <= EMPTY:
             return now
         if now == CUT:
@@ -214,19 +173,11 @@ def clip_all(
     return status
 
 
-@kernel
-def beyond(
-    point: Floats,
-    start: Ints,
-    ball: Floats,
-    k: int,
-    plane: Floats,
-    row: int,
-    count: int,
-    slack: float,
-) -> int:
+@inlined_kernel
+def beyond(g: Geometry, k: int, plane: Floats, row: int, count: int) -> int:
     """WHOLE if portal k reaches beyond every plane of a row, else EMPTY or NEAR_TIE."""
-    c0, c1, c2, radius = ball[k, 0], ball[k, 1], ball[k, 2], ball[k, 3]
+    point, slack = g.point, g.slack
+    c0, c1, c2, radius = g.ball[k, 0], g.ball[k, 1], g.ball[k, 2], g.ball[k, 3]
     for i in range(count):
         n0, n1, n2 = plane[row, i, 0], plane[row, i, 1], plane[row, i, 2]
         d = n0 * c0 + n1 * c1 + n2 * c2 + plane[row, i, 3]
@@ -235,7 +186,7 @@ def beyond(
         if d + radius <= slack - NEAR * slack:
             return EMPTY
         high = -np.inf
-        for j in range(start[k], start[k + 1]):
+        for j in range(g.start[k], g.start[k + 1]):
             d = n0 * point[j, 0] + n1 * point[j, 1] + n2 * point[j, 2] + plane[row, i, 3]
             high = max(high, d)
             if high > slack:

@@ -26,7 +26,7 @@ from ptmtools.arrays import Bits, Bools, Floats, Ints
 from ptmtools.errors import InputError, LimitError
 from ptmtools.executor import Executor
 from ptmtools.portal_flow.double_double import Searched, SequenceTest, searched
-from ptmtools.portal_flow.storage import Geometry, Scratch
+from ptmtools.portal_flow.storage import Geometry, Polygons, Scratch
 from ptmtools.progress import Progress, silent
 from ptmtools.tolerance import Tolerance
 
@@ -322,14 +322,17 @@ def scratch(g: Geometry, words: int) -> Scratch:
     depth = min(DEPTH, len(g.leaf) + 1)
     vertices = int(np.diff(g.start).max()) + GROWTH
     return Scratch(
-        polygon=np.zeros((2 * depth + 3, vertices, 3)),
-        size=np.zeros(2 * depth + 3, np.int64),
-        plane=np.zeros((depth + 1, 2 * vertices, 4)),
+        polygons=Polygons(
+            vertex=np.zeros((2 * depth + 3, vertices, 3)),
+            size=np.zeros(2 * depth + 3, np.int64),
+            plane=np.zeros((depth + 1, 2 * vertices, 4)),
+            distance=np.zeros(vertices),
+            slack=g.slack,
+        ),
         planes=np.zeros(depth + 1, np.int64),
         might=np.zeros((depth, words), np.uint64),
         via=np.zeros(depth + 1, np.int64),
         at=np.zeros(depth, np.int64),
-        distance=np.zeros(vertices),
         line=np.zeros((2, 3)),
         near_tie=np.zeros(NEAR_TIE_WORDS, np.int64),
     )

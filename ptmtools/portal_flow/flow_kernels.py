@@ -87,7 +87,7 @@ def thin_out(
     Returns (whether an unseen one is left, portals tested, how many of them by a near tie, words
     of `Scratch.near_tie` used).
     """
-    might, plane, count = s.might, s.plane, s.planes[frame]
+    might, plane, count = s.might, s.polygons.plane, s.planes[frame]
     left = False
     tested = ties = 0
     for w in range(might.shape[1]):
@@ -95,7 +95,7 @@ def thin_out(
         while rest != ZERO:
             q = (w << 6) + lowest(rest)
             tested += 1
-            now = beyond(g.point, g.start, g.ball, q >> 1, plane, frame, count, g.slack)
+            now = beyond(g, q >> 1, plane, frame, count)
             now = settled(s, opened, lenient, frame, q, now)
             if now == WHOLE:
                 left = True
@@ -134,13 +134,14 @@ def flow(
     """
     words = known.shape[1]
     depth = len(s.might)
-    polygon, size, plane, planes, distance = s.polygon, s.size, s.plane, s.planes, s.distance
-    might, via, at = s.might, s.via, s.at
-    normal, ball, slack = g.normal, g.ball, g.slack
+    c, plane, planes, might, via, at = s.polygons, s.polygons.plane, s.planes, s.might, s.via, s.at
+    normal, ball = g.normal, g.ball
     k0 = source >> 1
     s0 = 1.0 if source & 1 == 0 else -1.0
     behind = -g.low[k0] if source & 1 == 0 else g.high[k0]
-    load(g.point, g.start, k0, polygon, size, 0)
+    n0, n1, n2 = s0 * normal[k0, 0], s0 * normal[k0, 1], s0 * normal[k0, 2]
+    facing = (n0, n1, n2, behind)
+    load(c, 0, g.point, g.start, k0)
     for w in range(words):
         might[0, w] = known[source, w]
     via[0] = source
@@ -178,10 +179,8 @@ def flow(
         k = q >> 1
         sq = 1.0 if q & 1 == 0 else -1.0
         a, b = 2 * child, 2 * child + 1
-        load(g.point, g.start, k, polygon, size, b)
-        n0, n1, n2 = s0 * normal[k0, 0], s0 * normal[k0, 1], s0 * normal[k0, 2]
-        now = clip(polygon, size, b, distance, n0, n1, n2, behind, slack)
-        now = settled(s, opened, lenient, f, q, now)
+        load(c, b, g.point, g.start, k)
+        now = settled(s, opened, lenient, f, q, clip(c, b, facing))
         for i in range(planes[f]):
             if now <= EMPTY:
                 break
@@ -189,34 +188,25 @@ def flow(
             if n0 * ball[k, 0] + n1 * ball[k, 1] + n2 * ball[k, 2] + d >= ball[k, 3]:
                 continue
             ops += 1
-            now = clip(polygon, size, b, distance, n0, n1, n2, d, slack)
-            now = settled(s, opened, lenient, f, q, now)
+            now = settled(s, opened, lenient, f, q, clip(c, b, (n0, n1, n2, d)))
         status = now
         if now > EMPTY:
-            copy(polygon, size, 2 * f, a, size[2 * f])
+            copy(c, 2 * f, a, c.size[2 * f])
             ops += 1
             n0, n1, n2 = -sq * normal[k, 0], -sq * normal[k, 1], -sq * normal[k, 2]
             before = g.high[k] if q & 1 == 0 else -g.low[k]
-            now = clip(polygon, size, a, distance, n0, n1, n2, before, slack)
-            now = status = settled(s, opened, lenient, f, q, now)
+            now = settled(s, opened, lenient, f, q, clip(c, a, (n0, n1, n2, before)))
+            status = now
         if now > EMPTY and f > 0:
             passed, last = 2 * f + 1, via[f]
-            sp = 1.0 if last & 1 == 0 else -1.0
-            last >>= 1
             if status == CUT:
-                n = separate(
-                    polygon, size, a, k0, s0, passed, last, -sp, normal, plane, depth, slack
-                )
+                n = separate(c, normal, a, source, passed, last ^ 1, depth)
                 ops += n + 1
-                now = clip_all(polygon, size, b, distance, plane, depth, n, slack)
-                now = settled(s, opened, lenient, f, q, now)
+                now = settled(s, opened, lenient, f, q, clip_all(c, b, depth, n))
             if now > EMPTY:
-                n = separate(
-                    polygon, size, b, k, -sq, passed, last, sp, normal, plane, depth, slack
-                )
+                n = separate(c, normal, b, q ^ 1, passed, last, depth)
                 ops += n + 1
-                now = clip_all(polygon, size, a, distance, plane, depth, n, slack)
-                now = settled(s, opened, lenient, f, q, now)
+                now = settled(s, opened, lenient, f, q, clip_all(c, a, depth, n))
         if now <= EMPTY:
             if now == NEAR_TIE:
                 ties += 1
@@ -229,9 +219,7 @@ def flow(
         row = f
         if room:
             row = child
-            planes[child] = separate(
-                polygon, size, a, k0, s0, b, k, -sq, normal, plane, child, slack
-            )
+            planes[child] = separate(c, normal, a, source, b, q ^ 1, child)
             via[child] = q
             left, tested, near, used = thin_out(g, s, opened, lenient, child, seen, used)
             ops += 1 + (tested >> 3)
@@ -299,12 +287,9 @@ def flood(g: Geometry, s: Scratch, first: int, last: int, rows: Bits) -> None:
             if not ahead(g, p, r):
                 continue
             rows[p - first, r >> 6] |= ONE << np.uint64(r & 63)
-            load(g.point, g.start, p >> 1, s.polygon, s.size, 0)
-            load(g.point, g.start, r >> 1, s.polygon, s.size, 1)
-            a, b = (1.0 if p & 1 == 0 else -1.0), (-1.0 if r & 1 == 0 else 1.0)
-            count = separate(
-                s.polygon, s.size, 0, p >> 1, a, 1, r >> 1, b, g.normal, s.plane, 0, g.slack
-            )
+            load(s.polygons, 0, g.point, g.start, p >> 1)
+            load(s.polygons, 1, g.point, g.start, r >> 1)
+            count = separate(s.polygons, g.normal, 0, p, 1, r ^ 1, 0)
             wave += 1
             stack[0] = r
             top = 1
@@ -321,8 +306,7 @@ def flood(g: Geometry, s: Scratch, first: int, last: int, rows: Bits) -> None:
                     if facing[q] < 0 or not ahead(g, before, q):
                         continue
                     visited[q] = wave  # portals that the planes hide are hidden on every path
-                    now = beyond(g.point, g.start, g.ball, q >> 1, s.plane, 0, count, g.slack)
-                    if now != EMPTY:
+                    if beyond(g, q >> 1, s.polygons.plane, 0, count) != EMPTY:
                         rows[p - first, q >> 6] |= ONE << np.uint64(q & 63)
                         stack[top] = q
                         top += 1

@@ -27,17 +27,24 @@ class Geometry(NamedTuple):
     slack: float  # distances below this are rounding
 
 
+class Polygons(NamedTuple):
+    """Convex polygons in numbered slots, of which the last is spare, and rows of planes."""
+
+    vertex: Floats  # (S, V, 3)
+    size: Ints  # (S,) vertices of each
+    plane: Floats  # (R, P, 4) unit normal n and offset d: kept is where n·x + d >= 0
+    distance: Floats  # (V,) of the vertices from a plane
+    slack: float  # distances below this are rounding
+
+
 class Scratch(NamedTuple):
     """Working storage of one worker; `flow.scratch` sizes it."""
 
-    polygon: Floats  # (2D + 3, V, 3)
-    size: Ints  # (2D + 3,)
-    plane: Floats  # (D + 1, 2V, 4) unit normal n and offset d: kept is where n·x + d >= 0
+    polygons: Polygons  # 2D + 3 slots, D + 1 rows
     planes: Ints  # (D + 1,) how many
     might: Bits  # (D, W) bits
     via: Ints  # (D + 1,) the directed portal that led into the frame
     at: Ints  # (D,) next candidate, index into out
-    distance: Floats  # (V,)
     line: Floats  # (2, 3) a point and a direction
     near_tie: Ints  # (H,) sequences of portals rejected by a near tie, each after its length
 

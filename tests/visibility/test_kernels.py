@@ -14,6 +14,7 @@ from ptmtools.portal_flow import (
     line_kernels as bits,
 )
 from ptmtools.portal_flow.flow import GROWTH, Portals, geometry, scratch
+from ptmtools.portal_flow.storage import Polygons
 
 SLACK = 1e-12
 Z = np.array([[0.0, 0, 1]])
@@ -31,7 +32,8 @@ def slots(*polygons, spare=1):
     polygon = np.zeros((len(polygons) + spare, width, 3))
     for i, p in enumerate(polygons):
         polygon[i, : len(p), : p.shape[1]] = p
-    return polygon, np.array([len(p) for p in polygons] + [0] * spare)
+    size = np.array([len(p) for p in polygons] + [0] * spare)
+    return Polygons(polygon, size, np.zeros((1, 2 * width, 4)), np.zeros(width), SLACK)
 
 
 @given(rng=RANDOM, n=st.integers(3, 9), c=st.floats(-2, 2))
@@ -40,14 +42,14 @@ def test_clip_is_the_half_plane_intersection(rng, n, c):
     points = convex_polygon(rng, n)
     angle = rng.uniform(0, 2 * np.pi)
     normal = np.array([np.cos(angle), np.sin(angle)])
-    polygon, size = slots(points)
-    status = clipping.clip(polygon, size, 0, np.zeros(polygon.shape[1]), *normal, 0.0, -c, SLACK)
+    at = slots(points)
+    status = clipping.clip(at, 0, (*normal, 0.0, -c))
     along = np.array([-normal[1], normal[0]])
     half = np.array([-1, 1, 1, -1])[:, None] * 50 * along + np.array([0, 0, 1, 1])[:, None] * (
         50 * normal
     )
     expected = shapely.Polygon(points).intersection(shapely.Polygon(half + c * normal)).area
-    kept = 0.0 if status <= clipping.EMPTY else shapely.Polygon(polygon[0, : size[0], :2]).area
+    kept = 0.0 if status <= clipping.EMPTY else shapely.Polygon(at.vertex[0, : at.size[0], :2]).area
     assert kept == pytest.approx(expected, abs=1e-9)
     assert (status == clipping.WHOLE) == bool((points @ normal >= c - SLACK).all())
 
@@ -62,20 +64,17 @@ def test_clip_drops_what_only_touches_and_keeps_a_sliver():
         (1 - 1e-9, clipping.CUT),
         (0.0, clipping.WHOLE),
     ):
-        polygon, size = slots(square)
-        distance = np.zeros(polygon.shape[1])
-        assert clipping.clip(polygon, size, 0, distance, 1.0, 0.0, 0.0, -at, SLACK) == status
+        assert clipping.clip(slots(square), 0, (1.0, 0.0, 0.0, -at)) == status
 
 
 def test_clip_never_overruns_a_slot():
     # A comb, far from convex: 20 teeth make 40 crossings, more than the slot has room for.
     teeth = np.array([[i * 0.5, i % 2] for i in range(41)] + [[20, -1], [0, -1]], float)
-    polygon, size = slots(teeth)
-    polygon = np.ascontiguousarray(polygon[:, : len(teeth) + 1])
-    before = polygon[0].copy()
-    status = clipping.clip(polygon, size, 0, np.zeros(50), 0.0, 1.0, 0.0, -0.5, SLACK)
-    assert status == clipping.WHOLE
-    assert np.array_equal(polygon[0], before)
+    at = slots(teeth)
+    at = at._replace(vertex=np.ascontiguousarray(at.vertex[:, : len(teeth) + 1]))
+    before = at.vertex[0].copy()
+    assert clipping.clip(at, 0, (0.0, 1.0, 0.0, -0.5)) == clipping.WHOLE
+    assert np.array_equal(at.vertex[0], before)
 
 
 def brute_force_separators(a, b):
@@ -102,11 +101,10 @@ def test_separators_are_those_of_brute_force(rng, na, nb):
     tilt = rng.uniform(-0.4, 0.4)
     turn = np.array([[np.cos(tilt), 0, -np.sin(tilt)], [0, 1, 0], [np.sin(tilt), 0, np.cos(tilt)]])
     a, b = flat[0], flat[1] @ turn + [rng.uniform(-2, 2), rng.uniform(-2, 2), 3.0]
-    polygon, size = slots(a, b)
-    plane = np.zeros((1, 2 * polygon.shape[1], 4))
+    at = slots(a, b)
     normal = np.array([Z[0], Z[0] @ turn])
-    count = clipping.separate(polygon, size, 0, 0, 1.0, 1, 1, -1.0, normal, plane, 0, SLACK)
-    ours, theirs = plane[0, :count], brute_force_separators(a, b)
+    count = clipping.separate(at, normal, 0, 0, 1, 3, 0)
+    ours, theirs = at.plane[0, :count], brute_force_separators(a, b)
     assert count > 0
     for one, other in ((ours, theirs), (theirs, ours)):
         for m in one:
@@ -118,14 +116,13 @@ def test_separators_are_those_of_brute_force(rng, na, nb):
 def test_no_line_through_both_polygons_leaves_the_separators(rng):
     a = np.column_stack([convex_polygon(rng, 5), np.zeros(5)])
     b = np.column_stack([convex_polygon(rng, 4) + rng.uniform(-1, 1, 2), np.full(4, 0.7)])
-    polygon, size = slots(a, b)
-    plane = np.zeros((1, 2 * polygon.shape[1], 4))
+    at = slots(a, b)
     normal = np.concatenate([Z, Z])
-    count = clipping.separate(polygon, size, 0, 0, 1.0, 1, 1, -1.0, normal, plane, 0, SLACK)
+    count = clipping.separate(at, normal, 0, 0, 1, 3, 0)
     p = rng.dirichlet(np.ones(5), 200) @ a
     q = rng.dirichlet(np.ones(4), 200) @ b
     beyond = p + rng.uniform(1, 20, (200, 1)) * (q - p)
-    assert (beyond @ plane[0, :count, :3].T + plane[0, :count, 3] >= -1e-9).all()
+    assert (beyond @ at.plane[0, :count, :3].T + at.plane[0, :count, 3] >= -1e-9).all()
 
 
 def test_lowest_set_bit_of_every_word():
@@ -189,7 +186,9 @@ def test_a_chain_longer_than_the_scratch_is_accepted_whole(room_row):
         bits = range(p + 2, 22, 2) if p % 2 == 0 else range(p - 2, 0, -2)
         known[p, 0] = sum(1 << q for q in bits)
     whole = scratch(g, 1)
-    short = whole._replace(might=whole.might[:3], polygon=whole.polygon[-9:], plane=whole.plane[:4])
+    polygons = whole.polygons
+    few = polygons._replace(vertex=polygons.vertex[-9:], plane=polygons.plane[:4])
+    short = whole._replace(might=whole.might[:3], polygons=few)
     for storage, expected_cut in ((whole, False), (short, True)):
         seen = np.zeros(1, np.uint64)
         _, cut, *_ = flow_kernels.flow(g, storage, known, 0, 10**6, NONE, False, seen)
