@@ -149,7 +149,7 @@ def presets(report: Report, trials: dict[str, CoverageTrade], subjects: dict[str
 
 
 def rates(report: Report, trials: dict[str, CoverageTrade]) -> None:
-    found = [run(name, trade) for name, trade in trials.items()]
+    found = [run(name, trade.experiment()) for name, trade in trials.items()]
     report.head(
         "Rates: error ∝ rays^b", ("family", *(trade.stage for trade in found if trade.rates))
     )

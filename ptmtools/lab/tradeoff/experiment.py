@@ -1,9 +1,9 @@
 """Cost against error: the price and the effect of a stage's options on the user's own scene.
 
-An `Experiment` of a stage lists settings of its options, runs each, and
-measures how far the result is from a reference that does not depend on the options. The evaluation
-is the same for all: the Pareto front of the settings, the fall of the error with the work (a fitted
-power), and the cheapest setting for a wanted error.
+An `Experiment` of a stage lists settings of its options, runs each, and measures how far the result
+is from a reference that does not depend on the options. The evaluation is the same for all: the
+Pareto front of the settings, the fall of the error with the work (a fitted power), and the cheapest
+setting for a wanted error.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from statistics import linear_regression
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from ptmtools.progress import Progress, silent
 
@@ -62,24 +62,23 @@ class Measurement:
     note: str = ""
 
 
-class Experiment(Protocol):
+@dataclass(frozen=True)
+class Experiment:
     """A stage's knobs, their cost and their error.
 
     Attributes
     ----------
     work, error: definitions of work and error, with their units.
+    settings: to try, cheap ones first.
+    measure: runs the stage with a setting.
     reference_error: the standard error of the reference itself, 0 where it is exact.
     """
 
     work: str
     error: str
-    reference_error: float
-
-    def settings(self) -> Sequence[Setting]:
-        """Settings to try, cheap ones first."""
-
-    def measure(self, setting: Setting) -> Measurement:
-        """Runs the stage with a setting."""
+    settings: Sequence[Setting]
+    measure: Callable[[Setting], Measurement]
+    reference_error: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -118,7 +117,7 @@ class Trade:
 
 def run(stage: str, experiment: Experiment, progress: Progress = silent) -> Trade:
     """Tries all settings of a stage's experiment."""
-    settings = experiment.settings()
+    settings = experiment.settings
     trials = []
     for i, setting in enumerate(settings):
         trials.append(Trial(setting, experiment.measure(setting)))
@@ -140,7 +139,7 @@ def pareto(trials: Sequence[Trial]) -> tuple[Trial, ...]:
     marked = []
     for trial in ordered:
         best = trial.setting.sound and trial.measured.error < least
-        marked.append(Trial(trial.setting, trial.measured, best))
+        marked.append(replace(trial, best=best))
         least = trial.measured.error if best else least
     return tuple(marked)
 

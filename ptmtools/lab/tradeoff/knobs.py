@@ -8,7 +8,7 @@ again in a copy, and the others count their time with the database's own options
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, fields, replace
 from functools import partial
@@ -25,14 +25,6 @@ from ptmtools.pipeline.stages import ACH, CELLS, EMIT, PVS, STAGES, TEXTURES
 from ptmtools.progress import Progress, silent
 
 
-def _other(value: Any, own: Any) -> bool:
-    return bool(value != own)
-
-
-def _more(value: Any, own: Any) -> bool:
-    return bool(value > own)
-
-
 @dataclass(frozen=True)
 class Knob:
     """One option of a stage.
@@ -41,8 +33,8 @@ class Knob:
     ----------
     stage, field: the stage, and the field of its options.
     values: to try.
-    worth: ``worth(value, own)``: whether to try a value beside the database's own. Pictures are
-        compared with those of the database, so only coarser textures are tried.
+    coarser: only values above the database's own are tried, since pictures are compared with those
+        of the database.
     policy: the client's policy, if only some clients use the result; "" for those of the user.
     own: the property of the options with the value in force; by default the field.
     slow: values that take far longer, only tried if the knob is named.
@@ -52,7 +44,7 @@ class Knob:
     stage: Stage[Any]
     field: str
     values: tuple[Any, ...]
-    worth: Callable[[Any, Any], bool] = _other
+    coarser: bool = False
     policy: str = ""
     own: str = ""
     slow: tuple[Any, ...] = ()
@@ -77,9 +69,9 @@ KNOBS = (
     Knob(PVS, "method", ("fast", "sampled", "full")),
     Knob(ACH, "samples", (8, 1, 64, 512), policy="ach", own="points"),
     Knob(TEXTURES, "profile", ("raw", "fast"), slow=("small",)),
-    Knob(TEXTURES, "max_error", (2, 4), _more),
+    Knob(TEXTURES, "max_error", (2, 4), coarser=True),
     Knob(TEXTURES, "max_side", (1 / 2, 1 / 4), of_longest=True),
-    Knob(TEXTURES, "trim", (True,), _more),
+    Knob(TEXTURES, "trim", (True,), coarser=True),
     Knob(EMIT, "need", (16, 0)),
 )
 
@@ -123,7 +115,7 @@ def settings(
         values = (*knob.values, *(knob.slow if named else ()))
         if knob.of_longest:
             values = tuple(int(share * longest) for share in values if share * longest >= 1)
-        chosen = [value for value in values if knob.worth(value, current)]
+        chosen = [v for v in values if (v > current if knob.coarser else v != current)]
         for value in chosen[:1] if quick else chosen:
             with suppress(InputError):  # if the other options do not allow it
                 changed = replace(options, **{knob.field: value})

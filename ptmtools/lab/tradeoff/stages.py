@@ -22,19 +22,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.cells import SubdivideOptions, subdivide
+from ptmtools.cells import subdivide
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.ach import choose
 from ptmtools.coverage.item_buffer import VIEWS
 from ptmtools.coverage.options import MAX_SAMPLES, PRESETS, AchOptions
 from ptmtools.coverage.sampling import CellHints, Sampler
 from ptmtools.errors import MissingComponentError
-from ptmtools.lab.tradeoff.experiment import Measurement, Setting, Subject, timed
+from ptmtools.lab.tradeoff.experiment import Experiment, Measurement, Setting, Subject, timed
 from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS, SCENE, TEXTURES
 from ptmtools.scene.model import Scene, SourceImage
 from ptmtools.texture import EncodeOptions, encode, read_image
@@ -47,40 +46,14 @@ from ptmtools.visibility.pvs import compute_pvs
 WARM = 4
 
 
-def prepare_cells(subject: Subject) -> CellsTrade:
+def prepare_cells(subject: Subject) -> Experiment:
     """See `EXPERIMENTS`."""
-    return CellsTrade(subject.artifacts[APO], subject.options(CELLS))
+    scene, own = subject.artifacts[APO], subject.options(CELLS)
+    few = subdivide(scene, replace(own, max_leaves=WARM))
+    compute_pvs(few, PvsOptions(method="fast"))  # compiles both
 
-
-class CellsTrade:
-    """The experiment of the subdivision."""
-
-    work = "leaves"
-    error = "share of the building that a viewer may see"
-    reference_error = 0.0
-
-    def __init__(self, scene: Scene, options: SubdivideOptions) -> None:
-        self._scene, self._options = scene, options
-        few = subdivide(scene, replace(options, max_leaves=WARM))
-        compute_pvs(few, PvsOptions(method="fast"))  # compiles both
-
-    def settings(self) -> Sequence[Setting]:
-        """See `Experiment.settings`."""
-        area = self._options.wall_area
-        return [
-            Setting(
-                f"--cells {kind} --wall-area {area * factor:g}",
-                {"cells": kind, "wall_area": area * factor},
-                kind,
-            )
-            for kind in ("room", "leaf")
-            for factor in (4, 2, 1, 0.5)
-        ]
-
-    def measure(self, setting: Setting) -> Measurement:
-        """See `Experiment.measure`."""
-        options = replace(self._options, **setting.knobs)
-        cells, seconds = timed(lambda: subdivide(self._scene, options))
+    def measure(setting: Setting) -> Measurement:
+        cells, seconds = timed(lambda: subdivide(scene, replace(own, **setting.knobs)))
         mean, worst = compute_pvs(cells, PvsOptions(method="fast")).volume_at_hand
         return Measurement(
             seconds=seconds,
@@ -89,6 +62,15 @@ class CellsTrade:
             worst=worst,
             more={"cells": float(cells.cell_count), "portals": float(cells.portal_count)},
         )
+
+    areas = [own.wall_area * factor for factor in (4, 2, 1, 0.5)]
+    settings = [
+        Setting(f"--cells {kind} --wall-area {area:g}", {"cells": kind, "wall_area": area}, kind)
+        for kind in ("room", "leaf")
+        for area in areas
+    ]
+    error = "share of the building that a viewer may see"
+    return Experiment("leaves", error, settings, measure)
 
 
 #: Seed of the reference, unless the user takes the same.
@@ -107,19 +89,25 @@ GRID = (
 )
 
 
-def prepare_coverage(subject: Subject) -> CoverageTrade:
+def prepare_coverage(subject: Subject) -> Experiment:
     """See `EXPERIMENTS`. The options that settings choose are left open."""
     options = replace(subject.options(ACH), samples=None, face=None, placement=None, tolerance=None)
     artifacts = subject.artifacts
     tried, points = subject.cells_tried, subject.reference_points
-    return CoverageTrade(artifacts[APO], artifacts[CELLS], artifacts[PVS], options, tried, points)
+    return CoverageTrade(
+        artifacts[APO], artifacts[CELLS], artifacts[PVS], options, tried, points
+    ).experiment()
 
 
 class CoverageTrade:
-    """The experiment of the coverage hints."""
+    """The experiment of the coverage hints.
 
-    work = "rays per cell"
-    error = "total variation of a cell's hints"
+    Attributes
+    ----------
+    tried: cells that stand for all, evenly spread.
+    truth: their reference hints, by cell.
+    reference_error: the standard error of these.
+    """
 
     def __init__(
         self,
@@ -130,10 +118,7 @@ class CoverageTrade:
         cells_tried: int = 16,
         reference_points: int = MAX_SAMPLES,
     ) -> None:
-        """``options``: those that settings leave open, such as the backend and the weighting.
-        `tried` are the cells that stand for all, evenly spread; `truth` their reference hints, by
-        cell.
-        """
+        """``options``: those that settings leave open, such as the backend and the weighting."""
         self._scene, self._cells, self._pvs, self._options = scene, cells, pvs, options
         self._most = reference_points
         every = cells.cell_count
@@ -155,7 +140,14 @@ class CoverageTrade:
         bounds = bounds[np.isfinite(bounds)]
         self.reference_error = float(bounds.mean()) / 2 if len(bounds) else 0.0
 
-    def settings(self) -> Sequence[Setting]:
+    def experiment(self) -> Experiment:
+        """The experiment with all `settings`."""
+        error = "total variation of a cell's hints"
+        return Experiment(
+            "rays per cell", error, self.settings(), self.measure, self.reference_error
+        )
+
+    def settings(self) -> list[Setting]:
         """See `Experiment.settings`; only those with fewer points than the reference."""
         presets = [Setting(f"--preset {name}", {"preset": name}) for name in PRESETS]
         grid = [
@@ -225,52 +217,41 @@ class CoverageTrade:
 TRIED, CORNER = 4, 512
 
 
-def prepare_textures(subject: Subject) -> TexturesTrade:
+def prepare_textures(subject: Subject) -> Experiment:
     """See `EXPERIMENTS`."""
-    return TexturesTrade(subject.artifacts[SCENE].images, subject.options(TEXTURES))
+    return textures_experiment(subject.artifacts[SCENE].images, subject.options(TEXTURES))
 
 
-class TexturesTrade:
-    """The experiment of the texture profiles."""
+def textures_experiment(images: Sequence[SourceImage], own: EncodeOptions) -> Experiment:
+    """The experiment of the texture profiles, on corners of a few images."""
+    chosen = np.linspace(0, len(images) - 1, min(TRIED, len(images))).astype(int)
+    whole = [read_image(images[i].load()) for i in np.unique(chosen)]
+    corners = [pixels[:CORNER, :CORNER] for pixels in whole]
+    tried = sum(pixels.size for pixels in corners)
+    part = tried / max(sum(pixels.size for pixels in whole), 1)
+    times = len(images) / max(len(whole), 1) / (part or 1)
+    settings = []
+    for name, profile in PROFILES.items():
+        knobs = {"profile": name} if profile.lossy else {"profile": name, "max_error": 0}
+        with suppress(MissingComponentError):
+            if corners:  # compiles the kernels
+                encode(corners[0][:8, :8], replace(own, **knobs))
+            settings.append(Setting(f"--profile {name}", knobs))
 
-    work = "texels"
-    error = "bytes of all levels, as a share of the uncompressed finest"
-    reference_error = 0.0
-
-    def __init__(self, images: Sequence[SourceImage], options: EncodeOptions) -> None:
-        chosen = np.linspace(0, len(images) - 1, min(TRIED, len(images))).astype(int)
-        whole = [read_image(images[i].load()) for i in np.unique(chosen)]
-        self._pixels = [pixels[:CORNER, :CORNER] for pixels in whole]
-        tried = sum(pixels.size for pixels in self._pixels)
-        part = tried / max(sum(pixels.size for pixels in whole), 1)
-        self._times = len(images) / max(len(whole), 1) / (part or 1)
-        self._options = options
-        self._settings: list[Setting] = []
-        for name, profile in PROFILES.items():
-            knobs: dict[str, Any] = (
-                {"profile": name} if profile.lossy else {"profile": name, "max_error": 0}
-            )
-            with suppress(MissingComponentError):
-                if self._pixels:  # compiles the kernels
-                    encode(self._pixels[0][:8, :8], replace(options, **knobs))
-                self._settings.append(Setting(f"--profile {name}", knobs))
-
-    def settings(self) -> Sequence[Setting]:
-        """See `Experiment.settings`."""
-        return self._settings
-
-    def measure(self, setting: Setting) -> Measurement:
-        """See `Experiment.measure`."""
-        options = replace(self._options, **setting.knobs)
-        files, seconds = timed(lambda: [encode(pixels, options) for pixels in self._pixels])
-        raw = np.array([pixels.nbytes for pixels in self._pixels])
+    def measure(setting: Setting) -> Measurement:
+        options = replace(own, **setting.knobs)
+        files, seconds = timed(lambda: [encode(pixels, options) for pixels in corners])
+        raw = np.array([pixels.nbytes for pixels in corners])
         stored = np.array([len(data) for data in files])
         return Measurement(
-            seconds=seconds * self._times,
-            work=float(sum(pixels.shape[0] * pixels.shape[1] for pixels in self._pixels)),
+            seconds=seconds * times,
+            work=float(sum(pixels.shape[0] * pixels.shape[1] for pixels in corners)),
             error=float(stored.sum() / max(raw.sum(), 1)),
             worst=float((stored / raw).max(initial=0.0)),
         )
+
+    error = "bytes of all levels, as a share of the uncompressed finest"
+    return Experiment("texels", error, settings, measure)
 
 
 #: The budget of the reference, which hardly any portal exhausts.
@@ -281,56 +262,40 @@ BUDGETS = (200, 2_000, 20_000, 200_000)
 _BASE = PvsOptions()
 
 
-def prepare_visibility(subject: Subject) -> VisibilityTrade:
+def prepare_visibility(subject: Subject) -> Experiment:
     """See `EXPERIMENTS`."""
-    return VisibilityTrade(subject.artifacts[CELLS], subject.options(PVS))
+    return visibility_experiment(subject.artifacts[CELLS], subject.options(PVS).budget)
 
 
-class VisibilityTrade:
-    """The experiment of the visibility."""
+def visibility_experiment(cells: Cells, budget: int) -> Experiment:
+    """The experiment of the visibility; the database's own ``budget`` is one of those tried."""
+    ample = replace(_BASE, method="full", budget=max(AMPLE, budget))
+    truth = compute_pvs(cells, ample).to_matrix()
+    right = truth.sum(axis=1)
+    compute_pvs(cells, replace(_BASE, method="sampled", lines=1))  # compiles it
 
-    work = "operations"
-    error = "wrong pairs of cells, as a share of the right ones"
-    reference_error = 0.0
-
-    def __init__(self, cells: Cells, options: PvsOptions) -> None:
-        """``options``: only the budget is used; settings give the rest."""
-        self._cells, self._own = cells, options.budget
-        ample = replace(_BASE, method="full", budget=max(AMPLE, options.budget))
-        self._truth = compute_pvs(cells, ample).to_matrix()
-        compute_pvs(cells, replace(_BASE, method="sampled", lines=1))  # compiles it
-
-    def settings(self) -> Sequence[Setting]:
-        """See `Experiment.settings`."""
-        return [
-            *(
-                Setting(
-                    f"--pvs sampled --pvs-lines {n}",
-                    {"method": "sampled", "lines": n},
-                    "sampled",
-                    sound=False,
-                )
-                for n in (10, 100, 1000)
-            ),
-            Setting("--pvs fast", {"method": "fast"}),
-            *(
-                Setting(f"--pvs full --pvs-budget {n}", {"method": "full", "budget": n}, "budget")
-                for n in sorted({*BUDGETS, self._own})
-            ),
-        ]
-
-    def measure(self, setting: Setting) -> Measurement:
-        """See `Experiment.measure`."""
-        options = replace(_BASE, **setting.knobs)
-        pvs, seconds = timed(lambda: compute_pvs(self._cells, options))
+    def measure(setting: Setting) -> Measurement:
+        pvs, seconds = timed(lambda: compute_pvs(cells, replace(_BASE, **setting.knobs)))
         seen = pvs.to_matrix()
-        extra, missing = seen & ~self._truth, self._truth & ~seen
-        size = max(int(self._truth.sum()), 1)
-        each = (extra | missing).sum(axis=1) / np.maximum(self._truth.sum(axis=1), 1)
+        missing, wrong = truth & ~seen, truth != seen
+        size = max(int(truth.sum()), 1)
         return Measurement(
             seconds=seconds,
             work=float(pvs.work.sum()),
-            error=int((extra | missing).sum()) / size,
-            worst=float(each.max(initial=0.0)),
+            error=int(wrong.sum()) / size,
+            worst=float((wrong.sum(axis=1) / np.maximum(right, 1)).max(initial=0.0)),
             more={"missing": int(missing.sum()) / size},
         )
+
+    settings = [
+        Setting(f"--pvs sampled --pvs-lines {n}", {"method": "sampled", "lines": n}, "sampled",
+                sound=False)
+        for n in (10, 100, 1000)
+    ]  # fmt: skip
+    settings.append(Setting("--pvs fast", {"method": "fast"}))
+    settings += [
+        Setting(f"--pvs full --pvs-budget {n}", {"method": "full", "budget": n}, "budget")
+        for n in sorted({*BUDGETS, budget})
+    ]
+    error = "wrong pairs of cells, as a share of the right ones"
+    return Experiment("operations", error, settings, measure)

@@ -231,19 +231,16 @@ class _Walker:
 def _try_setting(
     copy: Path, setting: Setting, own: Own, seconds: Seconds, walker: _Walker
 ) -> WalkTrial:
-    stage = setting.knob.stage
+    stage, words = setting.knob.stage, (setting.name, setting.own, setting.knob.option)
     try:
         options = {**own, stage: setting.options}
         took = build_again(copy, {each: options[each] for each in concerned(stage, options)})
         world = walker.world(read_served(copy))
         seen = walker.walks(world, setting.knob.policy)
     except PtmError as fault:
-        return WalkTrial(
-            setting.name, setting.own, setting.knob.option, 0, 0, problem=fault.message
-        )
+        return WalkTrial(*words, 0, 0, problem=fault.message)
     build = sum({**seconds, **took}.values())
-    bytes_ = served_bytes(world.catalogue)
-    return WalkTrial(setting.name, setting.own, setting.knob.option, build, bytes_, tuple(seen))
+    return WalkTrial(*words, build, served_bytes(world.catalogue), tuple(seen))
 
 
 def compared(served: Served, walk: Walk, original: World) -> World:

@@ -4,36 +4,41 @@ from __future__ import annotations
 
 import csv
 import io
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, strategies as st
 
-from ptmtools.lab.tradeoff.experiment import Measurement, Setting, Trial, pareto, rates, run
+from ptmtools.lab.tradeoff.experiment import (
+    Experiment,
+    Measurement,
+    Setting,
+    Trial,
+    pareto,
+    rates,
+    run,
+)
 from ptmtools.lab.tradeoff.report import as_csv, table
 
 
-class Made:
-    """Errors that fall as work^-0.5, one dear and bad setting, and one that is not sound."""
+def measure(setting):
+    steps = setting.knobs["steps"]
+    seconds = steps * setting.knobs.get("times", 1)
+    return Measurement(seconds, steps, steps**-0.5, 2 * steps**-0.5)
 
-    work, error, reference_error = "steps", "distance", 0.01
 
-    def settings(self):
-        good = [Setting(f"--steps {n}", {"steps": n}, "steps") for n in (400, 100, 4, 1600)]
-        return [
-            *good,
-            Setting("--waste", {"steps": 4, "times": 1000}),
-            Setting("--guess", {"steps": 10**6, "times": 0}, sound=False),
-        ]
-
-    def measure(self, setting):
-        steps = setting.knobs["steps"]
-        seconds = steps * setting.knobs.get("times", 1)
-        return Measurement(seconds, steps, steps**-0.5, 2 * steps**-0.5)
+SETTINGS = [
+    *(Setting(f"--steps {n}", {"steps": n}, "steps") for n in (400, 100, 4, 1600)),
+    Setting("--waste", {"steps": 4, "times": 1000}),
+    Setting("--guess", {"steps": 10**6, "times": 0}, sound=False),
+]
+#: Errors that fall as work^-0.5, one dear and bad setting, and one that is not sound.
+MADE = Experiment("steps", "distance", SETTINGS, measure, 0.01)
 
 
 def test_an_experiment():
     calls = []
-    trade = run("made", Made(), lambda *call: calls.append(call))
+    trade = run("made", MADE, lambda *call: calls.append(call))
     assert [t.setting.name for t in trade.trials if t.best] == [
         "--steps 4",
         "--steps 100",
@@ -48,10 +53,8 @@ def test_an_experiment():
 
 
 def test_errors_below_twice_that_of_the_reference_fit_no_rate():
-    class Blurred(Made):
-        reference_error = 0.06  # 100, 400 and 1600 steps are below twice that
-
-    assert run("made", Blurred()).rates == {}
+    blurred = replace(MADE, reference_error=0.06)  # 100, 400 and 1600 steps are below twice that
+    assert run("made", blurred).rates == {}
 
 
 @given(
@@ -82,7 +85,7 @@ def test_two_trials_of_a_family_have_no_rate():
 
 
 def test_the_table_names_the_best_and_the_cheapest():
-    lines = table(run("made", Made()), 0.06)
+    lines = table(run("made", MADE), 0.06)
     assert [line[:13].strip() for line in lines if line.startswith("*")] == [
         "* --steps 4",
         "* --steps 100",
@@ -92,11 +95,11 @@ def test_the_table_names_the_best_and_the_cheapest():
     assert "  standard error of the reference: 0.0100" in lines
     assert "  steps: error ∝ work^-0.50" in lines
     assert lines[-1] == "  cheapest for an error of at most 0.06: --steps 400"
-    assert "none of these" in table(run("made", Made()), 1e-9)[-1]
+    assert "none of these" in table(run("made", MADE), 1e-9)[-1]
 
 
 def test_the_csv_has_every_trial():
-    rows = list(csv.DictReader(io.StringIO(as_csv([run("made", Made()), run("made", Made())]))))
+    rows = list(csv.DictReader(io.StringIO(as_csv([run("made", MADE), run("made", MADE)]))))
     assert len(rows) == 12
     assert rows[1]["setting"] == "--steps 4"
     assert float(rows[1]["error"]) == 0.5

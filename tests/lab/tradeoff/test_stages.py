@@ -19,8 +19,8 @@ from ptmtools.lab.tradeoff.experiment import Setting
 from ptmtools.lab.tradeoff.stages import (
     REFERENCE_SEED,
     CoverageTrade,
-    TexturesTrade,
-    VisibilityTrade,
+    textures_experiment,
+    visibility_experiment,
 )
 from ptmtools.pipeline.build import build_scene
 from ptmtools.scene.model import SourceImage
@@ -106,10 +106,10 @@ def test_a_database_of_lossy_textures() -> None:
     png = io.BytesIO()
     Image.fromarray(noise).save(png, "png")
     image = SourceImage("noise.png", "0" * 64, png.getvalue)
-    exact, lossy = (TexturesTrade([image], EncodeOptions(max_error=n)) for n in (0, 2))
+    exact, lossy = (textures_experiment([image], EncodeOptions(max_error=n)) for n in (0, 2))
     smaller = {
         setting.knobs["profile"]: lossy.measure(setting).error < exact.measure(setting).error
-        for setting in lossy.settings()
+        for setting in lossy.settings
     }
     assert smaller.pop("paper", False) is False  # needs an optional component
     assert smaller == {"raw": False, "fast": True, "small": True}
@@ -202,10 +202,10 @@ def test_visibility_is_tried_alike_whatever_the_database_was_built_with(room_row
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("ptmtools.lab.tradeoff.stages.compute_pvs", watched)
-        trade = VisibilityTrade(cells, built)
+        trade = visibility_experiment(cells, built.budget)
         assert (asked[0].method, asked[0].budget) == ("full", 2_000_000)
         asked.clear()
-        settings = trade.settings()
+        settings = trade.settings
         for setting in settings:
             trade.measure(setting)
     budgets = [s.knobs["budget"] for s in settings if s.family == "budget"]
@@ -217,8 +217,8 @@ def test_visibility_is_tried_alike_whatever_the_database_was_built_with(room_row
 
 def test_sampled_visibility_lacks_pairs_and_is_never_the_best(room_row) -> None:
     _, cells = room_row(6)
-    trade = VisibilityTrade(cells, PvsOptions())
-    settings = {s.name: s for s in trade.settings()}
+    trade = visibility_experiment(cells, PvsOptions().budget)
+    settings = {s.name: s for s in trade.settings}
     sampled = [s for name, s in settings.items() if "sampled" in name]
     assert sampled
     assert not any(s.sound for s in sampled)
