@@ -24,12 +24,13 @@ from ptmtools.cli.parameters import (
 )
 from ptmtools.coverage.options import MAX_SAMPLES
 from ptmtools.files import write_bytes
+from ptmtools.lab.figures import require
 from ptmtools.lab.path.making import path_through
 from ptmtools.lab.path.options import PathOptions
 from ptmtools.lab.tradeoff import EXPERIMENTS, report as sentences
 from ptmtools.lab.tradeoff.experiment import Subject, Trade, run
 from ptmtools.lab.tradeoff.knobs import KNOBS
-from ptmtools.lab.tradeoff.report import as_csv, picture, require, table
+from ptmtools.lab.tradeoff.report import as_csv, picture, table
 from ptmtools.lab.tradeoff.walk import WalkOptions, WalkTrade, try_settings
 from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.stage import Artifacts

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import groupby
 from typing import Any
 
@@ -40,8 +41,9 @@ def require() -> None:
     component("matplotlib.figure", "PTM-M100", "matplotlib is missing", "plot")
 
 
-def picture(played: Sequence[RunResult], measure: str = "e") -> bytes:
-    """A PNG of one of `MEASURES`, on the first walk; times with a still viewpoint are shaded.
+def plot(size: tuple[float, float], drawings: Sequence[Callable[[Any], None]]) -> bytes:
+    """A PNG of panels, one below the other, of this ``size`` in inches each; every drawing gets the
+    axes of its panel.
 
     Raises `MissingComponentError` PTM-M100 without matplotlib.
     """
@@ -49,22 +51,25 @@ def picture(played: Sequence[RunResult], measure: str = "e") -> bytes:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    label, values = MEASURES[measure]
-    first_walk = [p for p in played if p.walk == played[0].walk]
-    blocks = [list(some) for _, some in groupby(first_walk, lambda p: (p.run.conditions, p.memory))]
-    figure = Figure(figsize=(9, 3 * len(blocks)), dpi=110, layout="constrained")
+    many = len(drawings)
+    figure = Figure(figsize=(size[0], size[1] * max(many, 1)), dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
-    for number, block in enumerate(blocks):
-        axes = figure.add_subplot(len(blocks), 1, number + 1)
-        _draw(axes, block, values)
-        title = f"{link_text(block[0].run.conditions)}; texture memory {block[0].memory}"
-        axes.set(title=title, xlabel="s", ylabel=label)
+    for number, draw in enumerate(drawings):
+        draw(figure.add_subplot(many, 1, number + 1))
     out = io.BytesIO()
     figure.savefig(out, format="png", metadata={"Software": None})
     return out.getvalue()
 
 
-def _draw(axes: Any, block: list[RunResult], values: Callable[[Run], Floats]) -> None:
+def picture(played: Sequence[RunResult], measure: str = "e") -> bytes:
+    """A PNG of one of `MEASURES`, on the first walk; times with a still viewpoint are shaded."""
+    first_walk = [p for p in played if p.walk == played[0].walk]
+    blocks = groupby(first_walk, lambda p: (p.run.conditions, p.memory))
+    return plot((9, 3), [partial(_draw, list(some), measure) for _, some in blocks])
+
+
+def _draw(block: list[RunResult], measure: str, axes: Any) -> None:
+    label, values = MEASURES[measure]
     run = block[0].run
     axes.fill_between(
         run.time, 0, 1, where=run.still, step="mid", color="#f2f2f2", linewidth=0,
@@ -78,6 +83,8 @@ def _draw(axes: Any, block: list[RunResult], values: Callable[[Run], Floats]) ->
     most = max((float(np.percentile(v, 98)) for v in drawn if np.isfinite(v).all()), default=0.0)
     axes.set_ylim(0, 1.1 * most if most > 0 else 1)
     axes.set_xlim(0, run.time[-1] or 1)
+    title = f"{link_text(run.conditions)}; texture memory {block[0].memory}"
+    axes.set(title=title, xlabel="s", ylabel=label)
     axes.grid(True, color="#e5e5e5", linewidth=0.5)
     axes.legend(fontsize=7, loc="upper right")
 

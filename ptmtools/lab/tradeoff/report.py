@@ -9,13 +9,14 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import groupby
 from typing import Any
 
+from ptmtools.lab.figures import COLORS, plot
 from ptmtools.lab.report import rate_text
 from ptmtools.lab.tradeoff.experiment import Measurement, Setting, Trade, Trial, pareto
 from ptmtools.lab.tradeoff.walk import FIRST, WalkOutcome, WalkTrade, WalkTrial
-from ptmtools.lazy import component
 from ptmtools.quantities import size
 
 #: Columns of the CSV.
@@ -73,34 +74,15 @@ def as_csv(trades: Sequence[Trade]) -> str:
     return text.getvalue()
 
 
-COLORS = ("#1b6ca8", "#d1603d", "#5a9367", "#8d6a9f", "#b08d2e", "#5b6770", "#c2437a", "#2f8f8b")
-
-
-def require() -> None:
-    """Raises `MissingComponentError` PTM-M100 without matplotlib."""
-    component("matplotlib.figure", "PTM-M100", "matplotlib is missing", "plot")
-
-
 def picture(trades: Sequence[Trade]) -> bytes:
     """A PNG: every trial, families joined, with the names of the best settings.
 
     Raises `MissingComponentError` PTM-M100 without matplotlib.
     """
-    require()
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(8, 5 * max(len(trades), 1)), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
-    for i, trade in enumerate(trades):
-        axes = figure.add_subplot(len(trades), 1, i + 1)
-        _draw(axes, trade)
-    out = io.BytesIO()
-    figure.savefig(out, format="png", metadata={"Software": None})
-    return out.getvalue()
+    return plot((8, 5), [partial(_draw, trade) for trade in trades])
 
 
-def _draw(axes: Any, trade: Trade) -> None:
+def _draw(trade: Trade, axes: Any) -> None:
     families = list(dict.fromkeys(t.setting.family for t in trade.trials))
     least = min((t.measured.error for t in trade.trials if t.measured.error > 0), default=1.0)
     for number, family in enumerate(families):
