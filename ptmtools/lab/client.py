@@ -223,6 +223,25 @@ class Client(ABC):
         late = {"late": browser.sent.until(now) - now} if browser else {}
         self.waiting.append(self.link.request(part.end - part.begin, priority, part, **late))
 
+    def whole(self, kind: Kind, number: int, priority: float) -> bool:
+        """Requests a file as a whole; returns False if it was requested before."""
+        files = self.files[kind]
+        if files.asked[number]:
+            return False
+        self.ask(kind, number, int(files.size[number]), priority)
+        return True
+
+    def loaded_shapes(self, first: int = 0) -> Ints:
+        """The shapes of cells with loaded geometry whose texture is ``first`` or a later one."""
+        shapes = self.world.catalogue.shapes
+        return np.flatnonzero(self.geometry.whole[shapes.cell] & (shapes.texture >= first))
+
+    def shapes_ahead(self, first: int = 0) -> Ints:
+        """Those of `loaded_shapes` whose boxes meet the frustum."""
+        shapes, loaded = self.world.catalogue.shapes, self.loaded_shapes(first)
+        frustum = self.world.frustum(self.frame)
+        return loaded[frustum.meets_boxes(shapes.low[loaded], shapes.high[loaded])]
+
     def arrived(self, request: Request) -> None:
         """Handles a finished request."""
         assert isinstance(request.tag, Range)

@@ -182,13 +182,7 @@ def prepare(
     LimitError: PTM-L400 it is too long.
     DatabaseError, LimitError: those of `read_pyramids`.
     """
-    if walk.duration * rate > MOST_FRAMES:
-        raise LimitError(
-            "PTM-L400",
-            f"a walk of {walk.duration:g} s has more than {MOST_FRAMES:,} frames",
-            remedy="give a shorter one",
-        )
-    browser = walk.browser
+    time, browser = frame_times(walk, rate), walk.browser
     if browser:
         _require_fitting(browser, served)
         rate, time = (len(walk.time) - 1) / walk.duration, walk.time
@@ -196,7 +190,6 @@ def prepare(
         if (cell < 0).any():
             cell = np.where(cell < 0, served.locator.along(eye), cell)
     else:
-        time = np.arange(int(np.floor(walk.duration * rate + 1e-9)) + 1) / rate
         eye, direction = walk.at(time)
         cell = served.locator.along(eye)
     astray = cell < 0
@@ -268,6 +261,18 @@ def prepare(
     fetched = with_octrees(catalogue, served, octrees)
     more = {name: replace(world, form=name, catalogue=fetched, other_forms={}) for name in drawing}
     return replace(world, other_forms={**world.other_forms, **more})
+
+
+def frame_times(walk: Walk, rate: float) -> Floats:
+    """(F,) s, the times of the frames of a walk at a rate. Raises LimitError PTM-L400 if they are
+    too many."""
+    if walk.duration * rate > MOST_FRAMES:
+        raise LimitError(
+            "PTM-L400",
+            f"a walk of {walk.duration:g} s has more than {MOST_FRAMES:,} frames",
+            remedy="give a shorter one",
+        )
+    return np.asarray(np.arange(int(np.floor(walk.duration * rate + 1e-9)) + 1) / rate)
 
 
 def relief_of(

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats
 from ptmtools.errors import DatabaseError, InputError, LimitError
 from ptmtools.output.served import BUILD, Served
 from ptmtools.progress import Progress, silent
-from ptmtools.rendering.records import Pyramids
+from ptmtools.rendering.records import Pyramids, Sight, Triangles, own_levels
 from ptmtools.texture import reader
 from ptmtools.texture.detail import difference_between
 from ptmtools.texture.model import Limits
@@ -87,6 +88,16 @@ def packed(chains: list[list[NDArray[np.uint8]]]) -> Pyramids:
             at += level.size
         chain.clear()
     return Pyramids(texel, start, size, levels, np.zeros((len(chains), 3)), np.zeros(start.shape))
+
+
+def full_colors(sight: Sight, triangles: Triangles, pyramids: Pyramids) -> Floats:
+    """(n, 3) colours of pixels with all levels and all geometry, 0 to 255."""
+    from ptmtools.rendering.kernels import shade
+
+    shows, result = own_levels(pyramids), np.empty((len(sight.ray), 3))
+    loaded = np.ones(int(triangles.cell.max(initial=-1)) + 1, dtype=np.bool_)
+    shade(sight, triangles, shows, loaded, shows.last, result)
+    return result
 
 
 def mip_sizes(width: int, height: int) -> Iterator[tuple[int, int]]:

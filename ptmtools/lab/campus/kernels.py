@@ -84,12 +84,3 @@ def add_shown(
         if t >= 0:
             color_of(sight, i, triangles, sizes.large, shown, work[:4])
         sums[row, 3] += np.sqrt(distance(shown, exact[i]))
-
-
-@plain_kernel
-def full_colors(
-    sight: Sight, triangles: Triangles, textures: Pyramids, exact: Floats, work: Floats
-) -> None:
-    """Writes the full picture to ``exact`` (n, 3); ``work`` (4, 3) is scratch memory."""
-    for i in range(len(sight.triangle)):
-        color_of(sight, i, triangles, textures, exact[i], work)

@@ -27,13 +27,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints, Singles
-from ptmtools.errors import InputError, LimitError
+from ptmtools.errors import InputError
 from ptmtools.lab.campus.stock import Stock, read_stock, read_surfaces, read_textures
-from ptmtools.lab.world import MOST_FRAMES, PIXELS, RATE
+from ptmtools.lab.world import PIXELS, RATE, frame_times
 from ptmtools.neighbours.campus.model import SIZES
 from ptmtools.output.served import Served, Surfaces
 from ptmtools.progress import Progress, silent
-from ptmtools.rendering.pyramids import read_pyramids
+from ptmtools.rendering.pyramids import full_colors, read_pyramids
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.rendering.records import Pyramids, triangles_of
 from ptmtools.walk import Walk
@@ -96,7 +96,7 @@ def look(
     progress: Progress = silent,
 ) -> Tables:
     """The tables of (F, 3) eyes and directions; ``cell`` of the surfaces is the object."""
-    from ptmtools.lab.campus.kernels import COLUMNS, Sizes, add_shown, full_colors
+    from ptmtools.lab.campus.kernels import COLUMNS, Sizes, add_shown
 
     objects = int(max(finest.cell.max(initial=-1), coarsest.cell.max(initial=-1))) + 1
     wide = len(sizes[0].levels) + 1
@@ -107,7 +107,7 @@ def look(
     caster, triangles = kinds[1][1:] if one_picture else (None, triangles_of(full.surfaces))
     caster = caster or Caster(full.surfaces)
     pixels = camera.width * camera.height
-    exact, work = np.zeros((pixels, 3)), np.zeros((5, 3))
+    work = np.zeros((5, 3))
     sums = np.zeros((objects * wide, COLUMNS))
     start, rows, errors = [0], [np.zeros((0, 3), np.int64)], [np.zeros((0, COLUMNS), np.float32)]
     least = np.zeros(len(eye))
@@ -115,7 +115,7 @@ def look(
         progress(f, len(eye), "looking along the walk")
         coarse, fine = (each.look(camera, eye[f], direction[f]) for _, each, _ in kinds)
         sight = fine if one_picture else caster.look(camera, eye[f], direction[f])
-        full_colors(sight, triangles, full.textures, exact, work[:4])
+        exact = full_colors(sight, triangles, full.textures)
         owner = _owners((fine.triangle, finest), (coarse.triangle, coarsest))
         for (kind, _, drawn), seen in zip(kinds, (coarse, fine), strict=True):
             add_shown(owner, seen, drawn, Sizes(*sizes), exact, place, sums, work)
@@ -215,12 +215,7 @@ def prepare_campus(
     LimitError: PTM-L400 the walk is too long; PTM-L204 the index is.
     DatabaseError, LimitError: those of `read_pyramids`.
     """
-    if walk.duration * rate > MOST_FRAMES:
-        raise LimitError(
-            "PTM-L400",
-            f"a walk of {walk.duration:g} s has more than {MOST_FRAMES:,} frames",
-            remedy="give a shorter one",
-        )
+    time = frame_times(walk, rate)
     if walk.browser:
         raise InputError(
             "PTM-I701",
@@ -229,7 +224,6 @@ def prepare_campus(
         )
     folder = Path(folder)
     stock = read_stock(folder, only)
-    time = np.arange(int(np.floor(walk.duration * rate + 1e-9)) + 1) / rate
     eye, direction = walk.at(time)
     view, tables = np.full(len(time), -1, np.int64), None
     if every:

@@ -84,10 +84,7 @@ class ApoClient(EngineClient):
         self.distance = np.full(len(self.octrees), np.inf)
         if not len(self.octrees):
             return
-        loaded = np.flatnonzero(
-            self.geometry.whole[shapes.cell] & (shapes.texture >= self.octrees[0])
-        )
-        met = loaded[self.frustum.meets_boxes(shapes.low[loaded], shapes.high[loaded])]
+        met = self.shapes_ahead(int(self.octrees[0]))
         number = shapes.texture[met] - self.octrees[0]
         far = np.maximum(self.frustum.distance(shapes.low[met], shapes.high[met]), NEAR)
         np.minimum.at(self.distance, number, far)

@@ -196,12 +196,6 @@ class EngineClient(Client):
         """Average coverage hints, aligned with `known`."""
         return self.world.catalogue.coverage[self.cell]
 
-    def loaded_shapes(self) -> Ints:
-        """The textured shapes of the cells with loaded geometry."""
-        stock = self.world.catalogue
-        loaded = self.geometry.whole[stock.shapes.cell] & (stock.shapes.texture >= 0)
-        return np.flatnonzero(loaded)
-
     # The engine.
 
     def look(self, frame: int) -> None:
@@ -279,13 +273,13 @@ class EngineClient(Client):
     def _fetch_one(self) -> bool:
         """Requests the range of the greatest worth; False if there is none."""
         if not self.index:
-            return self._whole(Kind.INDEX, 0, math.inf)
-        if self._statistics and self._whole(Kind.STATISTICS, 0, math.inf):
+            return self.whole(Kind.INDEX, 0, math.inf)
+        if self._statistics and self.whole(Kind.STATISTICS, 0, math.inf):
             return True
         here = int(self.world.cell[self.frame])
-        if self._whole(Kind.RECORD, here, math.inf):
+        if self.whole(Kind.RECORD, here, math.inf):
             return True
-        if self.cell < 0 and self._whole(Kind.GEOMETRY, here, math.inf):
+        if self.cell < 0 and self.whole(Kind.GEOMETRY, here, math.inf):
             return True
         if self._worth is None:
             return False
@@ -300,9 +294,9 @@ class EngineClient(Client):
             least = min(records, key=lambda c: int(self.records.size[c]))
             record = NOTHING * RECORD_SHARE / float(self.records.size[least])
             if record > max(best, float(density[cell])):
-                return self._whole(Kind.RECORD, least, record)
+                return self.whole(Kind.RECORD, least, record)
         if density[cell] > best:
-            return self._whole(Kind.GEOMETRY, cell, float(density[cell]))
+            return self.whole(Kind.GEOMETRY, cell, float(density[cell]))
         if texture < 0 and worth.ahead is not None:
             best, texture, column = next_fetch(
                 worth.ahead, stock.ends, asked, stock.levels, overhead
@@ -326,13 +320,6 @@ class EngineClient(Client):
         latency, bandwidth = self.estimate.latency, self.estimate.bandwidth
         waiting = latency * bandwidth / 8 / CONNECTIONS if latency else 0.0
         return OVERHEAD + int(min(waiting, LONGEST_WAIT))
-
-    def _whole(self, kind: Kind, number: int, priority: float) -> bool:
-        files = self.files[kind]
-        if files.asked[number]:
-            return False
-        self.ask(kind, number, int(files.size[number]), priority)
-        return True
 
     def _range(self, texture: int, end: int, priority: float) -> bool:
         most = max(RANGE_BYTES, RANGE_SECONDS * self.estimate.bandwidth / 8)

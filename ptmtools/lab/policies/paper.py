@@ -156,20 +156,20 @@ class PaperClient(Client):
     def fetch(self) -> None:
         """See `Client.fetch`: documents and geometry; `tick` requests levels."""
         if not self.files[Kind.INDEX].asked[0]:
-            self._whole(Kind.INDEX, 0, CURRENT)
+            self._request(Kind.INDEX, 0, CURRENT)
         if not self.index:
             return
         here = int(self.world.cell[self.frame])
-        self._whole(Kind.RECORD, here, CURRENT)
-        self._whole(Kind.GEOMETRY, here, CURRENT)
+        self._request(Kind.RECORD, here, CURRENT)
+        self._request(Kind.GEOMETRY, here, CURRENT)
         if self.cell < 0:
             return
         for other in self.known().tolist():
-            self._whole(Kind.GEOMETRY, other, VISIBLE)
+            self._request(Kind.GEOMETRY, other, VISIBLE)
         following = self._next()
         if following >= 0:
-            self._whole(Kind.RECORD, following, NEXT)
-            self._whole(Kind.GEOMETRY, following, NEXT)
+            self._request(Kind.RECORD, following, NEXT)
+            self._request(Kind.GEOMETRY, following, NEXT)
 
     def arrived(self, request: object) -> None:
         """See `Client.arrived`."""
@@ -185,12 +185,10 @@ class PaperClient(Client):
         """The visible set of the cell in use."""
         return self.world.catalogue.visible[self.cell]
 
-    def _whole(self, kind: Kind, number: int, priority: float) -> None:
+    def _request(self, kind: Kind, number: int, priority: float) -> None:
         """Requests a file, or raises the priority of its request."""
         files = self.files[kind]
-        if not files.asked[number]:
-            self.ask(kind, number, int(files.size[number]), priority)
-        elif not files.whole[number]:
+        if not self.whole(kind, number, priority) and not files.whole[number]:
             part = Range(kind, number, 0, int(files.size[number]))
             for request in self.waiting:
                 if request.tag == part and request.priority < priority:

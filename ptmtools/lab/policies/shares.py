@@ -122,10 +122,7 @@ class Weighted:
 
     def __call__(self, client: EngineClient) -> Worth:
         """See `Policy`."""
-        shapes = client.world.catalogue.shapes
-        loaded = client.loaded_shapes()
-        ahead = loaded[client.frustum.meets_boxes(shapes.low[loaded], shapes.high[loaded])]
-        worth = every_level(client, self.weights(client, ahead))
+        worth = every_level(client, self.weights(client, client.shapes_ahead()))
         return Worth(worth, worth, geometry_by_coverage(client))
 
 

@@ -38,25 +38,40 @@ from ptmtools.rendering.rays import NEAR
 
 
 class WholeFileClient(Client, ABC):
-    """A client that requests whole files."""
+    """A client that requests whole files, after all earlier requests."""
+
+    def __init__(self, world: World, link: Link, budget: int) -> None:
+        super().__init__(world, link, budget)
+        #: The frame in which each texture was seen last, -1 for none.
+        self._seen = np.full(world.catalogue.texture_count, -1, np.int64)
 
     def documents(self) -> bool:
         """Requests the index, then the record of the cell and the geometry of its visible set;
         returns whether the index has arrived."""
-        self.whole(Kind.INDEX, 0)
+        self.request(Kind.INDEX, 0)
         if not self.index:
             return False
-        self.whole(Kind.RECORD, int(self.world.cell[self.frame]))
+        self.request(Kind.RECORD, int(self.world.cell[self.frame]))
         if self.cell >= 0:
             for cell in self.world.catalogue.visible[self.cell].tolist():
-                self.whole(Kind.GEOMETRY, cell)
+                self.request(Kind.GEOMETRY, cell)
         return True
 
-    def whole(self, kind: Kind, number: int) -> None:
-        """Requests a file, after all earlier requests, unless it was requested."""
-        files = self.files[kind]
-        if not files.asked[number]:
-            self.ask(kind, number, int(files.size[number]), -self.link.requests)
+    def request(self, kind: Kind, number: int) -> None:
+        """Requests a file unless it was requested."""
+        self.whole(kind, number, -self.link.requests)
+
+    def keep(self, order: Ints, left: int) -> None:
+        """Adds the finest levels that fit into ``left`` bytes, of the textures in this order, up to
+        the first that was never seen."""
+        memory, have = self.world.catalogue.memory, self.have
+        for t in order.tolist():
+            if self._seen[t] < 0:
+                break
+            held = int(memory[t, self.column[t]])
+            fits = int((memory[t, : have[t] + 1] <= held + left).sum()) - 1
+            self.column[t] = max(fits, int(self.column[t]))
+            left -= int(memory[t, self.column[t]]) - held
 
 
 class LruClient(WholeFileClient):
@@ -65,40 +80,28 @@ class LruClient(WholeFileClient):
     def __init__(self, world: World, link: Link, budget: int) -> None:
         super().__init__(world, link, budget)
         self._queue: list[int] = []
-        self._seen = np.full(world.catalogue.texture_count, -1, np.int64)
 
     def look(self, frame: int) -> None:
         """See `Client.look`."""
         self.frame = frame
-        stock, shapes = self.world.catalogue, self.world.catalogue.shapes
-        frustum = self.world.frustum(frame)
-        loaded = self.geometry.whole[shapes.cell] & (shapes.texture >= 0)
-        met = shapes.texture[loaded & frustum.meets_boxes(shapes.low, shapes.high)]
+        met = self.world.catalogue.shapes.texture[self.shapes_ahead()]
         for t in dict.fromkeys(met.tolist()):
             if self._seen[t] < 0:
                 self._queue.append(t)
             self._seen[t] = frame
-        assert len(self._queue) <= stock.texture_count
         super().look(frame)
 
     def settle(self) -> None:
         """See `Client.settle`: the finest level that fits, the last seen first."""
-        stock, have = self.world.catalogue, self.have
         self.column[:] = 0
-        left = self.budget
-        for t in np.argsort(-self._seen, kind="stable").tolist():
-            if self._seen[t] < 0:
-                break
-            fits = int((stock.memory[t, : have[t] + 1] <= left).sum()) - 1
-            self.column[t] = max(fits, 0)
-            left -= int(stock.memory[t, self.column[t]])
+        self.keep(np.argsort(-self._seen, kind="stable"), self.budget)
 
     def fetch(self) -> None:
         """See `Client.fetch`: one after the other, whole."""
         if not self.documents():
             return
         while self._queue and len(self.waiting) < CONNECTIONS:
-            self.whole(Kind.TEXTURE, self._queue.pop(0))
+            self.request(Kind.TEXTURE, self._queue.pop(0))
 
 
 #: Width of a ring around the camera, metres. Narrower rings make worse pictures, wider ones are not
@@ -121,7 +124,6 @@ class GpuiiClient(WholeFileClient):
         self._ring = ring
         self.distance: Floats = np.full(count, np.inf)
         self.wanted: Ints = np.zeros(count, np.int64)
-        self._seen = np.full(count, -1, np.int64)
         #: Texture and column of each visible and needed step, the most important first.
         self._steps: list[tuple[int, int]] = []
         self._target: Ints = np.zeros(count, np.int64)
@@ -136,15 +138,8 @@ class GpuiiClient(WholeFileClient):
 
     def settle(self) -> None:
         """See `Client.settle`."""
-        stock, have = self.world.catalogue, self.have
-        self.column, left = self._filled(np.minimum(self.wanted, have))
-        for t in np.lexsort((self.distance, -self._seen)).tolist():
-            if self._seen[t] < 0:
-                break
-            held = int(stock.memory[t, self.column[t]])
-            fits = int((stock.memory[t, : have[t] + 1] <= held + left).sum()) - 1
-            self.column[t] = max(fits, int(self.column[t]))
-            left -= int(stock.memory[t, self.column[t]]) - held
+        self.column, left = self._filled(np.minimum(self.wanted, self.have))
+        self.keep(np.lexsort((self.distance, -self._seen)), left)
 
     def fetch(self) -> None:
         """See `Client.fetch`."""
@@ -161,9 +156,7 @@ class GpuiiClient(WholeFileClient):
     def _see(self) -> None:
         """Updates the visible textures, their distances, and the columns that the screen needs."""
         stock, shapes = self.world.catalogue, self.world.catalogue.shapes
-        frustum = self.world.frustum(self.frame)
-        loaded = np.flatnonzero(self.geometry.whole[shapes.cell] & (shapes.texture >= 0))
-        met = loaded[frustum.meets_boxes(shapes.low[loaded], shapes.high[loaded])]
+        frustum, met = self.world.frustum(self.frame), self.shapes_ahead()
         texture = shapes.texture[met]
         far = np.maximum(frustum.distance(shapes.low[met], shapes.high[met]), NEAR)
         self.distance = np.full(stock.texture_count, np.inf)

@@ -20,8 +20,9 @@ from ptmtools.lab.rows import RowSums
 from ptmtools.output.served import Surfaces
 from ptmtools.rendering.light import lamps
 from ptmtools.rendering.octrees import Octrees
+from ptmtools.rendering.pyramids import full_colors
 from ptmtools.rendering.rays import Caster
-from ptmtools.rendering.records import Pyramids, Sight, Triangles, own_levels, triangles_of
+from ptmtools.rendering.records import Pyramids, Sight, Triangles, triangles_of
 
 #: Largest relative difference of the depths of the same surface.
 APART = 1e-3
@@ -50,13 +51,7 @@ class Reference:
 
     def shown(self, sight: Sight) -> Floats:
         """(n, 3) its full picture of them, 0 to 255."""
-        from ptmtools.rendering.kernels import shade
-
-        whole, cells = own_levels(self.pyramids), int(self.surfaces.cell.max(initial=-1)) + 1
-        result = np.empty((len(sight.ray), 3))
-        loaded = np.ones(cells, dtype=np.bool_)
-        shade(sight, self.triangles, whole, loaded, whole.last, result)
-        return result
+        return full_colors(sight, self.triangles, self.pyramids)
 
 
 @dataclass(frozen=True)
