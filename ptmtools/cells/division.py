@@ -367,4 +367,4 @@ def _rooms(group: Ints, standing: Standing) -> Iterator[Standing]:
 def groups(leaves: int, portals: list[Portal]) -> Ints:
     """(leaves,) the least leaf to which portals connect each."""
     ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
-    return connected(leaves, np.concatenate(ends.T), np.concatenate(ends[:, ::-1].T))
+    return connected(leaves, ends)

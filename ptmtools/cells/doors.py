@@ -167,7 +167,7 @@ def _closing(slabs: Slabs, structure: Structure, options: SubdivideOptions) -> S
     paired = fits[one] & fits[other] & (np.abs(wide) <= PAIR)
     paired &= (thick >= -structure.tolerance.plane) & (high >= 0.9 * leaves.size[one, 2])
     one, other = one[paired], other[paired]
-    door = connected(len(leaves), *_both_ways(one, other))
+    door = connected(len(leaves), np.stack([one, other], axis=1))
     door = np.unique(door, return_inverse=True)[1].reshape(-1)
     closes = close_openings(leaves.merged(door), structure, options.wall_thickness)
     return slabs.only((closes[door] & fits)[leaf])
@@ -175,17 +175,14 @@ def _closing(slabs: Slabs, structure: Structure, options: SubdivideOptions) -> S
 
 def _leaf_of_slab(slabs: Slabs, slack: float) -> Ints:
     """(k,) leaves from 0: parallel slabs behind one another are one leaf."""
-    one, other = slabs.near(THICK).T
+    pair = slabs.near(THICK)
+    one, other = pair.T
     overlap = slabs.overlaps(one, other)
     least = np.minimum(slabs.size[one], slabs.size[other])
     together = slabs.size[one, 0] + slabs.size[other, 0] - overlap[:, 0]
     alike = (together <= THICK + slack) & (overlap[:, 1:] > least[:, 1:] / 2).all(axis=1)
-    group = connected(len(slabs), *_both_ways(one[alike], other[alike]))
+    group = connected(len(slabs), pair[alike])
     return np.unique(group, return_inverse=True)[1].reshape(-1)
-
-
-def _both_ways(one: Ints, other: Ints) -> tuple[Ints, Ints]:
-    return np.concatenate([one, other]), np.concatenate([other, one])
 
 
 def _leaves(

@@ -71,7 +71,7 @@ def patches(scene: Scene, triangle: Ints, corner: Ints, may: Bools, tolerance: T
         alike = each[one] == each[other]
         one, other = one[alike], other[alike]
     one, other = one[may[one]], other[may[one]]
-    group = connected(len(triangle), np.append(one, other), np.append(other, one))
+    group = connected(len(triangle), np.stack([one, other], axis=1))
     # Named by its largest triangle, of which all others must be continuations: many small steps
     # lead around a column.
     order = np.lexsort((np.arange(len(group)), -areas(corners), group))

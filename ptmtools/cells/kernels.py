@@ -1,4 +1,4 @@
-"""Compiled loops: growth of flat regions and connected pieces over a mesh (`facets`, `roles`),
+"""Compiled loops: growth of flat regions over a mesh (`facets`), connected indices (`search`),
 descent of whole triangles through a BSP tree (`ownership`), points above floors (`model`).
 """
 
@@ -85,12 +85,12 @@ def grow_regions(
 
 
 @kernel
-def connect_corners(triangle: NDArray[np.int32], parent: Ints) -> None:
-    """Joins the corners of each of (n, 3) triangles in ``parent``, (V,), at first each its own;
-    afterwards each point names the least point to which triangles connect it."""
-    for t in range(len(triangle)):
-        for k in range(1, 3):
-            a, b = triangle[t, 0], triangle[t, k]
+def connect_rows(row: Ints, parent: Ints) -> None:
+    """Joins the indices in each of (n, k) rows in ``parent``, (count,), at first each its own;
+    afterwards each index names the least index to which rows connect it."""
+    for r in range(len(row)):
+        for k in range(1, row.shape[1]):
+            a, b = row[r, 0], row[r, k]
             while parent[a] != a:
                 parent[a] = parent[parent[a]]
                 a = parent[a]

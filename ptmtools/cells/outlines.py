@@ -115,8 +115,7 @@ def united(edges: Edges, kind: Ints) -> tuple[Edges, Ints]:
     one, other = one[opposite], other[opposite]
     stays = np.ones(len(order), dtype=np.bool_)
     stays[one] = stays[other] = False
-    a, b = edges.polygon[one], edges.polygon[other]
-    union = connected(len(kind), np.append(a, b), np.append(b, a))
+    union = connected(len(kind), edges.polygon[np.stack([one, other], axis=1)])
     left = edges.take(stays)
     return Edges(left.start, left.end, union[left.polygon]), union
 

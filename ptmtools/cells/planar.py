@@ -171,9 +171,8 @@ def simplified(shapes: Geometry, distance: float) -> Geometry:
 def neighbours(polygons: Geometry, gap: float) -> Ints:
     """(n,) the group of each of n polygons: those less than ``gap`` apart are in one, so that a
     T-junction whose edge misses the corner by a rounding still joins."""
-    tree = shapely.STRtree(polygons)
-    one, other = tree.query(polygons, predicate="dwithin", distance=gap)
-    return connected(len(polygons), one, other)
+    pairs = shapely.STRtree(polygons).query(polygons, predicate="dwithin", distance=gap)
+    return connected(len(polygons), pairs.T)
 
 
 def left_open(region: Geometry, blocking: Geometry, tolerance: Tolerance) -> Geometry:

@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints, summed
 from ptmtools.cells.facets import Facets, Welded
 from ptmtools.cells.options import SubdivideOptions
+from ptmtools.cells.search import connected
 from ptmtools.scene.model import Scene
 
 #: Words for a door, in lower case.
@@ -173,8 +174,5 @@ def detail_by_shape(facets: Facets, object_of: NDArray[np.integer], wall_area: f
 
 def connected_pieces(mesh: Welded) -> Ints:
     """(n,) the connected piece of each triangle; pieces share no corners."""
-    from ptmtools.cells.kernels import connect_corners
-
-    parent = np.arange(len(mesh.point))
-    connect_corners(mesh.triangle, parent)
-    return np.unique(parent[mesh.triangle[:, 0]], return_inverse=True)[1].reshape(-1)
+    point = connected(len(mesh.point), mesh.triangle)
+    return np.unique(point[mesh.triangle[:, 0]], return_inverse=True)[1].reshape(-1)

@@ -79,21 +79,19 @@ def welded(points: Floats, reach: float) -> Ints:
         apart = np.subtract(*points[one_each[pair]])
         pairs.append(pair[:, np.einsum("ij,ij->i", apart, apart) <= reach**2])
         step += 1
-    one, other = np.concatenate(pairs, axis=1)
-    group = connected(len(one_each), np.append(one, other), np.append(other, one))
+    group = connected(len(one_each), np.concatenate(pairs, axis=1).T)
     to = np.arange(len(points))
     to[one_each] = one_each[group]
     return to[first]
 
 
-def connected(count: int, one: Ints, other: Ints) -> Ints:
-    """(count,) the least index to which pairs of (n,) ``one`` and ``other``, listed both ways,
-    connect each index below ``count``."""
+def connected(count: int, rows: NDArray[np.integer]) -> Ints:
+    """(count,) the least index to which rows, (n, k), such as pairs of neighbours or the corners of
+    triangles, connect each index below ``count``."""
+    from ptmtools.cells.kernels import connect_rows
+
     group = np.arange(count)
-    while np.any(group[one] != group[other]):
-        least = group.copy()
-        np.minimum.at(least, group[one], group[other])
-        group = least[least[group]]  # pointer jumping: long strips need few rounds
+    connect_rows(np.ascontiguousarray(rows, dtype=np.int64), group)
     return group
 
 

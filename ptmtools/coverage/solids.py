@@ -118,7 +118,7 @@ def edge_groups(edge: Ints) -> Ints:
     order = np.argsort(edge, axis=None, kind="stable")
     same = np.flatnonzero(np.diff(edge.reshape(-1)[order]) == 0)
     one, other = order[same] // 3, order[same + 1] // 3
-    return connected(len(edge), np.append(one, other), np.append(other, one))
+    return connected(len(edge), np.stack([one, other], axis=1))
 
 
 def closed_and_oriented(edge: Ints, forward: Bools, group: Ints) -> tuple[Bools, Bools]:

@@ -84,7 +84,7 @@ def together(cells: Cells, *points: tuple[float, float, float]) -> bool:
     """Whether all points are in cells that hang together through portals."""
     at = cells.locate_leaf(np.array(points))
     ends = cells.portal_leaf.astype(np.int64)
-    group = connected(cells.leaf_count, np.concatenate(ends.T), np.concatenate(ends[:, ::-1].T))
+    group = connected(cells.leaf_count, ends)
     return bool((at >= 0).all() and len(set(group[at])) == 1)
 
 

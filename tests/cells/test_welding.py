@@ -8,7 +8,7 @@ from hypothesis import given, strategies as st
 
 from ptmtools.cells import search
 from ptmtools.cells.facets import Welded, across_edges
-from ptmtools.cells.search import distinct
+from ptmtools.cells.search import connected, distinct
 
 ROWS = st.lists(st.tuples(*[st.sampled_from([0.0, -0.0, 1.0, 2.0**60, 1e-300])] * 3), max_size=40)
 
@@ -52,3 +52,13 @@ def test_neighbours_across_edges() -> None:
     assert across_edges(triangle, turned).tolist()[2] == [1, 4, -1]
     third = np.concatenate([triangle, [[1, 2, 7]]])
     assert across_edges(third, np.zeros(6, dtype=bool)).tolist()[0] == [3, -1, -1]
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 30), st.integers(2, 3))
+def test_connected_indices_are_those_of_a_flood(seed: int, count: int, width: int) -> None:
+    rows = np.random.default_rng(seed).integers(0, 25, (count, width))
+    label = np.arange(25)
+    for _ in range(25):
+        for row in rows:
+            label[row] = label[row].min()
+    assert np.array_equal(connected(25, rows), label)

@@ -42,38 +42,8 @@ def corner_normals(
     triangle = np.ascontiguousarray(triangles, dtype=np.int64)
     out = np.empty((len(triangle), 3, 3))
     at = corners_by_point(triangle, len(points))
-    least = _least_cosine(crease)
+    least = least_cosine(crease)
     _corner_normals(np.ascontiguousarray(points, dtype=np.float64), triangle, *at, least, out)
-    return out
-
-
-def plain_corner_normals(
-    points: Floats, triangles: NDArray[np.integer], crease: float = CREASE
-) -> Floats:
-    """The readable equivalent of `corner_normals`, for comparison."""
-    triangle = np.asarray(triangles, dtype=np.int64)
-    corners = points[triangle]
-    edge = _units(np.roll(corners, -1, axis=1) - corners)
-    normal = _units(np.cross(edge[:, 0], -edge[:, 2])).reshape(-1, 3)
-    flat = np.asarray(~normal.any(axis=1))
-    weight = _angles(-_dot(edge, np.roll(edge, 1, axis=1)))
-    weight[flat] = 0
-    out = np.zeros((len(triangle), 3, 3))
-    order, start = corners_by_point(triangle, len(points))
-    for p in range(len(points)):
-        around = order[start[p] : start[p + 1]]
-        around_triangle, side = np.divmod(around, 3)
-        for t, k in zip(around_triangle, side, strict=True):
-            near = np.asarray(_dot(normal[around_triangle], normal[t]) >= _least_cosine(crease))
-            if len(around_triangle) > FAN or flat[t]:
-                near[:] = True
-            near |= around_triangle == t
-            total = np.zeros(3)
-            for other, turn in zip(around_triangle[near], side[near], strict=True):
-                total += weight[other, turn] * normal[other]
-            unit = _units(total)
-            fallback = normal[t] if not flat[t] else np.array([0.0, 0.0, 1.0])
-            out[t, k] = unit if unit.any() else fallback
     return out
 
 
@@ -85,25 +55,8 @@ def corners_by_point(triangle: Ints, points: int) -> tuple[Ints, Ints]:
     return order, np.concatenate([[0], np.cumsum(count)])
 
 
-def _least_cosine(crease: float) -> float:
+def least_cosine(crease: float) -> float:
     return math.cos(math.radians(min(max(crease, 0.0), 180.0))) if crease < 180 else -2.0
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.asarray(a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2])
-
-
-def _units(vectors: Floats) -> Floats:
-    """Vectors of length one; zero vectors stay."""
-    length = np.sqrt(_dot(vectors, vectors))[..., None]
-    return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0))
-
-
-def _angles(cosine: Floats) -> Floats:
-    x = np.minimum(np.abs(cosine), 1.0)
-    a, b, c, d = ARCCOS
-    angle = np.sqrt(1 - x) * (a + x * (b + x * (c + x * d)))
-    return np.asarray(np.where(cosine < 0, math.pi - angle, angle))
 
 
 @plain_kernel

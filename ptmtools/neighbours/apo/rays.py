@@ -89,7 +89,9 @@ def visible_pixels(corners: Floats, view: View) -> VisiblePixels:
 
 
 def draw(octree: Octree, corners: Floats, own: Floats, view: View, look: Look) -> Frame:
-    """See `OctreeShader.draw`."""
+    """See `shader.draw`."""
+    from importlib.metadata import version
+
     shape = (view.height, view.width)
     sight = visible_pixels(corners, view)
     row, column, triangle, q = sight.row, sight.column, sight.triangle, sight.place
@@ -106,7 +108,8 @@ def draw(octree: Octree, corners: Floats, own: Floats, view: View, look: Look) -
     colors = octree.colors[at] if octree.colors is not None and look.levels else None
     picture[row, column] = np.rint(255 * look.shown(normals, colors, view))
     address[row, column], depths[row, column], places[row, column] = at, stop, q
-    return Frame(picture, address, places, depths)
+    renderer = f"Embree (embreex {version('embreex')})"
+    return Frame(picture, address, places, depths, renderer)
 
 
 def weights(corners: Floats, places: Floats) -> Floats:

@@ -9,15 +9,15 @@ or in software; `rays` does the same without it.
 
 from __future__ import annotations
 
-from types import TracebackType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, Ints, Singles
+from ptmtools.arrays import Floats
 from ptmtools.coverage.backends.opengl import create_context
 from ptmtools.neighbours.apo.model import Octree
-from ptmtools.neighbours.apo.traversal import NEVER, WIDTH, rows_of
+from ptmtools.neighbours.apo.traversal import WIDTH, rows_of
 from ptmtools.neighbours.apo.view import AMBIENT, FILL, KEY, Frame, Look, View
 
 #: Least farthest depth, for a view without points.
@@ -63,26 +63,6 @@ ivec2 look_up(vec3 q, int stop) {{
     return ivec2(address, depth);
 }}
 """
-
-WHOLE = """
-#version 330
-void main() {
-    vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0;
-    gl_Position = vec4(corner, 0.0, 1.0);
-}
-"""
-
-POINTS = (
-    LOOK_UP
-    + """
-uniform sampler2D places;  // q and where to stop
-out ivec2 found;
-void main() {
-    vec4 place = texelFetch(places, ivec2(gl_FragCoord.xy), 0);
-    found = look_up(place.xyz, int(place.w));
-}
-"""
-)
 
 MESH = """
 #version 330
@@ -147,138 +127,68 @@ void main() {{
 )
 
 
-class OctreeShader:
-    """An octree on a graphics device; used and closed by the thread that made it.
+def draw(octree: Octree, corners: Floats, own: Floats, view: View, look: Look) -> Frame:
+    """The picture of (T, 3, 3) corners in the cube, with their own normals (T, 3, 3), which are
+    displayed without levels. ``view`` is in the cube, too.
 
     Raises MissingComponentError PTM-M500 without OpenGL.
     """
-
-    def __init__(self, octree: Octree, gpu: int | None = None) -> None:
-        self._context = context = create_context(gpu)
-        self.name = str(context.info["GL_RENDERER"])
-        self._octree = octree
-        self._texture = self._uploaded(octree.texels)
-        self._colors = None if octree.colors is None else self._uploaded(octree.colors)
-
-    def _uploaded(self, texels: np.ndarray) -> Any:
-        rows = rows_of(texels)
-        texture = self._context.texture(rows.shape[1::-1], 4, rows.tobytes(), dtype="u1")
-        texture.filter = (self._nearest, self._nearest)
-        return texture
-
-    @property
-    def _nearest(self) -> int:
-        return int(self._context.NEAREST)
-
-    def look_up(
-        self, q: Singles, levels: int | None = None, stop: Ints | int | None = None
-    ) -> tuple[Ints, Ints]:
-        """(n,) addresses and (n,) depths, as `traversal.look_up`; ``q`` is converted to float32."""
-        width = min(WIDTH, max(1, len(q)))
-        height = max(1, -(-len(q) // width))
-        places = np.zeros((height * width, 4), dtype=np.float32)
-        places[: len(q), :3] = q
-        places[: len(q), 3] = NEVER if stop is None else np.clip(stop, -1, NEVER)
-        context = self._context
-        program = context.program(vertex_shader=WHOLE, fragment_shader=POINTS)
-        texture = context.texture((width, height), 4, places.tobytes(), dtype="f4")
-        texture.filter = (self._nearest, self._nearest)
-        result = context.texture((width, height), 2, dtype="i4")
-        target = context.framebuffer([result])
-        drawing = context.vertex_array(program, [])
-        try:
-            target.use()
-            self._bind(program, self._levels(levels))
-            texture.use(1)
-            program["places"].value = 1
-            context.disable(context.DEPTH_TEST)
-            drawing.render(context.TRIANGLES, vertices=3)
-            data = np.frombuffer(result.read(), dtype=np.int32).reshape(-1, 2)[: len(q)]
-        finally:
-            for each in (drawing, target, result, texture, program):
-                each.release()
-        return data[:, 0].astype(np.int64), data[:, 1].astype(np.int64)
-
-    def draw(self, corners: Floats, own: Floats, view: View, look: Look) -> Frame:
-        """A picture of (T, 3, 3) corners in the cube with their own normals (T, 3, 3), which are
-        displayed without levels. ``view`` is in the cube, too."""
-        context, size = self._context, (view.width, view.height)
+    context, size, colors = create_context(), (view.width, view.height), octree.colors
+    try:
         program = context.program(vertex_shader=MESH, fragment_shader=SHADE)
         data = np.concatenate([corners, own], axis=2).astype(np.float32)
         buffer = context.buffer(data.tobytes())
         drawing = context.vertex_array(program, [(buffer, "3f 3f", "corner", "own")])
         shown = context.texture(size, 4, dtype="f1")
         place = context.texture(size, 4, dtype="f4")
-        address = context.texture(size, 1, np.full(size, -2, np.int32).tobytes(), dtype="i4")
-        depth = context.depth_renderbuffer(size)
-        target = context.framebuffer([shown, place, address], depth)
-        try:
-            target.use()
-            context.enable_only(context.DEPTH_TEST)
-            context.depth_func = "<"
-            target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
-            address.write(np.full(size, -2, np.int32).tobytes())
-            self._bind(program, look.levels)
-            if self._colors is not None:
-                self._colors.use(1)
-            depths: Floats = (corners.reshape(-1, 3) - view.eye) @ view.axes[2]
-            far = 2 * float(np.abs(depths).max(initial=TINY))
-            key, fill = look.lights(view)
-            values = {
-                "eye": tuple(view.eye.tolist()),
-                "view": tuple(view.axes.T.reshape(-1).tolist()),
-                "half_": view.half,
-                "near": far * look.near,
-                "far": far,
-                "colors": 1 if self._colors is not None else 0,
-                "colored": self._colors is not None,
-                "only_normals": look.what == "normals",
-                "key": tuple(key.tolist()),
-                "fill": tuple(fill.tolist()),
-                "stone": look.stone,
-            }
-            for name, value in values.items():
-                program[name].value = value
-            if len(corners):
-                drawing.render(context.TRIANGLES, vertices=3 * len(corners))
-            shape = (view.height, view.width)
-            color = np.frombuffer(shown.read(), dtype=np.uint8).reshape(*shape, 4)
-            at = np.frombuffer(address.read(), dtype=np.int32).reshape(shape).astype(np.int64)
-            where = np.frombuffer(place.read(), dtype=np.float32).reshape(*shape, 4)
-        finally:
-            for each in (drawing, buffer, target, depth, address, place, shown, program):
-                each.release()
-        picture = np.where((at == -2)[..., None], look.background, color[..., :3])
-        return Frame(
-            picture.astype(np.uint8),
-            at,
-            where[..., :3].astype(np.float64),
-            where[..., 3].astype(np.int64),
-        )
+        address = context.texture(size, 1, dtype="i4")
+        target = context.framebuffer([shown, place, address], context.depth_renderbuffer(size))
+        target.use()
+        context.enable_only(context.DEPTH_TEST)
+        context.depth_func = "<"
+        target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
+        address.write(np.full(size, -2, np.int32).tobytes())
+        layers = [octree.texels] if colors is None else [octree.texels, colors]
+        textures = [uploaded(context, texels) for texels in layers]
+        for unit, texture in enumerate(textures):
+            texture.use(unit)
+        depths: Floats = (corners.reshape(-1, 3) - view.eye) @ view.axes[2]
+        far = 2 * float(np.abs(depths).max(initial=TINY))
+        key, fill = look.lights(view)
+        values = {
+            "octree": 0,
+            "texels": len(octree.texels),
+            "deepest": look.levels - 1,
+            "eye": tuple(view.eye.tolist()),
+            "view": tuple(view.axes.T.reshape(-1).tolist()),
+            "half_": view.half,
+            "near": far * look.near,
+            "far": far,
+            "colors": len(textures) - 1,
+            "colored": colors is not None,
+            "only_normals": look.what == "normals",
+            "key": tuple(key.tolist()),
+            "fill": tuple(fill.tolist()),
+            "stone": look.stone,
+        }
+        for name, value in values.items():
+            program[name].value = value
+        if len(corners):
+            drawing.render(context.TRIANGLES, vertices=3 * len(corners))
+        shape = (view.height, view.width)
+        color = np.frombuffer(shown.read(), dtype=np.uint8).reshape(*shape, 4)
+        at = np.frombuffer(address.read(), dtype=np.int32).reshape(shape).astype(np.int64)
+        where = np.frombuffer(place.read(), dtype=np.float32).reshape(*shape, 4).astype(np.float64)
+        picture = np.where((at == -2)[..., None], look.background, color[..., :3]).astype(np.uint8)
+        name = str(context.info["GL_RENDERER"])
+        return Frame(picture, at, where[..., :3], where[..., 3].astype(np.int64), name)
+    finally:
+        context.release()
 
-    def _levels(self, levels: int | None) -> int:
-        available = self._octree.levels if levels is None else min(levels, self._octree.levels)
-        if available < 1:
-            raise ValueError("the look-up needs at least one level")
-        return available
 
-    def _bind(self, program: Any, levels: int) -> None:
-        self._texture.use(0)
-        program["octree"].value = 0
-        program["texels"].value = len(self._octree.texels)
-        program["deepest"].value = levels - 1
-
-    def close(self) -> None:
-        """Releases the context."""
-        self._context.release()
-
-    def __enter__(self) -> OctreeShader:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
+def uploaded(context: Any, texels: NDArray[np.uint8]) -> Any:
+    """The texture of (n, 4) texels, looked up without filtering."""
+    rows = rows_of(texels)
+    texture = context.texture(rows.shape[1::-1], 4, rows.tobytes(), dtype="u1")
+    texture.filter = (context.NEAREST, context.NEAREST)
+    return texture

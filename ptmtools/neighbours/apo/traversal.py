@@ -1,7 +1,6 @@
 """The normal of an octree texture at a point, as a client reads it (docs/formats/apo.md, "Looking a
 normal up"; Lacoste et al., section 3.2).
 
-A kernel follows points one by one; `plain_look_up` moves all of them down a level at a time.
 Addresses outside of the octree, as in damaged files, count as absent children.
 """
 
@@ -12,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.arrays import Floats, Ints
 from ptmtools.jit import plain_kernel
 from ptmtools.neighbours.apo.model import Octree
 
@@ -46,38 +45,16 @@ def look_up(
 
     Points outside the cube count as the nearest within it. Raises ValueError without a level.
     """
-    inside, depth = _limits(octree, q, levels, stop)
+    deepest = (octree.levels if levels is None else min(levels, octree.levels)) - 1
+    if deepest < 0:
+        raise ValueError("the look-up needs at least one level")
+    inside = np.nan_to_num(np.clip(np.asarray(q, np.float64), 0.0, np.nextafter(1.0, 0.0)), nan=0.0)
+    depth = np.full(len(q), deepest, dtype=np.int64)
+    if stop is not None:
+        depth = np.minimum(depth, stop)
     at, deep = np.empty(len(q), dtype=np.int64), np.empty(len(q), dtype=np.int64)
     _walk(np.ascontiguousarray(octree.texels), inside, depth, at, deep)
     return Nodes(at, deep, unpacked(octree.texels[at]))
-
-
-def plain_look_up(
-    octree: Octree, q: Floats, levels: int | None = None, stop: Ints | int | None = None
-) -> Nodes:
-    """The readable equivalent of `look_up`, for comparison."""
-    rest, limit = _limits(octree, q, levels, stop)
-    texel = octree.texels.astype(np.int64)
-    at, depth = np.zeros(len(q), dtype=np.int64), np.zeros(len(q), dtype=np.int64)
-    going = np.arange(len(q))
-    while len(going):
-        here = at[going]
-        present = texel[here, 3]
-        on: Bools = (present != 0) & (depth[going] < limit[going]) & (here + 1 < len(texel))
-        going, here, present = going[on], here[on], present[on]
-        doubled = 2 * rest[going]
-        half = doubled >= 1
-        rest[going] = doubled - half
-        child = half @ np.array([1, 2, 4])
-        red, green, blue, inner = texel[here + 1].T
-        below = (1 << child) - 1
-        first = red + (green << 8) + (blue << 16)
-        address_of = first + np.bitwise_count(present & below) + np.bitwise_count(inner & below)
-        on = (present >> child & 1 == 1) & (address_of < len(texel))
-        going = going[on]
-        at[going] = address_of[on]
-        depth[going] += 1
-    return Nodes(at, depth, unpacked(octree.texels[at]))
 
 
 def stop_depth(step: Floats) -> Ints:
@@ -101,20 +78,6 @@ def unpacked(texels: NDArray[np.uint8]) -> Floats:
     """(n, 3) unit normals of (n, 4) texels."""
     vector = texels[:, :3] / 127.5 - 1.0
     return np.asarray(vector / np.linalg.norm(vector, axis=1, keepdims=True))
-
-
-def _limits(
-    octree: Octree, q: Floats, levels: int | None, stop: Ints | int | None
-) -> tuple[Floats, Ints]:
-    """Points clipped to the cube, and (n,) their depth limits."""
-    deepest = (octree.levels if levels is None else min(levels, octree.levels)) - 1
-    if deepest < 0:
-        raise ValueError("the look-up needs at least one level")
-    inside = np.clip(np.asarray(q, dtype=np.float64), 0.0, np.nextafter(1.0, 0.0))
-    limit = np.full(len(q), deepest, dtype=np.int64)
-    if stop is not None:
-        limit = np.minimum(limit, stop)
-    return np.nan_to_num(inside, nan=0.0), limit
 
 
 @plain_kernel

@@ -147,12 +147,14 @@ class Frame:
     address: (h, w) of the texel; -1 for the mesh's own normal, -2 for an empty pixel.
     place: (h, w, 3) in the cube; undefined in empty pixels.
     stop: (h, w) the depth at which look-ups stop; undefined in empty pixels.
+    renderer: name of the renderer.
     """
 
     picture: NDArray[np.uint8]
     address: Ints
     place: Floats
     stop: Ints
+    renderer: str
 
     @property
     def covered(self) -> Bools:

@@ -12,11 +12,7 @@ from ptmtools.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from ptmtools.neighbours.campus.building import Made as Made, make_campus as make_campus
-    from ptmtools.neighbours.campus.model import (
-        Campus as Campus,
-        distances as distances,
-        shader as shader,
-    )
+    from ptmtools.neighbours.campus.model import Campus as Campus, distances as distances
     from ptmtools.neighbours.campus.options import CampusOptions as CampusOptions
     from ptmtools.neighbours.campus.reading import read_campus as read_campus
 
@@ -24,7 +20,7 @@ __getattr__ = lazy_exports(
     __name__,
     {
         "ptmtools.neighbours.campus.building": "Made make_campus",
-        "ptmtools.neighbours.campus.model": "Campus distances shader",
+        "ptmtools.neighbours.campus.model": "Campus distances",
         "ptmtools.neighbours.campus.options": "CampusOptions",
         "ptmtools.neighbours.campus.reading": "read_campus",
     },

@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, Singles
+from ptmtools.arrays import Floats, Ints, Singles
+from ptmtools.cells.search import connected
 from ptmtools.jit import kernel
 from ptmtools.lazy import component
 from ptmtools.neighbours.campus.model import LIGHT_SIZES
@@ -43,13 +44,13 @@ class Atlas:
     Attributes
     ----------
     uv: (T, 3, 2) in [0, 1] per corner, origin at the lower left.
-    chart: (T,) int32; faces of one chart are connected.
+    chart: (T,) numbers; faces of one chart are connected.
     side: of the least lightmap in which no two charts read the same texel; None if there are too
         many for any.
     """
 
     uv: Floats
-    chart: NDArray[np.int32]
+    chart: Ints
     side: int | None
 
 
@@ -78,7 +79,7 @@ def unwrap(points: Floats, triangles: NDArray[np.integer[Any]]) -> Atlas:
     scale = np.array([atlas.width, atlas.height]) / max(got, side)
     placed = uv.astype(np.float64)[index.astype(np.int64)] * scale
     placed[..., 1] = 1 - placed[..., 1]
-    chart = components(index.astype(np.int64), len(uv))
+    chart = connected(len(uv), index)
     return Atlas(np.clip(placed, 0.0, 1.0), chart[index[:, 0]], side if got <= side else None)
 
 
@@ -102,33 +103,12 @@ def _packed(
 def _longest(atlas: Any) -> float:
     """The longest side of the box of a chart, texels."""
     _, index, uv = atlas.get_mesh(0)
-    chart = components(index.astype(np.int64), len(uv))
+    chart = connected(len(uv), index)
     low, high = np.full((len(uv), 2), np.inf), np.full((len(uv), 2), -np.inf)
     np.minimum.at(low, chart, uv)
     np.maximum.at(high, chart, uv)
     size = np.array([atlas.width, atlas.height])
     return float(((high - low)[np.unique(chart)] * size).max())
-
-
-@kernel
-def components(triangle: NDArray[np.int64], count: int) -> NDArray[np.int32]:
-    """(count,) for each vertex the least one that (m, 3) triangles connect it with."""
-    root = np.arange(count).astype(np.int32)
-    for t in range(len(triangle)):
-        for k in range(2):
-            a, b = triangle[t, k], triangle[t, k + 1]
-            while root[a] != a:
-                a = int(np.int64(root[a]))
-            while root[b] != b:
-                b = int(np.int64(root[b]))
-            if a < b:
-                root[b] = a
-            else:
-                root[a] = b
-    for v in range(count):
-        # All before it are final, and none is connected with one after it by way of its root.
-        root[v] = root[root[v]]
-    return root
 
 
 @kernel

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles
-from ptmtools.neighbours.campus.atlas import components
+from ptmtools.cells.search import connected
 from ptmtools.neighbours.campus.occlusion import (
     Surroundings,
     areas,
@@ -230,4 +230,4 @@ def planes(corner: Floats, normal: Floats, of: Bools) -> Ints:
         alike &= np.abs(np.einsum("nx,nx->n", normal[one], normal[other])) >= PARALLEL_COSINE
         pairs.append(np.stack([one[alike], other[alike]], axis=1))
     joined = np.concatenate(pairs)
-    return components(joined[:, [0, 1, 1]], count).astype(np.int64)
+    return connected(count, joined)

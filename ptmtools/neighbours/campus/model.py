@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -324,22 +324,6 @@ def mesh_file(name: str, lod: int) -> str:
 def texture_file(base: str, size: int, channel: str) -> str:
     """``textures/wall_512_d.jpg``."""
     return f"{TEXTURES}/{base}_{size}_{channel}.jpg"
-
-
-#: In the order in which a name has them.
-PARTS = {DIFFUSE: "diffuse", LIGHT: "lightmap", ALPHA: "alpha", MASK: "mask"}
-
-
-def shader(channels: Iterable[str]) -> str:
-    """The name of the shader for the channels that are there, such as "diffuse+lightmap+alpha".
-
-    Raises KeyError for an unknown channel.
-    """
-    available = set(channels)
-    if unknown := available - set(PARTS):
-        raise KeyError(min(unknown))
-    first = "" if DIFFUSE in available else "color"
-    return "+".join(filter(None, [first, *(PARTS[c] for c in PARTS if c in available)]))
 
 
 def distances(eye: Floats, boxes: Floats, barycentres: Floats) -> Floats:

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
         read_manifest as read_manifest,
         validate_interlaced as validate_interlaced,
     )
-    from ptmtools.neighbours.interlace.shader import StepShader as StepShader
     from ptmtools.neighbours.interlace.steps import join as join, split as split
     from ptmtools.neighbours.interlace.writing import (
         interlace as interlace,
@@ -35,7 +34,6 @@ __getattr__ = lazy_exports(
     {
         "ptmtools.neighbours.interlace.model": "Axis Interlaced InterlaceOptions Part",
         "ptmtools.neighbours.interlace.reading": "deinterlace read_manifest validate_interlaced",
-        "ptmtools.neighbours.interlace.shader": "StepShader",
         "ptmtools.neighbours.interlace.steps": "join split",
         "ptmtools.neighbours.interlace.writing": "interlace write_folder",
     },

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 from hypothesis.extra.numpy import arrays
 
 from ptmtools.neighbours.apo import normals
-from ptmtools.neighbours.apo.normals import corner_normals, plain_corner_normals
+from ptmtools.neighbours.apo.normals import (
+    ARCCOS,
+    FAN,
+    corner_normals,
+    corners_by_point,
+    least_cosine,
+)
 
 CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=np.float64)
 FACES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
@@ -90,6 +98,51 @@ def test_flat_triangles_and_fans_are_no_trouble(monkeypatch: pytest.MonkeyPatch)
     tip = np.stack([np.full(count, count), k, (k + 1) % count], 1)
     found = corner_normals(cone, tip)[:, 0]
     np.testing.assert_allclose(found, np.broadcast_to([0, 0, 1.0], found.shape), atol=1e-9)
+
+
+def plain_corner_normals(points: np.ndarray, triangles: np.ndarray, crease: float) -> np.ndarray:
+    """The readable equivalent of `corner_normals`."""
+    triangle = np.asarray(triangles, dtype=np.int64)
+    corners = points[triangle]
+    edge = _units(np.roll(corners, -1, axis=1) - corners)
+    normal = _units(np.cross(edge[:, 0], -edge[:, 2])).reshape(-1, 3)
+    flat = np.asarray(~normal.any(axis=1))
+    weight = _angles(-_dot(edge, np.roll(edge, 1, axis=1)))
+    weight[flat] = 0
+    out = np.zeros((len(triangle), 3, 3))
+    order, start = corners_by_point(triangle, len(points))
+    for p in range(len(points)):
+        around = order[start[p] : start[p + 1]]
+        around_triangle, side = np.divmod(around, 3)
+        for t, k in zip(around_triangle, side, strict=True):
+            near = np.asarray(_dot(normal[around_triangle], normal[t]) >= least_cosine(crease))
+            if len(around_triangle) > FAN or flat[t]:
+                near[:] = True
+            near |= around_triangle == t
+            total = np.zeros(3)
+            for other, turn in zip(around_triangle[near], side[near], strict=True):
+                total += weight[other, turn] * normal[other]
+            unit = _units(total)
+            fallback = normal[t] if not flat[t] else np.array([0.0, 0.0, 1.0])
+            out[t, k] = unit if unit.any() else fallback
+    return out
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.asarray(a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2])
+
+
+def _units(vectors: np.ndarray) -> np.ndarray:
+    """Vectors of length one; zero vectors stay."""
+    length = np.sqrt(_dot(vectors, vectors))[..., None]
+    return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0))
+
+
+def _angles(cosine: np.ndarray) -> np.ndarray:
+    x = np.minimum(np.abs(cosine), 1.0)
+    a, b, c, d = ARCCOS
+    angle = np.sqrt(1 - x) * (a + x * (b + x * (c + x * d)))
+    return np.asarray(np.where(cosine < 0, math.pi - angle, angle))
 
 
 @given(

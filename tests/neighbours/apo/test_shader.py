@@ -9,11 +9,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from ptmtools.errors import InputError, MissingComponentError
-from ptmtools.neighbours.apo.picture import Rendering, RenderOptions, render, render_view
-from ptmtools.neighbours.apo.shader import OctreeShader
+from ptmtools.neighbours.apo import rays
+from ptmtools.neighbours.apo.picture import RenderOptions, render
 from ptmtools.neighbours.apo.traversal import look_up, stop_depth, unpacked
-from ptmtools.neighbours.apo.view import View, view_of
+from ptmtools.neighbours.apo.view import Frame, Look, View, view_of
 from tests.neighbours.apo.building import Node, ball, nodes, octree_of
+from tests.neighbours.apo.look_up_shader import look_up_by_shader
 from tests.neighbours.apo.test_normals import sphere
 
 LOW, SIDE = (-20.0, 3.0, 7.0), 4.0
@@ -25,7 +26,7 @@ def mesh(rows: int = 16) -> tuple[np.ndarray, np.ndarray]:
     return np.array(LOW) + SIDE * (0.5 + 0.45 * points), triangles
 
 
-def drawn(levels: int, backend: str, **options: object) -> Rendering:
+def drawn(levels: int, backend: str, **options: object) -> Frame:
     octree = ball(5, LOW, SIDE)
     settings = RenderOptions(levels=levels, width=161, height=120, backend=backend, **options)
     return render(octree, *mesh(), settings)
@@ -39,23 +40,21 @@ def test_texels_of_points_are_those_of_numpy(gl: None, root: Node, levels: int, 
     q = random.random((300, 3), dtype=np.float32)
     q[::3] = np.round(q[::3] * 16) / 16  # on the boundaries of nodes
     stop = random.integers(-1, 6, len(q))
-    with OctreeShader(octree) as shader:
-        for where in (None, stop):
-            address, depth = shader.look_up(q, levels, where)
-            found = look_up(octree, q, levels, where)
-            np.testing.assert_array_equal(address, found.address)
-            np.testing.assert_array_equal(depth, found.depth)
+    for where in (None, stop):
+        address, depth = look_up_by_shader(octree, q, levels, where)
+        found = look_up(octree, q, levels, where)
+        np.testing.assert_array_equal(address, found.address)
+        np.testing.assert_array_equal(depth, found.depth)
 
 
 def test_an_octree_of_many_rows_and_nothing_to_look_up(gl: None) -> None:
     octree = ball(6)
     assert len(octree.texels) > 3 * 4096
     q = np.random.default_rng(1).random((9000, 3), dtype=np.float32)
-    with OctreeShader(octree) as shader:
-        address, depth = shader.look_up(q)
-        np.testing.assert_array_equal(address, look_up(octree, q).address)
-        assert depth.max() == 6
-        assert shader.look_up(q[:0])[0].shape == (0,)
+    address, depth = look_up_by_shader(octree, q)
+    np.testing.assert_array_equal(address, look_up(octree, q).address)
+    assert depth.max() == 6
+    assert look_up_by_shader(octree, q[:0])[0].shape == (0,)
 
 
 def test_damaged_octrees_lead_nowhere_else(gl: None) -> None:
@@ -66,15 +65,14 @@ def test_damaged_octrees_lead_nowhere_else(gl: None) -> None:
         texels[random.integers(len(texels), size=30)] = random.integers(0, 256, (30, 4))
         damaged = replace(octree, texels=texels)
         q = random.random((2000, 3), dtype=np.float32)
-        with OctreeShader(damaged) as shader:
-            address, _ = shader.look_up(q)
+        address, _ = look_up_by_shader(damaged, q)
         np.testing.assert_array_equal(address, look_up(damaged, q).address)
 
 
 @pytest.mark.parametrize("levels", [1, 3, 6])
 def test_pixels_show_what_numpy_finds_at_their_places(gl: None, levels: int) -> None:
     octree = ball(5, LOW, SIDE)
-    shown = drawn(levels, "gl", what="normals", distance=2.5).drawn
+    shown = drawn(levels, "gl", what="normals", distance=2.5)
     at = shown.covered
     assert 0.02 < at.mean() < 0.5
     found = look_up(octree, shown.place[at], levels, shown.stop[at])
@@ -90,8 +88,8 @@ def test_pixels_show_what_numpy_finds_at_their_places(gl: None, levels: int) -> 
 @pytest.mark.parametrize("levels", [0, 2, 6])
 @pytest.mark.parametrize("distance", [0.0, 0.8, 6.0])
 def test_rays_draw_the_same(gl: None, levels: int, what: str, distance: float) -> None:
-    one = drawn(levels, "gl", what=what, distance=distance).drawn
-    other = drawn(levels, "embree", what=what, distance=distance).drawn
+    one = drawn(levels, "gl", what=what, distance=distance)
+    other = drawn(levels, "embree", what=what, distance=distance)
     both = one.covered & other.covered
     assert (one.covered != other.covered).mean() < 1e-3
     assert np.abs(one.place - other.place)[both].max() < 1e-4
@@ -104,13 +102,12 @@ def test_rays_draw_the_same(gl: None, levels: int, what: str, distance: float) -
 
 def test_pixels_stop_where_nodes_become_smaller() -> None:
     """Seen from the front, the middle of the sphere: a pixel is 2 tan(a/2) d / lines wide."""
-    octree, (points, triangles) = ball(5, LOW, SIDE), mesh(64)
-    middle = np.array(LOW) + SIDE / 2
+    octree, (points, triangles) = ball(5), mesh(64)
+    corners = ((points - LOW) / SIDE)[triangles]
+    middle = np.full(3, 0.5)
     for far in (1.0, 3.0, 9.0):
-        eye = middle + [0, 0, SIDE * (0.45 + far)]
-        shown = render_view(
-            octree, points, triangles, View(eye, middle, 101, 101), backend="embree"
-        ).drawn
+        view = View(middle + [0, 0, 0.45 + far], middle, 101, 101)
+        shown = rays.draw(octree, corners, corners, view, Look(6))
         wide = 2 * np.tan(np.radians(35 / 2)) * far / 101
         assert shown.stop[50, 50] == stop_depth(np.array([wide * 0.98]))[0]
         assert shown.deepest >= shown.stop[50, 50]
@@ -119,7 +116,7 @@ def test_pixels_stop_where_nodes_become_smaller() -> None:
 def test_levels_come_nearer_to_the_sphere() -> None:
     errors = []
     for levels in range(1, 7):
-        shown = drawn(levels, "embree").drawn
+        shown = drawn(levels, "embree")
         at = shown.covered
         truth = shown.place[at] - 0.5
         truth /= np.linalg.norm(truth, axis=1, keepdims=True)
@@ -130,7 +127,7 @@ def test_levels_come_nearer_to_the_sphere() -> None:
 
 
 def test_lit_from_the_upper_left() -> None:
-    shown = drawn(6, "embree", azimuth=-70.0).drawn
+    shown = drawn(6, "embree", azimuth=-70.0)
     row, column = np.nonzero(shown.covered)
     top, left = row < np.median(row), column < np.median(column)
     bright = [shown.picture[row[s], column[s]].mean() for s in (top & left, ~top & ~left)]
@@ -145,14 +142,14 @@ def test_colours(request: pytest.FixtureRequest, backend: str) -> None:
     colors = np.zeros_like(octree.texels)
     colors[:, 1] = 255
     options = RenderOptions(width=40, height=40, backend=backend)
-    shown = render(replace(octree, colors=colors), *mesh(), options).drawn
+    shown = render(replace(octree, colors=colors), *mesh(), options)
     green = shown.picture[shown.covered]
     assert not green[:, [0, 2]].any()
     assert green[:, 1].max() > 200
 
 
 def test_without_opengl_rays_draw(monkeypatch: pytest.MonkeyPatch) -> None:
-    def absent(gpu: object) -> None:
+    def absent() -> None:
         raise MissingComponentError("PTM-M500", "no OpenGL")
 
     monkeypatch.setattr("ptmtools.neighbours.apo.shader.create_context", absent)

@@ -8,12 +8,45 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ptmtools.neighbours.apo.traversal import NEVER, look_up, plain_look_up, stop_depth
+from ptmtools.neighbours.apo.model import Octree
+from ptmtools.neighbours.apo.traversal import NEVER, Nodes, look_up, stop_depth, unpacked
 from tests.neighbours.apo.building import Node, nodes, octree_of, walk
 
 RED, GREEN, BLUE, GREY = (255, 128, 128), (128, 255, 128), (128, 128, 255), (0, 128, 128)
 #: The root has children 1 (a leaf) and 6, and this one children 0 and 7.
 SMALL: Node = (GREY, {1: (RED, {}), 6: (GREEN, {0: (BLUE, {}), 7: (RED, {})})})
+
+
+def plain_look_up(
+    octree: Octree, q: np.ndarray, levels: int | None = None, stop: int | None = None
+) -> Nodes:
+    """The readable equivalent of `look_up`: all points move down a level at a time."""
+    deepest = (octree.levels if levels is None else min(levels, octree.levels)) - 1
+    if deepest < 0:
+        raise ValueError("the look-up needs at least one level")
+    rest = np.nan_to_num(q.clip(0.0, np.nextafter(1.0, 0.0)), nan=0.0)
+    limit = np.full(len(q), deepest if stop is None else min(deepest, stop))
+    texel = octree.texels.astype(np.int64)
+    at, depth = np.zeros(len(q), dtype=np.int64), np.zeros(len(q), dtype=np.int64)
+    going = np.arange(len(q))
+    while len(going):
+        here = at[going]
+        present = texel[here, 3]
+        on = (present != 0) & (depth[going] < limit[going]) & (here + 1 < len(texel))
+        going, here, present = going[on], here[on], present[on]
+        doubled = 2 * rest[going]
+        half = doubled >= 1
+        rest[going] = doubled - half
+        child = half @ np.array([1, 2, 4])
+        red, green, blue, inner = texel[here + 1].T
+        below = (1 << child) - 1
+        first = red + (green << 8) + (blue << 16)
+        address_of = first + np.bitwise_count(present & below) + np.bitwise_count(inner & below)
+        on = (present >> child & 1 == 1) & (address_of < len(texel))
+        going = going[on]
+        at[going] = address_of[on]
+        depth[going] += 1
+    return Nodes(at, depth, unpacked(octree.texels[at]))
 
 
 def test_an_octree_written_down() -> None:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ptmtools.arrays import Floats
-from ptmtools.neighbours.campus.atlas import claim, components, cover, nearest, unwrap
+from ptmtools.neighbours.campus.atlas import claim, cover, nearest, unwrap
 from tests.neighbours.campus.made import level
 from tests.neighbours.campus.shapes import (
     HOUSE,
@@ -38,16 +38,6 @@ def test_cover_is_a_test_of_every_texel(seed: int, faces: int) -> None:
                 wanted[row, column] = t
                 break
     assert (cover(uv, size) == wanted).mean() > 0.99
-
-
-@given(st.integers(0, 2**32 - 1), st.integers(1, 30))
-def test_components_are_those_of_a_flood(seed: int, faces: int) -> None:
-    triangle = np.random.default_rng(seed).integers(0, 25, (faces, 3))
-    label = np.arange(25)
-    for _ in range(25):
-        for t in triangle:
-            label[t] = label[t].min()
-    assert np.array_equal(components(triangle, 25), label)
 
 
 def test_an_atlas_gives_each_face_a_place_of_its_own() -> None:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ptmtools.arrays import Floats
-from ptmtools.neighbours.campus import distances, shader
+from ptmtools.neighbours.campus import distances
 
 NUMBER = st.floats(-1e3, 1e3, allow_subnormal=False)
 VECTOR = st.tuples(NUMBER, NUMBER, NUMBER)
@@ -71,19 +71,3 @@ def test_many_viewpoints_and_objects_at_once() -> None:
     assert whole.shape == (3, 5, 7)
     for i, j in np.ndindex(3, 5):
         assert np.array_equal(whole[i, j], distances(eyes[i, j], boxes, middles))
-
-
-def test_the_shader_follows_from_the_channels() -> None:
-    """The paper's II.B: a shader for each combination."""
-    assert shader("dl") == "diffuse+lightmap"
-    assert shader(["a", "d", "l"]) == "diffuse+lightmap+alpha"
-    assert shader(["d", "m", "l"]) == "diffuse+lightmap+mask"
-    assert shader([]) == "color"
-    assert shader("l") == "color+lightmap"
-    names = {
-        shader(c for c, on in zip("dalm", bits, strict=True) if on)
-        for bits in np.ndindex(2, 2, 2, 2)
-    }
-    assert len(names) == 16
-    with pytest.raises(KeyError):
-        shader("dx")

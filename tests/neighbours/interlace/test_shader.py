@@ -10,8 +10,8 @@ import pytest
 
 from ptmtools.errors import MissingComponentError
 from ptmtools.neighbours.interlace.model import Axis, axes_of
-from ptmtools.neighbours.interlace.shader import FRAGMENT, StepShader
 from ptmtools.neighbours.interlace.steps import join, split
+from tests.neighbours.interlace.step_shader import FRAGMENT, StepShader
 
 
 @pytest.fixture(scope="module")

@@ -1,13 +1,9 @@
-"""One step of joining as a fragment shader: the reference of what a client does on its GPU (§3.2).
+"""One step of joining as a fragment shader (Englert et al., §3.2), for comparison with numpy.
 
-As in the paper, a quad of the size of the result is drawn into a framebuffer; a pattern texture of
-2×2 texels, repeated over it R times (Eq. 1), says for each fragment which of the two images it is
-from, and all three are looked up at the fragment's own place, nearest texel. Rows and columns
-differ in the pattern alone. Integer textures, so that texels come out as they went in; all
-coordinates are multiples of powers of two, which single precision holds exactly up to sides of
-2^16.
-
-A client keeps the result as the texture of the next step, and shows it meanwhile.
+A quad of the size of the result is drawn into a framebuffer. A pattern texture of 2×2 texels,
+repeated over it (Eq. 1), selects the image of each fragment; all textures are looked up at the
+fragment's own place, nearest texel. Coordinates are multiples of powers of two, which float32 holds
+exactly up to sides of 2^16.
 """
 
 from __future__ import annotations
@@ -52,11 +48,11 @@ void main() {
 
 
 class StepShader:
-    """Joins by OpenGL; to be used and closed by the thread that made it."""
+    """Joins by OpenGL; used and closed by one thread."""
 
     def __init__(self) -> None:
-        """Opens a context without a window; raises MissingComponentError PTM-M500 where there is
-        no OpenGL 3.3."""
+        """Opens a context without a window; raises MissingComponentError PTM-M500 without OpenGL
+        3.3."""
         self._context = context = create_context()
         self.name = str(context.info["GL_RENDERER"])
         #: The longest side that it can join.
@@ -69,9 +65,8 @@ class StepShader:
             self._program[name].value = unit
 
     def join(self, first: Texels, second: Texels, axis: Axis) -> Texels:
-        """What `ptmtools.neighbours.interlace.steps.join` makes of two (h, w, c) images of uint8
-        or uint16, 1
-        to 4 components, whose sides are powers of two up to `most` / 2."""
+        """As `ptmtools.neighbours.interlace.steps.join`, of two (h, w, c) images of uint8 or
+        uint16, 1 to 4 components, whose sides are powers of two up to `most` / 2."""
         height, width, components = first.shape
         height, width = (2 * height, width) if axis == "rows" else (height, 2 * width)
         pattern = np.array(PATTERNS[axis], first.dtype)[:, :, None]
@@ -104,7 +99,7 @@ class StepShader:
         return texture
 
     def close(self) -> None:
-        """Gives the context back."""
+        """Releases the context."""
         self._context.release()
 
 
