@@ -1,22 +1,14 @@
-"""The BSP tree: convex leaves, best splits first.
+"""The BSP tree: convex leaves, best splits first (Airey 1990; Teller & Séquin 1991).
 
 A node holds a convex polyhedron and the wall fragments inside it, one (multi)polygon per wall
-plane. Every plane with a fragment may split the node; the choice maximises
+plane. The plane with the best score
 
     0.5 · occlusion + 0.3 · balance + 0.2 · (1 − splits)
 
-(Airey 1990; Teller & Séquin 1991 use the same three terms): *occlusion* is the share of the
-node's cross-section that the wall covers, *balance* the smaller over the larger number of
-fragments on the two sides, *splits* the share of the other fragments that the plane cuts. Nodes
-are split in the order of the wall area that their best plane brings, so that a limit on the number
-of leaves keeps the best splits. Where no wall is left, the reveals of a thick wall may still split,
-then the leaves of doors, and last the caps that close the node's whole cross-section
-(`split_planes`).
-
-A split that would leave a side thinner than a leaf may be is refused: no leaf is flat after
-rounding to float32. Where it would leave a side thinner than the cluster distance (a picture on a
-wall, the next room's wall a few millimetres out of line), the wall must close something: a part of
-the near boundary that is open without it.
+splits it; nodes are split in the order of the wall area that their best plane brings. Where no wall
+is left, reveals may split, then door leaves, then caps (`split_planes`). A side thinner than a leaf
+may be is refused, so that no leaf is flat after rounding to float32; where a side would be thinner
+than the cluster distance, the wall must close an opening of the near boundary.
 """
 
 from __future__ import annotations

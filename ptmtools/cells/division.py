@@ -1,11 +1,8 @@
 """Division of a root box into convex leaves, their portals, and the space that a flood reaches.
 
-Leaves that are connected through portals, but not with the start, are a group. A group with
-walkable floor is an *unreachable room*: behind a closed door, in another building, upstairs. A
-group without floor is a solid, the hollow of a wall or a shaft, and so is one whose walls face
-away. A group that touches the root box of a closed model is the outside. Floor under a roof and
-between walls there belongs to another building with a door or a window open; the flood cannot
-separate the two, so a note reports it.
+Leaves that portals connect, but not with the start, are a group. A group with walkable floor is an
+*unreachable room*, unless it is a solid. Groups that touch the root box of a closed model are the
+outside; floor under a roof and between walls there is reported.
 """
 
 from __future__ import annotations

@@ -1,16 +1,10 @@
 """Recognition of door leaves, which fill doorways and are no walls.
 
-A leaf is an upright slab of the size of a door. Its name identifies it, if the size fits; so does
-its place, if it closes an opening in a wall; and so does the user or its class, whatever its shape.
-Candidates are connected pieces of objects with a door's name, and flat rectangles: the rectangles
-identify a leaf in one piece with its frame or its handle, the piece one made of planks. Pieces and
-rectangles that are the two faces, the edge or the panels of one slab are one leaf, with all
+A leaf is an upright slab of the size of a door, identified by its name, by the opening that it
+closes (`doorways`), by the user or by its class. Candidates are connected pieces of objects with a
+door's name, and flat rectangles: the rectangles identify a leaf in one piece with its frame or
+handle, the piece one made of planks. Parallel slabs behind one another are one leaf, with all
 triangles within it.
-
-A name alone is not enough: a wall of 6 m called `wall_with_door`, a frame, a mat and a hatch in the
-floor are no slabs of that size, and a panel on a wall or a door open against it separates nothing.
-
-Rays from around a slab decide whether it closes an opening (`doorways`).
 """
 
 from __future__ import annotations

@@ -1,13 +1,8 @@
 """Facets: flat regions of a welded mesh, in as few triangles as their outlines need.
 
-A wall may come as two triangles or as a hundred thousand; it splits and blocks the same space.
-Triangles that share edges and lie in one plane, well within the distance at which two planes
-are one, are gathered into regions; a region of many triangles is replaced by as few as its outline
-allows. No corner moves, and corners are left out only where an outline runs on straight, so that
-a crack beside one is far narrower than a hairline, which is no opening.
-
-A region stays as it is unless three quarters of its triangles can be saved: the walls of most
-models are two triangles, and keep them.
+Triangles that share edges and lie in one plane are gathered into regions; a region of many is
+replaced by as few as its outline allows, if that saves three quarters. No corner moves. Corners are
+left out only where an outline runs on straight, so a crack beside one is narrower than a hairline.
 """
 
 from __future__ import annotations

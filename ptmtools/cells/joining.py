@@ -1,20 +1,12 @@
-"""Joining of pieces of geometry with the same owners.
+"""Joining of pieces of geometry with the same owners, which the cuts along leaves have separated.
 
-Geometry is cut to the leaves (`ownership`), and only then do leaves become cells. So triangles are
-cut where leaves of one cell meet, by planes with one owner on both sides, and each cut makes two
-triangles of a quadrilateral. Here a triangle all of whose pieces have the same owners is restored
-to the last bit. Of the others, and of triangles that continue each other (`patches`: one plane, one
-material, one texture map), pieces with the same owners are united (`outlines`) and divided into
-triangles anew (`planar.triangulated`).
+A triangle all of whose pieces have the same owners is restored to the last bit. Of the others, and
+of triangles that continue each other (`patches`), pieces with the same owners are united
+(`outlines`) and divided into triangles anew (`planar.triangulated`).
 
-No position is new, and a corner is removed from an edge only if it is removed from all triangles
-that have it there, whatever their owners; where one triangle has a corner on an edge, so have all
-others that share the edge. So no new gaps open, neither between parts of a triangle nor between
-triangles. (Cutting alone leaves gaps: a wall that lies in a plane is cut to the leaves on both its
-sides, the floor on which it stands only to those in front of it.) Corners on edges between joined
-triangles that only the cut made are removed as well.
-
-Only triangles of several owners go through GEOS; all others cost a few sorts.
+No position is new, a corner is removed from all triangles that have it or from none, and a corner
+on a shared edge is in all triangles of the edge. So no new gaps open. Only triangles of several
+owners go through GEOS; all others cost a few sorts.
 """
 
 from __future__ import annotations

@@ -1,17 +1,10 @@
-"""Doors that open, the portals that result, and how closed a model looks before it is divided.
+"""Doors that open, the portals that result, and an estimate of how closed a model is.
 
 The building is divided with all doors shut. A door opens if both its sides are inside: reached by
-the flood, or in an unreachable room (`division`). Its leaves then no longer block: the parts of the
-tree's planes that they covered become portals, and nothing is divided again. An entrance has the
-outside on one side and stays shut, as does the door of a cupboard without standing room. So a
-closed model stays closed.
-
-The flood may reach the outside of an open model like any room: through a window. There a point
-counts as inside if it has walls around it, glass included, and a roof above, if the building has
-any.
-
-`enclosure` estimates in advance, without a division, whether a model is closed: it casts sight
-lines from points at eye height over the floors of rooms and counts those that leave the model.
+the flood, or in an unreachable room (`division`). The parts of the tree's planes that its leaf
+covered become portals, and nothing is divided again; so a closed model stays closed. Where the
+flood reaches the outside, a point counts as inside if it has walls around it, glass included, and a
+roof above, if the building has any.
 """
 
 from __future__ import annotations

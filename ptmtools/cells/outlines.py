@@ -2,8 +2,8 @@
 
 Polygons are given by the numbers of their corners, so that a union needs no geometry: an edge
 between two of them runs once each way and cancels, and the remaining edges are loops. This requires
-edges that meet in corners on both sides, which `split_at_corners` provides. Rejected: unions by
-GEOS, which move corners by rounding, so that unions side by side no longer meet.
+edges that meet in corners on both sides, which `split_at_corners` provides. (Unions by GEOS move
+corners by rounding, so that unions side by side no longer meet.)
 """
 
 from __future__ import annotations

@@ -1,16 +1,11 @@
 """Cutting of the geometry along the boundaries of leaves, and the owners of each piece.
 
-Every triangle sinks through the BSP tree and is cut where it crosses a plane, so that each piece
-belongs to one leaf; texture coordinates at the cuts follow from barycentric coordinates of the
-source triangle. A piece that *lies* in a plane has two owners: the leaf that its front faces and
-the one behind it. It therefore sinks twice, once siding with its front and once with its back
-(design, "Ownership": true positions decide, not the plane that a cluster was snapped to).
-
-Most triangles end in one leaf, or in the two on both sides of a plane, in one piece: a compiled
-loop takes them there (`kernels`). The others are cut in numpy, all pieces at a tree node at once;
-crossing points are computed from the endpoint in front to the endpoint behind, so that two
-triangles sharing an edge are cut in the same point to the last bit. Pieces outside the root box
-belong to the leaf that the planes alone assign, so a clipped box loses no geometry.
+Every triangle sinks through the BSP tree and is cut where it crosses a plane. A piece that *lies*
+in a plane has two owners, so it sinks twice, siding with its front and with its back; true
+positions decide, not the plane that a cluster was snapped to. A compiled loop takes whole triangles
+to their leaves; the others are cut in numpy, all pieces at a node at once. Crossings are computed
+from the end in front to the end behind, so two triangles that share an edge are cut in the same
+point to the last bit. Pieces outside the root box belong to the leaf that the planes alone assign.
 """
 
 from __future__ import annotations

@@ -1,22 +1,14 @@
 """Places, the walkable parts of floors, and the leaves in which visitors stand.
 
 A **place** is a point of a surface within 45° of level over which an upright cylinder, the body of
-a walker from the height of a step to that of the head, meets nothing structural. Places are
-computed from the structure itself and not from leaves: a walker spans slivers, and does not fit
-into the hollow of a wall. In doubt the body fits.
+a walker from the height of a step to that of the head, meets nothing structural; in doubt the body
+fits. For each flat region of floor, the part of the structure in the band of heights above it is
+projected onto it along the vertical, widened by the radius and subtracted. Circles are polygons
+inside them. Floors and triangles are sorted by storeys, and regions with many triangles about them
+are cut in two, so the time is proportional to the triangles near floors.
 
-Places are the parts of flat regions of floor that are clear of the structure; curved floors are
-many small regions. The part of a triangle in a band of heights above a floor is projected onto it
-along the vertical, widened by a radius, and subtracted. Above a slope, heights are measured from
-the slope. Circles are polygons inside them, so that a body is never wider than its radius. Floors
-and triangles are sorted by storeys, and regions with many triangles about them are cut in two, so
-the time is proportional to the triangles near floors.
-
-Leaves are standing if they meet the eye region. Ceilings lower than the eyes may be are ignored, so
-space just above one counts as well: a small cost that hides nothing.
-
-Tried and rejected: a grid of columns, as in navigation meshes. Doors of 60 cm need cells of 5 cm,
-of which a campus has a hundred million.
+Leaves that meet the eye region are standing. Ceilings lower than the eyes may be are ignored: a
+small cost that hides nothing.
 """
 
 from __future__ import annotations

@@ -1,19 +1,10 @@
 """Polygons in a plane: union, difference, intersection, buffers and triangles, which never raise.
 
-Every overlay of the package goes through this module, on a grid: ours is `Tolerance.grid`, a
-thousandth of what counts as rounding. GEOS overlays in floating point resolve rounding by
-themselves, occasionally wrongly: of two rectangles 1.3 × 2.6 and 1.3 × 2.4 that share three sides,
-one of them but for 4e-16, GEOS 3.14 gives a point as the intersection. A wall lost so opens a room,
-an opening lost so hides one. On a grid (snap rounding, exact) this cannot happen.
-
-GEOS still gives up on some operands: polygons that cross themselves, and coordinates so large that
-the grid is finer than their last digit. Such an operation is tried again, alone,
-
-1. on coarser grids, up to what counts as rounding, or as far above the last digit of the
-   coordinates;
-2. there, with its operands repaired (`shapely.make_valid`).
-
-If that fails too, the result is a safe answer, and `counting` counts it:
+Every overlay goes through this module, on a grid (`Tolerance.grid`; snap rounding, exact): GEOS
+overlays in floating point occasionally lose a polygon, and a wall lost so opens a room. Where GEOS
+gives up, the operation is tried again, alone, on coarser grids, up to what counts as rounding or
+above the last digit of the coordinates, and then with its operands repaired. If that fails too, the
+result is a safe answer, and `counting` counts it:
 
 ============= ==================================================================================
 union         the part that could be united, without the smallest of the rest (a wall blocks
@@ -25,12 +16,8 @@ buffer        the shape itself; with ``more``, the box around it, widened
 triangles     none (a piece is drawn as it is)
 ============= ==================================================================================
 
-Results hold polygons only: lines and points in which operands touch are dropped.
-
-Triangulations are the constrained Delaunay ones of GEOS: as few triangles as there are, as plump as
-possible. They use every corner, also one on a straight edge (the neighbour beyond that edge has it
-too), and make none. Of 2,000 turned polygons with many such corners GEOS divided all without a
-sliver.
+Results hold polygons only. Triangulations are the constrained Delaunay ones of GEOS: they use every
+corner, also one on a straight edge, since the neighbour beyond that edge has it too, and make none.
 """
 
 from __future__ import annotations

@@ -1,22 +1,14 @@
 """Portals, the parts of the boundaries between leaves that no wall covers, and their flood.
 
-For every BSP plane the opening is the plane's cross-section less everything opaque that lies in
-it. Cracks, parts of the opening narrower than the hairline tolerance, are no openings; wider parts
-are kept, down to the square millimetre. The faces that leaves in front of the plane and leaves
-behind it have in that plane are intersected pairwise and with the opening; each connected piece is
-a portal, replaced by its convex hull where it is not convex. A portal is never shrunk: a cell
-missing from a PVS is a bug, an extra one is a cost.
+For every BSP plane the opening is the plane's cross-section less everything opaque that lies in it,
+without cracks narrower than a hairline. The faces that leaves on both sides have in that plane are
+intersected pairwise and with the opening; each connected piece is a portal, replaced by its convex
+hull where it is not convex. A portal is never shrunk: a cell missing from a PVS is a bug, an extra
+one is a cost.
 
-The flood starts from the viewpoints, else from the largest leaf that has floor below it, is not
-the inside of a solid and does not touch the root box, and runs through the portals. The model is
-closed if it never meets the root box; the space that it does not reach is a solid, a sealed void or
-the outside (design, "Reachable").
-
-A cap (`split_planes`) is worth a leaf where the space behind it is unreachable. Elsewhere, where
-both its sides are reached some other way or neither is, it would only add leaves, mostly slivers of
-some centimetres: the gallery would have half as many again (43 instead of 29), willowgarage an
-eighth (852 instead of 753). So all caps are tried, and after the flood those that separate nothing
-are removed. A rejoined leaf is reached as a whole or not at all, so the flood need not run again.
+The flood starts from the viewpoints, else from the largest leaf with floor that is no solid and
+does not touch the root box. Caps that separate nothing after the flood are removed; a rejoined leaf
+is reached as a whole or not at all, so the flood need not run again.
 """
 
 from __future__ import annotations

@@ -1,20 +1,10 @@
 """Roles of triangles: structural, detail or door, by the names and classes of objects and by shape.
 
-The class of an object acts like an option that names the object, `--structural`, `--detail` or
-`--door`; where the user names a triangle in any of these, its class is ignored. One thing differs:
-a triangle that is structural by class is never detail and never a door leaf, but divides the
-building only if its area suffices. (Tried: whatever its area, as with `--structural`. Then each
-tread and riser of a stair divides: an office building of 8 storeys with a stair of 18 steps in each
-had 836 leaves instead of 353, 2,170 portals instead of 506, 19.4 % of the volume resident instead
-of 15.3, and visibility took 23 s instead of 0.2.)
-
-Detail by shape is furniture, statues and plants, which can neither split nor block. Surfaces that
-divide a building and hide are flat: a polygon in one plane with others, a jamb, the edge of a slab.
-A sofa of 50,000 triangles has no such surface, but each of its triangles would be tried. So small,
-dense and round groups of triangles are detail, as if `--detail` named them: connected pieces first,
-then whole objects, since a plant is a thousand pieces.
-
-Errors are safe: detail hides nothing, so the visible sets can only grow.
+The class of an object acts like an option that names the object, unless the user names the triangle
+in `--structural`, `--detail` or `--door`; but triangles that are structural by class divide the
+building only if their area suffices. Detail by shape is furniture, statues and plants: small, dense
+and round connected pieces, or whole objects, since a plant is a thousand pieces. Errors are safe:
+detail hides nothing, so visible sets can only grow.
 """
 
 from __future__ import annotations

@@ -1,55 +1,24 @@
 """Grouping of leaves into rooms, and of a room's leaves into cells.
 
-**Rooms** are a watershed of free space on the graph of leaves. Walls cut a building into more
-leaves than it has rooms: every plane extends behind the wall that proposed it. Leaves grow together
-through the openings between them, widest first, like basins in a watershed of the distance from the
-walls: an opening joins two *regions* if it is at least `OPEN` of the cross-section of the narrower
-one. The remaining openings are doors.
-
-The cross-section of a region is its volume over its length in plan, and never less than that of
-anything that has joined it; length is the area over the width (least breadth in any direction) of
-the hull of its plan. So a corridor's is its width times its height, that of a room is its narrower
-side times its height, and a doorway, a sliver or a bay is narrow and joins the region into which it
-opens most: one room, since as part of that room it is narrow no more.
-
-The opening between two regions is the largest group of touching portals, by true area: two doors
-into one corridor are two openings, a wide arch that planes have cut up is one.
-
-A region without standing leaves, such as the space above a ceiling with holes, is no room. Leaf by
-leaf it joins the rooms around it, through the largest opening first.
-
-Tried and rejected: the share of the common boundary that is open (two rooms joined by a doorway as
-deep as its wall share nothing but the doorway); the volume of the convex hull that two regions
-fill together (splits every room with a pillar, and joins small rooms through their doors); the
-largest sphere in each leaf instead of its cross-section (under a ceiling of 2.6 m all halls have
-the same).
+**Rooms** are a watershed of free space on the graph of leaves. Leaves grow together through the
+openings between them, widest first: an opening joins two *regions* if it is at least `OPEN` of the
+cross-section of the narrower one, its volume over its length in plan, and never less than that of
+anything that has joined it. Length is the area over the least width of the hull of its plan. The
+opening between two regions is the largest group of touching portals, by true area. Regions without
+standing leaves join the rooms around them leaf by leaf, through the largest opening first.
 
 **Cells.** A room is one cell, unless dividing it saves its viewers more than
-`SubdivideOptions.gain` of their download: a corridor along many doors is worth dividing, a hall is
-not. A viewer in a cell fetches all cells that it may see, and every viewer that may see a cell
-fetches all of it. With v the volume of a leaf (the frequency of viewers in it), w the area of the
-surfaces in it (their cost) and S the leaves that it sees, a group G of leaves costs
+`SubdivideOptions.gain` of their download. With v the volume of a leaf (the frequency of viewers in
+it), w the area of the surfaces in it (their cost) and S the leaves that it sees (`sight`), a group
+G of leaves costs
 
     apart     Σ v·w(S) + w·v(S)  over the leaves of G
     together  v(G)·w(∪S) + w(G)·v(∪S)
 
-and the **gain** of dividing it is 1 - apart / together, the saved share of the download. It is 0 in
-a hall, whatever the size of the rest of the building, and the same in any unit. Groups are joined
-in the order of the gain of dividing the two, the lower numbered leaves first where it is the same,
-as long as it is less than the threshold.
-
-Leaves without standing room have no viewers, and dividing them from one another gains nothing. They
-come last: the pair that adds least to the cost of all groups is joined first, until half of the
-threshold has been added. So slivers and leaves that few see join their surroundings, and the top of
-a hall that the whole building sees stays by itself.
-
-Sight is estimated (`sight`), not computed: the subdivision comes before visibility, and the
-estimate decides only where cells end, never what they see. Cells never reach through a door, even
-if both sides see the same: the space behind a door covers little of the view, and the coverage
-hints can express that only of another cell.
-
-Tried and rejected: the gain of dividing the two groups, each as the whole that it has become. Once
-a cell sees nearly everything, anything may join it, and step by step it becomes the building.
+and the **gain** of dividing it is 1 - apart / together. Groups are joined in the order of the gain
+of dividing the two, as long as it is less than the threshold. Leaves without standing room come
+last: the pair that adds least to the cost of all groups is joined first, until half of the
+threshold has been added. Cells never reach through a door.
 """
 
 from __future__ import annotations

@@ -1,20 +1,12 @@
-"""Searches in less than quadratic time: equal rows, triangles near a plane or in a box, spans of
-height, and similar planes.
+"""Searches in less than quadratic time: equal rows, connected indices, triangles near a plane or in
+a box, spans of height, and similar planes.
 
-Model files repeat a vertex for each texture coordinate, object or face that uses it; triangles
-touch where positions are equal, to the last bit. Rows are compared by a hash of 64 bits and then by
-themselves: `numpy.unique` over the rows of 15 million corners takes ten times as long, and sorts
-them by value, which separates neighbours.
-
-A building has as many wall planes as rooms and each holds a few of its triangles: testing every
-triangle against every plane is quadratic (800 rooms: 24,000 planes and a million triangles).
-`Nearby` puts triangles into blocks of neighbours with bounding boxes, and only blocks near the
-plane are searched. `ByHeight` does so for spans of height: a tower has many storeys, and one has
-nothing to do with the others.
-
-`Bins` holds planes of similar normal and offset, so that each finds all that are near it. There are
-`_GRIDS` grids of bins, and a plane is looked up in the one in which it lies furthest from the edges
-of its bin: its neighbours to a tenth of the step are there, wherever it lies.
+Rows are compared by a hash of 64 bits and then by themselves: `numpy.unique` over the rows of 15
+million corners takes ten times as long, and sorts them by value, which separates neighbours.
+`Nearby` puts triangles into blocks of neighbours with bounding boxes; `ByHeight` does so for spans
+of height. `Bins` holds planes of similar normal and offset in `_GRIDS` grids of bins; a plane is
+looked up in the one in which it lies furthest from the edges of its bin, so its neighbours to a
+tenth of the step are there.
 """
 
 from __future__ import annotations

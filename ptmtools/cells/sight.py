@@ -1,14 +1,10 @@
 """Visibility between leaves before the portal flow: a lower estimate by lines, an upper bound.
 
-From below, straight lines through every portal, spread evenly over its area and over the
-directions, are followed to both sides through all portals that they meet. Leaves on one line see
-each other. Unlike a potentially visible set this misses leaves that no line happens to join; it
-serves to weigh, never to cull. Two thirds to nine tenths of the pairs of the portal flow take a
-second or two.
-
-The lines are the same for every portal in its own frame, and the same seen from either side and
-after quarter turns of that frame. So they depend neither on the order of the portals and of their
-corners nor on the position and rotation of the building, even upside down.
+From below, straight lines through every portal, spread evenly over its area and over the directions
+by the cosine, are followed to both sides through all portals that they meet; leaves on one line see
+each other. The lines are the same for every portal in its own frame, from either side and after
+quarter turns of the frame, so they depend neither on the order of portals and corners nor on the
+position and rotation of the building. The estimate serves to weigh, never to cull.
 
 From above, the first bound of the portal flow decides which leaves no standing viewer can see.
 """

@@ -1,26 +1,16 @@
 """Split planes beside those of walls: reveals, door leaves and caps.
 
-**Reveals** are the jambs, lintels and sills that close a wall's thickness around an opening. Two
-parallel walls near to one another are the faces of one wall. Between them the BSP leaves a slab
-that holds both solids and the doorways through it; the polygons that separate the two are far
-smaller than any wall. Their position identifies them: they bridge the slab from face to face.
-Without them, solids that are not capped (a wall ending under a floor slab) would join rooms to the
-outside, and every door in a wall to every other.
+**Reveals** are the jambs, lintels and sills that close a wall's thickness around an opening: flat
+regions that bridge the slab between two near, parallel walls from face to face, whatever their
+area. Without them solids that are not capped would join rooms to the outside.
 
-**Door planes** split after walls and reveals, whatever the size of the leaf. A leaf of 1 × 2.1 m is
-as large as a wall, but as one it would cut the thickness of the wall it hangs in: the jambs beside
-it bridge the wall from face to face, but neither of the two slabs that it makes of it. A leaf of
-0.8 × 2 m would be no wall. Like caps they are removed where both sides are reached (`portals`).
+**Door planes** split after walls and reveals, whatever the size of the leaf: as a wall, a leaf
+would cut the thickness of the wall in which it hangs, and no jamb would bridge it.
 
-**Caps** are small polygons that close the whole cross-section of a leaf. The planes of walls extend
-behind them and cut the solids of floors and walls into wedges. A flight of stairs does so to the
-floor slab beside it: between the slope and the top of the slab lie a solid and a piece of the
-stairwell, separated by the edge of the slab, which is smaller than a wall; nor is it a reveal, for
-the wedge lies between no two parallel faces. It is recognised since it leaves no opening. Such a
-split costs one leaf and never a portal. A polygon that leaves an opening, however small, is no cap.
-
-No area is too small: a chain of solids is as open as its narrowest end, and in the museum of 50
-rooms, with only the caps of at least 0.02 m², all 992 leaves stay instead of 365 with all caps.
+**Caps** are polygons of any area that close the whole cross-section of a leaf. The planes of walls
+extend behind them and cut the solids of floors and walls into wedges, which only such polygons
+separate from free space. A cap costs one leaf and never a portal; those that separate nothing are
+removed (`portals`).
 """
 
 from __future__ import annotations

@@ -1,24 +1,15 @@
 """Walls, the large coplanar polygons of a scene, the planes that they propose, and ray tests.
 
 Triangles are gathered into *layers*, sets that lie in one plane within tolerance, largest area
-first (cf. the area-weighted clustering of Airey 1990). In its plane, the triangles of a layer are
-united (shapely) and split into connected polygons; those of at least ``wall_area`` are walls.
+first (cf. Airey 1990). The triangles of a layer are united and split into connected polygons; those
+of at least ``wall_area`` are walls. A polygon blocks a portal only where it lies in the portal's
+plane within tolerance, so a plane is blocked by every opaque structural triangle there, whatever
+its size.
 
-Merging layers across the building within 1 cm, as the area-weighted mean or as the heaviest one,
-was tried and rejected: real walls of one line differ by millimetres from room to room, the merged
-plane then contains few of them, and walls outside the plane cannot block. Near-parallel planes are
-separated where they meet, in the BSP.
-
-A polygon blocks a portal only where it lies in the portal's plane within tolerance (design,
-"Structure"), so the blocking set of a plane is wider than its walls: every opaque structural
-triangle there, whatever its size.
-
-`Surroundings` casts rays from points to test for walls that face them, or away, and for a roof. A
-column on a floor has walkable floor inside, as far as surfaces show: floor and head room. But all
-its sides face outwards. And a point outside a building that is under a roof and between walls is in
-another building, with a door or a window open. Where a solid touches another, two faces lie in one
-plane, and a ray may meet either. So it is cast at all triangles moved a little to their fronts, and
-to their backs; a ray that meets faces of opposite directions in the two is ignored.
+`Surroundings` casts rays from points to test for walls that face them, or away, and for a roof.
+Where a solid touches another, two faces lie in one plane, and a ray may meet either. So it is cast
+at all triangles moved a little to their fronts, and to their backs; a ray that meets faces of
+opposite directions in the two is ignored.
 """
 
 from __future__ import annotations

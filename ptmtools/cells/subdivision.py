@@ -1,17 +1,12 @@
 """Subdivision of a scene into convex cells, portals and cut geometry (paper §3).
 
-1. Walls propose planes (`structure`), the planes split the root box into convex leaves (`bsp`), and
-   the parts of the leaves' boundaries that no wall covers are portals (`portals`).
-2. A flood through the portals finds the reachable leaves. The first root box is wider than the
-   model: if the flood never meets it, the model is closed and the remaining leaves are dropped.
-   Otherwise the model is open; the root box is then clipped to the walls and divided again, so that
-   the open space over low walls does not connect all rooms (`division`).
+1. Walls propose planes (`structure`), which split the root box into convex leaves (`bsp`); the
+   parts of the leaves' boundaries that no wall covers are portals (`portals`).
+2. A flood through the portals finds the reachable leaves (`division`). If it meets the first root
+   box, which is wider than the model, the model is open, and its bounding box is divided instead.
 3. The geometry is cut to the leaves, and each piece gets its owners (`ownership`).
-4. Leaves that no standing viewer sees are left out (`sight`). Each remaining leaf is a cell, or all
-   leaves of a room are one (`rooms`).
+4. Leaves that no standing viewer sees are left out (`sight`), the others grouped (`rooms`).
 5. Pieces of geometry with the same owners are joined again (`joining`).
-
-A model none of whose faces is visible from inside is an error, not a result.
 """
 
 from __future__ import annotations
