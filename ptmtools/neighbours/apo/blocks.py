@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ptmtools.arrays import Floats, Ints, Singles
+from ptmtools.arrays import Floats, Ints, Singles, areas
 from ptmtools.executor import Executor
 from ptmtools.neighbours.apo.octree import (
     Bounds,
@@ -22,11 +22,12 @@ from ptmtools.neighbours.apo.octree import (
     averaged,
     check_count,
     codes_of,
+    columns,
     divide,
     joined,
     pruned,
 )
-from ptmtools.neighbours.apo.sampling import Points, Source, areas, at, nearest, spread
+from ptmtools.neighbours.apo.sampling import Points, Source, at, nearest, spread
 from ptmtools.progress import Progress, silent
 
 #: Depths of the cells of blocks: 1/16 of the cube wide, or 1/1024 where a block would be too large.
@@ -115,18 +116,12 @@ def build(work: Work, executor: Executor, progress: Progress = silent) -> tuple[
         texels += texel_count(each.levels)
         check_count(texels)
     progress(len(blocks), len(blocks), "casting rays")
-    parts = [each.cells for each in results]
-    cells = Samples(
-        np.concatenate([part.code for part in parts]),
-        np.concatenate([part.count for part in parts]),
-        np.concatenate([part.value for part in parts]),
-        np.concatenate([part.square for part in parts]),
-    )
+    cells = Samples(*columns([each.cells for each in results]))
     width = cells.value.shape[1]
     # Cells are divided by their own samples, independently of the levels above.
     above = divide(cells, 0, work.top, work.bounds)
     kept = above[work.top].code if len(above) > work.top else np.zeros(0, np.uint64)
-    below = joined([pruned(each.levels, kept, 0) for each in results], width)
+    below = joined([pruned(each.levels, kept) for each in results], width)
     levels = [*above[: work.top], *(level for level in below if len(level.code))]
     total = int(cells.count.sum())
     return averaged(levels), sum(each.missed for each in results) / max(total, 1)

@@ -1,15 +1,9 @@
 """Writes and reads an octree texture and its mesh as a folder (docs/formats/apo.md; paper 2, §3.2
 and §4).
 
-Each level of a stream ends with a full flush of deflate: later bytes do not refer to earlier ones,
-so that every prefix of whole levels inflates, and every level alone. The flushes of all levels
-together cost some 5 bytes each.
-
-The simplified mesh is a GLB of one primitive, and an OBJ; `mesh_of` reads the GLB back.
-`read_octree` reads the octree from the folder, and `inflated` from the beginning of a stream.
-
-A folder may be untrusted: the index is checked against its schema and for contradictions, and sizes
-against the limit of addresses before memory is allocated.
+Each level of a stream ends with a full flush of deflate, so that every prefix of whole levels
+inflates, and every level alone. A folder may be untrusted: the index is checked against its schema
+and for contradictions, and sizes against the limit of addresses before memory is allocated.
 """
 
 from __future__ import annotations

@@ -2,12 +2,8 @@
 
 A corner's normal is the mean of the normals of the triangles around its point that deviate from its
 own triangle's by no more than a crease angle, each weighted by its angle at the point (Thürmer and
-Wüthrich 1998), which makes the mean independent of the triangulation of a face. Weights by area
-favour long triangles, of which simplified meshes are full; Max's weights (1999) the tiny ones of
-marching cubes.
-
-Angles come from a polynomial in the cosine: only sums, products and square roots, so that bytes
-derived from the normals are the same on every machine.
+Wüthrich 1998): weights by area favour long triangles, Max's (1999) tiny ones. Angles come from a
+polynomial in the cosine, so that bytes derived from the normals are the same on every machine.
 """
 
 from __future__ import annotations

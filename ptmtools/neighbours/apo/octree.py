@@ -1,30 +1,21 @@
-"""The octree of samples of a normal field (paper 2, §3.1), and its texels.
+"""The octree of samples of a normal field, and its texels (paper 2, §3.1 and §3.2).
 
-A node is divided while its samples deviate from their mean by more than the bound. The paper names
-the L2,1 metric of Cohen-Steiner et al. and a bound of 0.05; as a root mean square of the length of
-the difference, that gives textures of the paper's size (as a mean square, a tenth of it).
+A node is divided while its samples deviate from their mean by more than the bound, as a root mean
+square, and it has `ENOUGH` samples or its normals cancel out (docs/design/apo.md).
 
-A node of fewer than `ENOUGH` samples is not divided: its children would hold one or two each, and
-the surface between these would have none. (A sphere with relief, simplified from 327,680 triangles
-to 5,000, with eight samples each: 2.54 MB and 2.18° of mean error with this rule; without it 3.92
-MB and 1.93°, and 2.7 % of the surface between children instead of 1.0 %. At the same size fewer
-samples without this rule are worse: 2.37 MB and 2.65°.) A node whose normals cancel out is divided
-nevertheless: its mean would show on both sides of a thin part.
+All steps work level by level on whole arrays. The Morton code of a node interleaves the bits of its
+place in the `Cube`: three bits a level, x the lowest, the root's level first. Samples are sorted by
+their codes, so a subtree is a range of them, and its sums are differences of running sums.
 
-All steps work level by level on whole arrays. Samples are sorted by their Morton code, so that a
-node is a range of them, and its sums are differences of running sums.
-
-The Morton code of a node interleaves the bits of its place in the `Cube`: three bits a level, x the
-lowest, the root's level first. In the order of codes siblings are adjacent, and so are all nodes
-below a node: a range of sorted codes is a subtree.
-
-`octree_of` encodes the nodes as texels, and `fault_of` checks them (docs/formats/apo.md; paper 2,
-§3.2).
+`octree_of` encodes the nodes as texels, and `fault_of` checks them (docs/formats/apo.md).
 """
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -172,11 +163,11 @@ def averaged(levels: list[Level]) -> list[Level]:
     return result
 
 
-def pruned(levels: list[Level], kept: Codes, above: int) -> list[Level]:
-    """The parts of levels below the nodes ``kept``, sorted, of the level ``above`` these."""
+def pruned(levels: list[Level], kept: Codes) -> list[Level]:
+    """The parts of levels below the nodes ``kept``, sorted, of the first one."""
     result = []
     for k, level in enumerate(levels):
-        root = level.code >> np.uint64(3 * (k + above))
+        root = level.code >> np.uint64(3 * k)
         at = np.minimum(np.searchsorted(kept, root), max(len(kept) - 1, 0))
         here = kept[at] == root if len(kept) else np.zeros(len(root), dtype=bool)
         result.append(Level(level.code[here], level.value[here], level.children[here]))
@@ -185,17 +176,14 @@ def pruned(levels: list[Level], kept: Codes, above: int) -> list[Level]:
 
 def joined(parts: list[list[Level]], width: int) -> list[Level]:
     """Joins levels of parts that follow each other in the order of codes."""
-    deepest = max(map(len, parts), default=0)
     empty = Level(np.zeros(0, np.uint64), np.zeros((0, width), np.float32), np.zeros(0, np.uint8))
-    rows = [[part[k] if k < len(part) else empty for part in parts] for k in range(deepest)]
-    return [
-        Level(
-            np.concatenate([level.code for level in row]),
-            np.concatenate([level.value for level in row]),
-            np.concatenate([level.children for level in row]),
-        )
-        for row in rows
-    ]
+    rows = itertools.zip_longest(*parts, fillvalue=empty)
+    return [Level(*columns(row)) for row in rows]
+
+
+def columns(rows: Sequence[Level] | Sequence[Samples]) -> Iterator[NDArray[Any]]:
+    """The joined arrays of records, attribute by attribute."""
+    return map(np.concatenate, zip(*(vars(row).values() for row in rows), strict=True))
 
 
 def popcount(bits: NDArray[np.uint8]) -> Ints:

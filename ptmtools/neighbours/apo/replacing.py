@@ -1,17 +1,9 @@
 """Replaces objects of a building by simplified meshes and octrees of their original normals.
 
-This applies paper 2, which has one mesh, to the statues of a museum. Clients without octrees
-display the simplified mesh like any other, with its original materials, and visibility and hints
-are computed from it.
-
 The mesh is simplified with its materials, sides, texture coordinates and colours, whose borders
-stay, so it may keep more triangles than a plain one. Points that leave the box of the object are
-moved back into it: a statue that stands on a floor must not reach through it.
-
-Each new triangle stands for one of the object's own, has its material and sides, and takes its
-place in the order: results that depend on the order of the triangles do not change. Tolerances do
-not change either: they are those of the model's coordinates, and a simplified mesh does not leave
-the box of its object.
+stay. Points that leave the box of the object are moved back into it. Each new triangle stands for
+one of the object's own, has its material and sides, and takes its place in the order, so results
+that depend on the order of the triangles do not change; nor do tolerances.
 """
 
 from __future__ import annotations

@@ -1,18 +1,10 @@
 """Samples of the simplified mesh, and their normals and colours from the source (paper 2, §3.1).
 
-`spread` places points evenly on triangles. Rows parallel to the longest edge, as far apart as the
-points of a row, give thin triangles, which simplification leaves in flat places, no more points
-than their area requires, and no gaps along their length. (Tried: the middles of a regular division
-into n² similar triangles; in thin ones its points are many times farther apart one way than the
-other.)
-
-`nearest` finds the source point of each sample. Rays go both ways along the normal; the nearest hit
-that faces the same way counts. A surface that faces away is the other side of a thin part, or the
-far side of a hole, and is passed through.
-
-`Paint` has the colours at points of the source: materials, vertices and textures, multiplied as in
-the model. The paper leaves colour for later. Texels are those of the finest level: where samples
-are farther apart, texels between them are ignored.
+`spread` places points evenly on triangles, in rows parallel to the longest edge: thin triangles get
+no more points than their area requires, and no gaps along their length. `nearest` finds the source
+point of each sample by rays both ways along the normal; the nearest hit that faces the same way
+counts, and surfaces that face away are passed through. `Paint` has the colours at points of the
+source: materials, vertices and texels of the finest level, multiplied as in the model.
 """
 
 from __future__ import annotations
@@ -24,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, Singles
+from ptmtools.arrays import Bools, Floats, Ints, Singles, areas
 from ptmtools.scene.model import Scene
 
 #: Factor of the spacing while there are too many points.
@@ -41,13 +33,6 @@ class Points(NamedTuple):
 
     triangle: Ints
     weight: Floats
-
-
-def areas(corner: Floats) -> Floats:
-    """(m,) areas of (m, 3, 3) triangles."""
-    cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    result: Floats = np.linalg.norm(cross, axis=1) / 2
-    return result
 
 
 def longest_first(corner: Floats) -> Ints:

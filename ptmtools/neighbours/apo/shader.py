@@ -18,10 +18,10 @@ from ptmtools.arrays import Floats
 from ptmtools.coverage.backends.opengl import create_context
 from ptmtools.neighbours.apo.model import Octree
 from ptmtools.neighbours.apo.traversal import WIDTH, rows_of
-from ptmtools.neighbours.apo.view import AMBIENT, FILL, KEY, Frame, Look, View
+from ptmtools.neighbours.apo.view import AMBIENT, FILL, KEY, STONE, Frame, Look, View
 
-#: Least farthest depth, for a view without points.
-TINY = 2.0**-100
+#: Least farthest depth, for a view without points; nearest depth, as a share of the farthest.
+TINY, NEAR = 2.0**-100, 2.0**-14
 
 LOOK_UP = f"""
 #version 330
@@ -162,14 +162,14 @@ def draw(octree: Octree, corners: Floats, own: Floats, view: View, look: Look) -
             "eye": tuple(view.eye.tolist()),
             "view": tuple(view.axes.T.reshape(-1).tolist()),
             "half_": view.half,
-            "near": far * look.near,
+            "near": far * NEAR,
             "far": far,
             "colors": len(textures) - 1,
             "colored": colors is not None,
             "only_normals": look.what == "normals",
             "key": tuple(key.tolist()),
             "fill": tuple(fill.tolist()),
-            "stone": look.stone,
+            "stone": STONE,
         }
         for name, value in values.items():
             program[name].value = value

@@ -99,6 +99,10 @@ AMBIENT, KEY, FILL = 0.2, 0.7, 0.2
 _KEY, _FILL = (-0.5, 0.65, 0.6), (0.8, -0.3, 0.5)
 
 
+#: Reflected shares of red, green and blue of a surface without colour.
+STONE = (0.93, 0.9, 0.85)
+
+
 @dataclass(frozen=True)
 class Look:
     """The content and style of a picture.
@@ -107,14 +111,10 @@ class Look:
     ----------
     levels: number of octree levels; 0 shows the mesh's own normals.
     what: "shaded", or "normals" as the octree stores them.
-    stone: reflected shares of red, green and blue of a surface without colour.
-    near: nearest drawn depth, as a share of the farthest.
     """
 
     levels: int
     what: str = "shaded"
-    stone: tuple[float, float, float] = (0.93, 0.9, 0.85)
-    near: float = 2.0**-14
 
     @property
     def background(self) -> NDArray[np.uint8]:
@@ -133,7 +133,7 @@ class Look:
             return normals / 2 + 0.5
         key, fill = self.lights(view)
         light = AMBIENT + KEY * np.maximum(normals @ key, 0) + FILL * np.maximum(normals @ fill, 0)
-        base = np.array(self.stone) if colors is None else colors[:, :3] / 255
+        base = np.array(STONE) if colors is None else colors[:, :3] / 255
         return np.asarray(np.minimum(base * light[:, None], 1.0))
 
 

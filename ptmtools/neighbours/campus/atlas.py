@@ -1,14 +1,10 @@
-"""An atlas for a lightmap: every face of a mesh in a place of its own, by xatlas.
+"""The atlas of a lightmap: every face of a mesh in a place of its own, by xatlas.
 
-No texel that a bilinear lookup on one chart reads is read on another, in any size; all sizes have
-the same layout. xatlas packs into a square of about as many texels as it is asked for, so it is
-asked again, with fewer texels to the metre, until all charts fit the least lightmap. Where the
-edges of charts would take nearly all of it, the next larger one is packed, and in the smaller
-neighbours run into each other.
-
-(Tried: two more texels between charts. Of a building with 5,700 charts a texel of the least size
-was then 1.3 m wide instead of 0.2 m, so that it was packed for the next size, where a texel has
-0.13 m, and a third of its charts had no texel at all in the least.)
+No texel that a bilinear look-up on one chart reads is read on another, in any size; all sizes have
+the same layout. xatlas packs with fewer and fewer texels to the metre until all charts fit into the
+least lightmap. If the edges of charts would take nearly all of it, the next larger one is packed,
+and neighbours run into each other in the smaller ones. (With two more texels between charts, a
+building with 5,700 charts had texels of 1.3 m instead of 0.2 m in the least size.)
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A model becomes a campus folder: reading, objects and textures in parallel, the index.
+"""Writes a model as a campus folder: objects and textures in parallel, and the index.
 
 Nothing in the folder depends on the number of workers, on time, or on the folder's name.
 """
@@ -17,8 +17,16 @@ from numpy.typing import NDArray
 
 from ptmtools.executor import Executor
 from ptmtools.lazy import component
-from ptmtools.neighbours.campus.making import ObjectMade, Work, make_object
-from ptmtools.neighbours.campus.model import ALPHA, FORM, INDEX, Campus, CampusMaterial, Names
+from ptmtools.neighbours.campus.making import Work, make_object
+from ptmtools.neighbours.campus.model import (
+    ALPHA,
+    FORM,
+    INDEX,
+    Campus,
+    CampusMaterial,
+    CampusObject,
+    Names,
+)
 from ptmtools.neighbours.campus.objects import notes_on, parts_of
 from ptmtools.neighbours.campus.occlusion import Surroundings
 from ptmtools.neighbours.campus.options import CampusOptions
@@ -32,15 +40,15 @@ from ptmtools.scene.options import IngestOptions
 
 @dataclass(frozen=True)
 class Made:
-    """What was written.
+    """A written campus.
 
     Attributes
     ----------
     campus: the index.
     scene: that of the model, for its notes.
-    notes: what else there is to say.
-    seconds: by phase.
-    covered, computed: texels of lightmaps that are read on faces, and those that were computed.
+    notes: further notes.
+    seconds: duration of each phase.
+    covered, computed: texels of lightmaps that are read on faces, and computed ones.
     """
 
     campus: Campus
@@ -71,7 +79,7 @@ def make_campus(
 
     Raises
     ------
-    InputError: what ingest raises; PTM-I701 no lightmaps in the model.
+    InputError: as ingest; PTM-I701 no lightmaps in the model.
     LimitError: PTM-L400 too many objects.
     OutputError: PTM-O001, O002, O003, O010 of the folder.
     MissingComponentError: PTM-M100 lightmaps are to be baked, and xatlas is not installed.
@@ -82,9 +90,10 @@ def make_campus(
         component("xatlas", "PTM-M100", "lightmaps need xatlas", "campus")
     clock = _Clock()
     scene = ingest(path, reading, progress, workers=executor.workers)
-    masks, notes = model_masks(path, scene, reading)
+    masks, mask_notes = model_masks(path, scene, reading)
     painted = model_light(path, reading) if options.lightmaps == "model" else None
     parts = parts_of(scene, options.small)
+    notes = [*mask_notes, *notes_on(parts)]
     names = Names()
     bases, of_image = _bases(scene, masks, names)
     materials, material = _materials(scene, of_image, bases)
@@ -110,7 +119,8 @@ def make_campus(
                 put(record.file, data)
                 textures.append(record)
         clock.end("textures")
-        results: list[ObjectMade] = []
+        objects: list[CampusObject] = []
+        covered = computed = 0
         tasks = [(names.take(part.label, "object"), part) for part in parts]
         for done, each in enumerate(executor.each(make_object, work, tasks)):
             progress(done, len(tasks), "objects")
@@ -119,7 +129,9 @@ def make_campus(
             for record, data in each.lightmaps:
                 put(record.file, data)
                 textures.append(record)
-            results.append(ObjectMade(each.record, (), (), each.notes, each.covered, each.computed))
+            objects.append(each.record)
+            notes += each.notes
+            covered, computed = covered + each.covered, computed + each.computed
         progress(len(tasks), len(tasks), "objects")
         clock.end("objects")
         campus = Campus(
@@ -128,20 +140,13 @@ def make_campus(
             scene.space.up,
             options.lods,
             options.lightmaps,
-            tuple(each.record for each in results),
+            tuple(objects),
             materials,
             tuple(textures),
         )
         put(INDEX, index_bytes(campus))
     clock.end("writing")
-    return Made(
-        campus,
-        scene,
-        (*notes, *notes_on(parts), *(note for each in results for note in each.notes)),
-        clock.seconds,
-        sum(each.covered for each in results),
-        sum(each.computed for each in results),
-    )
+    return Made(campus, scene, tuple(notes), clock.seconds, covered, computed)
 
 
 def index_bytes(campus: Campus) -> bytes:
@@ -152,7 +157,7 @@ def index_bytes(campus: Campus) -> bytes:
 
 @dataclass
 class _Clock:
-    """How long phases take."""
+    """The duration of phases, seconds."""
 
     seconds: dict[str, float] = field(default_factory=dict)
     _since: float = field(default_factory=time.perf_counter)
@@ -165,7 +170,7 @@ class _Clock:
 def _bases(
     scene: Scene, masks: Mapping[int, Mask], names: Names
 ) -> tuple[list[BaseImage], dict[int, int]]:
-    """The textures, one for each distinct image and mask; and which of them each material has."""
+    """The textures, one for each distinct image and mask; and the index of each material's."""
     index_of: dict[tuple[int, str], int] = {}
     bases: list[BaseImage] = []
     of: dict[int, int] = {}
@@ -173,7 +178,7 @@ def _bases(
         if material.image < 0:
             continue
         image, mask = scene.images[material.image], masks.get(number)
-        # By what is in the mask: two files may hold the same.
+        # By the content of the mask: two files may be equal.
         key = material.image, "" if mask is None else _digest(mask)
         if key not in index_of:
             index_of[key] = len(bases)
@@ -200,8 +205,8 @@ def _digest(mask: Mask) -> str:
 def _materials(
     scene: Scene, of: Mapping[int, int], bases: list[BaseImage]
 ) -> tuple[tuple[CampusMaterial, ...], NDArray[np.int32]]:
-    """The materials of a campus, one for each of the scene's and the sides that it is seen from;
-    and (T,) which of them each face has."""
+    """The materials of a campus, one for each material of the scene and the sides that show it; and
+    (T,) the material of each face."""
     key = 2 * scene.triangle_material.astype(np.int64) + scene.two_sided
     used, place = np.unique(key, return_inverse=True)
     materials = []

@@ -1,27 +1,16 @@
-"""The lightmaps of an object: light in every texel of an atlas, in three sizes.
+"""The lightmaps of an object, in three sizes, and the light of its coarse meshes.
 
-A texel has the light of the point of its face that is nearest to its centre. Those have one, too,
-whose centre no face holds, but which a lookup on some face reads: most windows have sills and
-reveals that are thinner than a texel, which would else show what lies beside them in the atlas.
+A texel has the light of the nearest point of its face, also where a look-up on a face reads it but
+no face holds its centre, as of sills thinner than a texel. The map of half the least size is
+computed texel by texel. Each larger one takes over the bilinear mean of the four texels below where
+they agree, and computes the rest: light is smooth except where surfaces meet. Computed texels are
+smoothed with neighbours on the same chart that differ by no more than the grain of the light. What
+no face reads takes the nearest value. (Smoothing over edges made files a tenth smaller, and twice
+as many points were off by a tenth.)
 
-One of half the least size is computed texel by texel. Each larger one takes over what the four
-texels below agree on, as their bilinear mean, and computes the rest anew: light is smooth but for
-where surfaces meet. At the edge of a chart those of the four count that lie on it, if they have
-half of the weight. What was computed is smoothed with those of its eight neighbours on the same
-chart that differ by no more than the grain of the light: where light has an edge, it stays. What no
-face reads takes the value of what is nearest, so that JPEG has few edges to code.
-
-(Tried: smoothing over edges, too. Files were a tenth smaller, and twice as many points of the
-sample campus had light that was off by a tenth.)
-
-The light of a coarse mesh, in the colours of its vertices.
-
-A lightmap belongs to one mesh: on another one its charts would tear. So only the finest mesh of an
-object has it, and the others, which are seen from afar and loaded first, carry their light with
-them: at each vertex the value with which linear interpolation over the faces is nearest to the
-light at many points of them, in the least squares (Kavan, Bargteil and Sloan 2011). A value taken
-at the vertex itself would often lie in a corner, and blacken all of its faces. (Not done: an atlas
-for each mesh, which is three more files for an object of which a few hundred faces are seen.)
+A lightmap belongs to the charts of one mesh. Coarse meshes carry their light at vertices: values
+whose linear interpolation is nearest to the light at many points of the faces, in the least squares
+(Kavan, Bargteil and Sloan 2011); a value taken at the vertex itself often lies in a dark corner.
 """
 
 from __future__ import annotations
@@ -31,11 +20,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, Singles
+from ptmtools.arrays import Bools, Floats, Ints, Singles, areas
 from ptmtools.neighbours.campus.atlas import Atlas, claim, cover, nearest
 from ptmtools.neighbours.campus.lights import Look
 from ptmtools.neighbours.campus.model import LIGHT_SIZES
-from ptmtools.neighbours.campus.occlusion import SPREAD, areas, hemisphere, turns
+from ptmtools.neighbours.campus.occlusion import SPREAD, hemisphere, turns
 from ptmtools.tolerance import INWARD_SHARE, TIE_SHARE
 
 #: Four texels agree if none differs from another by more.

@@ -1,18 +1,11 @@
-"""Where the light of a surface comes from: rays, or the lightmap of the model.
+"""The light of a surface: by rays, or from the lightmap of the model; and the lit side of a face.
 
-Which side of a face with two sides counts: that on which viewers can be.
-
-Outside of a building its walls see the sky, or what sees it; within a closed one nothing does,
-however large it is and however narrow the court before it. So walks by random rays begin on both
-sides, turned back by what they meet, and that side counts from which more of them come to the sky;
-where as many do from either, as of a fence, or as good as none, as within, the lighter one. Faces
-of one plane that share an edge are decided together, by points spread over all of them. Where the
-two sides are close, more points are asked.
-
-(Tried: the lighter side of each face by itself, by 16 rays from its middle. Rays that end on
-something far away count nearly as if they escaped, so a hall of 20 m is lighter within than a court
-of 3 m, and a face whose middle lies behind a drainpipe has the other side than the wall around
-it.)
+Of a face with two sides, that side counts on which viewers can be. Walks by random rays begin on
+both sides and turn at surfaces; the side from which more of them reach the sky counts, or the
+lighter one if they are alike, as of a fence or within a building. Faces of one plane that share an
+edge are decided together, by points spread over all of them, and more points where the two sides
+are close. (The lighter side of each face by itself, by 16 rays from its middle, takes a hall of
+20 m for lighter than a court of 3 m.)
 """
 
 from __future__ import annotations
@@ -25,11 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, Singles
+from ptmtools.arrays import Bools, Floats, Ints, Singles, areas
 from ptmtools.cells.search import connected
 from ptmtools.neighbours.campus.occlusion import (
     Surroundings,
-    areas,
     escaping,
     light,
     normals,

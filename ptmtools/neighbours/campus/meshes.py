@@ -1,16 +1,5 @@
-"""The meshes as GLB: geometry alone, which names materials by their number in campus.json.
-
-One node and one mesh, with a primitive for each material, in the order of the index. World
-coordinates, float32, without a transform.
-
-=============  ==================================================================================
-POSITION       metres
-TEXCOORD_0     of the material's textures, where it has some; origin at the upper left
-TEXCOORD_1     of the lightmap, in the finest mesh
-COLOR_0        linear light, uint16, normalised: colours of the model's vertices, and in a mesh
-               without a lightmap their light; not there where all is white
-material       name: the material's base, or its own name; extras.material: its number
-=============  ==================================================================================
+"""The meshes as GLB: geometry in world coordinates, which names materials by their number in
+campus.json (docs/formats/campus.md, "Meshes").
 """
 
 from __future__ import annotations

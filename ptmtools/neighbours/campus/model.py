@@ -1,19 +1,5 @@
-"""What a campus folder holds: the records of campus.json, whose schema has their meaning and units.
-
-Plain values; nothing heavy is imported.
-
-Names of files: safe on any system, and unique without regard to case.
-
-Which shader a material has: it follows from the channels that exist (the paper's II.B).
-
-A combination of channels is a shader of its own: "diffuse + lightmap", "diffuse + lightmap +
-alpha". A material without textures is a colour.
-
-How far an object is from a viewpoint, approximately (the paper's III, figure 4).
-
-From the barycentre of the object a segment leads to the viewpoint; the distance is from where it
-leaves the object's bounding box to the viewpoint, and 0 for a viewpoint in the box. It is never
-less than the distance to the box itself, and never more than that to the barycentre.
+"""The records of campus.json, whose schema has their meaning and units; names of its files, safe on
+any system and unique without regard to case; and distances from viewpoints.
 """
 
 from __future__ import annotations
@@ -140,15 +126,10 @@ class TextureFile:
     source: tuple[int, int]
 
 
-@dataclass(frozen=True)
-class Preset:
-    """A quality and what it costs: `bytes` of all files that it needs, `download` what is left of
-    them to load."""
+@dataclass(frozen=True, kw_only=True)
+class Preset(Quality):
+    """A quality with its cost: `bytes` of all files that it needs, `download` the rest to load."""
 
-    name: str
-    diffuse: int
-    light: int
-    cached: bool
     bytes: int
     download: int
 
@@ -181,8 +162,8 @@ class Campus:
 
     @property
     def presets(self) -> tuple[Preset, ...]:
-        """What all of the campus takes in each quality, for who has come near every object: every
-        mesh, textures of the least size, of the preset's, and its lightmaps."""
+        """The cost of all of the campus in each quality: every mesh, textures of the least size and
+        of the preset's, and its lightmaps."""
         meshes = sum(mesh.bytes for each in self.objects for mesh in each.meshes)
         parts = []
         for quality in PRESETS:
@@ -204,7 +185,7 @@ class Campus:
         return result
 
     def to_document(self) -> dict[str, Any]:
-        """As campus.json has it."""
+        """The document of campus.json."""
         return {
             "format": FORMAT,
             "schema": SCHEMA,
@@ -217,14 +198,8 @@ class Campus:
             "presets": [vars(preset) for preset in self.presets],
             "objects": [
                 {
-                    "name": o.name,
-                    "label": o.label,
-                    "parts": o.parts,
-                    "box": o.box,
-                    "barycentre": o.barycentre,
+                    **vars(o),
                     "viewpoint": dict(zip(("position", "direction"), o.viewpoint, strict=True)),
-                    "materials": o.materials,
-                    "lightmap": o.lightmap,
                     "meshes": [vars(mesh) for mesh in o.meshes],
                 }
                 for o in self.objects
@@ -235,7 +210,7 @@ class Campus:
 
     @staticmethod
     def from_document(document: Mapping[str, Any]) -> Campus:
-        """Of a document that its schema allows."""
+        """The campus of a valid document."""
         return Campus(
             origin=tuple(document["origin"]),
             unit=document["unit"],
@@ -258,7 +233,7 @@ def _material_document(material: CampusMaterial) -> dict[str, Any]:
 
 
 def _fields(cls: Any, row: Mapping[str, Any]) -> dict[str, Any]:
-    """Of a record, those that we know: others may have been added."""
+    """The known members of a record: others may have been added."""
     return {name: row[name] for name in cls.__dataclass_fields__ if name in row}
 
 
@@ -281,9 +256,9 @@ def _object(row: Mapping[str, Any]) -> CampusObject:
 
 #: Names that Windows keeps for devices, with or without a suffix.
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)$", re.IGNORECASE)
-#: Longest name that is given out, in characters; a number may follow.
+#: Longest name, in characters; a number may follow.
 _LONGEST = 60
-#: What a folder of ours consists of, besides its index.
+#: Files of a campus folder besides its index.
 _OURS = re.compile(
     rf"({MESHES}/[A-Za-z0-9_-]+_\d+\.glb|"
     rf"{TEXTURES}/[A-Za-z0-9_-]+_\d+_[{DIFFUSE}{ALPHA}{MASK}{LIGHT}]\.jpg)"
@@ -294,15 +269,15 @@ FORM = FolderForm(
 
 
 class Names:
-    """Gives out names."""
+    """Unique names of files."""
 
     def __init__(self) -> None:
         self._taken: set[str] = set()
-        #: Of each name the number that was last added to it.
+        #: The last number that was added to each name.
         self._last: dict[str, int] = {}
 
     def take(self, text: str, otherwise: str) -> str:
-        """A name after ``text``, or ``otherwise`` if nothing of that can stand in one."""
+        """A name like ``text``, or like ``otherwise`` if no character of that is allowed."""
         plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
         stem = re.sub(r"[^A-Za-z0-9-]+", "_", plain).strip("_")[:_LONGEST].strip("_") or otherwise
         if _DEVICES.match(stem):
@@ -327,7 +302,10 @@ def texture_file(base: str, size: int, channel: str) -> str:
 
 
 def distances(eye: Floats, boxes: Floats, barycentres: Floats) -> Floats:
-    """(…, m) metres from each viewpoint to each object.
+    """(…, m) metres from each viewpoint to each object, approximately (the paper's III, figure 4).
+
+    The distance is that from the viewpoint to the point in which the segment from the barycentre
+    leaves the box; 0 in the box. It is between the distances to the box and to the barycentre.
 
     Parameters
     ----------

@@ -1,11 +1,8 @@
-"""What counts as an object: those that the model names, and small ones together.
+"""Division of a model into the objects of a campus: those that it names, and small ones joined.
 
-An object has meshes, a lightmap and a place in the client's order of its own, so thousands of
-lamps and chairs would each take three lightmaps and a request. Objects smaller than a few metres
-are therefore joined with the small ones of the same square of a grid on the ground. Larger ones
-stay as they are, however many faces they have: where one object is all of the model, a client can
-only load all of it at once, and that is said. (Not done: cutting it up. Where a building ends is
-known to who made the model.)
+Each object has meshes, a lightmap and a place in the client's order, so thousands of lamps and
+chairs would each take three lightmaps and a request. Objects smaller than a few metres are joined
+with the small ones of the same square of a grid on the ground; larger ones stay.
 """
 
 from __future__ import annotations

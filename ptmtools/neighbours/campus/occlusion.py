@@ -1,24 +1,20 @@
-"""How much light reaches a point: ambient occlusion by rays of Embree.
+"""The light at a point: ambient occlusion by rays of Embree, and points spread over surfaces.
 
 Rays go out into the hemisphere over a point, denser by the cosine of their angle to the normal, and
 the light is the share of them that escape. The directions are a Hammersley set, turned about the
-normal by an angle that every point has of its own, so that what 64 rays leave of error is a grain
-and not bands. An object occludes itself and all others; so does a level ground under the scene.
-Transparent materials do not occlude.
-
-A ray that hits something at distance d counts d / reach, and 1 beyond (ambient obscurance, Zhukov,
-Iones and Kronin 1998): with plain occlusion, ``reach`` inf, every room is black, and every wall is
-half as light as a floor however high it stands, since half of its rays end on the ground.
+normal by an angle of each point's own, so that the error of few rays is a grain and not bands. All
+opaque faces and a level ground under the scene occlude. A ray with a hit at distance d counts
+d / reach, and 1 beyond (ambient obscurance, Zhukov, Iones and Kronin 1998): with plain occlusion,
+``reach`` inf, rooms are black.
 
 Embree computes in float32. Its tree is built around the middle of the scene, and rays begin as far
 above a surface as the scene's tolerance for planes.
-
-Points spread over surfaces, the same every time.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -26,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools import arrays
 from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import DEPTH_SHARE
@@ -94,16 +91,9 @@ class Surroundings:
         hit = self.tree.run(start, along, dists=short.copy(), query="DISTANCE")
         return np.asarray(hit >= short)
 
-    def below(self, point: Floats, far: float) -> Floats:
-        """(n,) the heights of what lies first under (n, 3) points, at most so ``far``; where that
-        is nothing, of the ground."""
-        return self._upright(point, far, -1.0)
-
-    def above(self, point: Floats, far: float) -> Floats:
-        """The same of what lies first over points."""
-        return self._upright(point, far, 1.0)
-
-    def _upright(self, point: Floats, far: float, way: float) -> Floats:
+    def upright(self, point: Floats, far: float, way: float) -> Floats:
+        """(n,) the heights of the first surfaces above (``way`` 1) or below (-1) (n, 3) points, at
+        most ``far`` away; the ground's where there is none."""
         result = np.full(len(point), self.ground)
         if self.tree is None:
             return result
@@ -148,17 +138,24 @@ def light(
     turn: (n,) in [0, 1), by which share of a circle the directions are turned.
     samples, reach: as in `CampusOptions`.
     """
-    fan = hemisphere(samples)
     result = np.empty(len(point), np.float32)
-    step = max(1, RAYS // samples)
+    for part, origin, along in _fans(around, point, normal, turn, samples):
+        share = _escaping(around, origin.astype(np.float32), along, reach)
+        result[part] = share.reshape(-1, samples).mean(axis=1)
+    return result
+
+
+def _fans(
+    around: Surroundings, point: Floats, normal: Floats, turn: Floats, samples: int
+) -> Iterator[tuple[slice, Floats, Singles]]:
+    """Runs of points, with the (k, 3) origins of the rays from these, relative to the middle of the
+    scene, and their (k, 3) directions; see `light`."""
+    fan, step = hemisphere(samples), max(1, RAYS // samples)
     for at in range(0, len(point), step):
         part = slice(at, at + step)
         along = (fan @ _frames(normal[part], turn[part])).reshape(-1, 3)
-        lifted = point[part] + around.lift * normal[part]
-        origin = np.repeat((lifted - around.middle).astype(np.float32), samples, axis=0)
-        share = _escaping(around, origin, along, reach)
-        result[part] = share.reshape(-1, samples).mean(axis=1)
-    return result
+        lifted = point[part] + around.lift * normal[part] - around.middle
+        yield part, np.repeat(lifted, samples, axis=0), along
 
 
 def escaping(
@@ -174,17 +171,12 @@ def escaping(
     ``bounces`` times. ``turn`` as of `light`."""
     fan = hemisphere(samples)
     count = np.zeros(len(point), np.int64)
-    step = max(1, RAYS // samples)
-    for at in range(0, len(point), step):
-        part = slice(at, at + step)
-        along = (fan @ _frames(normal[part], turn[part])).reshape(-1, 3)
-        lifted = point[part] + around.lift * normal[part] - around.middle
-        origin = np.repeat(lifted, samples, axis=0)
+    for part, origin, along in _fans(around, point, normal, turn, samples):
         walk = np.arange(len(origin))
         for bounce in range(bounces + 1):
             far, against = _met(around, origin, along)
             out = np.isinf(far)
-            count[part] += np.bincount(walk[out] // samples, minlength=len(lifted))
+            count[part] += np.bincount(walk[out] // samples, minlength=len(count[part]))
             if bounce == bounces or out.all():
                 break
             kept = ~out
@@ -231,7 +223,7 @@ def hemisphere(samples: int) -> Singles:
 
 def normals(corner: Floats) -> Floats:
     """(T, 3) unit normals of (T, 3, 3) triangles; of those without area, up."""
-    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    across = arrays.normals(corner)
     length = np.linalg.norm(across, axis=1, keepdims=True)
     return np.where(length > 0, across / np.where(length > 0, length, 1.0), [0.0, 1.0, 0.0])
 
@@ -273,12 +265,6 @@ def _escaping(around: Surroundings, origin: Singles, along: Singles, reach: floa
 
 #: Multiples of these modulo 1 are far apart in both directions (Roberts' R2 sequence).
 SPREAD = 0.7548776662466927, 0.5698402909980532
-
-
-def areas(corner: Floats) -> Floats:
-    """(T,) of (T, 3, 3) triangles."""
-    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    return np.asarray(np.linalg.norm(across, axis=1) / 2)
 
 
 def points_on(corner: Floats, number: Ints) -> Floats:

@@ -1,9 +1,4 @@
-"""The index of a campus, read back.
-
-What a campus weighs: by level of detail, by size and channel of textures, beside the paper's.
-
-What `ptm info` says of a campus.
-"""
+"""Reads the index of a campus, and summarises it beside the sizes of the paper."""
 
 from __future__ import annotations
 
@@ -27,52 +22,43 @@ from ptmtools.neighbours.campus.model import (
 )
 from ptmtools.quantities import count, size
 
-#: An index longer than this is none, bytes.
+#: Longest index, bytes.
 LONGEST = 1 << 28
 
 
 def read_campus(folder: str | os.PathLike[str]) -> Campus:
-    """The index of a campus folder. What else a campus must be is for `check_campus`.
+    """The index of a campus folder; `check_campus` checks the rest.
 
     Raises
     ------
-    InputError: PTM-I122 it cannot be read, PTM-I821 it is not as its schema says, or an object has
-        fewer or more meshes than the campus has levels.
+    InputError: PTM-I122 it cannot be read, PTM-I821 it violates its schema, or an object has fewer
+        or more meshes than the campus has levels.
     LimitError: PTM-L204 it is too long.
     """
     file = Path(folder) / INDEX
+
+    def wrong(place: str | None, message: str) -> InputError:
+        remedy = "write it again with `ptm campus`"
+        return InputError("PTM-I821", message, file=file, place=place, remedy=remedy)
+
     try:
         with open_below(folder, INDEX) as stream:
             data = stream.read(LONGEST + 1)
     except (OSError, ValueError) as fault:
         why = getattr(fault, "strerror", None) or str(fault)
-        raise InputError(
-            "PTM-I122",
-            f"cannot be read ({why})",
-            file=file,
-            remedy="name a folder that `ptm campus` wrote",
-        ) from None
-    return parse_campus(data, file)
-
-
-def parse_campus(data: bytes, file: Path) -> Campus:
-    """The campus that the bytes of an index describe; raises as `read_campus`."""
+        remedy = "name a folder that `ptm campus` wrote"
+        raise InputError("PTM-I122", f"cannot be read ({why})", file=file, remedy=remedy) from None
     if len(data) > LONGEST:
         raise LimitError("PTM-L204", "is too long for the index of a campus", file=file)
     try:
         campus = Campus.from_document(schemas.read(data, schemas.CAMPUS))
     except schemas.ShapeError as fault:
-        raise _wrong(file, fault.place or None, fault.message) from None
+        raise wrong(fault.place or None, fault.message) from None
     for place, each in enumerate(campus.objects):
         if len(each.meshes) != campus.lods:
-            what = f"has {len(each.meshes)} items, not {campus.lods}"
-            raise _wrong(file, f"objects[{place}].meshes", what)
+            message = f"has {len(each.meshes)} items, not {campus.lods}"
+            raise wrong(f"objects[{place}].meshes", message)
     return campus
-
-
-def _wrong(file: Path, place: str | None, what: str) -> InputError:
-    remedy = "write it again with `ptm campus`"
-    return InputError("PTM-I821", what, file=file, place=place, remedy=remedy)
 
 
 #: Average sizes of the paper's table 1, KB (of 1024 bytes), by side.
@@ -116,7 +102,7 @@ def kinds(campus: Campus) -> list[Kind]:
 
 
 def summary(campus: Campus) -> Iterator[str]:
-    """Lines for people."""
+    """The lines that `ptm campus` prints."""
     parts = sum(len(o.parts) for o in campus.objects)
     joined = f" of the model's {parts:,}" if parts != len(campus.objects) else ""
     shared = sum(len(o.materials) for o in campus.objects)
@@ -154,13 +140,13 @@ def summary(campus: Campus) -> Iterator[str]:
 
 
 def describe_campus(folder: Path) -> tuple[tuple[str, ...], Mapping[str, Any]]:
-    """Lines for people, and the same as JSON. Raises what `read_campus` raises."""
+    """The lines of `ptm info`, and its record as JSON; raises as `read_campus`."""
     campus = read_campus(folder)
     return tuple(summary(campus)), record(campus)
 
 
-def record(campus: Any) -> dict[str, Any]:
-    """Of a `Campus`, what `ptm campus --json` and `ptm info --json` print."""
+def record(campus: Campus) -> dict[str, Any]:
+    """The record of a `Campus` in `ptm campus --json` and `ptm info --json`."""
     document = campus.to_document()
     return {
         "objects": len(campus.objects),

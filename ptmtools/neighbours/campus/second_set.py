@@ -1,17 +1,9 @@
-"""What a model has beside what a scene knows: lightmaps, and reflection masks.
+"""Lightmaps and reflection masks of a model, which a scene does not have (docs/formats/campus.md,
+"Sources by format").
 
-===========  ===============================================  =====================================
-format       lightmap                                         mask
-===========  ===============================================  =====================================
-glTF         red of occlusionTexture, whichever set of        1 − roughness: green of
-             coordinates it has                               metallicRoughnessTexture, inverted
-OBJ          none                                             map_Ks, its luminance
-others       none                                             none
-===========  ===============================================  =====================================
-
-A mask has the texture coordinates of the colours, or is left out. Of OBJ the scene's own reader
-tells where the masks are. A glTF is read a second time, with the other texture in place of the
-colours': its faces are then cleaned as they were before, and are the scene's, one by one.
+A mask has the texture coordinates of the colours, or is left out. For OBJ, the scene's own reader
+names the masks. A glTF is read a second time with the other texture in place of the colours'; its
+faces are cleaned as before, and are the scene's, one by one.
 """
 
 from __future__ import annotations
@@ -134,10 +126,8 @@ def model_masks(
 ) -> tuple[dict[int, Mask], tuple[str, ...]]:
     """The masks of a model that was read as ``scene``, by the number of its material, and notes on
     those that cannot be had."""
-    suffix = model.suffix.lower()
-    if suffix in _GLTF:
-        return _gltf_masks(model, scene, options)
-    return _shines(model, scene, options)
+    masks_of = _gltf_masks if model.suffix.lower() in _GLTF else _shines
+    return masks_of(model, scene, options)
 
 
 @dataclass(frozen=True)

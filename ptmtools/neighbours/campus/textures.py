@@ -1,12 +1,9 @@
-"""The textures of a campus: each distinct image in three sizes, with a file for each channel.
+"""The textures of a campus: each distinct image as squares of three sizes, a file for each channel.
 
-They are squares, as the paper has them: the aspect is in the texture coordinates, which are shares
-of the image. The set is complete: an image of 200 texels has a file of 512, too, which says no more
-than that of 256, and the index records what it was made of, so that a client may leave it out.
-Made smaller, a texel is the mean of what it covers, in the encoded values, as the levels of a
-`.ptm` are; made larger, it is interpolated. Alpha is a file of its own, and colours are not
-multiplied by it; but where an image has alpha that counts, a colour has the weight of its alpha, so
-that what is not seen does not fringe what is.
+The set is complete: an image of 200 texels has a file of 512, too, and the index records its size,
+so that a client may leave the file out. A smaller texel is the mean of the encoded values that it
+covers, a larger one is interpolated. Colours are not multiplied by alpha; but where alpha counts,
+each has the weight of its alpha, so that transparent texels do not fringe opaque ones.
 """
 
 from __future__ import annotations

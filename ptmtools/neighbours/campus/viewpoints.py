@@ -1,11 +1,10 @@
-"""Where a visitor is put who wants to see an object: on the ground, at the height of eyes.
+"""The viewpoint of an object: on the ground, at the height of eyes.
 
-Candidates stand all around its box, as far away as lets the whole box into the view, nearer and
-farther. Those count that stand on the ground under the open sky: what lies highest there is what
-lies lowest, within a step. So none is within a solid, on a roof, in a tree or under a bridge. Of
-them that one is taken from which most of the object is seen, past all others; where several are
-alike the first, before the widest side. An object of which nothing is seen from any such place,
-because it stands in a building, is looked at from beside it, on whatever floor there is.
+Candidates stand around its box, as far away as lets the whole box into the view, nearer and
+farther. Those count that stand under the open sky: the highest surface there is the lowest one,
+within a step. The one that sees most of the object is taken, or the first of several alike, before
+the widest side. An object that is visible from none of them, because it stands in a building, is
+seen from beside it, on whatever floor there is.
 """
 
 from __future__ import annotations
@@ -14,9 +13,9 @@ import math
 
 import numpy as np
 
-from ptmtools.arrays import Floats
+from ptmtools.arrays import Floats, areas
 from ptmtools.neighbours.campus.model import Vector
-from ptmtools.neighbours.campus.occlusion import Surroundings, areas, points_on, spread_over
+from ptmtools.neighbours.campus.occlusion import Surroundings, points_on, spread_over
 
 #: Height of eyes, and how near and how far from a box one stands, metres.
 EYE, NEAREST, FARTHEST = 1.6, 3.0, 150.0
@@ -50,7 +49,7 @@ def viewpoint(around: Surroundings, corner: Floats, box: Floats) -> tuple[Vector
     if not seen.max() > _ALIKE:
         # From the height of eyes down to a floor; first those beside the foot of the object.
         head = np.column_stack([place[:, 0], np.full(len(place), low[1] + EYE), place[:, 1]])
-        floor = around.below(head, EYE + STEP)
+        floor = around.upright(head, EYE + STEP, -1.0)
         floor = np.where(floor > head[:, 1] - EYE - STEP, floor, low[1])
         within = np.column_stack([place[:, 0], floor + EYE, place[:, 1]])
         eyes = np.concatenate([outside, within])
@@ -90,10 +89,10 @@ def _heights(around: Surroundings, place: Floats) -> tuple[Floats, Floats]:
     least, most = around.points[:, 1].min(), around.points[:, 1].max()
     height = most - least + EYE
     at = np.column_stack([place[:, 0], np.full(len(place), most + EYE), place[:, 1]])
-    top = around.below(at, 2 * height)
+    top = around.upright(at, 2 * height, -1.0)
     under = at.copy()
     under[:, 1] = least - EYE
-    return top, around.above(under, 2 * height)
+    return top, around.upright(under, 2 * height, 1.0)
 
 
 def _points_of(corner: Floats) -> Floats:

@@ -8,7 +8,7 @@ smaller than twice the minimum is one.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -93,61 +93,28 @@ class Interlaced:
 
     def document(self) -> dict[str, Any]:
         """The manifest as JSON; `ptmtools/schemas/interlace.schema.json` describes it."""
-        return {
-            "format": FORMAT,
-            "schema": SCHEMA,
-            "width": self.width,
-            "height": self.height,
-            "original": _sides(self.original),
-            "container": self.container,
-            "lossless": self.lossless,
-            "components": self.components,
-            "kind": self.kind,
-            "min": self.min,
-            "files": [
-                {
-                    "name": part.name,
-                    "width": part.width,
-                    "height": part.height,
-                    "bytes": part.bytes,
-                    "crc32": part.crc32,
-                    "axis": part.axis,
-                    "joined": _sides(part.joined),
-                }
-                for part in self.parts
-            ],
-        }
+        document: dict[str, Any] = {"format": FORMAT, "schema": SCHEMA, **vars(self)}
+        document["original"] = _sides(self.original)
+        document["files"] = [{**vars(p), "joined": _sides(p.joined)} for p in document.pop("parts")]
+        return document
 
     @staticmethod
-    def of(document: dict[str, Any]) -> Interlaced:
-        """The manifest in a document that is as the schema says."""
-        parts = tuple(
-            Part(
-                file["name"],
-                file["width"],
-                file["height"],
-                file["bytes"],
-                file["crc32"],
-                file["axis"],
-                (file["joined"]["width"], file["joined"]["height"]),
-            )
-            for file in document["files"]
-        )
-        return Interlaced(
-            document["width"],
-            document["height"],
-            (document["original"]["width"], document["original"]["height"]),
-            document["container"],
-            document["lossless"],
-            document["components"],
-            document["kind"],
-            document["min"],
-            parts,
-        )
+    def of(document: Mapping[str, Any]) -> Interlaced:
+        """The manifest in a valid document."""
+        parts = tuple(_known(Part, file) for file in document["files"])
+        manifest: Interlaced = _known(Interlaced, {**document, "parts": parts})
+        return manifest
 
 
 def _sides(size: Size) -> dict[str, int]:
     return {"width": size[0], "height": size[1]}
+
+
+def _known(cls: Any, row: Mapping[str, Any]) -> Any:
+    """The record of a class: members that are unknown are ignored, sizes become pairs."""
+    values = {name: row[name] for name in cls.__dataclass_fields__}
+    sizes = {n: (v["width"], v["height"]) for n, v in values.items() if isinstance(v, dict)}
+    return cls(**values | sizes)
 
 
 def axes_of(width: int, height: int, smallest: int) -> tuple[Axis, ...]:

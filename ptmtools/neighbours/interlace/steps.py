@@ -1,23 +1,13 @@
-"""An image as interlaced files and back, in numpy: the reference of what a client does on its GPU.
+"""Interlacing and scaling of an image in numpy (Englert et al., §3.1 and §3.2).
 
-Splitting takes every second line away as a file, odd rows first, then odd columns of what is left,
-and so on; what is left in the end is the first file (paper §3.1, oriented on Adam7). Joining puts
-the lines of the next file between those that are there (§3.2). Every texel is in one file. So the
-image after a step is the whole one with every 2^i-th column and 2^j-th row, unfiltered: a fine
-pattern becomes a coarse one (aliasing), which means of blocks, such as levels of a `.ptm`, do not
-show.
+Splitting takes every second line away as a file, odd rows and odd columns in turn; the rest is the
+first file. Joining puts the lines of the next file between those of the image before. Every texel
+is in one file, so the image after a step is the whole one with every 2^i-th column and 2^j-th row.
 
-Scaling to powers of two, which textures of WebGL 1 need for mip levels (paper §3.1: "the best
-matching power-of-two representation").
-
-Each side goes to the nearest power of two by ratio, so that it changes by a factor of √2 at most;
-an image that has such sides is not touched. The filter is the cubic of Catmull and Rom (Keys 1981,
-a = -1/2), stretched by the factor where a side shrinks, so that nothing aliases. It is sharper than
-a bilinear one, rings less than Lanczos, and needs only the four operations, which IEEE 754 rounds
-alike everywhere: the same bytes on every machine.
-
-Colours are weighted by alpha, so that what a transparent texel holds does not bleed out of it.
-Samples count as they are stored: gamma is not undone, as GPUs do not either.
+Scaling brings each side to the nearest power of two by ratio. The filter is the cubic of Catmull
+and Rom (Keys 1981, a = -1/2), stretched by the factor where a side shrinks. It needs only the four
+operations, which IEEE 754 rounds alike everywhere: the same bytes on every machine. Colours are
+weighted by alpha; samples count as they are stored, without undoing gamma, as GPUs do.
 """
 
 from __future__ import annotations

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ptmtools.arrays import areas
 from ptmtools.errors import InputError, LimitError
 from ptmtools.executor import Executor
 from ptmtools.neighbours.apo import blocks
@@ -16,7 +17,7 @@ from ptmtools.neighbours.apo.making import ApoTexture, make_apo, welded
 from ptmtools.neighbours.apo.model import ApoOptions
 from ptmtools.neighbours.apo.normals import corner_normals
 from ptmtools.neighbours.apo.octree import fault_of
-from ptmtools.neighbours.apo.sampling import REACH, Source, areas, nearest
+from ptmtools.neighbours.apo.sampling import REACH, Source, nearest
 from ptmtools.neighbours.apo.traversal import look_up
 from ptmtools.parallel import open_executor
 from tests.neighbours.apo.meshes import scene_of, sphere, square

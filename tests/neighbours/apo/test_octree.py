@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from hypothesis.extra import numpy as arrays
 
-from ptmtools.arrays import Floats
+from ptmtools.arrays import Floats, areas
 from ptmtools.neighbours.apo.octree import (
     ENOUGH,
     MARGIN,
@@ -23,7 +23,7 @@ from ptmtools.neighbours.apo.octree import (
     joined,
     pruned,
 )
-from ptmtools.neighbours.apo.sampling import areas, at, spacing_for, spread
+from ptmtools.neighbours.apo.sampling import at, spacing_for, spread
 
 shares = st.floats(0, 1, exclude_max=True, width=32)
 
@@ -194,9 +194,9 @@ def test_parts_make_the_whole() -> None:
         divide(Samples(*(field[rows] for field in vars(samples).values())), 1, 4, bounds)
         for rows in (slice(0, cut), slice(cut, None))
     ]
-    below = joined([pruned(part, whole[1].code, 0) for part in parts], 3)
+    below = joined([pruned(part, whole[1].code) for part in parts], 3)
     for found, expected in zip(below, whole[1:], strict=True):
         assert np.array_equal(found.code, expected.code)
         assert np.array_equal(found.children, expected.children)
-    none = pruned(parts[0], np.zeros(0, np.uint64), 0)
+    none = pruned(parts[0], np.zeros(0, np.uint64))
     assert not any(len(level.code) for level in none)
