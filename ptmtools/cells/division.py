@@ -70,7 +70,7 @@ class Building:
     def of(scene: Scene, options: SubdivideOptions) -> Building:
         tolerance = scene.tolerance.for_walls(options.wall_thickness)
         opaque = Opaque.of(scene, options)
-        structure = Structure.of_opaque(opaque, tolerance)
+        structure = Structure.of(opaque, tolerance)
         doors, structure = Doors.recognise(scene, opaque, structure, options)
         walls = find_walls(structure, options.wall_area)
         reveals = Reveals(structure, options.wall_thickness)
@@ -162,7 +162,7 @@ def _complete(building: Building, space: Space, outer: Bools) -> Space:
             return replace(space, closed=False)
         opened = open_doors(building.doors, structure, tree, portals, within, outer)
         if opened:
-            doors, tree, portals = opened.doors, opened.tree, opened.portals
+            doors, tree, portals = opened
             seeds = tuple(np.flatnonzero(reached).tolist())
             reached = flood(len(tree.leaves), portals, seeds)
             beyond = beyond.without(reached, portals)

@@ -57,7 +57,7 @@ class Doors:
             leaf[door.triangles] = i
         glass, roofed = scene.corners[~scene.opaque], True
         if leaves:
-            structure = Structure.of_opaque(opaque, structure.tolerance, leaf >= 0)
+            structure = Structure.of(opaque, structure.tolerance, leaf >= 0)
             roofed = roofed_share(structure.corners, options.wall_area) >= ROOFED
         of = leaf[structure.source]
         across = np.array([door.axes[0] for door in leaves]).reshape(-1, 3)
@@ -70,13 +70,12 @@ class Doors:
 
     def sides(self, tree: Tree, within: Bools) -> Bools:
         """(d, 2) which sides of door leaves are in the (L,) tree leaves ``within``."""
-        result = np.zeros((len(self.leaves), 2), dtype=bool)
-        for i, door in enumerate(self.leaves):
-            at = np.array(
-                [descend(tree.planes, tree.children, side) for side in door.grid(_BEYOND)]
-            )
-            result[i] = within[-2 - at].mean(axis=1) > _MOST
-        return result
+        shares = [
+            within[-2 - descend(tree.planes, tree.children, side)].mean()
+            for door in self.leaves
+            for side in door.grid(_BEYOND)
+        ]
+        return np.array(shares).reshape(-1, 2) > _MOST
 
     def lead_to_open_rooms(
         self, structure: Structure, tree: Tree, inside: Bools, outside: Bools
@@ -89,12 +88,9 @@ class Doors:
     def sheltered(self, structure: Structure) -> Bools:
         """(d,) which leaves have walls around and a roof above the ways on both sides."""
         around = Surroundings(np.concatenate([structure.corners, self.glass]), structure.tolerance)
-        result = np.zeros(len(self.leaves), dtype=bool)
-        for i, door in enumerate(self.leaves):
-            result[i] = all(
-                around.inside(points, self.roofed).all() for points in _ways(door, around)
-            )
-        return result
+        ways = (_ways(door, around) for door in self.leaves)
+        each = [all(around.inside(points, self.roofed).all() for points in way) for way in ways]
+        return np.array(each, dtype=bool)
 
     def lead_out(self, portals: list[Portal], outside: Bools) -> Bools:
         """(d,) which leaves have portals around them that lead ``outside``, (L,): some frames leave
@@ -122,15 +118,6 @@ def _ways(door: DoorLeaf, around: Surroundings) -> Iterator[Floats]:
         yield start + np.array(far)[:, None] * to
 
 
-@dataclass(frozen=True)
-class Opened:
-    """A tree and its portals with open doors."""
-
-    doors: Bools  # (d,) which leaves do not block
-    tree: Tree
-    portals: list[Portal]
-
-
 def open_doors(
     doors: Doors,
     structure: Structure,
@@ -138,9 +125,9 @@ def open_doors(
     portals: list[Portal],
     within: Bools,
     outer: Bools,
-) -> Opened | None:
-    """The tree and its portals with all doors open that lead from inside to inside; None if none
-    does.
+) -> tuple[Bools, Tree, list[Portal]] | None:
+    """The (d,) doors that lead from inside to inside, and the tree and its portals with these open;
+    None if none does.
 
     ``within``: (L,) leaves that are inside. ``outer``: (L,) those at the box around a closed model,
     which the flood must not reach.
@@ -151,17 +138,17 @@ def open_doors(
     rooms = tuple(np.flatnonzero(within).tolist())
     outside = flood(len(tree.leaves), portals, tuple(np.flatnonzero(outer).tolist()))
     while which.any():
-        opened = _opened(doors, which, structure, tree, portals)
-        if not (flood(len(tree.leaves), opened.portals, rooms) & outer).any():
-            return opened
-        out = doors.lead_out(opened.portals, outside) & which
+        opened, passages = _opened(doors, which, structure, tree, portals)
+        if not (flood(len(tree.leaves), passages, rooms) & outer).any():
+            return which, opened, passages
+        out = doors.lead_out(passages, outside) & which
         which = which & ~out & out.any()
     return None
 
 
 def _opened(
     doors: Doors, which: Bools, structure: Structure, tree: Tree, portals: list[Portal]
-) -> Opened:
+) -> tuple[Tree, list[Portal]]:
     """The tree and its portals with the doors ``which``, (d,), open."""
     free = np.append(which, False)[doors.of]
     near = structure.tolerance.plane
@@ -178,7 +165,7 @@ def _opened(
     stale = set(fresh)
     remaining = [portal for portal in portals if portal.node not in stale]
     remaining += find_portals(tree, structure.tolerance, fresh)
-    return Opened(which, tree, sorted(remaining, key=lambda portal: portal.node))
+    return tree, sorted(remaining, key=lambda portal: portal.node)
 
 
 #: Points from which sight lines are cast, how high over a floor, metres, and lines from each.
@@ -214,9 +201,7 @@ def enclosure(scene: Scene, options: SubdivideOptions | None = None) -> Enclosur
     options = options or SubdivideOptions()
     tolerance = scene.tolerance.for_walls(options.wall_thickness)
     opaque = Opaque.of(scene, options)
-    doors, structure = Doors.recognise(
-        scene, opaque, Structure.of_opaque(opaque, tolerance), options
-    )
+    doors, structure = Doors.recognise(scene, opaque, Structure.of(opaque, tolerance), options)
     corners, names = structure.corners, tuple(leaf.name for leaf in doors.leaves)
     if not len(corners):
         return Enclosure(names, 0.0, 0, 0.0)

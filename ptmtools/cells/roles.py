@@ -18,7 +18,7 @@ from fnmatch import fnmatchcase
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, summed
+from ptmtools.arrays import Bools, Ints, summed
 from ptmtools.cells.facets import Facets, Welded
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.search import connected
@@ -111,45 +111,21 @@ LARGEST_FLAT_SHARE = 0.25
 FLAT = 2 / 3
 
 
-@dataclass(frozen=True)
-class Groups:
-    """The shapes of g groups of triangles."""
-
-    size: Ints  # (g,) triangles
-    box: Floats  # (g, 3) sides of their bounding boxes, ascending, metres
-    area: Floats  # (g,) m²
-    flat: Floats  # (g,) m² in flat regions that could split or block
-    flattest: Floats  # (g,) m² of the largest flat region
-
-    @staticmethod
-    def of(group: Ints, facets: Facets, wall_area: float) -> Groups:
-        """``group``: (n,) the group of each triangle, from 0."""
-        count = int(group.max(initial=-1)) + 1
-        order = np.argsort(group, kind="stable")
-        size = np.bincount(group, minlength=count)
-        corners = facets.mesh.corners[order]
-        begin = np.cumsum(size) - size
-        low = np.minimum.reduceat(corners.min(axis=1), begin)
-        high = np.maximum.reduceat(corners.max(axis=1), begin)
-        large = np.where(facets.whole, facets.area, 0.0)[facets.region]
-        area = facets.areas
-        flat = np.where(large >= FLAT_SHARE * wall_area, area, 0.0)
-        return Groups(
-            size,
-            np.sort(high - low, axis=1),
-            summed(group, area, count),
-            summed(group, flat, count),
-            np.maximum.reduceat(large[order], begin),
-        )
-
-    def detail(self, wall_area: float) -> Bools:
-        """(g,) which groups are detail."""
-        dense = self.size >= DENSE
-        small = (self.box[:, 2] <= LARGEST) & (self.box[:, 0] >= COMPACT * self.box[:, 2])
-        curved = self.flat <= FLAT * self.area
-        curved &= self.flattest <= LARGEST_FLAT_SHARE * wall_area
-        result: Bools = dense & small & curved
-        return result
+def _detail_groups(group: Ints, facets: Facets, wall_area: float) -> Bools:
+    """(g,) which groups of triangles are detail; ``group``: (n,) that of each, from 0."""
+    size = np.bincount(group)
+    order, begin = np.argsort(group, kind="stable"), np.cumsum(size) - size
+    corners = facets.mesh.corners[order]
+    low = np.minimum.reduceat(corners.min(axis=1), begin)
+    high = np.maximum.reduceat(corners.max(axis=1), begin)
+    shortest, _, longest = np.sort(high - low, axis=1).T
+    # The area of the flat region of each triangle: what could split or block.
+    region = np.where(facets.whole, facets.area, 0.0)[facets.region]
+    flat = np.where(region >= FLAT_SHARE * wall_area, facets.areas, 0.0)
+    curved = summed(group, flat, len(size)) <= FLAT * summed(group, facets.areas, len(size))
+    curved &= np.maximum.reduceat(region[order], begin) <= LARGEST_FLAT_SHARE * wall_area
+    small = (longest <= LARGEST) & (shortest >= COMPACT * longest)
+    return np.asarray((size >= DENSE) & small & curved)
 
 
 def detail_by_shape(facets: Facets, object_of: NDArray[np.integer], wall_area: float) -> Bools:
@@ -158,7 +134,7 @@ def detail_by_shape(facets: Facets, object_of: NDArray[np.integer], wall_area: f
         return np.zeros(0, dtype=bool)
     result = np.zeros(len(object_of), dtype=bool)
     for group in (connected_pieces(facets.mesh), np.unique(object_of, return_inverse=True)[1]):
-        result |= Groups.of(group, facets, wall_area).detail(wall_area)[group]
+        result |= _detail_groups(group, facets, wall_area)[group]
     return result
 
 

@@ -87,14 +87,9 @@ class Structure:
     door: Bools  # (T,) whether it belongs to a door leaf, which is no wall but may block
 
     @staticmethod
-    def of(scene: Scene, options: SubdivideOptions, tolerance: Tolerance) -> Structure:
-        """The structural triangles of a scene, without repetitions and in the order of the file,
-        flat regions of many in as few as their outlines need (`facets`)."""
-        return Structure.of_opaque(Opaque.of(scene, options), tolerance)
-
-    @staticmethod
-    def of_opaque(opaque: Opaque, tolerance: Tolerance, doors: Bools | None = None) -> Structure:
-        """The structure of the opaque triangles; ``doors``: (T,) whether one of the scene's
+    def of(opaque: Opaque, tolerance: Tolerance, doors: Bools | None = None) -> Structure:
+        """The structure of the opaque triangles, in the order of the file, flat regions of many in
+        as few as their outlines need (`facets`); ``doors``: (T,) whether one of the scene's
         triangles belongs to a door leaf."""
         facets, source, detail, forced, file = opaque
         mesh = facets.mesh

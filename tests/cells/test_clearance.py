@@ -11,7 +11,7 @@ from ptmtools.arrays import Floats
 from ptmtools.cells import SubdivideOptions, places as clearance
 from ptmtools.cells.options import Walker
 from ptmtools.cells.places import Floors, detail_of, eye_region, find_places
-from ptmtools.cells.structure import Structure
+from ptmtools.cells.structure import Opaque, Structure
 from ptmtools.tolerance import Tolerance
 from tests.cells.conftest import box
 from tests.conftest import scene_of, subdivided
@@ -46,7 +46,7 @@ def areas_of(faces: Floats, walker: Walker = WALKER, times: int = 1) -> tuple[fl
     """m² in plan where one can stand, and where eyes can be, each floor by itself."""
     scene = subdivided(scene_of(faces.tolist()), times)
     options = SubdivideOptions(detail_by_shape=False)
-    structure = Structure.of(scene, options, scene.tolerance)
+    structure = Structure.of(Opaque.of(scene, options), scene.tolerance)
     floors = Floors.of(scene, detail_of(scene, structure, options), backs=True)
     places = find_places(floors, structure, walker, EVERYWHERE)
     eyes = eye_region(places, walker, structure.tolerance)

@@ -10,7 +10,7 @@ import pytest
 from ptmtools.arrays import areas
 from ptmtools.cells import SubdivideOptions, structural_triangles, subdivide
 from ptmtools.cells.places import Floors, detail_of
-from ptmtools.cells.structure import Structure
+from ptmtools.cells.structure import Opaque, Structure
 from ptmtools.scene.model import Material, Scene
 from tests.conftest import scene_of, subdivided
 
@@ -105,6 +105,6 @@ def test_nobody_stands_on_a_ball_of_glass(room_faces) -> None:
     scene = replace(scene, materials=(*scene.materials, glass), triangle_material=of)
     for by_shape in (True, False):
         options = SubdivideOptions(detail_by_shape=by_shape)
-        structure = Structure.of(scene, options, scene.tolerance)
+        structure = Structure.of(Opaque.of(scene, options), scene.tolerance)
         floors = Floors.of(scene, detail_of(scene, structure, options))
         assert (len(floors.corners) > 4) != by_shape  # floor and ceiling have four

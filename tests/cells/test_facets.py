@@ -12,7 +12,7 @@ from ptmtools.arrays import areas
 from ptmtools.cells import SubdivideOptions, subdivide
 from ptmtools.cells.facets import Facets, Welded
 from ptmtools.cells.planar import counting
-from ptmtools.cells.structure import Structure, find_walls
+from ptmtools.cells.structure import Opaque, Structure, find_walls
 from ptmtools.scene import ingest
 from ptmtools.tolerance import Tolerance
 from tests.conftest import scene_of, subdivided
@@ -109,7 +109,7 @@ def test_a_compressed_model_whose_outlines_cross_has_its_walls(shared: Path) -> 
     """At 14 bits, corners of furniture come to lie beyond the edges beside them."""
     scene = ingest(shared / "scenes/apartment_gallery/gallery.glb")
     with counting() as undecided:
-        structure = Structure.of(scene, SubdivideOptions(), scene.tolerance)
+        structure = Structure.of(Opaque.of(scene, SubdivideOptions()), scene.tolerance)
     assert undecided["triangles"] > 0
     opaque = scene.corners[scene.opaque]
     assert areas(structure.corners).sum() == pytest.approx(areas(opaque).sum(), rel=0.05)
@@ -169,6 +169,6 @@ def test_a_flat_wall_is_found_among_a_scan_without_trying_every_triangle(
     monkeypatch.setattr(
         Structure, "lie_in", lambda *arguments: tried.append(1) or lie_in(*arguments)
     )
-    walls = find_walls(Structure.of(scene, SubdivideOptions(), scene.tolerance), 2.0)
+    walls = find_walls(Structure.of(Opaque.of(scene, SubdivideOptions()), scene.tolerance), 2.0)
     assert len(tried) < len(scene.triangles) / 2
     assert any(abs(w.frame.plane[3] + 0.02) < 1e-4 and w.blocking.area > 10 for w in walls)

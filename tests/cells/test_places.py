@@ -13,7 +13,7 @@ from ptmtools.arrays import areas
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
 from ptmtools.cells.options import Walker
 from ptmtools.cells.places import Floors, detail_of, find_places
-from ptmtools.cells.structure import Structure
+from ptmtools.cells.structure import Opaque, Structure
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
 from ptmtools.scene.model import Scene
@@ -25,7 +25,7 @@ SLACK = 0.02  # m², for circles that are polygons
 
 
 def place_area(scene: Scene, options: SubdivideOptions = SubdivideOptions()) -> float:  # noqa: B008
-    structure = Structure.of(scene, options, scene.tolerance)
+    structure = Structure.of(Opaque.of(scene, options), scene.tolerance)
     floors = Floors.of(scene, detail_of(scene, structure, options))
     places = find_places(floors, structure, Walker(*options.walker), EVERYWHERE)
     return float(areas(places.triangles(scene.tolerance)).sum())
@@ -73,7 +73,7 @@ def test_a_ramp_under_a_sloping_ceiling_has_its_head_room_along_the_slope() -> N
         ceiling = floor_of(0, 8, -2, 2, above, 4)
         options = SubdivideOptions()
         scene = scene_of([ramp, ceiling])
-        structure = Structure.of(scene, options, scene.tolerance)
+        structure = Structure.of(Opaque.of(scene, options), scene.tolerance)
         floors = Floors.of(scene, detail_of(scene, structure, options))
         found = find_places(floors, structure, WALKER, EVERYWHERE).triangles(scene.tolerance)
         below = found[:, :, 1].mean(axis=1) < found[:, :, 0].mean(axis=1) / 2 + above / 2

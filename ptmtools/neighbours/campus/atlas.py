@@ -22,27 +22,26 @@ from ptmtools.jit import kernel
 from ptmtools.lazy import component
 from ptmtools.neighbours.campus.model import LIGHT_SIZES
 
-#: Half the size of what is unwrapped, in the unit of its own. (With 64 xatlas takes faces of some
+#: Half the size of an unwrapped mesh, in a unit of its own. (With 64 xatlas takes faces of some
 #: centimetres in a kilometre for empty.)
 _LARGE = 1024.0
-#: How often xatlas is asked, and the share of the square that the first packing aims at.
+#: Most packings, and the share of the square that the first one aims at.
 _TRIES, _FIRST = 8, 0.6
-#: An atlas with fewer texels to the metre than this share of those aimed at is mostly edges.
+#: An atlas with less than this share of the intended density is mostly edges,
 _WORTH = 0.4
-#: But where a chart is as long as this share of the side, as a street's is, its length decides.
+#: unless a chart, such as a street, is as long as this share of the side.
 _LONG = 0.7
 
 
 @dataclass(frozen=True)
 class Atlas:
-    """Where each face lies.
+    """The places of faces.
 
     Attributes
     ----------
     uv: (T, 3, 2) in [0, 1] per corner, origin at the lower left.
     chart: (T,) numbers; faces of one chart are connected.
-    side: of the least lightmap in which no two charts read the same texel; None if there are too
-        many for any.
+    side: side of the least lightmap in which no two charts read the same texel; None without one.
     """
 
     uv: Floats
@@ -56,8 +55,7 @@ def unwrap(points: Floats, triangles: NDArray[np.integer[Any]]) -> Atlas:
     Raises MissingComponentError: PTM-M100 xatlas is not installed.
     """
     xatlas = component("xatlas", "PTM-M100", "baking lightmaps needs xatlas", "campus")
-    # Far from the origin single precision has no texels, and xatlas drops faces that it takes for
-    # empty, whatever the unit.
+    # Far from the origin float32 has no texels, and xatlas drops faces that it takes for empty.
     near = points - points.mean(axis=0)
     largest = float(np.abs(near).max(initial=0.0))
     unit = _LARGE / largest if largest else 1.0
@@ -109,8 +107,8 @@ def _longest(atlas: Any) -> float:
 
 @kernel
 def cover(uv: NDArray[np.float64], size: int) -> NDArray[np.int32]:
-    """(size, size) the face whose part of the atlas holds the centre of each texel, rows from the
-    top, -1 where there is none; the first of several. ``uv`` is (T, 3, 2), from the lower left."""
+    """(size, size) the first face that holds the centre of each texel, rows from the top; -1 for
+    none. ``uv`` is (T, 3, 2), from the lower left."""
     owner = np.full((size, size), -1, np.int32)
     for t in range(len(uv)):
         ax, ay = uv[t, 0, 0] * size, (1 - uv[t, 0, 1]) * size
@@ -136,9 +134,9 @@ def cover(uv: NDArray[np.float64], size: int) -> NDArray[np.int32]:
 
 @kernel
 def claim(uv: NDArray[np.float64], owner: NDArray[np.int32]) -> NDArray[np.int32]:
-    """(size, size) the same as `cover`, and of texels whose centre no face holds that nearest face
-    of which some point reads them: with bilinear filtering all those less than a texel away along
-    both axes. So a face thinner than a texel has some, too."""
+    """(size, size) as `cover`; a texel whose centre no face holds belongs to the nearest face with
+    a point less than a texel away along both axes, which reads it with bilinear filtering. So a
+    face thinner than a texel has texels, too."""
     size = len(owner)
     claimed = owner.copy()
     near = np.full((size, size), np.inf)
@@ -157,7 +155,7 @@ def claim(uv: NDArray[np.float64], owner: NDArray[np.int32]) -> NDArray[np.int32
                 apart = apart or not (y.min() < row + 1 and y.max() > row - 1)
                 for k in range(3):
                     across, down = x[(k + 1) % 3] - x[k], y[(k + 1) % 3] - y[k]
-                    # Along the normal of a side the square of what reads the texel, and the face.
+                    # Along the normal of a side: the face, and the square that reads the texel.
                     low = high = 0.0
                     for j in range(3):
                         far = down * (x[j] - x[k]) - across * (y[j] - y[k])
@@ -178,8 +176,8 @@ def claim(uv: NDArray[np.float64], owner: NDArray[np.int32]) -> NDArray[np.int32
 
 
 def nearest(uv: Floats, at: Floats) -> Floats:
-    """(n, 3) the shares of the corners of (n, 3, 2) triangles in those of their points that are
-    nearest to (n, 2) places."""
+    """(n, 3) barycentric coordinates of the points of (n, 3, 2) triangles nearest to (n, 2)
+    places."""
     a, b, c = np.moveaxis(uv, 1, 0)
     area = _cross(b - a, c - a)
     flat = area == 0

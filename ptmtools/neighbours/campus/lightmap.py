@@ -27,17 +27,17 @@ from ptmtools.neighbours.campus.model import LIGHT_SIZES
 from ptmtools.neighbours.campus.occlusion import SPREAD, hemisphere, turns
 from ptmtools.tolerance import INWARD_SHARE, TIE_SHARE
 
-#: Four texels agree if none differs from another by more.
+#: Largest difference between four texels that agree.
 AGREE = 8 / 255
-#: The share of the bilinear weight that texels of the same chart must have.
+#: Least share of the bilinear weight of texels of the same chart.
 _ENOUGH = 0.5
 _KERNEL = ((-1, 0.25), (0, 0.5), (1, 0.25))
 
 
 @dataclass(frozen=True)
 class Lit:
-    """A lightmap: (size, size) linear light, rows from the top, and how many of its texels were
-    computed and how many are read on faces."""
+    """A lightmap: (size, size) linear light, rows from the top, and the numbers of its texels that
+    were computed, and that are read on faces."""
 
     value: Singles
     computed: int
@@ -51,7 +51,7 @@ def bake(
     grain: float,
     sizes: tuple[int, ...] = LIGHT_SIZES,
 ) -> list[Lit]:
-    """The lightmaps of (T, 3, 3) faces, whose light ``look`` says.
+    """The lightmaps of (T, 3, 3) faces, whose light is ``look``.
 
     Neighbours that differ by more than ``grain`` stay apart; ``sizes`` ascend, each twice the one
     before.
@@ -80,7 +80,7 @@ def bake(
 
 
 def fill(value: Singles, known: Bools) -> Singles:
-    """The same where it is ``known``, and elsewhere what is nearest, by a pyramid of means."""
+    """The known values, and nearby ones in the other texels, by a pyramid of means."""
     if known.all() or not known.any():
         return np.asarray(np.where(known, value, 1), np.float32)
     height, width = value.shape
@@ -102,7 +102,7 @@ def _positions(
     """(n, 3) the points of faces that are nearest to the centres of texels."""
     at = np.stack([(column + 0.5) / size, 1 - (row + 0.5) / size], axis=1)
     share = nearest(uv[face], at)
-    # A row of texels whose centres are the lower edge of a wall would lie in the ground.
+    # Texels whose centres are on the lower edge of a wall would be in the ground.
     share += INWARD_SHARE * (1 / 3 - share)
     return np.asarray(np.einsum("nk,nkx->nx", share, corner[face]))
 
@@ -110,10 +110,9 @@ def _positions(
 def _enlarged(
     value: Singles, chart: NDArray[np.int32], centred: Bools, larger: NDArray[np.int32]
 ) -> tuple[Singles, Bools]:
-    """A lightmap of twice the size as bilinear filtering has it, and where that can be believed:
-    enough of the four texels are of the same chart as the one between them, and those agree. Where
-    no face holds the centre of any of those, as of faces thinner than a texel, there are too few to
-    know."""
+    """A lightmap of twice the size by bilinear filtering, and the texels in which it is valid:
+    enough of the four texels belong to the chart of the one between them, these agree, and a face
+    holds the centre of one of them."""
     size = len(larger)
     place = (np.arange(size) + 0.5) / 2 - 0.5
     first = np.clip(np.floor(place).astype(np.int64), 0, len(value) - 2)
@@ -156,18 +155,18 @@ def _smoothed(
     return np.asarray(total / weight)
 
 
-#: Points of a face at which its light is computed.
+#: Number of points of a face at which its light is computed.
 POINTS = 8
-#: Corners in one place share a light where their faces turn by no more than this (a dot product).
+#: Least dot product of the normals of faces whose corners in one place share a light.
 SMOOTH = 0.8
-#: How much a vertex wants the mean of its own points, beside what fits them best.
+#: Weight of the mean of a vertex's own points, beside the fit; rounds of conjugate gradients.
 _STEADY = 0.01
 _ROUNDS = 24
 
 
 def vertex_light(look: Look, corner: Floats, normal: Floats) -> Floats:
-    """(T, 3) light from 0 to 1 at the corners of (T, 3, 3) faces, as ``look`` says it is on them;
-    (T, 3) normals say where surfaces turn."""
+    """(T, 3) light from 0 to 1 at the corners of (T, 3, 3) faces with (T, 3) normals; ``look`` is
+    their light."""
     count = len(corner)
     share = _inside()
     point = np.einsum("pk,tkx->tpx", share, corner).reshape(-1, 3)
@@ -187,7 +186,7 @@ def _inside() -> Floats:
 
 
 def _shared(corner: Floats, normal: Floats) -> Ints:
-    """(T, 3) a number for each corner; those in one place on faces that hardly turn share it."""
+    """(T, 3) a number for each corner, equal for corners in one place on nearly parallel faces."""
     place = np.unique(corner.reshape(-1, 3), axis=0, return_inverse=True)[1].ravel()
     facing = np.repeat(normal, 3, axis=0)
     order = np.argsort(place, kind="stable")

@@ -36,7 +36,7 @@ from ptmtools.tolerance import PARALLEL_COSINE
 #: (n,) faces, (n, 3) points on them, (n,) shares of a circle by which points differ → (n,) linear
 #: light from 0 to 1.
 Look = Callable[[Ints, Floats, Floats], Singles]
-#: What n rays leave of grain is within this, divided by the root of n.
+#: The grain of n rays is within this, divided by the root of n.
 _GRAIN = 0.8
 
 
@@ -44,7 +44,7 @@ _GRAIN = 0.8
 class Rays:
     """The light of (T, 3, 3) faces by rays along (T, 3) unit normals; see `light`.
 
-    Faces that are up to ``error`` metres off the surface that they stand for have its light.
+    Faces up to ``error`` metres off the model's surface have its light.
     """
 
     around: Surroundings
@@ -62,14 +62,13 @@ class Rays:
         error: float = 0.0,
         side: Floats | float = 1.0,
     ) -> Rays:
-        """Of faces that are lit on (T,) sides, 1 the front and -1 the back."""
+        """The light of faces on their (T,) sides: 1 for the front, -1 for the back."""
         normal = normals(corner) * np.broadcast_to(side, len(corner))[:, None]
         return Rays(around, normal, samples, reach, error)
 
     @property
     def grain(self) -> float:
-        """By how much the light found at a point may differ from that found beside it, where it is
-        the same."""
+        """Largest difference between samples of the same light."""
         return _GRAIN / math.sqrt(self.samples)
 
     def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
@@ -80,13 +79,13 @@ class Rays:
 
 @dataclass(frozen=True)
 class LightImage:
-    """A lightmap of the model as a material has it.
+    """A lightmap of a material of the model.
 
     Attributes
     ----------
     texels: (h, w) linear light in 255ths, rows from the top; materials share those of one image.
     wrap: beyond [0, 1], across and up.
-    strength: how much of the light it decides, in [0, 1]; the rest is white.
+    strength: its share of the light, in [0, 1]; the rest is white.
     """
 
     texels: NDArray[np.uint8]
@@ -103,7 +102,7 @@ class Painted:
     corner, uv: (T, 3, 3) and (T, 3, 2), of the model's faces; uv from the lower left.
     image: (T,) index into `images`, -1 for faces without, which are white.
     images: see `LightImage`.
-    source: (F,) for each face that is asked about the one of the model's that it came from.
+    source: (F,) the model's face of each face.
     """
 
     corner: Floats
@@ -114,7 +113,7 @@ class Painted:
 
     @property
     def grain(self) -> float:
-        """None: what is painted is exact."""
+        """0: painted light is exact."""
         return 0.0
 
     def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
@@ -139,7 +138,7 @@ class Painted:
 
 
 def _bilinear(image: LightImage, at: Floats) -> Singles:
-    """(n,) of an image at (n, 2) coordinates from its lower left."""
+    """(n,) light of an image at (n, 2) coordinates from its lower left."""
     texels, (across, up) = image.texels, image.wrap
     left, right, s = _between(at[:, 0], texels.shape[1], across)
     above, below, t = _between(1 - at[:, 1], texels.shape[0], up)
@@ -149,8 +148,8 @@ def _bilinear(image: LightImage, at: Floats) -> Singles:
 
 
 def _between(at: Floats, count: int, wrap: SourceWrap) -> tuple[Ints, Ints, Floats]:
-    """The two of ``count`` texels in a row between whose centres coordinates lie, and the share of
-    the second."""
+    """(n,) and (n,): the two of ``count`` texels in a row with coordinates between their centres,
+    and (n,) the share of the second."""
     if wrap == "mirror":
         at = 1 - np.abs(1 - at % 2)
     place = (at % 1 if wrap == "repeat" else np.clip(at, 0, 1)) * count - 0.5
@@ -160,21 +159,20 @@ def _between(at: Floats, count: int, wrap: SourceWrap) -> tuple[Ints, Ints, Floa
     return np.maximum(first, 0), np.minimum(first + 1, count - 1), place - first
 
 
-#: Points of a plane from which walks begin on either side, first, and where that leaves it open;
-#: walks of each, and how often one is turned back: from the underside of a sill to the ground, to a
-#: wall, to the sky.
+#: Points of a plane from which walks begin on either side, at first and if the sides are close;
+#: walks from each, and most turns of one: from the underside of a sill to the ground, to a wall, to
+#: the sky.
 _POINTS, _MORE, _WALKS, _BOUNCES = 8, 32, 16, 3
-#: Two sides differ where their counts of rays do by so many standard deviations.
+#: Two sides differ if their counts of rays do by more standard deviations.
 _SURE = 3.0
-#: At so many faces that share an edge planes are followed through it.
+#: Planes are followed through edges of at most this many faces.
 _AT_AN_EDGE = 4
 
 
 def open_sides(around: Surroundings, corner: Floats, both: Bools, reach: float) -> Floats:
     """(T,) -1 for faces of which the back counts, and 1 for all others.
 
-    ``corner`` is (T, 3, 3); ``both``, (T,), says which have two sides; ``reach`` is as in
-    `CampusOptions`.
+    ``corner``: (T, 3, 3); ``both``: (T,) which have two sides; ``reach``: as in `CampusOptions`.
     """
     normal = normals(corner)
     area = areas(corner)
@@ -182,7 +180,7 @@ def open_sides(around: Surroundings, corner: Floats, both: Bools, reach: float) 
     if not wanted.any():
         return np.ones(len(corner))
     plane = planes(corner, normal, wanted)
-    # As seen from the first face of its plane.
+    # Relative to the first face of the plane.
     sign = np.where(np.einsum("tx,tx->t", normal, normal[plane]) < 0, -1.0, 1.0)
     front, back = np.zeros(len(corner)), np.zeros(len(corner))
 
@@ -208,8 +206,8 @@ def open_sides(around: Surroundings, corner: Floats, both: Bools, reach: float) 
 
 
 def planes(corner: Floats, normal: Floats, of: Bools) -> Ints:
-    """(T,) for each of (T, 3, 3) faces the first of those that lie in its plane and are connected
-    with it by edges; only those ``of`` which it is asked are connected."""
+    """(T,) for each of (T, 3, 3) faces the first face in its plane that edges connect with it, by
+    way of the faces ``of``, (T,)."""
     count = len(corner)
     vertex = np.unique(corner.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(-1, 3)
     edge = np.sort(np.stack([vertex, np.roll(vertex, -1, axis=1)], axis=2), axis=2).reshape(-1, 2)

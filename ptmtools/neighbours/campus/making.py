@@ -34,73 +34,42 @@ from ptmtools.neighbours.campus.second_set import ModelLight
 from ptmtools.neighbours.campus.textures import Written, light_files
 from ptmtools.neighbours.campus.viewpoints import viewpoint
 from ptmtools.scene.colors import encoded, to_linear
-from ptmtools.simplification import Mesh, SimplifyOptions, simplify
-
-
-@dataclass(frozen=True)
-class Level:
-    """A mesh of an object.
-
-    Attributes
-    ----------
-    corner: (T, 3, 3) metres.
-    material: (T,) indices.
-    uv: (T, 3, 2).
-    color: (T, 3, 3) uint8 sRGB, or None.
-    source: (T,) the face of the finest mesh that each came from.
-    error: metres, see `Simplified`.
-    """
-
-    corner: Floats
-    material: NDArray[np.int32]
-    uv: Floats
-    color: NDArray[np.uint8] | None
-    source: NDArray[np.int32]
-    error: float
+from ptmtools.simplification import Mesh, Simplified, SimplifyOptions, simplify
 
 
 def level_faces(faces: int, lods: int, ratio: float, least: int) -> list[int]:
-    """How many faces each mesh of an object of so many ``faces`` may have, the coarsest first."""
+    """The largest numbers of faces of the meshes of an object of ``faces``, the coarsest first."""
     wanted = [faces * ratio ** (lods - 1 - lod) for lod in range(lods)]
     return [min(faces, max(least, round(some))) for some in wanted]
 
 
-def levels(mesh: Mesh, lods: int, ratio: float, least: int, error: float) -> list[Level]:
+def levels(mesh: Mesh, lods: int, ratio: float, least: int, error: float) -> list[Simplified]:
     """The meshes of an object, from the coarsest to the finest; ``error`` is a share of the
     diagonal of its box."""
     bound = error * float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
     whole = len(mesh.triangles)
-    result = []
-    for faces in level_faces(whole, lods, ratio, least):
-        if faces == whole:
-            result.append(_level(mesh, np.arange(whole, dtype=np.int32), 0.0))
-            continue
-        less = simplify(mesh, SimplifyOptions(faces=faces, error=bound, keep_parts=True))
-        result.append(_level(less.mesh, less.source, less.error))
-    return result
+    return [
+        simplify(mesh, SimplifyOptions(faces=faces, error=bound, keep_parts=True))
+        if faces < whole
+        else Simplified(mesh, np.arange(whole, dtype=np.int32), 0.0)
+        for faces in level_faces(whole, lods, ratio, least)
+    ]
 
 
-def _level(mesh: Mesh, source: NDArray[np.int32], error: float) -> Level:
-    material, uv = mesh.material, mesh.uv
-    assert material is not None
-    assert uv is not None
-    return Level(mesh.points[mesh.triangles], material, uv, mesh.colors, source, error)
-
-
-#: A coarse face may lie so many times the error of its mesh, which is a mean, beneath the surface.
+#: Largest depth of a coarse face beneath the surface, in errors of its mesh, which are means.
 _BENEATH = 2.0
 
 
 @dataclass(frozen=True)
 class Work:
-    """What all objects have in common.
+    """Data shared by all objects.
 
     Attributes
     ----------
     points, triangles, uv, colors, two_sided: as of the scene.
     material: (T,) indices into `materials`.
-    around: what takes light.
-    painted: the model's own lightmaps, if those are asked for.
+    around: the occluding surfaces.
+    painted: the model's own lightmaps, if the options ask for them.
     """
 
     points: Floats
@@ -117,8 +86,8 @@ class Work:
 
 @dataclass(frozen=True)
 class ObjectMade:
-    """An object's record and its files; `notes` on it; how many texels of its lightmaps are read on
-    faces, and how many were computed."""
+    """An object's record, files and notes, and the numbers of texels of its lightmaps that are read
+    on faces, and computed."""
 
     record: CampusObject
     meshes: tuple[tuple[str, bytes], ...]
@@ -144,16 +113,18 @@ def make_object(work: Work, task: tuple[str, Part]) -> ObjectMade:
         None if work.colors is None else work.colors[faces],
     )
     lods = levels(mesh, options.lods, options.ratio, options.faces, options.error)
-    finest = lods[-1]
+    corner = [level.mesh.points[level.mesh.triangles] for level in lods]
+    finest = corner[-1]
     lit, side = options.lightmaps != "none", np.ones(len(faces))
-    place, lightmaps, notes = None, [], []
+    lightmaps, notes = [], []
     covered = computed = 0
     if lit:
         atlas = unwrap(mesh.points, mesh.triangles)
-        place = atlas.uv
-        side = _sides(work, faces, finest)
-        look = _look(work, faces, finest, finest, side)
-        maps = bake(look, finest.corner, atlas, look.grain)
+        if work.painted is None:  # a painted face has its light on both sides
+            reach = options.reach
+            side = open_sides(work.around, finest, work.two_sided[faces], reach)
+        look = _look(work, faces, finest, lods[-1], side)
+        maps = bake(look, finest, atlas, look.grain)
         source = _light_source(work, faces)
         texels = [(len(m.value), encoded(m.value.astype(np.float64)), source) for m in maps]
         lightmaps = light_files(name, texels, options.quality)
@@ -166,27 +137,30 @@ def make_object(work: Work, task: tuple[str, Part]) -> ObjectMade:
                 f"{part.label}: too many charts for {least}; neighbours run into each other"
             )
     files, records = [], []
-    for lod, level in enumerate(lods):
-        fine = level is finest
-        color = None if level.color is None else to_linear(level.color / 255)
+    for lod, (level, points) in enumerate(zip(lods, corner, strict=True)):
+        material, uv, colors = level.mesh.material, level.mesh.uv, level.mesh.colors
+        assert material is not None
+        assert uv is not None
+        fine = lod == options.lods - 1
+        color = None if colors is None else to_linear(colors / 255)
         if lit and not fine:
             look = _look(work, faces, finest, level, side)
-            held = vertex_light(look, level.corner, normals(level.corner))[..., None]
+            held = vertex_light(look, points, normals(points))[..., None]
             color = held * (np.ones(3) if color is None else color)
-        corners = Corners(level.corner, level.material, level.uv, place if fine else None, color)
+        corners = Corners(points, material, uv, atlas.uv if lit and fine else None, color)
         data, file = mesh_bytes(corners, work.materials), mesh_file(name, lod)
         files.append((file, data))
-        record = MeshFile(file, len(level.corner), len(data), zlib.crc32(data), _short(level.error))
+        record = MeshFile(file, len(points), len(data), zlib.crc32(data), _short(level.error))
         records.append(record)
-    box = _box(lods)
+    box = _box(corner)
     return ObjectMade(
         CampusObject(
             name=name,
             label=part.label,
             parts=part.parts,
             box=tuple(box.tolist()),
-            barycentre=_barycentre(finest.corner, box),
-            viewpoint=viewpoint(work.around, finest.corner, box),
+            barycentre=_barycentre(finest, box),
+            viewpoint=viewpoint(work.around, finest, box),
             materials=tuple(np.unique(work.material[faces]).tolist()),
             lightmap=name if lit else None,
             meshes=tuple(records),
@@ -199,23 +173,17 @@ def make_object(work: Work, task: tuple[str, Part]) -> ObjectMade:
     )
 
 
-def _sides(work: Work, faces: Ints, finest: Level) -> Floats:
-    """(T,) as of `open_sides`; a painted face has its light on both."""
-    if work.painted is not None:
-        return np.ones(len(faces))
-    return open_sides(work.around, finest.corner, work.two_sided[faces], work.options.reach)
-
-
-def _look(work: Work, faces: Ints, finest: Level, level: Level, side: Floats) -> Rays | Painted:
-    """The light on the faces of a level, of which (T,) of the finest say the sides."""
-    if work.painted is not None:
-        painted = work.painted
-        return Painted(
-            finest.corner, painted.uv[faces], painted.image[faces], painted.images, level.source
-        )
+def _look(
+    work: Work, faces: Ints, finest: Floats, level: Simplified, side: Floats
+) -> Rays | Painted:
+    """The light on the faces of a level; ``finest``: (T, 3, 3) those of the finest one, ``side``:
+    (T,) their lit sides."""
+    if (painted := work.painted) is not None:
+        image = painted.image[faces]
+        return Painted(finest, painted.uv[faces], image, painted.images, level.source)
     return Rays.of(
         work.around,
-        level.corner,
+        level.mesh.points[level.mesh.triangles],
         work.options.samples,
         work.options.reach,
         _BENEATH * level.error,
@@ -224,7 +192,7 @@ def _look(work: Work, faces: Ints, finest: Level, level: Level, side: Floats) ->
 
 
 def _light_source(work: Work, faces: Ints) -> tuple[int, int]:
-    """The size of what the lightmap is made of: the largest image, or rays as many as texels."""
+    """The size of the lightmap's source: the largest image, or one ray a texel."""
     if work.painted is None:
         return LIGHT_SIZES[-1], LIGHT_SIZES[-1]
     used = {i for i in np.unique(work.painted.image[faces]).tolist() if i >= 0}
@@ -233,15 +201,14 @@ def _light_source(work: Work, faces: Ints) -> tuple[int, int]:
     return width, height
 
 
-def _box(lods: list[Level]) -> Floats:
-    """(6,) of the positions of all meshes as their files have them."""
-    held = [level.corner.astype(np.float32).reshape(-1, 3) for level in lods]
-    low, high = (np.array([f(p, axis=0) for p in held]) for f in (np.min, np.max))
-    return np.concatenate([low.min(axis=0), high.max(axis=0)]).astype(np.float64)
+def _box(corners: list[Floats]) -> Floats:
+    """(6,) the box around the float32 positions of all meshes."""
+    points = np.concatenate([corner.reshape(-1, 3) for corner in corners]).astype(np.float32)
+    return np.concatenate([points.min(axis=0), points.max(axis=0)]).astype(np.float64)
 
 
 def _barycentre(corner: Floats, box: Floats) -> tuple[float, float, float]:
-    """The centre of a surface; within its box, whatever rounding did."""
+    """The centre of a surface, within its box in spite of rounding."""
     across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     area = np.linalg.norm(across, axis=1)
     weight = area if area.sum() > 0 else np.ones(len(area))

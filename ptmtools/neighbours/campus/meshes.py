@@ -41,8 +41,8 @@ class Corners:
     ----------
     point: (T, 3, 3) metres.
     material: (T,) indices into those of the campus.
-    uv: (T, 3, 2) origin at the lower left, of no meaning where the material has no textures.
-    light: (T, 3, 2) of the lightmap, or None.
+    uv: (T, 3, 2) origin at the lower left; ignored without textures.
+    light: (T, 3, 2) coordinates of the lightmap, or None.
     color: (T, 3, 3) linear, or None if all are white.
     """
 
@@ -90,7 +90,7 @@ def mesh_bytes(mesh: Corners, materials: tuple[CampusMaterial, ...]) -> bytes:
 
 @dataclass(frozen=True)
 class Primitive:
-    """What a GLB has of one material, read back.
+    """The part of a GLB with one material, read back.
 
     Attributes
     ----------
@@ -137,10 +137,9 @@ def read_mesh(data: bytes) -> tuple[Primitive, ...]:
 
 
 def view_bytes(document: Any, binary: bytes) -> int:
-    """Bytes of all vertices and indices of a GLB: what it takes in graphics memory.
+    """Bytes of all vertices and indices of a GLB in graphics memory.
 
-    Raises ValueError if it says that these are more than it has, LookupError or TypeError if it
-    does not say it as glTF does.
+    Raises ValueError if its views exceed its bytes, LookupError or TypeError for invalid glTF.
     """
     held = sum(natural(view["byteLength"]) for view in document["bufferViews"])
     if held > len(binary):
@@ -184,13 +183,13 @@ def _read(document: Any, binary: bytes, primitive: Mapping[str, Any]) -> Primiti
 
 
 def _flipped(uv: Floats) -> Singles:
-    """With the origin at the upper left."""
+    """Coordinates with the origin at the upper left."""
     return np.stack([uv[..., 0], 1 - uv[..., 1]], axis=-1).astype("<f4")
 
 
 def _vertices(rows: NDArray[np.uint8]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Of (3 m, bytes) corners the first of each distinct one, in the order in which they come, and
-    (m, 3) the number of each corner among them."""
+    """The first of each distinct one of (3 m, bytes) corners, ascending, and (m, 3) the number of
+    each corner among them."""
     kept = np.ascontiguousarray(rows).view(f"V{rows.shape[1]}").ravel()
     _, first, place = np.unique(kept, return_index=True, return_inverse=True)
     order = np.argsort(first)

@@ -66,13 +66,13 @@ class CampusObject:
 
     Attributes
     ----------
-    name: that its files begin with.
-    label: for visitors.
+    name: prefix of its files.
+    label: name for visitors.
     parts: names of the model's objects in it.
     box: least x, y, z, greatest x, y, z of all its meshes, metres.
     barycentre: the centre of the surface of its finest mesh.
-    viewpoint: position and unit direction of a visitor who is taken to it.
-    materials: that its meshes use, indices.
+    viewpoint: position and unit direction of a view of it.
+    materials: indices of the materials of its meshes.
     lightmap: base name of its lightmaps, or None.
     meshes: from the coarsest to the finest.
     """
@@ -90,12 +90,12 @@ class CampusObject:
 
 @dataclass(frozen=True)
 class CampusMaterial:
-    """How surfaces look.
+    """The appearance of surfaces.
 
     Attributes
     ----------
     base: base name of its textures, None without.
-    channels: those of its textures that count for it.
+    channels: channels of its textures that apply.
     color: sRGB, multiplied with the diffuse texture.
     alpha: "opaque", "mask" (tested against `cutoff`) or "blend".
     two_sided: whether its faces have a back.
@@ -114,8 +114,8 @@ class CampusMaterial:
 
 @dataclass(frozen=True)
 class TextureFile:
-    """A texture or lightmap of one size and channel; `source` is the width and height of what it
-    was made of, which may be less."""
+    """A texture or lightmap of one size and channel; `source`: width and height of its source,
+    which may be less."""
 
     file: str
     base: str
@@ -140,11 +140,11 @@ class Campus:
 
     Attributes
     ----------
-    origin, unit, up: how the model's coordinates became world metres, as in hints.json.
+    origin, unit, up: transformation of the model's coordinates to world metres, as in hints.json.
     lods: meshes of each object.
     lightmaps: "bake", "model" or "none".
-    start: bytes of what every visitor loads first: the coarsest mesh of each object and all
-        textures of the least size.
+    start: bytes that every visitor loads first: the coarsest mesh of each object and all textures
+        of the least size.
     """
 
     origin: Vector

@@ -16,11 +16,11 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import LimitError
 from ptmtools.scene.model import Scene
 
-#: The grid's squares are so many times as large as what is small.
+#: Side of the grid's squares, in sizes of the largest small object.
 SQUARE = 4
 #: Most objects of a campus.
 MAX_OBJECTS = 20_000
-#: An object with more than this share of all faces is spoken of.
+#: An object with more than this share of all faces gets a note.
 MOST_FACES = 0.8
 
 
@@ -94,7 +94,7 @@ def notes_on(parts: Sequence[Part]) -> tuple[str, ...]:
 
 
 def _boxes(corners: Floats, of: np.ndarray, count: int) -> Floats:
-    """(count, 6) bounding boxes of (T, 3, 3) triangles by what they are ``of``."""
+    """(count, 6) bounding boxes of objects; ``of``: (T,) the object of each of (T, 3, 3) faces."""
     low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
     np.minimum.at(low, of, corners.min(axis=1))
     np.maximum.at(high, of, corners.max(axis=1))

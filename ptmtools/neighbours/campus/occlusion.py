@@ -34,14 +34,14 @@ _GOLDEN = 0.6180339887498949
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What occludes.
+    """The occluding surfaces.
 
     Attributes
     ----------
-    points, triangles: (V, 3) metres and (T, 3) of what takes light.
+    points, triangles: (V, 3) metres and (T, 3), of the opaque faces.
     middle: (3,) subtracted before anything goes to float32.
     ground: height of the ground, metres.
-    lift: how far above its surface a ray begins, metres.
+    lift: height above its surface at which a ray begins, metres.
     """
 
     points: Floats
@@ -52,7 +52,7 @@ class Surroundings:
 
     @staticmethod
     def of(scene: Scene) -> Surroundings:
-        """Those of a scene's objects: its opaque faces."""
+        """The opaque faces of a scene."""
         low, high = scene.points.min(axis=0), scene.points.max(axis=0)
         return Surroundings(
             scene.points,
@@ -67,7 +67,7 @@ class Surroundings:
 
     @cached_property
     def tree(self) -> Any:
-        """The committed Embree scene; None of no faces."""
+        """Embree's tree; None without faces."""
         if not len(self.triangles):
             return None
         from embreex.mesh_construction import TriangleMesh
@@ -78,16 +78,15 @@ class Surroundings:
         return tree
 
     def free(self, origin: Floats, target: Floats) -> Bools:
-        """(n,) whether nothing lies between (n, 3) points, but what is at the target itself."""
+        """(n,) whether nothing is between (n, 3) points and their targets, (n, 3), on surfaces."""
         way = target - origin
         far = np.linalg.norm(way, axis=1)
         if self.tree is None:
             return np.ones(len(far), np.bool_)
         along = (way / np.maximum(far, np.finfo(float).tiny)[:, None]).astype(np.float32)
         start = (origin - self.middle).astype(np.float32)
-        # Not quite as far as the target, which lies on a surface.
         short = (far * (1 - DEPTH_SHARE) - self.lift).astype(np.float32)
-        # A copy: Embree writes into what it is given.
+        # A copy: Embree writes into its arguments.
         hit = self.tree.run(start, along, dists=short.copy(), query="DISTANCE")
         return np.asarray(hit >= short)
 
@@ -108,10 +107,10 @@ class Surroundings:
 
 
 def outermost(around: Surroundings, point: Floats, normal: Floats, within: float) -> Floats:
-    """(n, 3) points moved to the outermost surface that is nearer than ``within`` metres along
-    their normals, before or behind; those where there is none stay.
+    """(n, 3) points moved to the outermost surface within ``within`` metres along their normals,
+    before or behind them; unchanged without one.
 
-    The faces of a coarse mesh lie beneath the model's own, which would shade them.
+    The model's own faces would shade those of a coarse mesh beneath them.
     """
     if around.tree is None or within <= around.lift:
         return point
@@ -135,7 +134,7 @@ def light(
 
     Parameters
     ----------
-    turn: (n,) in [0, 1), by which share of a circle the directions are turned.
+    turn: (n,) rotation of the directions about the normals, in turns from 0 to 1.
     samples, reach: as in `CampusOptions`.
     """
     result = np.empty(len(point), np.float32)
@@ -166,9 +165,9 @@ def escaping(
     samples: int,
     bounces: int,
 ) -> Ints:
-    """(n,) how many of ``samples`` walks from (n, 3) points into the hemispheres over (n, 3)
-    normals come to the sky, each turned back into a new direction by what it meets, at most
-    ``bounces`` times. ``turn`` as of `light`."""
+    """(n,) the number of ``samples`` walks from (n, 3) points into the hemispheres over (n, 3)
+    normals that reach the sky, each reflected by surfaces at most ``bounces`` times. ``turn`` as of
+    `light`."""
     fan = hemisphere(samples)
     count = np.zeros(len(point), np.int64)
     for part, origin, along in _fans(around, point, normal, turn, samples):
@@ -190,8 +189,8 @@ def escaping(
 
 
 def _met(around: Surroundings, origin: Floats, along: Singles) -> tuple[Floats, Floats]:
-    """(n,) how far rays from the middle of the scene go, inf to the sky; (n, 3) the normals of what
-    they meet, against them."""
+    """(n,) lengths of rays whose origins are relative to the middle of the scene, inf to the sky;
+    (n, 3) the normals of the surfaces that they meet, against them."""
     with np.errstate(divide="ignore", invalid="ignore"):
         down = (around.ground - around.middle[1] - origin[:, 1]) / along[:, 1]
     far = np.where(along[:, 1] < 0, np.maximum(down, 0), np.inf)
@@ -222,14 +221,14 @@ def hemisphere(samples: int) -> Singles:
 
 
 def normals(corner: Floats) -> Floats:
-    """(T, 3) unit normals of (T, 3, 3) triangles; of those without area, up."""
+    """(T, 3) unit normals of (T, 3, 3) triangles; up for those without area."""
     across = arrays.normals(corner)
     length = np.linalg.norm(across, axis=1, keepdims=True)
     return np.where(length > 0, across / np.where(length > 0, length, 1.0), [0.0, 1.0, 0.0])
 
 
 def turns(count: int) -> Floats:
-    """(count,) shares of a circle that are far apart in a row."""
+    """(count,) turns from 0 to 1, far apart in sequence."""
     return np.asarray(np.arange(count) * _GOLDEN % 1.0)
 
 
@@ -250,13 +249,13 @@ def _frames(normal: Floats, turn: Floats) -> Singles:
 
 
 def _escaping(around: Surroundings, origin: Singles, along: Singles, reach: float) -> Singles:
-    """(n,) how much each ray counts."""
+    """(n,) the light of each ray."""
     far = np.full(len(origin), min(reach, np.finfo(np.float32).max), np.float32)
     with np.errstate(divide="ignore", invalid="ignore"):
         down = (np.float32(around.ground - around.middle[1]) - origin[:, 1]) / along[:, 1]
     limit = np.where((along[:, 1] < 0) & (down < far), np.maximum(down, 0), far)
     if around.tree is not None:
-        # A copy: Embree writes into what it is given.
+        # A copy: Embree writes into its arguments.
         limit = around.tree.run(origin, along, dists=limit.astype(np.float32), query="DISTANCE")
     if math.isinf(reach):
         return (limit >= far).astype(np.float32)
@@ -268,8 +267,8 @@ SPREAD = 0.7548776662466927, 0.5698402909980532
 
 
 def points_on(corner: Floats, number: Ints) -> Floats:
-    """(n, 3) a point in each of (n, 3, 3) triangles, the one that (n,) numbers say; points of
-    different numbers are far apart in one and the same triangle."""
+    """(n, 3) a point in each of (n, 3, 3) triangles, by its (n,) number in a sequence whose points
+    are far apart in one triangle."""
     along = np.sqrt(number * SPREAD[0] % 1.0)
     aside = number * SPREAD[1] % 1.0
     share = np.stack([1 - along, along * (1 - aside), along * aside], axis=1)
@@ -277,11 +276,8 @@ def points_on(corner: Floats, number: Ints) -> Floats:
 
 
 def spread_over(area: Floats, group: Ints, chosen: Ints, count: int) -> Ints:
-    """(len(chosen), count) faces by area: of each chosen group of faces as many, each as often as
-    its share of the group's area says.
-
-    ``area`` and ``group`` are (T,); each group that is chosen has some area.
-    """
+    """(len(chosen), count) faces of each chosen group, each as often as its share of the group's
+    area. ``area``, ``group``: (T,); chosen groups have some area."""
     order = np.argsort(group, kind="stable")
     total = np.concatenate([[0.0], np.cumsum(area[order])])
     first = np.searchsorted(group[order], chosen)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from ptmtools.scene.gltf.material import TextureOf
 
 _GLTF = (".glb", ".gltf")
-#: What becomes of a file that a model names.
+#: Reasons for leaving out a file that a model names.
 _NOT_THERE = {"missing": "not found", "outside": "lies outside the model's folder"}
 
 
@@ -54,8 +54,8 @@ class ModelLight:
 def model_light(model: Path, options: IngestOptions) -> ModelLight:
     """The lightmaps of a model, for the faces of its scene.
 
-    Raises InputError: PTM-I701 it has none, or its format cannot, or one that it names is missing;
-    what reading and decoding raise.
+    Raises InputError: PTM-I701 it has none, its format has none, or one that it names is missing;
+    and as reading and decoding.
     """
     read = None
     if model.suffix.lower() in _GLTF:
@@ -92,8 +92,8 @@ def model_light(model: Path, options: IngestOptions) -> ModelLight:
 
 
 def _missing(model: Path, material: str, number: int, read: _Read) -> InputError:
-    """The error for a lightmap that a material names and nobody finds."""
-    # Each material that got no texture it asked for left a note, in the same order.
+    """The error for a missing lightmap that a material names."""
+    # Each material without the texture that it names left a note, in the same order.
     textures = zip(read.asked, read.source.materials, strict=True)
     lost = [k for k, (asked, m) in enumerate(textures) if asked and m.texture is None]
     fault = read.missing[min(lost.index(number), len(read.missing) - 1)]
@@ -107,7 +107,7 @@ def _missing(model: Path, material: str, number: int, read: _Read) -> InputError
 
 
 def _red(texture: Texture, material: str, options: IngestOptions) -> NDArray[np.uint8]:
-    """(h, w) of a lightmap. Raises what decoding raises, and InputError PTM-I122."""
+    """(h, w) red samples of a lightmap. Raises as decoding, and InputError PTM-I122."""
     try:
         image = decoded_lightmap(texture.read(), options.limit << 20, texture.label)
     except InputError as fault:
@@ -125,7 +125,7 @@ def model_masks(
     model: Path, scene: Scene, options: IngestOptions
 ) -> tuple[dict[int, Mask], tuple[str, ...]]:
     """The masks of a model that was read as ``scene``, by the number of its material, and notes on
-    those that cannot be had."""
+    invalid ones."""
     masks_of = _gltf_masks if model.suffix.lower() in _GLTF else _shines
     return masks_of(model, scene, options)
 
@@ -136,10 +136,10 @@ class _Read:
 
     Attributes
     ----------
-    source: as it was read.
-    faces: (T,) which of its faces the scene has.
+    source: the file.
+    faces: (T,) its faces that are in the scene.
     asked: for each of its materials, whether it names such a texture.
-    missing: what was said of textures that are not there, in the order of the materials.
+    missing: messages about missing textures, in the order of the materials.
     """
 
     source: Source
@@ -201,7 +201,7 @@ def _gltf_masks(
 def _shines(
     model: Path, scene: Scene, options: IngestOptions
 ) -> tuple[dict[int, Mask], tuple[str, ...]]:
-    """Those that the scene's own reader came across."""
+    """The masks that the scene's own reader names."""
     folder = Folder(model.absolute().parent, options.allow_outside)
     masks, notes = {}, []
     for number, (its, shine) in enumerate(zip(scene.materials, scene.shines, strict=True)):
@@ -223,7 +223,7 @@ def _shines(
 
 
 def _fault(mask: Mask, options: IngestOptions) -> str:
-    """Why a mask is no image, or "". Raises LimitError."""
+    """The fault of a mask that is no image, or "". Raises LimitError."""
     try:
         decoded_lightmap(mask.load(), options.limit << 20, mask.label)
     except LimitError:

@@ -35,9 +35,8 @@ Written = tuple[TextureFile, bytes]
 
 @dataclass(frozen=True)
 class Mask:
-    """Where a reflection mask comes from: `load` returns the bytes of an image, of which a band
-    (0 to 2, or -1 for the luminance) says how much is reflected, or where it is ``inverted`` how
-    little."""
+    """The source of a reflection mask: `load` returns the bytes of an image, whose ``band``, 0 to 2
+    or -1 for the luminance, is the reflectance, or one minus it if ``inverted``."""
 
     load: Callable[[], bytes]
     label: str
@@ -47,7 +46,7 @@ class Mask:
 
 @dataclass(frozen=True)
 class BaseImage:
-    """What the textures of one base name are made of; `alpha`: whether that channel is wanted."""
+    """The sources of the textures of a base name; `alpha`: whether they include that channel."""
 
     base: str
     image: SourceImage | None
@@ -56,7 +55,7 @@ class BaseImage:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Those that it has, in their order."""
+        """Its channels, in their order."""
         layers = (DIFFUSE, self.image), (ALPHA, self.alpha), (MASK, self.mask)
         return tuple(channel for channel, wanted in layers if wanted)
 
@@ -64,7 +63,7 @@ class BaseImage:
 def texture_files(limits: tuple[int, int], base: BaseImage) -> list[Written]:
     """The files of a base name. ``limits``: the most bytes of a decoded image, and the quality.
 
-    Raises what decoding raises.
+    Raises as decoding.
     """
     most, quality = limits
     result: list[Written] = []
@@ -113,8 +112,8 @@ def jpeg(image: Image.Image, quality: int) -> bytes:
 
 
 def squared(image: Image.Image, size: int) -> Image.Image:
-    """An image as a square: the mean where it becomes smaller, interpolated where it becomes
-    larger, along each axis by itself."""
+    """An image as a square: averaged along an axis that shrinks, interpolated along one that
+    grows."""
     from PIL.Image import Resampling
 
     for axis in (0, 1):
@@ -126,15 +125,15 @@ def squared(image: Image.Image, size: int) -> Image.Image:
 
 
 def weighted(colors: Image.Image, alpha: Image.Image, size: int) -> Image.Image:
-    """The colours of an image as a square, each with the weight of its ``alpha``; where all of that
-    is 0, what `squared` makes of them."""
+    """The colours of an image as a square, each with the weight of its ``alpha``; unweighted where
+    that is 0."""
     from PIL import Image
 
     share = np.asarray(alpha, np.float32)
     total = _resized(share, size)
     plain = squared(colors, size)
     held = np.asarray(plain, np.float32).copy()
-    # Interpolation overshoots beside what is clear.
+    # Interpolation overshoots beside transparent texels.
     covered = total >= 1
     for band in range(3):
         of = _resized(np.asarray(colors.getchannel(band), np.float32) * share, size)
@@ -143,7 +142,7 @@ def weighted(colors: Image.Image, alpha: Image.Image, size: int) -> Image.Image:
 
 
 def decoded_lightmap(data: bytes, most: int, label: str) -> Image.Image:
-    """An image as RGB. Raises what decoding raises."""
+    """An image as RGB. Raises as decoding."""
     return _decoded(data, most, label).convert("RGB")
 
 
@@ -159,7 +158,7 @@ def _written(base: str, size: int, channel: str, data: bytes, source: tuple[int,
 
 
 def _decoded(data: bytes, most: int, label: str) -> Image.Image:
-    """An image of 8 bits: L, RGB or RGBA. Its orientation says nothing, as for all textures."""
+    """An image of 8 bits: L, RGB or RGBA. Its orientation is ignored, as for all textures."""
     from PIL import Image
 
     with naming(label):

@@ -17,20 +17,20 @@ from ptmtools.arrays import Floats, areas
 from ptmtools.neighbours.campus.model import Vector
 from ptmtools.neighbours.campus.occlusion import Surroundings, points_on, spread_over
 
-#: Height of eyes, and how near and how far from a box one stands, metres.
+#: Height of eyes, and least and greatest distance from a box, metres.
 EYE, NEAREST, FARTHEST = 1.6, 3.0, 150.0
-#: Half of the angle that the box fits into.
+#: Half of the angle of view that the box fits into, radians.
 _HALF_VIEW = math.radians(25)
-#: Shares of the distance that are tried, and directions around the box.
+#: Candidates: shares of the distance, and number of directions around the box.
 _SHARES, _WAYS = (1.0, 0.7, 0.5, 0.25, 1.5), 24
-#: How many points of the object are looked at; gains below this share count as none.
+#: Number of points of the object that are tested; smaller gains than this share count as none.
 _POINTS, _ALIKE = 64, 0.05
-#: Who stands no more than this over what lies lowest, metres, stands on the ground.
+#: Places no higher than this above the lowest surface, metres, are on the ground.
 STEP = 0.6
 
 
 def viewpoint(around: Surroundings, corner: Floats, box: Floats) -> tuple[Vector, Vector]:
-    """Position and unit direction of a visitor who looks at an object.
+    """Position and unit direction of a view of an object.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def viewpoint(around: Surroundings, corner: Floats, box: Floats) -> tuple[Vector
     seen = np.where(top <= ground + STEP, _seen(around, outside, target), 0.0)
     eyes = outside
     if not seen.max() > _ALIKE:
-        # From the height of eyes down to a floor; first those beside the foot of the object.
+        # On a floor, beside the foot of the object first.
         head = np.column_stack([place[:, 0], np.full(len(place), low[1] + EYE), place[:, 1]])
         floor = around.upright(head, EYE + STEP, -1.0)
         floor = np.where(floor > head[:, 1] - EYE - STEP, floor, low[1])
@@ -55,7 +55,7 @@ def viewpoint(around: Surroundings, corner: Floats, box: Floats) -> tuple[Vector
         eyes = np.concatenate([outside, within])
         seen = np.concatenate([seen, _seen(around, within, target)])
         if not seen.any():
-            # Wholly hidden: wherever one can stand.
+            # Hidden: anywhere on the ground.
             seen = np.concatenate([(top <= ground + STEP) * 1.0, np.zeros(len(within))])
     eye = eyes[int(np.flatnonzero(seen > seen.max() - _ALIKE)[0])]
     way = middle - eye
@@ -65,7 +65,7 @@ def viewpoint(around: Surroundings, corner: Floats, box: Floats) -> tuple[Vector
 
 
 def _candidates(low: Floats, high: Floats) -> Floats:
-    """(n, 2) x and z around a box, first those as far away as shows all of it, before the middle of
+    """(n, 2) x and z around a box, first at the distance that shows all of it, before the middle of
     its widest side."""
     half, middle = (high - low)[[0, 2]] / 2, (low + high)[[0, 2]] / 2
     turn = 2 * math.pi * np.arange(_WAYS) / _WAYS
@@ -74,7 +74,7 @@ def _candidates(low: Floats, high: Floats) -> Floats:
     way = np.stack([np.sin(turn), np.cos(turn)], axis=1)
     if half[1] > half[0]:
         way = way[:, ::-1]
-    # To the edge of the box, and half of what is seen of it from there.
+    # The distance to the edge of the box, and half of its apparent width.
     with np.errstate(divide="ignore"):
         edge = (half / np.abs(way)).min(axis=1)
     across = np.abs(way[:, ::-1]) @ half
@@ -84,8 +84,8 @@ def _candidates(low: Floats, high: Floats) -> Floats:
 
 
 def _heights(around: Surroundings, place: Floats) -> tuple[Floats, Floats]:
-    """(n,) of what lies highest and of what lies lowest at (n, 2) places; the ground of the scene
-    is what lies lowest where there is nothing else."""
+    """(n,) heights of the highest and of the lowest surface at (n, 2) places; the ground of the
+    scene where there is none."""
     least, most = around.points[:, 1].min(), around.points[:, 1].max()
     height = most - least + EYE
     at = np.column_stack([place[:, 0], np.full(len(place), most + EYE), place[:, 1]])
@@ -105,6 +105,6 @@ def _points_of(corner: Floats) -> Floats:
 
 
 def _seen(around: Surroundings, eyes: Floats, target: Floats) -> Floats:
-    """(n,) the share of points that is seen from each of (n, 3) eyes."""
+    """(n,) the share of points that is visible from each of (n, 3) eyes."""
     origin, end = np.repeat(eyes, len(target), axis=0), np.tile(target, (len(eyes), 1))
     return np.asarray(around.free(origin, end).reshape(len(eyes), -1).mean(axis=1))

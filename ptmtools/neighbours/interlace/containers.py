@@ -1,9 +1,9 @@
-"""The image formats that files of an interlaced image can have, in a table.
+"""A table of the image formats of the files of interlaced images.
 
 Any format that browsers show will do (paper §3.1: "the original image format only serves as
-container format"); each holds some samples only, and what it does not hold is refused, never
-changed in a whisper. Files carry texels and nothing else: no colour profile and no orientation,
-since a browser would apply them to some files of an image and not to others.
+container format"). Samples that a format does not support are refused, never changed silently.
+Files carry texels only: browsers would apply a colour profile or an orientation to some files of an
+image and not to others.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ class Container:
 
     Attributes
     ----------
-    about: what it is good for.
+    about: description for users.
     lossless: whether texels come back exactly.
-    magic: how its files begin.
-    side: the longest that it holds, texels.
-    components, kinds: of the samples that it holds.
-    remedy: what to do about others.
-    write: (h, w, c) texels and the quality, which only lossy formats go by, as bytes of a file.
-    read: (h, w, c) texels as `ptmtools.texture.images.load_image` has them, and the number of
-        components that went in; gives those. Raises ValueError for others.
+    magic: first bytes of its files.
+    side: its longest side, texels.
+    components, kinds: numbers of components and types of samples that it supports.
+    remedy: remedy for others.
+    write: the bytes of a file, from (h, w, c) texels and the quality, for lossy formats.
+    read: the stored texels, from (h, w, c) texels of `ptmtools.texture.images.load_image` and the
+        number of stored components. Raises ValueError for others.
     """
 
     about: str
@@ -51,7 +51,7 @@ class Container:
 
 
 def check_held(name: str, width: int, height: int, components: int, kind: str) -> None:
-    """Raise what keeps a container from holding an image.
+    """Raises an error if a container does not support an image.
 
     InputError: PTM-I126 its samples. LimitError: PTM-L400 its sides.
     """

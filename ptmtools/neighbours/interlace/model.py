@@ -1,4 +1,4 @@
-"""What an interlaced image is: options, the axes of its steps, its manifest. Plain values.
+"""Options of an interlaced image, the axes of its steps, and its manifest.
 
 The paper halves rows and columns alternately until a side reaches the minimum (§3.1). Read as pairs
 of a row and a column step, as its counts want it (512² is 5 files, 4096² is 11): a pair is made as
@@ -15,9 +15,9 @@ from typing import Any, ClassVar, Literal
 from ptmtools.neighbours.interlace.containers import CONTAINERS
 from ptmtools.options import option
 
-#: The index of a folder, and what it says of itself.
+#: The index of a folder, and its format.
 INDEX, FORMAT, SCHEMA = "interlace.json", "ptmtools interlaced image", 1
-#: Lines of which kind a file interleaves with the image before it.
+#: The lines that a file interleaves with the image before it.
 Axis = Literal["rows", "columns"]
 Size = tuple[int, int]
 
@@ -40,8 +40,8 @@ class Part:
     Attributes
     ----------
     name: of the file, in the folder.
-    width, height: of the image in it, texels.
-    bytes, crc32: of the file.
+    width, height: size of the image in it, texels.
+    bytes, crc32: length and checksum of the file.
     axis: whether its lines become the odd rows or the odd columns; None for the first file.
     joined: (width, height) of the image that it completes.
     """
@@ -61,14 +61,14 @@ class Interlaced:
 
     Attributes
     ----------
-    width, height: of the whole image as it is stored, powers of two, texels.
+    width, height: size of the whole stored image, powers of two, texels.
     original: (width, height) before it was scaled to powers of two.
     container: format of the files, a name in `CONTAINERS`.
-    lossless: whether joined files are the stored image exactly.
+    lossless: whether joined files equal the stored image.
     components: 1 grey, 2 grey and alpha, 3 RGB, 4 RGB and alpha.
-    kind: of the samples, "uint8" or "uint16".
-    min: of `InterlaceOptions`.
-    parts: the files, in the order in which they are needed.
+    kind: type of the samples, "uint8" or "uint16".
+    min: as in `InterlaceOptions`.
+    parts: the files, in their order.
     """
 
     width: int
@@ -88,7 +88,7 @@ class Interlaced:
 
     @property
     def bytes(self) -> int:
-        """Of all files, without the manifest."""
+        """Bytes of all files, without the manifest."""
         return sum(part.bytes for part in self.parts)
 
     def document(self) -> dict[str, Any]:
@@ -126,8 +126,8 @@ def axes_of(width: int, height: int, smallest: int) -> tuple[Axis, ...]:
 
 
 def sizes_of(width: int, height: int, axes: Iterable[Axis]) -> list[tuple[Size, Size]]:
-    """(size of its image, size after joining) of each file, given the whole and the axes of its
-    steps; the first file first."""
+    """(size of its image, size after joining) of each file, the first file first; ``axes`` as
+    `axes_of` returns them."""
     sizes: list[tuple[Size, Size]] = []
     for axis in reversed(list(axes)):
         joined = width, height

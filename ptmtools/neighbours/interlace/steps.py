@@ -28,8 +28,7 @@ Texels = NDArray[Any]
 def split(image: Texels, axes: Sequence[Axis]) -> list[Texels]:
     """The images of the files of an (h, w, …) image, the first file first; views.
 
-    ``axes``: of the steps that join them, the first step first. Sides must halve as often as there
-    are steps along them.
+    ``axes``: as `axes_of` returns them; sides are divisible by the steps along them.
     """
     parts: list[Texels] = []
     for axis in reversed(axes):
@@ -56,14 +55,14 @@ def join(first: Texels, second: Texels, axis: Axis) -> Texels:
 
 
 def stride(axes: Sequence[Axis], step: int) -> tuple[int, int]:
-    """(rows, columns): every how many-th of them the first ``step`` files show."""
+    """(rows, columns): the distances of the lines that the first ``step`` files show."""
     left = axes[step - 1 :]
     return 1 << left.count("rows"), 1 << left.count("columns")
 
 
 #: Half the width of the filter, texels.
 _REACH = 2.0
-#: So many samples of the result are made at a time.
+#: Samples of the result that are computed at a time.
 _STRIP_SAMPLES = 1 << 18
 
 
@@ -96,7 +95,7 @@ def scaled(image: Rows, width: int, height: int) -> NDArray[Any]:
 
 
 def _taps(old: int, new: int) -> tuple[Ints, Floats]:
-    """(new, n) lines of the old image that each new one is made of, and their weights."""
+    """(new, n) source lines of each new line, and their weights."""
     factor = max(1.0, old / new)
     centre = (np.arange(new) + 0.5) * (old / new)
     count = int(np.ceil(2 * _REACH * factor)) + 1
@@ -121,7 +120,7 @@ def _filtered(image: Floats, line: Ints, weight: Floats, axis: int) -> Floats:
     """An (h, w, c) image whose rows (axis 0) or columns (1) are sums of (n, k) weighted lines."""
     shape = [1, 1, 1]
     shape[axis] = -1
-    # One after the other: numpy's own sum goes by pairs, of as many as suit the machine.
+    # One after the other: numpy's own sum is pairwise, in blocks that depend on the machine.
     total = np.zeros(())
     for k in range(line.shape[1]):
         taken = np.take(image, line[:, k], axis)
@@ -138,7 +137,7 @@ def _weighted(image: Floats, top: int) -> Floats:
 
 
 def _plain(image: Floats, top: int) -> Floats:
-    """The inverse of `_weighted`; colours of what is transparent are 0."""
+    """The inverse of `_weighted`; colours of transparent texels are 0."""
     if image.shape[2] in (2, 4):
         alpha = image[:, :, -1:] / top
         seen = alpha > 0

@@ -1,4 +1,4 @@
-"""An image as an interlaced folder: scaled to powers of two, split into files, and a manifest."""
+"""Writes an image as an interlaced folder: scaled to powers of two, split into files."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from ptmtools.texture.model import MAX_SIDE, Description, Limits
 from ptmtools.whole_folder import FolderForm
 
 _OPTIONS, _LIMITS = InterlaceOptions(), Limits()
-#: What a folder of ours holds besides its index.
+#: Files of such a folder besides its index.
 _OURS = re.compile(r"[1-9][0-9]?\.(" + "|".join(CONTAINERS) + ")")
 FORM = FolderForm(
     INDEX, FORMAT, "ptm interlace", lambda name: name == INDEX or bool(_OURS.fullmatch(name))
@@ -44,7 +44,7 @@ class Written:
     ----------
     interlaced: the manifest.
     files: bytes of each file, in its order.
-    notes: what was changed on the way, one line each.
+    notes: changes of the image, one line each.
     """
 
     interlaced: Interlaced
@@ -66,8 +66,9 @@ def interlace(
 
     Raises
     ------
-    InputError: PTM-I111 an option out of range; PTM-I126 samples that the container does not hold.
-    LimitError: PTM-L400 a side that it does not hold; PTM-L104 more than ``limits`` allow, scaled.
+    InputError: PTM-I111 an option out of range; PTM-I126 samples that the container does not
+        support.
+    LimitError: PTM-L400 a side too long for it; PTM-L104 more than ``limits`` allow, scaled.
     """
     _check_options(options)
     notes = []
@@ -117,7 +118,7 @@ def interlace(
 
 
 def _coloured(description: Description) -> bool:
-    """Whether colours are said to be others than those of sRGB, which untagged files have."""
+    """Whether colours are declared to be others than those of sRGB, which untagged files have."""
     described = description.gamma is not None or description.chromaticities is not None
     return description.icc is not None or (described and description.srgb is None)
 

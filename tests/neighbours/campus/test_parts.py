@@ -189,11 +189,13 @@ def facade(steps: int) -> Mesh:
 def test_a_facade_keeps_its_texture_through_the_levels() -> None:
     whole = facade(16)
     found = levels(whole, 3, 0.25, 4, 0.01)
-    assert [len(level.corner) for level in found] == sorted(len(v.corner) for v in found)
-    assert len(found[0].corner) < 0.2 * len(whole.triangles)
+    faces = [len(level.source) for level in found]
+    assert faces == sorted(faces)
+    assert faces[0] < 0.2 * len(whole.triangles)
     for level in found:
-        expected = np.stack([level.corner[..., 0], level.corner[..., 1]], axis=2) / TILE
-        assert np.abs(level.uv - expected).max() < 1e-6
+        expected = level.mesh.points[level.mesh.triangles][..., :2] / TILE
+        assert level.mesh.uv is not None
+        assert np.abs(level.mesh.uv - expected).max() < 1e-6
     assert found[-1].error == 0.0
 
 
