@@ -164,7 +164,7 @@ class Facets:
         order = np.argsort(of, kind="stable")
         at, k, of = at[order], k[order], of[order]
         ends = np.stack([self.mesh.triangle[at, k], self.mesh.triangle[at, (k + 1) % 3]], axis=1)
-        u, v = _axes(self.normal[chosen])
+        u, v = plane_axes(self.normal[chosen])
         space = self.mesh.point[ends]
         flat = np.stack(
             [np.einsum("eki,ei->ek", space, u[of]), np.einsum("eki,ei->ek", space, v[of])], axis=2
@@ -195,7 +195,7 @@ class Facets:
         return space.reshape(-1, 3)[origin.reshape(-1, 3)[kept]], which[kept]
 
 
-def _axes(normal: Floats) -> tuple[Floats, Floats]:
+def plane_axes(normal: Floats) -> tuple[Floats, Floats]:
     """(r, 3) and (r, 3): directions square to each of (r, 3) unit normals and to one another."""
     axis = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
     u = cross(axis, normal)

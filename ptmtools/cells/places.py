@@ -322,8 +322,24 @@ class Places:
     slope: Floats  # (r, 3): the height is a·x + b·z + c
 
     def triangles(self, tolerance: Tolerance) -> Floats:
-        """(n, 3, 3) corners, metres."""
-        return _triangles(self.plan, self.slope, tolerance.grid)
+        """(n, 3, 3) triangles of the regions, on their slopes, metres."""
+        parts, region = shapely.get_parts(self.plan, return_index=True)
+        flat = shapely.get_dimensions(parts) == 2
+        parts, region = parts[flat], region[flat]
+        corners, of = [np.zeros((0, 3, 2))], [np.zeros(0, dtype=np.int64)]
+        while len(parts):
+            # Of many corners, or none that GEOS can divide: cut in two, and tried again.
+            large = shapely.get_num_coordinates(parts) > CORNERS
+            triangles = delaunay(np.where(large, shapely.Polygon(), parts))
+            pieces, part = shapely.get_parts(triangles, return_index=True)
+            corners.append(shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3])
+            of.append(region[part])
+            left = shapely.is_empty(triangles)
+            parts, which = halves(parts[left], tolerance.grid)
+            region = region[left][which]
+        plan, slope = np.concatenate(corners), self.slope[np.concatenate(of)]
+        height = np.einsum("ncx,nx->nc", plan, slope[:, :2]) + slope[:, 2:]
+        return np.stack([plan[..., 0], height, plan[..., 1]], axis=2)
 
 
 def find_places(floors: Floors, structure: Structure, walker: Walker, boxes: Floats) -> Places:
@@ -365,27 +381,6 @@ def _slopes(floors: Floors) -> Floats:
     slope = -normal[:, PLAN] / normal[:, 1:2]
     at = corners[largest].mean(axis=1)
     return np.column_stack([slope, at[:, 1] - np.einsum("ij,ij->i", slope, at[:, PLAN])])
-
-
-def _triangles(free: Geometry, slope: Floats, grid: float) -> Floats:
-    """(n, 3, 3) triangles of regions in plan, on their slopes."""
-    parts, region = shapely.get_parts(free, return_index=True)
-    flat = shapely.get_dimensions(parts) == 2
-    parts, region = parts[flat], region[flat]
-    corners, of = [np.zeros((0, 3, 2))], [np.zeros(0, dtype=np.int64)]
-    while len(parts):
-        # Of many corners, or none that GEOS can divide: cut in two, and tried again.
-        large = shapely.get_num_coordinates(parts) > CORNERS
-        triangles = delaunay(np.where(large, shapely.Polygon(), parts))
-        pieces, part = shapely.get_parts(triangles, return_index=True)
-        corners.append(shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3])
-        of.append(region[part])
-        left = shapely.is_empty(triangles)
-        parts, which = halves(parts[left], grid)
-        region = region[left][which]
-    plan, slope = np.concatenate(corners), slope[np.concatenate(of)]
-    height = np.einsum("ncx,nx->nc", plan, slope[:, :2]) + slope[:, 2:]
-    return np.stack([plan[..., 0], height, plan[..., 1]], axis=2)
 
 
 #: Eyes stay farther from what the body touches than rounding, but by no more of its radius.

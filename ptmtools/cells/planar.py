@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from typing import Any
 
@@ -282,23 +282,16 @@ def _each(
         sides = ([each[part] for each in operands] for part in (slice(half), slice(half, None)))
         return np.concatenate([_each(name, operation, side, again, instead) for side in sides])
     single = [each.reshape(-1)[0] for each in operands]
-    value = _first(again, single)
-    if value is None:
+    for attempt in again:
+        with suppress(shapely.GEOSException):
+            value = attempt(*single)
+            break
+    else:
         count([name] if name else [])
         value = instead(*single)
     array = np.empty(operands[0].shape, object)
     array[...] = value
     return array[()]
-
-
-def _first(attempts: list[Callable[..., Geometry]], operands: list[Geometry]) -> Geometry | None:
-    """The result of the first attempt that succeeds."""
-    for attempt in attempts:
-        try:
-            return attempt(*operands)
-        except shapely.GEOSException:
-            continue
-    return None
 
 
 def _step(grid: float, shapes: Geometry) -> float:

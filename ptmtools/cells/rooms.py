@@ -27,7 +27,6 @@ import heapq
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -36,11 +35,9 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints, areas
 from ptmtools.cells.model import Cells
 from ptmtools.cells.options import SubdivideOptions
+from ptmtools.cells.planar import Geometry
 from ptmtools.cells.sight import from_places, sampled_sight
 from ptmtools.diagnostics import Warned
-
-if TYPE_CHECKING:
-    Plan = Any
 
 
 class Groups(ABC):
@@ -100,10 +97,6 @@ class Groups(ABC):
                 continue
             for pair in self.join(a, b):
                 put(*pair)
-        return self.ends()
-
-    def ends(self) -> Ints:
-        """(L,) the group of each leaf."""
         result = self._parent
         while not np.array_equal(result, result[result]):
             result = result[result]
@@ -163,7 +156,7 @@ class _Regions(Groups):
         plan = cells.leaf_point[:, [0, 2]]
         rows = np.repeat(np.arange(cells.leaf_count), np.diff(cells.leaf_point_start))
         hulls = shapely.convex_hull(shapely.multipoints(plan, indices=rows))
-        self._plan: list[Plan] = list(hulls[order].tolist())
+        self._plan: list[Geometry] = list(hulls[order].tolist())
         self._section = [_section(v, p) for v, p in zip(self._volume, self._plan, strict=True)]
         self._area = cells.portal_area.tolist()
         self._touching = _touching(cells, cells.tolerance.plane)
@@ -213,7 +206,7 @@ class _Regions(Groups):
         return largest
 
 
-def _section(volume: float, plan: Plan) -> float:
+def _section(volume: float, plan: Geometry) -> float:
     """m²: the mean cross-section along a region, volume over length."""
     corners = shapely.get_coordinates(plan)
     edge = np.diff(corners, axis=0)

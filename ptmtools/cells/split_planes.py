@@ -21,7 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ptmtools.arrays import Bools, Floats, Ints, cross
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.cells.facets import plane_axes
 from ptmtools.cells.planar import left_open
 from ptmtools.cells.polyhedron import BOX_FACE, Polyhedron, section
 from ptmtools.cells.search import Tries
@@ -255,10 +256,7 @@ def _section_areas(body: Polyhedron, planes: Floats) -> Floats:
 
 def _around(points: Floats, normals: Floats) -> Floats:
     """(n,) areas of the convex polygons with corners (n, k, 3), in any order, about 0."""
-    axis = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
-    u = cross(axis, normals)
-    u /= np.linalg.norm(u, axis=1, keepdims=True)
-    v = cross(normals, u)
+    u, v = plane_axes(normals)
     x, y = np.einsum("nki,ni->nk", points, u), np.einsum("nki,ni->nk", points, v)
     order = np.argsort(np.arctan2(y, x), axis=1)
     x, y = np.take_along_axis(x, order, 1), np.take_along_axis(y, order, 1)

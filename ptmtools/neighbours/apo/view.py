@@ -160,9 +160,3 @@ class Frame:
     def covered(self) -> Bools:
         """(h, w) which pixels show the mesh."""
         return self.address > -2
-
-    @property
-    def deepest(self) -> int:
-        """The depth beyond which nodes are smaller than the pixels of this view, so that a client
-        may stop the transmission (section 4.2); -1 for an empty picture."""
-        return int(self.stop[self.covered].max(initial=-1))

@@ -9,7 +9,7 @@ import json
 import os
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -88,7 +88,12 @@ def make_campus(
     FORM.check(folder, force=force)
     if options.lightmaps != "none":
         component("xatlas", "PTM-M100", "lightmaps need xatlas", "campus")
-    clock = _Clock()
+    seconds, since = {}, [time.perf_counter()]
+
+    def end(phase: str) -> None:
+        since.append(time.perf_counter())
+        seconds[phase] = since[-1] - since[-2]
+
     scene = ingest(path, reading, progress, workers=executor.workers)
     masks, mask_notes = model_masks(path, scene, reading)
     painted = model_light(path, reading) if options.lightmaps == "model" else None
@@ -109,7 +114,7 @@ def make_campus(
         options,
         painted,
     )
-    clock.end("reading")
+    end("reading")
     with FORM.staged(folder, force=force) as put:
         textures = []
         limits = reading.limit << 20, options.quality
@@ -118,7 +123,7 @@ def make_campus(
             for record, data in written:
                 put(record.file, data)
                 textures.append(record)
-        clock.end("textures")
+        end("textures")
         objects: list[CampusObject] = []
         covered = computed = 0
         tasks = [(names.take(part.label, "object"), part) for part in parts]
@@ -133,7 +138,7 @@ def make_campus(
             notes += each.notes
             covered, computed = covered + each.covered, computed + each.computed
         progress(len(tasks), len(tasks), "objects")
-        clock.end("objects")
+        end("objects")
         campus = Campus(
             scene.space.origin,
             scene.space.metres,
@@ -145,26 +150,14 @@ def make_campus(
             tuple(textures),
         )
         put(INDEX, index_bytes(campus))
-    clock.end("writing")
-    return Made(campus, scene, tuple(notes), clock.seconds, covered, computed)
+    end("writing")
+    return Made(campus, scene, tuple(notes), seconds, covered, computed)
 
 
 def index_bytes(campus: Campus) -> bytes:
     """The bytes of campus.json."""
     text = json.dumps(campus.to_document(), indent=1, ensure_ascii=False, allow_nan=False)
     return f"{text}\n".encode("utf-8", "replace")
-
-
-@dataclass
-class _Clock:
-    """The duration of phases, seconds."""
-
-    seconds: dict[str, float] = field(default_factory=dict)
-    _since: float = field(default_factory=time.perf_counter)
-
-    def end(self, phase: str) -> None:
-        now = time.perf_counter()
-        self.seconds[phase], self._since = now - self._since, now
 
 
 def _bases(

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -42,29 +43,22 @@ _GRAIN = 0.8
 
 @dataclass(frozen=True)
 class Rays:
-    """The light of (T, 3, 3) faces by rays along (T, 3) unit normals; see `light`.
+    """The light by rays of (T, 3, 3) faces, on their (T,) sides: 1 for the front, -1 for the back;
+    see `light`.
 
     Faces up to ``error`` metres off the model's surface have its light.
     """
 
     around: Surroundings
-    normal: Floats
+    corner: Floats
     samples: int
     reach: float
     error: float = 0.0
+    side: Floats | float = 1.0
 
-    @staticmethod
-    def of(
-        around: Surroundings,
-        corner: Floats,
-        samples: int,
-        reach: float,
-        error: float = 0.0,
-        side: Floats | float = 1.0,
-    ) -> Rays:
-        """The light of faces on their (T,) sides: 1 for the front, -1 for the back."""
-        normal = normals(corner) * np.broadcast_to(side, len(corner))[:, None]
-        return Rays(around, normal, samples, reach, error)
+    @cached_property
+    def _normal(self) -> Floats:
+        return normals(self.corner) * np.broadcast_to(self.side, len(self.corner))[:, None]
 
     @property
     def grain(self) -> float:
@@ -72,7 +66,7 @@ class Rays:
         return _GRAIN / math.sqrt(self.samples)
 
     def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
-        normal = self.normal[face]
+        normal = self._normal[face]
         place = outermost(self.around, point, normal, self.error)
         return light(self.around, place, normal, turn, self.samples, self.reach)
 

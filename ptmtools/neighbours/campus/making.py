@@ -181,7 +181,7 @@ def _look(
     if (painted := work.painted) is not None:
         image = painted.image[faces]
         return Painted(finest, painted.uv[faces], image, painted.images, level.source)
-    return Rays.of(
+    return Rays(
         work.around,
         level.mesh.points[level.mesh.triangles],
         work.options.samples,

@@ -33,7 +33,7 @@ def test_thin_faces_show_their_own_light() -> None:
     atlas = unwrap(*indexed(corner))
     where = surroundings(corner, GROUND)
     face, point, at = samples(corner, atlas.uv, 4000)
-    light = Rays.of(where, corner, 256, 0.2)
+    light = Rays(where, corner, 256, 0.2)
     wanted = light(face, point, np.zeros(len(face)))
     assert np.ptp(wanted) > 0.5
     maps = bake(light, corner, atlas, light.grain)
@@ -45,7 +45,7 @@ def test_a_lightmap_of_a_house_on_the_ground() -> None:
     points, triangles = indexed(HOUSE)
     atlas = unwrap(points, triangles)
     where = surroundings(HOUSE, GROUND)
-    look = Rays.of(where, HOUSE, 64, 20.0)
+    look = Rays(where, HOUSE, 64, 20.0)
     maps = bake(look, HOUSE, atlas, look.grain)
     assert [len(m.value) for m in maps] == [512, 1024, 2048]
     normal = normals(HOUSE)
@@ -66,7 +66,7 @@ def test_larger_lightmaps_are_nearly_what_rays_say_everywhere(
     points, triangles = indexed(HOUSE)
     atlas = unwrap(points, triangles)
     where = surroundings(HOUSE, GROUND)
-    look = Rays.of(where, HOUSE, 64, 20.0)
+    look = Rays(where, HOUSE, 64, 20.0)
     (taken,) = bake(look, HOUSE, atlas, look.grain, (512,))
 
     def nothing(
@@ -88,7 +88,7 @@ def test_no_row_of_texels_lies_in_the_ground() -> None:
     points, triangles = indexed(HOUSE)
     atlas = unwrap(points, triangles)
     where = surroundings(HOUSE, GROUND)
-    look = Rays.of(where, HOUSE, 64, 20.0)
+    look = Rays(where, HOUSE, 64, 20.0)
     (found,) = bake(look, HOUSE, atlas, look.grain, (512,))
     assert found.value.min() > 0.4
 
@@ -151,7 +151,7 @@ def test_vertices_carry_the_light_of_their_faces() -> None:
 
 def test_a_corner_does_not_blacken_its_faces() -> None:
     where = surroundings(HOUSE, GROUND)
-    look = Rays.of(where, HOUSE, 64, 20.0)
+    look = Rays(where, HOUSE, 64, 20.0)
     found = vertex_light(look, HOUSE, normals(HOUSE))
     roof = normals(HOUSE)[:, 1] > 0.9
     assert found[roof].min() > 0.95

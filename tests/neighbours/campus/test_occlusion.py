@@ -81,7 +81,7 @@ def test_the_lighter_side_counts() -> None:
     assert open_sides(where, mixed, np.ones(2, bool), 20.0).tolist() == [1, -1]
     face, point = np.array([0]), sheet[0].mean(axis=0)[None]
     for side, least, most in ((-1.0, 0.9, 1.0), (1.0, 0.0, 0.2)):
-        found = Rays.of(where, sheet, 64, 20.0, side=side)(face, point, np.zeros(1))[0]
+        found = Rays(where, sheet, 64, 20.0, side=side)(face, point, np.zeros(1))[0]
         assert least <= found <= most
 
 
@@ -138,8 +138,8 @@ def test_a_coarse_face_beneath_the_surface_has_its_light() -> None:
     assert (normals(sheet)[:, 1] > 0).all()
     where = around(FLOOR)
     face, point = np.array([0]), sheet[0].mean(axis=0)[None]
-    assert Rays.of(where, sheet, 64, 20.0)(face, point, np.zeros(1))[0] < 0.2
-    assert Rays.of(where, sheet, 64, 20.0, 0.3)(face, point, np.zeros(1))[0] == 1.0
+    assert Rays(where, sheet, 64, 20.0)(face, point, np.zeros(1))[0] < 0.2
+    assert Rays(where, sheet, 64, 20.0, 0.3)(face, point, np.zeros(1))[0] == 1.0
 
 
 def test_sight_ends_at_what_is_before_it() -> None:
