@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "sample_data")]
 
 from ptmtools.neighbours.apo.files import streamed  # noqa: E402
-from ptmtools.neighbours.apo.making import Made, make_apo  # noqa: E402
+from ptmtools.neighbours.apo.making import ApoTexture, make_apo  # noqa: E402
 from ptmtools.neighbours.apo.model import ApoOptions  # noqa: E402
 from ptmtools.parallel import open_executor  # noqa: E402
 from ptmtools.pipeline.warm_up import warm_statue  # noqa: E402
@@ -48,7 +48,7 @@ def processor_time() -> float:
     return sum(each.ru_utime + each.ru_stime for each in used)
 
 
-def measure(file: Path, options: ApoOptions, jobs: int) -> tuple[Made, float, float]:
+def measure(file: Path, options: ApoOptions, jobs: int) -> tuple[ApoTexture, float, float]:
     """What is made of a file, the seconds that it takes, and those of processors."""
     scene = ingest(file, IngestOptions(up="y", unit="m"))
     began, used = time.perf_counter(), processor_time()
@@ -57,7 +57,7 @@ def measure(file: Path, options: ApoOptions, jobs: int) -> tuple[Made, float, fl
     return made, time.perf_counter() - began, processor_time() - used
 
 
-def row(name: str, made: Made, seconds: float, used: float) -> str:
+def row(name: str, made: ApoTexture, seconds: float, used: float) -> str:
     """Of the table."""
     size = len(streamed(made.octree.texels, made.octree)[0])
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
@@ -68,7 +68,7 @@ def row(name: str, made: Made, seconds: float, used: float) -> str:
     )
 
 
-def levels(name: str, made: Made) -> str:
+def levels(name: str, made: ApoTexture) -> str:
     """MB of each level, the first seven together as the paper has them."""
     _, found = streamed(made.octree.texels, made.octree)
     each = np.diff(found["ends"], prepend=0) / 1e6

@@ -58,7 +58,8 @@ class Rays:
 
     @cached_property
     def _normal(self) -> Floats:
-        return normals(self.corner) * np.broadcast_to(self.side, len(self.corner))[:, None]
+        side = np.broadcast_to(self.side, len(self.corner))
+        return np.asarray(normals(self.corner) * side[:, None])
 
     @property
     def grain(self) -> float:
