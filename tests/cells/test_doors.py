@@ -99,7 +99,7 @@ def found(scene: Scene, **options: object) -> list[str]:
     chosen = SubdivideOptions(**options)  # type: ignore[arg-type]
     tolerance = scene.tolerance.for_walls(chosen.wall_thickness)
     opaque = Opaque.of(scene, chosen)
-    doors, _ = Doors.recognise(scene, opaque, Structure.of_opaque(opaque, tolerance), chosen)
+    doors, _ = Doors.recognise(scene, opaque, Structure.of(opaque, tolerance), chosen)
     return [door.name for door in doors.leaves]
 
 

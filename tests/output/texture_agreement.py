@@ -15,7 +15,7 @@ from ptmtools.errors import PtmError
 from ptmtools.neighbours.apo.files import Stream, inflated
 from ptmtools.neighbours.apo.model import Octree
 from ptmtools.neighbours.apo.octree import fault_of
-from ptmtools.neighbours.apo.traversal import plain_look_up
+from ptmtools.neighbours.apo.traversal import look_up
 from ptmtools.neighbours.interlace import deinterlace, read_manifest
 from ptmtools.neighbours.interlace.steps import scaled
 from ptmtools.output.gltf_reader import ReadGlb, ReadMaterial, ReadPrimitive
@@ -187,4 +187,4 @@ def _bare(www: Path, row: Mapping[str, Any], q: Any) -> float:
     if not len(q) or fault_of(octree):
         return 0.0
     # The walk ends in an inner node where there is no texel.
-    return float((octree.texels[plain_look_up(octree, q).address, 3] > 0).mean())
+    return float((octree.texels[look_up(octree, q).address, 3] > 0).mean())
