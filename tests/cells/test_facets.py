@@ -147,7 +147,8 @@ def test_structural_names_hold_for_their_own_triangles_alone(quads) -> None:
     halves = [grid(8) * [0.5, 1, 1], grid(8) * [0.5, 1, 1] + [5, 0, 0]]
     faces = np.concatenate(halves)
     scene = scene_of(faces, objects=["a"] * 128 + ["b"] * 128)
-    structure = Structure.of(scene, SubdivideOptions(structural=("b",)), scene.tolerance)
+    options = SubdivideOptions(structural=("b",))
+    structure = Structure.of(Opaque.of(scene, options), scene.tolerance)
     assert len(structure.corners) == 4
     right = structure.corners.reshape(4, 9)[:, ::3].mean(axis=1) > 5
     assert np.array_equal(structure.forced, right)
