@@ -150,20 +150,14 @@ def campus(
             model, folder, options, reading, executor, force=force, progress=progress
         )
     scene_notes = exterior_notes(result.scene.notes)
-    if console.as_json:
-        seconds = {name: round(value, 3) for name, value in result.seconds.items()}
-        notes = [line(note) for note in scene_notes]
-        console.json(
-            {**record(result.campus), "seconds": seconds, "notes": [*notes, *result.notes]}
-        )
-        return
-    for warning in warnings(scene_notes):
-        console.warn(warning)
-    for note in result.notes:
-        console.warn(f"note: {note}")
-    if console.verbose:
-        for each in scene_notes:
-            console.warn(f"note: {line(each)}")
-    console.print(f"{folder}: {count(len(result.campus.files()) + 1, 'file')}")
-    for text in summary(result.campus):
-        console.print(text)
+    if not console.as_json:
+        shown = [*warnings(scene_notes), *(f"note: {note}" for note in result.notes)]
+        for text in shown + [f"note: {line(each)}" for each in scene_notes if console.verbose]:
+            console.warn(text)
+    document = {
+        **record(result.campus),
+        "seconds": {name: round(value, 3) for name, value in result.seconds.items()},
+        "notes": [*map(line, scene_notes), *result.notes],
+    }
+    head = f"{folder}: {count(len(result.campus.files()) + 1, 'file')}"
+    console.result(document, [head, *summary(result.campus)])

@@ -16,9 +16,8 @@ import os
 import re
 import unicodedata
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, cast
@@ -134,7 +133,7 @@ class ImageStore:
         for texture in textures:
             if (texture.read, None) not in self._examined:
                 pending.setdefault(texture.read, texture)
-        with _unwarned(), ThreadPoolExecutor(workers) as pool:
+        with warnings.catch_warnings(action="ignore"), ThreadPoolExecutor(workers) as pool:
             records = pool.map(lambda texture: _examine(texture, self.limit), pending.values())
             for done, (read, record) in enumerate(zip(pending, records, strict=True)):
                 progress(done, len(pending), "images")
@@ -175,7 +174,7 @@ class ImageStore:
         a miss, if it cannot be decoded."""
         key = texture.read, channel
         if key not in self._examined:
-            with _unwarned():
+            with warnings.catch_warnings(action="ignore"):
                 self._examined[key] = _examine(texture, self.limit, channel)
         if fault := self._examined[key].fault:
             self._findings.miss("PTM-N206", f"{texture.what}: {fault}", texture.place)
@@ -254,21 +253,13 @@ def is_plain(data: bytes, name: str, limit: int) -> bool:
     ``limit`` as in `ImageStore`. Raises LimitError PTM-L104.
     """
     try:
-        with _unwarned():
+        with warnings.catch_warnings(action="ignore"):
             opened = _decode(data, limit)
     except LimitError:
         raise
     except InputError:
         return False
     return not opened.has_transparency_data and name.endswith(f".{_suffix(opened.format or '')}")
-
-
-@contextmanager
-def _unwarned() -> Iterator[None]:
-    """Hides Pillow's warnings, in all threads; entered before these start."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        yield
 
 
 def _decode(data: bytes, limit: int) -> Image.Image:

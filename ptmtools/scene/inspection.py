@@ -18,26 +18,18 @@ from ptmtools.scene.up_axis import USUAL_UP, Candidate, NamedFaces, Up, candidat
 from ptmtools.texture.images.opening import opened
 from ptmtools.texture.model import Limits
 
-#: Format by suffix.
+#: Formats that are not called like their suffix.
 _FORMATS = {
     ".3ds": "3D Studio",
-    ".3mf": "3MF",
     ".ctm": "OpenCTM",
     ".dae": "COLLADA",
     ".glb": "glTF binary",
     ".gltf": "glTF",
-    ".ifc": "IFC",
     ".ifczip": "IFC",
     ".obj": "Wavefront OBJ",
-    ".off": "OFF",
-    ".ply": "PLY",
-    ".stl": "STL",
-    ".usd": "USD",
     ".usda": "USD",
     ".usdc": "USD",
-    ".usdz": "USDZ",
     ".wrl": "VRML",
-    ".x3d": "X3D",
 }
 
 
@@ -110,7 +102,7 @@ def inspect(
         triangles[scene.objects[index]] += count
     best, *others = _guesses(scene, USUAL_UP.get(suffix))
     return Inspection(
-        format=f"{_FORMATS.get(suffix, suffix)} {asset.get('version', '')}".strip(),
+        format=f"{_FORMATS.get(suffix, suffix[1:].upper())} {asset.get('version', '')}".strip(),
         generator=str(asset.get("generator", "")),
         bytes=path.stat().st_size,
         extensions={name: support_of(name) for name in sorted({*map(str, extensions)})},

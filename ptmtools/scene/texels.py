@@ -56,15 +56,13 @@ def uses_holes(
             low[:, axis] = np.clip(low[:, axis], 0, size - 1)
             high[:, axis] = np.clip(high[:, axis], 1, size)
             span[:, axis] = np.minimum(span[:, axis], 1.0)
-    if (span.prod(axis=1) > _MANY_TILES).any():
-        return True
-    # Shifted by whole repetitions, so that the numbers are small and exact.
-    for axis, size in enumerate((width, height)):
-        if wraps[axis] == "repeat":
+        else:  # shifted by whole repetitions, so that the numbers are small and exact
             shift = np.floor(low[:, axis] / size) * size
             low[:, axis] -= shift
             high[:, axis] -= shift
             texel[..., axis] -= shift[:, None]
+    if (span.prod(axis=1) > _MANY_TILES).any():
+        return True
 
     box = np.concatenate([low, high], axis=1).astype(np.int64)
     table = _table(holes)

@@ -6,7 +6,7 @@ one that installs without a compiler was a month old; the format is small and st
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,9 +31,10 @@ def decode(data: bytes, extension: Mapping[str, Any]) -> bytes:
     mode, filtered = extension["mode"], extension.get("filter", "NONE")
     stream = np.frombuffer(data, np.uint8)
     if mode == "ATTRIBUTES":
-        if stride not in _FILTERED.get(filtered, ()):
+        strides, restore = _FILTERS.get(filtered, ((), None))
+        if restore is None or stride not in strides:
             raise ValueError(f"meshopt filter {filtered!r} with a stride of {stride}")
-        return bytes(_FILTERS[filtered](_attributes(stream, count, stride)).tobytes())
+        return restore(_attributes(stream, count, stride)).tobytes()
     if filtered != "NONE" or stride not in (2, 4):
         raise ValueError(f"meshopt mode {mode} with filter {filtered} and a stride of {stride}")
     if mode == "TRIANGLES":
@@ -152,18 +153,12 @@ def _color(elements: NDArray[np.uint8]) -> NDArray[Any]:
     return np.clip(_rounded(values * (most / scale)[:, None]), 0, most).astype(kind)
 
 
-#: Valid strides by filter.
-_FILTERED = {
-    "NONE": range(4, 257, 4),
-    "OCTAHEDRAL": (4, 8),
-    "QUATERNION": (8,),
-    "EXPONENTIAL": range(4, 257, 4),
-    "COLOR": (4, 8),
-}
-_FILTERS = {
-    "NONE": lambda elements: elements,
-    "OCTAHEDRAL": _octahedral,
-    "QUATERNION": _quaternion,
-    "EXPONENTIAL": _exponential,
-    "COLOR": _color,
+_Filter = Callable[[NDArray[np.uint8]], NDArray[Any]]
+#: Valid strides and inverse of each filter.
+_FILTERS: dict[str, tuple[Sequence[int], _Filter]] = {
+    "NONE": (range(4, 257, 4), lambda elements: elements),
+    "OCTAHEDRAL": ((4, 8), _octahedral),
+    "QUATERNION": ((8,), _quaternion),
+    "EXPONENTIAL": (range(4, 257, 4), _exponential),
+    "COLOR": ((4, 8), _color),
 }
