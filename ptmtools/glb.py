@@ -14,7 +14,7 @@ then     length of the bytes, "BIN\0", the bytes, zeros up to 4;
 
 GLBs of one mesh, a buffer view for each array: those of campuses and octree textures.
 
-The cells of a database share arrays between their shapes; they have a writer of their own
+The cells of a database share arrays and buffer views between their shapes
 (`ptmtools.output.gltf`)."""
 
 from __future__ import annotations
@@ -123,8 +123,8 @@ class BufferWriter:
     def positions(self, point: NDArray[np.floating[Any]]) -> int:
         """(n, 3), with the bounds that glTF requires."""
         held = point.astype("<f4")
-        bounds = {"min": _numbers(held.min(axis=0)), "max": _numbers(held.max(axis=0))}
-        return self._attribute(held, bounds)
+        ends = {"min": held.min(axis=0), "max": held.max(axis=0)}
+        return self._attribute(held, {name: self._numbers(end) for name, end in ends.items()})
 
     def vectors(self, values: NDArray[np.floating[Any]]) -> int:
         """(n, 2) or (n, 3) of float32: texture coordinates, normals."""
@@ -156,6 +156,10 @@ class BufferWriter:
         self._size += len(self._parts[-1])
         return len(self._accessors) - 1
 
+    def _numbers(self, values: NDArray[np.float32]) -> list[float]:
+        """The shortest decimals that read back to the same float32."""
+        return [float(str(value)) for value in values]
+
     def members(self) -> dict[str, Any]:
         """The members "accessors", "bufferViews" and "buffers" of the document."""
         return {
@@ -186,8 +190,3 @@ def one_mesh(
     }
     text = json.dumps(document, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return glb([(JSON, text.encode("utf-8", "replace")), (BINARY, buffer.bytes())])
-
-
-def _numbers(values: NDArray[np.float32]) -> list[float]:
-    """The shortest decimals that read back to the same float32."""
-    return [float(str(value)) for value in values]

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import areas, summed
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
 from ptmtools.output.emitter import Emitter
@@ -111,11 +112,7 @@ class Geometry:
         count = np.diff(self.triangle_start)
         first = np.repeat(self.point_start[:-1], count)[:, None]
         corners = self.point[self.shape_point[first + self.triangle]].astype(np.float64)
-        edge = corners[:, 1:] - corners[:, :1]
-        area = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1) / 2
-        total = np.zeros(len(count))
-        np.add.at(total, np.repeat(np.arange(len(count)), count), area)
-        return total
+        return summed(np.repeat(np.arange(len(count)), count), areas(corners), len(count))
 
     def shape(self, s: int) -> Shape:
         """One shape."""

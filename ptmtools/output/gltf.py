@@ -44,107 +44,85 @@ from numpy.typing import NDArray
 
 from ptmtools import schemas
 from ptmtools.errors import LimitError
-from ptmtools.glb import BINARY, JSON, glb, glb_chunks
+from ptmtools.glb import (
+    BINARY,
+    COMPONENTS,
+    FLOAT,
+    INT,
+    ITEMS,
+    JSON,
+    SHORT,
+    BufferWriter,
+    glb,
+    glb_chunks,
+)
 from ptmtools.output.content import Content, Geometry, Shape
 from ptmtools.output.model import FileError, TextureRecord, shaped
 from ptmtools.output.names import GLTF_FILES, UP, cell_name, path_of
 from ptmtools.scene.colors import packed, to_linear, unpacked
 from ptmtools.scene.model import Material, Scene, Wrap
 
-_FLOAT, _SHORT, _INT = 5126, 5123, 5125
-_VERTICES, _INDICES = 34962, 34963
-#: Narrow indices end before 65535, which restarts a primitive.
-_NARROW = 65535
-#: In the order of the views: component type, type, bytes of an element, target.
-_KINDS = (
-    (_FLOAT, "VEC3", 12, _VERTICES),
-    (_FLOAT, "VEC2", 8, _VERTICES),
-    (_SHORT, "VEC4", 8, _VERTICES),
-    (_INT, "SCALAR", 4, _INDICES),
-    (_SHORT, "SCALAR", 2, _INDICES),
-)
-_POSITION, _COORDINATE, _COLOR, _WIDE, _THIN = range(5)
+#: In the order of the views: component type and type.
+_KINDS = ((FLOAT, "VEC3"), (FLOAT, "VEC2"), (SHORT, "VEC4"), (INT, "SCALAR"), (SHORT, "SCALAR"))
 #: Whole numbers below this are written without the ".0" that Python gives them.
 _WHOLE = 1e15
 
 
-class BufferWriter:
-    """Gathers arrays; each method returns the index of the array's accessor."""
+class CellBufferWriter(BufferWriter):
+    """Gathers the arrays of one cell: one view for each kind, one accessor for equal arrays."""
 
     def __init__(self) -> None:
-        self._bytes: tuple[list[bytes], ...] = ([], [], [], [], [])
-        self._size = [0, 0, 0, 0, 0]
-        self._accessors: list[dict[str, Any]] = []
+        super().__init__()
         self._known: dict[tuple[int, bytes], int] = {}
+        self._of_kind: tuple[list[bytes], ...] = tuple([] for _ in _KINDS)
+        self._sizes = [0] * len(_KINDS)
+        self._targets = [0] * len(_KINDS)
 
-    def positions(self, point: NDArray[np.float32]) -> int:
-        """(n, 3), with the bounds that glTF requires."""
-        bounds = {
-            "min": _numbers(point.min(axis=0)),
-            "max": _numbers(point.max(axis=0)),
-        }
-        return self._add(_POSITION, point.astype("<f4").tobytes(), bounds)
-
-    def coordinates(self, uv: NDArray[np.float32]) -> int:
-        """(n, 2)."""
-        return self._add(_COORDINATE, uv.astype("<f4").tobytes(), {})
-
-    def colors(self, light: NDArray[np.float64]) -> int:
-        """(n, 3) linear light from 0 to 1; 16 bits, as 8 would be too few in the dark."""
-        rgba = np.full((len(light), 4), 65535, "<u2")
-        rgba[:, :3] = np.rint(65535 * light)
-        return self._add(_COLOR, rgba.tobytes(), {"normalized": True})
-
-    def indices(self, triangle: NDArray[np.int64], vertices: int) -> int:
-        """(m, 3) indices into ``vertices`` vertices."""
-        kind, form = (_THIN, "<u2") if vertices <= _NARROW else (_WIDE, "<u4")
-        return self._add(kind, triangle.astype(form).tobytes(), {})
-
-    def _add(self, kind: int, data: bytes, more: dict[str, Any]) -> int:
+    def _append(self, accessor: dict[str, Any], data: bytes, target: int) -> int:
+        kind = _KINDS.index((accessor["componentType"], accessor["type"]))
         place = self._known.setdefault((kind, data), len(self._accessors))
         if place == len(self._accessors):
-            component, form, size, _ = _KINDS[kind]
-            accessor: dict[str, Any] = {"bufferView": kind}
-            if self._size[kind]:
-                accessor["byteOffset"] = self._size[kind]
-            accessor |= {"componentType": component, "count": len(data) // size, "type": form}
-            self._accessors.append(accessor | more)
-            self._bytes[kind].append(data)
-            self._size[kind] += len(data)
+            begin = {"byteOffset": self._sizes[kind]} if self._sizes[kind] else {}
+            self._accessors.append({"bufferView": kind} | begin | accessor)
+            self._of_kind[kind].append(data)
+            self._sizes[kind] += len(data)
+            self._targets[kind] = target
         return place
 
-    def finish(self) -> tuple[dict[str, Any], bytes]:
-        """The members "accessors", "bufferViews" and "buffers" of the document, and the bytes."""
-        if not self._accessors:
-            return {}, b""
+    def _numbers(self, values: NDArray[np.float32]) -> list[float]:
+        shortest = super()._numbers(values)
+        return [int(v) if v.is_integer() and abs(v) < _WHOLE else v for v in shortest]
+
+    def members(self) -> dict[str, Any]:
+        """The members "accessors", "bufferViews" and "buffers" of the document; none without
+        arrays."""
         views: list[dict[str, Any]] = []
         place: dict[int, int] = {}
         at = 0
-        for kind, (_, _, size, target) in enumerate(_KINDS):
-            if not self._size[kind]:
+        for kind, (component, form) in enumerate(_KINDS):
+            if not self._sizes[kind]:
                 continue
             place[kind] = len(views)
-            view: dict[str, Any] = {"buffer": 0}
-            if at:
-                view["byteOffset"] = at
-            view["byteLength"] = self._size[kind]
+            view: dict[str, Any] = {"buffer": 0} | ({"byteOffset": at} if at else {})
+            view["byteLength"] = self._sizes[kind]
             # Vertex data that several accessors share must have it, indices must not.
-            if target == _VERTICES and len(self._bytes[kind]) > 1:
-                view["byteStride"] = size
-            views.append(view | {"target": target})
-            at += self._size[kind]
-        members = {
-            "accessors": [a | {"bufferView": place[a["bufferView"]]} for a in self._accessors],
-            "bufferViews": views,
-            "buffers": [{"byteLength": at}],
-        }
-        return members, b"".join(part for parts in self._bytes for part in parts)
+            if form != "SCALAR" and len(self._of_kind[kind]) > 1:
+                view["byteStride"] = ITEMS[form] * np.dtype(COMPONENTS[component]).itemsize
+            views.append(view | {"target": self._targets[kind]})
+            at += self._sizes[kind]
+        return (
+            {}
+            if not views
+            else {
+                "accessors": [a | {"bufferView": place[a["bufferView"]]} for a in self._accessors],
+                "bufferViews": views,
+                "buffers": [{"byteLength": at}],
+            }
+        )
 
-
-def _numbers(values: NDArray[np.float32]) -> list[float]:
-    """As the shortest decimals that read back to the same float32."""
-    shortest = [float(str(v)) for v in values]
-    return [int(v) if v.is_integer() and abs(v) < _WHOLE else v for v in shortest]
+    def bytes(self) -> bytes:
+        """All arrays."""
+        return b"".join(part for parts in self._of_kind for part in parts)
 
 
 _LARGEST = 2**32 - 1
@@ -293,7 +271,7 @@ def flipped(uv: NDArray[np.floating]) -> NDArray[np.float32]:
 
 
 def _glb(content: Content, cell: int) -> bytes:
-    scene, geometry, buffer = content.scene, content.geometry, BufferWriter()
+    scene, geometry, buffer = content.scene, content.geometry, CellBufferWriter()
     materials = MaterialWriter(scene.materials, content.records, content.options.fallback)
     nodes: list[dict[str, Any]] = []
     node: dict[str, Any]
@@ -318,8 +296,7 @@ def _glb(content: Content, cell: int) -> bytes:
     }
     if nodes:
         document |= {"nodes": nodes, "meshes": meshes}
-    members, binary = buffer.finish()
-    return pack(document | materials.members() | members, binary)
+    return pack(document | materials.members() | buffer.members(), buffer.bytes())
 
 
 def _primitive(
@@ -341,9 +318,12 @@ def _primitive(
     attributes = {"POSITION": buffer.positions(geometry.point[shape.point[vertex // width]])}
     if textured:
         uv = geometry.uv[shape.uv[vertex % width]]
-        attributes["TEXCOORD_0"] = buffer.coordinates(flipped(uv))
+        attributes["TEXCOORD_0"] = buffer.vectors(flipped(uv))
     if color is not None:
-        attributes["COLOR_0"] = buffer.colors(to_linear(color / 255))
+        # 8 bits of linear light would be too few in the dark.
+        rgba = np.full((len(color), 4), 65535, "<u2")
+        rgba[:, :3] = np.rint(65535 * to_linear(color / 255))
+        attributes["COLOR_0"] = buffer.shares(rgba)
     return {
         "attributes": attributes,
         "indices": buffer.indices(triangle, len(vertex)),

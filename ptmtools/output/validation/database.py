@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -100,7 +100,7 @@ def validate_ptm(path: str | os.PathLike[str], *, limits: Limits = _LIMITS) -> V
 
 
 @dataclass
-class FileReading:
+class _Reading:
     """The result of reading one file.
 
     Attributes
@@ -113,92 +113,6 @@ class FileReading:
     findings: Findings
     size: int | None = None
     content: object | None = None
-
-
-@dataclass(frozen=True)
-class FileReader:
-    """Reads the files of a database; its method may be called from several threads.
-
-    Attributes
-    ----------
-    folder: of the database.
-    outputs: the stages' files, relative to the database, with their hashes.
-    served: the served files, relative to the served folder.
-    limits: larger files are only hashed.
-    """
-
-    folder: Path
-    outputs: Mapping[str, str]
-    served: Collection[str]
-    limits: Limits
-
-    def read(self, name: str) -> FileReading:
-        """Reads a file, named relative to the database."""
-        findings = Findings(CODES)
-        reading, at = FileReading(findings), findings.at(name)
-        if name.startswith(f"{SERVED}/") and not self._is_served(name):
-            # `served_files` has reported what exists and is no file.
-            if not os.path.lexists(self.folder / name):
-                at.add("PTM-D651", "missing")
-            return reading
-        try:
-            size, data, digest = self._content(name)
-        except FileNotFoundError:
-            at.add("PTM-D651", "missing")
-            return reading
-        except OSError as fault:
-            at.add("PTM-D651", f"cannot be read ({fault.strerror or fault})")
-            return reading
-        reading.size = size
-        if self.outputs and name not in self.outputs:
-            at.add("PTM-D653", "no stage wrote this file")
-        elif self.outputs.get(name, digest) != digest:
-            at.add("PTM-D652", "the hash differs from the manifest's")
-        if data is None:
-            at.add("PTM-D713", f"{size} bytes")
-        elif name.startswith(f"{SERVED}/"):
-            with np.errstate(all="ignore"):  # which each thread has of its own
-                reading.content = self._parse(name, data, at)
-        return reading
-
-    def _content(self, name: str) -> tuple[int, bytes | None, str]:
-        """(size, bytes, SHA-256) of a file; no bytes beyond the limit."""
-        with open_regular(self.folder / name) as file:
-            size = os.fstat(file.fileno()).st_size
-            if size <= self.limits.decoded_bytes:
-                data = file.read(size)
-                return len(data), data, hashlib.sha256(data).hexdigest()
-            digest = hashlib.sha256()
-            while piece := file.read(_PIECE):
-                digest.update(piece)
-            return size, None, digest.hexdigest()
-
-    def _parse(self, name: str, data: bytes, at: Place) -> object | None:
-        stem, suffix = os.path.splitext(name)
-        path = name.removeprefix(f"{SERVED}/")
-        emitter = owner_of(path)
-        if suffix == GZIP:
-            check_gzip(data, self._neighbour(stem), at)
-        elif suffix == ".png" and emitter is None:
-            return read_png(data, self.limits, at)
-        elif suffix == ".ptm":
-            return read_ptm(data, self.limits, at)
-        elif emitter and emitter.reader:
-            try:
-                return emitter.reader.load()(path, data)
-            except FileError as fault:
-                at.add(fault.code, fault.message, fault.place)
-        return None
-
-    def _is_served(self, name: str) -> bool:
-        return name.removeprefix(f"{SERVED}/") in self.served
-
-    def _neighbour(self, name: str) -> bytes | None:
-        """The bytes of another served file, if it exists and can be read."""
-        try:
-            return self._content(name)[1] if self._is_served(name) else None
-        except OSError:
-            return None
 
 
 class _Check:
@@ -215,15 +129,17 @@ class _Check:
         self._stages: dict[str, dict[str, Any]] = {}
         #: Name relative to the database → hash in the manifest.
         self._outputs: dict[str, str] = {}
+        #: The served files that are checked, relative to the served folder.
+        self._ours: set[str] = set()
 
     def run(self, progress: Progress, workers: int) -> None:
         self._read_manifest()
         served = served_files(self._folder / SERVED, self.findings)
         check_names(served, self.findings)
         database = ServedDatabase(self._folder / SERVED, served, self.findings, self._limits)
-        ours = {path for path in served if self._is_ours(path)}
+        ours = self._ours = {path for path in served if self._is_ours(path)}
         self._note_foreign([path for path in served if path not in ours])
-        self._read_files(ours, database, progress, workers)
+        self._read_files(database, progress, workers)
         if _EMIT not in self._stages and not any(e.entry in ours for e in all_emitters()):
             database.at(HINTS).add("PTM-D655", f"the stage `{_EMIT}` has not run")
             return
@@ -284,14 +200,11 @@ class _Check:
         except (KeyError, ValueError):
             return present or chosen_emitters(EmitOptions().format)
 
-    def _read_files(
-        self, ours: Collection[str], database: ServedDatabase, progress: Progress, workers: int
-    ) -> None:
+    def _read_files(self, database: ServedDatabase, progress: Progress, workers: int) -> None:
         from ptmtools.parallel import ordered
 
-        reader = FileReader(self._folder, self._outputs, ours, self._limits)
-        names = sorted({*self._outputs, *(f"{SERVED}/{path}" for path in ours)})
-        for i, reading in enumerate(ordered(reader.read, names, workers)):
+        names = sorted({*self._outputs, *(f"{SERVED}/{path}" for path in self._ours)})
+        for i, reading in enumerate(ordered(self._read, names, workers)):
             progress(i, len(names), "files")
             self.findings.take(reading.findings.issues())
             if reading.size is None:
@@ -301,3 +214,71 @@ class _Check:
             if reading.content is not None:
                 database.contents[names[i].removeprefix(f"{SERVED}/")] = reading.content
         progress(len(names), len(names), "files")
+
+    def _read(self, name: str) -> _Reading:
+        """Reads a file, named relative to the database; called from several threads."""
+        findings = Findings(CODES)
+        reading, at = _Reading(findings), findings.at(name)
+        if name.startswith(f"{SERVED}/") and not self._is_served(name):
+            # `served_files` has reported what exists and is no file.
+            if not os.path.lexists(self._folder / name):
+                at.add("PTM-D651", "missing")
+            return reading
+        try:
+            size, data, digest = self._content(name)
+        except FileNotFoundError:
+            at.add("PTM-D651", "missing")
+            return reading
+        except OSError as fault:
+            at.add("PTM-D651", f"cannot be read ({fault.strerror or fault})")
+            return reading
+        reading.size = size
+        if self._outputs and name not in self._outputs:
+            at.add("PTM-D653", "no stage wrote this file")
+        elif self._outputs.get(name, digest) != digest:
+            at.add("PTM-D652", "the hash differs from the manifest's")
+        if data is None:
+            at.add("PTM-D713", f"{size} bytes")
+        elif name.startswith(f"{SERVED}/"):
+            with np.errstate(all="ignore"):  # which each thread has of its own
+                reading.content = self._parse(name, data, at)
+        return reading
+
+    def _content(self, name: str) -> tuple[int, bytes | None, str]:
+        """(size, bytes, SHA-256) of a file; no bytes beyond the limit."""
+        with open_regular(self._folder / name) as file:
+            size = os.fstat(file.fileno()).st_size
+            if size <= self._limits.decoded_bytes:
+                data = file.read(size)
+                return len(data), data, hashlib.sha256(data).hexdigest()
+            digest = hashlib.sha256()
+            while piece := file.read(_PIECE):
+                digest.update(piece)
+            return size, None, digest.hexdigest()
+
+    def _parse(self, name: str, data: bytes, at: Place) -> object | None:
+        stem, suffix = os.path.splitext(name)
+        path = name.removeprefix(f"{SERVED}/")
+        emitter = owner_of(path)
+        if suffix == GZIP:
+            check_gzip(data, self._neighbour(stem), at)
+        elif suffix == ".png" and emitter is None:
+            return read_png(data, self._limits, at)
+        elif suffix == ".ptm":
+            return read_ptm(data, self._limits, at)
+        elif emitter and emitter.reader:
+            try:
+                return emitter.reader.load()(path, data)
+            except FileError as fault:
+                at.add(fault.code, fault.message, fault.place)
+        return None
+
+    def _is_served(self, name: str) -> bool:
+        return name.removeprefix(f"{SERVED}/") in self._ours
+
+    def _neighbour(self, name: str) -> bytes | None:
+        """The bytes of another served file, if it exists and can be read."""
+        try:
+            return self._content(name)[1] if self._is_served(name) else None
+        except OSError:
+            return None

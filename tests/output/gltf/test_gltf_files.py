@@ -17,7 +17,7 @@ from hypothesis import given, strategies as st
 
 from ptmtools.errors import InputError, LimitError, OutputError
 from ptmtools.output import EmitOptions, validate_database
-from ptmtools.output.gltf import BufferWriter, linear, pack, unpack
+from ptmtools.output.gltf import CellBufferWriter, linear, pack, unpack
 from ptmtools.output.vrml_reader import Node, parse
 from ptmtools.scene.model import Material
 from tests.output.agreement import disagreements
@@ -260,13 +260,13 @@ def test_vrml_alone(artifacts: Any, tmp_path: Path, emit_gltf: EmitGltf) -> None
 
 
 def test_same_arrays_have_one_accessor() -> None:
-    buffer = BufferWriter()
+    buffer = CellBufferWriter()
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
     index = np.array([[0, 1, 2], [0, 2, 3]])
     assert [buffer.positions(square), buffer.positions(square * 2)] == [0, 1]
     assert [buffer.indices(index, 4), buffer.indices(index, 9)] == [2, 2]
     assert buffer.positions(square) == 0
-    members, binary = buffer.finish()
+    members, binary = buffer.members(), buffer.bytes()
     assert [view["byteLength"] for view in members["bufferViews"]] == [96, 12]
     assert [view.get("byteStride") for view in members["bufferViews"]] == [12, None]
     assert members["accessors"][1]["byteOffset"] == 48
@@ -277,23 +277,23 @@ def test_same_arrays_have_one_accessor() -> None:
 @pytest.mark.parametrize(("vertices", "component", "size"), [(65535, 5123, 2), (65536, 5125, 4)])
 def test_indices_are_wide_where_they_must(vertices: int, component: int, size: int) -> None:
     """65535 restarts a primitive, so it is no index of 16 bits."""
-    buffer = BufferWriter()
+    buffer = CellBufferWriter()
     buffer.indices(np.array([[0, 1, vertices - 1]]), vertices)
-    members, binary = buffer.finish()
+    members, binary = buffer.members(), buffer.bytes()
     assert members["accessors"][0]["componentType"] == component
     assert np.frombuffer(binary, f"<u{size}").tolist() == [0, 1, vertices - 1]
 
 
 def test_wide_and_narrow_indices_beside_each_other() -> None:
     """Wide ones go first, so that both are aligned whatever their number."""
-    buffer = BufferWriter()
+    buffer = CellBufferWriter()
     point = np.zeros((1, 3), np.float32)
     places = [
         buffer.positions(point),
         buffer.indices(np.array([[0, 0, 0]]), 1),
         buffer.indices(np.array([[1, 2, 70000]]), 70001),
     ]
-    members, binary = buffer.finish()
+    members, binary = buffer.members(), buffer.bytes()
     starts = [
         members["bufferViews"][members["accessors"][i]["bufferView"]].get("byteOffset", 0)
         for i in places
