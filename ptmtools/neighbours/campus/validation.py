@@ -23,16 +23,15 @@ from ptmtools.neighbours.campus.model import (
     TextureFile,
     texture_file,
 )
-from ptmtools.neighbours.campus.reading import LONGEST, parse_campus
+from ptmtools.neighbours.campus.reading import LONGEST, read_campus
 from ptmtools.texture.model import Limits
 
 
 def check_campus(folder: Path, limits: Limits) -> ValidationReport:
     """Checks a campus; all faults are in the report."""
     check = _Check(folder, limits)
-    data = check.bytes_of(INDEX, "PTM-D800", LONGEST)
-    if data is not None:
-        check.index(data)
+    if check.bytes_of(INDEX, "PTM-D800", LONGEST) is not None:
+        check.index()
     return ValidationReport(check.findings.issues(), check.files, check.bytes)
 
 
@@ -57,9 +56,10 @@ class _Check:
         self.bytes += len(data)
         return data
 
-    def index(self, data: bytes) -> None:
+    def index(self) -> None:
+        """Checks the index and all files."""
         try:
-            campus = parse_campus(data, self._folder / INDEX)
+            campus = read_campus(self._folder)
         except PtmError as fault:
             self.findings.add("PTM-D800", INDEX, fault.place or "", fault.message)
             return
