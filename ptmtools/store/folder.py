@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ from ptmtools.errors import DatabaseError, Rebuild
 from ptmtools.files import open_regular
 from ptmtools.store.digests import Digests
 from ptmtools.store.layout import MANIFEST, arrays_of, sha256
-from ptmtools.store.manifest import Manifest, StageRecord, damaged_manifest
+from ptmtools.store.manifest import Manifest, StageRecord, damaged_manifest, listed_before
 
 if TYPE_CHECKING:
     import numpy as np
@@ -149,3 +150,12 @@ def read_manifest(folder: Path) -> Manifest | None:
             "PTM-D001", f"cannot be read ({fault.strerror or fault})", file=file
         ) from fault
     return Manifest.from_bytes(data, file=file)
+
+
+def last_manifest(folder: Path) -> Manifest | None:
+    """As `read_manifest`, also of an earlier schema, see `listed_before`; None if it is damaged."""
+    with suppress(DatabaseError):
+        return read_manifest(folder)
+    with suppress(OSError), open_regular(folder / MANIFEST) as stream:
+        return listed_before(stream.read())
+    return None

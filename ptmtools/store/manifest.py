@@ -25,7 +25,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from os import PathLike
-from typing import Any, NamedTuple
+from typing import Any
 
 from ptmtools import schemas
 from ptmtools.errors import DatabaseError, Rebuild
@@ -63,7 +63,7 @@ class Manifest:
     ----------
     model: the file's name.
     stages: by name.
-    replaced: the schema of the earlier manifest that this one replaces; not written.
+    replaced: the earlier schema of this manifest, or of the one that it replaces; not written.
     """
 
     model: str
@@ -129,20 +129,11 @@ class Manifest:
         )
 
 
-class Earlier(NamedTuple):
-    """A manifest of an earlier schema: the schema, the model, the listed files, and the stages,
-    whose records have only a recipe and parameters, both unchecked."""
+def listed_before(data: bytes) -> Manifest | None:
+    """Reads a manifest of an earlier schema, its `replaced`; None if it is no such manifest.
 
-    schema: int
-    model: str
-    outputs: set[str]
-    stages: Mapping[str, StageRecord]
-
-
-def listed_before(data: bytes) -> Earlier | None:
-    """Reads a manifest of an earlier schema; None if it is no such manifest.
-
-    It tells which files of the folder belong to the database, and how it was built.
+    It tells which files of the folder belong to the database, and how it was built: the records
+    have only outputs, without digests, and a recipe and parameters, both unchecked.
     """
     try:
         document = json.loads(data)
@@ -150,14 +141,11 @@ def listed_before(data: bytes) -> Earlier | None:
         earlier = type(schema) is int and 0 < schema < SCHEMA
         if document["format"] != FORMAT or not earlier or not isinstance(model, str):
             return None
-        stages = document["stages"]
-        listed = [path for stage in stages.values() for path in stage["outputs"]]
-        outputs = {path for path in listed if isinstance(path, str) and _is_output(path)}
-        records = {
-            name: StageRecord(stage.get("recipe"), stage.get("parameters"), {}, {})
-            for name, stage in stages.items()
-        }
-        return Earlier(schema, model, outputs, records)
+        records = {}
+        for name, stage in document["stages"].items():
+            outputs = {path: "" for path in stage["outputs"] if _is_output(path)}
+            records[name] = StageRecord(stage.get("recipe"), stage.get("parameters"), {}, outputs)
+        return Manifest(model, records, schema)
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
 
@@ -170,8 +158,10 @@ def _nested(value: object, deepest: int) -> bool:
     return deepest == 0 or any(_nested(each, deepest - 1) for each in inner)
 
 
-def _is_output(path: str) -> bool:
+def _is_output(path: object) -> bool:
     """Whether a path is one that stages write: in one of their folders, on every system."""
+    if not isinstance(path, str):
+        return False
     folder, _, name = path.partition("/")
     return folder in WRITTEN and name != "" and leads_inside(path)
 

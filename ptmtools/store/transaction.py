@@ -22,11 +22,11 @@ from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING
 
-from ptmtools.errors import DatabaseError, OutputError
+from ptmtools.errors import OutputError
 from ptmtools.files import real_file, real_folder, write_bytes, writing
-from ptmtools.store.folder import DatabaseFolder, read_manifest
+from ptmtools.store.folder import DatabaseFolder, last_manifest
 from ptmtools.store.layout import MANIFEST, STAGING, arrays_of, sha256
-from ptmtools.store.manifest import Manifest, StageRecord, listed_before
+from ptmtools.store.manifest import Manifest, StageRecord
 
 if TYPE_CHECKING:
     import numpy as np
@@ -203,29 +203,16 @@ def _complete(folder: Path, relative: str) -> None:
     with writing(folder):
         data = (staging / MANIFEST).read_bytes()
         after = Manifest.from_bytes(data, file=staging / MANIFEST).outputs()
-        before = _listed(folder)
+        before = last_manifest(folder)
         for name in after:
             parent, _, base = name.rpartition("/")
             if source := real_file(staging, name):
                 source.replace(real_folder(folder, parent) / base)
-        for name in before:
+        for name in before.outputs() if before else ():
             if name not in after:
                 _remove(folder, name)
         (staging / MANIFEST).replace(folder / MANIFEST)
         shutil.rmtree(staging)  # not its parent, where another transaction may begin
-
-
-def _listed(folder: Path) -> Iterable[str]:
-    """The files listed in the manifest of a database, also in one of an earlier schema; none if it
-    is damaged."""
-    try:
-        manifest = read_manifest(folder)
-    except DatabaseError:
-        with suppress(OSError):
-            earlier = listed_before((folder / MANIFEST).read_bytes())
-            return sorted(earlier.outputs) if earlier else ()
-        return ()
-    return manifest.outputs() if manifest else ()
 
 
 def _remove(folder: Path, name: str) -> None:

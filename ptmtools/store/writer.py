@@ -24,9 +24,9 @@ from threading import Lock
 
 from ptmtools.errors import DatabaseError, InputError, OutputError
 from ptmtools.files import open_regular, writing
-from ptmtools.store.folder import DatabaseFolder, read_manifest
+from ptmtools.store.folder import DatabaseFolder, last_manifest, read_manifest
 from ptmtools.store.layout import LOCK, MANIFEST, STAGING
-from ptmtools.store.manifest import Manifest, listed_before
+from ptmtools.store.manifest import Manifest
 from ptmtools.store.transaction import Transaction, discard, recover
 
 
@@ -117,10 +117,10 @@ def admitted(folder: Path, model: str, *, force: bool) -> Manifest:
     try:
         manifest = read_manifest(folder)
     except DatabaseError:
-        earlier = listed_before((folder / MANIFEST).read_bytes())
+        earlier = last_manifest(folder)
         if not force and (earlier is None or earlier.model != model):
             raise
-        return Manifest(model, replaced=earlier and earlier.schema)
+        return Manifest(model, replaced=earlier.replaced if earlier else None)
     if manifest and manifest.model == model:
         return manifest
     if manifest and not force:
