@@ -100,6 +100,9 @@ class Ach:
         n = len(value)
         start = stored.starts("start", None, n)
         cells = len(start) - 1
+        reals = {name: stored.array(name, np.float64, n) for name in ("error", "p95", "seen")}
+        bounds = ("missed", "uncertain", "unseen_below", "floor")
+        reals |= {name: stored.array(name, np.float64, cells) for name in bounds}
         textures = stored.indices("texture", np.int32, None, low=-1, high=1 << 31)
         texture_start = stored.array("texture_start", np.int64, None)
         if len(texture_start) or len(textures):
@@ -108,16 +111,10 @@ class Ach:
             start=start,
             value=value,
             pixels=stored.array("pixels", np.float64, n, finite=True),
-            error=stored.array("error", np.float64, n),
-            p95=stored.array("p95", np.float64, n),
-            seen=stored.array("seen", np.float64, n),
             views=stored.array("views", np.float64, n, 6),
-            missed=stored.array("missed", np.float64, cells),
             samples=stored.array("samples", np.int32, cells),
             rejected=stored.array("rejected", np.int32, cells),
-            uncertain=stored.array("uncertain", np.float64, cells),
-            unseen_below=stored.array("unseen_below", np.float64, cells),
-            floor=stored.array("floor", np.float64, cells),
+            **reals,
             texture_start=texture_start,
             texture=textures,
             texture_value=stored.array("texture_value", np.float64, len(textures)),

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ptmtools.arrays import Bits, Ints
-from ptmtools.portal_flow.storage import DoubleDoublePortals, DoubleDoubleScratch, Geometry, Scratch
+from ptmtools.portal_flow.storage import DDPortals, DDScratch, Geometry, Scratch
 from ptmtools.tolerance import Tolerance
 
 #: Vertices that clipping may add to a portal before it is left unclipped.
@@ -28,14 +28,14 @@ class SequenceTest:
 
     def __init__(self, geometry: Geometry) -> None:
         self._geometry = geometry
-        self._portals = DoubleDoublePortals(
+        self._portals = DDPortals(
             np.zeros(geometry.point.shape, complex), geometry.start, geometry.normal
         )
         self._loaded = np.zeros(len(geometry.start) - 1, dtype=np.bool_)
         _, self._exponent = math.frexp(float(np.abs(geometry.point).max(initial=0.0)))
         self._noise = Tolerance.for_points(geometry.point).noise
         vertices = int(np.diff(geometry.start).max(initial=0)) + GROWTH
-        self._scratch = DoubleDoubleScratch(
+        self._scratch = DDScratch(
             polygon=np.zeros((4, vertices, 3), complex),
             size=np.zeros(4, np.int64),
             cuts=np.zeros(4, np.int64),

@@ -25,7 +25,7 @@ import numpy as np
 
 from ptmtools.arrays import Ints
 from ptmtools.jit import plain_kernel as kernel
-from ptmtools.portal_flow.storage import DoubleDoublePortals, DoubleDoubleScratch
+from ptmtools.portal_flow.storage import DDPortals, DDScratch
 
 #: Bound of the error of a product of vectors and of a vertex newly cut.
 ERROR = 2.0**-99
@@ -112,7 +112,7 @@ def greater(a: complex, b: complex) -> bool:
 
 
 @kernel
-def side(s: DoubleDoubleScratch, row: int, i: int, slot: int, k: int) -> complex:
+def side(s: DDScratch, row: int, i: int, slot: int, k: int) -> complex:
     """n·x + d of plane i of a row and vertex k of a polygon."""
     total: complex = s.plane[row, i, 3]
     for a in range(3):
@@ -121,7 +121,7 @@ def side(s: DoubleDoubleScratch, row: int, i: int, slot: int, k: int) -> complex
 
 
 @kernel
-def clip(s: DoubleDoubleScratch, row: int, count: int, slot: int) -> bool:
+def clip(s: DDScratch, row: int, count: int, slot: int) -> bool:
     """Keeps the part of a polygon in all half-spaces of a row, in place; returns whether it is not
     empty."""
     polygon = s.polygon
@@ -155,7 +155,7 @@ def clip(s: DoubleDoubleScratch, row: int, count: int, slot: int) -> bool:
 
 
 @kernel
-def move(s: DoubleDoubleScratch, source: int, target: int, count: int) -> None:
+def move(s: DDScratch, source: int, target: int, count: int) -> None:
     """Puts the first vertices of one polygon into the place of another."""
     for i in range(count):
         for a in range(3):
@@ -164,7 +164,7 @@ def move(s: DoubleDoubleScratch, source: int, target: int, count: int) -> None:
 
 
 @kernel
-def load(g: DoubleDoublePortals, s: DoubleDoubleScratch, k: int, slot: int) -> None:
+def load(g: DDPortals, s: DDScratch, k: int, slot: int) -> None:
     """Puts the polygon of portal k into a slot."""
     first = g.start[k]
     s.size[slot], s.cuts[slot] = g.start[k + 1] - first, 0
@@ -175,14 +175,7 @@ def load(g: DoubleDoublePortals, s: DoubleDoubleScratch, k: int, slot: int) -> N
 
 @kernel
 def separators_through(
-    g: DoubleDoublePortals,
-    s: DoubleDoubleScratch,
-    a: int,
-    q: int,
-    b: int,
-    flip: bool,
-    row: int,
-    count: int,
+    g: DDPortals, s: DDScratch, a: int, q: int, b: int, flip: bool, row: int, count: int
 ) -> int:
     """Appends to a row the planes that separate polygons ``a`` and ``b`` through the edges of a.
 
@@ -253,7 +246,7 @@ def separators_through(
 
 
 @kernel
-def own_plane(g: DoubleDoublePortals, s: DoubleDoubleScratch, q: int, row: int) -> None:
+def own_plane(g: DDPortals, s: DDScratch, q: int, row: int) -> None:
     """The first plane of a row := that of directed portal q; kept is what lies beyond it, and
     SLACK more."""
     k, sign = q >> 1, 1.0 if q & 1 == 0 else -1.0
@@ -266,7 +259,7 @@ def own_plane(g: DoubleDoublePortals, s: DoubleDoubleScratch, q: int, row: int) 
 
 
 @kernel
-def something_left(g: DoubleDoublePortals, s: DoubleDoubleScratch, sequence: Ints) -> bool:
+def something_left(g: DDPortals, s: DDScratch, sequence: Ints) -> bool:
     """Whether any part of a sequence of directed portals remains after clipping; False is certain.
 
     The next portal is clipped by all planes so far, the source by the next, the next by those that
@@ -298,17 +291,10 @@ def something_left(g: DoubleDoublePortals, s: DoubleDoubleScratch, sequence: Int
 
 @kernel
 def separate(
-    g: DoubleDoublePortals,
-    s: DoubleDoubleScratch,
-    near: int,
-    near_q: int,
-    beyond: int,
-    beyond_q: int,
-    row: int,
-    count: int,
+    g: DDPortals, s: DDScratch, a: int, p: int, b: int, q: int, row: int, count: int
 ) -> int:
-    """Row ``row`` from plane ``count`` on := all planes that separate two polygons, left of the
-    directed portals that lead towards each other; kept is the side beyond. Returns the planes in
-    the row."""
-    count = separators_through(g, s, near, near_q, beyond, False, row, count)
-    return separators_through(g, s, beyond, beyond_q, near, True, row, count)
+    """Row ``row`` from plane ``count`` on := all planes that separate polygon a, left of directed
+    portal p, from b, left of q; p and q lead towards each other. Kept is the side of b, and beyond.
+    Returns the planes in the row."""
+    count = separators_through(g, s, a, p, b, False, row, count)
+    return separators_through(g, s, b, q, a, True, row, count)

@@ -49,7 +49,7 @@ class Scratch(NamedTuple):
     near_tie: Ints  # (H,) sequences of portals rejected by a near tie, each after its length
 
 
-class DoubleDoublePortals(NamedTuple):
+class DDPortals(NamedTuple):
     """Portals in double-double numbers (`double_double_kernels`); `double_double` fills it."""
 
     point: Doubles  # (Q, 3) at most 1
@@ -57,8 +57,8 @@ class DoubleDoublePortals(NamedTuple):
     normal: Floats  # (K, 3)
 
 
-class DoubleDoubleScratch(NamedTuple):
-    """Working storage of one worker for `DoubleDoublePortals`."""
+class DDScratch(NamedTuple):
+    """Working storage of one worker for `DDPortals`."""
 
     polygon: Doubles  # (4, V, 3)
     size: Ints  # (4,)
