@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+import numpy as np
+from numpy.typing import NDArray
 
-    Data = bytes | memoryview
-    Samples = NDArray[Any]
-    Shape = tuple[int, int, int]
+Data = bytes | memoryview
+Samples = NDArray[Any]
+Shape = tuple[int, int, int]
 
 
 @dataclass(frozen=True)

@@ -11,14 +11,14 @@ from __future__ import annotations
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, LimitError, naming
 from ptmtools.parallel import ordered
-from ptmtools.texture.coder import Coder, Coding, Tile
+from ptmtools.texture.coder import Coder, Coding, Shape, Tile
 from ptmtools.texture.coders.group import damaged
 from ptmtools.texture.container import (
     EXACT,
@@ -33,9 +33,6 @@ from ptmtools.texture.model import Description, Level, Limits, PtmHeader
 from ptmtools.texture.profiles import PROFILES
 from ptmtools.texture.pyramid import Box, covering, tiles_under
 from ptmtools.texture.sources import Ranges, Source, ranges_of
-
-if TYPE_CHECKING:
-    from ptmtools.texture.coder import Shape
 
 Samples = NDArray[Any]
 _LIMITS = Limits()

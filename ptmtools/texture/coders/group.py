@@ -15,17 +15,14 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
-from ptmtools.texture.coder import Coding
+from ptmtools.texture.coder import Coding, Data, Samples, Shape, Tile
 from ptmtools.texture.pyramid import level_sizes
-
-if TYPE_CHECKING:
-    from ptmtools.texture.coder import Data, Samples, Shape, Tile
 
 
 def damaged(what: str) -> InputError:

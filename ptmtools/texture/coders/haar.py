@@ -6,11 +6,10 @@ frequency tables; the number of escapes and the escapes; the rANS words to the e
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.texture.coder import Data, Shape
 from ptmtools.texture.coders import haar_kernels as kernels, rans as tables
 from ptmtools.texture.coders.group import Reader, damaged, plane_order, references
 from ptmtools.texture.coders.haar_layout import (
@@ -25,10 +24,6 @@ from ptmtools.texture.coders.haar_layout import (
     sent_mask,
 )
 from ptmtools.texture.coders.rans import Sink, check_end, empty_sink, encode_symbols, read_stream
-
-if TYPE_CHECKING:
-    from ptmtools.texture.coder import Data, Shape
-
 
 #: Flag bits: weights are sent; from bit 4 on, component i is coded by rank.
 SENT_WEIGHTS = 1

@@ -24,19 +24,11 @@ WEIGHT_TOP = 2047
 
 #: Activity below which lies class 0, 1, 2 …: in sixteenths of the expected residual.
 CLASS_BOUNDS = (1, 3, 7, 12, 20, 32, 50, 76, 115, 170, 250, 370, 560)
-
-
 CLASSES = len(CLASS_BOUNDS) + 1
-
-
 #: One table for each class of V and h1, one for each class of h2', one for the edge texels.
 TABLES = 2 * CLASSES + 1
-
-
 #: The table of the edge texels, which alone has no escape.
 EDGE_TABLE = TABLES - 1
-
-
 #: Weights in 1/256 for a plane with 0, 1, 2 references: V, h1, h2' by seven features.
 BUILT_IN_WEIGHTS = np.array(
     [
@@ -50,8 +42,6 @@ BUILT_IN_WEIGHTS = np.array(
     ],
     np.int32,
 )  # fmt: skip
-
-
 #: Activity weights in 1/64 of a sixteenth, likewise.
 ACTIVITY_WEIGHTS = np.array(
     [
@@ -81,15 +71,9 @@ def class_of_activity() -> NDArray[np.int64]:
 
 #: Groups of fewer blocks use the built-in weights: sending others would not pay.
 FEWEST_BLOCKS = 96 * 96
-
-
 #: Block rows sampled, about.
 SAMPLED_ROWS = 12
-
-
 Ranks = NDArray[np.int32]
-
-
 #: Weight of a block by the magnitude of its first feature: steep blocks tell less.
 _SLOPE_WEIGHTS = 4096 // (4 + np.arange(256))
 

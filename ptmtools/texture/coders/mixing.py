@@ -13,12 +13,11 @@ from __future__ import annotations
 
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coder import PLAIN, Coding
+from ptmtools.texture.coder import PLAIN, Coding, Data, Shape
 from ptmtools.texture.coders import mixing_decisions as decisions, mixing_kernels as kernels
 from ptmtools.texture.coders.group import Reader, damaged, pack_varints, plane_order
 from ptmtools.texture.coders.mixing_decisions import BATCH, FEATURES, LOGIT_TOP, SAMPLE, SQUASH
@@ -32,10 +31,6 @@ from ptmtools.texture.coders.mixing_kernels import (
     State,
     Tables,
 )
-
-if TYPE_CHECKING:
-    from ptmtools.texture.coder import Data, Shape
-
 
 #: Slots of a hashed context, entries of a match: powers of two, by the number of texels.
 SLOT_BITS = (8, 16)

@@ -19,15 +19,9 @@ Table = NDArray[np.int32]
 
 #: A logit of 12: larger ones count as this. 256 units are 1.
 LOGIT_TOP = 12 * 256
-
-
 #: Quantised magnitudes: 24 levels, of which the last holds everything from here on.
 MAGNITUDES = 24
-
-
 MAGNITUDE_TOP = 1023
-
-
 #: e^-x for x = -12 … 12.
 _TAIL = np.exp(np.arange(LOGIT_TOP, -LOGIT_TOP - 1, -1) / 256)
 

@@ -5,11 +5,10 @@ Layout of a coded group: the frequency tables; the stream of `rans`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.texture.coder import Data, Shape
 from ptmtools.texture.coders import (
     rans as tables,
     repeats_blocks as blocks,
@@ -18,9 +17,6 @@ from ptmtools.texture.coders import (
 from ptmtools.texture.coders.group import Reader, plane_order
 from ptmtools.texture.coders.rans import Sink, check_end, empty_sink, encode_symbols, read_stream
 from ptmtools.texture.coders.rans_kernels import split_numbers
-
-if TYPE_CHECKING:
-    from ptmtools.texture.coder import Data, Shape
 
 #: Weights in 1/64 of W, N, NW and NE, each less the block's mean, in predictions of p, q and r.
 WEIGHTS = np.array([[20, 24, -10, -7], [2, 27, -12, -2], [13, -7, -6, -39]], np.int64)

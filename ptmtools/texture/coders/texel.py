@@ -14,11 +14,11 @@ detected: a pattern of 16² random floats costs 90 times what zstd needs. With a
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.texture.coder import Data, Samples, Shape
 from ptmtools.texture.coders import (
     rans as tables,
     texel_kernels as kernels,
@@ -35,9 +35,6 @@ from ptmtools.texture.coders.texel_layout import (
 from ptmtools.texture.profiles import raw
 from ptmtools.texture.profiles.raw import sample_bytes
 from ptmtools.texture.samples import SampleKind, from_ordered, kind_of, to_ordered
-
-if TYPE_CHECKING:
-    from ptmtools.texture.coder import Data, Samples, Shape
 
 #: Forms of a group.
 RAW, PLAIN, CODED, CODED_WITH_WEIGHTS = 0, 1, 2, 3

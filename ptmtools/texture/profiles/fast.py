@@ -15,12 +15,12 @@ repeats first and decoding new texels by rows afterwards, which would be faster 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coder import PLAIN, Coding, Tile
+from ptmtools.texture.coder import PLAIN, Coding, Data, Samples, Shape, Tile
 from ptmtools.texture.coders import haar, repeats, texel
 from ptmtools.texture.coders.group import (
     Reader,
@@ -34,9 +34,6 @@ from ptmtools.texture.coders.group import (
 from ptmtools.texture.profiles import raw
 from ptmtools.texture.profiles.raw import group_length
 from ptmtools.texture.pyramid import build_pyramid
-
-if TYPE_CHECKING:
-    from ptmtools.texture.coder import Data, Samples, Shape
 
 #: Coders 1 to 3 are those of files of version 1.
 STORED, HAAR_1, DEFLATED_1, DIFFERENCES_1, HAAR, REPEATS, PYRAMID = range(7)

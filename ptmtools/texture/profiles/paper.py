@@ -12,13 +12,13 @@ installed, and InputError (PTM-I111) for floats.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ptmtools.errors import InputError
 from ptmtools.lazy import component
-from ptmtools.texture.coder import PLAIN, Coding, Tile
+from ptmtools.texture.coder import PLAIN, Coding, Data, Samples, Shape, Tile
 from ptmtools.texture.coders.group import Reader, damaged
 from ptmtools.texture.profiles import raw
 from ptmtools.texture.profiles.raw import (
@@ -29,9 +29,6 @@ from ptmtools.texture.profiles.raw import (
     residuals,
     sample_bytes,
 )
-
-if TYPE_CHECKING:
-    from ptmtools.texture.coder import Data, Samples, Shape
 
 #: Forms of a group: as in `raw`, where JPEG is longer or there are no blocks; with JPEGs.
 RAW, JPEG = 0, 1

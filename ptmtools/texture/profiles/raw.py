@@ -17,17 +17,14 @@ elsewhere.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coder import PLAIN, Coding, Tile
+from ptmtools.texture.coder import PLAIN, Coding, Data, Samples, Shape, Tile
 from ptmtools.texture.coders.group import Reader, damaged
 from ptmtools.texture.samples import from_ordered, kind_of, round_to, to_ordered
-
-if TYPE_CHECKING:
-    from ptmtools.texture.coder import Data, Samples, Shape
 
 #: Correction codes 0, 1, 2 stand for 0, -1, +1 units in the last place; this one for an escape.
 ESCAPE = 3

@@ -7,18 +7,15 @@ the pyramid of its own. Noise is coded *evenly*: all blocks with the right mean 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ptmtools.texture.coder import PLAIN, Coding, Tile
+from ptmtools.texture.coder import PLAIN, Coding, Data, Samples, Shape, Tile
 from ptmtools.texture.coders import mixing, texel
 from ptmtools.texture.coders.group import Reader, damaged, pack_levels, shapes_to, unpack_levels
 from ptmtools.texture.profiles import raw
 from ptmtools.texture.pyramid import build_pyramid
-
-if TYPE_CHECKING:
-    from ptmtools.texture.coder import Data, Samples, Shape
 
 #: The first byte of a group.
 MIXED, STORED, TEXEL, EVEN = range(4)
