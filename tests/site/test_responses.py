@@ -311,6 +311,16 @@ def test_six_connections_are_kept_open(served: str) -> None:
         client.connection.close()
 
 
+def test_a_small_body_does_not_wait_for_the_acknowledgement_of_its_head(ask: Client) -> None:
+    seconds = []
+    for _ in range(50):
+        begun = time.perf_counter()
+        assert ask("/data/small.json").body == b"{}"
+        seconds.append(time.perf_counter() - begun)
+    # Systems acknowledge the first packets of a connection at once, later ones after 40 ms.
+    assert min(seconds[30:]) < 0.02
+
+
 def test_every_request_is_recorded() -> None:
     visits = Visits()
     files = {"a": Entry("a", NOISE, "x/y")}
