@@ -10,11 +10,10 @@ import struct
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 
-from ptmtools.errors import InputError, MissingComponentError
-from ptmtools.scene.sandbox import run_in_sandbox, serve
+from ptmtools.errors import InputError
+from ptmtools.scene.sandbox import require, run_in_sandbox, serve
 from ptmtools.scene.source import FileRange
 
 MAGIC = b"\xabKTX 20\xbb\r\n\x1a\n"
@@ -49,13 +48,12 @@ def transcoded(data: bytes) -> bytes:
     width, height = _SIZE.unpack_from(data, _SIZE_AT)
     if not (0 < width <= _LARGEST_SIDE and 0 < height <= _LARGEST_SIDE):
         raise InputError("PTM-I125", f"{width} x {height} texels in a KTX2 image")
-    if find_spec("opengl_basisu") is None:
-        raise MissingComponentError(
-            "PTM-M100",
-            "opengl-basisu is needed for KTX2 textures",
-            remedy="pip install 'ptmtools[basisu]', or "
-            "run `npx @gltf-transform/cli ktxdecompress IN.glb OUT.glb`",
-        )
+    require(
+        "opengl_basisu",
+        "opengl-basisu is needed for KTX2 textures",
+        "pip install 'ptmtools[basisu]', or "
+        "run `npx @gltf-transform/cli ktxdecompress IN.glb OUT.glb`",
+    )
     with tempfile.TemporaryDirectory() as scratch:
         ktx2, png = Path(scratch, "image.ktx2"), Path(scratch, "image.png")
         ktx2.write_bytes(data)

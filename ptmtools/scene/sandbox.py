@@ -16,6 +16,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from contextlib import suppress
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -73,6 +74,12 @@ def run_in_sandbox(
         reason = reply.get("fault") or f"it ended with status {run.returncode}"
         raise unreadable(library, model, reason)
     return reply["answer"]
+
+
+def require(module: str, message: str, remedy: str, file: Path | None = None) -> None:
+    """Raises MissingComponentError PTM-M100 unless a module of a library is installed."""
+    if find_spec(module) is None:
+        raise MissingComponentError("PTM-M100", message, file=file, remedy=remedy)
 
 
 def unreadable(library: str, model: Path, reason: str) -> InputError:

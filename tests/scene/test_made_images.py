@@ -181,10 +181,10 @@ def test_floats_are_not_mirrored(put: Put) -> None:
 def test_ktx2_without_its_library(put: Put, monkeypatch: pytest.MonkeyPatch) -> None:
     """An error: a scene without its textures would stay as it is when the library comes."""
     from ptmtools.errors import MissingComponentError
-    from ptmtools.scene import ktx2
+    from ptmtools.scene import ktx2, sandbox
     from tests.scene.features.gltf import KTX2
 
-    monkeypatch.setattr(ktx2, "find_spec", lambda name: None)
+    monkeypatch.setattr(sandbox, "find_spec", lambda name: None)
     with pytest.raises(MissingComponentError, match=r"PTM-M100"):
         ktx2.transcoded(KTX2)
     assert ktx2.TranscodedBytes(lambda: b"\x89PNG")() == b"\x89PNG"

@@ -11,7 +11,6 @@ import struct
 import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass
-from importlib.util import find_spec
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -19,9 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.errors import MissingComponentError
 from ptmtools.scene.gltf.document import Document
-from ptmtools.scene.sandbox import run_in_sandbox, serve
+from ptmtools.scene.sandbox import require, run_in_sandbox, serve
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 
 EXTENSION = "KHR_draco_mesh_compression"
@@ -84,13 +82,8 @@ def decode_primitives(document: Document, views: Iterable[int]) -> dict[int, Dec
     distinct = sorted(set(views))
     if not distinct:
         return {}
-    if find_spec("DracoPy") is None:
-        raise MissingComponentError(
-            "PTM-M100",
-            "meshes compressed with Draco require DracoPy",
-            file=document.path,
-            remedy="pip install DracoPy",
-        )
+    message = "meshes compressed with Draco require DracoPy"
+    require("DracoPy", message, "pip install DracoPy", document.path)
     primitives = {}
     with tempfile.TemporaryDirectory() as scratch:
         for k, view in enumerate(distinct):

@@ -11,14 +11,14 @@ import re
 import tempfile
 import zipfile
 import zlib
-from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
 from typing import IO
 
-from ptmtools.errors import InputError, LimitError, MissingComponentError, naming
+from ptmtools.errors import InputError, LimitError, naming
 from ptmtools.files import open_regular
 from ptmtools.scene.messages import read_in_sandbox
 from ptmtools.scene.notes import Findings
+from ptmtools.scene.sandbox import require
 from ptmtools.scene.source import MAX_VERTICES, Source
 
 #: The start and the end of a file of ISO 10303-21.
@@ -58,13 +58,7 @@ def read_ifc(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) 
         if path.suffix.lower() == ".ifczip":
             file = _unpacked(path, Path(scratch))
         _check(file)
-        if not find_spec("ifcopenshell"):
-            raise MissingComponentError(
-                "PTM-M100",
-                "IFC requires ifcopenshell",
-                file=path,
-                remedy="pip install 'ptmtools[ifc]'",
-            )
+        require("ifcopenshell", "IFC requires ifcopenshell", "pip install 'ptmtools[ifc]'", path)
         arguments = str(file), str(max_triangles)
         module = "ptmtools.scene.ifc.products"
         other_bytes = 0 if file == path.absolute() else file.stat().st_size

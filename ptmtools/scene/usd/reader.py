@@ -10,15 +10,13 @@ from __future__ import annotations
 import os
 import tempfile
 from contextlib import suppress
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from ptmtools.errors import MissingComponentError
 from ptmtools.scene.messages import pack_source, read_in_sandbox
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.options import USD
-from ptmtools.scene.sandbox import serve
+from ptmtools.scene.sandbox import require, serve
 from ptmtools.scene.source import MAX_VERTICES, Source
 
 #: Largest number of files in the model's folder whose size is read.
@@ -33,12 +31,7 @@ def read_usd(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) 
     allocated, for more than ``max_triangles``, instances included; and MissingComponentError
     PTM-M100.
     """
-    if find_spec("pxr") is None:
-        raise MissingComponentError(
-            "PTM-M100",
-            "USD requires usd-core",
-            remedy="pip install 'ptmtools[usd]'",
-        )
+    require("pxr", "USD requires usd-core", "pip install 'ptmtools[usd]'")
     outside = "outside" if findings.folder.allow_outside else ""
     with tempfile.TemporaryDirectory() as scratch:
         return read_in_sandbox(
