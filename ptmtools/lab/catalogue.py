@@ -29,12 +29,12 @@ class Columns(NamedTuple):
 
     Attributes
     ----------
-    last: (T,) last column of each texture; column 0 is nothing.
+    levels: (T,) columns of each texture, without the first, which is nothing.
     ends: (T, K) bytes of each column and those before it. memory: (T, K) bytes of texture memory.
     size: (T, K, 2) width and height of the finest image that each column shows.
     """
 
-    last: Ints
+    levels: Ints
     ends: Ints
     memory: Ints
     size: Ints
@@ -70,7 +70,8 @@ def joined(first: Columns, second: Columns) -> Columns:
         return np.concatenate(list(parts))
 
     tables = zip(first[1:], second[1:], strict=True)
-    return Columns(np.concatenate([first.last, second.last]), *(both(*pair) for pair in tables))
+    levels = np.concatenate([first.levels, second.levels])
+    return Columns(levels, *(both(*pair) for pair in tables))
 
 
 def aligned(rows: Sequence[tuple[Any, Any, Any]]) -> Columns:
@@ -211,15 +212,8 @@ class Catalogue:
 
     def in_columns(self, columns: Columns) -> Catalogue:
         """The same textures with other columns, all of the least difference."""
-        stored = _stored(columns.last, columns.ends.shape[1])
-        return replace(
-            self,
-            levels=columns.last,
-            ends=columns.ends,
-            memory=columns.memory,
-            size=columns.size,
-            differences=np.where(stored, LEAST, 0.0),
-        )
+        differences = np.where(_stored(columns), LEAST, 0.0)
+        return replace(self, **columns._asdict(), differences=differences)
 
     def with_memory(self, memory: Ints) -> Catalogue:
         """The same catalogue with other texture memory (t, k) of the first textures."""
@@ -241,12 +235,9 @@ class Catalogue:
         ]
         return replace(
             self,
-            levels=own.last,
-            ends=own.ends,
-            memory=own.memory,
-            size=own.size,
+            **own._asdict(),
             differences=np.concatenate(each),
-            colors=np.concatenate([self.colors, np.zeros((len(more.last), 3))]),
+            colors=np.concatenate([self.colors, np.zeros((len(more.levels), 3))]),
             shapes=self.shapes if shapes is None else self.shapes.joined_with(shapes),
         )
 
@@ -255,9 +246,9 @@ def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalog
     """The catalogue of a served folder; ``differences`` (T, L) and ``colors`` (T, 3) are those of
     `Pyramids`, for hints without them."""
     textures = served.index["textures"]
-    levels, ends, memory, size = columns_of(textures)
-    differences_ = np.zeros(ends.shape)
-    differences_[:, 1:] = differences[:, : ends.shape[1] - 1]
+    columns = columns_of(textures)
+    differences_: Floats = np.zeros(columns.ends.shape)
+    differences_[:, 1:] = differences[:, : differences_.shape[1] - 1]
     if all(len(row.get("differences", ())) == len(row["ends"]) for row in textures):
         for into, row in zip(differences_, textures, strict=True):
             into[1 : len(row["ends"]) + 1] = row["differences"]
@@ -265,13 +256,10 @@ def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalog
         colors = np.array([row["color"] for row in textures], dtype=np.float64)
     boxes = np.array([cell["box"] for cell in served.index["cells"]], dtype=np.float64)
     low, high = boxes.reshape(-1, 2, 3).transpose(1, 0, 2).copy()
-    stored = _stored(levels, ends.shape[1])
+    stored = _stored(columns)
     differences_[stored] = np.maximum(differences_[stored], LEAST)
     return Catalogue(
-        levels=levels,
-        ends=ends,
-        memory=memory,
-        size=size,
+        **columns._asdict(),
         differences=differences_,
         colors=colors,
         index_bytes=served.index_bytes,
@@ -286,10 +274,10 @@ def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalog
     )
 
 
-def _stored(last: Ints, wide: int) -> Bools:
+def _stored(columns: Columns) -> Bools:
     """(T, K) which columns exist, without the first."""
-    column = np.arange(wide)
-    result: Bools = (column > 0) & (column <= last[:, None])
+    column = np.arange(columns.ends.shape[1])
+    result: Bools = (column > 0) & (column <= columns.levels[:, None])
     return result
 
 

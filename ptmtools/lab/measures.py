@@ -144,9 +144,9 @@ class Flip:
     frame: (n,) numbers of the frames. height, width: of the pictures.
     """
 
-    def __init__(self, world: World, count: int = FRAMES, seed: int = SEED) -> None:
+    def __init__(self, world: World, count: int = FRAMES) -> None:
         require()
-        random = np.random.default_rng(seed)
+        random = np.random.default_rng(SEED)
         self.frame: Ints = np.sort(
             random.choice(world.frames, min(count, world.frames), replace=False)
         )

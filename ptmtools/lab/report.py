@@ -63,13 +63,18 @@ def table(
             "to 1."
         )
     lines.append("")
-    lines += [f"{name}: {_walk_line(world)}" for name, world in worlds.items()]
+    lines += [
+        f"{name}: {world.time[-1]:.0f} s, {world.frames:,} frames, "
+        f"the viewpoint still in {world.still.mean():.0%} of them"
+        for name, world in worlds.items()
+    ]
     wide = max(len(p.run.policy) for p in played)
     spread = f"{'of walks':>13} " if several else ""
+    final = " ".join(f"{f'{share:.0%}':>6}" for share in SHARES)
     head = (
         f"  {'policy':<{wide}} {'e':>6} {spread}{'p95':>6} {'still':>6} {'moving':>6} "
         f"{'rmse':>6} {'  FLIP ' if flip else ''}{'missing':>7} {'quality':>7} {'received':>9} "
-        f"{'waste':>5} {'requests':>8} {'stalled':>7}  {_final_head()}"
+        f"{'waste':>5} {'requests':>8} {'stalled':>7}  {final}"
     )
     for (link, memory), runs in groupby(played, lambda p: (p.run.conditions, p.memory)):
         block = list(runs)
@@ -81,13 +86,6 @@ def table(
     if over:
         lines += ["", f"{count(over, 'frame')} above the budget"]
     return lines
-
-
-def _walk_line(world: World) -> str:
-    return (
-        f"{world.time[-1]:.0f} s, {world.frames:,} frames, "
-        f"the viewpoint still in {world.still.mean():.0%} of them"
-    )
 
 
 def rate_text(bandwidth: float | None) -> str:
@@ -105,10 +103,6 @@ def link_text(link: Conditions) -> str:
 
 
 _UNITS = ((10**9, "Gbit/s"), (10**6, "Mbit/s"), (10**3, "kbit/s"), (1, "bit/s"))
-
-
-def _final_head() -> str:
-    return " ".join(f"{f'{share:.0%}':>6}" for share in SHARES)
 
 
 def _row(name: str, some: list[RunResult], *, flip: bool) -> str:

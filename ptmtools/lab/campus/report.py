@@ -35,11 +35,11 @@ def table(runs: Sequence[CampusRun]) -> list[str]:
     return [*_head("", runs), *(_row(name, [of(run) for run in runs]) for name, of in rows)]
 
 
-def received(runs: Sequence[CampusRun], every: float = EVERY) -> list[str]:
+def received(runs: Sequence[CampusRun]) -> list[str]:
     """MB received by time, a column for each preset; in brackets the increase since the row
     before."""
     time = runs[0].time
-    instants = [*np.arange(every, time[-1], every).tolist(), float(time[-1])]
+    instants = [*np.arange(EVERY, time[-1], EVERY).tolist(), float(time[-1])]
     lines, before = _head("s", runs), [0.0] * len(runs)
     for instant in instants:
         at = int(np.searchsorted(time, instant, "right")) - 1

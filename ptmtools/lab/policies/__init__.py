@@ -20,7 +20,7 @@ from ptmtools.lab.policies.apo import ApoClient
 from ptmtools.lab.policies.engine import EngineClient, Policy
 from ptmtools.lab.policies.oracle import Oracle
 from ptmtools.lab.policies.paper import PaperClient, PaperOptions
-from ptmtools.lab.policies.shares import BEST, Screen
+from ptmtools.lab.policies.shares import BEST, Screen, Weighted
 from ptmtools.lab.policies.whole_files import GpuiiClient, LruClient
 from ptmtools.lab.world import World
 
@@ -57,17 +57,12 @@ class PolicyEntry:
         return self.options.limits(world, budget) if self.options else whole
 
 
-def _engine(
-    make: Callable[[World], Policy], *, statistics: bool = False
-) -> Callable[[World, Link, int], Client]:
-    def client(world: World, link: Link, budget: int) -> Client:
-        return EngineClient(world, link, budget, make(world), statistics=statistics)
-
-    return client
+def _engine(policy: Policy, *, statistics: bool = False) -> Callable[..., Client]:
+    return partial(EngineClient, policy=policy, statistics=statistics)
 
 
-def _same(policy: Policy, *, statistics: bool = False) -> Callable[[World, Link, int], Client]:
-    return _engine(lambda _: policy, statistics=statistics)
+def _oracle(world: World, link: Link, budget: int, *, exchanging: bool = False) -> Client:
+    return EngineClient(world, link, budget, Oracle(world, exchanging=exchanging))
 
 
 _LIST = (
@@ -84,47 +79,47 @@ _LIST = (
     PolicyEntry(
         "ach",
         "average coverage hints, in the engine that most policies share",
-        _same(shares.Weighted(shares.coverage_shares)),
+        _engine(Weighted(shares.coverage_shares)),
     ),
     PolicyEntry(
         "ach-views",
         "coverage hints of the six views",
-        _same(shares.Weighted(shares.by_views), statistics=True),
+        _engine(Weighted(shares.by_views), statistics=True),
     ),
     PolicyEntry(
         "ach-texture",
         "coverage hints of textures (`ptm ach --per-texture`)",
-        _same(shares.Weighted(shares.by_texture)),
+        _engine(Weighted(shares.by_texture)),
         needs=("textureShares", "measure it with `ptm ach DB --per-texture`, then `ptm emit DB`"),
     ),
-    PolicyEntry("distance", "nearest cells first", _same(shares.Weighted(shares.distance_shares))),
+    PolicyEntry("distance", "nearest cells first", _engine(Weighted(shares.distance_shares))),
     PolicyEntry(
-        "bbox", "screen area of boxes, without occlusion", _same(shares.Weighted(shares.by_box))
+        "bbox", "screen area of boxes, without occlusion", _engine(Weighted(shares.by_box))
     ),
-    PolicyEntry("screen", "pixels of an item buffer", _same(Screen())),
-    PolicyEntry("screen+distance", "screen, and near cells", _same(Screen(shares.by_distance))),
+    PolicyEntry("screen", "pixels of an item buffer", _engine(Screen())),
+    PolicyEntry("screen+distance", "screen, and near cells", _engine(Screen(shares.by_distance))),
     PolicyEntry(
-        "screen+ach", "screen, and average coverage hints", _same(Screen(shares.by_coverage))
+        "screen+ach", "screen, and average coverage hints", _engine(Screen(shares.by_coverage))
     ),
     PolicyEntry(
         "screen+need",
         "screen, and the resolution needed in the cell",
-        _same(Screen(shares.by_need)),
+        _engine(Screen(shares.by_need)),
         needs=("need", "measure it with `ptm emit DB --need 16`"),
     ),
-    PolicyEntry("best", "policy of the viewer: screen, need and distance", _same(BEST)),
+    PolicyEntry("best", "policy of the viewer: screen, need and distance", _engine(BEST)),
     PolicyEntry(
         "apo",
         "client of Lacoste et al., §4.2: octree textures level by level; other textures as in best",
         ApoClient,
         form="octree",
     ),
-    PolicyEntry("best+apo", "best, also for octree textures", _same(BEST), form="octree"),
-    PolicyEntry("oracle", "knows the walk; greedy", _engine(Oracle)),
+    PolicyEntry("best+apo", "best, also for octree textures", _engine(BEST), form="octree"),
+    PolicyEntry("oracle", "knows the walk; greedy", _oracle),
     PolicyEntry(
         "oracle-exchange",
         "knows the walk; also exchanges levels in memory",
-        _engine(partial(Oracle, exchanging=True)),
+        partial(_oracle, exchanging=True),
     ),
 )
 #: Policies by name.

@@ -23,10 +23,10 @@ class Oracle:
     """A policy for one walk; with ``exchanging`` it exchanges steps, see
     `ptmtools.lab.allocation.exchange`."""
 
-    def __init__(self, world: World, soon: float = SOON, *, exchanging: bool = False) -> None:
+    def __init__(self, world: World, *, exchanging: bool = False) -> None:
         self._exchanging = exchanging
         self._now, self._cells = _drops(world)
-        self._soon = [_discounted(table, soon * world.rate) for table in (self._now, self._cells)]
+        self._soon = [_discounted(table, SOON * world.rate) for table in (self._now, self._cells)]
         self._later = [_discounted(t, LATER * world.rate) for t in (self._now, self._cells)]
 
     def __call__(self, client: EngineClient) -> Worth:

@@ -22,7 +22,6 @@ from ptmtools.options import option_name
 from ptmtools.pipeline.build import run_stage
 from ptmtools.pipeline.stage import Artifacts, Options, Stage
 from ptmtools.pipeline.stages import ACH, CELLS, EMIT, PVS, STAGES, TEXTURES
-from ptmtools.progress import Progress, silent
 
 
 @dataclass(frozen=True)
@@ -152,11 +151,11 @@ def copied(db: Path) -> Iterator[Path]:
         yield Path(shutil.copytree(db, Path(folder) / "db"))
 
 
-def build_again(db: Path, options: Own, progress: Progress = silent) -> Seconds:
+def build_again(db: Path, options: Own) -> Seconds:
     """Runs the stages whose options are given, current or not, in the order of the options, by one
     worker: nothing is reused."""
     result: Seconds = {}
     for stage, chosen in options.items():
-        run = partial(run_stage, db, chosen, workers=1, rebuild=True, progress=progress)
+        run = partial(run_stage, db, chosen, workers=1, rebuild=True)
         _, result[stage.name] = timed(run)
     return result

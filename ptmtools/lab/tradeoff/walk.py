@@ -196,16 +196,12 @@ class _Walker:
     """Walks the same way through databases built from the same model."""
 
     def __init__(self, walk: Walk, original: World, options: WalkOptions) -> None:
-        self._walk, self._original, self._options = walk, original, options
+        self.walk, self.original, self._options = walk, original, options
         stock = counted(original, options)
         # The same bytes for all databases.
         self._memory = {
             str(max(budget_of(stock, m), 1)): m.text for m in dict.fromkeys(options.memories)
         }
-
-    def world(self, served: Served) -> World:
-        """The world of the same walk, compared with the original."""
-        return compared(served, self._walk, self._original)
 
     def walks(self, world: World, policy: str = "") -> list[WalkOutcome]:
         """Outcomes of a policy, or of those of the options."""
@@ -235,7 +231,7 @@ def _try_setting(
     try:
         options = {**own, stage: setting.options}
         took = build_again(copy, {each: options[each] for each in concerned(stage, options)})
-        world = walker.world(read_served(copy))
+        world = compared(read_served(copy), walker.walk, walker.original)
         seen = walker.walks(world, setting.knob.policy)
     except PtmError as fault:
         return WalkTrial(*words, 0, 0, problem=fault.message)
