@@ -8,7 +8,7 @@ faces are cleaned as before, and are the scene's, one by one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -126,8 +126,15 @@ def model_masks(
 ) -> tuple[dict[int, Mask], tuple[str, ...]]:
     """The masks of a model that was read as ``scene``, by the number of its material, and notes on
     invalid ones."""
-    masks_of = _gltf_masks if model.suffix.lower() in _GLTF else _shines
-    return masks_of(model, scene, options)
+    masks_of = _gltf_masks if model.suffix.lower() in _GLTF else _obj_masks
+    masks, notes = {}, []
+    for number, label, mask in masks_of(model, scene, options):
+        if fault := mask if isinstance(mask, str) else _fault(mask, options):
+            name = scene.materials[number].name
+            notes.append(f"the mask of material {name} is left out: {label}{fault}")
+        elif not isinstance(mask, str):
+            masks[number] = mask
+    return masks, tuple(notes)
 
 
 @dataclass(frozen=True)
@@ -169,57 +176,43 @@ def _again(model: Path, options: IngestOptions, texture_of: TextureOf) -> _Read 
     return _Read(source, faces, tuple(asked), tuple(missing))
 
 
-def _gltf_masks(
-    model: Path, scene: Scene, options: IngestOptions
-) -> tuple[dict[int, Mask], tuple[str, ...]]:
+#: The number of a material, the beginning of a note on its mask, and the mask or its fault.
+_Candidates = Iterator[tuple[int, str, Mask | str]]
+
+
+def _gltf_masks(model: Path, scene: Scene, options: IngestOptions) -> _Candidates:
     def glossy(entry: Mapping[str, Any]) -> Any:
         return entry.get("pbrMetallicRoughness", {}).get("metallicRoughnessTexture")
 
     if (read := _again(model, options, glossy)) is None:
-        return {}, ()
+        return
     source, faces = read.source, read.faces
     material = source.triangle_material[faces]
-    masks, notes = {}, []
     for number, index in enumerate(np.unique(material).tolist()):
         texture = source.materials[index].texture
         if texture is None or scene.materials[number].image < 0:
             continue
-        its = material == index
-        if "mirror" in (texture.wrap_s, texture.wrap_t) or not np.array_equal(
-            source.uv[faces][its], scene.uv[its]
-        ):
-            notes.append(_left_out(scene.materials[number].name, "other texture coordinates"))
-            continue
-        mask = Mask(texture.read, texture.label, band=1, inverted=True)
-        if fault := _fault(mask, options):
-            notes.append(_left_out(scene.materials[number].name, fault))
+        own = material == index
+        mirrored = "mirror" in (texture.wrap_s, texture.wrap_t)
+        if mirrored or not np.array_equal(source.uv[faces][own], scene.uv[own]):
+            yield number, "", "other texture coordinates"
         else:
-            masks[number] = mask
-    return masks, tuple(notes)
+            yield number, "", Mask(texture.read, texture.label, band=1, inverted=True)
 
 
-def _shines(
-    model: Path, scene: Scene, options: IngestOptions
-) -> tuple[dict[int, Mask], tuple[str, ...]]:
+def _obj_masks(model: Path, scene: Scene, options: IngestOptions) -> _Candidates:
     """The masks that the scene's own reader names."""
     folder = Folder(model.absolute().parent, options.allow_outside)
-    masks, notes = {}, []
-    for number, (its, shine) in enumerate(zip(scene.materials, scene.shines, strict=True)):
-        if its.image < 0 or shine is None:
+    for number, (own, shine) in enumerate(zip(scene.materials, scene.shines, strict=True)):
+        if own.image < 0 or shine is None:
             continue
         file = None if shine.fault else folder.find(shine.file, shine.base)
         if file is None:
-            notes.append(_left_out(its.name, shine.fault))
+            yield number, "", shine.fault
         elif file.path is None:
-            why = _NOT_THERE[file.outcome]
-            notes.append(_left_out(its.name, f"map_Ks {shine.file}: {why}"))
+            yield number, f"map_Ks {shine.file}: ", _NOT_THERE[file.outcome]
         else:
-            mask = Mask(FileRange(file.path), file.path.name)
-            if fault := _fault(mask, options):
-                notes.append(_left_out(its.name, f"map_Ks {shine.file}: {fault}"))
-            else:
-                masks[number] = mask
-    return masks, tuple(notes)
+            yield number, f"map_Ks {shine.file}: ", Mask(FileRange(file.path), file.path.name)
 
 
 def _fault(mask: Mask, options: IngestOptions) -> str:
@@ -233,7 +226,3 @@ def _fault(mask: Mask, options: IngestOptions) -> str:
     except OSError as fault:
         return fault.strerror or str(fault)
     return ""
-
-
-def _left_out(material: str, why: str) -> str:
-    return f"the mask of material {material} is left out: {why}"

@@ -67,6 +67,10 @@ def texture_files(limits: tuple[int, int], base: BaseImage) -> list[Written]:
     """
     most, quality = limits
     result: list[Written] = []
+
+    def put(size: int, channel: str, image: Image.Image, source: tuple[int, int]) -> None:
+        result.append(_written(base.base, size, channel, jpeg(image, quality), source))
+
     if base.image is not None:
         image = _decoded(base.image.load(), most, base.image.name)
         alpha = None
@@ -74,23 +78,17 @@ def texture_files(limits: tuple[int, int], base: BaseImage) -> list[Written]:
             alpha = image.getchannel("A") if "A" in image.getbands() else _white(image)
         colors = image.convert("RGB")
         for size in SIZES:
-            fitted = squared(colors, size) if alpha is None else weighted(colors, alpha, size)
-            data = jpeg(fitted, quality)
-            result.append(_written(base.base, size, DIFFUSE, data, image.size))
-            if alpha is not None:
-                data = jpeg(squared(alpha, size), quality)
-                result.append(_written(base.base, size, ALPHA, data, image.size))
+            if alpha is None:
+                put(size, DIFFUSE, squared(colors, size), image.size)
+            else:
+                put(size, DIFFUSE, weighted(colors, alpha, size), image.size)
+                put(size, ALPHA, squared(alpha, size), image.size)
     if base.mask is not None:
-        image = _decoded(base.mask.load(), most, base.mask.label)
-        held = np.asarray(
-            image.convert("L")
-            if base.mask.band < 0
-            else image.convert("RGB").getchannel(base.mask.band)
-        )
+        image, band = _decoded(base.mask.load(), most, base.mask.label), base.mask.band
+        held = np.asarray(image.convert("L") if band < 0 else image.convert("RGB").getchannel(band))
         shine = _grey(255 - held if base.mask.inverted else held)
         for size in SIZES:
-            data = jpeg(squared(shine, size), quality)
-            result.append(_written(base.base, size, MASK, data, shine.size))
+            put(size, MASK, squared(shine, size), shine.size)
     return result
 
 
