@@ -84,7 +84,7 @@ def apo(
         lines.append(line)
     if not exists:
         source, mesh_file = index.document["source"], index.mesh
-        whole = sum(stream.ends[-1] for stream in (index.normals, index.colors) if stream)
+        whole = sum(stream["ends"][-1] for stream in (index.normals, index.colors) if stream)
         lines.append(
             f"{target}: {source['triangles']:,} triangles → {mesh_file['faces']:,} faces, "
             f"{size(mesh_file['bytes'])}; octree of {count(index.levels, 'level')}, "

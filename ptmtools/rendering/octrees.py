@@ -80,7 +80,7 @@ def _rows(served: Served) -> Sequence[Mapping[str, Any]]:
 
 
 def _texels(served: Served, row: Mapping[str, Any]) -> NDArray[np.uint8]:
-    from ptmtools.neighbours.apo.files import Stream, inflated
+    from ptmtools.neighbours.apo.files import inflated
 
     file = served.file(row["file"])
     start = np.concatenate([[0], np.cumsum(row["levels"], dtype=np.int64)])
@@ -92,7 +92,7 @@ def _texels(served: Served, row: Mapping[str, Any]) -> NDArray[np.uint8]:
     if not problem:
         data = served.read(row["file"])
         try:
-            return inflated(data, start, Stream(row["file"], row["ends"], row["crc32"]))
+            return inflated(data, start, row)
         except (InputError, zlib.error) as fault:
             problem = getattr(fault, "message", str(fault))
     raise DatabaseError("PTM-D006", problem, file=file, remedy=BUILD)

@@ -12,7 +12,7 @@ import pytest
 
 from ptmtools.cli.main import main
 from ptmtools.glb import JSON, glb_chunks
-from ptmtools.neighbours.apo.files import Stream, inflated
+from ptmtools.neighbours.apo.files import inflated
 from ptmtools.neighbours.apo.model import Octree
 from ptmtools.neighbours.apo.octree import fault_of
 from ptmtools.neighbours.apo.traversal import look_up
@@ -102,7 +102,7 @@ def test_statues_can_be_lit_by_what_is_served(tmp_path: Path, ptm: Ptm) -> None:
             row = rows[name]
             data = (www / row["file"]).read_bytes()
             start = np.concatenate([[0], np.cumsum(row["levels"])])
-            texels = inflated(data, start, Stream(row["file"], row["ends"], row["crc32"]))
+            texels = inflated(data, start, row)
             low, side = np.array(row["cube"]["low"]), row["cube"]["side"]
             octree = Octree(texels, start, low, side)
             assert fault_of(octree) is None

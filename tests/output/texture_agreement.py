@@ -12,7 +12,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from ptmtools.errors import PtmError
-from ptmtools.neighbours.apo.files import Stream, inflated
+from ptmtools.neighbours.apo.files import inflated
 from ptmtools.neighbours.apo.model import Octree
 from ptmtools.neighbours.apo.octree import fault_of
 from ptmtools.neighbours.apo.traversal import look_up
@@ -182,7 +182,7 @@ def _bare(www: Path, row: Mapping[str, Any], q: Any) -> float:
     """The share of an object's points without a texel in its octree."""
     start = np.concatenate([[0], np.cumsum(row["levels"], dtype=np.int64)])
     data = (www / unquote(row["file"])).read_bytes()
-    texels = inflated(data, start, Stream(row["file"], row["ends"], row["crc32"]))
+    texels = inflated(data, start, row)
     octree = Octree(texels, start, np.array(row["cube"]["low"]), row["cube"]["side"])
     if not len(q) or fault_of(octree):
         return 0.0

@@ -73,8 +73,8 @@ def _size(folder: Path, name: str, findings: Findings) -> int | None:
 
 def _check_octree(folder: Path, index: Index, sizes: Mapping[str, int], findings: Findings) -> None:
     for stream in (index.normals, index.colors):
-        if stream and sizes.get(stream.file, 0) > stream.ends[-1]:
-            findings.add("PTM-D804", stream.file, "", "continues after the last level")
+        if stream and sizes.get(stream["file"], 0) > stream["ends"][-1]:
+            findings.add("PTM-D804", stream["file"], "", "continues after the last level")
     if NORMALS not in sizes or (index.colors and COLORS not in sizes):
         return
     try:
@@ -122,7 +122,7 @@ def describe(folder: Path) -> tuple[tuple[str, ...], Mapping[str, Any]]:
         f"{size(4 * int(index.start[-1]) * len(streams))} of texture memory",
         f"{'level':>9} {'texels':>10} {'bytes':>10} {'up to here':>11}",
     ]
-    ends = np.sum([stream.ends for stream in streams], axis=0)
+    ends = np.sum([stream["ends"] for stream in streams], axis=0)
     for k, (texels, part) in enumerate(
         zip(np.diff(index.start).tolist(), np.diff(ends, prepend=0).tolist(), strict=True)
     ):

@@ -158,15 +158,6 @@ _MESH_MOST = 1 << 28
 
 
 @dataclass(frozen=True)
-class Stream:
-    """A file of texels: the end of each level, and its checksum."""
-
-    file: str
-    ends: tuple[int, ...]
-    crc32: tuple[int, ...]
-
-
-@dataclass(frozen=True)
 class Index:
     """The content of `apo.json`.
 
@@ -174,7 +165,7 @@ class Index:
     ----------
     start: (L + 1,) first texel of each level.
     low, side: corner and side of the cube.
-    normals, colors: the streams; colours may be None.
+    normals, colors: the streams: file, the end of each level and its checksum; colours may be None.
     mesh: faces, bytes and checksum of the mesh's file.
     document: the whole document.
     """
@@ -182,8 +173,8 @@ class Index:
     start: Ints
     low: Floats
     side: float
-    normals: Stream
-    colors: Stream | None
+    normals: Mapping[str, Any]
+    colors: Mapping[str, Any] | None
     mesh: Mapping[str, Any]
     document: Mapping[str, Any]
 
@@ -242,8 +233,8 @@ def _index(data: bytes) -> Index:
         start.astype(np.int64),
         np.array(document["cube"]["low"], dtype=np.float64),
         float(document["cube"]["side"]),
-        _stream(document["normals"]),
-        _stream(document["colors"]) if "colors" in document else None,
+        document["normals"],
+        document.get("colors"),
         document["mesh"],
         document,
     )
@@ -251,19 +242,15 @@ def _index(data: bytes) -> Index:
     return result
 
 
-def _stream(row: Mapping[str, Any]) -> Stream:
-    return Stream(row["file"], tuple(row["ends"]), tuple(row["crc32"]))
-
-
 def _check(index: Index) -> None:
     problem = ""
     streams = [(index.normals, NORMALS), *([(index.colors, COLORS)] if index.colors else [])]
     for stream, name in streams:
-        if stream.file != name:
-            problem = f"a stream is called {stream.file[:40]!r} instead of {name!r}"
-        elif {len(stream.ends), len(stream.crc32)} != {index.levels}:
+        if stream["file"] != name:
+            problem = f"a stream is called {stream['file'][:40]!r} instead of {name!r}"
+        elif {len(stream["ends"]), len(stream["crc32"])} != {index.levels}:
             problem = f"{name} has another number of levels than the octree"
-        elif ((size := np.diff(stream.ends, prepend=0)) <= 0).any():
+        elif ((size := np.diff(stream["ends"], prepend=0)) <= 0).any():
             problem = f"the levels of {name} do not follow each other"
         elif (size > 4 * np.diff(index.start) * _GROWTH + _BESIDES).any():
             problem = f"a level of {name} takes more than its texels"
@@ -296,26 +283,26 @@ def read_octree(folder: str | os.PathLike[str], levels: int | None = None) -> Oc
 
 
 def _texels(
-    folder: str | os.PathLike[str], index: Index, stream: Stream, levels: int
+    folder: str | os.PathLike[str], index: Index, stream: Mapping[str, Any], levels: int
 ) -> NDArray[np.uint8]:
-    data = _bytes_of(folder, stream.file, stream.ends[levels - 1], whole=False)
-    with naming(Path(folder) / stream.file):
+    data = _bytes_of(folder, stream["file"], stream["ends"][levels - 1], whole=False)
+    with naming(Path(folder) / stream["file"]):
         return inflated(data, index.start[: levels + 1], stream)
 
 
-def inflated(data: bytes, start: Ints, stream: Stream) -> NDArray[np.uint8]:
-    """(n, 4) texels of the first levels, from the beginning of a stream.
+def inflated(data: bytes, start: Ints, stream: Mapping[str, Any]) -> NDArray[np.uint8]:
+    """(n, 4) texels of the first levels, from the beginning of a stream with "ends" and "crc32".
 
     Raises InputError PTM-I821: it is damaged, or too short.
     """
     inflate, parts, at = zlib.decompressobj(), [], 0
-    for k, end in enumerate(stream.ends[: len(start) - 1]):
+    for k, end in enumerate(stream["ends"][: len(start) - 1]):
         size = 4 * int(start[k + 1] - start[k])
         try:
             part = inflate.decompress(data[at:end], size + 1)
         except zlib.error:
             part = b""
-        if end > len(data) or len(part) != size or zlib.crc32(part) != stream.crc32[k]:
+        if end > len(data) or len(part) != size or zlib.crc32(part) != stream["crc32"][k]:
             problem = "ends before it is whole" if end > len(data) else "is damaged"
             raise InputError("PTM-I821", problem, place=f"level {k}", remedy=_AGAIN)
         parts.append(part)

@@ -123,7 +123,7 @@ def _row_fault(row: Mapping[str, Any]) -> str:
 
 def _check_octree(row: Mapping[str, Any], data: bytes, at: Place) -> None:
     """Inflates the levels of a row, each by itself, and checks that they form an octree."""
-    from ptmtools.neighbours.apo.files import Stream, inflated
+    from ptmtools.neighbours.apo.files import inflated
     from ptmtools.neighbours.apo.model import Octree
     from ptmtools.neighbours.apo.octree import fault_of
 
@@ -132,7 +132,7 @@ def _check_octree(row: Mapping[str, Any], data: bytes, at: Place) -> None:
         less = len(data) < row["ends"][-1]
         at.add("PTM-D710", f"ends {'before' if less else 'after'} the last level")
     try:
-        texels = inflated(data, start, Stream(row["file"], row["ends"], row["crc32"]))
+        texels = inflated(data, start, row)
     except InputError as error:
         at.add("PTM-D710", error.message, error.place or "")
         return

@@ -71,8 +71,8 @@ def check(folder: Path) -> ValidationReport:
 def test_every_prefix_of_whole_levels_inflates_by_itself(written: Path) -> None:
     index, data = read_index(written), (written / NORMALS).read_bytes()
     whole = read_octree(written)
-    assert index.normals.ends[-1] == len(data)
-    for k, end in enumerate(index.normals.ends):
+    assert index.normals["ends"][-1] == len(data)
+    for k, end in enumerate(index.normals["ends"]):
         # By any inflater, which knows nothing of levels.
         assert (
             zlib.decompressobj().decompress(data[:end])
@@ -86,8 +86,8 @@ def test_every_prefix_of_whole_levels_inflates_by_itself(written: Path) -> None:
 def test_every_level_inflates_without_those_before_it(written: Path) -> None:
     index, data = read_index(written), (written / NORMALS).read_bytes()
     texels = read_octree(written).texels
-    for k, end in enumerate(index.normals.ends):
-        begin = index.normals.ends[k - 1] if k else 2  # behind the head of the stream
+    for k, end in enumerate(index.normals["ends"]):
+        begin = index.normals["ends"][k - 1] if k else 2  # behind the head of the stream
         raw = zlib.decompressobj(-zlib.MAX_WBITS).decompress(data[begin:end])
         assert raw == texels[index.start[k] : index.start[k + 1]].tobytes()
 
@@ -95,7 +95,7 @@ def test_every_level_inflates_without_those_before_it(written: Path) -> None:
 def test_any_truncation_decodes_to_the_levels_that_are_whole(written: Path) -> None:
     index, data = read_index(written), (written / NORMALS).read_bytes()
     for cut in range(len(data) + 1):
-        there = sum(end <= cut for end in index.normals.ends)
+        there = sum(end <= cut for end in index.normals["ends"])
         if there:
             inflated(data[:cut], index.start[: there + 1], index.normals)
         if there < index.levels:
