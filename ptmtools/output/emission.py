@@ -48,7 +48,6 @@ if TYPE_CHECKING:
     from ptmtools.coverage.required_levels import Need
 
 
-#: A path in the served folder and the file's content.
 #: Files written at a time.
 _WRITER_THREADS = 8
 #: Deflate, no name, no time, best compression, no system (RFC 1952).
@@ -133,7 +132,7 @@ def visit_of(content: Content, sizes: Mapping[str, int]) -> Visit:
     mean, most = over_places(at_hand, pvs.viewers)
     volume = pvs.volume_at_hand
     images = sum(records[i].fallback_bytes for i in used.tolist() if content.options.fallback)
-    browsed = [sizes[f.entry] + _total(_geometry(content, f, sizes)) for f in forms if f.entry]
+    browsed = [sizes[f.entry] + int(_geometry(content, f, sizes).sum()) for f in forms if f.entry]
     return Visit(
         browser=browsed[0] + images if browsed else None,
         first_room=int(sum(opening)),
@@ -150,10 +149,6 @@ def _geometry(content: Content, form: Emitter, sizes: Mapping[str, int]) -> NDAr
     """(C,) bytes of the cells in a form."""
     paths = (path_of(cell, form.cell_files) for cell in range(content.cells.cell_count))
     return np.array([sizes[path] for path in paths], np.int64)
-
-
-def _total(sizes: NDArray[np.int64]) -> int:
-    return int(sizes.sum())
 
 
 def emit(

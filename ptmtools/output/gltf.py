@@ -9,22 +9,9 @@ accessor for the whole cell the files of the sample museum are 13 % smaller, tho
 
 One buffer view holds each kind of data: positions, texture coordinates, colours, wide indices,
 narrow ones. Equal arrays share an accessor. Vertices are in the order of their first use, so
-rectangles of all sizes share their six indices, and often their texture coordinates: the sample
-museum's files are 9 % smaller for it.
+rectangles of all sizes share their six indices, and often their texture coordinates.
 
-=================================  =======================================================
-glTF material                      from the scene
-=================================  =======================================================
-baseColorFactor                    colour and opacity; glTF multiplies linear light, the scene
-                                   values encoded as sRGB, so the colour is converted
-baseColorTexture                   the fallback image, by URI, if there is one
-metallicFactor 0, roughness 1      matt, by default
-doubleSided                        the shape's sidedness
-alphaMode BLEND                    opacity below 1, or a used texel with alpha below 255
-alphaMode MASK, alphaCutoff        such texels of a material that tests them against a cutoff
-extras.ptm, extras.texture         the image's `.ptm`, and its index in the hints' textures
-extras.wrapS, extras.wrapT         the sampler's, for clients with textures of their own
-=================================  =======================================================
+docs/formats/gltf.md lists the members of a material by the properties of the scene's.
 
 (Tried: the texture as emissiveTexture over black, which shows it texel for texel as VRML does,
 without KHR_materials_unlit. Clients then have no base colour texture to replace with their own, and

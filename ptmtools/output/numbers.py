@@ -10,10 +10,7 @@ of a database.) Shares have `DIGITS` significant digits; sampling leaves two or 
 
 orjson computes the digits, the same as NumPy's Dragon4 does. It writes "1.0" for 1 and "1000.0" for
 1e3, so the few numbers that it writes differently are taken out beforehand and put back into its
-text. Megabytes of text a second, metres with all digits, millimetres, whole metres: 38, 30, 18;
-without orjson, the same method (Schubfach) in NumPy 7, 13, 23, in compiled loops 114, 136, 147, for
-370 lines more; NumPy's own conversion 10. So a museum quartered to 984,576 triangles is emitted in
-2.2 s of processor time instead of 1.2, one of usual size as fast as before (0.20 s).
+text (speeds and alternatives: docs/formats/database.md, "Measurements").
 """
 
 from __future__ import annotations

@@ -8,11 +8,6 @@ first room form a tree (Dijkstra, over leaves and portals); the rooms are in the
 around that tree, the shortest branch first, one storey after the other. A browser in WALK mode
 drops the viewpoint onto the floor, so it is put there beforehand: at the height of the eye above
 the nearest upward-facing surface below.
-
-(Tried: an Anchor on every portal, with a transparent polygon to click on. view3dscene 4.2 and
-X_ITE 15 draw nothing of it, to the last pixel; but in X_ITE a drag that begins on it jumps instead
-of walking, and at the museum's first viewpoint that is 42 % of the picture. Readers without
-transparency show a wall in every door.)
 """
 
 from __future__ import annotations

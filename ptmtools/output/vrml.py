@@ -1,27 +1,11 @@
 """The VRML97 files: a cell file for each cell, and `root.wrl`, where a walk can begin.
 
 A cell file is a PTMCell node, then the cell's shapes. PTMCell is a PROTO whose body draws nothing,
-so a browser that ignores it still shows the cell. The appearance of a shape, and the reasons (seen
-in view3dscene 4.2 and X_ITE 15, the same in both unless stated):
-
-================================  ==================================================
-texture                           ImageTexture alone: shown unlit, texel for texel
-texture × colour                  ImageTexture and one Color for all faces: unlit, multiplied.
-                                  A Material's diffuseColor multiplies too, but is lit, and
-                                  emissiveColor hides the texture in view3dscene. VRML97 to the
-                                  letter shows the bare texture.
-texture, opacity < 1              ImageTexture and Material (diffuseColor, transparency): lit,
-                                  as only a Material has a transparency
-no texture                        Material (diffuseColor, transparency): lit by the headlight,
-                                  and a quarter as bright by itself (emissiveColor). A
-                                  headlight alone leaves floors, ceilings and corridor walls
-                                  black, since it shines along them
-colours of corners                Color and colorIndex, in place of the diffuse colour; with a
-                                  texture unlit, multiplied
-================================  ==================================================
-
-(Tried: baking the colour into a second image. It is not lossless, and costs a texture. Ambient
-light in the root file instead of a glow: X_ITE shows none.)
+so a browser that ignores it still shows the cell. docs/formats/database.md lists the appearance of
+a shape by its material, and what browsers show: a texture alone is unlit; a `Color` tints it; a
+`Material` stands only where transparency or a missing texture needs one, with a glow
+(emissiveColor), since a headlight leaves floors and corridor walls black. (Tried: ambient light in
+the root file instead of a glow: X_ITE shows none.)
 
 `NODES` and `PROTOS` are the emission pattern: all nodes and fields that the files may have. The
 items of a list are separated by a comma, or by a line's end after several: one character, which

@@ -19,10 +19,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ptmtools.cells import Cells, structural_triangles
+from ptmtools.cells import structural_triangles
 from ptmtools.diagnostics import Findings, Issue, ValidationReport, worst_first
 from ptmtools.errors import DatabaseError
 from ptmtools.lazy import Lazy
@@ -35,7 +32,7 @@ from ptmtools.progress import Progress, silent
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import MANIFEST
 from ptmtools.texture.model import Limits
-from ptmtools.visibility import Pvs, SegmentReport, check_conservative
+from ptmtools.visibility import SegmentReport, check_conservative
 
 
 def check_stages(db: DatabaseFolder, faulty: Collection[str] = ()) -> tuple[Issue, ...]:
@@ -197,16 +194,7 @@ def shoot_segments(
     ------
     DatabaseError: PTM-D001 to PTM-D006, as `DatabaseFolder` and `Artifacts`.
     """
-    structural, cells, pvs = structure_of(db)
-    return check_conservative(structural, cells, pvs, segments, progress=progress)
-
-
-def structure_of(db: str | os.PathLike[str]) -> tuple[NDArray[np.float64], Cells, Pvs]:
-    """The (T, 3, 3) occluding triangles of a database, m, its cells and its PVS.
-
-    Raises as `shoot_segments`.
-    """
     artifacts = Artifacts(open_database(db))
     options, scene, cells = artifacts.recorded(CELLS), artifacts[APO], artifacts[CELLS]
     corners = scene.corners[structural_triangles(scene, options, cells.opened)]
-    return corners, cells, artifacts[PVS]
+    return check_conservative(corners, cells, artifacts[PVS], segments, progress=progress)
