@@ -6,16 +6,12 @@ contexts, each trained on its own error, their mean refined by an adaptive proba
 All in integers. The arithmetic coder is PAQ's carryless one with 32 bits and probabilities
 of 16.
 
-For noise (`code_even`) all blocks that have the parent as their mean are equally likely. A model
-that adapts pays for the attempt to learn; without anything to learn, counting is shorter. The
-number of ways to complete a block gives the exact probability of each bit of its texels, in
-integers.
+For noise (`code_even`) all blocks that have the parent as their mean are equally likely: the number
+of ways to complete a block gives the exact probability of each bit of its texels, in integers.
 
-The texel predictor's weights come from weighted recursive least squares, in batches. For each of
-the positions of a texel in its block, a linear model of the features f of a sample predicts its
-target y. The normal equations A = Σ ω f fᵀ, b = Σ ω f y forget 1/32 of the past with every batch of
-16 samples and are solved anew after each, later after every other. The target is kept as the last
-of the 24 features: A and b are one matrix.
+The texel predictor's weights come from weighted recursive least squares, in batches
+(``docs/formats/ptm-small.md``, "Learning"). The target is kept as the last of the 24 features: the
+normal equations A = Σ ω f fᵀ, b = Σ ω f y are one matrix.
 
 Why the bits cannot differ between machines: A holds integers below 2^53 in float64, sums and
 products of which are exact in any order. The elimination rounds, in a fixed order of operations

@@ -10,7 +10,6 @@ import io
 import os
 from collections.abc import Callable
 from functools import partial
-from importlib import import_module
 from pathlib import PurePath
 from typing import IO, Any, BinaryIO, cast
 
@@ -19,10 +18,10 @@ from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, OutputError, naming
 from ptmtools.texture.container import HEAD_MAX, MAGIC, read_header
-from ptmtools.texture.images import floats as openexr, floats as radiance
-from ptmtools.texture.images.floats import NPY_MAGIC, read_npy
+from ptmtools.texture.images import deep, floats, opening
+from ptmtools.texture.images.opening import PNG, TIFF, pillow_faults
 from ptmtools.texture.images.picture import Picture, unsupported
-from ptmtools.texture.images.png import check_chunks
+from ptmtools.texture.images.png import check_chunks, save_png
 from ptmtools.texture.model import Description, Limits
 from ptmtools.texture.sources import open_file
 
@@ -113,8 +112,6 @@ def read_ptm(path: str | os.PathLike[str]) -> bytes:
 
 
 def _load(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
-    from ptmtools.texture.images.opening import pillow_faults
-
     result = _opened(file, path, limits)
     if isinstance(result, Picture):
         return result
@@ -135,28 +132,18 @@ def _opened(file: BinaryIO, path: str | None, limits: Limits) -> Picture | Calla
             "is a progressive texture map already, not an image",
             remedy="use ptm decode to get an image from it",
         )
-    if first.startswith(NPY_MAGIC):
-        return read_npy(file, path, limits)
-    if first.startswith(radiance.MAGIC):
-        return radiance.read_hdr(file, limits)
-    if first.startswith(openexr.OPENEXR_MAGIC):
-        return openexr.read_exr(file, path, limits)
+    if first.startswith(floats.NPY_MAGIC):
+        return floats.read_npy(file, path, limits)
+    if first.startswith(floats.MAGIC):
+        return floats.read_hdr(file, limits)
+    if first.startswith(floats.OPENEXR_MAGIC):
+        return floats.read_exr(file, path, limits)
     return _by_pillow(file, path, first, limits)
 
 
 def _by_pillow(
     file: BinaryIO, path: str | None, first: bytes, limits: Limits
 ) -> Picture | Callable[[], Picture]:
-    from ptmtools.texture.images import deep, opening as eight_bit
-    from ptmtools.texture.images.opening import (
-        PNG,
-        TIFF,
-        high_colour,
-        lossy_format,
-        opened,
-        pillow_faults,
-    )
-
     with pillow_faults():
         if first.startswith(_PPM) and (picture := deep.read_ppm(file, path, limits)):
             return picture
@@ -164,8 +151,8 @@ def _by_pillow(
             check_chunks(file)
         if first.startswith(TIFF) and deep.is_deep(tags := deep.tiff_tags(file)):
             return deep.read_tiff(file, tags, limits)
-        image = opened(file, limits)
-        eight_bit.one_frame(image)
+        image = opening.opened(file, limits)
+        opening.one_frame(image)
         depth = 8
         if first.startswith(PNG):
             depth, colour = first[24], first[25]
@@ -173,10 +160,10 @@ def _by_pillow(
                 return deep.read_png(file, image, colour, limits)
         elif image.format == "PPM" and _rescaled(image.tile):
             raise unsupported("samples that do not fill their bits")
-        elif high_colour(image):
+        elif opening.high_colour(image):
             raise unsupported("samples of 5 or 6 bits")
-        eight_bit.check(image, limits)
-        return partial(eight_bit.read, image, depth, lossy_format(file, image))
+        opening.check(image, limits)
+        return partial(opening.read, image, depth, opening.lossy_format(file, image))
 
 
 def _rescaled(tiles: list[Any]) -> bool:
@@ -227,7 +214,7 @@ def write_to(
     writer(suffix)(file, texels, description)
 
 
-Writer = Callable[[IO[bytes], "Samples", Description], object]
+Writer = Callable[[IO[bytes], Samples, Description], object]
 
 
 def writer(suffix: str) -> Writer:
@@ -241,17 +228,15 @@ def writer(suffix: str) -> Writer:
             f"the suffix {suffix!r} {why}",
             remedy=f"use one of {', '.join(WRITTEN)}",
         )
-    module, name = writer
-    write: Writer = getattr(import_module(f"ptmtools.texture.images.{module}"), name)
-    return write
+    return writer
 
 
-#: Suffix → the module, and its function that writes such files.
-WRITTEN = {
-    ".png": ("png", "save_png"),
-    ".npy": ("floats", "save_npy"),
-    ".tif": ("deep", "save_tiff"),
-    ".tiff": ("deep", "save_tiff"),
-    ".hdr": ("floats", "save_radiance"),
-    ".exr": ("floats", "save_openexr"),
+#: Suffix → the function that writes such files.
+WRITTEN: dict[str, Writer] = {
+    ".png": save_png,
+    ".npy": floats.save_npy,
+    ".tif": deep.save_tiff,
+    ".tiff": deep.save_tiff,
+    ".hdr": floats.save_radiance,
+    ".exr": floats.save_openexr,
 }
