@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ptmtools.arrays import Floats
+from ptmtools.arrays import Floats, areas
 from ptmtools.lab.catalogue import LEAST, Catalogue, Columns, Shapes, aligned
 from ptmtools.output.served import Served
 from ptmtools.rendering.octrees import Octrees
@@ -67,10 +67,7 @@ def differences(served: Served, octrees: Octrees, columns: Columns) -> Floats:
         levels = int(octrees.levels[o])
         if len(own):
             corner = surfaces.corner[own]
-            area = np.linalg.norm(
-                np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1
-            )
-            total = np.cumsum(area)
+            total = np.cumsum(areas(corner))
             which = np.searchsorted(total, random.uniform(0, total[-1], _POINTS), "right")
             weight = random.dirichlet(np.ones(3), _POINTS)
             place = np.einsum("nk,nkj->nj", weight, corner[np.minimum(which, len(own) - 1)])
@@ -79,8 +76,7 @@ def differences(served: Served, octrees: Octrees, columns: Columns) -> Floats:
                 count = descend(octrees, o, x, y, z, DEEP, light)
                 steps[1:count] += np.abs(np.diff(light[:count]))
             result[o, 1 : levels + 1] = _BRIGHT * steps / _POINTS
-        stored = result[o, 1 : levels + 1]
-        result[o, 1 : levels + 1] = np.maximum(stored, LEAST)
+        result[o, 1 : levels + 1] = np.maximum(result[o, 1 : levels + 1], LEAST)
     return result
 
 

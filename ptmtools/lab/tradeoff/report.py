@@ -16,7 +16,7 @@ from typing import Any
 from ptmtools.lab.figures import COLORS, plot
 from ptmtools.lab.report import rate_text
 from ptmtools.lab.tradeoff.experiment import Measurement, Setting, Trade, Trial, pareto
-from ptmtools.lab.tradeoff.walk import FIRST, WalkOutcome, WalkTrade, WalkTrial
+from ptmtools.lab.tradeoff.walk import FIRST, Case, WalkOutcome, WalkTrade, WalkTrial
 from ptmtools.quantities import size
 
 #: Columns of the CSV.
@@ -111,11 +111,12 @@ def _draw(trade: Trade, axes: Any) -> None:
     axes.legend(fontsize=7)
 
 
+#: Name of the unchanged database.
+_AS_IS = "as it is"
 #: Least visible change of e, as a share of it and in steps of 8-bit colour.
 _SHARE, _STEPS = 0.005, 0.01
 #: Least relevant share of bytes, and of seconds, which are no more exact.
 _BYTES, _SECONDS = 0.005, 0.1
-Case = tuple[str, float | None, str]
 
 
 def sentences(trade: WalkTrade) -> list[str]:
@@ -227,7 +228,7 @@ def settings_table(trade: WalkTrade, wanted: float | None = None) -> list[str]:
         f"fetched: on the walk, of {trade.seconds:.0f} s. first: until {FIRST:.0%} of the first "
         "picture is there.",
     ]
-    wide = max(len(tried.name) for tried in (*trade.trials, _AS_IS))
+    wide = max(map(len, [_AS_IS, *(tried.name for tried in trade.trials)]))
     head = f"  {'setting':<{wide}} {'build':>8} {'served':>9} {'e':>7} {'change':>7} {'95%':>7} "
     head += f"{'fetched':>9} {'first':>7}"
     for case in trade.cases:
@@ -242,9 +243,6 @@ def settings_table(trade: WalkTrade, wanted: float | None = None) -> list[str]:
     return [*lines, "", *problems] if problems else lines
 
 
-_AS_IS = WalkTrial("as it is", "", "", 0, 0)
-
-
 def _rows(trade: WalkTrade, case: Case, wide: int) -> Iterator[str]:
     was = trade.own.by(case)
     for tried in (trade.own, *trade.trials):
@@ -254,7 +252,7 @@ def _rows(trade: WalkTrade, case: Case, wide: int) -> Iterator[str]:
         change = f"{(seen.e - was.e) / was.e:+.1%}" if seen is not was and was.e else "–"
         first = "–" if seen.first is None else f"{seen.first:.1f} s"
         yield (
-            f"{tried.name or _AS_IS.name:<{wide}} {tried.build:6.1f} s {size(tried.served):>9} "
+            f"{tried.name or _AS_IS:<{wide}} {tried.build:6.1f} s {size(tried.served):>9} "
             f"{seen.e:7.3f} {change:>7} {seen.p95:7.3f} {size(seen.fetched):>9} {first:>7}"
         )
 
@@ -273,7 +271,7 @@ def _trade(trade: WalkTrade, case: Case) -> Trade:
             more = {"fetched": float(seen.fetched)}
             if seen.first is not None:
                 more["first"] = seen.first
-            setting = Setting(tried.name or _AS_IS.name, {})
+            setting = Setting(tried.name or _AS_IS, {})
             measured = Measurement(tried.build, tried.served, seen.e, seen.p95, more)
             trials.append(Trial(setting, measured))
     return Trade("walk", "bytes served", f"e ({where})", 0.0, pareto(trials), {})

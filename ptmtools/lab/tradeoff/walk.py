@@ -62,14 +62,17 @@ class WalkOptions(SimulateOptions):
     )
 
 
+#: Policy of the client, bandwidth of the link (bit/s, None for no limit), texture memory.
+Case = tuple[str, float | None, str]
+
+
 @dataclass(frozen=True)
 class WalkOutcome:
     """Outcome of a walk.
 
     Attributes
     ----------
-    policy, bandwidth, memory: policy of the client, bandwidth of the link (bit/s, None for no
-        limit), texture memory.
+    policy, bandwidth, memory: see `Case`.
     e, p95: mean over the walk, and what 95 % of the frames do not exceed; 0 to 255.
     fetched: bytes received on the walk.
     first: s until `FIRST` of the first picture has arrived; None if it never has.
@@ -84,7 +87,7 @@ class WalkOutcome:
     first: float | None
 
     @property
-    def case(self) -> tuple[str, float | None, str]:
+    def case(self) -> Case:
         """The key of comparable outcomes."""
         return self.policy, self.bandwidth, self.memory
 
@@ -112,7 +115,7 @@ class WalkTrial:
     seen: tuple[WalkOutcome, ...] = ()
     problem: str = ""
 
-    def by(self, case: tuple[str, float | None, str]) -> WalkOutcome | None:
+    def by(self, case: Case) -> WalkOutcome | None:
         """The outcome of a case."""
         return next((seen for seen in self.seen if seen.case == case), None)
 
@@ -132,7 +135,7 @@ class WalkTrade:
     trials: tuple[WalkTrial, ...]
 
     @property
-    def cases(self) -> list[tuple[str, float | None, str]]:
+    def cases(self) -> list[Case]:
         """All cases, see `WalkOutcome.case`."""
         return [seen.case for seen in self.own.seen]
 
