@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Any, Generic, TypeVar, cast
 
 from ptmtools.errors import MissingComponentError
@@ -59,3 +60,16 @@ def component(module: str, code: str, message: str, extra: str) -> Any:
     except ImportError:
         remedy = f"pip install 'ptmtools[{extra}]'"
         raise MissingComponentError(code, message, remedy=remedy) from None
+
+
+def pymeshlab_absence() -> str:
+    """The reason why pymeshlab is unavailable, or "". Without OpenGL it imports, prints a page of
+    warnings and supports no format and no filter, so libOpenGL is checked first."""
+    import ctypes
+
+    try:
+        if sys.platform == "linux":
+            ctypes.CDLL("libOpenGL.so.0")
+    except OSError as error:
+        return str(error)
+    return "" if find_spec("pymeshlab") else "No module named 'pymeshlab'"

@@ -10,11 +10,8 @@ OFF), and textured PLY, of which trimesh keeps one image. Both libraries cut pol
 
 from __future__ import annotations
 
-import ctypes
 import os
-import sys
 import tempfile
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, MissingComponentError
+from ptmtools.lazy import pymeshlab_absence
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.options import IFC, SUFFIXES, TRIMESH, USD
 from ptmtools.scene.sandbox import run_in_sandbox, serve
@@ -33,7 +31,7 @@ def convert(path: Path, scratch: Path) -> list[tuple[Path, str]]:
 
     Raises InputError PTM-I254 if pymeshlab cannot read the model, MissingComponentError PTM-M100.
     """
-    if fault := _absence():
+    if fault := pymeshlab_absence():
         raise MissingComponentError(
             "PTM-M100",
             f"pymeshlab is unavailable ({fault})",
@@ -41,17 +39,6 @@ def convert(path: Path, scratch: Path) -> list[tuple[Path, str]]:
         )
     labels = run_in_sandbox(__name__, "pymeshlab", path, path.absolute(), scratch)
     return [(scratch / f"{i}.obj", label) for i, label in enumerate(labels)]
-
-
-def _absence() -> str:
-    """The reason why pymeshlab is unavailable, or "". Without OpenGL it imports, prints a page of
-    warnings and supports no format, so libOpenGL is checked first."""
-    try:
-        if sys.platform == "linux":
-            ctypes.CDLL("libOpenGL.so.0")
-    except OSError as error:
-        return str(error)
-    return "" if find_spec("pymeshlab") else "No module named 'pymeshlab'"
 
 
 def _convert(path: str, scratch: str) -> list[str]:

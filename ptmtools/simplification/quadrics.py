@@ -119,47 +119,6 @@ def _scales(slope: Floats, area: Floats) -> Floats:
     return np.asarray(1 / np.clip(steep, mean / SCALES**2, mean * SCALES**2))
 
 
-def value(quadric: Floats, d: Floats) -> float:
-    """Of one vertex's row, for a displacement: what `quadric_kernels.value_at` computes."""
-    return float(d @ _matrix(quadric) @ d + 2 * quadric[6:9] @ d + quadric[9])
-
-
-def shifted(quadric: Floats, d: Floats) -> Floats:
-    """The same quadric for a vertex that has moved by ``d``."""
-    moved = quadric.copy()
-    moved[6:9] = quadric[6:9] + _matrix(quadric) @ d
-    moved[9] = value(quadric, d)
-    return moved
-
-
-def attribute_value(quadric: Floats, d: Floats, s: Floats) -> float:
-    """Of one wedge's row, for displacements of the vertex and of its attributes."""
-    result = value(quadric, d)
-    for k, step in enumerate(s):
-        g, r, w = np.split(quadric[10 + PER_ATTRIBUTE * k :][:PER_ATTRIBUTE], [3, 4])
-        result += float(step * step * w[0] - 2 * step * (g @ d + r[0]))
-    return result
-
-
-def attribute_shifted(quadric: Floats, d: Floats, s: Floats) -> Floats:
-    """The same quadric for a wedge whose vertex has moved by ``d``, and its attributes by ``s``."""
-    moved = quadric.copy()
-    moved[6:9] = quadric[6:9] + _matrix(quadric) @ d
-    for k, step in enumerate(s):
-        begin = 10 + PER_ATTRIBUTE * k
-        moved[6:9] -= step * quadric[begin : begin + 3]
-        moved[begin + 3] += quadric[begin : begin + 3] @ d - step * quadric[begin + 4]
-    moved[9] = attribute_value(quadric, d, s)
-    return moved
-
-
-def _matrix(quadric: Floats) -> Floats:
-    matrix = np.empty((3, 3))
-    for entry, (i, j) in zip(quadric, _ENTRIES, strict=False):
-        matrix[i, j] = matrix[j, i] = entry
-    return matrix
-
-
 #: Steps to the best place, each of which leaves the pull's share of the way: vertices on the edges
 #: of a box stay there.
 STEPS = 3

@@ -3,14 +3,8 @@
 After Garland & Heckbert, "Surface simplification using quadric error metrics", 1997, with the
 attributes of Hoppe, "New quadric metric for simplifying meshes with appearance attributes", 1999.
 
-Tried on made statues (`benchmarks/simplification.py`: 1,002,252 faces to 10,000), each
-beside ours:
+Tried (`benchmarks/simplification.py`; other simplifiers: docs/design/simplification.md):
 
-- fast-simplification 0.2 takes 0.11 of the time and leaves 2.0 times the mean distance and 1.6
-  times the mean angle: it collapses whatever is below a threshold, in the order of the file. It
-  knows no seams. The triangles are made once and looked at for years: not worth it.
-- pymeshlab 2025.7 takes 1.7 times as long, with 1.07 times the mean distance. It stays, for
-  plain meshes and on request, since the paper on octree textures used it.
 - A stronger pull to the middle of an edge (`collapse_kernels.PULL`): a thousand times leaves 1.13
   times the mean distance (100,000 faces); none leaves flat parts without a best place.
 - Refusing thin faces outright: on flat walls collapses that cost nothing were refused, and dear
@@ -26,15 +20,12 @@ collapses keep.
 
 from __future__ import annotations
 
-import ctypes
-import sys
 from dataclasses import replace
-from importlib.util import find_spec
-from math import inf
 
 import numpy as np
 
 from ptmtools.errors import InputError, MissingComponentError
+from ptmtools.lazy import pymeshlab_absence
 from ptmtools.progress import Progress, silent
 from ptmtools.simplification.collapse_kernels import collapse_edges, fill
 from ptmtools.simplification.legality_kernels import CAREFUL, CARELESS
@@ -55,7 +46,6 @@ from ptmtools.simplification.state_kernels import (
 )
 from ptmtools.simplification.surface import Surface, check, edges_of, surface_of
 from ptmtools.simplification.topology import HELD, PER_HANDLE, filled, parts_of, topology
-from ptmtools.tolerance import FILE_SHARE
 
 
 def by_meshlab(mesh: Mesh, surface: Surface, faces: int) -> Simplified:
@@ -70,7 +60,7 @@ def by_meshlab(mesh: Mesh, surface: Surface, faces: int) -> Simplified:
             "pymeshlab simplifies meshes without materials, textures and colours only",
             remedy="choose the method quadric",
         )
-    if fault := _absence():
+    if fault := pymeshlab_absence():
         raise MissingComponentError(
             "PTM-M100",
             f"pymeshlab cannot be used ({fault})",
@@ -90,16 +80,6 @@ def by_meshlab(mesh: Mesh, surface: Surface, faces: int) -> Simplified:
     return Simplified(
         Mesh(points, triangles), source, float("nan"), too_many(len(triangles), faces)
     )
-
-
-def _absence() -> str:
-    """Why pymeshlab cannot be used. Without OpenGL it imports, and knows no filter."""
-    try:
-        if sys.platform == "linux":
-            ctypes.CDLL("libOpenGL.so.0")
-    except OSError as error:
-        return str(error)
-    return "" if find_spec("pymeshlab") else "No module named 'pymeshlab'"
 
 
 #: Progress is told after so many parts of the work.
@@ -137,7 +117,8 @@ def _simplified(
 ) -> Simplified:
     counts = topology(surface)
     state = _state(mesh, surface)
-    state.worst[1] = _square(options.error / surface.scale)
+    bound = options.error / surface.scale
+    state.worst[1] = bound * bound
     held = PER_HANDLE * counts.handles if options.keep_parts else counts.held
     if held > HELD * options.faces:
         state.number[TOPOLOGY] = CLOSE if options.keep_parts else DROP
@@ -155,10 +136,6 @@ def _simplified(
         return result
     gone = f"{counts.parts - left:,} of {counts.parts:,} parts are gone"
     return replace(result, notes=(f"{gone}: they would hold many of the faces", *result.notes))
-
-
-def _square(error: float) -> float:
-    return error * error if error < 1 / FILE_SHARE else inf
 
 
 def _state(mesh: Mesh, surface: Surface) -> State:

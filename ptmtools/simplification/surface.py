@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.jit import plain_kernel as kernel
+from ptmtools.cells.search import connected, distinct
 from ptmtools.simplification.model import Mesh
 from ptmtools.tolerance import FILE_SHARE
 
@@ -68,7 +68,7 @@ class Surface:
 def surface_of(mesh: Mesh) -> Surface:
     """Welds a mesh and finds its seams. ValueError where arrays do not fit each other."""
     check(mesh)
-    vertex, given = _welded(mesh.points)
+    given, vertex = distinct(mesh.points)
     corners = vertex[mesh.triangles]
     whole = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
     source = np.flatnonzero(whole).astype(np.int32)
@@ -114,34 +114,15 @@ def check(mesh: Mesh) -> None:
         raise ValueError("triangles has an index out of range")
 
 
-def _welded(points: Floats) -> tuple[Ints, Ints]:
-    """The vertex of each point, and the first point of each vertex; vertices are numbered in the
-    order of the points."""
-    order = np.lexsort(points.T)
-    ordered = points[order]
-    fresh = np.ones(len(points), bool)
-    fresh[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    # The sort is stable: the first of a run has the least index.
-    first = order[fresh]
-    rank = np.empty(len(first), np.int64)
-    rank[np.argsort(first)] = np.arange(len(first))
-    vertex = np.empty(len(points), np.int64)
-    vertex[order] = rank[np.cumsum(fresh) - 1]
-    return vertex, np.sort(first)
-
-
 def _layered(triangle: Ints, given: Ints) -> tuple[Ints, Ints]:
     """The same with vertices of their own for faces that coincide with earlier ones."""
-    corners = np.sort(triangle, axis=1)
-    order = np.lexsort(corners.T)
-    ordered = corners[order]
-    fresh = np.ones(len(order), bool)
-    fresh[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    if fresh.all():
+    first, group = distinct(np.sort(triangle, axis=1))
+    if len(first) == len(group):
         return triangle, given
-    begin = np.flatnonzero(fresh)
+    order = np.argsort(group, kind="stable")
+    begin = np.searchsorted(group[order], np.arange(len(first)))
     layer = np.empty(len(order), np.int64)
-    layer[order] = np.arange(len(order)) - begin[np.cumsum(fresh) - 1]
+    layer[order] = np.arange(len(order)) - begin[group[order]]
     place, index = np.unique(layer[:, None] * len(given) + triangle, return_inverse=True)
     return index.reshape(-1, 3), given[place % len(given)]
 
@@ -210,10 +191,8 @@ def _seams(
     kept = np.packbits(open_.reshape(-1, 3), axis=1, bitorder="little").reshape(-1)
     lone = open_[edges.order[edges.start]]
     ends = np.bincount(np.concatenate([end[lone] for end in edges.ends]), minlength=count)
-    parent = np.arange(triangle.size)
-    unite(parent, one, following(two))
-    unite(parent, following(one), two)
-    return kept, flattened(parent), ends
+    pairs = [[one, following(two)], [following(one), two]]
+    return kept, connected(triangle.size, np.concatenate(pairs, axis=1).T), ends
 
 
 def following(corner: Ints) -> Ints:
@@ -238,33 +217,3 @@ def _continued(mesh: Mesh, source: Indices, one: Ints, two: Ints) -> Bools:
         for a, b in ends:
             same &= (mesh.colors[here, a] == mesh.colors[there, b]).all(axis=1)
     return same
-
-
-@kernel
-def unite(parent: Ints, one: Ints, two: Ints) -> None:
-    """Joins the sets of each pair; the least member stands for a set."""
-    for i in range(len(one)):
-        a, b = one[i], two[i]
-        while parent[a] != a:
-            parent[a] = parent[parent[a]]
-            a = parent[a]
-        while parent[b] != b:
-            parent[b] = parent[parent[b]]
-            b = parent[b]
-        if a < b:
-            parent[b] = a
-        else:
-            parent[a] = b
-
-
-@kernel
-def flatten(parent: Ints) -> None:
-    """Lets every member know who stands for its set."""
-    for i in range(len(parent)):
-        parent[i] = parent[parent[i]]
-
-
-def flattened(parent: Ints) -> Ints:
-    """The same array, after `flatten`."""
-    flatten(parent)
-    return parent

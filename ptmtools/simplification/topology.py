@@ -22,9 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.cells.search import connected
 from ptmtools.jit import plain_kernel as kernel
 from ptmtools.simplification.model import Mesh
-from ptmtools.simplification.surface import Edges, Surface, edges_of, flattened, following, unite
+from ptmtools.simplification.surface import Edges, Surface, edges_of, following
 
 #: Faces that a handle, a closed part and one with a border hold.
 PER_HANDLE, PER_CLOSED, PER_OPEN = 4, 4, 1
@@ -70,7 +71,7 @@ def topology(surface: Surface) -> Topology:
         # Where fans of faces touch in a vertex each has one of its own.
         fan = _fans(edges, triangle.size)
         begin, end = fan[lone], fan[following(lone)]
-        borders = len(np.unique(joined(triangle.size, begin, end)[begin]))
+        borders = len(np.unique(connected(triangle.size, np.stack([begin, end], axis=1))[begin]))
         characteristic = len(np.unique(fan)) - len(edges.start) + len(triangle)
         handles = max(0, (2 * parts - borders - characteristic) // 2)
     return Topology(handles, parts - bordered, bordered)
@@ -81,7 +82,7 @@ def parts_of(edges: Edges, faces: int) -> Ints:
     same = np.ones(len(edges.order), np.bool_)
     same[edges.start] = False
     later = np.flatnonzero(same)
-    return joined(faces, edges.order[later - 1] // 3, edges.order[later] // 3)
+    return connected(faces, edges.order[np.stack([later - 1, later], axis=1)] // 3)
 
 
 def _fans(edges: Edges, corners: int) -> Ints:
@@ -90,14 +91,7 @@ def _fans(edges: Edges, corners: int) -> Ints:
     one, two = edges.order[first], edges.order[first + 1]
     agree = edges.begin[one] != edges.begin[two]
     begin, end = np.where(agree, following(two), two), np.where(agree, two, following(two))
-    return joined(corners, np.append(one, following(one)), np.append(begin, end))
-
-
-def joined(count: int, one: Ints, two: Ints) -> Ints:
-    """Of each of so many things the least that pairs join it with."""
-    parent = np.arange(count)
-    unite(parent, one, two)
-    return flattened(parent)
+    return connected(corners, np.concatenate([[one, begin], [following(one), end]], axis=1).T)
 
 
 Kind = TypeVar("Kind", bound=np.generic)
@@ -157,7 +151,7 @@ def filled(mesh: Mesh, surface: Surface, faces: int) -> Filled | None:
     following = np.full(triangle.size, TANGLED)
     follow(opposite, following)
 
-    part = joined(len(surface.point), *edges.ends)
+    part = connected(len(surface.point), np.stack(edges.ends, axis=1))
     low, high = np.full(surface.point.shape, np.inf), np.full(surface.point.shape, -np.inf)
     np.minimum.at(low, part, surface.point)
     np.maximum.at(high, part, surface.point)
@@ -203,19 +197,6 @@ def follow(opposite: Ints, following: Ints) -> None:
             at = at - 2 if at % 3 == 2 else at + 1
         if opposite[at] == BORDER:
             following[edge] = at
-
-
-@kernel
-def has(key: Ints, wanted: int) -> bool:
-    """Whether a number is among ascending ones."""
-    low, high = 0, len(key)
-    while low < high:
-        middle = (low + high) // 2
-        if key[middle] < wanted:
-            low = middle + 1
-        else:
-            high = middle
-    return low < len(key) and key[low] == wanted
 
 
 @kernel
@@ -312,7 +293,9 @@ def cut_ears(
         for i in range(count):
             one, two = loop[i - 1 if i else count - 1], loop[i + 1 if i + 1 < count else 0]
             a, b = triangle[one // 3, one % 3], triangle[two // 3, two % 3]
-            if a == b or has(key, min(a, b) * len(point) + max(a, b)):
+            edge = min(a, b) * len(point) + max(a, b)
+            at = np.searchsorted(key, edge)
+            if a == b or (at < len(key) and key[at] == edge):
                 continue
             square = 0.0
             for k in range(3):

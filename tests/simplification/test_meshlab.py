@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
 
+from ptmtools import lazy
 from ptmtools.errors import InputError, MissingComponentError
-from ptmtools.simplification import SimplifyOptions, simplification as meshlab, simplify
+from ptmtools.simplification import SimplifyOptions, simplify
 from tests.simplification.shapes import sphere
 
 TO_500 = SimplifyOptions(500, method="meshlab")
 
 
 def test_a_sphere_stays_one(require: Callable[[str, str], None]) -> None:
-    if meshlab._absence() or not find_spec("pymeshlab"):
+    if lazy.pymeshlab_absence():
         require("pymeshlab", "pip install pymeshlab; apt install libopengl0 libgl1")
     given = sphere(20)
     given = replace(given, points=given.points * 1e-3 + 5)
@@ -38,7 +38,7 @@ def test_painted_meshes_are_refused() -> None:
 
 
 def test_without_pymeshlab_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(meshlab, "find_spec", lambda name: None)
-    monkeypatch.setattr(meshlab.sys, "platform", "elsewhere")
+    monkeypatch.setattr(lazy, "find_spec", lambda name: None)
+    monkeypatch.setattr(lazy.sys, "platform", "elsewhere")
     with pytest.raises(MissingComponentError, match="PTM-M100"):
         simplify(sphere(20), TO_500)

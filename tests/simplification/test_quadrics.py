@@ -10,16 +10,13 @@ from ptmtools.arrays import Floats
 from ptmtools.simplification.model import Mesh
 from ptmtools.simplification.quadrics import (
     LINE_WEIGHT,
+    PER_ATTRIBUTE,
     SIZE,
     add,
-    attribute_shifted,
-    attribute_value,
     attributes,
     best_place,
     shift,
     shift_wedge,
-    shifted,
-    value,
     value_at,
     vertex_quadrics,
     wedge_quadrics,
@@ -29,6 +26,47 @@ from ptmtools.simplification.surface import surface_of
 from tests.simplification.shapes import cylinder, facade, sphere
 
 SEEDS = st.integers(0, 2**32 - 1)
+
+
+def _matrix(row: Floats) -> Floats:
+    matrix = np.empty((3, 3))
+    matrix[np.triu_indices(3)] = row[:6]
+    matrix.T[np.triu_indices(3)] = row[:6]
+    return matrix
+
+
+def value(quadric: Floats, d: Floats) -> float:
+    """The value of a vertex's row for a displacement."""
+    return float(d @ _matrix(quadric) @ d + 2 * quadric[6:9] @ d + quadric[9])
+
+
+def shifted(quadric: Floats, d: Floats) -> Floats:
+    """The row relative to a vertex moved by ``d``."""
+    moved = quadric.copy()
+    moved[6:9] = quadric[6:9] + _matrix(quadric) @ d
+    moved[9] = value(quadric, d)
+    return moved
+
+
+def attribute_value(quadric: Floats, d: Floats, s: Floats) -> float:
+    """The value of a wedge's row for displacements of the vertex and of its attributes."""
+    result = value(quadric, d)
+    for k, step in enumerate(s):
+        g, r, w = np.split(quadric[10 + PER_ATTRIBUTE * k :][:PER_ATTRIBUTE], [3, 4])
+        result += float(step * step * w[0] - 2 * step * (g @ d + r[0]))
+    return result
+
+
+def attribute_shifted(quadric: Floats, d: Floats, s: Floats) -> Floats:
+    """A wedge's row relative to a vertex moved by ``d`` and attributes moved by ``s``."""
+    moved = quadric.copy()
+    moved[6:9] = quadric[6:9] + _matrix(quadric) @ d
+    for k, step in enumerate(s):
+        begin = 10 + PER_ATTRIBUTE * k
+        moved[6:9] -= step * quadric[begin : begin + 3]
+        moved[begin + 3] += quadric[begin : begin + 3] @ d - step * quadric[begin + 4]
+    moved[9] = attribute_value(quadric, d, s)
+    return moved
 
 
 def planes(rng: np.random.Generator, count: int) -> Floats:
@@ -105,13 +143,6 @@ def test_nowhere_is_better_than_the_best_place(seed: int) -> None:
     assert found == pytest.approx(value(both, place), rel=1e-6, abs=1e-9)
     exact = np.linalg.lstsq(_matrix(both), -both[6:9], rcond=None)[0]
     assert found <= value(both, exact) + 1e-6 * (1 + abs(both[9]))
-
-
-def _matrix(row: Floats) -> Floats:
-    matrix = np.empty((3, 3))
-    matrix[np.triu_indices(3)] = row[:6]
-    matrix.T[np.triu_indices(3)] = row[:6]
-    return matrix
 
 
 def test_the_best_place_in_a_plane_is_the_middle() -> None:
