@@ -1,4 +1,4 @@
-"""How much memory something takes."""
+"""Measures the memory of a call."""
 
 from __future__ import annotations
 

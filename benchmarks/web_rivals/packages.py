@@ -1,5 +1,4 @@
-"""What the rivals need from npm; each has a folder of its own, since npm removes what else lies in
-one."""
+"""npm packages of the rivals, in a folder each, since npm removes other content of a folder."""
 
 from __future__ import annotations
 

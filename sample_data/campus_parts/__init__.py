@@ -1,1 +1,1 @@
-"""What the sample campus is made of."""
+"""Parts of the sample campus."""

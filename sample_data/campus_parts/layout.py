@@ -1,4 +1,4 @@
-"""Where things are: the street's line, the plots beside it, and frames to put things into.
+"""Layout of the campus: the line of the street, the plots beside it, and frames to place objects.
 
 The street bends a little every 250 m. Along it runs s, and t across it, to the right as seen by
 who walks on. Cosines and sines of its headings are rational, so that nothing depends on a

@@ -1,4 +1,4 @@
-"""How a building is described, and the styles of windows that several have."""
+"""Recipes of buildings, and their styles of windows."""
 
 from __future__ import annotations
 

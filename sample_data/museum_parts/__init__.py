@@ -1,1 +1,1 @@
-"""What the sample museum is made of: its plan, shell, furnishing and textures."""
+"""Parts of the sample museum: plan, shell, furnishing and textures."""

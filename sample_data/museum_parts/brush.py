@@ -1,4 +1,4 @@
-"""What all styles of painting share: brush strokes, canvas, lettering, shapes."""
+"""Brush strokes, canvas, lettering and shapes, shared by all styles of painting."""
 
 from __future__ import annotations
 

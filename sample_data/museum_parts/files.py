@@ -1,4 +1,4 @@
-"""How a sample is written: all files or none, and over nobody else's."""
+"""Writes a sample: all files or none, and never over foreign files."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""Buildings carved out of a block, files of them, and what must come of them. Metres, Z up, as in
-tests/scene/made.py."""
+"""Buildings carved out of a block, their files and expectations. Metres, Z up, as in
+tests/scene/buildings.py."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 from ptmtools.arrays import Bools, Floats
 from ptmtools.scene import IngestOptions, Scene, ingest
 from ptmtools.scene.space import to_world
-from tests.scene.made import Point, box, inside_out, sheet, welded
+from tests.scene.buildings import Point, box, inside_out, sheet, welded
 
 Box = tuple[Point, Point]
 
@@ -126,35 +126,35 @@ def write(path: Path, parts: Iterable[tuple[str, Floats]]) -> Path:
 #: Rooms are not divided where that would save downloading.
 WHOLE = {"gain": 1.0}
 #: What a user says of the files here; without, it is guessed.
-SAID = {"up": "z", "unit": "m"}
+AXES = {"up": "z", "unit": "m"}
 
 
 @dataclass(frozen=True)
-class Made:
-    """A building, and what must come of it. Points are those of the model, before ``scale`` and
+class BuildingCase:
+    """A building and its expected cells. Points are those of the model, before ``scale`` and
     ``offset``."""
 
     #: Triangles, or triangles by the names of objects.
     model: Floats | dict[str, Floats]
-    #: Eyes of people: they are in leaves that stand, unless that is left open.
+    #: Eyes of visitors, in standing leaves unless that is left open.
     eyes: dict[str, Point]
-    #: Eyes in one cell, for all cells one can stand in; None: every eye has a cell of its own.
+    #: Eyes in one cell, for all cells where one can stand; None: every eye has a cell of its own.
     rooms: tuple[str, ...] | None = None
     #: There may be more such cells.
     more: bool = False
-    #: Points that are seen, but where nobody stands; in the room of these eyes, if that is fixed.
+    #: Visible points where one cannot stand; in the room of these eyes, if that is fixed.
     seen: Mapping[Point, str | None] = field(default_factory=dict)
     #: Points in no cell.
     gone: tuple[Point, ...] = ()
-    #: Pairs of eyes, by what the cell of one sees of that of the other.
+    #: Pairs of eyes whose cells see each other, or do not.
     sees: tuple[str, ...] = ()
     blind: tuple[str, ...] = ()
     closed: bool = True
-    #: Groups that cannot be reached from the start, which are kept and told.
+    #: Groups that are unreachable from the start, kept, and reported.
     cut_off: int = 0
-    said: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     options: Mapping[str, Any] = field(default_factory=lambda: WHOLE)
-    ingest: Mapping[str, Any] = field(default_factory=lambda: SAID)
+    ingest: Mapping[str, Any] = field(default_factory=lambda: AXES)
     file: str = "model.obj"
     #: Whether faces have backs; None: as the file says.
     backs: bool | None = None

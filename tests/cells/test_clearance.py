@@ -1,5 +1,5 @@
-"""What is clear of the structure does not depend on how the model is turned, on how its floors are
-divided, on how they are looked at, or on what else there is."""
+"""Clearance from the structure does not depend on the orientation of the model, the division of its
+floors, the order of queries, or other objects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is taken for detail by its shape, and what is not."""
+"""Classification of objects as detail by their shape."""
 
 from __future__ import annotations
 

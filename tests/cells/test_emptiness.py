@@ -12,7 +12,7 @@ from ptmtools.cells.subdivision import check_seen
 from ptmtools.errors import InputError
 from ptmtools.scene.model import Scene
 from tests.conftest import scene_of
-from tests.scene.made import box, house, inside_out, sheet, sheets, y_up
+from tests.scene.buildings import box, house, inside_out, sheet, sheets, y_up
 
 FLOOR = sheet((0, 0, 0), (10, 0, 0), (10, 8, 0), (0, 8, 0))
 #: Faces without backs, of which none is seen from inside.

@@ -1,4 +1,4 @@
-"""What the classes of objects are to the structure, and that the user is believed before them."""
+"""Effect of the classes of objects on the structure; the user's options take precedence."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
-"""Where somebody can stand, and that no such place is lost. What is expected follows from the
-definitions in docs/design/cells.md; it was written before the first run."""
+"""Places where a visitor can stand, none of which is lost.
+
+Expectations follow from the definitions in docs/design/cells.md and precede the first run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is said: nothing that a terminal obeys, and nothing that cannot be written."""
+"""Printed text holds no terminal control characters and no unencodable characters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How fine textures are needed: against rays that are followed one by one, and the hints."""
+"""Required levels of textures, against rays traced one by one, and the hints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which points are usable: clearance exactly, inside closed surfaces only."""
+"""Usable sample points: exact clearance, inside closed surfaces only."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""How the error falls with the number of sample points, and points added until it is small
-enough: against hints known by quadrature."""
+"""The error falls with the number of sample points; points are added until it is within tolerance.
+Reference: hints by quadrature."""
 
 from __future__ import annotations
 

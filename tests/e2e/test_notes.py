@@ -1,4 +1,4 @@
-"""What is said, in which order, and what is only counted."""
+"""Notes of a build: their order, and notes that are only counted."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ptmtools.pipeline.records import StageReport
 from ptmtools.pipeline.stages import CELLS
 from ptmtools.scene import IngestOptions
 from tests.e2e.conftest import TWO_ROOMS, Ptm
-from tests.scene.made import house, inside_out, obj_text, y_up
+from tests.scene.buildings import house, inside_out, obj_text, y_up
 from tests.scene.test_facing import glb
 
 MODEL = TWO_ROOMS / "two_rooms.obj"

@@ -12,8 +12,8 @@ from PIL import Image
 from ptmtools.output.gltf import unpack
 from ptmtools.texture.images.png import png_bytes
 from tests.e2e.conftest import Ptm
+from tests.scene.buildings import house, welded, y_up
 from tests.scene.conftest import Gltf
-from tests.scene.made import house, welded, y_up
 
 COLORS = np.random.default_rng(3).integers(0, 255, (16, 16, 3), dtype=np.uint8)
 CLEAR = np.concatenate([COLORS, np.full((16, 16, 1), 40, np.uint8)], axis=2)

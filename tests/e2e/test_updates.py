@@ -1,4 +1,4 @@
-"""What a build does again, what it says that it would do, and what it takes over."""
+"""Incremental builds: stages that run again, predictions of `--dry-run`, and reused results."""
 
 from __future__ import annotations
 

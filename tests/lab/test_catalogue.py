@@ -1,4 +1,4 @@
-"""What is said of textures comes from the hints where they say it, and else from the textures."""
+"""Facts about textures come from the hints if these have them, otherwise from the textures."""
 
 from __future__ import annotations
 

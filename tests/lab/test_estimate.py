@@ -1,4 +1,4 @@
-"""What a client believes of its link is what the link is."""
+"""A client's estimate of its link agrees with the link."""
 
 from __future__ import annotations
 

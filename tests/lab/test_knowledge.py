@@ -1,4 +1,4 @@
-"""What clients go by: what they know by then, and nothing that is yet to come."""
+"""Clients decide by past information only."""
 
 from __future__ import annotations
 

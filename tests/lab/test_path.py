@@ -20,11 +20,11 @@ from ptmtools.lab.path.making import Path as Made, make_path
 from ptmtools.lab.path.options import PathOptions
 from ptmtools.scene import Scene, ingest
 from ptmtools.walk import Walk, parse_walk, walk_text
-from tests.cells.buildings import Made as Building
-from tests.cells.made_buildings import HEIGHTS, TWO_ROOMS
-from tests.cells.made_doors import LEAF
+from tests.cells.buildings import BuildingCase as Building
+from tests.cells.closed_doors import LEAF
+from tests.cells.small_buildings import HEIGHTS, TWO_ROOMS
 from tests.conftest import RoomRow
-from tests.scene.made import box
+from tests.scene.buildings import box
 
 SAMPLE = Path(__file__).resolve().parents[2] / "sample_data/two_rooms/two_rooms.obj"
 STAIR = HEIGHTS["two floors with a stair"]

@@ -1,4 +1,4 @@
-"""What is served is held against the index before anything walks through it."""
+"""Served files are checked against the index before a walk."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which copy of a piece in a boundary is seen from where."""
+"""Visible copy of a piece in a boundary, by viewpoint."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is on the screen, against slow and plain references: rays, samples, levels of detail."""
+"""The picture on the screen, against slow references: rays, samples, levels of detail."""
 
 from __future__ import annotations
 

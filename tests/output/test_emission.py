@@ -1,4 +1,4 @@
-"""What `emit` writes, read back by our own reader and by view3dscene."""
+"""Files of `emit`, read back by our own reader and by view3dscene."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a database means for a visitor, held against the served files, which a client reads."""
+"""Figures of a visit of a database, against the served files that a client reads."""
 
 from __future__ import annotations
 

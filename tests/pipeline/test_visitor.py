@@ -1,4 +1,4 @@
-"""What the summary and `ptm info` end with."""
+"""Closing lines of the summary and of `ptm info`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the museum script writes, and what it refuses to overwrite."""
+"""Files that the museum script writes, and files that it refuses to overwrite."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which faces are kept, at every size and place."""
+"""Faces that are kept, at every size and place."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""Which models are inside out. With faces that have no backs, of the real scenes less than 1 % of
-what bounds rooms is turned away, and 83 % or more when they are turned over."""
+"""Detection of models that are inside out. With one-sided faces, less than 1 % of the
+bounds of rooms faces away in the real scenes, and 83 % or more when these are turned over."""
 
 from __future__ import annotations
 

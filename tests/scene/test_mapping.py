@@ -1,4 +1,4 @@
-"""How textures lie on triangles: against the corners."""
+"""Mapping of textures on triangles, against the corners."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which texels count as used: against a dense sampling with the filter's own arithmetic."""
+"""Used texels, against a dense sampling with the filter's own arithmetic."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a simplified mesh keeps: shape, outlines, texture, topology, whatever its place and size."""
+"""A simplified mesh keeps shape, outlines, texture and topology, at any place and size."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What goes wrong on the way: the page mends what it can, and says what it cannot."""
+"""Network faults: the page recovers from some, and reports the others."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the server answers, over real connections."""
+"""Responses of the server, over real connections."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the viewer finds itself, and what its camera takes in, as Python does."""
+"""The viewer's point location and frustum tests agree with Python's."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""What a simulated client saw, received, chose and asked for, in that order, for another client to
-do the same."""
+"""Records frames, arrivals, choices and requests of a simulated client, for replay by another."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What lies in a database before it is written: nothing is read, written or removed through a link.
+"""Foreign content of a database before a write: no link is followed to read, write or remove.
 
 Each case puts something in the place of a folder or file of a database, or of what an interrupted
 run left, and opens it to write. Nothing outside may change, and nothing there may be opened.

@@ -1,4 +1,4 @@
-"""What `ptm compare` measures is exact, or it says why there is nothing to measure."""
+"""Measures of `ptm compare` are exact, or it states why there is none."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What each level adds, from the encoder, against levels that were decoded and enlarged."""
+"""Detail that each level adds, from the encoder, against decoded and enlarged levels."""
 
 from __future__ import annotations
 

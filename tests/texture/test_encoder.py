@@ -1,4 +1,4 @@
-"""What is kept of a pyramid, and images that are never whole in memory."""
+"""Kept parts of a pyramid, and images that are never whole in memory."""
 
 from __future__ import annotations
 

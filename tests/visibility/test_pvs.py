@@ -1,4 +1,4 @@
-"""Who sees whom in hand-made rooms, by the whole of `compute_pvs`."""
+"""Visible pairs of hand-made rooms, by the whole of `compute_pvs`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a page calls: levels from ranges, workers, aborting; and that types and bytes are right."""
+"""The API of a page: levels from ranges, workers, aborting; types and bytes are right."""
 
 from __future__ import annotations
 

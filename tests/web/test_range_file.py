@@ -1,4 +1,4 @@
-"""How `web/three-ptm` reads files from servers, good ones and others; run by node."""
+"""Reading of files by `web/three-ptm` from good and faulty servers; run by node."""
 
 from __future__ import annotations
 

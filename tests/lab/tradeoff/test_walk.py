@@ -1,4 +1,4 @@
-"""What knobs are worth to a walker: the sentences, the tables, and the real thing on two rooms."""
+"""Prices of options for a visitor: sentences, tables, and a real run on two rooms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is taken from the model itself: its lightmaps and its masks."""
+"""Lightmaps and masks from the model itself."""
 
 from __future__ import annotations
 

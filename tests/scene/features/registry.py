@@ -1,4 +1,4 @@
-"""What becomes of a feature of a format, and what is then seen.
+"""Support for each feature of a format, and its effect on the picture.
 
 Outcomes are those of the formats' specifications: glTF 2.0 and its extensions, the OBJ and MTL
 appendices of Wavefront's manual, and, for colours of vertices in OBJ, what scanners write.

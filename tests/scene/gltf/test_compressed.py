@@ -11,9 +11,9 @@ import pytest
 
 from ptmtools.cells import Cells, subdivide
 from ptmtools.scene import Scene, ingest
+from tests.scene.buildings import HIGH, WIDE, house
 from tests.scene.conftest import Gltf, Put, noise, png
 from tests.scene.features.gltf import compressed
-from tests.scene.made import HIGH, WIDE, house
 
 #: Bits of the grid that encoders take where nobody says otherwise.
 BITS = 14

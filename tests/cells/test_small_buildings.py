@@ -1,4 +1,4 @@
-"""What comes of small buildings, as `made_buildings` has it."""
+"""Cells of small buildings against the expectations in `small_buildings`."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from ptmtools.scene import ingest
 from ptmtools.scene.notes import line
 from ptmtools.visibility import compute_pvs
 from tests.cells.buildings import write
-from tests.cells.made_buildings import EMPTY, GAP_BEHIND_GAP, HEIGHTS, MODELS, NO_PLACES, ROOMS
-from tests.cells.made_doors import DOORS
-from tests.scene.made import house, inside_out, y_up
+from tests.cells.closed_doors import DOORS
+from tests.cells.small_buildings import EMPTY, GAP_BEHIND_GAP, HEIGHTS, MODELS, NO_PLACES, ROOMS
+from tests.scene.buildings import house, inside_out, y_up
 
 EVERY = ROOMS | HEIGHTS | NO_PLACES | DOORS | MODELS
 #: Of which something else comes, so far, and why.
@@ -40,7 +40,7 @@ def test_what_comes_of_it(name: str, tmp_path: Path) -> None:
     cells = subdivide(scene, SubdivideOptions(**made.options))
     assert cells.closed == made.closed
     notes = [*map(line, scene.notes), *cells.notes]
-    assert [word for word in made.said if not any(word in note for note in notes)] == []
+    assert [word for word in made.notes if not any(word in note for note in notes)] == []
     cut_off = [note for note in notes if "of floor around" in note]
     assert len(cut_off) == made.cut_off, cut_off
 

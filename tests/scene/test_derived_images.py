@@ -1,4 +1,4 @@
-"""Images that are made of a model's: with a mask as their alpha, beside their mirror image."""
+"""Images derived from a model's: with a mask as their alpha, beside their mirror image."""
 
 from __future__ import annotations
 

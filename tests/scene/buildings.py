@@ -1,4 +1,4 @@
-"""Buildings made on the spot: (T, 3, 3) triangles in metres, Z up, facing outwards from solids."""
+"""Hand-made buildings: (T, 3, 3) triangles in metres, Z up, facing outwards from solids."""
 
 from __future__ import annotations
 

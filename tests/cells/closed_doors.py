@@ -1,10 +1,9 @@
-"""Buildings with doors that are closed in the model, and what must come of them, as in
-`made_buildings`."""
+"""Buildings with closed doors in the model and their expectations, as in `small_buildings`."""
 
 from __future__ import annotations
 
-from tests.cells.buildings import WHOLE, Made, carved, moved
-from tests.cells.made_buildings import (
+from tests.cells.buildings import WHOLE, BuildingCase, carved, moved
+from tests.cells.small_buildings import (
     BEFORE_THE_HOUSE,
     BOTH,
     DOORWAY,
@@ -15,7 +14,7 @@ from tests.cells.made_buildings import (
     B,
     C,
 )
-from tests.scene.made import box
+from tests.scene.buildings import box
 
 LEAF = box((5.05, 2, 0), (5.1, 2.9, 2.1))
 SHUTTER = carved([A, B], [((5, 2, 0.9), (5.2, 3.2, 2.1))]), box((5.05, 2, 0.9), (5.1, 3.2, 2.1))
@@ -24,13 +23,13 @@ AJAR = box((-0.15, 2, 0), (-0.1, 2.9, 2.1))
 
 #: Doors that are closed in the model.
 DOORS = {
-    "two rooms and a door leaf, by its shape": Made(
+    "two rooms and a door leaf, by its shape": BuildingCase(
         {"building": TWO_ROOMS, "panel": LEAF}, BOTH, sees=("a b",)
     ),
-    "two rooms and a door leaf, by its name": Made(
+    "two rooms and a door leaf, by its name": BuildingCase(
         {"building": TWO_ROOMS, "Zimmertür": LEAF}, BOTH, sees=("a b",)
     ),
-    "a door of two leaves": Made(
+    "a door of two leaves": BuildingCase(
         {
             "building": carved([A, B], [((5, 1.5, 0), (5.2, 3.3, 2.1))]),
             "Door.L": box((5.05, 1.5, 0), (5.1, 2.4, 2.1)),
@@ -39,7 +38,7 @@ DOORS = {
         BOTH,
         sees=("a b",),
     ),
-    "three rooms and two door leaves": Made(
+    "three rooms and two door leaves": BuildingCase(
         {
             "building": carved([A, B, C], [DOORWAY, NEXT]),
             "door 1": LEAF,
@@ -48,12 +47,12 @@ DOORS = {
         BOTH | {"c": (13, 2.5, 1.6)},
         sees=("a b", "b c", "a c"),
     ),
-    "an entrance that stays shut": Made(
+    "an entrance that stays shut": BuildingCase(
         {"building": carved([A], [((-0.2, 2, 0), (0, 2.9, 2.1))]), "front door": AJAR},
         {"a": IN_A},
         gone=(BEFORE_THE_HOUSE,),
     ),
-    "an entrance 1.2 m wide, whose leaf is as large as a wall": Made(
+    "an entrance 1.2 m wide, whose leaf is as large as a wall": BuildingCase(
         {
             "building": carved([A], [((-0.2, 2, 0), (0, 3.2, 2.1))]),
             "front door": box((-0.15, 2, 0), (-0.1, 3.2, 2.1)),
@@ -61,23 +60,23 @@ DOORS = {
         {"a": IN_A},
         gone=(BEFORE_THE_HOUSE,),
     ),
-    "an entrance that stays shut, and a door leaf that does not": Made(
+    "an entrance that stays shut, and a door leaf that does not": BuildingCase(
         {"building": ENTRANCE, "front door": AJAR, "door": LEAF},
         BOTH,
         sees=("a b",),
         gone=(BEFORE_THE_HOUSE,),
     ),
-    "a shutter with a sill is no door": Made(
+    "a shutter with a sill is no door": BuildingCase(
         dict(zip(("building", "shutter"), SHUTTER, strict=True)), BOTH, blind=("a b",), cut_off=1
     ),
-    "a door leaf, and doors are closed": Made(
+    "a door leaf, and doors are closed": BuildingCase(
         {"building": TWO_ROOMS, "door": LEAF},
         BOTH,
         blind=("a b",),
         cut_off=1,
         options=WHOLE | {"doors": "closed"},
     ),
-    "a door leaf 1.2 m wide, and doors are closed": Made(
+    "a door leaf 1.2 m wide, and doors are closed": BuildingCase(
         {
             "building": carved([A, B], [((5, 2, 0), (5.2, 3.2, 2.1))]),
             "door": box((5.05, 2, 0), (5.1, 3.2, 2.1)),
@@ -87,7 +86,7 @@ DOORS = {
         cut_off=1,
         options=WHOLE | {"doors": "closed"},
     ),
-    "a door leaf, and doors are hidden": Made(
+    "a door leaf, and doors are hidden": BuildingCase(
         {"building": TWO_ROOMS, "door": LEAF},
         BOTH,
         sees=("a b",),
