@@ -89,8 +89,8 @@ class Report:
 def cpu(work: Callable[[], Any]) -> tuple[Any, float]:
     """What ``work`` returns, and processor seconds."""
     start = time.process_time()
-    found = work()
-    return found, time.process_time() - start
+    actual = work()
+    return actual, time.process_time() - start
 
 
 def has_gl() -> str:
@@ -121,8 +121,8 @@ def presets(report: Report, trials: dict[str, CoverageTrade], subjects: dict[str
             for backend in backends:
                 few = backend == "gl" and options.points > PRESETS["paper"][0]
                 tried = trade.tried[:FEW] if few else trade.tried
-                found, seconds[backend], _ = trade.hints(replace(options, backend=backend), tried)
-                errors = trade.errors(found)
+                actual, seconds[backend], _ = trade.hints(replace(options, backend=backend), tried)
+                errors = trade.errors(actual)
                 auto = choose(*subjects[name][1:], options).name
                 mean = float(errors.mean())
                 if preset == "paper" and backend == auto:
@@ -131,8 +131,8 @@ def presets(report: Report, trials: dict[str, CoverageTrade], subjects: dict[str
                 if base and backend == auto:
                     ratios = (f"{mean / max(base[0], 1e-12):.3f}" if base[0] else "0 / 0",
                               f"{seconds[backend] / base[1]:.4f}")  # fmt: skip
-                missed = np.mean([hints.missed for hints in found.values()])
-                points = np.mean([hints.samples for hints in found.values()])
+                missed = np.mean([hints.missed for hints in actual.values()])
+                points = np.mean([hints.samples for hints in actual.values()])
                 rays = points * len(VIEWS) * options.side**2
                 report.row((
                     name, preset, backend + (" (auto)" if backend == auto else ""), f"{mean:.4f}",
@@ -149,16 +149,16 @@ def presets(report: Report, trials: dict[str, CoverageTrade], subjects: dict[str
 
 
 def rates(report: Report, trials: dict[str, CoverageTrade]) -> None:
-    found = [run(name, trade.experiment()) for name, trade in trials.items()]
+    actual = [run(name, trade.experiment()) for name, trade in trials.items()]
     report.head(
-        "Rates: error ∝ rays^b", ("family", *(trade.stage for trade in found if trade.rates))
+        "Rates: error ∝ rays^b", ("family", *(trade.stage for trade in actual if trade.rates))
     )
-    for family in dict.fromkeys(family for trade in found for family in trade.rates):
-        rate = [trade.rates.get(family) for trade in found if trade.rates]
+    for family in dict.fromkeys(family for trade in actual for family in trade.rates):
+        rate = [trade.rates.get(family) for trade in actual if trade.rates]
         report.row((family, *("–" if b is None else f"{b:.2f}" for b in rate)))
     OUTPUT.mkdir(parents=True, exist_ok=True)
-    (OUTPUT / "ach.csv").write_text(as_csv(found))
-    (OUTPUT / "ach.png").write_bytes(picture(found))
+    (OUTPUT / "ach.csv").write_text(as_csv(actual))
+    (OUTPUT / "ach.png").write_bytes(picture(actual))
 
 
 def tolerance(report: Report, trials: dict[str, CoverageTrade]) -> None:
@@ -167,13 +167,13 @@ def tolerance(report: Report, trials: dict[str, CoverageTrade]) -> None:
     report.head("Tolerance", columns)
     for name, trade in trials.items():
         for wanted in (0.02, 0.01):
-            found, seconds, _ = trade.hints(AchOptions(backend="embree", tolerance=wanted, face=4))
-            errors = trade.errors(found)
-            points = [hints.samples for hints in found.values()]
-            short = sum(not hints.row.uncertain <= wanted for hints in found.values())
-            bars = bar_coverage(trade, found)
+            actual, seconds, _ = trade.hints(AchOptions(backend="embree", tolerance=wanted, face=4))
+            errors = trade.errors(actual)
+            points = [hints.samples for hints in actual.values()]
+            short = sum(not hints.row.uncertain <= wanted for hints in actual.values())
+            bars = bar_coverage(trade, actual)
             report.row((
-                name, wanted, len(found), f"{np.mean(errors <= wanted):.1%}",
+                name, wanted, len(actual), f"{np.mean(errors <= wanted):.1%}",
                 f"{errors.mean():.4f}", f"{errors.max():.4f}", int(np.median(points)), max(points),
                 short,
                 "–" if bars is None else f"{bars[0]:.1%} of {bars[1]}", f"{seconds:.2f}",

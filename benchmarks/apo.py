@@ -70,8 +70,8 @@ def row(name: str, made: ApoTexture, seconds: float, used: float) -> str:
 
 def levels(name: str, made: ApoTexture) -> str:
     """MB of each level, the first seven together as the paper has them."""
-    _, found = streamed(made.octree.texels, made.octree)
-    each = np.diff(found["ends"], prepend=0) / 1e6
+    _, actual = streamed(made.octree.texels, made.octree)
+    each = np.diff(actual["ends"], prepend=0) / 1e6
     first = each[:8].sum()
     rest = ", ".join(f"{k} {mb:.2f}" for k, mb in enumerate(each[8:], start=8))
     return f"{name}: levels 0 to 7 {first:.2f} MB" + (f", {rest}" if rest else "")
@@ -97,10 +97,10 @@ def main() -> None:
         )
     shown = []
     for file in files:
-        found = measure(file, options, given.jobs)
+        actual = measure(file, options, given.jobs)
         name = file.stem if given.files else f"{file.stem} {int(file.parent.name) // 1000}k"
-        print(row(name, *found), flush=True)
-        shown.append(levels(name, found[0]))
+        print(row(name, *actual), flush=True)
+        shown.append(levels(name, actual[0]))
     print("\n" + "\n".join(shown))
 
 
@@ -108,7 +108,7 @@ def made_statues(triangles: list[int], only: list[str] | None) -> list[Path]:
     """The sample statues of each size, in build/bench/statues."""
     import make_statues
 
-    found = []
+    actual = []
     for count in triangles:
         folder = ROOT / "build/bench/statues" / f"{count}"
         wanted = only or list(make_statues.STATUES)
@@ -118,8 +118,8 @@ def made_statues(triangles: list[int], only: list[str] | None) -> list[Path]:
                 made = ["-o", str(folder), "--triangles", str(count), "--only", name]
                 with redirect_stdout(sys.stderr):
                     make_statues.main(made)
-            found.append(file)
-    return found
+            actual.append(file)
+    return actual
 
 
 if __name__ == "__main__":

@@ -67,7 +67,7 @@ def _subdivided(
         parts = np.where(which, np.maximum(np.round(np.sqrt(area * density)), 1), 1).astype(int)
         low, high = (low, density) if (parts**2).sum() > wanted else (density, high)
     both = np.concatenate([corners, uv], axis=2)
-    found, sources = [], []
+    actual, sources = [], []
     for k in np.unique(parts):
         rows = np.flatnonzero(parts == k)
         i, j = (n.ravel() for n in np.meshgrid(np.arange(k), np.arange(k), indexing="ij"))
@@ -90,11 +90,11 @@ def _subdivided(
             / k
         )  # (k², 3, 2) shares of the second and third corner
         share = np.concatenate([1 - grid.sum(axis=2, keepdims=True), grid], axis=2)
-        found.append(np.einsum("pcw,rwx->rpcx", share, both[rows]).reshape(-1, 3, 5))
+        actual.append(np.einsum("pcw,rwx->rpcx", share, both[rows]).reshape(-1, 3, 5))
         sources.append(np.repeat(rows, k * k))
     source = np.concatenate(sources)
     order = np.argsort(source, kind="stable")
-    every = np.concatenate(found)[order]
+    every = np.concatenate(actual)[order]
     return (every[..., :3], every[..., 3:]), source[order]
 
 

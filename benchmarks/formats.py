@@ -189,18 +189,18 @@ def main() -> None:
         for number, (name, (make, suffix)) in enumerate(FORMS.items()):
             files[name] = Path(folder, f"{number}{suffix}")
             files[name].write_bytes(make(*shape))
-        found: dict[str, list[tuple[float, int]]] = {name: [] for name in FORMS}
+        actual: dict[str, list[tuple[float, int]]] = {name: [] for name in FORMS}
         for _ in range(given.runs):
             for name, file in files.items():
                 command = [sys.executable, "-c", READ, str(file)]
                 run = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)
                 seconds, memory, triangles = run.stdout.split()
                 assert int(triangles) >= 0.99 * len(shape[2]), (name, triangles)
-                found[name].append((float(seconds), int(memory)))
+                actual[name].append((float(seconds), int(memory)))
         print(f"{len(shape[2]):,} triangles, median of {given.runs} runs")
         print(f"{'':<14}{'file':>10}{'seconds':>9}{'beside':>8}{'memory':>9}")
-        beside = float(np.median([seconds for seconds, _ in found["GLB"]]))
-        for name, rows in found.items():
+        beside = float(np.median([seconds for seconds, _ in actual["GLB"]]))
+        for name, rows in actual.items():
             seconds = float(np.median([s for s, _ in rows]))
             memory = float(np.median([m for _, m in rows])) / 1024
             size = files[name].stat().st_size / 1e6

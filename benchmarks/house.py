@@ -215,7 +215,7 @@ def imports(
         elif isinstance(node, ast.Constant | ast.JoinedStr) and id(node) not in texts:
             text = written(node, name)
             places = iter([text.replace(":", ".")] if PLACE.fullmatch(text) else [])
-        kept = {found for place in places if (found := module_of(root, place))}
+        kept = {actual for place in places if (actual := module_of(root, place))}
         by_statement = isinstance(node, ast.Import | ast.ImportFrom) and id(node) not in for_types
         (plain if by_statement else declared).update(kept)
     return frozenset(plain), frozenset(declared)

@@ -251,7 +251,7 @@ def table_of_previews(images: dict[str, list[Texels]], quick: bool) -> Iterator[
             rows, columns = stride(axes, step)
             shown = [image[::rows, ::columns] for image in these]
             means = [box(image, rows, columns) for image in these]
-            found = [psnr(*pair) for pair in zip(means, shown, strict=True)]
+            actual = [psnr(*pair) for pair in zip(means, shown, strict=True)]
             looks = theirs = "–"
             if rows == columns:
                 levels = [next(x for x in p if len(x) == len(means[0])) for p in pyramids]
@@ -262,8 +262,8 @@ def table_of_previews(images: dict[str, list[Texels]], quick: bool) -> Iterator[
                     own = np.mean([flip(*p) for p in zip(means, levels, strict=True)])
                     theirs += f", {own:.3f}"
             yield (
-                f"| {step} | {side // columns} × {side // rows} | {np.mean(found):.1f} "
-                f"({min(found):.1f} to {max(found):.1f}) | {looks} | {theirs} |"
+                f"| {step} | {side // columns} × {side // rows} | {np.mean(actual):.1f} "
+                f"({min(actual):.1f} to {max(actual):.1f}) | {looks} | {theirs} |"
             )
         yield ""
 

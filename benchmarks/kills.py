@@ -103,8 +103,8 @@ class Trial:
             return None
         if (status := self.build(db, more)) != 0:
             return f"the next run ends with {status}"
-        found = state(db)
-        wrong = [n for n in {**found, **self.wanted} if found.get(n) != self.wanted.get(n)]
+        actual = state(db)
+        wrong = [n for n in {**actual, **self.wanted} if actual.get(n) != self.wanted.get(n)]
         return ", ".join(sorted(wrong)[:3])
 
     def at_name(self, n: int) -> str | None:

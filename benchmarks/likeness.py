@@ -124,11 +124,11 @@ def _cuts(
     jump -= uv[a, 0] + np.einsum("nij,nj->ni", tracer.uv_gradient(a), q - corner[a, 0])
     jump -= np.round(jump)
     step = np.abs(((q - p) * normal).sum(axis=1))
-    found = material[a] != material[b]
-    found |= np.abs((normal * other).sum(axis=1)) < np.cos(np.radians(BEND))
-    found |= np.abs(jump).max(axis=1) > SEAM
-    found |= step > STEP * np.linalg.norm(p, axis=1)
-    cut[both] = found
+    actual = material[a] != material[b]
+    actual |= np.abs((normal * other).sum(axis=1)) < np.cos(np.radians(BEND))
+    actual |= np.abs(jump).max(axis=1) > SEAM
+    actual |= step > STEP * np.linalg.norm(p, axis=1)
+    cut[both] = actual
     return cut
 
 

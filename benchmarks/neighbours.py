@@ -184,13 +184,13 @@ def standing_places(world: World) -> list[int]:
     """Frames in which the walker has just come to stand, spread over the walk."""
     begins = np.flatnonzero(world.still[1:] & ~world.still[:-1]) + 1
     chosen = begins[np.linspace(0, len(begins) - 1, min(PLACES, len(begins))).astype(int)]
-    found: list[int] = chosen.tolist()
-    return found
+    actual: list[int] = chosen.tolist()
+    return actual
 
 
 def by_bytes(world: World, policy: PolicyEntry, places: Sequence[int]) -> tuple[list[float], float]:
     """e at each of the `MARKS` and at the end, and the bytes by then."""
-    own, found = world.in_form(policy.form), []
+    own, actual = world.in_form(policy.form), []
     for frame in places:
         stands = replace(
             own,
@@ -198,8 +198,8 @@ def by_bytes(world: World, policy: PolicyEntry, places: Sequence[int]) -> tuple[
         ).standing(STANDS)
         run = simulate(stands, policy, LINK, own.catalogue.whole)
         at = np.searchsorted(run.fetched, MARKS, "right") - 1
-        found.append([*run.error[np.maximum(at, 0)], run.error[-1], run.fetched[-1]])
-    *errors, received = np.mean(found, axis=0).tolist()
+        actual.append([*run.error[np.maximum(at, 0)], run.error[-1], run.fetched[-1]])
+    *errors, received = np.mean(actual, axis=0).tolist()
     return errors, received
 
 

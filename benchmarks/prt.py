@@ -87,7 +87,7 @@ def arriving(
         weight = rng.exponential(size=(len(p), widest)) * (np.arange(widest) < sizes[p >> 1, None])
         return np.einsum("ij,ijk->ik", weight / weight.sum(axis=1, keepdims=True), polygon[p >> 1])
 
-    found = np.zeros(len(pairs), np.int64)
+    actual = np.zeros(len(pairs), np.int64)
     for row, (a, b) in enumerate(pairs):
         first = rng.choice(np.flatnonzero(leaves == a), lines)
         origin = points(first)
@@ -97,7 +97,7 @@ def arriving(
         for _ in range(portals.leaf_count):
             if len(at) == 0:
                 break
-            found[row] += int((at == b).sum())
+            actual[row] += int((at == b).sum())
             on = at != b
             origin, along, at = origin[on], along[on], at[on]
             degree = out_start[at + 1] - out_start[at]
@@ -117,7 +117,7 @@ def arriving(
             line, first_hit = np.unique(line[inside], return_index=True)
             at = enters[p[inside][first_hit]]
             origin, along = origin[line], along[line]
-    return found
+    return actual
 
 
 class Sequences:

@@ -108,8 +108,8 @@ def in_child(work: Callable[..., Any], *given: Any) -> Any:
 def timed(work: Callable[..., Any], *given: Any) -> tuple[Any, float, float]:
     """What ``work`` returns, processor seconds and wall seconds."""
     cpu, wall = time.process_time(), time.perf_counter()
-    found = work(*given)
-    return found, time.process_time() - cpu, time.perf_counter() - wall
+    actual = work(*given)
+    return actual, time.process_time() - cpu, time.perf_counter() - wall
 
 
 def stored(folder: Path, name: str, content: Any = None) -> Any:
@@ -198,13 +198,13 @@ def weigh(folder: Path, model: Path, kind: str) -> dict[str, dict[str, Any]]:
     way = passed(cells, walk.corner)
     volume = cells.cell_volumes()
     full = stored(folder, f"{kind}-full").to_matrix()
-    found = {}
+    actual = {}
     for method in METHODS:
         pvs = stored(folder, f"{kind}-{method}")
         shares = [1 / np.arange(3, 3 + len(pvs.row(c))) for c in range(cells.cell_count)]
         texts = cell_texts(scene, cells, pvs, [s / s.sum() for s in shares])
         walked = load(cells, pvs, way, np.array([len(t.text.encode()) for t in texts]))
-        found[method] = {
+        actual[method] = {
             "leaves": cells.leaf_count,
             "cells": cells.cell_count,
             "portals": cells.portal_count,
@@ -219,7 +219,7 @@ def weigh(folder: Path, model: Path, kind: str) -> dict[str, dict[str, Any]]:
             "at_hand_texels": texels_at_hand(scene, cells, pvs, way, texts),
             "lacks": int(np.count_nonzero(full & ~pvs.to_matrix())) // 2,
         }
-    return found
+    return actual
 
 
 def check(folder: Path, model: Path, kind: str, method: str, segments: int) -> dict[str, int]:

@@ -73,12 +73,12 @@ def views(scene: Scene, leaves: Cells, seed: int) -> list[tuple[int, NDArray[np.
     viewers = SamplePoints(points, np.full(PLACES, clearance), np.zeros((PLACES, 2)))
     counter = PixelCounter(EmbreeRenderer(surfaces, FACE), surfaces, leaves, FACE)
     every, kept = np.arange(leaves.cell_count), leaf_of_cell(leaves)
-    found = []
+    actual = []
     for i, leaf in enumerate(leaves.locate_leaf(points).tolist()):
         pixels = np.zeros(leaves.leaf_count, dtype=np.int64)
         pixels[kept] = counter.count(viewers.part(slice(i, i + 1)), every).in_views.sum(axis=0)
-        found.append((leaf, pixels))
-    return found
+        actual.append((leaf, pixels))
+    return actual
 
 
 def hint_error(

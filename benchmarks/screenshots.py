@@ -221,22 +221,22 @@ def main(arguments: list[str] | None = None) -> int:
             what = outline(database.scene, database.view(viewpoint, size))
             for name, album in albums.items():
                 own = database.own(viewpoint, size, name)
-                found = likeness(album.pictures[k], own, what, LOOKS[name])
-                print(row(title, viewpoint, name, found), flush=True)
-                every.setdefault((title, name), []).append(found)
+                actual = likeness(album.pictures[k], own, what, LOOKS[name])
+                print(row(title, viewpoint, name, actual), flush=True)
+                every.setdefault((title, name), []).append(actual)
                 label = f"{title}, viewpoint {viewpoint}: ours, {name}, difference; "
-                label += f"{found.psnr:.1f} dB outside edges"
+                label += f"{actual.psnr:.1f} dB outside edges"
                 strips.append((label, strip(album.pictures[k], own, what)))
         if strips:
             sheet(strips, given.output / f"{title}.png")
-        said = [f"{name}: {line}" for name, album in albums.items() for line in album.complaints]
+        printed = [f"{name}: {line}" for name, album in albums.items() for line in album.complaints]
         if "view3dscene" in names:
             for file, lines in view3dscene.check_all(database.www).items():
-                said += [f"view3dscene: {file}: {line}" for line in lines]
+                printed += [f"view3dscene: {file}: {line}" for line in lines]
         files = len(list(database.www.rglob("*.wrl")))
-        print(f"{title}: {files} files, textures to {database.side}², {len(said)} warnings")
-        print("".join(f"  {line}\n" for line in said), end="", flush=True)
-        warnings += len(said)
+        print(f"{title}: {files} files, textures to {database.side}², {len(printed)} warnings")
+        print("".join(f"  {line}\n" for line in printed), end="", flush=True)
+        warnings += len(printed)
     print(f"\n{summary(every)}\n\n{warnings} warnings; pictures in {given.output}")
     return 0
 

@@ -348,10 +348,10 @@ def apart(one: Mesh, other: Mesh) -> tuple[Floats, Floats]:
     for side in (1.0, -1.0):
         origin = (points - side * back * normals).astype(np.float32)
         hit = scene.run(origin, (side * normals).astype(np.float32), output=True)
-        found = hit["primID"]
-        cosine = (facing[found] * normals).sum(axis=1)
+        actual = hit["primID"]
+        cosine = (facing[actual] * normals).sum(axis=1)
         far = np.abs(hit["tfar"] - back)
-        nearer = (found >= 0) & (cosine > 0) & (far < way)
+        nearer = (actual >= 0) & (cosine > 0) & (far < way)
         way[nearer] = far[nearer]
         angle[nearer] = np.degrees(np.arccos(np.clip(cosine[nearer], -1, 1)))
     met = np.isfinite(way)
@@ -504,12 +504,12 @@ def main() -> None:
                 continue
             with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as process:
                 work = process.submit(timed, method, count, asked.shape, asked.to, asked.runs)
-                found, seconds, peak = work.result()
-            errors = figures(given, found) if len(found.triangles) else [np.nan] * 5
+                actual, seconds, peak = work.result()
+            errors = figures(given, actual) if len(actual.triangles) else [np.nan] * 5
             row = [seconds, peak / 1e6, *errors]
             first = first or row
             cells = [cell(x, y) for x, y in zip(row, first, strict=True)]
-            head = f"| {len(given.triangles):,} | `{method}` | {len(found.triangles):,} "
+            head = f"| {len(given.triangles):,} | `{method}` | {len(actual.triangles):,} "
             print(head + "".join(f"| {each} " for each in cells) + "|", flush=True)
 
 

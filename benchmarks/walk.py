@@ -143,15 +143,15 @@ def passed(cells: Cells, walk: NDArray[np.float64]) -> Way:
         leaf = leaf[cells.locate(walk) >= 0]
         return Way(leaf.astype(np.int64), np.ones(len(leaf)))
     least = cells.tolerance.hairline
-    found = [
+    actual = [
         (leaf, metres)
         for a, b in pairwise(walk)
         for leaf, metres in _stretches(cells, a, b)
         if metres >= least and cells.leaf_cell[leaf] >= 0
     ]
     return Way(
-        np.array([leaf for leaf, _ in found], dtype=np.int64),
-        np.array([metres for _, metres in found], dtype=np.float64),
+        np.array([leaf for leaf, _ in actual], dtype=np.int64),
+        np.array([metres for _, metres in actual], dtype=np.float64),
     )
 
 
@@ -161,7 +161,7 @@ def _stretches(
     """The leaves along a segment, and the metres in each: down the tree, the nearer child first."""
     length = float(np.linalg.norm(b - a))
     waiting: list[tuple[int, float, float]] = []
-    found: list[tuple[int, float]] = []
+    actual: list[tuple[int, float]] = []
     with np.errstate(divide="ignore", invalid="ignore"):
         sides = np.sort((cells.root_box - a) / (b - a), axis=0)
     begin, end = max(0.0, float(np.nanmax(sides[0]))), min(1.0, float(np.nanmin(sides[1])))
@@ -171,7 +171,7 @@ def _stretches(
         node, begin, end = waiting.pop()
         if node < 0:
             if node <= -2:
-                found.append((-2 - node, (end - begin) * length))
+                actual.append((-2 - node, (end - begin) * length))
             continue
         plane = cells.node_plane[node]
         first, last = (plane[:3] @ (a + t * (b - a)) + plane[3] for t in (begin, end))
@@ -183,7 +183,7 @@ def _stretches(
         else:
             cut = begin + (end - begin) * float(first / (first - last))
             waiting += [(far, cut, end), (near, begin, cut)]
-    return found
+    return actual
 
 
 class CellText(NamedTuple):
@@ -245,8 +245,8 @@ def _texels(scene: Scene) -> NDArray[np.float64]:
 
     from PIL import Image
 
-    found = []
+    actual = []
     for image in scene.images:
         with Image.open(io.BytesIO(image.load())) as opened:
-            found.append(float(opened.width * opened.height))
-    return np.array(found)
+            actual.append(float(opened.width * opened.height))
+    return np.array(actual)

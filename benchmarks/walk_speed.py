@@ -82,11 +82,11 @@ def run(world: World, policy: str) -> float:
 
 def seconds_of(profile: Profile) -> list[float]:
     """What the `PARTS` took, with all that they call."""
-    found = dict.fromkeys(PARTS.values(), 0.0)
+    actual = dict.fromkeys(PARTS.values(), 0.0)
     for (file, _, name), (_, _, _, cumulative, _) in Stats(profile).stats.items():  # type: ignore[attr-defined]
-        if name in found and "walkthrough" in file:
-            found[name] += cumulative
-    return list(found.values())
+        if name in actual and "walkthrough" in file:
+            actual[name] += cumulative
+    return list(actual.values())
 
 
 if __name__ == "__main__":

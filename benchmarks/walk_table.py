@@ -125,7 +125,7 @@ def tables(rows: Rows) -> list[str]:
         for scene in scenes
         for head, name in (("e", "mean"), ("p95", "p95"), ("/ oracle", "ratio"))
     ]
-    found = [
+    actual = [
         _table("e", rows, under("mean") + summary),
         _table("e / oracle", rows, under("ratio")),
         _table("by scene", rows, by_scene),
@@ -135,9 +135,9 @@ def tables(rows: Rows) -> list[str]:
     known = [row for row in known if row["bandwidth"] in PROTOTYPE_LINKS]
     beside = [s for s in PROTOTYPE_SCENES if s in scenes]
     if known and beside:
-        found.append(_table("e / prototype", known, [_prototype(scene) for scene in beside]))
+        actual.append(_table("e / prototype", known, [_prototype(scene) for scene in beside]))
     over = sum(row["overruns"] for row in rows)
-    return [*found, f"{len(rows):,} runs; frames above the budget: {over}"]
+    return [*actual, f"{len(rows):,} runs; frames above the budget: {over}"]
 
 
 def _table(title: str, rows: Rows, columns: Sequence[Column]) -> str:
@@ -238,14 +238,14 @@ def _run_all(cases: list[Case], file: Path) -> None:
         begin = time.process_time()
         run = simulate(world, policy, link, budget)
         seconds = time.process_time() - begin
-        found = measure(run, world, simulate(standing, policy, link, budget))
+        actual = measure(run, world, simulate(standing, policy, link, budget))
         row = {
             "key": case.key,
             **vars(case),
             "budget": budget,
             "seconds": round(seconds, 3),
             "preparation": round(preparation, 1),
-            **asdict(found),
+            **asdict(actual),
         }
         with file.open("a", encoding="utf-8") as lines:
             lines.write(f"\n{json.dumps(row)}")  # before it: the last line may have been cut off

@@ -57,7 +57,7 @@ class Timed:
 
 def encoded(name: str, sources: list[Path], folder: Path) -> Timed:
     """The 8-bit images of a set, as `.ptm` and as PNG."""
-    found = Timed(name, [], [])
+    actual = Timed(name, [], [])
     for number, source in enumerate(sources):
         image = read_image(source)
         if image.dtype != "uint8":
@@ -66,9 +66,9 @@ def encoded(name: str, sources: list[Path], folder: Path) -> Timed:
         file.write_bytes(encode(image))
         plain = image[:, :, 0] if image.ndim == 3 and image.shape[2] == 1 else image
         Image.fromarray(plain).save(file.with_suffix(".png"))
-        found.files.append(file)
-        found.bytes.append(image.nbytes)
-    return found
+        actual.files.append(file)
+        actual.bytes.append(image.nbytes)
+    return actual
 
 
 def by_python(data: bytes) -> float:
@@ -123,15 +123,15 @@ def print_sizes() -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    found = sets()
-    parser.add_argument("names", nargs="*", default=["Kodak", "textures"], help=", ".join(found))
+    actual = sets()
+    parser.add_argument("names", nargs="*", default=["Kodak", "textures"], help=", ".join(actual))
     parser.add_argument("--rounds", type=int, default=3, help="each of several within a process")
     parser.add_argument("--images", type=int, default=6, help="of each set at most")
     parser.add_argument("--browser", action="store_true")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="web-decoder-") as name:
         folder = Path(name)
-        timed = [encoded(one, found[one][: given.images], folder) for one in given.names]
+        timed = [encoded(one, actual[one][: given.images], folder) for one in given.names]
         for _ in range(given.rounds):
             for one in timed:
                 one.note("Python", [by_python(file.read_bytes()) for file in one.files])

@@ -87,8 +87,8 @@ def test_what_a_kernel_sees_decides_about_its_machine_code(package: Path, chosen
     ):
         file = package / f"{edited}.py"
         file.write_text(file.read_text().replace(old, new))
-        *announced, found = run(PROGRAM, package.parent, NUMBA_CACHE_DIR=chosen)
-        assert int(found) == result
+        *announced, actual = run(PROGRAM, package.parent, NUMBA_CACHE_DIR=chosen)
+        assert int(actual) == result
         assert len(announced) == fresh
 
 
@@ -152,7 +152,7 @@ def test_without_a_place_to_keep_it_code_still_runs(tmp_path: Path) -> None:
 
 def test_no_import_is_overlooked() -> None:
     for file in ROOT.rglob("*.py"):
-        found = set()
+        actual = set()
         for node in ast.walk(ast.parse(file.read_text())):
             names = []
             if isinstance(node, ast.Import):
@@ -163,5 +163,5 @@ def test_no_import_is_overlooked() -> None:
             for name in names:
                 if name.split(".")[0] == ROOT.name:
                     own = jit._module(name)
-                    found.add(own or jit._module(name.rpartition(".")[0]))
-        assert found <= jit._imports(file), file
+                    actual.add(own or jit._module(name.rpartition(".")[0]))
+        assert actual <= jit._imports(file), file

@@ -83,9 +83,9 @@ def fetch_panoramas() -> None:
             for name, path in wanted.items():
                 member = packed.extractfile(f"package/hdri/{name}.exr.js")
                 assert member is not None
-                found = re.search(rb"base64,([A-Za-z0-9+/=]+)", member.read())
-                assert found is not None
-                path.write_bytes(base64.b64decode(found[1]))
+                actual = re.search(rb"base64,([A-Za-z0-9+/=]+)", member.read())
+                assert actual is not None
+                path.write_bytes(base64.b64decode(actual[1]))
                 print(path)
 
 
@@ -93,8 +93,8 @@ def exact(image: Samples, profile: str) -> tuple[int, float, float]:
     """Bytes, seconds to encode and to decode; checks every bit of every level."""
     encoding, data = best(lambda: encode(image, EncodeOptions(profile)), 2)
     decoding, levels = best(lambda: list(decode_levels(data)), 2)
-    for found, wanted in zip(levels, build_pyramid(image), strict=True):
-        assert found.tobytes() == wanted.tobytes(), "not exact"
+    for actual, wanted in zip(levels, build_pyramid(image), strict=True):
+        assert actual.tobytes() == wanted.tobytes(), "not exact"
     return len(data), encoding, decoding
 
 
@@ -102,15 +102,15 @@ def rivals(image: Samples) -> dict[str, int]:
     """Bytes of the finest level alone."""
     raw = image.tobytes()
     apart = np.frombuffer(raw, np.uint8).reshape(-1, image.itemsize).T.tobytes()
-    found = {
+    actual = {
         "zstd-19": len(imagecodecs.zstd_encode(raw, 19)),
         "zstd-19, bytes apart": len(imagecodecs.zstd_encode(apart, 19)),
     }
     if image.dtype == np.uint16:
-        found["PNG"] = len(imagecodecs.png_encode(image.squeeze()))
+        actual["PNG"] = len(imagecodecs.png_encode(image.squeeze()))
     else:
-        found |= open_exr(image)
-    return found
+        actual |= open_exr(image)
+    return actual
 
 
 def open_exr(image: Samples) -> dict[str, int]:

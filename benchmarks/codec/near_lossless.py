@@ -101,8 +101,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Bytes and PSNR for an allowed error.")
     parser.add_argument("--images", type=int, default=4)
     given = parser.parse_args()
-    found = sets()
-    files = [*found["Kodak"][: (given.images + 1) // 2], *found["textures"][: given.images // 2]]
+    actual = sets()
+    files = [*actual["Kodak"][: (given.images + 1) // 2], *actual["textures"][: given.images // 2]]
     images = [read_image(file) for file in files]
     print(f"{len(images)} images: {', '.join(file.name for file in files)}")
     print(f"{'':26} {'bytes':>12} {'of own 0':>8} {'PSNR':>7} {'max':>5}")

@@ -132,8 +132,8 @@ def draw(shares: dict[str, list[float]], output: Path) -> None:
     from matplotlib import pyplot
 
     figure, axes = pyplot.subplots(figsize=(8, 5))
-    for way, found in shares.items():
-        axes.plot(range(len(found)), found, marker="o", markersize=4, label=way)
+    for way, actual in shares.items():
+        axes.plot(range(len(actual)), actual, marker="o", markersize=4, label=way)
     axes.set(
         xlabel="halvings below the finest level",
         ylabel="bytes until that level, over PNG of the finest",
@@ -151,8 +151,8 @@ def main() -> None:
     parser.add_argument("--images", type=int, default=6)
     parser.add_argument("-o", "--output", type=Path, default=OUTPUT / "progressive.png")
     given = parser.parse_args()
-    found = sets()
-    files = [*found["Kodak"][: (given.images + 1) // 2], *found["textures"][: given.images // 2]]
+    actual = sets()
+    files = [*actual["Kodak"][: (given.images + 1) // 2], *actual["textures"][: given.images // 2]]
     images = [read_image(file) for file in files]
     png = sum(len(png_bytes(image)) for image in images)
     deepest = min(len(build_pyramid(image)) for image in images)

@@ -148,17 +148,17 @@ def main() -> None:
     chosen = {str(folder): image_files(folder) for folder in given.folders} or sets()
     for name, files in chosen.items():
         print(f"{name}: {len(files)} images, whole pyramid over PNG of the finest level")
-        found = []
+        actual = []
         for file in files:
-            found.append(measure(read_image(file), contenders, given.repeat))
-            by_name = {one.codec: one for one in found[-1]}
+            actual.append(measure(read_image(file), contenders, given.repeat))
+            by_name = {one.codec: one for one in actual[-1]}
             png = by_name["PNG"]
             shares = "".join(
                 f"  {profile} {ratio(by_name[f'ptm {profile}'], png):7.3f}" for profile in profiles
             )
             print(f"  {file.name[:30]:30} {png.finest_bytes:10,}{shares}", flush=True)
-        table(total(found))
-        verdicts(name, files, found)
+        table(total(actual))
+        verdicts(name, files, actual)
     print("the extremes")
     noise([profile for profile in profiles if profile != "paper"])
     print("two threads against one")

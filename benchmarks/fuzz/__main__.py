@@ -43,15 +43,15 @@ def main() -> None:
     os.nice(19)
     print(f"{'kind':<10}{'inputs':>9}{'read':>8}{'refused':>9}{'s each':>9}{'longest':>9}"
           f"{'most':>9}  findings", flush=True)  # fmt: skip
-    found: list[Summary] = []
+    actual: list[Summary] = []
     for name in names:
         count = max(1, round(given.count * KINDS[name].weight / whole))
         summary = run(name, KINDS[name].make, given.seed, given.start, count, given.jobs)
-        found.append(summary)
+        actual.append(summary)
         print_summary(summary)
-    total = sum(summary.read for summary in found)
-    findings = sum(len(summary.tally.findings) for summary in found)
-    seconds = sum(summary.seconds for summary in found)
+    total = sum(summary.read for summary in actual)
+    findings = sum(len(summary.tally.findings) for summary in actual)
+    seconds = sum(summary.seconds for summary in actual)
     print(f"{total:,} inputs, seed {given.seed}, in {seconds:,.0f} s: {findings} findings")
     sys.exit(bool(findings))
 

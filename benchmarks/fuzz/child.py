@@ -265,11 +265,11 @@ def _itself(path: str) -> str:
 
 def listing(folder: Path) -> dict[str, tuple[int, int, int]]:
     """Kind, size and time of change of all that lies in a folder; links are not followed."""
-    found = {}
+    actual = {}
     for path in sorted(folder.rglob("*")):
         status = os.lstat(path)
-        found[str(path)] = (status.st_mode, status.st_size, status.st_mtime_ns)
-    return found
+        actual[str(path)] = (status.st_mode, status.st_size, status.st_mtime_ns)
+    return actual
 
 
 def memory_now() -> int:

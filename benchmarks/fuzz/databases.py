@@ -124,7 +124,7 @@ class _Held(DatabaseFolder):
 
 def _zip_fields(data: bytes) -> list[tuple[int, int]]:
     """Where the numbers of an archive are: of local heads, of the directory and of its end."""
-    found = []
+    actual = []
     for mark, offsets in (
         (b"PK\3\4", ((6, 2), (8, 2), (14, 4), (18, 4), (22, 4), (26, 2), (28, 2))),
         (b"PK\1\2", ((8, 2), (10, 2), (16, 4), (20, 4), (24, 4), (28, 2), (30, 2), (42, 4))),
@@ -132,10 +132,10 @@ def _zip_fields(data: bytes) -> list[tuple[int, int]]:
     ):
         at = data.find(mark)
         while at >= 0:
-            found += [(at + offset, size) for offset, size in offsets]
+            actual += [(at + offset, size) for offset, size in offsets]
             at = data.find(mark, at + 1)
     heads = [at for at in range(len(data) - 6) if data[at : at + 6] == b"\x93NUMPY"][:50]
-    return found + [(at + offset, 1) for at in heads for offset in range(6, 80, 3)]
+    return actual + [(at + offset, 1) for at in heads for offset in range(6, 80, 3)]
 
 
 def _rezipped(rng: Random, arrays: Mapping[str, Any]) -> bytes:

@@ -146,8 +146,8 @@ class ApoFolder(Folder):
     def use(self) -> str:
         """See `Folder.use`."""
         octree, mesh = read_octree(self._folder), read_mesh(self._folder)
-        found = look_up(octree, (mesh.points - octree.low) / octree.side)
-        assert np.isfinite(found.normals).all()
+        actual = look_up(octree, (mesh.points - octree.low) / octree.side)
+        assert np.isfinite(actual.normals).all()
         return f"{octree.levels} levels"
 
 
@@ -243,12 +243,12 @@ class Interlaced:
             return f"info {commanded('info', str(self._folder))[0]}"
         report = validate_interlaced(self._folder, TEXTURE_LIMITS)
         try:
-            found = deinterlace(self._folder, limits=TEXTURE_LIMITS)
+            actual = deinterlace(self._folder, limits=TEXTURE_LIMITS)
         except PtmError:
             assert report.issues, "the check found nothing in what cannot be joined"
             raise
-        if found.tobytes() == self._exact[which]:
+        if actual.tobytes() == self._exact[which]:
             return "exact"
         assert sealed or name == INTERLACE_INDEX, "a wrong image"
-        assert found.nbytes <= TEXTURE_LIMITS.decoded_bytes
-        return f"another image of {np.dtype(found.dtype)}"
+        assert actual.nbytes <= TEXTURE_LIMITS.decoded_bytes
+        return f"another image of {np.dtype(actual.dtype)}"

@@ -112,7 +112,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     given = parser.parse_args()
-    found = 0
+    actual = 0
     with ProcessPoolExecutor(given.jobs) as pool:
         for kind in MAKERS:
             tasks = [pool.submit(read, kind, given.seed, n) for n in range(given.count)]
@@ -126,9 +126,9 @@ def main() -> None:
             print(f"{kind:<8} {len(results)} inputs, longest {longest:.1f} s: {counts}", flush=True)
             for n in wrong:
                 print(f"         ! {kind}:{n} {results[n]}", flush=True)
-            found += len(wrong)
-    print(f"{found} findings")
-    sys.exit(bool(found))
+            actual += len(wrong)
+    print(f"{actual} findings")
+    sys.exit(bool(actual))
 
 
 if __name__ == "__main__":

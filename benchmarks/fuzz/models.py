@@ -430,10 +430,10 @@ class Meshopt:
         from ptmtools.scene.gltf.meshopt import decode
 
         try:
-            found = decode(case.data, case.facts)
+            actual = decode(case.data, case.facts)
         except ValueError as error:
             raise InputError("PTM-I249", str(error)) from None
-        assert len(found) == case.facts["count"] * case.facts["byteStride"]
+        assert len(actual) == case.facts["count"] * case.facts["byteStride"]
         return case.facts["mode"].lower()
 
 

@@ -56,7 +56,7 @@ def textures() -> list[tuple[str, NDArray[Any]]]:
 @cache
 def encoded() -> list[bytes]:
     """A file of every profile, kind and way of coding."""
-    found = []
+    actual = []
     for profile in ("raw", "fast", "small", "paper"):
         for _, image in textures():
             errors = (0, 3) if profile in ("fast", "small") and image.dtype.kind == "u" else (0,)
@@ -65,8 +65,8 @@ def encoded() -> list[bytes]:
                     if profile == "paper" and image.dtype.kind == "f":
                         continue
                     options = EncodeOptions(profile, max_error, tile)
-                    found.append(encode(image, options))
-    return found
+                    actual.append(encode(image, options))
+    return actual
 
 
 class Ptm:
@@ -200,12 +200,12 @@ def images() -> list[tuple[str, bytes]]:
     from ptmtools.texture import write_image
 
     noise = np.random.default_rng(3).integers(0, 255, (19, 23, 4), np.uint8)
-    found = []
+    actual = []
 
     def saved(kind: str, mode: str, **settings: Any) -> None:
         stream = io.BytesIO()
         Image.fromarray(noise).convert(mode).save(stream, kind, **settings)
-        found.append((kind, stream.getvalue()))
+        actual.append((kind, stream.getvalue()))
 
     for mode in ("RGB", "RGBA", "L", "LA", "P", "1"):
         saved("PNG", mode)
@@ -230,8 +230,8 @@ def images() -> list[tuple[str, bytes]]:
         {"quality": 80, "exif": b"Exif\0\0II*\0"},
     ):
         saved("WEBP", "RGBA", **settings)
-    found.append(("PPM", b"P3 3 2 255\n" + b"1 22 255 " * 6))
-    found.append(("PPM", b"P3 3 2 65535\n" + b"1 22222 65535 " * 6))
+    actual.append(("PPM", b"P3 3 2 255\n" + b"1 22 255 " * 6))
+    actual.append(("PPM", b"P3 3 2 65535\n" + b"1 22222 65535 " * 6))
     import tempfile
 
     with tempfile.TemporaryDirectory() as folder:
@@ -242,11 +242,11 @@ def images() -> list[tuple[str, bytes]]:
                     write_image(path, image)
                 except Exception:  # what the format does not hold
                     continue
-                found.append((suffix[1:].upper().replace("NPY", "npy"), path.read_bytes()))
+                actual.append((suffix[1:].upper().replace("NPY", "npy"), path.read_bytes()))
     height, width = noise.shape[:2]
     mantissas = noise.tobytes()
-    found.append(("HDR", f"#?RADIANCE\n\n-Y {height} +X {width}\n".encode() + mantissas))
-    return found
+    actual.append(("HDR", f"#?RADIANCE\n\n-Y {height} +X {width}\n".encode() + mantissas))
+    return actual
 
 
 def sealed_png(data: bytes) -> bytes:

@@ -80,10 +80,10 @@ def main() -> None:
 
 def speed(text: str) -> float:
     """bit/s."""
-    found = parse_bandwidth(text)
-    if not found:
+    actual = parse_bandwidth(text)
+    if not actual:
         raise SystemExit(f"{text}: a link without a limit has no timeline to compare")
-    return float(found)
+    return float(actual)
 
 
 def timelines(
@@ -94,22 +94,22 @@ def timelines(
     for link in links:
         computed = before[1].over(before[0], link) if before and entrant.steady else None
         if computed is None:
-            found = watch(browser, entrant, link)
+            actual = watch(browser, entrant, link)
         elif computed.begins > patience:
-            found = computed
+            actual = computed
         else:
-            found = watch(browser, entrant, link, seconds=patience)
-            if found.done == math.inf:
-                found = found.continued(computed)
+            actual = watch(browser, entrant, link, seconds=patience)
+            if actual.done == math.inf:
+                actual = actual.continued(computed)
             else:
                 print(
                     f"{entrant.name}, {(link.bandwidth or 0) / 1e6:g} Mbit/s: all in "
-                    f"{found.done:.2f} s, computed {computed.done:.2f}"
+                    f"{actual.done:.2f} s, computed {computed.done:.2f}"
                 )
-        for message in found.messages:
+        for message in actual.messages:
             print(f"{entrant.name}: {message}", file=sys.stderr)
-        before = link, found
-        yield found
+        before = link, actual
+        yield actual
 
 
 if __name__ == "__main__":

@@ -65,7 +65,7 @@ def measured(
     world = prepare(served, walk, full, pixels=(WIDTH, HEIGHT))
     sight = Renderer(world, HEIGHT, _SAMPLES).look(walk.eye[0], walk.direction[0])
     rounded = _rounded(full)
-    found = []
+    actual = []
     for form in (LOSSLESS, *BLOCK_BYTES):
         if form == LOSSLESS:
             own, cost, true = world, world.catalogue.memory, full
@@ -81,8 +81,8 @@ def measured(
             column = np.zeros(len(cost), np.int64)
             used = allocate(worth, cost, own.catalogue.levels, budget, column, True)
             shown = drawn.colors(sight, there, column)
-            found.append(Held(form, budget, int(used), flip(reference, shown)))
-    return found
+            actual.append(Held(form, budget, int(used), flip(reference, shown)))
+    return actual
 
 
 def _standing(viewpoint: Mapping[str, Any]) -> Walk:

@@ -87,16 +87,16 @@ def _primitive(scene: Scene, rows: Any, material: int, buffer: BufferWriter) -> 
 def _material(material: Material, place: int, two_sided: bool, embedded: bool) -> dict[str, Any]:
     factor = [*map(linear, material.color), material.opacity]
     surface: dict[str, Any] = {"baseColorFactor": factor}
-    found = {"pbrMetallicRoughness": surface, "extensions": {UNLIT: {}}}
+    actual = {"pbrMetallicRoughness": surface, "extensions": {UNLIT: {}}}
     if material.image >= 0 and embedded:
         surface["baseColorTexture"] = {"index": place}
     elif material.image >= 0:
-        found["extras"] = {"image": material.image, **_sampler(material)}
+        actual["extras"] = {"image": material.image, **_sampler(material)}
     if material.transparent:
-        found["alphaMode"] = "BLEND"
+        actual["alphaMode"] = "BLEND"
     if two_sided:
-        found["doubleSided"] = True
-    return found
+        actual["doubleSided"] = True
+    return actual
 
 
 def _texture(material: Material, sampler: int, extension: str | None) -> dict[str, Any]:

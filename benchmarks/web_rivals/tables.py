@@ -34,13 +34,13 @@ def times_table(runs: Mapping[str, Timeline]) -> str:
 
 def goals_of(run: Timeline) -> dict[str, Reached]:
     """When a run reached each of the goals."""
-    found: dict[str, Reached] = {c: run.until(most, run.full) for c, most in GOALS.items()}
-    return found | {EVERYTHING: (run.done, run.everything)}
+    actual: dict[str, Reached] = {c: run.until(most, run.full) for c, most in GOALS.items()}
+    return actual | {EVERYTHING: (run.done, run.everything)}
 
 
 def _beside(rows: Sequence[tuple[str, Reached]]) -> float:
     """Seconds of the walk page, or else of the best."""
-    seconds = {name: found[0] for name, found in rows if found}
+    seconds = {name: actual[0] for name, actual in rows if actual}
     return seconds.get(WALK, min(seconds.values()))
 
 

@@ -360,7 +360,7 @@ TURNED = {eye: tuple(turned_in_plan(np.array(at), 30).tolist()) for eye, at in F
 
 def five(model: Floats, eyes: dict[str, Point] = FIVE, **more: Any) -> BuildingCase:
     fixed = {"sees": ("sw nw", "sw hall", "hall ne", "se ne"), "blind": ("nw ne",)}
-    return BuildingCase(model, eyes, closed=False, **fixed | {"said": ("open",)} | more)
+    return BuildingCase(model, eyes, closed=False, **fixed | {"notes": ("open",)} | more)
 
 
 HALL = carved([room(0, 0, 10.2, 5)])

@@ -290,8 +290,8 @@ def test_a_facade_of_glass_is_a_wall_of_the_room_behind_it() -> None:
     assert together(cells, A, B)
     main = subdivide(made, SubdivideOptions(doors="closed"))
     assert main.locate(np.array([B])) == [-1]
-    (told,) = [note for note in main.notes if "open to the outside" in note]
-    assert isinstance(told, Warned)
+    (reported,) = [note for note in main.notes if "open to the outside" in note]
+    assert isinstance(reported, Warned)
 
 
 def test_an_entrance_that_is_detail_is_no_door() -> None:
@@ -323,10 +323,10 @@ def test_a_viewpoint_that_is_no_number_is_outside() -> None:
 
 def test_a_viewpoint_inside_a_wall_is_told() -> None:
     made = scene(rooms(), solid((2, 0, 0.5), (2.6, 3, 1.1)), inner_door=leaf(4.05))
-    for point, told in (((2.3, 1.5, 0.8), True), (A, False)):
+    for point, reported in (((2.3, 1.5, 0.8), True), (A, False)):
         cells = subdivide(made, SubdivideOptions(viewpoints=(point,)))
         notes = [note for note in cells.notes if note.endswith("which becomes a cell")]
-        assert [isinstance(note, Warned) for note in notes] == [True] * told
+        assert [isinstance(note, Warned) for note in notes] == [True] * reported
 
 
 @pytest.mark.parametrize("slab", [0.1, 0.3])
@@ -593,8 +593,10 @@ def test_another_building_is_one_too() -> None:
     cells = subdivide(made)
     assert cells.closed
     assert together(cells, (41.0, 1.0, 1.2), (47.0, 1.0, 1.2))
-    (told,) = [note for note in cells.notes if "cannot be reached from the starting point" in note]
-    assert float(told.split(" ")[0]) == pytest.approx(2 * 3.5 * 3.5, abs=0.5)
+    (reported,) = [
+        note for note in cells.notes if "cannot be reached from the starting point" in note
+    ]
+    assert float(reported.split(" ")[0]) == pytest.approx(2 * 3.5 * 3.5, abs=0.5)
     # Nobody is in the leaf of the door only.
     assert cells.leaf_count == 1 + 3
 

@@ -51,15 +51,15 @@ def test_a_wall_is_as_few_triangles_as_its_outline_needs(
     turn: float, hole: tuple[int, int] | None, triangles: int
 ) -> None:
     corners = grid(16, hole, turn)
-    found, source = fewer(facets_of(corners))
-    assert len(found) == triangles
+    actual, source = fewer(facets_of(corners))
+    assert len(actual) == triangles
     assert np.all(source == 0)
-    assert areas(found).sum() == pytest.approx(areas(corners).sum(), rel=1e-6)
+    assert areas(actual).sum() == pytest.approx(areas(corners).sum(), rel=1e-6)
     # Every corner is one that was there, to the last bit.
     known = {tuple(point) for point in corners.reshape(-1, 3).tolist()}
-    assert all(tuple(point) in known for point in found.reshape(-1, 3).tolist())
+    assert all(tuple(point) in known for point in actual.reshape(-1, 3).tolist())
     if not turn:
-        unions = [shapely.union_all(shapely.polygons(c[:, :, :2])) for c in (corners, found)]
+        unions = [shapely.union_all(shapely.polygons(c[:, :, :2])) for c in (corners, actual)]
         assert shapely.area(shapely.symmetric_difference(*unions)) < 1e-9
 
 
@@ -67,16 +67,16 @@ def test_walls_that_meet_in_a_corner_stay_two() -> None:
     wall = grid(8)
     facets = facets_of(np.concatenate([wall, wall[:, :, [2, 0, 1]]]))
     assert len(facets.area) == 2
-    found, source = fewer(facets)
+    actual, source = fewer(facets)
     assert sorted(source.tolist()) == [0, 0, len(wall), len(wall)]
-    assert areas(found).sum() == pytest.approx(200)
+    assert areas(actual).sum() == pytest.approx(200)
 
 
 def test_what_is_curved_stays_as_it_is() -> None:
     wall = grid(24)
     wall[:, :, 2] = 0.2 * np.sin(wall[:, :, 0]) * np.cos(wall[:, :, 1])
-    found, source = fewer(facets_of(wall))
-    assert np.array_equal(found, wall)
+    actual, source = fewer(facets_of(wall))
+    assert np.array_equal(actual, wall)
     assert np.array_equal(source, np.arange(len(wall)))
 
 
@@ -86,8 +86,8 @@ def test_a_bend_far_below_the_tolerance_does_not_add_up() -> None:
     wall[:, :, 2] = 2e-3 * (wall[:, :, 0] - 5) ** 2
     facets = facets_of(wall)
     assert 1 < len(facets.area) < len(wall)
-    found, _ = fewer(facets)
-    for corners in found:
+    actual, _ = fewer(facets)
+    for corners in actual:
         middle = corners.mean(axis=0)
         assert abs(middle[2] - 2e-3 * (middle[0] - 5) ** 2) <= TOLERANCE.plane
 
@@ -99,8 +99,8 @@ def test_a_triangulation_with_a_corner_of_its_own_is_not_taken() -> None:
     flat, of = space[:, :, :2], np.repeat([3, 5], 3)
     rings = np.array([[[0, 0], [4, 0], [0, 4]], [[0, 0], [4, 0], [2, 2]], [[0, 0], [2, 2], [0, 4]]])
     with counting() as undecided:
-        found, which = facets._lifted(rings.astype(float), np.array([3, 5, 5]), flat, of, space)
-    assert np.array_equal(found, space[None, :3, 0])
+        actual, which = facets._lifted(rings.astype(float), np.array([3, 5, 5]), flat, of, space)
+    assert np.array_equal(actual, space[None, :3, 0])
     assert which.tolist() == [3]
     assert undecided == {"triangles": 1}
 
@@ -117,8 +117,8 @@ def test_a_compressed_model_whose_outlines_cross_has_its_walls(shared: Path) -> 
 
 def test_two_triangles_stay_two() -> None:
     corners = grid(1)
-    found, source = fewer(facets_of(corners))
-    assert np.array_equal(found, corners)
+    actual, source = fewer(facets_of(corners))
+    assert np.array_equal(actual, corners)
     assert source.tolist() == [0, 1]
 
 
@@ -126,9 +126,9 @@ def test_a_crossing_wall_leaves_the_floor_in_two_parts() -> None:
     # Three triangles meet in the edges of its foot: the floor is not one region; nothing is lost.
     floor = grid(8)
     wall = grid(8)[:, :, [2, 0, 1]] + [5.0, 0, 0]
-    found, _ = fewer(facets_of(np.concatenate([floor, wall])))
-    assert areas(found).sum() == pytest.approx(200)
-    assert len(found) == 6
+    actual, _ = fewer(facets_of(np.concatenate([floor, wall])))
+    assert areas(actual).sum() == pytest.approx(200)
+    assert len(actual) == 6
 
 
 @pytest.mark.parametrize("times", [5, 12])

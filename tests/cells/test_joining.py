@@ -57,19 +57,19 @@ def open_edges(corners: np.ndarray) -> np.ndarray:
 
 def gaping(scene: Scene, corners: np.ndarray) -> np.ndarray:
     """The open edges of triangles that do not run along open edges of the model."""
-    found, model = open_edges(corners), open_edges(scene.corners)
+    actual, model = open_edges(corners), open_edges(scene.corners)
     way = model[:, 1] - model[:, 0]
     length = np.linalg.norm(way, axis=1)
     way /= length[:, None]
     reach = 10 * scene.tolerance.rounding
-    along = np.zeros(len(found), dtype=bool)
-    for first in range(0, len(found), CHUNK):
-        ahead = found[first : first + CHUNK, :, None] - model[:, 0]
+    along = np.zeros(len(actual), dtype=bool)
+    for first in range(0, len(actual), CHUNK):
+        ahead = actual[first : first + CHUNK, :, None] - model[:, 0]
         place = np.einsum("neki,ki->nek", ahead, way)
         off = np.linalg.norm(ahead - place[..., None] * way, axis=3)
         on = (off <= reach) & (place >= -reach) & (place <= length + reach)
         along[first : first + CHUNK] = on.all(axis=1).any(axis=1)
-    return found[~along]
+    return actual[~along]
 
 
 def halls(quads: Callable[..., Scene], room_faces: Any, partition: Any, **look: Any) -> Scene:
@@ -345,7 +345,7 @@ def test_texture_coordinates_stay(given: tuple[Any, ...]) -> None:
         there = (place.min(axis=1) > -1e-6) & (place.sum(axis=1) < 1 + 1e-6)
         there &= off < 2 * tolerance.file
         there &= scene.triangle_material == scene.triangle_material[source]
-        said = scene.uv[there, 0] + np.einsum(
+        printed = scene.uv[there, 0] + np.einsum(
             "tk,tkj->tj", place[there], scene.uv[there, 1:] - scene.uv[there, :1]
         )
-        assert np.abs(said - uv).max(axis=1).min() < 2e-5
+        assert np.abs(printed - uv).max(axis=1).min() < 2e-5

@@ -96,13 +96,13 @@ def test_the_user_comes_first(kind: Kind, option: str, pattern: str) -> None:
     """By the name of the object or by that of its material, which all objects share."""
     made = classed(scene(rooms(), thing=THING), thing=kind, masonry="structural")
     options = SubdivideOptions(**{option: (pattern,)})  # type: ignore[arg-type]
-    said = Designated.of(made, options)
+    printed = Designated.of(made, options)
     thing = made.triangle_object == made.objects.index("thing")
     for name in ("structural", "detail", "door"):
-        assert (getattr(said, name)[thing] == (name == option)).all()
+        assert (getattr(printed, name)[thing] == (name == option)).all()
     everywhere = pattern == "pla*"
-    assert (said.structural[~thing] == (not everywhere or option == "structural")).all()
-    assert (said.forced == (thing | everywhere) & (option == "structural")).all()
+    assert (printed.structural[~thing] == (not everywhere or option == "structural")).all()
+    assert (printed.forced == (thing | everywhere) & (option == "structural")).all()
 
 
 def test_no_classes_no_difference() -> None:

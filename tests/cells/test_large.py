@@ -153,6 +153,6 @@ def test_a_limit_that_was_reached_is_said() -> None:
     whole = subdivide(scene, SubdivideOptions(cells="leaf"))
     assert not any("limit" in note for note in whole.notes)
     cut = subdivide(scene, SubdivideOptions(cells="leaf", max_leaves=10))
-    (said,) = [note for note in cut.notes if "limit" in note]
-    assert said.startswith("the limit of 10 leaves was reached: ")
-    assert "--max-leaves" in said
+    (printed,) = [note for note in cut.notes if "limit" in note]
+    assert printed.startswith("the limit of 10 leaves was reached: ")
+    assert "--max-leaves" in printed

@@ -76,9 +76,9 @@ def test_a_ramp_under_a_sloping_ceiling_has_its_head_room_along_the_slope() -> N
         scene = scene_of([ramp, ceiling])
         structure = Structure.of(Opaque.of(scene, options), scene.tolerance)
         floors = Floors.of(scene, detail_of(scene, structure, options))
-        found = find_places(floors, structure, WALKER, EVERYWHERE).triangles(scene.tolerance)
-        below = found[:, :, 1].mean(axis=1) < found[:, :, 0].mean(axis=1) / 2 + above / 2
-        assert areas(found[below]).sum() == pytest.approx(area, abs=0.3)
+        actual = find_places(floors, structure, WALKER, EVERYWHERE).triangles(scene.tolerance)
+        below = actual[:, :, 1].mean(axis=1) < actual[:, :, 0].mean(axis=1) / 2 + above / 2
+        assert areas(actual[below]).sum() == pytest.approx(area, abs=0.3)
 
 
 def test_stairs_are_places_from_step_to_step() -> None:
@@ -132,8 +132,8 @@ def test_what_the_flood_does_not_reach(
     cells = subdivide(scene)
     assert cells.closed
     assert located(cells, HALL, point) == [True, kept]
-    said = [note for note in cells.notes if "of floor around" in note]
-    assert len(said) == kept
+    printed = [note for note in cells.notes if "of floor around" in note]
+    assert len(printed) == kept
     main = subdivide(scene, SubdivideOptions(reach="main"))
     assert located(main, HALL, point) == [True, False]
     left_out = [note for note in main.notes if "is left out; --reach all" in note]
@@ -143,7 +143,7 @@ def test_what_the_flood_does_not_reach(
     assert areas(main.left_out).sum() == pytest.approx(kept * width * depth)
     with pytest.raises(InputError, match="PTM-I305") if left_out else nullcontext():
         subdivide(scene, SubdivideOptions(reach="main", strict=True))
-    for note in said:  # the viewpoint that is named leads there
+    for note in printed:  # the viewpoint that is named leads there
         there = tuple(float(c) for c in note.split("around ")[1].split(" ")[0].split(","))
         options = SubdivideOptions(reach="main", viewpoints=(there,))  # type: ignore[arg-type]
         assert located(subdivide(scene, options), HALL, point) == [False, True]
@@ -173,9 +173,9 @@ def test_a_house_that_is_open_beside_a_closed_one_is_told(quads, room_faces) -> 
     cells = subdivide(quads(hall + house))
     assert cells.closed
     assert located(cells, HALL, (35, 1, 0)) == [True, False]
-    (told,) = [note for note in cells.notes if "open to the outside" in note]
-    assert isinstance(told, Warned)
-    there = tuple(float(c) for c in told.split("--viewpoint ")[1].split(" ")[0].split(","))
+    (reported,) = [note for note in cells.notes if "open to the outside" in note]
+    assert isinstance(reported, Warned)
+    there = tuple(float(c) for c in reported.split("--viewpoint ")[1].split(" ")[0].split(","))
     both = subdivide(quads(hall + house), SubdivideOptions(viewpoints=(there,)))  # type: ignore[arg-type]
     assert located(both, HALL, (35, 1, 0)) == [True, True]
     assert areas(cells.left_out).sum() == pytest.approx(9.5 * 7.5, abs=1), "and half the doorway"
@@ -195,8 +195,8 @@ def test_a_house_on_the_ground_is_a_part_of_all_places(quads, room_faces) -> Non
     options = SubdivideOptions(strict=True)
     cells = subdivide(quads([*hall, *house, ground]), options)
     assert cells.closed
-    (told,) = [note for note in cells.notes if "open to the outside" in note]
-    assert 5 < float(told.split(" ")[0]) < 12
+    (reported,) = [note for note in cells.notes if "open to the outside" in note]
+    assert 5 < float(reported.split(" ")[0]) < 12
     assert not any("of the walkable floor" in note for note in cells.notes)
 
 
@@ -207,8 +207,8 @@ def test_a_floor_of_many_facets_is_a_place(quads, room_faces) -> None:
     gravel[..., 1] += 0.003 * np.random.default_rng(1).random(gravel.shape[:2])
     cells = subdivide(scene_of(np.concatenate([quads(rooms).corners, gravel])))
     assert located(cells, HALL, (32, 1, 0)) == [True, True]
-    (said,) = [note for note in cells.notes if "of floor around" in note]
-    assert float(said.split(" ")[0]) == pytest.approx(3.5 * 3.5, abs=0.5)
+    (printed,) = [note for note in cells.notes if "of floor around" in note]
+    assert float(printed.split(" ")[0]) == pytest.approx(3.5 * 3.5, abs=0.5)
 
 
 def test_the_ground_costs_nothing_however_large(quads, room_faces) -> None:
@@ -216,8 +216,8 @@ def test_the_ground_costs_nothing_however_large(quads, room_faces) -> None:
     rooms = room_faces((0, 0, -4), (20, 4, 4)) + room_faces((30, 0, -2), (34, 4, 2))
     cells = subdivide(quads([*rooms, ground]))
     assert located(cells, HALL, (32, 1, 0)) == [True, True]
-    (said,) = [note for note in cells.notes if "of floor around" in note]
-    assert float(said.split(" ")[0]) == pytest.approx(3.5 * 3.5, abs=0.3)
+    (printed,) = [note for note in cells.notes if "of floor around" in note]
+    assert float(printed.split(" ")[0]) == pytest.approx(3.5 * 3.5, abs=0.3)
 
 
 def test_the_outside_of_a_closed_building_is_not_kept(quads, room_faces) -> None:
@@ -236,8 +236,8 @@ def test_many_rooms_are_counted_after_the_largest(quads, room_faces) -> None:
     for i in range(5):
         faces += room_faces((30 + 10 * i, 0, -1 - i), (34 + 10 * i, 4, 1 + i))
     cells = subdivide(quads(faces))
-    said = [note for note in cells.notes if "of floor around" in note]
-    assert len(said) == 3
-    size = [float(note.split(" ")[0]) for note in said]
+    printed = [note for note in cells.notes if "of floor around" in note]
+    assert len(printed) == 3
+    size = [float(note.split(" ")[0]) for note in printed]
     assert size == pytest.approx([33.25, 26.25, 19.25], abs=0.06)
     assert any("2 more such areas" in note for note in cells.notes)

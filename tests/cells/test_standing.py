@@ -107,8 +107,8 @@ def test_without_floors_one_may_be_anywhere_and_is_told(quads, room_faces, viewp
     assert cells.leaf_standing.all()
     assert (cells.leaf_cell >= 0).all()
     assert not len(cells.eye_floor)
-    (said,) = [note for note in cells.notes if "fits on no floor" in note]
-    assert isinstance(said, Warned)
+    (printed,) = [note for note in cells.notes if "fits on no floor" in note]
+    assert isinstance(printed, Warned)
 
 
 @pytest.mark.parametrize("two_sided", [True, False])

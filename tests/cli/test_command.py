@@ -62,15 +62,15 @@ class Options(Base):
     ],
 )
 def test_options_come_from_the_class(arguments: list[str], wanted: Options | None) -> None:
-    found = []
+    actual = []
 
     @click.command()
     @options_of(Options)
     def command(**values: object) -> None:
-        found.append(take(Options, values))
+        actual.append(take(Options, values))
 
     result = CliRunner().invoke(command, arguments)
-    assert (result.exit_code, found) == ((0, [wanted]) if wanted else (2, []))
+    assert (result.exit_code, actual) == ((0, [wanted]) if wanted else (2, []))
 
 
 def test_arguments_give_the_same_options_again() -> None:
@@ -165,7 +165,7 @@ def test_the_public_names_are_there() -> None:
 def test_packages_name_the_same_for_type_checkers_and_at_run_time() -> None:
     """The table of `lazy_exports` has the imports ``if TYPE_CHECKING``."""
     packages = list(Path(ptmtools.__file__).parent.rglob("__init__.py"))
-    found = 0
+    actual = 0
     for package in packages:
         tree = ast.parse(package.read_text("utf-8"))
         tables = [
@@ -173,12 +173,12 @@ def test_packages_name_the_same_for_type_checkers_and_at_run_time() -> None:
             for node in ast.walk(tree)
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "lazy_exports"
         ]
-        found += len(tables)
+        actual += len(tables)
         if tables:
             (checked,) = [node for node in tree.body if isinstance(node, ast.If)]
             imports = [node for node in checked.body if isinstance(node, ast.ImportFrom)]
             assert tables[0] == {n.module: " ".join(a.name for a in n.names) for n in imports}
-    assert found > 10
+    assert actual > 10
 
 
 def test_numbers_for_people() -> None:

@@ -191,7 +191,7 @@ def test_tables_are_known_and_made_by_scripts_that_exist() -> None:
 
 def test_messages_are_those_of_the_program() -> None:
     """Runs of six words or more, in the notes and errors that pages show, stand in the source."""
-    said = "\n".join(
+    printed = "\n".join(
         node.value
         for file in (ROOT / "ptmtools").rglob("*.py")
         for node in ast.walk(ast.parse(file.read_text("utf-8")))
@@ -201,7 +201,7 @@ def test_messages_are_those_of_the_program() -> None:
     for page in PAGES:
         for note in re.findall(r"^ {4}(?:note|ptm): (.*)", page.read_text("utf-8"), re.MULTILINE):
             runs = re.findall(r"[a-z]+(?: [a-z]+){5,}", note)
-            unknown += [(page.name, run) for run in runs if run not in said]
+            unknown += [(page.name, run) for run in runs if run not in printed]
     assert unknown == []
 
 

@@ -74,8 +74,8 @@ def through(
 )
 def test_which_images_are_meant(named: list[str], made: list[str], folder: Path) -> None:
     assert main(["-q", "encode", *named, "--profile", "raw", "-j", "2"]) == 0
-    found = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*.ptm"))
-    assert found == made
+    actual = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*.ptm"))
+    assert actual == made
     for name in made:
         np.testing.assert_array_equal(decode(folder / name), RGB)
 
@@ -136,8 +136,8 @@ def test_each_file_once_and_none_over_another(
 def test_where_results_go(named: list[str], output: str, made: list[str], folder: Path) -> None:
     before = set(folder.rglob("*"))
     assert main(["-q", "encode", *named, "-o", output, "--profile", "raw"]) == 0
-    found = {path for path in folder.rglob("*") if path.is_file()} - before
-    assert sorted(path.relative_to(folder).as_posix() for path in found) == made
+    actual = {path for path in folder.rglob("*") if path.is_file()} - before
+    assert sorted(path.relative_to(folder).as_posix() for path in actual) == made
     # And back, the same way.
     if made != ["new"]:
         assert main(["-q", "decode", *made, "-o", "back/"]) == 0
@@ -276,9 +276,9 @@ def test_pipes_are_as_standard_input(folder: Path, through: Callable[..., Any]) 
     def piped(data: bytes, *arguments: str) -> tuple[int, bytes, str]:
         writer = threading.Thread(target=Path("pipe").write_bytes, args=[data], daemon=True)
         writer.start()
-        found = through(b"", *arguments)
+        actual = through(b"", *arguments)
         writer.join()
-        return found
+        return actual
 
     status, data, err = piped(png_bytes(RGB), "encode", "pipe", "--profile", "raw")
     assert (status, data) == (0, encode(RGB, RAW))
@@ -310,8 +310,8 @@ def test_stdin_and_stdout(folder: Path, through: Callable[..., Any]) -> None:
     assert (status, data) == (0, encode(RGB, RAW))
     assert err.startswith("-: 5 levels")
     assert through(data, "decode", "-", "-q") == (0, png_bytes(RGB), "")
-    status, found, _ = through(data, "decode", "-", "--level", "2", "-o", "-")
-    np.testing.assert_array_equal(load_image(found).array(), build_pyramid(RGB)[2])
+    status, actual, _ = through(data, "decode", "-", "--level", "2", "-o", "-")
+    np.testing.assert_array_equal(load_image(actual).array(), build_pyramid(RGB)[2])
     assert through(data, "decode", "-", "-o", "x.png", "-q") == (0, b"", "")
     np.testing.assert_array_equal(load_image("x.png").array(), RGB)
     (folder / "a.ptm").write_bytes(data)
@@ -328,9 +328,9 @@ def test_the_suffix_follows_the_samples(kind: str, folder: Path) -> None:
     (folder / "x.ptm").write_bytes(encode(texels, RAW))
     assert main(["-q", "decode", "x.ptm"]) == 0
     made = "x.npy" if kind.startswith("f") else "x.png"
-    found = load_image(made).array()
-    assert found.dtype == texels.dtype
-    np.testing.assert_array_equal(found, texels)
+    actual = load_image(made).array()
+    assert actual.dtype == texels.dtype
+    np.testing.assert_array_equal(actual, texels)
     assert main(["-q", "encode", made, "--profile", "raw", "-o", "y.ptm"]) == 0
     assert (folder / "y.ptm").read_bytes() == (folder / "x.ptm").read_bytes()
 
@@ -357,12 +357,12 @@ def test_a_window(folder: Path) -> None:
 
 
 def test_colour_and_orientation_come_back(folder: Path) -> None:
-    said = Description(b"a profile", None, 45455, None, 6)
-    (folder / "x.png").write_bytes(png_bytes(RGB, said))
+    printed = Description(b"a profile", None, 45455, None, 6)
+    (folder / "x.png").write_bytes(png_bytes(RGB, printed))
     assert main(["-q", "encode", "x.png", "--profile", "raw"]) == 0
     assert main(["-q", "decode", "x.ptm", "-o", "y.png"]) == 0
     picture = load_image("y.png")
-    assert picture.description == said
+    assert picture.description == printed
     np.testing.assert_array_equal(picture.array(), RGB)
     assert main(["-q", "encode", "x.png", "--profile", "raw", "--orient", "--force"]) == 0
     with open_ptm("x.ptm") as ptm:
@@ -411,9 +411,9 @@ def test_decode_reports_as_json(folder: Path, through: Callable[..., Any]) -> No
 
 
 def test_info_counts(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    said = Description(b"a profile", 1, 45455, None, 6)
+    printed = Description(b"a profile", 1, 45455, None, 6)
     texels = np.tile(RGB, (3, 3, 1)).astype(np.uint16)
-    data = encode(texels, EncodeOptions("raw", tile=16, max_level=-2), description=said)
+    data = encode(texels, EncodeOptions("raw", tile=16, max_level=-2), description=printed)
     header = read_header(data)
     (folder / "x.ptm").write_bytes(data[: header.levels[-1].end - 1])
     assert main(["info", "x.ptm", "--json"]) == 0

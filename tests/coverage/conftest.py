@@ -208,12 +208,12 @@ def exact_row() -> Callable[[int, str], np.ndarray]:
 
     def exact(n: int, weighting: str = "pixel") -> np.ndarray:
         share = [1.0, *(beyond(k, weighting) for k in range(1, n))]
-        found = np.zeros((n, n))
+        actual = np.zeros((n, n))
         for i in range(n):
             for far, step in ((n - 1 - i, 1), (i, -1)):
                 for k in range(1, far + 1):
-                    found[i, i + step * k] = share[k] - (share[k + 1] if k < far else 0.0)
-            found[i, i] = 1 - found[i].sum()
-        return found
+                    actual[i, i + step * k] = share[k] - (share[k + 1] if k < far else 0.0)
+            actual[i, i] = 1 - actual[i].sum()
+        return actual
 
     return exact

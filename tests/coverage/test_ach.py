@@ -291,10 +291,10 @@ def test_who_names_a_device_wants_that_one(room_row, no_gl):
 def test_any_seed_will_do_with_a_tolerance(room_row):
     scene, cells = room_row(2)
     options = AchOptions(tolerance=0.2, backend="embree", seed=2**32 - 1, samples=64)
-    found = compute_ach(scene, cells, all_visible(2), options)
+    actual = compute_ach(scene, cells, all_visible(2), options)
     other = compute_ach(scene, cells, all_visible(2), replace(options, seed=2**32 - 2))
-    assert (found.samples == 64).all()
-    assert not np.array_equal(found.pixels, other.pixels)
+    assert (actual.samples == 64).all()
+    assert not np.array_equal(actual.pixels, other.pixels)
 
 
 @pytest.mark.parametrize(

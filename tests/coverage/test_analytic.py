@@ -55,9 +55,9 @@ def test_the_quadrature_itself(through_doors, weighting):
         t = (4 * door - eye[:, 0]) / along[:, 0]
         y, z = (eye + t[:, None] * along)[:, 1:].T
         passes &= (y > 0) & (y < 3) & (np.abs(z) < 1)
-        found = np.average(passes, weights=weight)
+        actual = np.average(passes, weights=weight)
         assert through_doors(door, weighting) == pytest.approx(
-            found, rel=0.02 if door == 1 else 0.1
+            actual, rel=0.02 if door == 1 else 0.1
         )
 
 
@@ -117,10 +117,10 @@ def test_large_views_of_a_few_points_estimate_the_same(room_row, through_doors, 
     """As the paper does it: the same limit, from another end. Many seeds of 8 points."""
     share = through_doors(1, weighting)
     options = AchOptions(preset="paper", face=16, backend="embree", weighting=weighting)
-    found = [
+    actual = [
         compute_ach(*room_row(2), all_visible(2), replace(options, seed=seed)).value[1::2].mean()
         for seed in range(60)
     ]
-    error = np.std(found, ddof=1) / np.sqrt(len(found))
+    error = np.std(actual, ddof=1) / np.sqrt(len(actual))
     assert error < 0.06 * share
-    assert abs(np.mean(found) - share) <= 3 * error
+    assert abs(np.mean(actual) - share) <= 3 * error

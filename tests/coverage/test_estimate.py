@@ -31,11 +31,11 @@ def in_all_views(at_points):
 
 @given(st.lists(st.integers(0, 2**40), min_size=1, max_size=50))
 def test_shares_sum_to_1_for_any_counts(counts):
-    found = shares(np.array(counts))
-    assert abs(math.fsum(found) - 1) <= 2.0**-52
-    assert ((found >= 0) & (found <= 1)).all()
+    actual = shares(np.array(counts))
+    assert abs(math.fsum(actual) - 1) <= 2.0**-52
+    assert ((actual >= 0) & (actual <= 1)).all()
     if not any(counts):
-        assert found[0] == 1
+        assert actual[0] == 1
 
 
 def test_shares_of_many_rows_and_of_none():
@@ -46,9 +46,9 @@ def test_shares_of_many_rows_and_of_none():
 @given(COUNTS)
 def test_ninety_five_percent_of_the_points_do_not_exceed_p95(rows):
     counts = np.array(rows, dtype=np.int64)
-    found = ninety_fifth(counts)
+    actual = ninety_fifth(counts)
     at_points = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
-    for share, column in zip(found, at_points.T, strict=True):
+    for share, column in zip(actual, at_points.T, strict=True):
         enough = [x for x in column if 20 * np.count_nonzero(column <= x) >= 19 * len(column)]
         assert share == min(enough)
 
@@ -157,11 +157,11 @@ def test_error_bars_are_as_wide_as_the_truth_is_far(name):
     total variation against how often it holds."""
     counts, truth = simulated(*MIXTURES[name], runs=1500, seed=2)
     group = grouped(counts.shape[1])
-    found = [spread(run, group) for run in counts]
+    actual = [spread(run, group) for run in counts]
     away = np.array([shares(run.sum(axis=0)) for run in counts]) - truth
-    claimed = np.sqrt(np.mean([error**2 for error, _ in found], axis=0))
+    claimed = np.sqrt(np.mean([error**2 for error, _ in actual], axis=0))
     assert claimed == pytest.approx(np.sqrt((away**2).mean(axis=0)), rel=0.08)
-    holds = np.mean(np.abs(away).sum(axis=1) / 2 <= [bound for _, bound in found])
+    holds = np.mean(np.abs(away).sum(axis=1) / 2 <= [bound for _, bound in actual])
     assert 0.93 <= holds <= 0.99
 
 
@@ -170,10 +170,10 @@ def test_of_fewer_groups_there_is_no_bound(groups):
     """Two groups are always equally far from their mean, so their distances tell nothing of how
     far that is from the truth."""
     counts, truth = simulated(*MIXTURES["two parts"], runs=1000, seed=groups)
-    found = [spread(run, np.arange(128) * groups // 128) for run in counts]
-    assert np.isnan([bound for _, bound in found]).all()
+    actual = [spread(run, np.arange(128) * groups // 128) for run in counts]
+    assert np.isnan([bound for _, bound in actual]).all()
     away = np.array([shares(run.sum(axis=0)) for run in counts]) - truth
-    claimed = np.sqrt(np.mean([error**2 for error, _ in found], axis=0))
+    claimed = np.sqrt(np.mean([error**2 for error, _ in actual], axis=0))
     assert claimed == pytest.approx(np.sqrt((away**2).mean(axis=0)), rel=0.1)
 
 

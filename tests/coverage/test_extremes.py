@@ -88,10 +88,10 @@ def test_scale_and_place(room_row, elsewhere, backend, factor, extents):
     offset = factor * extents * 12 * np.array([1.0, -0.7, 0.3])
     there = elsewhere(scene, cells, offset, factor)
     expected = compute_ach(scene, cells, all_visible(3), options)
-    found = compute_ach(*there, all_visible(3), options)
-    assert_near(found, expected)
+    actual = compute_ach(*there, all_visible(3), options)
+    assert_near(actual, expected)
     # The points are the same but for rounding, so hardly a pixel changes.
-    assert np.abs(found.pixels - expected.pixels).sum() <= 1e-3 * expected.pixels.sum()
+    assert np.abs(actual.pixels - expected.pixels).sum() <= 1e-3 * expected.pixels.sum()
 
 
 def test_turned_obliquely(room_row, backend):
@@ -131,8 +131,8 @@ def test_quarter_turns_and_mirrors(room_row, backend, weighting, turn):
     scene, cells = room_row(3)
     options = replace(SOME, samples=512, backend=backend, weighting=weighting)
     expected = compute_ach(scene, cells, all_visible(3), options)
-    found = compute_ach(*turned(scene, cells, matrix), all_visible(3), options)
-    assert_near(found, expected)
+    actual = compute_ach(*turned(scene, cells, matrix), all_visible(3), options)
+    assert_near(actual, expected)
 
 
 def test_mirrored_views_are_mirrored(room_row):
@@ -223,9 +223,9 @@ def test_a_cell_of_a_millimetre(room_row, backend, weighting, through_doors):
     assert (np.abs(ach.value[row] - [1 - 2 * share, share, share]) <= 3 * error).all()
     # From the first room, the thin one is its rim, and all behind it is the third.
     whole = through_doors(1, weighting)
-    found = ach.row(0)
-    assert abs(found[1:].sum() - whole) <= 3 * ach.error[0]
-    assert found[1] < 0.01
+    actual = ach.row(0)
+    assert abs(actual[1:].sum() - whole) <= 3 * ach.error[0]
+    assert actual[1] < 0.01
 
 
 def test_a_pvs_of_one(room_row, backend):
@@ -383,10 +383,10 @@ def test_seventy_thousand_cells(
         wanted, begin = owners.in_cells(np.arange(side**2, dtype=np.int32))
         seen = counter.count(sample_points(eye), wanted)
     assert len(owners.first) == side**2 + 1
-    found = np.add.reduceat(seen.in_views, begin, axis=1)[v]
+    actual = np.add.reduceat(seen.in_views, begin, axis=1)[v]
     # A pixel whose centre lies on a joint may show either tile.
-    assert np.abs(found - expected).sum() / 2 <= 1e-3 * face**2
-    assert found.sum() == face**2
+    assert np.abs(actual - expected).sum() / 2 <= 1e-3 * face**2
+    assert actual.sum() == face**2
     assert seen.missed[0] == 0
     if by_image:
         painted = owners.image[wanted] == owners.cell[wanted] % 3

@@ -205,8 +205,8 @@ def test_neither_place_nor_unit_matters(
     far_off = np.array(offset) * factor
     there = elsewhere(scene, cells, far_off, factor)
     expected = coverage_at(backend, scene, cells, eye)
-    found = coverage_at(backend, *there, eye * factor + far_off, near=1e-3 * factor)
-    assert found.tolist() == expected.tolist()
+    actual = coverage_at(backend, *there, eye * factor + far_off, near=1e-3 * factor)
+    assert actual.tolist() == expected.tolist()
 
 
 @settings(max_examples=15, deadline=None, suppress_health_check=list(HealthCheck))
@@ -238,9 +238,9 @@ class Doubtful:
         self.rays, self.wrong, self.triangle = rays, wrong, triangle
 
     def show(self, points, needed=None):
-        found = self.rays.show(points, needed)
-        found.reshape(1, -1)[0, self.wrong] = self.triangle
-        return found
+        actual = self.rays.show(points, needed)
+        actual.reshape(1, -1)[0, self.wrong] = self.triangle
+        return actual
 
     def trace(self, points, pixels):
         assert set(self.wrong) <= set(pixels)
@@ -299,11 +299,11 @@ def test_rays_through_some_pixels_are_the_rays_through_all(
     assert whole.shape == (2, 2, 6, FACE**2)
     pixels = np.arange(0, 2 * 6 * FACE**2, 7)
     with drawing(backend, surfaces, FACE) as renderer:
-        found, place = renderer.trace(at, pixels)
+        actual, place = renderer.trace(at, pixels)
         drawn = renderer.show(at)
-    assert np.array_equal(found, whole.reshape(2, -1)[:, pixels])
-    hit = found[0] >= 0
-    plane = surfaces.plane[found[0][hit]]
+    assert np.array_equal(actual, whole.reshape(2, -1)[:, pixels])
+    hit = actual[0] >= 0
+    plane = surfaces.plane[actual[0][hit]]
     off = np.einsum("ij,ij->i", plane[:, :3], surfaces.normalised(place[0][hit])) + plane[:, 3]
     assert np.abs(off).max() < 1e-6
     assert np.mean(drawn != whole) < 1e-3  # triangles that share an edge may share its pixels

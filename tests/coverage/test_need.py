@@ -50,14 +50,14 @@ def need(rooms: Artifacts) -> Need:
 
 def by_level(need: Need, cell: int) -> dict[int, np.ndarray]:
     """Image → share of the view that wants just that level."""
-    found = {}
+    actual = {}
     for entry in range(*need.start[cell : cell + 2].tolist()):
         share = need.share[slice(*need.share_start[entry : entry + 2].tolist())]
         levels = np.zeros(SIZES[int(need.image[entry])].levels)
         first = int(need.first[entry])
         levels[first : first + len(share)] = share - np.append(share[1:], 0)
-        found[int(need.image[entry])] = levels
-    return found
+        actual[int(need.image[entry])] = levels
+    return actual
 
 
 def met(corners: np.ndarray, eye: np.ndarray, ray: np.ndarray) -> tuple[int, float]:
@@ -97,7 +97,7 @@ def test_rays_followed_one_by_one_want_the_same(rooms: Artifacts, need: Need) ->
     weight = np.repeat(sampler.weight(points), 6, axis=0).ravel()
     image = np.array([m.image for m in scene.materials])[scene.triangle_material]
     assert scene.opaque.all()
-    found = {i: np.zeros(size.levels) for i, size in SIZES.items()}
+    actual = {i: np.zeros(size.levels) for i, size in SIZES.items()}
     total, chosen = 0, np.random.default_rng(5).permutation(len(origin))[:6000]
     corners = scene.corners
     for pixel in chosen.tolist():
@@ -126,10 +126,10 @@ def test_rays_followed_one_by_one_want_the_same(rooms: Artifacts, need: Need) ->
             ]
             span.append(np.linalg.norm(ends[1] - ends[0]) * 100)
         detail = max(0, math.floor(math.log2(max(span)))) if max(span) > 0 else 0
-        found[int(image[triangle])][max(size.levels - 1 - detail, 0)] += weight[pixel]
+        actual[int(image[triangle])][max(size.levels - 1 - detail, 0)] += weight[pixel]
     measured = by_level(need, 0)
     several = 0
-    for i, levels in found.items():
+    for i, levels in actual.items():
         several += (levels > 0).sum() > 2
         wanted = measured.get(i, np.zeros(len(levels)))
         # 6,000 of 24,576 rays: a standard error of 0.006 at most.

@@ -38,19 +38,19 @@ def around(room_row, furnish, quads, sides=(0, 0)):
 
 
 def test_inside_a_statue(room_row, furnish):
-    found = around(room_row, furnish, STATUE)
-    assert len(found.solids) == 1
-    assert found.in_solid(np.atleast_2d(INSIDE))[0]
-    assert not found.in_solid(np.atleast_2d(OUTSIDE))[0]
-    assert not found.in_solid(np.atleast_2d(np.array([1.5, 2.6, -0.5])))[0]
+    actual = around(room_row, furnish, STATUE)
+    assert len(actual.solids) == 1
+    assert actual.in_solid(np.atleast_2d(INSIDE))[0]
+    assert not actual.in_solid(np.atleast_2d(OUTSIDE))[0]
+    assert not actual.in_solid(np.atleast_2d(np.array([1.5, 2.6, -0.5])))[0]
 
 
 @pytest.mark.parametrize("flip", [[0], [1, 4], [0, 1, 2]])
 def test_winding_need_not_be_right(room_row, furnish, flip):
     quads = [q[::-1] if i in flip else q for i, q in enumerate(STATUE)]
-    found = around(room_row, furnish, quads)
-    assert found.in_solid(np.atleast_2d(INSIDE))[0]
-    assert not found.in_solid(np.atleast_2d(OUTSIDE))[0]
+    actual = around(room_row, furnish, quads)
+    assert actual.in_solid(np.atleast_2d(INSIDE))[0]
+    assert not actual.in_solid(np.atleast_2d(OUTSIDE))[0]
 
 
 def test_a_shell_that_faces_inwards_is_a_room(room_row, furnish):
@@ -80,15 +80,15 @@ def test_open_and_thin_things_have_no_inside(room_row, furnish):
     no_lid = [q for i, q in enumerate(STATUE) if i != 3]
     twice = [STATUE[0], STATUE[0][::-1]]
     for quads in (sheet, no_lid, twice):
-        found = around(room_row, furnish, quads)
+        actual = around(room_row, furnish, quads)
         for point in (INSIDE, OUTSIDE, np.array([1.001, 1.3, -0.45])):
-            assert not found.in_solid(np.atleast_2d(point))[0]
+            assert not actual.in_solid(np.atleast_2d(point))[0]
 
 
 def test_a_body_within_a_body(room_row, furnish):
-    found = around(room_row, furnish, STATUE + box([1.2, 1, -0.8], [1.6, 1.5, -0.2]))
-    assert len(found.solids) == 2
-    assert found.in_solid(np.atleast_2d(INSIDE))[0]
+    actual = around(room_row, furnish, STATUE + box([1.2, 1, -0.8], [1.6, 1.5, -0.2]))
+    assert len(actual.solids) == 2
+    assert actual.in_solid(np.atleast_2d(INSIDE))[0]
 
 
 def test_groups_hang_together_by_edges_not_by_corners():
@@ -105,7 +105,7 @@ def test_groups_hang_together_by_edges_not_by_corners():
 def test_distance_to_a_triangle(a, b, c):
     """Against the least distance to a dense set of points of it, slivers and points included."""
     corners = np.array([a, b, c])
-    found = distance(np.zeros(3), corners)
+    actual = distance(np.zeros(3), corners)
     n = 60
     i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1))
     u, v = (g[i + j <= n] / n for g in (i, j))
@@ -114,19 +114,19 @@ def test_distance_to_a_triangle(a, b, c):
     )
     nearest = np.linalg.norm(dense, axis=1).min()
     spacing = np.ptp(corners, axis=0).sum() / n
-    assert nearest - spacing - 1e-9 <= found <= nearest + 1e-9
+    assert nearest - spacing - 1e-9 <= actual <= nearest + 1e-9
 
 
 def test_clearance_stops_looking_when_it_is_enough(room_row, furnish):
-    found = around(room_row, furnish, STATUE)
+    actual = around(room_row, furnish, STATUE)
     points = np.array([[2.25, 1.3, -0.5], [2.0, 1.3, -0.5], [0.5, 2.0, 0.25]])
-    assert found.clearance(points, 1.0) == pytest.approx([0.25, 0, 0.5])
-    assert found.clearance(points, 0.1).tolist() == [0.1, 0, 0.1]
+    assert actual.clearance(points, 1.0) == pytest.approx([0.25, 0, 0.5])
+    assert actual.clearance(points, 0.1).tolist() == [0.1, 0, 0.1]
 
 
 def test_clearance_is_that_of_all_triangles(room_row, furnish):
     """Points in any order, against every triangle."""
-    found = around(room_row, furnish, STATUE)
+    actual = around(room_row, furnish, STATUE)
     points = np.random.default_rng(0).uniform([-0.2, -0.2, -2.2], [4.2, 4.2, 2.2], (300, 3))
-    nearest = [min(distance(p, corners) for corners in found.corners) for p in points]
-    assert found.clearance(points, 0.3) == pytest.approx(np.minimum(nearest, 0.3))
+    nearest = [min(distance(p, corners) for corners in actual.corners) for p in points]
+    assert actual.clearance(points, 0.3) == pytest.approx(np.minimum(nearest, 0.3))

@@ -59,11 +59,11 @@ def test_textures_sum_to_their_cell(room_row, backend, weighting, tolerance):
     assert (ach.texture_value > 0).all()
     several = 0
     for entry, value in enumerate(ach.value):
-        found = of_entry(ach, entry)
-        assert list(found) == sorted(found)
-        assert set(found) <= {-1, 0, 1, 2, 3}
-        assert math.fsum(found.values()) == pytest.approx(value, abs=1e-15)
-        several += len(found) > 2
+        actual = of_entry(ach, entry)
+        assert list(actual) == sorted(actual)
+        assert set(actual) <= {-1, 0, 1, 2, 3}
+        assert math.fsum(actual.values()) == pytest.approx(value, abs=1e-15)
+        several += len(actual) > 2
     assert several >= 5
     plain = compute_ach(scene, cells, all_visible(3), replace(options, per_texture=False))
     assert not plain.by_texture
@@ -78,10 +78,10 @@ def test_what_is_seen_twice_as_large_has_twice_the_share(room_row, backend):
     scene = painted(scene, {FLOOR: 0, BACK: 1, FRONT: 1})
     options = replace(BY_TEXTURE, backend=backend, samples=1024, face=4)
     ach = compute_ach(scene, cells, all_visible(1), options)
-    found = of_entry(ach, 0)
-    assert found[0] == pytest.approx(1 / 6, abs=1e-3)
-    assert found[1] == pytest.approx(2 / 6, abs=2e-3)
-    assert found[-1] == pytest.approx(3 / 6, abs=2e-3)
+    actual = of_entry(ach, 0)
+    assert actual[0] == pytest.approx(1 / 6, abs=1e-3)
+    assert actual[1] == pytest.approx(2 / 6, abs=2e-3)
+    assert actual[-1] == pytest.approx(3 / 6, abs=2e-3)
 
 
 def test_textures_are_counted_where_they_are_seen(room_row, backend, drawing):
@@ -107,11 +107,11 @@ def test_textures_are_counted_where_they_are_seen(room_row, backend, drawing):
                 counted[key] = counted.get(key, 0) + int(times)
         total = sum(counted.values())
         assert total == options.points * 6 * options.side**2
-        found = {}
+        actual = {}
         for entry, other in enumerate(all_visible(2).row(cell), int(ach.start[cell])):
-            found |= {(int(other), image): v for image, v in of_entry(ach, entry).items()}
-        assert found.keys() == counted.keys()
-        for key, share in found.items():
+            actual |= {(int(other), image): v for image, v in of_entry(ach, entry).items()}
+        assert actual.keys() == counted.keys()
+        for key, share in actual.items():
             assert share == pytest.approx(counted[key] / total, abs=1e-12), key
 
 
@@ -126,12 +126,12 @@ def test_a_transparent_picture_has_a_share_of_its_own(room_row, furnish, backend
     scene = replace(scene, materials=(*scene.materials[:-1], curtain))
     after = compute_ach(scene, cells, all_visible(1), replace(BY_TEXTURE, backend=backend))
     assert set(of_entry(before, 0)) == {-1, 0}
-    found = of_entry(after, 0)
-    assert set(found) == {-1, 0, 1}
-    assert found[1] > 0.1
+    actual = of_entry(after, 0)
+    assert set(actual) == {-1, 0, 1}
+    assert actual[1] > 0.1
     for image in (-1, 0):
         opaque = of_entry(before, 0)[image] * before.pixels[0]
-        assert found[image] * after.pixels[0] == pytest.approx(opaque, rel=0.01)
+        assert actual[image] * after.pixels[0] == pytest.approx(opaque, rel=0.01)
 
 
 def test_what_belongs_to_no_cell_keeps_its_image_where_the_cell_has_it(room_row):
@@ -143,12 +143,12 @@ def test_what_belongs_to_no_cell_keeps_its_image_where_the_cell_has_it(room_row)
     unowned = replace(cells, triangle_cell=owner)
     options = replace(BY_TEXTURE, backend="embree", samples=512, face=4)
     shared = painted(scene, {FLOOR: 0, CEILING: 0})
-    found = of_entry(compute_ach(shared, unowned, all_visible(1), options), 0)
-    assert found[0] == pytest.approx(2 / 6, abs=5e-3)
+    actual = of_entry(compute_ach(shared, unowned, all_visible(1), options), 0)
+    assert actual[0] == pytest.approx(2 / 6, abs=5e-3)
     alone = painted(scene, {FLOOR: 1, CEILING: 0})
-    found = of_entry(compute_ach(alone, unowned, all_visible(1), options), 0)
-    assert set(found) == {-1, 0}
-    assert found[-1] == pytest.approx(5 / 6, abs=5e-3)
+    actual = of_entry(compute_ach(alone, unowned, all_visible(1), options), 0)
+    assert set(actual) == {-1, 0}
+    assert actual[-1] == pytest.approx(5 / 6, abs=5e-3)
 
 
 def test_owners_of_images(room_row):

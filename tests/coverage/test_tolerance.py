@@ -20,10 +20,10 @@ ROOMS = 3
 
 def matrix(ach, pvs):
     """(C, C) hints, 0 outside the PVS."""
-    found = np.zeros((pvs.cell_count, pvs.cell_count))
+    actual = np.zeros((pvs.cell_count, pvs.cell_count))
     for i in range(pvs.cell_count):
-        found[i, pvs.row(i)] = ach.row(i)
-    return found
+        actual[i, pvs.row(i)] = ach.row(i)
+    return actual
 
 
 def all_visible(n):
@@ -73,8 +73,8 @@ def test_error_bars_of_independent_sequences_are_honest(runs, exact_row):
         error = np.array([ach.error[ach.entries(i)] for i in range(ROOMS)])
         rows = [all_visible(ROOMS).row(i) for i in range(ROOMS)]
         expected = np.array([truth[i, row] for i, row in enumerate(rows)])
-        found = np.array([ach.row(i) for i in range(ROOMS)])
-        worst.append(((found - expected) / error)[expected > 0.02])
+        actual = np.array([ach.row(i) for i in range(ROOMS)])
+        worst.append(((actual - expected) / error)[expected > 0.02])
     score = np.concatenate(worst)
     assert 0.6 < np.sqrt(np.mean(score**2)) < 1.6
     assert np.mean(np.abs(score) <= 2.365) >= 0.88
@@ -210,7 +210,7 @@ def test_views_of_a_few_pixels_have_no_grid(room_row, exact_row, placement):
     """With the same 4 pixel centres at every point no number of points would be enough: here they
     are off by 0.007."""
     options = replace(RAYS, samples=4096, face=2, placement=placement)
-    found = compute_ach(*room_row(ROOMS), all_visible(ROOMS), options)
-    away = variation(matrix(found, all_visible(ROOMS)), exact_row(ROOMS))
-    assert (away <= 1.5 * found.uncertain).all()
-    assert found.uncertain.max() < 0.004
+    actual = compute_ach(*room_row(ROOMS), all_visible(ROOMS), options)
+    away = variation(matrix(actual, all_visible(ROOMS)), exact_row(ROOMS))
+    assert (away <= 1.5 * actual.uncertain).all()
+    assert actual.uncertain.max() < 0.004

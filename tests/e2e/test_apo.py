@@ -39,8 +39,8 @@ def museum(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def counts(db: Path, stage: str) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((db / "manifest.json").read_text())["stages"][stage]
-    return dict(found["counts"])
+    actual: dict[str, Any] = json.loads((db / "manifest.json").read_text())["stages"][stage]
+    return dict(actual["counts"])
 
 
 def test_the_building_is_the_same(museum: Path, ptm: Ptm) -> None:
@@ -108,8 +108,8 @@ def test_statues_can_be_lit_by_what_is_served(tmp_path: Path, ptm: Ptm) -> None:
             assert fault_of(octree) is None
             flat = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
             flat /= np.linalg.norm(flat, axis=1, keepdims=True)
-            found = look_up(octree, (corner.mean(axis=1) - low) / side).normals
-            off = np.degrees(np.arccos(np.clip((found * flat).sum(axis=1), -1, 1)))
+            actual = look_up(octree, (corner.mean(axis=1) - low) / side).normals
+            off = np.degrees(np.arccos(np.clip((actual * flat).sum(axis=1), -1, 1)))
             assert np.median(off) < 12  # the relief, not the triangle
             assert off.mean() > 1
             seen += len(corner)
@@ -130,12 +130,12 @@ def shapes(file: Path) -> list[tuple[str, np.ndarray]]:
         kind = types[accessor["componentType"]]
         return np.frombuffer(binary, kind, accessor["count"] * width, begin).reshape(-1, width)
 
-    found = []
+    actual = []
     for node in tree.get("nodes", []):
         for primitive in tree["meshes"][node["mesh"]]["primitives"]:
             points = values(primitive["attributes"]["POSITION"], 3).astype(np.float64)
-            found.append((node["name"], points[values(primitive["indices"], 1).reshape(-1, 3)]))
-    return found
+            actual.append((node["name"], points[values(primitive["indices"], 1).reshape(-1, 3)]))
+    return actual
 
 
 def test_killed_builds_end_as_undisturbed_ones(tmp_path: Path) -> None:

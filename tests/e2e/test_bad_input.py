@@ -398,8 +398,8 @@ def test_a_cut_file_decodes_to_its_last_whole_level(folder: Path, ptm: Ptm) -> N
     (folder / "a.ptm").write_bytes(data[:-9])
     outcome = ptm("decode", folder / "a.ptm")
     assert outcome.status == 0
-    with Image.open(folder / "a.png") as found:
-        assert found.size == (16, 16)
+    with Image.open(folder / "a.png") as actual:
+        assert actual.size == (16, 16)
 
 
 def test_a_bug_is_reported_in_one_line_and_status_1(

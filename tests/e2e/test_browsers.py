@@ -72,12 +72,12 @@ def real(
 
 def compared(database: Database, album: Album, browser: str) -> list[Likeness]:
     """The pictures of the first viewpoints, beside ours."""
-    found = []
+    actual = []
     for viewpoint, picture in enumerate(album.pictures):
         what = outline(database.scene, database.view(viewpoint, SIZE))
         own = database.own(viewpoint, SIZE, browser)
-        found.append(likeness(picture, own, what, LOOKS[browser]))
-    return found
+        actual.append(likeness(picture, own, what, LOOKS[browser]))
+    return actual
 
 
 def alike(found: Likeness) -> bool:
@@ -90,11 +90,11 @@ def alike(found: Likeness) -> bool:
 
 def check(database: Database, album: Album, browser: str) -> None:
     assert album.complaints == ()
-    found = compared(database, album, browser)
-    assert len(found) == min(len(database.viewpoints), ROOMS)
-    assert all(alike(each) for each in found), found
+    actual = compared(database, album, browser)
+    assert len(actual) == min(len(database.viewpoints), ROOMS)
+    assert all(alike(each) for each in actual), actual
     # What is compared is most of the picture.
-    assert all(each.masked < 0.25 for each in found), found
+    assert all(each.masked < 0.25 for each in actual), actual
 
 
 def first_rooms(database: Database) -> range:
@@ -129,9 +129,9 @@ def test_view3dscene_complains_about_broken_files(
     castle: Any, museum: Path, tmp_path: Path
 ) -> None:
     root, wrong, missing = broken(museum, tmp_path)
-    found = castle.check_all(root.parent)
-    assert "cordIndex" in found[f"cells/{wrong}"][0]
-    assert missing in " ".join(found["root.wrl"])
+    actual = castle.check_all(root.parent)
+    assert "cordIndex" in actual[f"cells/{wrong}"][0]
+    assert missing in " ".join(actual["root.wrl"])
     # A picture of the root tells of all that it inlines.
     shown = " ".join(castle.screenshot(root, tmp_path / "broken.png", width=64, height=64))
     assert "Cannot load the texture" in shown
@@ -143,10 +143,10 @@ def test_view3dscene_complains_about_broken_files(
 @pytest.mark.parametrize("museum", ["room"], indirect=True)
 def test_x_ite_complains_about_broken_files(web: Any, museum: Path, tmp_path: Path) -> None:
     root, _, missing = broken(museum, tmp_path)
-    said = " ".join(web.show(root, width=64, height=64).messages)
-    assert "cordIndex" in said
-    assert missing in said
-    assert ".png" in said
+    printed = " ".join(web.show(root, width=64, height=64).messages)
+    assert "cordIndex" in printed
+    assert missing in printed
+    assert ".png" in printed
 
 
 def test_view3dscene_shows_what_rays_see(castle: Any, museum: Path) -> None:

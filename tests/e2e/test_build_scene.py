@@ -274,8 +274,8 @@ def test_gallery_is_one_hall_and_said_to_be(
     assert counts["cells"]["leaves"] > 20
     done = ptm("validate", db, "--segments", 100_000)
     assert done.status == 0, done.out
-    said = [note for stage in report["stages"] for note in stage["notes"] if "culling" in note]
-    assert said == ["visibility culling gains nothing here: the model is a single hall"]
+    printed = [note for stage in report["stages"] for note in stage["notes"] if "culling" in note]
+    assert printed == ["visibility culling gains nothing here: the model is a single hall"]
 
 
 def test_progress_is_not_shown_to_a_pipe(tmp_path: Path) -> None:

@@ -32,15 +32,15 @@ def khronos(require: Callable[[str, str], None]) -> Any:
 def clean(khronos: Any, database: Path) -> int:
     """The triangles of all GLBs, once they are known to be without errors and warnings."""
     www = database / "www"
-    found = khronos.validate(www / "gltf")
+    actual = khronos.validate(www / "gltf")
     cells = json.loads((www / "hints.json").read_text())["cells"]
-    assert sorted(found) == sorted(f"{cell['name']}.glb" for cell in cells)
-    assert {name: file.complaints for name, file in found.items() if file.complaints} == {}
-    assert set().union(*(file.remarks for file in found.values())) <= REMARKS
+    assert sorted(actual) == sorted(f"{cell['name']}.glb" for cell in cells)
+    assert {name: file.complaints for name, file in actual.items() if file.complaints} == {}
+    assert set().union(*(file.remarks for file in actual.values())) <= REMARKS
     for cell in cells:  # every image was fetched
         record = json.loads((www / f"hints/{cell['name']}.json").read_text())
-        assert found[f"{cell['name']}.glb"].images >= len(record["textures"][0])
-    return sum(file.triangles for file in found.values())
+        assert actual[f"{cell['name']}.glb"].images >= len(record["textures"][0])
+    return sum(file.triangles for file in actual.values())
 
 
 def counts(database: Path) -> dict[str, int]:

@@ -38,8 +38,8 @@ def rooms(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def read(www: Path, name: str) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((www / name).read_text())
-    return found
+    actual: dict[str, Any] = json.loads((www / name).read_text())
+    return actual
 
 
 def record_of(www: Path, cell: int) -> dict[str, Any]:
@@ -85,9 +85,9 @@ def test_three_js_shows_what_rays_see(three: Any, gltf_museum: Path) -> None:
             shown = np.asarray(image.convert("RGB"))
         view = View.of_hint(viewpoint, width, height)
         own, edges = render(scene, view, LOOK, samples=2), outline(scene, view)
-        found = likeness(shown, own, edges, LOOK)
-        assert found.psnr > LIKE
-        assert found.stray == 0
+        actual = likeness(shown, own, edges, LOOK)
+        assert actual.psnr > LIKE
+        assert actual.stray == 0
         mirrored.append(likeness(shown[:, ::-1], own, edges, LOOK).psnr)
     assert min(mirrored) < LIKE - 10
 
@@ -166,14 +166,14 @@ def test_three_js_moves_on(three: Any, rooms: Path, after: int) -> None:
     """What a cell alone needed is called off when the viewer enters another."""
     seen = [set(seen_from(rooms, cell)[0]) for cell in range(len(list(rooms.glob("gltf/*.glb"))))]
     here, there = next((a, b) for a, at in enumerate(seen) for b, to in enumerate(seen) if at - to)
-    found, visit = three.run(HURRY, {"www": rooms}, cells=[here, there], after=after)
+    actual, visit = three.run(HURRY, {"www": rooms}, cells=[here, there], after=after)
     assert visit.messages == []
     visible, share = seen_from(rooms, there)
-    assert found["done"][1] is True
-    assert found["groups"] == len(visible)
-    assert set(found["files"]) == set(share)
+    assert actual["done"][1] is True
+    assert actual["groups"] == len(visible)
+    assert set(actual["files"]) == set(share)
     if not after:
-        assert found["done"][0] is False
+        assert actual["done"][0] is False
         alone = seen[here] - seen[there]
         assert not [path for path in visit.paths for cell in alone if f"c{cell:04d}.glb" in path]
 
@@ -196,9 +196,9 @@ def test_three_js_complains(three: Any, gltf_museum: Path, tmp_path: Path) -> No
     (www / glb).unlink()
     (www / ptm).unlink()
     walked = three.walk(www, width=64, height=64)
-    said = " ".join(walked.messages)
-    assert f"{glb}: 404" in said
-    assert f"{ptm}: 404" in said
+    printed = " ".join(walked.messages)
+    assert f"{glb}: 404" in printed
+    assert f"{ptm}: 404" in printed
     assert walked.stays[0]["groups"] == len(visible) - 1
 
 
@@ -236,10 +236,10 @@ def test_the_example_walks(three: Any, gltf_museum: Path, tmp_path: Path) -> Non
         (tmp_path / name).symlink_to(folders[folder])
     served = {"node_modules": tmp_path, "www": gltf_museum / "www"}
     visit = web.visit(web.REPORTING + EXAMPLE, served)
-    found = json.loads(visit.body)
+    actual = json.loads(visit.body)
     index = read(gltf_museum / "www", "hints.json")
     first = index["viewpoints"][0]["cell"]
     visible, _ = seen_from(gltf_museum / "www", first)
     assert visit.messages == []
-    assert found["line"].startswith(f"cell {first}, {len(visible)} cells in sight, textures: ")
-    assert found["colors"] > 50
+    assert actual["line"].startswith(f"cell {first}, {len(visible)} cells in sight, textures: ")
+    assert actual["colors"] > 50

@@ -33,15 +33,15 @@ def until(condition: Callable[[], bool]) -> None:
 
 def in_session(leader: int) -> list[int]:
     """The living processes of a session but its leader."""
-    found = []
+    actual = []
     for file in Path("/proc").glob("[0-9]*/stat"):
         try:
             state, _, _, session = file.read_text().rpartition(")")[2].split()[:4]
         except OSError:
             continue
         if int(session) == leader != int(file.parent.name) and state != "Z":
-            found.append(int(file.parent.name))
-    return found
+            actual.append(int(file.parent.name))
+    return actual
 
 
 Build = subprocess.Popen[str]

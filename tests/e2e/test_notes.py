@@ -43,8 +43,8 @@ def test_warnings_come_with_their_stage_and_notes_are_counted(ptm: Ptm, lying: P
     notes = [line for line in again if line.startswith("note: ")]
     assert f"{len(notes)} more notes; -v lists them" == lines[-1]
     for verbose in ([], ["-v"]):
-        told = ptm("info", lying.with_suffix(".db"), *verbose).out
-        assert told.count(lines[1].removeprefix("warning: ")) == 1
+        reported = ptm("info", lying.with_suffix(".db"), *verbose).out
+        assert reported.count(lines[1].removeprefix("warning: ")) == 1
 
     turned = ptm("cells", lying, "--up", "z").out
     assert "warning: " not in turned

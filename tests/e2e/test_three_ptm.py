@@ -82,19 +82,19 @@ def test_levels_are_pythons(three: Any, files: Path, name: str) -> None:
     wanted, memory = expected(files / f"{name}.ptm"), pyramid_bytes(files / f"{name}.ptm")
     last = len(wanted) - 1
     order = [*range(last + 1), last // 2, 0, last]
-    found, visit = three.run(EVERY_LEVEL, {"files": files}, name=name, order=order)
+    actual, visit = three.run(EVERY_LEVEL, {"files": files}, name=name, order=order)
     assert visit.messages == []
     before = -1
-    for level, told in zip(order, found["told"], strict=True):
-        assert told["levels"] == wanted[: level + 1]
-        assert told["told"] == told["counted"] == memory[level]
+    for level, reported in zip(order, actual["told"], strict=True):
+        assert reported["levels"] == wanted[: level + 1]
+        assert reported["told"] == reported["counted"] == memory[level]
         had = memory[before] if before >= 0 else 0
         if level == before + 1 or level < before:
-            assert told["most"] == (had + memory[level] if before >= 0 else memory[level])
-        assert told["uploaded"] == max(memory[level] - had, 0)
+            assert reported["most"] == (had + memory[level] if before >= 0 else memory[level])
+        assert reported["uploaded"] == max(memory[level] - had, 0)
         before = level
-    assert found["largest"] <= 1 << 18
-    assert found["left"] == found["textures"] == 0
+    assert actual["largest"] <= 1 << 18
+    assert actual["left"] == actual["textures"] == 0
     ends = [end for _, _, end in visit.ranges]
     begins = [begin for _, begin, _ in visit.ranges]
     assert begins == [0, *ends[:-1]], "each range begins where the last one ended"
@@ -144,14 +144,14 @@ return {
 
 def test_a_lost_context_comes_back(three: Any, files: Path) -> None:
     """From the bytes at hand: what was there is not fetched again, what was under way goes on."""
-    found, visit = three.run(LOST, {"files": files})
+    actual, visit = three.run(LOST, {"files": files})
     assert visit.messages == []
-    assert found["before"] == [200, 100, 0, 255]
-    assert found["levels"] == [-1, -1]
-    assert found["done"] is True
-    assert found["found"] == [expected(files / f"{name}.ptm") for name in ("odd", "tiled")]
-    assert found["after"] == found["shown"] != found["before"]
-    assert found["told"] == found["counted"]
+    assert actual["before"] == [200, 100, 0, 255]
+    assert actual["levels"] == [-1, -1]
+    assert actual["done"] is True
+    assert actual["found"] == [expected(files / f"{name}.ptm") for name in ("odd", "tiled")]
+    assert actual["after"] == actual["shown"] != actual["before"]
+    assert actual["told"] == actual["counted"]
     whole = [end - begin for path, begin, end in visit.ranges if "tiled" in path]
     assert sum(whole) == (files / "tiled.ptm").stat().st_size
 
@@ -175,9 +175,9 @@ return { first, second, third, levels, left: gpu.bytes, told: texture.gpuBytes }
 
 
 def test_refining_is_called_off(three: Any, files: Path) -> None:
-    found, visit = three.run(CALLED_OFF, {"files": files})
+    actual, visit = three.run(CALLED_OFF, {"files": files})
     assert visit.messages == []
-    assert found == {
+    assert actual == {
         "first": [False, False, True],
         "second": False,
         "third": False,
@@ -208,14 +208,14 @@ return {
 
 def test_two_ways_to_wrap_are_two_textures(three: Any, files: Path) -> None:
     """Both counted, the file fetched once."""
-    found, visit = three.run(WRAPPED, {"files": files})
+    actual, visit = three.run(WRAPPED, {"files": files})
     file = files / "odd.ptm"
     wanted, memory = expected(file), pyramid_bytes(file)
     assert visit.messages == []
-    assert found["wraps"] == [33071, 10497]
-    assert found["found"] == [wanted, wanted[:5]]
-    assert found["told"] == [memory[-1], memory[4]]
-    assert found["counted"] == memory[-1] + memory[4]
+    assert actual["wraps"] == [33071, 10497]
+    assert actual["found"] == [wanted, wanted[:5]]
+    assert actual["told"] == [memory[-1], memory[4]]
+    assert actual["counted"] == memory[-1] + memory[4]
     assert sum(end - begin for _, begin, end in visit.ranges) == file.stat().st_size
 
 
@@ -240,14 +240,14 @@ def test_files_at_fault(three: Any, files: Path, tmp_path: Path) -> None:
     (tmp_path / "head.ptm").write_bytes(bytes(40) + file)
     (tmp_path / "cut.ptm").write_bytes(file[:-1])
     names = ["flipped", "head", "cut", "none"]
-    found, visit = three.run(FAULTS, {"files": tmp_path}, names=names)
+    actual, visit = three.run(FAULTS, {"files": tmp_path}, names=names)
     last = len(expected(files / "odd.ptm")) - 1
-    faults = {name: (fault, level) for name, fault, level in found["say"]}
+    faults = {name: (fault, level) for name, fault, level in actual["say"]}
     assert faults["flipped"] == ("PTM-I108", last - 1)
     assert faults["head"] == ("PTM-I101", -1)
     assert faults["cut"] == ("PTM-I103", last - 1)
     assert "404" in faults["none"][0]
-    assert found["left"] == 0
+    assert actual["left"] == 0
     ranges = [(begin, end) for path, begin, end in visit.ranges if "flipped" in path]
     assert [end for _, end in ranges[-2:]] == [len(file)] * 2
     assert len(visit.messages) == 2

@@ -43,8 +43,8 @@ def planned(ptm: Ptm, model: Path, db: Path, *more: object) -> dict[str, Any]:
 
 
 def states(ptm: Ptm, db: Path) -> dict[str, str]:
-    found = json.loads(ptm("status", db, "--json").out)
-    return {stage["stage"]: stage["state"] for stage in found["stages"]}
+    actual = json.loads(ptm("status", db, "--json").out)
+    return {stage["stage"]: stage["state"] for stage in actual["stages"]}
 
 
 def ran(stages: dict[str, Any]) -> list[str]:
@@ -155,8 +155,8 @@ def test_status(model: Path, tmp_path: Path, ptm: Ptm) -> None:
     assert set(states(ptm, db).values()) == {"done"}
     repaint(model.with_name("floor.png"))
     assert ptm("cells", model, "-o", db, "--max-leaves", 2).status == 0
-    found = states(ptm, db)
-    assert (found["pvs"], found["textures"], found["scene"]) == ("stale", "stale", "done")
+    actual = states(ptm, db)
+    assert (actual["pvs"], actual["textures"], actual["scene"]) == ("stale", "stale", "done")
     assert ptm("emit", db).status == 5
     (db / "stages/pvs.npz").unlink()
     assert states(ptm, db)["pvs"] == "damaged"

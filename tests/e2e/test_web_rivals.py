@@ -111,8 +111,8 @@ def test_a_glb_has_the_triangles_and_the_images(
     document = json.loads(text)
     assert kind == BINARY
     views = document["bufferViews"]
-    found = [views[image["bufferView"]] for image in document["images"]]
-    assert [binary[v["byteOffset"] :][: v["byteLength"]] for v in found] == files
+    actual = [views[image["bufferView"]] for image in document["images"]]
+    assert [binary[v["byteOffset"] :][: v["byteLength"]] for v in actual] == files
     (texture,) = document["textures"]
     named = texture if form == "png" else texture["extensions"]["EXT_texture_webp"]
     assert named["source"] == 1

@@ -35,16 +35,16 @@ def test_every_fault_is_found() -> None:
     planted = {n: generator(7, "planted", n).choice(list(FAULTS)) for n in numbers}
     assert set(planted.values()) == set(FAULTS)
     summary = run("planted", Planted, 7, 0, len(numbers), slow=0.5, hangs=5.0)
-    found: dict[int, str] = {}
+    actual: dict[int, str] = {}
     for number, what in summary.tally.findings:
-        found[number] = found.get(number, "") + what
+        actual[number] = actual.get(number, "") + what
     late = "writes beside without Python"  # seen as soon as the folders are compared
-    assert any(FAULTS[late] in what for what in found.values())
+    assert any(FAULTS[late] in what for what in actual.values())
     for number, fault in planted.items():
         if FAULTS[fault] and fault != late:
-            assert FAULTS[fault] in found[number]
+            assert FAULTS[fault] in actual[number]
         else:
-            assert found.get(number, FAULTS[late]).startswith(FAULTS[late])
+            assert actual.get(number, FAULTS[late]).startswith(FAULTS[late])
 
 
 def test_inputs_follow_from_seed_and_number(tmp_path: Path) -> None:

@@ -157,7 +157,7 @@ def test_the_picture_of_a_frame(seed: int, colored: bool) -> None:
     for frame in range(world.frames):
         rows = views.rows(frame)
         shown, drawn = np.zeros(stock.ends.shape, np.bool_), np.zeros(stock.cell_count, np.bool_)
-        found = picture(
+        actual = picture(
             rows.start, rows.stop, views.cell, views.texture, views.error, views.square,
             views.need, there, column, colored, shown, drawn,
         )  # fmt: skip
@@ -172,7 +172,7 @@ def test_the_picture_of_a_frame(seed: int, colored: bool) -> None:
             if t >= 0:
                 levels += [float(views.need[r, held:].sum()), float(views.need[r].sum())]
                 seen[t, 1 : held + 1] |= views.need[r, :held] > 0
-        assert found == pytest.approx((*sums, levels[0] / levels[1] if levels[1] else 0.0))
+        assert actual == pytest.approx((*sums, levels[0] / levels[1] if levels[1] else 0.0))
         assert (shown == seen).all()
         on_screen = np.isin(np.arange(stock.cell_count), views.cell[rows])
         assert (drawn == (on_screen & there)).all()

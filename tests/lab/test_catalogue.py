@@ -30,15 +30,15 @@ def without(served: Served, *names: str) -> None:
 
 
 def test_hints_and_textures_say_the_same(database: Path) -> None:
-    told, silent = read_served(database), read_served(database)
+    reported, silent = read_served(database), read_served(database)
     without(silent, *TOLD)
-    pyramids = read_pyramids(told)
-    one, other = (catalogue_of(s, pyramids.differences, pyramids.mean) for s in (told, silent))
+    pyramids = read_pyramids(reported)
+    one, other = (catalogue_of(s, pyramids.differences, pyramids.mean) for s in (reported, silent))
     assert one.differences.max() > 1
     assert one.differences == pytest.approx(other.differences, rel=5.1e-3)
     assert one.colors == pytest.approx(other.colors, abs=0.5)
     assert (one.memory == other.memory).all()
-    for row, ends, memory in zip(told.index["textures"], one.ends, one.memory, strict=True):
+    for row, ends, memory in zip(reported.index["textures"], one.ends, one.memory, strict=True):
         header = read_header((database / "www" / row["file"]).read_bytes())
         texels = np.cumsum([level.width * level.height for level in header.levels])
         assert (ends[1 : len(texels) + 1] == [level.end for level in header.levels]).all()
@@ -51,8 +51,8 @@ def test_what_hints_say_counts_only_if_they_say_it_of_every_texture(database: Pa
     served = read_served(database)
     first = catalogue_of(served, *made_up)
     row = served.index["textures"][0]
-    said = [max(LEAST, value) for value in row["differences"]]
-    assert first.differences[0, 1 : len(row["ends"]) + 1].tolist() == said
+    printed = [max(LEAST, value) for value in row["differences"]]
+    assert first.differences[0, 1 : len(row["ends"]) + 1].tolist() == printed
     assert first.colors.max() > 0
     without(served, "differences")
     assert (catalogue_of(served, *made_up).differences[:, 1:] == made_up[0]).all()
@@ -73,7 +73,7 @@ def test_how_large_an_image_is_on_a_shape(database: Path) -> None:
     pyramids = read_pyramids(served)
     stock = catalogue_of(served, pyramids.differences, pyramids.mean)
     painted = stock.shapes.texture >= 0
-    found = {tuple(np.round(side, 3).tolist()) for side in stock.shapes.side[painted]}
-    assert found == {(4, 3), (1, 1)}
+    actual = {tuple(np.round(side, 3).tolist()) for side in stock.shapes.side[painted]}
+    assert actual == {(4, 3), (1, 1)}
     assert (stock.size[:, -1] == 64).all()
     assert (stock.size[:, 1] == 1).all()

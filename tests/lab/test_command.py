@@ -27,9 +27,9 @@ def test_a_walk(db: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     files = [tmp_path / name for name in ("a.json", "b.json")]
     for file in files:
         assert main(["path", str(db), "-o", str(file)]) == 0
-    said = capsys.readouterr().out.splitlines()
+    printed = capsys.readouterr().out.splitlines()
     walk = read_walk(files[0])
-    assert said[0].startswith(f"{files[0]}: 2 of 2 rooms, {walk.length:.0f} m in ")
+    assert printed[0].startswith(f"{files[0]}: 2 of 2 rooms, {walk.length:.0f} m in ")
     assert files[0].read_bytes() == files[1].read_bytes()
     assert files_below(db) == before
 
@@ -38,21 +38,25 @@ def test_a_walk_that_is_too_short_for_all_rooms(
     db: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["path", str(db), "-o", str(tmp_path / "walk.json"), "--duration", "1"]) == 0
-    said = capsys.readouterr().out
-    assert "1 of 2 rooms" in said
-    assert "a longer --duration visits 1 more room\n" in said
+    printed = capsys.readouterr().out
+    assert "1 of 2 rooms" in printed
+    assert "a longer --duration visits 1 more room\n" in printed
 
 
 def test_options_and_json(db: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "walk.json"
     asked = ["--seed", "3", "--duration", "12", "--rate", "20", "--speed", "1", "--json"]
     assert main(["path", str(db), "-o", str(file), *asked]) == 0
-    told = json.loads(capsys.readouterr().out)
+    reported = json.loads(capsys.readouterr().out)
     walk = read_walk(file)
-    assert (told["samples"], told["duration"]) == (241, 12.0) == (len(walk.time), walk.duration)
-    assert told["length"] == pytest.approx(walk.length, abs=1e-3)
-    assert (told["rooms"], told["unreachable"]) == (2, [])
-    assert 1 <= len(told["visited"]) <= 2
+    assert (
+        (reported["samples"], reported["duration"])
+        == (241, 12.0)
+        == (len(walk.time), walk.duration)
+    )
+    assert reported["length"] == pytest.approx(walk.length, abs=1e-3)
+    assert (reported["rooms"], reported["unreachable"]) == (2, [])
+    assert 1 <= len(reported["visited"]) <= 2
 
 
 def test_what_is_there_is_kept(

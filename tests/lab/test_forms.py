@@ -178,8 +178,8 @@ def test_what_interlaced_images_show(interlaced_world: World) -> None:
             assert shows.held[t, k] == shows.pyramids.levels[r]
             for n, level in enumerate(mip_levels(deinterlace(folder, k)[:, :, :3])):
                 begin = shows.pyramids.start[r, n]
-                found = shows.pyramids.texel[begin : begin + level.size]
-                assert np.array_equal(found, level.ravel())
+                actual = shows.pyramids.texel[begin : begin + level.size]
+                assert np.array_equal(actual, level.ravel())
 
 
 def test_what_is_left_with_all_files_there(interlaced_world: World) -> None:

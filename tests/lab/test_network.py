@@ -219,8 +219,8 @@ def test_without_a_limit_all_comes_after_the_latency(
 ) -> None:
     link = Link(Conditions(None, latency, 300, protocol))
     requests = [link.request(size, 1.0) for size in sizes]
-    found = [link.advance(latency) for _ in sizes]
-    assert {id(r) for r in found} == {id(r) for r in requests}
+    actual = [link.advance(latency) for _ in sizes]
+    assert {id(r) for r in actual} == {id(r) for r in requests}
     assert {r.ended for r in requests} == {r.first_byte for r in requests} == {latency}
     assert link.advance(latency) is None
     assert (link.busy, link.carried) == (0, sum(sizes) + 300 * len(sizes))

@@ -205,8 +205,8 @@ def test_what_a_cell_does_not_use_is_left_for_the_next() -> None:
     """Of 900, the first gets 600 and uses 400; the other is alone with the 500 that are left. It
     offers 250 to the first of its two, which keeps them; and to the second, which needs 100."""
     sizes = [[400], [1000], [100]]
-    found = shares(900, [(0.6, [0]), (0.3, [1, 2])], sizes)
-    assert found == pytest.approx([400, 250, 100])
+    actual = shares(900, [(0.6, [0]), (0.3, [1, 2])], sizes)
+    assert actual == pytest.approx([400, 250, 100])
 
 
 def test_what_a_shape_does_not_use_is_left_for_the_next() -> None:
@@ -217,16 +217,16 @@ def test_what_a_shape_does_not_use_is_left_for_the_next() -> None:
 def test_three_cells() -> None:
     """1000 · .5 = 500, of which 200 are used; 800 · .3/.5 = 480, all of them; 320 · .2/.2."""
     sizes = [[200], [900], [900]]
-    found = shares(1000, [(0.5, [0]), (0.3, [1]), (0.2, [2])], sizes)
-    assert found == pytest.approx([200, 480, 320])
+    actual = shares(1000, [(0.5, [0]), (0.3, [1]), (0.2, [2])], sizes)
+    assert actual == pytest.approx([200, 480, 320])
 
 
 def test_a_texture_of_two_cells_saves_up() -> None:
     """It keeps 500 of the first cell, which are too few for 700, and 200 of the second."""
     sizes = [[700], [900]]
-    found = shares(1000, [(0.5, [0]), (0.5, [0, 1])], sizes)
+    actual = shares(1000, [(0.5, [0]), (0.5, [0, 1])], sizes)
     # The second cell has 500: 250 are offered, of which 200 are missing, and 300 go to the other.
-    assert found == pytest.approx([700, 300])
+    assert actual == pytest.approx([700, 300])
 
 
 def test_the_next_level_counts_or_the_present_one_if_there_is_none() -> None:
@@ -240,8 +240,8 @@ def test_the_next_level_counts_or_the_present_one_if_there_is_none() -> None:
 
 
 def test_shapes_out_of_the_frustum_and_without_texture_get_nothing() -> None:
-    found = shares(600, [(1.0, [0, 1, -1, 2])], [[900]] * 3, hidden=[1])
-    assert found == pytest.approx([300, 0, 300])
+    actual = shares(600, [(1.0, [0, 1, -1, 2])], [[900]] * 3, hidden=[1])
+    assert actual == pytest.approx([300, 0, 300])
     assert shares(600, [(1.0, [-1]), (0.5, [0])], [[900]]) == pytest.approx([600])
 
 

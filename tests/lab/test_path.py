@@ -61,7 +61,7 @@ def crosses(scene: Scene, start: Floats, end: Floats) -> Bools:
     """(n,) whether segments meet any triangle, in double precision, one against all."""
     a, b, c = scene.corners.transpose(1, 0, 2)
     normal = np.cross(b - a, c - a)
-    found = np.zeros(len(start), dtype=bool)
+    actual = np.zeros(len(start), dtype=bool)
     for row, (p, q) in enumerate(zip(start, end, strict=True)):
         below = np.einsum("ij,ij->i", p - a, normal)
         above = np.einsum("ij,ij->i", q - a, normal)
@@ -71,21 +71,21 @@ def crosses(scene: Scene, start: Floats, end: Floats) -> Bools:
         inside = parted
         for u, v in pairwise((a, b, c, a)):
             inside = inside & (np.einsum("ij,ij->i", np.cross(v - u, at - u), normal) >= 0)
-        found[row] = inside.any()
-    return found
+        actual[row] = inside.any()
+    return actual
 
 
 def turns(walk: Walk) -> Floats:
     """Degrees a second."""
     cosine = (walk.direction[1:] * walk.direction[:-1]).sum(axis=1)
-    found: Floats = np.degrees(np.arccos(np.clip(cosine, -1, 1))) / np.diff(walk.time)
-    return found
+    actual: Floats = np.degrees(np.arccos(np.clip(cosine, -1, 1))) / np.diff(walk.time)
+    return actual
 
 
 def speeds(walk: Walk) -> Floats:
     """Metres a second."""
-    found: Floats = np.linalg.norm(np.diff(walk.eye, axis=0), axis=1) / np.diff(walk.time)
-    return found
+    actual: Floats = np.linalg.norm(np.diff(walk.eye, axis=0), axis=1) / np.diff(walk.time)
+    return actual
 
 
 def check(made: Made, scene: Scene, cells: Cells, options: PathOptions) -> None:
@@ -144,8 +144,8 @@ def test_a_walk_is_what_its_file_holds(subject: Subjects) -> None:
 def above(box: tuple[Floats, ...], eye: Floats, margin: float = 0.0) -> Bools:
     """(n,) which points are within the plan of a box, or of one so much wider, metres."""
     low, high = np.minimum(*box) - margin, np.maximum(*box) + margin
-    found: Bools = ((eye > low) & (eye < high))[:, [0, 2]].all(axis=1)
-    return found
+    actual: Bools = ((eye > low) & (eye < high))[:, [0, 2]].all(axis=1)
+    return actual
 
 
 def test_furniture_is_walked_around(subject: Subjects) -> None:
@@ -371,10 +371,10 @@ def test_points_of_a_grid_over_triangles() -> None:
             np.column_stack([GRID * at[inside] + shift, np.ones(inside.sum())]).T,
         )
         expected.append(np.column_stack([at[inside], triangle[:, 1] @ weight]))
-    wanted, found = np.concatenate(expected), np.column_stack([column, point[:, 1]])
-    for rows in (wanted, found):
+    wanted, actual = np.concatenate(expected), np.column_stack([column, point[:, 1]])
+    for rows in (wanted, actual):
         rows[:] = rows[np.lexsort(rows.T.round(6))]
-    np.testing.assert_allclose(found, wanted, atol=1e-9)
+    np.testing.assert_allclose(actual, wanted, atol=1e-9)
     np.testing.assert_allclose(point[:, [0, 2]], GRID * column + shift, atol=1e-12)
 
 

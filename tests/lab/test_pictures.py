@@ -127,9 +127,9 @@ def test_large_pictures_say_what_tables_do(world: World) -> None:
 
 def test_frames_and_strip(world: World) -> None:
     (played,) = play({"walk": world}, SimulateOptions(policy="ach", bandwidth="4M", memory="inf"))
-    found = dict(frames(world, played.run, 8.0))
-    assert list(found) == ["00000.0.png", "00008.0.png", "00016.0.png"]
-    with Image.open(io.BytesIO(found["00008.0.png"])) as picture:
+    actual = dict(frames(world, played.run, 8.0))
+    assert list(actual) == ["00000.0.png", "00008.0.png", "00016.0.png"]
+    with Image.open(io.BytesIO(actual["00008.0.png"])) as picture:
         assert picture.size == (960, 540)
     first = strip(world, played)
     assert first == strip(world, played)

@@ -99,10 +99,10 @@ def test_light_is_that_of_the_nodes_a_point_lies_in(root: Node, seed: int) -> No
     light = np.zeros(64)
     for at, (x, y, z) in zip(q, (octree.low + q * octree.side).tolist(), strict=True):
         for stop in range(octree.levels):
-            found = look_up(octree, at[None], stop=stop)
+            actual = look_up(octree, at[None], stop=stop)
             count = descend(octrees, 0, x, y, z, stop, light)
-            assert count == found.depth[0] + 1
-            assert light[count - 1] == pytest.approx(lamp(*found.normals[0]), abs=1e-12)
+            assert count == actual.depth[0] + 1
+            assert light[count - 1] == pytest.approx(lamp(*actual.normals[0]), abs=1e-12)
 
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=9, max_size=9))
@@ -139,9 +139,9 @@ def test_nodes_stop_where_they_are_pixels(world: World) -> None:
         place = eye + far[:, None] * ray
         side = float(relief.octrees.side[relief.octrees.of[f]])
         step = np.linalg.norm(place[1:] - place[0], axis=1).min() / side
-        found = stop_of(sight, 0, renderer._triangles, float(far[0]), side)
+        actual = stop_of(sight, 0, renderer._triangles, float(far[0]), side)
         # The next pixel is not infinitely near: by so little the depths may differ.
-        assert found in stop_depth(step * np.array([0.98, 1.0, 1.02]))
+        assert actual in stop_depth(step * np.array([0.98, 1.0, 1.02]))
         checked += 1
     assert checked >= 3
 
@@ -273,14 +273,14 @@ def levels_asked(world: World, asked: list[Range]) -> dict[str, int]:
     """Of each object, how many levels of its octree were asked for."""
     own = world.in_form("octree")
     first, ends = len(own.pyramids.levels), own.catalogue.ends
-    found = {}
+    actual = {}
     for o, row in enumerate(own.served.index["octrees"]):
         mine = [a.end for a in asked if a.kind == Kind.TEXTURE and a.number == first + o]
         levels = own.catalogue.levels[first + o]
         last = max(mine, default=0)
         assert last in ends[first + o]
-        found[row["object"]] = int(np.searchsorted(ends[first + o, : levels + 1], last))
-    return found
+        actual[row["object"]] = int(np.searchsorted(ends[first + o, : levels + 1], last))
+    return actual
 
 
 def test_levels_come_one_after_the_other_until_nodes_are_pixels(world: World) -> None:
@@ -290,12 +290,12 @@ def test_levels_come_one_after_the_other_until_nodes_are_pixels(world: World) ->
     first = len(world.pyramids.levels)
     octrees = [a for a in asked if a.kind == Kind.TEXTURE and a.number >= first]
     assert [a.begin for a in octrees] == [0, *[a.end for a in octrees[:-1]]]
-    found = levels_asked(world, asked)
+    actual = levels_asked(world, asked)
     assert world.relief
     # At 40 cm all levels are needed; of what is in the other room, nothing is there yet.
     number = [row["object"] for row in world.served.index["octrees"]].index("statue_01")
-    assert found == {"statue_01": world.relief.octrees.levels[number], "statue_02": 0}
-    assert near.column[-1, first + number] == found["statue_01"]
+    assert actual == {"statue_01": world.relief.octrees.levels[number], "statue_02": 0}
+    assert near.column[-1, first + number] == actual["statue_01"]
 
 
 def test_the_transmission_pauses_where_nodes_are_pixels(world: World) -> None:
@@ -365,11 +365,11 @@ def test_as_many_columns_as_the_tables_have(levels: int) -> None:
     """Whatever is deeper, a texture or an octree; policies go through all of them."""
     stock = catalogue([raw(16)], [(0, 0)])
     octrees = no_octrees_of(levels)
-    found = without_octrees(stock, octrees)
-    assert found.ends.shape == (3, 1 + max(5, levels))
-    assert (found.ends[1:] == 0).all()
-    assert (found.levels == [5, 0, 0]).all()
-    assert found.whole == stock.whole
+    actual = without_octrees(stock, octrees)
+    assert actual.ends.shape == (3, 1 + max(5, levels))
+    assert (actual.ends[1:] == 0).all()
+    assert (actual.levels == [5, 0, 0]).all()
+    assert actual.whole == stock.whole
 
 
 def no_octrees_of(levels: int) -> Octrees:
@@ -481,8 +481,8 @@ def test_as_a_command(ptm: Ptm, made: Path, tmp_path: Path) -> None:
     assert ptm(*call).status == 3
     assert "--lit" in ptm(*call).err
     strip = tmp_path / "strip.png"
-    said = ptm(*call, "--lit", "--against", made / "plain.db", "--json", "--strip", strip)
-    e = {run["policy"]: run["e"]["mean"] for run in json.loads(said.out)["runs"]}
+    printed = ptm(*call, "--lit", "--against", made / "plain.db", "--json", "--strip", strip)
+    e = {run["policy"]: run["e"]["mean"] for run in json.loads(printed.out)["runs"]}
     assert e["apo"] < e["best"]
     assert e["best+apo"] < e["best"]
     assert strip.is_file()

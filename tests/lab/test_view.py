@@ -118,8 +118,8 @@ def at_point(surfaces: Surfaces, f: int, point: Floats) -> Floats:
     a, b, c = surfaces.corner[f]
     share = np.linalg.lstsq(np.stack([b - a, c - a], axis=1), point - a, rcond=None)[0]
     ua, ub, uc = surfaces.uv[f]
-    found: Floats = ua + share[0] * (ub - ua) + share[1] * (uc - ua)
-    return found
+    actual: Floats = ua + share[0] * (ub - ua) + share[1] * (uc - ua)
+    return actual
 
 
 def bilinear(level: NDArray[np.uint8], at: Floats, clamped: Bools) -> Floats:
@@ -144,8 +144,8 @@ def detail_at(
 
     def texels(along: Floats) -> Floats:
         far = normal @ (surfaces.corner[f, 0] - eye) / (normal @ along)
-        found: Floats = at_point(surfaces, f, eye + far * along) * size
-        return found
+        actual: Floats = at_point(surfaces, f, eye + far * along) * size
+        return actual
 
     h = 1e-3 * pixel
     moved = [texels(ray + h * axis) - texels(ray - h * axis) for axis in axes]
@@ -184,8 +184,8 @@ def test_tables_against_slow_ones(seed: int) -> None:
     (views,) = look(surfaces, made.pyramids, CAMERA, eye[None], direction[None])
     assert set(zip(views.cell.tolist(), views.texture.tolist(), strict=True)) == set(tables)
     for r, key in enumerate(zip(views.cell.tolist(), views.texture.tolist(), strict=True)):
-        found = (views.error[r], views.square[r], views.need[r], views.sight[r])
-        for mine, theirs in zip(tables[key], found, strict=True):
+        actual = (views.error[r], views.square[r], views.need[r], views.sight[r])
+        for mine, theirs in zip(tables[key], actual, strict=True):
             assert theirs == pytest.approx(mine, rel=1e-3, abs=2e-3)
     assert views.owner[0].tolist() == owner[CAMERA.sparse].tolist()
     assert views.depth[0] == pytest.approx(depth[CAMERA.sparse], rel=1e-4)
@@ -244,14 +244,14 @@ def test_levels_of_detail_against_differences(seed: int) -> None:
     for f in range(len(corner)):
         if abs(normal[f] @ ray) < 0.05 * np.linalg.norm(normal[f]):
             continue
-        found = level_of_detail(ray, axes[0], normal[f], corner[f, 0] - eye, slopes[f], pixel)
+        actual = level_of_detail(ray, axes[0], normal[f], corner[f, 0] - eye, slopes[f], pixel)
         expected = detail_at(surfaces, f, eye, ray, axes[0], size)
-        assert found == pytest.approx(expected, abs=1e-3)
+        assert actual == pytest.approx(expected, abs=1e-3)
 
 
 def _unit(random: np.random.Generator) -> Floats:
-    found = random.normal(size=3)
-    return found / np.linalg.norm(found)
+    actual = random.normal(size=3)
+    return actual / np.linalg.norm(actual)
 
 
 @given(SEEDS)

@@ -100,7 +100,7 @@ def everything(artifacts, tmp_path_factory, put_textures, seal) -> Path:
 )
 def test_mutations(everything: Path, seal: Callable[[Path], None], name: str) -> None:
     path, good = everything / name, (everything / name).read_bytes()
-    found = 0
+    actual = 0
     try:
         for round in range(ROUNDS):
             rng = random.Random(f"{name} {round}")
@@ -114,11 +114,11 @@ def test_mutations(everything: Path, seal: Callable[[Path], None], name: str) ->
                 seal(everything)
             report = validate_database(everything, workers=1)
             assert {i.code for i in report.issues} <= set(CODES)
-            found += bool(report.issues)
+            actual += bool(report.issues)
     finally:
         path.write_bytes(good)
         seal(everything)
-    assert found > ROUNDS // 2, "most mutations are faults"
+    assert actual > ROUNDS // 2, "most mutations are faults"
 
 
 @pytest.mark.parametrize(

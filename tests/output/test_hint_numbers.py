@@ -17,31 +17,31 @@ from ptmtools.output.numbers import coordinates, json_text, shares_of, significa
 def test_shares_still_sum_to_one(parts: list[float]) -> None:
     whole = math.fsum(parts)
     row = np.array(parts) / whole if whole > 1e-6 else np.eye(1, len(parts))[0]
-    found = shares_of(row)
-    assert abs(math.fsum(found) - 1) <= 1e-9
-    assert abs(float(np.array(found, np.float32).astype(np.float64).sum()) - 1) <= 1e-5
-    for short, exact in zip(found, row.tolist(), strict=True):
+    actual = shares_of(row)
+    assert abs(math.fsum(actual) - 1) <= 1e-9
+    assert abs(float(np.array(actual, np.float32).astype(np.float64).sum()) - 1) <= 1e-5
+    for short, exact in zip(actual, row.tolist(), strict=True):
         assert short >= 0
         assert (short == 0) == (exact == 0) or exact < 1e-15
         assert short == pytest.approx(exact, rel=1.01e-4, abs=1e-10)
-    assert sum(len(repr(share)) > 11 for share in found) <= 1
+    assert sum(len(repr(share)) > 11 for share in actual) <= 1
 
 
 def test_many_equal_shares() -> None:
     """Rounded one by one they would miss 1 by more than the greatest."""
     row = np.full(70_001, 1 / 70_001)
-    found = shares_of(row)
-    assert abs(math.fsum(found) - 1) <= 1e-9
-    assert max(found) / min(found) < 1 + 1e-4
+    actual = shares_of(row)
+    assert abs(math.fsum(actual) - 1) <= 1e-9
+    assert max(actual) / min(actual) < 1 + 1e-4
 
 
 def test_coordinates_are_those_of_float32() -> None:
     values = np.array([[0.1, -0.0, 12.0], [1 / 3, 1e-7, -123456.789], [1e20, 5e-40, 2.5]])
-    found = coordinates(values, "points")
-    assert (np.array(found, np.float32) == values.astype(np.float32)).all()
-    assert found[0] == [0.1, 0, 12]
-    assert json_text(found[0]) == "[0.1,0,12]"
-    assert json_text(found[1]) == "[0.33333334,1e-07,-123456.79]"
+    actual = coordinates(values, "points")
+    assert (np.array(actual, np.float32) == values.astype(np.float32)).all()
+    assert actual[0] == [0.1, 0, 12]
+    assert json_text(actual[0]) == "[0.1,0,12]"
+    assert json_text(actual[1]) == "[0.33333334,1e-07,-123456.79]"
     with pytest.raises(DatabaseError, match="PTM-D601"):
         coordinates([1e39], "points")
 

@@ -148,13 +148,13 @@ def test_what_was_left_out_is_hatched(artifacts, tmp_path: Path) -> None:
 
 def test_view_only_cells_are_dotted(artifacts, tmp_path: Path) -> None:
     cells = artifacts.cells
-    found = []
+    actual = []
     for standing in ([True] * 3, [True, False, True], [False] * 3):
         changed = replace(cells, leaf_standing=np.array(standing)[cells.leaf_cell])
         picture = draw(replace(artifacts, cells=changed), tmp_path / "a.png", FINE)
-        found.append(pixels(picture, VIEW_ONLY[0]))
-    assert found[0] == 0
-    assert 300 < found[1] < 0.6 * found[2]
+        actual.append(pixels(picture, VIEW_ONLY[0]))
+    assert actual[0] == 0
+    assert 300 < actual[1] < 0.6 * actual[2]
 
 
 def test_leaks_are_ringed(artifacts, tmp_path: Path) -> None:

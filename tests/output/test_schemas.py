@@ -41,14 +41,14 @@ def validator(name: str) -> jsonschema.Draft202012Validator:
 @pytest.fixture(scope="module")
 def served(finished: Path) -> dict[str, dict[str, Any]]:
     """By schema; the index and the record with optional fields that no other database here has."""
-    found = {n: json.loads((finished / "www" / file).read_text()) for n, file in SERVED.items()}
+    actual = {n: json.loads((finished / "www" / file).read_text()) for n, file in SERVED.items()}
     cube = {"low": [0.5, 0, -1], "side": 2}
     octree = {"object": "a", "file": "apo/a.bin", "cube": cube, "levels": [2, 8]}
-    found[schemas.HINTS]["octrees"] = [octree | {"ends": [16, 90], "crc32": [0, 1]}]
-    record = found[schemas.CELL]
+    actual[schemas.HINTS]["octrees"] = [octree | {"ends": [16, 90], "crc32": [0, 1]}]
+    record = actual[schemas.CELL]
     record["need"] = [[0, 1, 0.25, 0.125]]
     record["textureShares"] = [[[0, record["ach"][0]]], [[None, record["ach"][1]]], []]
-    return found
+    return actual
 
 
 @pytest.fixture(scope="module")

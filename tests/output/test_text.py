@@ -54,7 +54,7 @@ def hard() -> np.ndarray:
 def nearly_whole() -> np.ndarray:
     """Of every binade the numbers that, or whose neighbours half way, come nearest to a multiple
     of the power of ten that decides on their last digit, without being one."""
-    found = []
+    actual = []
     for binade in range(1, 255):
         unit = Fraction(2) ** (binade - 150)
         for ten in range(-46, 40):
@@ -70,8 +70,8 @@ def nearly_whole() -> np.ndarray:
                     below, low = below - above, low + high
                 for halves in (low, high):
                     if 2**24 <= halves < 2**25:
-                        found += [(binade << 23) | ((halves + i >> 1) & 0x7FFFFF) for i in (0, 1)]
-    return bits(np.array(found, dtype=np.int64))
+                        actual += [(binade << 23) | ((halves + i >> 1) & 0x7FFFFF) for i in (0, 1)]
+    return bits(np.array(actual, dtype=np.int64))
 
 
 def random_bits(count: int, seed: int) -> np.ndarray:

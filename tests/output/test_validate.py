@@ -626,11 +626,11 @@ def test_what_the_manifest_says(database: Path) -> None:
     (database / "www/cells/c0001.wrl").unlink()
     flipped(database)
     (database / "www/cells/notes.txt").write_text("mine")
-    found = {(i.code, i.file) for i in validate_database(database).issues}
-    assert ("PTM-D651", "www/cells/c0001.wrl") in found
-    assert ("PTM-D652", "www/textures/a.ptm") in found
-    assert ("PTM-D710", "www/textures/a.ptm") in found
-    assert ("PTM-D653", "www/cells/notes.txt") in found
+    actual = {(i.code, i.file) for i in validate_database(database).issues}
+    assert ("PTM-D651", "www/cells/c0001.wrl") in actual
+    assert ("PTM-D652", "www/textures/a.ptm") in actual
+    assert ("PTM-D710", "www/textures/a.ptm") in actual
+    assert ("PTM-D653", "www/cells/notes.txt") in actual
 
 
 def test_other_files_belong_to_the_user(database: Path) -> None:
@@ -812,8 +812,8 @@ def test_what_is_too_large_is_not_looked_into(database: Path, finished: Path) ->
     assert "www/hints.json" in large
     assert {i.code for i in report.errors} == set()
     flipped(database)
-    found = {(i.code, i.file) for i in validate_database(database, limits=limits).issues}
-    assert ("PTM-D652", "www/textures/a.ptm") in found, "its hash is held against the manifest"
+    actual = {(i.code, i.file) for i in validate_database(database, limits=limits).issues}
+    assert ("PTM-D652", "www/textures/a.ptm") in actual, "its hash is held against the manifest"
     small = validate_ptm(finished / "www/textures/a.ptm", limits=limits)
     assert [i.code for i in small.issues] == ["PTM-D713"], "texels of more bytes"
 

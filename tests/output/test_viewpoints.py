@@ -217,7 +217,7 @@ def test_the_longest_view(seed: int) -> None:
     places = random.uniform(-4, 4, (5, 2))
     yaws = 2 * np.pi * np.arange(72) / 72
     ray = np.stack([-np.sin(yaws), -np.cos(yaws)], axis=1)
-    for place, found in zip(places, lengths(places, walls), strict=True):
+    for place, actual in zip(places, lengths(places, walls), strict=True):
         free = np.full(72, np.inf)
         for a, b in walls:
             for i, way in enumerate(ray):
@@ -226,7 +226,7 @@ def test_the_longest_view(seed: int) -> None:
                     free[i] = min(free[i], far)
         free[np.isinf(free)] = 0
         mean = [np.roll(free, 3 - i)[:7].mean() for i in range(72)]
-        np.testing.assert_allclose(found, mean)
+        np.testing.assert_allclose(actual, mean)
     assert not lengths(places[:2], walls[:0]).any()
 
 

@@ -64,11 +64,11 @@ def test_dying_workers(require, monkeypatch):
         with open_executor(scheduler=machines.scheduler_address) as executor:
             processes = set(executor.each(tasks.process, None, range(20)))
             for victims in (1, 2):
-                found = executor.each(tasks.at, array, [7] * 40)
-                assert next(found) == 7
+                actual = executor.each(tasks.at, array, [7] * 40)
+                assert next(actual) == 7
                 for process in list(processes)[:victims]:
                     os.kill(process, signal.SIGKILL)
-                assert list(found) == [7] * 39
+                assert list(actual) == [7] * 39
                 processes = set(executor.each(tasks.process, None, range(20)))
             with pytest.raises(WorkerError, match="PTM-W004"):
                 list(executor.each(tasks.die, 1, [0, 1]))

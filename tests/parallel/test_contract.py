@@ -19,10 +19,10 @@ IN_THREADS = pytest.mark.parametrize("releases_lock", [False, True])
 @IN_THREADS
 @pytest.mark.parametrize("chunk", [1, 3])
 def test_results_come_in_the_order_of_the_tasks(executor, releases_lock, chunk):
-    found = executor.each(
+    actual = executor.each(
         tasks.slower_at_first, 0.02, range(20), releases_lock=releases_lock, chunk=chunk
     )
-    assert list(found) == [i * i for i in range(20)]
+    assert list(actual) == [i * i for i in range(20)]
     assert list(executor.each(tasks.slower_at_first, 0.0, [], chunk=chunk)) == []
 
 
@@ -37,29 +37,29 @@ def test_few_tasks_are_taken_ahead(executor, releases_lock, chunk):
             taken += 1
             yield i
 
-    found = executor.each(
+    actual = executor.each(
         tasks.slower_at_first, 0.0, endless(), releases_lock=releases_lock, chunk=chunk
     )
     assert taken == 0
     for i in range(12):
-        assert next(found) == i * i
+        assert next(actual) == i * i
         assert taken <= (AHEAD * executor.workers + i // chunk) * chunk + 1
     if executor.workers > 1:
         assert taken > 12
-    found.close()
+    actual.close()
     assert list(executor.each(tasks.slower_at_first, 0.0, [3])) == [9]
 
 
 @IN_THREADS
 @pytest.mark.parametrize("chunk", [1, 2])
 def test_an_exception_comes_out_in_its_place(executor, releases_lock, chunk):
-    found = executor.each(tasks.refuse, 5, range(100), releases_lock=releases_lock, chunk=chunk)
-    assert [next(found) for _ in range(5)] == [0, 1, 2, 3, 4]
+    actual = executor.each(tasks.refuse, 5, range(100), releases_lock=releases_lock, chunk=chunk)
+    assert [next(actual) for _ in range(5)] == [0, 1, 2, 3, 4]
     with pytest.raises(InputError) as caught:
-        next(found)
+        next(actual)
     assert str(caught.value) == "a.png: byte 7: no 5; take another [PTM-I999]"
     assert (caught.value.code, caught.value.place) == ("PTM-I999", "byte 7")
-    assert list(found) == []
+    assert list(actual) == []
     assert list(executor.each(tasks.refuse, 5, [1, 2])) == [1, 2]
 
 

@@ -104,9 +104,9 @@ def test_ctrl_c_ends_all_at_once_and_only_the_parent_speaks(tmp_path):
 
 
 def test_a_worker_that_is_killed_is_an_error_and_not_the_end(local):
-    found = local.each(tasks.die, 3, range(100))
+    actual = local.each(tasks.die, 3, range(100))
     with pytest.raises(WorkerError, match="PTM-W004"):
-        list(found)
+        list(actual)
     assert list(local.each(tasks.die, 3, range(3))) == [0, 1, 2]
 
 
@@ -128,9 +128,9 @@ def test_a_full_disk_is_told(local, monkeypatch):
 
 def test_without_threads_even_one_worker_is_another_process():
     with Local(1, threads=False) as one:
-        found = set(one.each(tasks.process, None, range(3), releases_lock=True))
-    assert len(found) == 1
-    assert os.getpid() not in found
+        actual = set(one.each(tasks.process, None, range(3), releases_lock=True))
+    assert len(actual) == 1
+    assert os.getpid() not in actual
 
 
 @pytest.mark.parametrize("releases_lock", [False, True])

@@ -49,8 +49,8 @@ def test_pvs(grid, local: Executor, cluster: Executor, options):
     if options.budget > 50:
         assert first.decided.sum() > 0
     for executor in (local, cluster):
-        found = compute_pvs(grid, options, lambda *step: steps.append(step), executor)
-        assert pack_arrays(found.to_arrays()) == pack_arrays(first.to_arrays())
+        actual = compute_pvs(grid, options, lambda *step: steps.append(step), executor)
+        assert pack_arrays(actual.to_arrays()) == pack_arrays(first.to_arrays())
     assert [done for done, _, _ in steps] == [64, 128, 168] * 2
 
 
@@ -68,8 +68,8 @@ def test_ach(room_row, local: Executor, cluster: Executor, monkeypatch):
     options = AchOptions(backend="embree", samples=8, per_texture=True)
     expected = pack_arrays(compute_ach(*given, options).to_arrays())
     for executor in (local, cluster):
-        found = compute_ach(*given, options, executor=executor)
-        assert pack_arrays(found.to_arrays()) == expected
+        actual = compute_ach(*given, options, executor=executor)
+        assert pack_arrays(actual.to_arrays()) == expected
 
 
 def test_whole_databases(tmp_path, scheduler: str, monkeypatch):

@@ -356,9 +356,9 @@ def test_commands_of_a_manifest_that_lies(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    stage, said = SAID[number]
+    stage, printed = SAID[number]
     document = json.loads((built / "manifest.json").read_bytes())
-    document["stages"][stage].update(said)
+    document["stages"][stage].update(printed)
     for command, options in COMMANDS.items():
         database = shutil.copytree(built, tmp_path / command)
         (database / "manifest.json").write_text(json.dumps(document))

@@ -47,10 +47,10 @@ def test_another_recipe_is_out_of_date(db: Path, capsys: pytest.CaptureFixture[s
     assert main(["pvs", str(db)]) == 5
     assert "PTM-D008" in capsys.readouterr().err
     assert main(["validate", str(db)]) == 8
-    said = capsys.readouterr()
-    assert "PTM-D656" in said.out
-    assert "PTM-D720" not in said.out
-    assert "--max-leaves 99 --samples 8 --backend embree" in said.err
+    printed = capsys.readouterr()
+    assert "PTM-D656" in printed.out
+    assert "PTM-D720" not in printed.out
+    assert "--max-leaves 99 --samples 8 --backend embree" in printed.err
     build_scene(db.parent / "two_rooms.obj", db, until=PVS)
     assert database_status(db).stages[1].state == "done"
 
@@ -100,10 +100,10 @@ def test_every_command_names_what_brings_it_up_to_date(
     aged(db)
     name, *options = command.split()
     assert main([name, str(db), *options]) == status
-    said = capsys.readouterr()
+    printed = capsys.readouterr()
     whole = f"`{COMMAND} {db} {OPTIONS}"  # and no --format: what was the default is not asked for
-    assert any(f"{whole}{end}" in said.out + said.err for end in ("`", " --rebuild`"))
-    assert "invalid counts" not in said.out
+    assert any(f"{whole}{end}" in printed.out + printed.err for end in ("`", " --rebuild`"))
+    assert "invalid counts" not in printed.out
 
 
 @pytest.mark.parametrize(
@@ -155,11 +155,11 @@ def test_the_first_build_says_what_is_rebuilt_and_why(
     build = ["build-scene", str(db.parent / "two_rooms.obj"), "--samples", "8"]
     build += ["--backend", "embree", "--max-leaves", "99"]
     assert main(build) == 0
-    said = capsys.readouterr().out
+    printed = capsys.readouterr().out
     for before in (SCENE.recipe - 1, PVS.recipe - 1, 4):
-        assert f"because this release computes it differently (recipe {before}" in said
-    assert "the hints hold the effect of each texture level" in said
-    assert "because format: vrml → vrml,gltf" in said
+        assert f"because this release computes it differently (recipe {before}" in printed
+    assert "the hints hold the effect of each texture level" in printed
+    assert "because format: vrml → vrml,gltf" in printed
     names = ("manifest.json", "www/hints.json", "www/hints/c0000.json", "www/gltf/c0000.glb")
     assert all((db / name).read_bytes() == (built / name).read_bytes() for name in names)
     assert main(["validate", str(db), "--strict"]) == 0
@@ -168,9 +168,9 @@ def test_the_first_build_says_what_is_rebuilt_and_why(
     manifest = json.loads((db / "manifest.json").read_bytes())
     (db / "manifest.json").write_text(json.dumps(manifest | {"schema": 1}))
     assert main(build) == 0
-    said = capsys.readouterr().out
-    told = sum(not stage.changes for stage in STAGES.values())
-    assert said.count("because the database has schema 1, this ptmtools writes 2") == told
+    printed = capsys.readouterr().out
+    reported = sum(not stage.changes for stage in STAGES.values())
+    assert printed.count("because the database has schema 1, this ptmtools writes 2") == reported
     assert (db / "manifest.json").read_bytes() == (built / "manifest.json").read_bytes()
 
 

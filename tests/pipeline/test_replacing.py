@@ -64,8 +64,8 @@ def opened(db: Path) -> Artifacts:
 
 
 def index_of(db: Path) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((db / "www" / HINTS).read_text())
-    return found
+    actual: dict[str, Any] = json.loads((db / "www" / HINTS).read_text())
+    return actual
 
 
 def test_without_objects_the_stage_leaves_nothing(made: Path) -> None:
@@ -238,12 +238,12 @@ def test_a_list_that_names_another_file(folder: Path) -> None:
 
 def glb_nodes(db: Path) -> dict[str, int]:
     """The octree that each object has, by all GLBs."""
-    found = {}
+    actual = {}
     for file in sorted((db / "www/gltf").glob("*.glb")):
         for node in unpack(file.read_bytes())[0].get("nodes", []):
             if "extras" in node:
-                found[node["name"]] = node["extras"]["octree"]
-    return found
+                actual[node["name"]] = node["extras"]["octree"]
+    return actual
 
 
 def renumbered(db: Path, change: Callable[[int], int]) -> None:
@@ -320,9 +320,9 @@ def test_nothing_fits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     model = write_rooms(tmp_path / "model", 2, ("Büste 1", "buste 1"))
     options = ["-o", str(tmp_path / "db"), "--samples", "4", "-j", "1"]
     assert main(["build-scene", str(model), *options, "--apo", "b*", "--apo", "statue*"]) == 0
-    said = capsys.readouterr().out
-    assert "warning: --apo: no object is called 'statue*'" in said
-    assert "warning: 1 object of --apo has no more triangles than --apo-faces 2,000" in said
+    printed = capsys.readouterr().out
+    assert "warning: --apo: no object is called 'statue*'" in printed
+    assert "warning: 1 object of --apo has no more triangles than --apo-faces 2,000" in printed
     assert main(["build-scene", str(model), *options, "--apo-faces", "2"]) == 3
     assert "--apo-faces 2 is not possible" in capsys.readouterr().err
     assert main(["build-scene", str(model), *options, "--apo-error", "0.1"]) == 3
@@ -335,5 +335,5 @@ def test_nothing_fits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert validate(tmp_path / "db").issues == ()
     assert "2 objects of 640 triangles" in capsys.readouterr().out
     assert main(["info", str(tmp_path / "db")]) == 0
-    said = capsys.readouterr().out
-    assert "options: --apo '[bB]*' --apo-faces 99" in said
+    printed = capsys.readouterr().out
+    assert "options: --apo '[bB]*' --apo-faces 99" in printed

@@ -63,13 +63,13 @@ def test_what_is_left_when_it_is_stopped_is_done_later(tmp_path: Path) -> None:
 
 def test_many_textures_are_encoded_beside_the_cells(tmp_path, monkeypatch) -> None:
     """The same bytes from one worker, from workers beside, and where some are left for later."""
-    found = {}
+    actual = {}
     for count, least in ((1, 8), (2, 1), (2, 10**9)):
         monkeypatch.setattr(parallel, "WORTH_A_PROCESS", least)
         db = tmp_path / f"{count} {least}"
         build_scene(TWO_ROOMS, db, workers=count)
-        found[db] = {f.relative_to(db): f.read_bytes() for f in db.rglob("*") if f.is_file()}
-    one, *others = found.values()
+        actual[db] = {f.relative_to(db): f.read_bytes() for f in db.rglob("*") if f.is_file()}
+    one, *others = actual.values()
     assert all(other == one for other in others)
 
 

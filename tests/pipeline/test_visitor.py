@@ -68,8 +68,8 @@ def test_a_damaged_manifest(value: object) -> None:
     assert isinstance(Visitor(1, 1, dict.fromkeys(VISIT, value)).lines(), list)
     assert Visitor(1, 1, {}).lines() == []
     emitted = StageRecord(1, {}, {}, {}, {"visit": value})
-    found = Visitor.of(Manifest("m.obj", {"emit": emitted}))
-    assert (found is None) == (not isinstance(value, dict))
+    actual = Visitor.of(Manifest("m.obj", {"emit": emitted}))
+    assert (actual is None) == (not isinstance(value, dict))
     assert Visitor.of(Manifest("m.obj")) is None
 
 
@@ -92,10 +92,10 @@ def test_the_model_as_it_was(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         if round == 0:
             Image.effect_noise((64, 64), 90).convert("RGB").save(model.with_name("floor.png"))
     assert main(["info", str(db)]) == 0
-    told = capsys.readouterr().out
+    reported = capsys.readouterr().out
     lines = Visitor.of(DatabaseFolder.open(db).manifest).lines()  # type: ignore[union-attr]
     assert len(lines) == 5
-    assert [line.removeprefix("visitor").strip() for line in told.splitlines()[-5:]] == lines
+    assert [line.removeprefix("visitor").strip() for line in reported.splitlines()[-5:]] == lines
 
 
 @pytest.mark.parametrize(("volume", "little"), [(91.0, True), (1.0, False)])
@@ -109,9 +109,9 @@ def test_culling_gains_little_where_most_of_the_volume_is_at_hand(
     assert pvs.average_share < 0.3
     assert any("gains little" in note for note in PVS.notes(pvs, PvsOptions())) is little
     assert PVS.counts is not None
-    said = PVS.summarize(PVS.counts(pvs))
+    printed = PVS.summarize(PVS.counts(pvs))
     share = f"{pvs.volume_at_hand[0]:.1%}"
-    assert said == f"{share} of the volume stays resident on average, 100.0% at most"
+    assert printed == f"{share} of the volume stays resident on average, 100.0% at most"
 
 
 def test_only_what_is_served_means_something(tmp_path: Path) -> None:

@@ -178,10 +178,10 @@ def test_rectangles_cover_the_rest_once(
     expected = np.ones((8, 8), dtype=int)
     for a, b, c, d in holes:
         expected[a:c, b:d] = 0
-    found = np.zeros((8, 8), dtype=int)
+    actual = np.zeros((8, 8), dtype=int)
     clipped = [(a, b, min(c, 8), min(d, 8)) for a, b, c, d in holes if a < 8 and b < 8]
     for a, b, c, d in rectangles((0, 0, 8, 8), clipped):
         assert a < c
         assert b < d
-        found[a:c, b:d] += 1
-    assert (found == expected).all()
+        actual[a:c, b:d] += 1
+    assert (actual == expected).all()

@@ -19,29 +19,29 @@ SMALL = HallOptions(statues=5, triangles=1500, images=2)
 
 def statues(rows: list[str], first: int = 0) -> dict[str, np.ndarray]:
     """Points of each statue; every face has three points of its own statue."""
-    found: dict[str, list[list[float]]] = {}
+    actual: dict[str, list[list[float]]] = {}
     faces: list[int] = []
     name = ""
     for row in rows:
         word, *rest = row.split()
         if word == "o":
             name = rest[0]
-            found[name] = []
+            actual[name] = []
         elif word == "v":
-            found[name].append([float(v) for v in rest])
+            actual[name].append([float(v) for v in rest])
         elif word == "f":
             faces += [int(v) for v in rest]
-    count = first + sum(map(len, found.values()))
+    count = first + sum(map(len, actual.values()))
     assert first < min(faces)
     assert max(faces) == count
-    return {name: np.array(points) for name, points in found.items()}
+    return {name: np.array(points) for name, points in actual.items()}
 
 
 def test_they_stand_apart_on_the_floor() -> None:
     length = 20.0
-    found = statues(statue_rows(SMALL, length, 7), 7)
-    assert len(found) == 5
-    boxes = [(p.min(axis=0), p.max(axis=0)) for p in found.values()]
+    actual = statues(statue_rows(SMALL, length, 7), 7)
+    assert len(actual) == 5
+    boxes = [(p.min(axis=0), p.max(axis=0)) for p in actual.values()]
     for low, high in boxes:
         assert low[1] == pytest.approx(0, abs=1e-6)
         assert 0.5 < high[1] <= HEIGHT + 1e-3

@@ -40,17 +40,17 @@ def test_a_mask_of_another_size(textured: Textured, size: tuple[int, int]) -> No
     scene = ingest(
         textured("map_Kd wall.png\nmap_d m.png", {"wall.png": png(wall), "m.png": png(mask)})
     )
-    found = texels(scene)
-    assert np.array_equal(found[..., :3], wall)
-    assert not found[..., 3].any()
+    actual = texels(scene)
+    assert np.array_equal(actual[..., :3], wall)
+    assert not actual[..., 3].any()
     assert scene.materials[0].transparent
 
 
 def test_a_mask_times_the_images_own_alpha(textured: Textured) -> None:
     wall = np.dstack([noise(1, 2), [[255, 128], [0, 255]]]).astype(np.uint8)
     files = {"wall.png": png(wall), "m.png": png(MASK)}
-    found = texels(ingest(textured("map_Kd wall.png\nmap_d m.png", files)))
-    assert found[..., 3].tolist() == [[0, 128], [0, 51]]
+    actual = texels(ingest(textured("map_Kd wall.png\nmap_d m.png", files)))
+    assert actual[..., 3].tolist() == [[0, 128], [0, 51]]
 
 
 def test_of_16_bits_nothing_is_lost(textured: Textured) -> None:
@@ -109,8 +109,8 @@ def mirrored(put: Put, uv: list[list[float]], limit: int) -> tuple[Source, np.nd
         materials=(SourceMaterial("paint", texture=texture),),
     )
     store = ImageStore(findings, limit)
-    materials, found = bake(source.materials, [np.array([0])], corners, store, findings)
-    return replace(source, uv=found, materials=tuple(materials)), corners, findings
+    materials, actual = bake(source.materials, [np.array([0])], corners, store, findings)
+    return replace(source, uv=actual, materials=tuple(materials)), corners, findings
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,7 @@ from ptmtools.cli.main import main
 from ptmtools.scene import IngestOptions, ingest
 from ptmtools.scene.facing import TURNED_AWAY, share_turned_away
 
-from .conftest import Gltf, Put
-from .made import (
+from .buildings import (
     box,
     castle,
     corridor,
@@ -29,6 +28,7 @@ from .made import (
     welded,
     y_up,
 )
+from .conftest import Gltf, Put
 
 #: Solids that face outwards, which is towards the rooms between them.
 SOUND = {

@@ -49,10 +49,10 @@ def test_what_becomes_of_it(
     given = {} if feature.form in SAYS else {"unit": "m", "up": "y"}
     scene = ingest(path, IngestOptions(**given))
     feature.check(scene)
-    told = {note.code for note in scene.notes} - BY_THE_WAY
+    reported = {note.code for note in scene.notes} - BY_THE_WAY
     if feature.outcome in ("baked", "noted"):
-        assert feature.codes[0] in told
-    assert told <= {*feature.codes}
+        assert feature.codes[0] in reported
+    assert reported <= {*feature.codes}
 
 
 TABLE = Path(__file__).parents[2] / "docs/guide/prepare.md"

@@ -237,8 +237,8 @@ def test_misses_are_told_with_their_line_and_strict_refuses_them(put: Put, name:
     put("in/deep/a.mtl", mtl)
     path = put("in/deep/a.obj", head + QUAD + "usemtl a\n" + FACE)
     scene = ingest(path)
-    found = said(scene)
-    assert found[0] == (code, place)
+    actual = said(scene)
+    assert actual[0] == (code, place)
     assert scene.images == ()
     assert scene.materials[0].image == -1
     with pytest.raises(InputError) as caught:

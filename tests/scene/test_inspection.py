@@ -19,8 +19,8 @@ def info(path: Path, capsys: pytest.CaptureFixture[str], *words: str) -> str:
 
 
 def record(path: Path, capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(info(path, capsys, "--json", *words))
-    return found
+    actual: dict[str, Any] = json.loads(info(path, capsys, "--json", *words))
+    return actual
 
 
 def rooms(doors: bool = True, roof: bool = True) -> str:
@@ -67,10 +67,10 @@ def test_what_is_said(put: Put, capsys: pytest.CaptureFixture[str]) -> None:
 def test_whether_it_looks_closed(
     put: Put, capsys: pytest.CaptureFixture[str], given: dict[str, bool], closed: bool
 ) -> None:
-    found = record(put("house.obj", rooms(**given)), capsys)["enclosure"]
-    assert found["closed"] is closed
-    assert bool(found["rooms"]) is given.get("roof", True)
-    assert found["doors"] == (["Door_12"] if given.get("doors", True) else [])
+    actual = record(put("house.obj", rooms(**given)), capsys)["enclosure"]
+    assert actual["closed"] is closed
+    assert bool(actual["rooms"]) is given.get("roof", True)
+    assert actual["doors"] == (["Door_12"] if given.get("doors", True) else [])
 
 
 def test_a_hole_in_the_roof_is_noticed(put: Put, capsys: pytest.CaptureFixture[str]) -> None:
@@ -83,9 +83,9 @@ def test_a_hole_in_the_roof_is_noticed(put: Put, capsys: pytest.CaptureFixture[s
             text += f"v {x} 2.6 {z}\n"
         text += "f " + " ".join(str(number + k) for k in range(4)) + "\n"
         number += 4
-    found = record(put("house.obj", text), capsys)["enclosure"]
-    assert not found["closed"]
-    assert 0.001 < found["leaving"] < 0.1
+    actual = record(put("house.obj", text), capsys)["enclosure"]
+    assert not actual["closed"]
+    assert 0.001 < actual["leaving"] < 0.1
 
 
 def test_of_a_gltf_model(put: Put, capsys: pytest.CaptureFixture[str]) -> None:
@@ -100,27 +100,27 @@ def test_of_a_gltf_model(put: Put, capsys: pytest.CaptureFixture[str]) -> None:
     doc.place(doc.quad(material=0))
     doc.place(doc.quad(material=1), name="chair", translation=[0, 0, 5])
     doc.place(doc.quad(material=1), name="chair", translation=[0, 0, 9])
-    found = record(put("a.glb", doc.glb()), capsys)
-    assert found["format"] == "glTF binary 2.0"
-    assert found["generator"] == "a test"
-    assert found["extensions"] == {
+    actual = record(put("a.glb", doc.glb()), capsys)
+    assert actual["format"] == "glTF binary 2.0"
+    assert actual["generator"] == "a test"
+    assert actual["extensions"] == {
         "KHR_materials_ior": "does not change what is drawn",
         "KHR_materials_unlit": "read",
         "MSFT_lod": "not carried over",
     }
-    assert found["objects"] == {"chair": 4, "wall": 2}
-    assert [image["width"] for image in found["images"]] == [8]
-    assert found["space"]["metres"] == 1
-    assert not found["space"]["unit_guessed"]
-    assert "PTM-N204" in {note["code"] for note in found["notes"]}
+    assert actual["objects"] == {"chair": 4, "wall": 2}
+    assert [image["width"] for image in actual["images"]] == [8]
+    assert actual["space"]["metres"] == 1
+    assert not actual["space"]["unit_guessed"]
+    assert "PTM-N204" in {note["code"] for note in actual["notes"]}
     text = info(put("a.glb", doc.glb()), capsys)
     assert "warning    material 1: texture 1: has no image [PTM-N204]" in text
 
 
 def test_options_count_as_in_a_build(put: Put, capsys: pytest.CaptureFixture[str]) -> None:
-    found = record(put("house.obj", rooms()), capsys, "--unit", "ft", "--up", "z")
-    assert (found["space"]["metres"], found["space"]["up"]) == (0.3048, "z")
-    assert np.allclose(found["size"], [8 * 0.3048, 4 * 0.3048, 2.6 * 0.3048])
+    actual = record(put("house.obj", rooms()), capsys, "--unit", "ft", "--up", "z")
+    assert (actual["space"]["metres"], actual["space"]["up"]) == (0.3048, "z")
+    assert np.allclose(actual["size"], [8 * 0.3048, 4 * 0.3048, 2.6 * 0.3048])
 
 
 @pytest.mark.parametrize("name", ["gone.obj", "a.glb"])

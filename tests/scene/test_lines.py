@@ -7,14 +7,14 @@ import pytest
 
 from ptmtools.scene.facing import SampleLines
 
-from .made import box, divided, house, meadow, turned_in_plan, welded
+from .buildings import box, divided, house, meadow, turned_in_plan, welded
 
 
 def one_by_one(lines: SampleLines, triangles: np.ndarray, axis: int) -> list[tuple[int, int]]:
     """Pairs of line and triangle, by solving for the point in barycentric coordinates."""
     u, v = (k for k in range(3) if k != axis)
     rows_u, rows_v = lines.rows(u), lines.rows(v)
-    found = []
+    actual = []
     for t, (a, b, c) in enumerate(triangles[:, :, [u, v]]):
         edges = np.stack([b - a, c - a], axis=1)
         if abs(np.linalg.det(edges)) == 0:
@@ -23,8 +23,8 @@ def one_by_one(lines: SampleLines, triangles: np.ndarray, axis: int) -> list[tup
             for j, y in enumerate(rows_v):
                 p, q = np.linalg.solve(edges, np.array([x, y]) - a)
                 if min(p, q, 1 - p - q) > 0:
-                    found.append((i * len(rows_v) + j, t))
-    return sorted(found)
+                    actual.append((i * len(rows_v) + j, t))
+    return sorted(actual)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -33,26 +33,26 @@ def test_crossings(axis: int) -> None:
     points = random.normal(size=(24, 3))
     faces = random.permutation(np.repeat(np.arange(24), 2))[:45].reshape(15, 3)
     lines = SampleLines(points, faces)
-    found = lines.along(axis)
-    pairs = list(zip(found.line.tolist(), found.triangle.tolist(), strict=True))
+    actual = lines.along(axis)
+    pairs = list(zip(actual.line.tolist(), actual.triangle.tolist(), strict=True))
     assert sorted(pairs) == one_by_one(lines, points[faces], axis)
     assert len(pairs) > 200
-    corner = points[faces[found.triangle]]
+    corner = points[faces[actual.triangle]]
     low, high = corner[:, :, axis].min(axis=1), corner[:, :, axis].max(axis=1)
-    assert np.all((low <= found.position) & (found.position <= high))
-    after, gap = found.gaps()
+    assert np.all((low <= actual.position) & (actual.position <= high))
+    after, gap = actual.gaps()
     assert np.all(gap >= 0)
-    assert np.all(found.line[after] == found.line[after + 1])
-    assert len(after) == len(pairs) - len(np.unique(found.line))
+    assert np.all(actual.line[after] == actual.line[after + 1])
+    assert len(after) == len(pairs) - len(np.unique(actual.line))
 
 
 def test_areas_are_summed_up() -> None:
     """Of a meadow of 480 m well, and roughly of a house of 8 × 5 m in its middle, which is met."""
     points, faces = welded(meadow(box((0, 0, 0), (8, 5, 3))))
-    found = SampleLines(points, faces).along(2)
-    ground = points[faces][found.triangle][:, :, 2].max(axis=1) < 0
-    assert found.section[ground].sum() == pytest.approx(480**2, rel=0.05)
-    assert 2 * 40 < found.section[~ground].sum() < 0.01 * 480**2
+    actual = SampleLines(points, faces).along(2)
+    ground = points[faces][actual.triangle][:, :, 2].max(axis=1) < 0
+    assert actual.section[ground].sum() == pytest.approx(480**2, rel=0.05)
+    assert 2 * 40 < actual.section[~ground].sum() < 0.01 * 480**2
 
 
 def test_dividing_triangles_changes_nothing() -> None:
@@ -76,6 +76,6 @@ def test_a_heap_of_large_triangles_is_met_by_fewer_lines() -> None:
 def test_flat_and_tiny_models(axis: int) -> None:
     points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     faces = np.array([[0, 1, 2], [0, 2, 3]])
-    found = SampleLines(points, faces).along(axis)
-    assert (len(found.line) > 0) == (axis == 2)
+    actual = SampleLines(points, faces).along(axis)
+    assert (len(actual.line) > 0) == (axis == 2)
     assert len(SampleLines(points[:3] * 0, faces[:1]).along(axis).line) == 0

@@ -11,8 +11,8 @@ from ptmtools.scene.colors import gradients
 def test_gradients_of_triangles() -> None:
     random = np.random.default_rng(2)
     corners, uv = random.normal(size=(50, 3, 3)), random.normal(size=(50, 3, 2))
-    found = gradients(corners, uv)
-    for change, points, at in zip(found, corners, uv, strict=True):
+    actual = gradients(corners, uv)
+    for change, points, at in zip(actual, corners, uv, strict=True):
         assert change @ (points[1] - points[0]) == pytest.approx(at[1] - at[0])
         assert change @ (points[2] - points[0]) == pytest.approx(at[2] - at[0])
         assert change @ np.cross(points[1] - points[0], points[2] - points[0]) == pytest.approx(

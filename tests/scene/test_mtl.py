@@ -123,8 +123,8 @@ def test_lines_not_understood_and_names_defined_twice(put: Callable[..., Path]) 
     path = put("a.mtl", "newmtl m\r\nKd red\r\nd\r\nmap_Kd -s\r\nnewmtl m\r\nKd 1 1 1\r\n")
     findings = Findings(path)
     assert read_mtl(path, findings)["m"].color is None
-    said = [(n.code, n.place) for n in findings.notes]
-    assert said == [
+    printed = [(n.code, n.place) for n in findings.notes]
+    assert printed == [
         ("PTM-N214", "a.mtl:2"),
         ("PTM-N214", "a.mtl:3"),
         ("PTM-N214", "a.mtl:4"),

@@ -38,8 +38,8 @@ def test_warnings_are_the_gravest_first_and_one_of_each_kind() -> None:
 def test_the_docs_list_the_same_warnings() -> None:
     text = (ROOT / "docs/formats/codes.md").read_text("utf-8")
     table = text[text.index("| warnings | of |") : text.index("| notes | of |")]
-    found = set()
+    actual = set()
     for row in re.findall(r"^\| PTM-([^|]*)\|", table, re.MULTILINE):
         for first, _, last in re.findall(r"N(\d+)( to N(\d+))?", row):
-            found |= {f"PTM-N{n}" for n in range(int(first), int(last or first) + 1)}
-    assert found == set(WARNINGS)
+            actual |= {f"PTM-N{n}" for n in range(int(first), int(last or first) + 1)}
+    assert actual == set(WARNINGS)

@@ -103,8 +103,8 @@ def test_what_is_skipped_is_counted(put: Callable[..., Path]) -> None:
     path = put("a.obj", QUAD + "vn 0 0 1\ns off\nl 1 2\nl 2 3\nblah 1\nf 1 2\nf 1 2 3\n")
     findings = Findings(path)
     read_obj(path, findings)
-    said = {(n.code, n.place): n.count for n in findings.notes}
-    assert said == {
+    printed = {(n.code, n.place): n.count for n in findings.notes}
+    assert printed == {
         ("PTM-N215", "a.obj:11"): 2,
         ("PTM-N215", "a.obj:13"): 1,
         ("PTM-N214", "a.obj:14"): 1,

@@ -36,10 +36,10 @@ def model(put: Callable[..., Path], tmp_path: Path) -> Path:
     ],
 )
 def test_found_where_the_model_says(model: Path, name: str, file: str) -> None:
-    found = Folder(model).find(name)
-    assert found.outcome == "found"
-    assert found.path is not None
-    assert found.path.resolve() == model / file
+    actual = Folder(model).find(name)
+    assert actual.outcome == "found"
+    assert actual.path is not None
+    assert actual.path.resolve() == model / file
 
 
 @pytest.mark.parametrize(
@@ -56,17 +56,17 @@ def test_found_where_the_model_says(model: Path, name: str, file: str) -> None:
 )
 def test_found_by_the_end_of_the_name(model: Path, name: str) -> None:
     (model / "Wall 1.png").write_bytes(b"at the top")
-    found = Folder(model).find(name)
-    assert found.outcome == "elsewhere"
+    actual = Folder(model).find(name)
+    assert actual.outcome == "elsewhere"
     expected = "Wall 1.png" if "share" in name else "textures/Wall 1.png"
-    assert found.path is not None
-    assert found.path.resolve() == model / expected
+    assert actual.path is not None
+    assert actual.path.resolve() == model / expected
 
 
 def test_beside_the_library_before_the_root(model: Path) -> None:
     (model / "near.png").write_bytes(b"far")
-    found = Folder(model).find("near.png", model / "mtl")
-    assert found.path == model / "mtl" / "near.png"
+    actual = Folder(model).find("near.png", model / "mtl")
+    assert actual.path == model / "mtl" / "near.png"
     assert Folder(model).find("Tür.png", model / "mtl").path == model / "Tür.png"
 
 

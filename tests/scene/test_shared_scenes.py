@@ -41,9 +41,9 @@ def test_willowgarage(shared: Path) -> None:
     scene = load(shared, "willowgarage")
     assert (scene.space.metres, scene.space.up) == (0.0254, "z")
     assert np.ptp(scene.points, axis=0) == pytest.approx([58.63, 2.84, 48.62], abs=0.01)
-    found = counts(scene)
+    actual = counts(scene)
     # The README counts 248 and 6,729: two faces are collinear to the last digit, one of a pair.
-    assert found["PTM-N214"] == pytest.approx(248, abs=2)
+    assert actual["PTM-N214"] == pytest.approx(248, abs=2)
     (pairs,) = (note for note in scene.notes if note.code == "PTM-N211")
     assert pairs.message.startswith("pairs of coincident faces")
     assert pairs.count == pytest.approx(6729, abs=1)

@@ -14,7 +14,7 @@ from ptmtools.scene.notes import Findings
 from ptmtools.scene.space import UNITS, DeclaredSpace, parse_unit, rotated, settle
 from ptmtools.scene.up_axis import NamedFaces
 
-from .made import atrium, box, corridor, house, site_plan, tower, welded, y_up
+from .buildings import atrium, box, corridor, house, site_plan, tower, welded, y_up
 
 
 @pytest.mark.parametrize(

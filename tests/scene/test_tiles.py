@@ -16,13 +16,13 @@ def test_whole_repetitions_alike_in_a_group(seed: int, count: int, far: float) -
     # Of few binary digits, so that what is left of them is exact.
     uv = np.round((middle + random.uniform(-3, 3, (count, 3, 2))) * 256) / 256
     repeats = random.integers(0, 2, (4, 2)).astype(bool)[group]
-    found = near_origin(uv, group, repeats)
-    moved = uv - found
+    actual = near_origin(uv, group, repeats)
+    moved = uv - actual
     assert (moved % 2 == 0).all()
     assert (moved.transpose(0, 2, 1)[~repeats] == 0).all()
     for number in range(4):
         here = moved[group == number].reshape(-1, 2)
         assert (here == here[:1]).all()
-    near = np.abs(found).max(axis=1)
+    near = np.abs(actual).max(axis=1)
     assert (near[repeats] <= FAR).all()
     assert (moved.transpose(0, 2, 1)[np.abs(uv).max(axis=1) <= FAR - 8] == 0).all()

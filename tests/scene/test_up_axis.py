@@ -25,7 +25,7 @@ from ptmtools.scene.up_axis import (
     evidence,
 )
 
-from .made import (
+from .buildings import (
     atrium,
     box,
     corridor,

@@ -45,24 +45,24 @@ def spread(count: int) -> NDArray[np.float64]:
 
 
 def fill(mesh: Mesh, faces: int) -> Mesh:
-    found = filled(mesh, surface_of(mesh), faces)
-    assert found is not None
-    assert len(found.like) == len(found.mesh.triangles)
-    assert found.like.max() < len(mesh.triangles)
-    assert (found.mesh.triangles[: len(mesh.triangles)] == mesh.triangles).all()
-    return found.mesh
+    actual = filled(mesh, surface_of(mesh), faces)
+    assert actual is not None
+    assert len(actual.like) == len(actual.mesh.triangles)
+    assert actual.like.max() < len(mesh.triangles)
+    assert (actual.mesh.triangles[: len(mesh.triangles)] == mesh.triangles).all()
+    return actual.mesh
 
 
 def test_what_fills_a_hole_looks_the_way_the_mesh_does() -> None:
     """Holes of six and more corners, each where a point was."""
     whole = sphere(40)
     holed = without(whole, around(whole, spread(100)))
-    found = fill(holed, 1000)
-    assert (edge_faces(found) == 2).all()
-    assert euler(found) == 2
-    assert len(found.triangles) == len(whole.triangles) - 200
-    assert volume(found) == pytest.approx(volume(whole), rel=1e-3)
-    inwards = (normals(found) * found.points[found.triangles].mean(axis=1)).sum(axis=1)
+    actual = fill(holed, 1000)
+    assert (edge_faces(actual) == 2).all()
+    assert euler(actual) == 2
+    assert len(actual.triangles) == len(whole.triangles) - 200
+    assert volume(actual) == pytest.approx(volume(whole), rel=1e-3)
+    inwards = (normals(actual) * actual.points[actual.triangles].mean(axis=1)).sum(axis=1)
     assert (inwards > 0).all()
 
 
@@ -71,14 +71,14 @@ def test_holes_hold_no_faces_then() -> None:
     whole = sphere(40)
     random = np.random.default_rng(1)
     holed = without(whole, random.random(len(whole.triangles)) < 0.1)
-    found = simplify(holed, SimplifyOptions(1000))
-    assert len(found.mesh.triangles) <= 1000
-    assert [note.endswith("they would hold many of the faces") for note in found.notes] == [True]
-    assert np.abs(np.linalg.norm(found.mesh.points, axis=1) - 1).max() < 0.02
-    assert volume(found.mesh) == pytest.approx(volume(whole), rel=0.02)
+    actual = simplify(holed, SimplifyOptions(1000))
+    assert len(actual.mesh.triangles) <= 1000
+    assert [note.endswith("they would hold many of the faces") for note in actual.notes] == [True]
+    assert np.abs(np.linalg.norm(actual.mesh.points, axis=1) - 1).max() < 0.02
+    assert volume(actual.mesh) == pytest.approx(volume(whole), rel=0.02)
     # What each face is like lies where it is.
-    middle = found.mesh.points[found.mesh.triangles].mean(axis=1)
-    like = holed.points[holed.triangles[found.source]].mean(axis=1)
+    middle = actual.mesh.points[actual.mesh.triangles].mean(axis=1)
+    like = holed.points[holed.triangles[actual.source]].mean(axis=1)
     assert np.linalg.norm(middle - like, axis=1).max() < 0.3
 
     kept = simplify(holed, SimplifyOptions(1000, keep_parts=True))
@@ -118,16 +118,16 @@ def test_a_hole_takes_over_what_is_painted_around_it() -> None:
     random = np.random.default_rng(2)
     bricks = whole.material == 0
     holed = without(whole, bricks & (random.random(len(bricks)) < 0.02))
-    found = fill(holed, 100)
-    assert found.uv is not None
-    assert found.material is not None
-    new = np.arange(len(found.triangles)) >= len(holed.triangles)
+    actual = fill(holed, 100)
+    assert actual.uv is not None
+    assert actual.material is not None
+    new = np.arange(len(actual.triangles)) >= len(holed.triangles)
     assert new.sum() > 20
-    at = found.points[found.triangles[new]][..., :2]
-    on_bricks = found.material[new] == 0
+    at = actual.points[actual.triangles[new]][..., :2]
+    on_bricks = actual.material[new] == 0
     assert on_bricks.any()
     wanted = at[on_bricks] * [4.0, 8.0] + 0.25
-    whole_bricks = np.abs(found.uv[new][on_bricks] - wanted).max(axis=(1, 2)) < 1e-9
+    whole_bricks = np.abs(actual.uv[new][on_bricks] - wanted).max(axis=(1, 2)) < 1e-9
     # But at windows, where the bricks' holes have corners of theirs.
     assert whole_bricks.mean() > 0.9
 
@@ -140,8 +140,8 @@ def test_tangled_borders_are_left_alone() -> None:
     fins = triangles[5::40].copy()
     fins[:, 2] = fins[::-1, 2]
     given = replace(whole, triangles=np.concatenate([triangles[::2], fins]))
-    found = simplify(given, SimplifyOptions(20))
-    assert np.isfinite(found.mesh.points).all()
+    actual = simplify(given, SimplifyOptions(20))
+    assert np.isfinite(actual.mesh.points).all()
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(0, 0.9), st.integers(1, 300))
@@ -153,12 +153,12 @@ def test_whatever_is_missing(seed: int, share: float, faces: int) -> None:
     gone[0] = False
     holed = without(whole, gone)
     options = SimplifyOptions(faces)
-    found, again = (simplify(holed, options) for _ in range(2))
-    assert found.mesh.triangles.tobytes() == again.mesh.triangles.tobytes()
-    assert found.mesh.points.tobytes() == again.mesh.points.tobytes()
-    assert len(found.mesh.triangles) > 0
-    assert (np.diff(np.sort(found.mesh.triangles, axis=1), axis=1) > 0).all()
-    assert 0 <= found.source.min() <= found.source.max() < len(holed.triangles)
+    actual, again = (simplify(holed, options) for _ in range(2))
+    assert actual.mesh.triangles.tobytes() == again.mesh.triangles.tobytes()
+    assert actual.mesh.points.tobytes() == again.mesh.points.tobytes()
+    assert len(actual.mesh.triangles) > 0
+    assert (np.diff(np.sort(actual.mesh.triangles, axis=1), axis=1) > 0).all()
+    assert 0 <= actual.source.min() <= actual.source.max() < len(holed.triangles)
     more = filled(holed, surface_of(holed), faces)
     if more is not None:
         assert edge_faces(more.mesh).max() <= 2

@@ -21,13 +21,13 @@ def test_a_sphere_stays_one(require: Callable[[str, str], None]) -> None:
         require("pymeshlab", "pip install pymeshlab; apt install libopengl0 libgl1")
     given = sphere(20)
     given = replace(given, points=given.points * 1e-3 + 5)
-    found = simplify(given, TO_500)
-    assert 490 <= len(found.mesh.triangles) <= 500
-    assert np.linalg.norm(found.mesh.points - 5, axis=1) == pytest.approx(1e-3, rel=0.02)
-    here = found.mesh.points[found.mesh.triangles].mean(axis=1)
-    there = given.points[given.triangles[found.source]].mean(axis=1)
+    actual = simplify(given, TO_500)
+    assert 490 <= len(actual.mesh.triangles) <= 500
+    assert np.linalg.norm(actual.mesh.points - 5, axis=1) == pytest.approx(1e-3, rel=0.02)
+    here = actual.mesh.points[actual.mesh.triangles].mean(axis=1)
+    there = given.points[given.triangles[actual.source]].mean(axis=1)
     assert np.linalg.norm(here - there, axis=1).max() < 3e-4
-    assert np.isnan(found.error)
+    assert np.isnan(actual.error)
 
 
 def test_painted_meshes_are_refused() -> None:

@@ -138,11 +138,11 @@ def test_nowhere_is_better_than_the_best_place(seed: int) -> None:
     rng = np.random.default_rng(seed)
     rows = np.stack([planes(rng, 3), planes(rng, 3)])
     away, place = rng.normal(size=3), np.empty(3)
-    found = best_place(rows, 0, 1, *away, 1e-12, place)
+    actual = best_place(rows, 0, 1, *away, 1e-12, place)
     both = rows[0] + shifted(rows[1], -away)
-    assert found == pytest.approx(value(both, place), rel=1e-6, abs=1e-9)
+    assert actual == pytest.approx(value(both, place), rel=1e-6, abs=1e-9)
     exact = np.linalg.lstsq(_matrix(both), -both[6:9], rcond=None)[0]
-    assert found <= value(both, exact) + 1e-6 * (1 + abs(both[9]))
+    assert actual <= value(both, exact) + 1e-6 * (1 + abs(both[9]))
 
 
 def test_the_best_place_in_a_plane_is_the_middle() -> None:
@@ -195,8 +195,8 @@ def test_an_affine_texture_costs_nothing_and_a_shift_counts_as_distance() -> Non
         area = quadric[wedge, 14] * surface.scale**2 * (4**2 + 8**2) / 2
         shifted_by = np.array([0.5, 0.0])
         expected = area * 0.5**2 / ((4**2 + 8**2) / 2) / surface.scale**2
-        found = attribute_value(quadric[wedge], d, uv + shifted_by)
-        assert found == pytest.approx(expected)
+        actual = attribute_value(quadric[wedge], d, uv + shifted_by)
+        assert actual == pytest.approx(expected)
 
 
 def test_what_a_texture_wrapped_around_costs_is_its_bend_alone() -> None:

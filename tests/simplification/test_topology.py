@@ -114,8 +114,8 @@ def test_holes_that_touch_take_no_part_away() -> None:
     for i in range(5):
         triangles.append(chips.triangles + len(sheet.points) + i * len(chips.points))
     given = Mesh(np.concatenate(points), np.concatenate(triangles).astype(np.int32))
-    found = simplify(given, SimplifyOptions(300, keep_parts=True))
-    whose = np.searchsorted(np.cumsum([len(part) for part in triangles]), found.source, "right")
+    actual = simplify(given, SimplifyOptions(300, keep_parts=True))
+    whose = np.searchsorted(np.cumsum([len(part) for part in triangles]), actual.source, "right")
     assert np.unique(whose).tolist() == [0, 1, 2, 3, 4, 5]
 
 
@@ -128,11 +128,11 @@ def test_the_note_counts_parts_of_which_nothing_is_left() -> None:
     given = Mesh(
         np.concatenate([*many, big.points]), np.concatenate([chips, big.triangles + 200 * step])
     )
-    found = simplify(given, SimplifyOptions(100))
-    part = np.minimum(found.source // len(box(1).triangles), 200)
+    actual = simplify(given, SimplifyOptions(100))
+    part = np.minimum(actual.source // len(box(1).triangles), 200)
     gone = 201 - len(np.unique(part))
     assert gone > 100
-    assert found.notes[0].startswith(f"{gone} of 201 parts are gone")
+    assert actual.notes[0].startswith(f"{gone} of 201 parts are gone")
 
 
 def test_nobody_can_say_where_three_faces_meet() -> None:
@@ -146,15 +146,15 @@ def test_nobody_can_say_where_three_faces_meet() -> None:
 def test_many_handles_are_closed_and_the_plate_stays() -> None:
     """400 holes hold 1,600 faces; of the plate's outline 200 are enough."""
     given = plate(20)
-    found = simplify(given, SimplifyOptions(faces=200))
-    assert len(found.mesh.triangles) <= 200
-    assert found.notes == ()
+    actual = simplify(given, SimplifyOptions(faces=200))
+    assert len(actual.mesh.triangles) <= 200
+    assert actual.notes == ()
     # Nothing opens: every edge has an even number of faces.
-    assert (edge_faces(found.mesh) % 2 == 0).all()
+    assert (edge_faces(actual.mesh) % 2 == 0).all()
     low, high = given.points.min(axis=0), given.points.max(axis=0)
-    assert np.allclose(found.mesh.points.min(axis=0), low, atol=0.5)
-    assert np.allclose(found.mesh.points.max(axis=0), high, atol=0.5)
-    volume = (normals(found.mesh) * found.mesh.points[found.mesh.triangles[:, 0]]).sum() / 6
+    assert np.allclose(actual.mesh.points.min(axis=0), low, atol=0.5)
+    assert np.allclose(actual.mesh.points.max(axis=0), high, atol=0.5)
+    volume = (normals(actual.mesh) * actual.mesh.points[actual.mesh.triangles[:, 0]]).sum() / 6
     # Of whole cubes: each hole closes by some, or stays.
     assert 0.85 * np.prod(high - low) < volume < 1.1 * np.prod(high - low)
 
@@ -162,9 +162,9 @@ def test_many_handles_are_closed_and_the_plate_stays() -> None:
 def test_few_handles_stay() -> None:
     """What holds a tenth of the faces at most is kept, as anything else that one sees."""
     given = plate(3)
-    found = simplify(given, SimplifyOptions(faces=360))
-    assert euler(found.mesh) == 2 - 2 * 9
-    assert (edge_faces(found.mesh) == 2).all()
+    actual = simplify(given, SimplifyOptions(faces=360))
+    assert euler(actual.mesh) == 2 - 2 * 9
+    assert (edge_faces(actual.mesh) == 2).all()
 
 
 def test_no_step_goes_beyond_the_error() -> None:
@@ -181,12 +181,12 @@ def test_materials_stay_where_they_are() -> None:
     given = plate(12)
     middle = (given.points[:, 0].max() + given.points[:, 0].min()) // 2
     material = (given.points[given.triangles].mean(axis=1)[:, 0] > middle).astype(np.int32)
-    found = simplify(replace(given, material=material), SimplifyOptions(faces=150)).mesh
-    assert found.material is not None
-    assert (edge_faces(found) % 2 == 0).all()
-    corners = found.points[found.triangles][..., 0]
-    assert corners[found.material == 0].max() <= middle + 1e-9
-    assert corners[found.material == 1].min() >= middle - 1e-9
+    actual = simplify(replace(given, material=material), SimplifyOptions(faces=150)).mesh
+    assert actual.material is not None
+    assert (edge_faces(actual) % 2 == 0).all()
+    corners = actual.points[actual.triangles][..., 0]
+    assert corners[actual.material == 0].max() <= middle + 1e-9
+    assert corners[actual.material == 1].min() >= middle - 1e-9
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(8, 200))
@@ -194,12 +194,12 @@ def test_noise_stays_closed_and_is_the_same_again(seed: int, faces: int) -> None
     """Cubes at random: handles, islands, edges of four faces."""
     random = np.random.default_rng(seed)
     given = voxels(random.random((6, 6, 6)) < 0.6)
-    found, again = (simplify(given, SimplifyOptions(faces=faces)) for _ in range(2))
-    assert (edge_faces(found.mesh) % 2 == 0).all()
-    assert found.mesh.points.tobytes() == again.mesh.points.tobytes()
-    assert found.mesh.triangles.tobytes() == again.mesh.triangles.tobytes()
-    assert (np.diff(np.sort(found.mesh.triangles, axis=1), axis=1) > 0).all()
-    assert np.isfinite(found.mesh.points).all()
+    actual, again = (simplify(given, SimplifyOptions(faces=faces)) for _ in range(2))
+    assert (edge_faces(actual.mesh) % 2 == 0).all()
+    assert actual.mesh.points.tobytes() == again.mesh.points.tobytes()
+    assert actual.mesh.triangles.tobytes() == again.mesh.triangles.tobytes()
+    assert (np.diff(np.sort(actual.mesh.triangles, axis=1), axis=1) > 0).all()
+    assert np.isfinite(actual.mesh.points).all()
 
 
 def beside(body: Mesh, chip: Mesh, count: int) -> Mesh:
@@ -234,10 +234,10 @@ def test_many_parts_give_way_to_the_body(chip: Mesh, closed: bool) -> None:
     given = beside(sphere(40), chip, 2000)
     there = topology(surface_of(given))
     assert (there.parts, there.closed) == (2001, 2001 if closed else 1)
-    found = simplify(given, SimplifyOptions(1000))
-    assert len(found.mesh.triangles) <= 1000
-    assert any("parts are gone" in note for note in found.notes)
-    far = np.linalg.norm(found.mesh.points[found.mesh.triangles].mean(axis=1), axis=1)
+    actual = simplify(given, SimplifyOptions(1000))
+    assert len(actual.mesh.triangles) <= 1000
+    assert any("parts are gone" in note for note in actual.notes)
+    far = np.linalg.norm(actual.mesh.points[actual.mesh.triangles].mean(axis=1), axis=1)
     body = far < 1.2
     assert body.sum() > 400
     assert np.abs(far[body] - 1).max() < 0.05
@@ -248,9 +248,9 @@ def test_many_parts_give_way_to_the_body(chip: Mesh, closed: bool) -> None:
 
 def test_few_parts_stay() -> None:
     given = beside(sphere(20), sphere(2), 5)
-    found = simplify(given, SimplifyOptions(1000))
-    assert topology(surface_of(found.mesh)).parts == 6
-    assert found.notes == ()
+    actual = simplify(given, SimplifyOptions(1000))
+    assert topology(surface_of(actual.mesh)).parts == 6
+    assert actual.notes == ()
 
 
 @pytest.mark.parametrize("mesh", [sphere(10), torus(20, 12), plate(5)])

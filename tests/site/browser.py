@@ -80,8 +80,8 @@ class Visitor:
 
     def state(self) -> dict[str, Any]:
         """`window.ptm.state()`."""
-        found: dict[str, Any] = self.page.evaluate("window.ptm?.state() ?? {}")
-        return found
+        actual: dict[str, Any] = self.page.evaluate("window.ptm?.state() ?? {}")
+        return actual
 
     def until(self, condition: str, seconds: float = 120) -> dict[str, Any]:
         """Waits for a condition, an expression of ``s``, the state; TimeoutError if it never is."""

@@ -34,8 +34,8 @@ class Client:
         given = {name.replace("_", "-"): value for name, value in headers.items()}
         self.connection.request(method, path, headers=given)
         response = self.connection.getresponse()
-        found = {name.lower(): value for name, value in response.getheaders()}
-        return Answer(response.status, found, response.read())
+        actual = {name.lower(): value for name, value in response.getheaders()}
+        return Answer(response.status, actual, response.read())
 
 
 @contextmanager

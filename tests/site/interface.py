@@ -69,12 +69,12 @@ def visit(browser: Any, path: str = "/", *, size: tuple[int, int], **options: An
     context = browser.new_context(viewport={"width": width, "height": height}, **options)
     try:
         page = context.new_page()
-        said: list[str] = []
-        page.on("console", lambda message: said.append(message.text))
-        page.on("pageerror", lambda error: said.append(str(error)))
+        printed: list[str] = []
+        page.on("console", lambda message: printed.append(message.text))
+        page.on("pageerror", lambda error: printed.append(str(error)))
         context.route("**/*", _answer)
         page.goto(HOST + path)
         yield page
-        assert said == []
+        assert printed == []
     finally:
         context.close()

@@ -32,8 +32,8 @@ def phone(chromium: Any) -> Iterator[Any]:
 
 
 def pose(page: Any) -> Pose:
-    found: Pose = page.evaluate("fake.walker.pose")
-    return found
+    actual: Pose = page.evaluate("fake.walker.pose")
+    return actual
 
 
 def held(page: Any, *keys: str, milliseconds: int = 300) -> tuple[Pose, Pose]:
@@ -189,9 +189,9 @@ def test_the_keyboard_is_enough(desk: Any) -> None:
     controls = "button, input, select, canvas[tabindex], section[tabindex]"
     usable = desk.locator(controls).filter(visible=True).count()
     assert len(reached) == usable > 15
-    told = " ".join(reached)
+    reported = " ".join(reached)
     for name in ("canvas", "Gallery", "Data saver", "Texture memory", "Policy", "Compare"):
-        assert name in told
+        assert name in reported
 
 
 def test_settings(desk: Any) -> None:
@@ -361,7 +361,7 @@ def test_the_map_shows_here_and_what_may_be_seen(desk: Any) -> None:
 
     def color(x: float, z: float) -> list[int]:
         at = [round(10 + scale * (x + 6)), round(10 + scale * (z + 14))]
-        found: list[int] = plan.evaluate(
+        actual: list[int] = plan.evaluate(
             """(plan, [x, y]) => {
               const copy = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
               copy.drawImage(plan, -x, -y);
@@ -369,7 +369,7 @@ def test_the_map_shows_here_and_what_may_be_seen(desk: Any) -> None:
             }""",
             at,
         )
-        return found
+        return actual
 
     hall, cabinet, store = color(-4, -4), color(11, 2), color(11, -13)
     assert hall[0] > hall[2] + 100

@@ -34,8 +34,8 @@ def read(site: Site, url: str) -> bytes:
 
 
 def record_of(site: Site, cell: int) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(read(site, site.index["cells"][cell]["record"]))
-    return found
+    actual: dict[str, Any] = json.loads(read(site, site.index["cells"][cell]["record"]))
+    return actual
 
 
 def geometry_of(site: Site, cell: int) -> ReadGlb:
@@ -50,8 +50,8 @@ def tall(viewpoint: dict[str, Any], width: int, height: int) -> float:
 
 @pytest.fixture(params=["museum", "hospital"])
 def site(request: pytest.FixtureRequest) -> Site:
-    found: Site = request.getfixturevalue(request.param)
-    return found
+    actual: Site = request.getfixturevalue(request.param)
+    return actual
 
 
 def test_cells_that_are_drawn_are_those_in_sight(visit: Callable[..., Any], site: Site) -> None:
@@ -93,9 +93,9 @@ def test_pictures_are_what_rays_see(
             shown = visitor.picture()
             view = View.of_hint(places[number], width, height)
             own, edges = render(scene, view, LOOK, samples=1), outline(scene, view)
-            found = likeness(shown, own, edges, LOOK)
-            assert found.psnr > LIKE, (number, found)
-            assert found.stray < 0.001
+            actual = likeness(shown, own, edges, LOOK)
+            assert actual.psnr > LIKE, (number, actual)
+            assert actual.stray < 0.001
     assert visitor.messages == []
 
 
@@ -160,11 +160,11 @@ def test_levels_on_the_gpu_are_those_of_python(visit: Callable[..., Any], site: 
         for texture, held in enumerate(state["held"]):
             if held < 6 or checked == 6:
                 continue
-            found = visitor.page.evaluate(LEVELS, texture)
+            actual = visitor.page.evaluate(LEVELS, texture)
             with open_ptm(read(site, site.index["textures"][texture]["file"])) as ptm:
                 own = [hashlib.sha256(as_held(level)).hexdigest() for level in ptm.levels()]
-            assert found == own[: len(found)]
-            assert len(found) >= held
+            assert actual == own[: len(actual)]
+            assert len(actual) >= held
             checked += 1
     assert checked >= 3
     assert visitor.messages == []
@@ -211,8 +211,8 @@ def test_keys_walk(visit: Callable[..., Any], museum: Site) -> None:
         place = museum.index["cells"][state["cell"]]["box"]
         eye = state["pose"]["eye"]
         assert all(place[k] < eye[k] < place[k + 3] for k in range(3))
-        told = "(x) => Math.abs(Number(location.hash.slice(1).split(',')[0]) - x) < 0.01"
-        visitor.page.wait_for_function(told, arg=eye[0])
+        reported = "(x) => Math.abs(Number(location.hash.slice(1).split(',')[0]) - x) < 0.01"
+        visitor.page.wait_for_function(reported, arg=eye[0])
         link = visitor.page.url
         visitor.page.goto("about:blank")
         visitor.page.goto(link)

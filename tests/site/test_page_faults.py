@@ -45,7 +45,7 @@ def test_a_lost_connection(visit: Callable[..., Any], museum: Site) -> None:
 
     with visit(museum, prepare=lambda page: spoiled(page, lose)) as visitor:
         visitor.complete()
-    assert all("ERR_CONNECTION_RESET" in said for said in visitor.messages)
+    assert all("ERR_CONNECTION_RESET" in printed for printed in visitor.messages)
     assert visitor.messages
 
 
@@ -83,7 +83,7 @@ def test_a_host_that_ignores_ranges(visit: Callable[..., Any], museum: Site) -> 
     with visit(museum, prepare=lambda page: spoiled(page, whole)) as visitor:
         visitor.complete()
     assert len(asked) == len(set(asked))
-    assert len([said for said in visitor.messages if "ignores byte ranges" in said]) == 1
+    assert len([printed for printed in visitor.messages if "ignores byte ranges" in printed]) == 1
     assert len(visitor.messages) == 1
 
 
@@ -224,7 +224,7 @@ def test_no_webgl(visit: Callable[..., Any], museum: Site) -> None:
 
     with visit(museum, prepare=without) as visitor:
         visitor.page.get_by_text("WebGL 2").first.wait_for()
-    assert all("pageerror" not in said for said in visitor.messages)
+    assert all("pageerror" not in printed for printed in visitor.messages)
 
 
 def test_no_simd(visit: Callable[..., Any], museum: Site) -> None:
@@ -281,11 +281,11 @@ def test_a_context_lost_while_comparing(visit: Callable[..., Any], museum: Site)
         visitor.page.wait_for_function("window.ptm.walk.comparison?.settle()", polling=200)
         visitor.page.evaluate("window.ptm.compare(false)")
         visitor.complete()
-        told, counted = visitor.page.evaluate(
+        reported, counted = visitor.page.evaluate(
             "[window.ptm.state().residentBytes, window.ptm.walk.memory.bytes]"
         )
-        assert told == counted
-    assert not any("does not belong" in said for said in visitor.messages)
+        assert reported == counted
+    assert not any("does not belong" in printed for printed in visitor.messages)
 
 
 def test_links_and_questions_that_mean_nothing(visit: Callable[..., Any], museum: Site) -> None:
@@ -301,13 +301,13 @@ def test_links_and_questions_that_mean_nothing(visit: Callable[..., Any], museum
 
 def test_the_policy_of_the_docs(visit: Callable[..., Any], museum: Site) -> None:
     """With the Content-Security-Policy of docs/guide/publish.md nothing is refused."""
-    told = re.search(r"^ *Content-Security-Policy: (.+)$", DOCS.read_text(), re.MULTILINE)
-    assert told
+    reported = re.search(r"^ *Content-Security-Policy: (.+)$", DOCS.read_text(), re.MULTILINE)
+    assert reported
 
     def strict(page: Any) -> None:
         def handle(route: Any) -> None:
             answer = route.fetch()
-            headers = {**answer.headers, "content-security-policy": told[1]}
+            headers = {**answer.headers, "content-security-policy": reported[1]}
             route.fulfill(response=answer, headers=headers)
 
         page.route(lambda url: url.endswith("/"), handle)

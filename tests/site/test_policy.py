@@ -56,8 +56,8 @@ def test_what_is_chosen(tmp_path: Path) -> None:
         budget, column = int(random.integers(0, int(cost[:, -1].sum()) + 3)), last.copy()
         used = allocate(worth, cost, last, budget, column, False)
         expected.append([used, column.tolist()])
-        told = {"worth": worth.tolist(), "cost": cost.tolist(), "last": last.tolist()}
-        calls.append(("allocate", {**told, "budget": budget}))
+        reported = {"worth": worth.tolist(), "cost": cost.tolist(), "last": last.tolist()}
+        calls.append(("allocate", {**reported, "budget": budget}))
     assert called(tmp_path, calls) == expected
 
 
@@ -69,8 +69,8 @@ def test_what_is_fetched_next(tmp_path: Path) -> None:
         asked, busy = random.integers(0, ends[:, -1] + 1), random.random(len(last)) < 0.3
         free = np.where(busy, ends[:, -1], asked)
         expected.append(list(next_fetch(worth, ends, free, last, 5)))
-        told = {"worth": worth, "ends": ends, "asked": asked, "last": last, "busy": busy}
-        calls.append(("next", {k: v.tolist() for k, v in told.items()} | {"overhead": 5}))
+        reported = {"worth": worth, "ends": ends, "asked": asked, "last": last, "busy": busy}
+        calls.append(("next", {k: v.tolist() for k, v in reported.items()} | {"overhead": 5}))
     assert called(tmp_path, calls) == expected
     assert {texture for _, texture, _ in expected} >= {-1, 0, 1, 2}
 
@@ -101,7 +101,7 @@ def test_how_the_paper_shares_out(tmp_path: Path) -> None:
             rounds.append([share.tolist(), asks.tolist(), column.tolist()])
         expected.append(rounds)
         rows = zip(weight.tolist(), cells, strict=True)
-        told = {
+        reported = {
             "memory": memory.tolist(),
             "levels": levels.tolist(),
             "have": have.tolist(),
@@ -110,7 +110,7 @@ def test_how_the_paper_shares_out(tmp_path: Path) -> None:
             "column": [0] * len(levels),
             "cells": [{"weight": w, "textures": some.tolist()} for w, some in rows],
         }
-        calls.append(("share", told))
+        calls.append(("share", reported))
     assert same(called(tmp_path, calls), expected)
 
 
@@ -158,10 +158,10 @@ def test_what_is_believed_of_a_link(
         while wait(until):
             pass
     folder = tmp_path_factory.mktemp("estimate")
-    told = called(folder, [("estimate", {"calls": calls, "size": 5000})])[0]
-    known = [(a, b) for a, b in zip(told, expected, strict=True) if b]
-    for found, wanted in known:
-        assert found == pytest.approx(wanted)
+    reported = called(folder, [("estimate", {"calls": calls, "size": 5000})])[0]
+    known = [(a, b) for a, b in zip(reported, expected, strict=True) if b]
+    for actual, wanted in known:
+        assert actual == pytest.approx(wanted)
 
 
 def test_the_catalogue_of_an_index(tmp_path: Path, world: World) -> None:
@@ -171,9 +171,9 @@ def test_the_catalogue_of_an_index(tmp_path: Path, world: World) -> None:
     index = json.loads(json.dumps(served.index))
     for c, cell in enumerate(index["cells"]):
         cell |= {name: int(size[c]) for name, size in sizes.items()}
-    found, guessed = called(tmp_path, [("catalogue", {"index": i}) for i in (index, served.index)])
+    actual, guessed = called(tmp_path, [("catalogue", {"index": i}) for i in (index, served.index)])
     flat = {k: np.ravel(v).tolist() if isinstance(v, list) else v for k, v in expected.items()}
-    assert found == flat
+    assert actual == flat
     assert guessed["recordBytes"] == [1000] * world.catalogue.cell_count
 
 
@@ -215,9 +215,9 @@ def test_a_link_that_fails(tmp_path: Path, policy: str, seed: int) -> None:
     world = standing(catalogue([raw(128)] * 8, shapes, cells=5, random=random), 1.0)
     file = tmp_path / "life.json"
     write(file, {**documents(world), "policy": policy, "seed": seed})
-    told = json.loads(run(HERE / "life.mjs", file))
-    assert told["failures"] > 0
-    assert [told[name] for name in ("overlaps", "beyond", "above", "early")] == [0] * 4
-    assert told["forgotten"]
-    assert told["again"] > 0
-    assert told["missing"] == 0
+    reported = json.loads(run(HERE / "life.mjs", file))
+    assert reported["failures"] > 0
+    assert [reported[name] for name in ("overlaps", "beyond", "above", "early")] == [0] * 4
+    assert reported["forgotten"]
+    assert reported["again"] > 0
+    assert reported["missing"] == 0

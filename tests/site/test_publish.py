@@ -42,18 +42,18 @@ def other(two_rooms: Path) -> Site:
 
 def test_all_of_a_site_and_nothing_else(site: Site, tmp_path: Path) -> None:
     done = publish(site, tmp_path / "a" / "site")
-    found = files_below(tmp_path / "a" / "site")
+    actual = files_below(tmp_path / "a" / "site")
     wanted = {name: entry.read() for name, entry in site.entries.items()}
-    assert {name: found[name] for name in wanted} == wanted
-    assert found.keys() - wanted.keys() == {LIST, HEADERS}
+    assert {name: actual[name] for name in wanted} == wanted
+    assert actual.keys() - wanted.keys() == {LIST, HEADERS}
     assert sorted(done.written) == sorted([*wanted, HEADERS])
     assert not done.unchanged
     assert not done.removed
-    text = found[HEADERS].decode()
+    text = actual[HEADERS].decode()
     assert "/data/*\n  Cache-Control: public, max-age=31536000, immutable\n" in text
     assert "/index.html\n  Cache-Control: no-cache\n" in text
     publish(site, tmp_path / "b")
-    assert files_below(tmp_path / "b") == found
+    assert files_below(tmp_path / "b") == actual
 
 
 def test_again_only_what_changed(site: Site, other: Site, tmp_path: Path) -> None:
@@ -213,9 +213,9 @@ def test_the_command(ptm: Ptm, two_rooms: Path, tmp_path: Path) -> None:
     folder = tmp_path / "site"
     done = ptm("publish", two_rooms, "-o", folder, "--no-pictures", "--title", "Rooms", "--json")
     assert (done.status, done.err) == (0, "")
-    told = json.loads(done.out)
-    assert told["bytes"]["page"] < told["bytes"]["first_room"] < told["bytes"]["whole"]
-    assert told["removed"] == []
+    reported = json.loads(done.out)
+    assert reported["bytes"]["page"] < reported["bytes"]["first_room"] < reported["bytes"]["whole"]
+    assert reported["removed"] == []
     assert "<title>Rooms</title>" in (folder / "index.html").read_text()
     done = ptm("publish", two_rooms, "-o", folder, "--no-pictures", "--title", "Rooms")
     assert "0 files written" in done.out

@@ -375,11 +375,11 @@ def test_concurrent_responses_of_a_thin_link_are_whole_and_no_faster_than_it() -
     visits = Visits()
     parts = {f"{i}": NOISE[i * 1000 :][:20_000] for i in range(6)}
     files = {name: Entry(name, data, "x/y") for name, data in parts.items()}
-    found = {}
+    actual = {}
 
     def fetch(url: str, name: str) -> None:
         with client_of(url) as ask:
-            found[name] = ask(f"/{name}").body
+            actual[name] = ask(f"/{name}").body
 
     with serving(files, throttle=Throttle(4e6, 0.05), visits=visits) as url:
         threads = [threading.Thread(target=fetch, args=(url, name)) for name in parts]
@@ -387,7 +387,7 @@ def test_concurrent_responses_of_a_thin_link_are_whole_and_no_faster_than_it() -
             thread.start()
         for thread in threads:
             thread.join()
-    assert found == parts
+    assert actual == parts
     # No sooner than the link can.
     begun = [visit.begun for visit in visits]
     first = [visit.first_byte or 0.0 for visit in visits]

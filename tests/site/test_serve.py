@@ -140,10 +140,10 @@ def failing(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int
 def test_a_taken_port(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = urlsplit(url_of(other)).port
-        status, said = failing(capsys, folder, "--port", port)
+        status, printed = failing(capsys, folder, "--port", port)
     assert status == 3
-    assert f"127.0.0.1:{port}: the port is taken by another program; give another" in said
-    assert "[PTM-I920]" in said
+    assert f"127.0.0.1:{port}: the port is taken by another program; give another" in printed
+    assert "[PTM-I920]" in printed
 
 
 @pytest.mark.parametrize(
@@ -153,9 +153,9 @@ def test_a_taken_port(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_addresses_that_cannot_be(
     folder: Path, capsys: pytest.CaptureFixture[str], options: tuple[str, ...]
 ) -> None:
-    status, said = failing(capsys, folder, *(options or ("--host", "a" * 70)))
+    status, printed = failing(capsys, folder, *(options or ("--host", "a" * 70)))
     assert status == 3
-    assert "[PTM-I920]" in said
+    assert "[PTM-I920]" in printed
 
 
 @pytest.mark.parametrize("module", ["starlette", "uvicorn"])
@@ -166,10 +166,10 @@ def test_without_the_extra(
     module: str,
 ) -> None:
     monkeypatch.setitem(sys.modules, module, None)
-    status, said = failing(capsys, folder)
+    status, printed = failing(capsys, folder)
     assert status == 6
-    assert f"{module} is not installed" in said
-    assert "pip install 'ptmtools[viewer]' [PTM-M100]" in said
+    assert f"{module} is not installed" in printed
+    assert "pip install 'ptmtools[viewer]' [PTM-M100]" in printed
 
 
 @pytest.mark.parametrize(
@@ -190,8 +190,8 @@ def test_options_that_cannot_be(
     status: int,
     code: str,
 ) -> None:
-    found, said = failing(capsys, folder, *options)
-    assert (found, code in said) == (status, True)
+    actual, printed = failing(capsys, folder, *options)
+    assert (actual, code in printed) == (status, True)
 
 
 def database(folder: Path, stages: Mapping[str, StageRecord], schema: int = SCHEMA) -> Path:
@@ -214,11 +214,11 @@ def test_what_is_no_database_to_serve(tmp_path: Path, capsys: pytest.CaptureFixt
         (database(tmp_path / "unfinished", {"scene": RECORD}), "PTM-D004", "run `ptm build-scene"),
         (database(tmp_path / "old", {"scene": RECORD}, 1), "PTM-D003", "build it again"),
     ):
-        status, said = failing(capsys, path)
+        status, printed = failing(capsys, path)
         assert status == 5
-        assert code in said
-        assert words in said
-        assert str(path) in said
+        assert code in printed
+        assert words in printed
+        assert str(path) in printed
 
 
 @dataclass(frozen=True)
@@ -284,11 +284,11 @@ def data_of(find: Lookup) -> dict[str, bytes]:
         assert entry, name
         return entry.read()
 
-    told = re.search(
+    reported = re.search(
         rb'<script type="application/json" id="site">(.*?)</script>', read("index.html")
     )
-    assert told
-    index = json.loads(read(json.loads(told[1])["index"]))
+    assert reported
+    index = json.loads(read(json.loads(reported[1])["index"]))
     names = [cell[key] for cell in index["cells"] for key in ("record", "geometry")]
     names += [row["file"] for row in index["textures"]]
     return {f"data/{name}": read(f"data/{name}") for name in names}

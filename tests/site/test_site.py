@@ -60,9 +60,9 @@ def refused(code: str) -> Iterator[None]:
 def told(site: Site) -> Any:
     """What the page tells its script."""
     page = site.entries["index.html"].read().decode()
-    found = re.search(r'<script type="application/json" id="site">(.*?)</script>', page, re.DOTALL)
-    assert found
-    return json.loads(found[1])
+    actual = re.search(r'<script type="application/json" id="site">(.*?)</script>', page, re.DOTALL)
+    assert actual
+    return json.loads(actual[1])
 
 
 def test_names_are_hashes(site: Site, two_rooms: Path) -> None:
@@ -260,22 +260,22 @@ def test_textures_that_browsers_do_not_read(tmp_path: Path, kind: str, profile: 
         "ends": [level.end for level in header.levels], "components": 3, "width": 56, "height": 40,
         "texelBytes": header.texel_bytes, "gpuTexelBytes": 4, "color": [0, 0, 0], "differences": [],
     }  # fmt: skip
-    found = web_texture(file, row)
+    actual = web_texture(file, row)
     if profile == "raw":
-        assert (found.row, found.data, found.note) == (row, None, "")
+        assert (actual.row, actual.data, actual.note) == (row, None, "")
         return
-    assert found.data
-    assert "a.ptm" in found.note
-    new = read_header(found.data)
+    assert actual.data
+    assert "a.ptm" in actual.note
+    new = read_header(actual.data)
     assert (new.profile, new.kind, new.version) == ("fast", "uint8", 2)
-    assert [level.end for level in new.levels] == found.row["ends"]
+    assert [level.end for level in new.levels] == actual.row["ends"]
     assert [(o.width, o.height) for o in new.levels] == [(o.width, o.height) for o in header.levels]
-    assert (found.row["texelBytes"], found.row["gpuTexelBytes"]) == (3, 4)
+    assert (actual.row["texelBytes"], actual.row["gpuTexelBytes"]) == (3, 4)
     scale = {"uint8": 1.0, "uint16": 1 / 257, "float32": 255.0}[kind]
     wanted = np.clip(image.astype(float) * scale, 0, 255)
-    assert np.abs(decode(found.data) - wanted).max() <= 1
-    coarsest = next(iter(decode_levels(found.data))).reshape(-1, 3).mean(axis=0)
-    assert np.abs(coarsest - found.row["color"]).max() <= 0.5
+    assert np.abs(decode(actual.data) - wanted).max() <= 1
+    coarsest = next(iter(decode_levels(actual.data))).reshape(-1, 3).mean(axis=0)
+    assert np.abs(coarsest - actual.row["color"]).max() <= 0.5
 
 
 def test_weight(site: Site) -> None:

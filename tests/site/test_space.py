@@ -57,7 +57,7 @@ def test_what_a_camera_takes_in(tmp_path: Path) -> None:
                 "distances": frustum.distance(low, high).tolist(),
             }
         )
-        told = {
+        reported = {
             "pose": {"eye": eye.tolist(), "yaw": yaw, "pitch": pitch},
             "angle": angle,
             "aspect": aspect,
@@ -65,34 +65,34 @@ def test_what_a_camera_takes_in(tmp_path: Path) -> None:
             "high": high.tolist(),
             "hulls": hulls.tolist(),
         }
-        calls.append(("frustum", told))
-    found = called(tmp_path, calls)
+        calls.append(("frustum", reported))
+    actual = called(tmp_path, calls)
     sides = [
         {name: case.pop(name) for name in ("direction", "right", "up")}
-        for cases in (found, expected)
+        for cases in (actual, expected)
         for case in cases
     ]
     for one, other in zip(sides[:CASES], sides[CASES:], strict=True):
         assert one == {name: pytest.approx(axis, abs=1e-12) for name, axis in other.items()}
-    assert found == expected
+    assert actual == expected
     assert 0.1 < np.mean([case["boxes"] for case in expected]) < 0.9
     assert 0.1 < np.mean([case["hulls"] for case in expected]) < 0.9
 
 
 def test_the_camera_straight_up_has_a_right_side(tmp_path: Path) -> None:
     pose = {"eye": [0, 0, 0], "yaw": 0.7, "pitch": math.pi / 2}
-    told = {"pose": pose, "angle": 1, "aspect": 1, "low": [], "high": [], "hulls": []}
-    (found,) = called(tmp_path, [("frustum", told)])
-    assert found["right"] == pytest.approx([math.cos(0.7), 0, -math.sin(0.7)])
-    assert found["up"] == pytest.approx([math.sin(0.7), 0, math.cos(0.7)])
+    reported = {"pose": pose, "angle": 1, "aspect": 1, "low": [], "high": [], "hulls": []}
+    (actual,) = called(tmp_path, [("frustum", reported)])
+    assert actual["right"] == pytest.approx([math.cos(0.7), 0, -math.sin(0.7)])
+    assert actual["up"] == pytest.approx([math.sin(0.7), 0, math.cos(0.7)])
 
 
 def located(
     folder: Path, world: World, eyes: Floats, known: list[int], cell: int = -1
 ) -> list[Any]:
     """The cell of each eye, each from the one before, and the cells whose record may say more."""
-    told = {"index": world.served.index, "records": world.served.records, "known": known}
-    call = {**told, "eyes": eyes.tolist(), "from": cell}
+    reported = {"index": world.served.index, "records": world.served.records, "known": known}
+    call = {**reported, "eyes": eyes.tolist(), "from": cell}
     rows: list[Any] = called(folder, [("locate", call)])[0]
     return rows
 
@@ -105,11 +105,11 @@ def test_the_cell_along_a_walk(tmp_path: Path, world: World) -> None:
     share = np.linspace(0, 1, 37)[:, None]
     ways = [(1 - share) * a + share * b for a, b in itertools.pairwise(middle)]
     eyes = np.concatenate([world.eye, *ways])
-    found = located(tmp_path, world, eyes, every)
-    cells = [cell for cell, _ in found]
+    actual = located(tmp_path, world, eyes, every)
+    cells = [cell for cell, _ in actual]
     assert cells == world.served.locator.along(eyes).tolist()
     assert len(set(cells)) > 1
-    assert not any(candidates for _, candidates in found)
+    assert not any(candidates for _, candidates in actual)
 
 
 def test_the_cell_anywhere(tmp_path: Path, world: World) -> None:
@@ -119,11 +119,11 @@ def test_the_cell_anywhere(tmp_path: Path, world: World) -> None:
     low, high = stock.low.min(axis=0) - 1, stock.high.max(axis=0) + 1
     eyes = random.uniform(low, high, (400, 3))
     every = list(range(stock.cell_count))
-    found = [cell for cell, _ in located(tmp_path, world, eyes, every)]
+    actual = [cell for cell, _ in located(tmp_path, world, eyes, every)]
     outside = np.array([locator.outside(cell, eyes) for cell in every])
-    for cell, far in zip(found, outside.T, strict=True):
+    for cell, far in zip(actual, outside.T, strict=True):
         assert far[cell] <= SLACK if cell >= 0 else (far > SLACK).all()
-    assert len(set(found)) > 2
+    assert len(set(actual)) > 2
 
 
 def test_cells_whose_record_is_not_there(tmp_path: Path, world: World) -> None:
@@ -131,14 +131,14 @@ def test_cells_whose_record_is_not_there(tmp_path: Path, world: World) -> None:
     stock = world.catalogue
     here = int(world.cell[0])
     middle = (stock.low + stock.high) / 2
-    told = located(tmp_path, world, middle, [here], here)
-    for cell, (_, candidates) in enumerate(told):
+    reported = located(tmp_path, world, middle, [here], here)
+    for cell, (_, candidates) in enumerate(reported):
         inside = (stock.low <= middle[cell]) & (middle[cell] <= stock.high)
         near = set(np.flatnonzero(inside.all(axis=1)).tolist()) - {here}
         assert set(candidates) == near
         beside = [c in stock.adjacent[here] for c in candidates]
         assert beside == sorted(beside, reverse=True)
-    assert any(candidates for _, candidates in told)
+    assert any(candidates for _, candidates in reported)
 
 
 def test_ways_through_polygons(tmp_path: Path) -> None:
@@ -158,8 +158,8 @@ def test_ways_through_polygons(tmp_path: Path) -> None:
             way = np.zeros(3)
         share = _crossing(eye, way, polygon)
         expected.append(share if math.isfinite(share) else "infinite")
-        told = {"eye": eye.tolist(), "way": way.tolist(), "polygon": polygon.tolist()}
-        calls.append(("crossing", told))
-    for found, wanted in zip(called(tmp_path, calls), expected, strict=True):
-        assert found == (pytest.approx(wanted) if wanted != "infinite" else wanted)
+        reported = {"eye": eye.tolist(), "way": way.tolist(), "polygon": polygon.tolist()}
+        calls.append(("crossing", reported))
+    for actual, wanted in zip(called(tmp_path, calls), expected, strict=True):
+        assert actual == (pytest.approx(wanted) if wanted != "infinite" else wanted)
     assert 30 < expected.count("infinite") < 270

@@ -317,8 +317,8 @@ def test_a_place_is_kept_until_the_first_step(tmp_path: Path) -> None:
 def test_a_cell_that_comes_bit_by_bit_is_the_same() -> None:
     """A call does little, nothing is met before all is there, and then it is what comes at once."""
     count = 5000
-    told = json.loads(node.run(HERE / "slices.mjs", count))
-    assert told["calls"] > count / 64
-    assert told["early"] == 0
-    assert told["parts"] == told["whole"]
-    assert 0 < sum(map(len, told["whole"])) < 20 * count
+    reported = json.loads(node.run(HERE / "slices.mjs", count))
+    assert reported["calls"] > count / 64
+    assert reported["early"] == 0
+    assert reported["parts"] == reported["whole"]
+    assert 0 < sum(map(len, reported["whole"])) < 20 * count

@@ -65,10 +65,10 @@ class Witness:
             levels = [request for request in client.waiting if request not in number]
             fetch()
             estimate = client.estimate
-            found = [request for request in client.waiting if request not in number]
+            actual = [request for request in client.waiting if request not in number]
             # Some policies ask for levels when they look; documents are asked for before these.
-            found.sort(key=levels.__contains__)
-            rows = [r for r in found if r.tag.kind != Kind.INDEX]  # type: ignore[attr-defined]
+            actual.sort(key=levels.__contains__)
+            rows = [r for r in actual if r.tag.kind != Kind.INDEX]  # type: ignore[attr-defined]
             for request in rows:
                 number[request] = len(number)
             if client.index:

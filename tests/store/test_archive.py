@@ -27,13 +27,13 @@ ARRAYS = st.dictionaries(
 
 @given(ARRAYS)
 def test_what_goes_in_comes_out(arrays: dict[str, np.ndarray]) -> None:
-    found = unpack_arrays(pack_arrays(arrays), file="x.npz")
-    assert set(found) == set(arrays)
+    actual = unpack_arrays(pack_arrays(arrays), file="x.npz")
+    assert set(actual) == set(arrays)
     for name, array in arrays.items():
-        assert found[name].dtype == array.dtype
-        assert found[name].shape == array.shape
-        assert found[name].tobytes() == array.tobytes()
-        assert found[name].flags.writeable
+        assert actual[name].dtype == array.dtype
+        assert actual[name].shape == array.shape
+        assert actual[name].tobytes() == array.tobytes()
+        assert actual[name].flags.writeable
 
 
 def test_bytes_depend_on_the_arrays_alone() -> None:
@@ -57,8 +57,8 @@ def test_no_flipped_bit_of_an_array_passes(data: st.DataObject) -> None:
     packed[at] ^= 1 << data.draw(st.integers(0, 7))
     with suppress(DatabaseError):
         # Where it passes, it was a bit of the archive's own bookkeeping, such as a date.
-        found = unpack_arrays(bytes(packed), file="x.npz")
-        assert all(np.array_equal(values, array) for values in found.values())
+        actual = unpack_arrays(bytes(packed), file="x.npz")
+        assert all(np.array_equal(values, array) for values in actual.values())
 
 
 @pytest.mark.parametrize("data", [b"", b"PK", b"no archive at all", b"\x93NUMPY"])

@@ -17,9 +17,9 @@ RECORD = StageRecord(
 
 
 def document() -> dict[str, Any]:
-    found = json.loads(Manifest("m.obj", {"cells": RECORD}).to_bytes())
-    assert isinstance(found, dict)
-    return found
+    actual = json.loads(Manifest("m.obj", {"cells": RECORD}).to_bytes())
+    assert isinstance(actual, dict)
+    return actual
 
 
 def test_reads_back_what_it_writes() -> None:
@@ -49,9 +49,9 @@ def test_the_order_of_inputs_does_not_show() -> None:
 
 
 def broken(change: dict[str, Any]) -> bytes:
-    found = document()
-    found["stages"]["cells"].update(change)
-    return json.dumps(found).encode()
+    actual = document()
+    actual["stages"]["cells"].update(change)
+    return json.dumps(actual).encode()
 
 
 @pytest.mark.parametrize(

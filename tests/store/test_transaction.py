@@ -47,8 +47,8 @@ def write(db: Path, files: dict[str, bytes], recipe: int) -> None:
 
 def stamp(file: Path) -> tuple[int, int]:
     """Which file it is, and when it was last changed; looking at it changes neither."""
-    found = file.stat()
-    return found.st_ino, found.st_ctime_ns
+    actual = file.stat()
+    return actual.st_ino, actual.st_ctime_ns
 
 
 def without(found: dict[str, bytes]) -> dict[str, bytes]:
@@ -74,10 +74,10 @@ def test_killed_at_any_change_of_a_name(tmp_path: Path) -> None:
         assert status == -signal.SIGKILL
         with DatabaseWriter.open_for_model(db, "m.obj"):
             pass
-        found = files_below(db)
-        assert found.pop("www/mine.txt") == b"mine"
-        assert found in (before, after), n
-        outcomes.append(found == after)
+        actual = files_below(db)
+        assert actual.pop("www/mine.txt") == b"mine"
+        assert actual in (before, after), n
+        outcomes.append(actual == after)
         write(db, AFTER, 2)
         assert files_below(db) == {**after, "www/mine.txt": b"mine"}, n
     else:

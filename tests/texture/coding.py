@@ -33,8 +33,8 @@ def coded_groups(
     """Every group of a pyramid and its level. What comes back has the encoder's bits, and the
     level's or lies within the error; each level refines the one that came back."""
     coarsest, *levels = build_pyramid(image)
-    found = [(profile.encode_base(coarsest), coarsest)]
-    below = profile.decode_base(found[0][0], coarsest.shape, coarsest.dtype)
+    actual = [(profile.encode_base(coarsest), coarsest)]
+    below = profile.decode_base(actual[0][0], coarsest.shape, coarsest.dtype)
     same(below, coarsest)
     learned = known = None
     for level in levels:
@@ -47,5 +47,5 @@ def coded_groups(
         else:
             same(back.texels, level)
         below, learned, known = back.texels, tile.memory, back.memory
-        found.append((tile.data, level))
-    return found
+        actual.append((tile.data, level))
+    return actual

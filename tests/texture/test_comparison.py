@@ -17,11 +17,11 @@ RNG = np.random.default_rng(4)
 @pytest.mark.parametrize("kind", ["uint8", "uint16"])
 def test_every_rival_gives_back_what_it_holds(kind: str, components: int) -> None:
     texels = RNG.integers(0, 1000, (19, 33, components)).astype(kind)
-    found = {one.codec: one for one in measure(texels, codecs(["raw"]))}
-    assert found["PNG"].all_bytes == sum(len(png_bytes(level)) for level in build_pyramid(texels))
-    assert found["PNG"].finest_bytes == len(png_bytes(texels))
-    assert found["ptm raw"].all_bytes == len(encode(texels, EncodeOptions("raw")))
-    for one in found.values():
+    actual = {one.codec: one for one in measure(texels, codecs(["raw"]))}
+    assert actual["PNG"].all_bytes == sum(len(png_bytes(level)) for level in build_pyramid(texels))
+    assert actual["PNG"].finest_bytes == len(png_bytes(texels))
+    assert actual["ptm raw"].all_bytes == len(encode(texels, EncodeOptions("raw")))
+    for one in actual.values():
         if one.problem is None:
             assert one.raw_bytes == texels.nbytes
             assert one.encode_seconds > 0
@@ -30,7 +30,7 @@ def test_every_rival_gives_back_what_it_holds(kind: str, components: int) -> Non
             assert "exactly" not in one.problem
             assert one.codec != "PNG"
     if kind == "uint8":
-        assert [one.problem for one in found.values() if "WebP" in one.codec] == [None]
+        assert [one.problem for one in actual.values() if "WebP" in one.codec] == [None]
 
 
 @pytest.mark.parametrize("components", [2, 4])
@@ -46,6 +46,6 @@ def test_opaque_alpha_comes_back_from_webp(components: int) -> None:
 def test_a_lossy_codec_is_found_out() -> None:
     texels = RNG.integers(0, 256, (9, 9, 3), dtype=np.uint8)
     lossy = Codec("lossy", lambda image: image.tobytes(), lambda data, shape: texels & 254)
-    (found,) = measure(texels, [lossy])
-    assert found.problem == "does not give back uint8 texels exactly"
-    assert total([[found], [found]]) == [found]
+    (actual,) = measure(texels, [lossy])
+    assert actual.problem == "does not give back uint8 texels exactly"
+    assert total([[actual], [actual]]) == [actual]

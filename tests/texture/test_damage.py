@@ -108,9 +108,9 @@ def test_a_damaged_group_is_an_error_or_an_image(
         group[0] = form
     group = group[: int(cut * len(group))] + more
     try:
-        found, code = decode(bytes(group), mean_below(level), level.shape).shape, ""
+        actual, code = decode(bytes(group), mean_below(level), level.shape).shape, ""
     except InputError as error:
-        found, code = None, error.code
-    assert code == "PTM-I112" or found == level.shape
+        actual, code = None, error.code
+    assert code == "PTM-I112" or actual == level.shape
     # The bytes of a group of integers are as many as its size says.
     assert code or not name.startswith("raw, u") or len(group) == len(whole)

@@ -88,10 +88,10 @@ def test_colour_key_of_16_bits() -> None:
     near = texels.copy()
     near[0, 0] = key ^ 1  # differs in low bytes only
     rows = [r.astype(">u2").tobytes() for r in near]
-    found = load_image(png(7, rows, 16, 2, chunk(b"tRNS", key.astype(">u2").tobytes()))).array()
-    np.testing.assert_array_equal(found[:, :, :3], near)
-    assert np.argwhere(found[:, :, 3] == 0).tolist() == [[2, 3]]
-    assert found[0, 0, 3] == 0xFFFF
+    actual = load_image(png(7, rows, 16, 2, chunk(b"tRNS", key.astype(">u2").tobytes()))).array()
+    np.testing.assert_array_equal(actual[:, :, :3], near)
+    assert np.argwhere(actual[:, :, 3] == 0).tolist() == [[2, 3]]
+    assert actual[0, 0, 3] == 0xFFFF
 
 
 @pytest.mark.parametrize("order", ["<", ">"])
@@ -236,11 +236,11 @@ def test_radiance_by_hand() -> None:
     for i, value in enumerate((200, 100, 50)):
         coded += bytes([128 + 8, value, 1, i + 1])
     coded += bytes([9]) + bytes(texel[3] for texel in row)
-    found = load_image(hdr(coded + coded)).array()
-    same(found, load_image(hdr(plain + plain)).array())
-    assert found[1, 0].tolist() == [200 / 128, 100 / 128, 50 / 128]
-    assert found[1, 1].tolist() == [200 / 64, 100 / 64, 50 / 64]
-    assert found[0, 8].tolist() == [0, 0, 0]
+    actual = load_image(hdr(coded + coded)).array()
+    same(actual, load_image(hdr(plain + plain)).array())
+    assert actual[1, 0].tolist() == [200 / 128, 100 / 128, 50 / 128]
+    assert actual[1, 1].tolist() == [200 / 64, 100 / 64, 50 / 64]
+    assert actual[0, 8].tolist() == [0, 0, 0]
     for end in range(1, len(coded) + 1):
         with pytest.raises(InputError, match="PTM-I125"):
             load_image(hdr(coded + coded[:-end]))

@@ -43,11 +43,11 @@ def by_definition(data: bytes) -> list[float]:
     levels = list(decode_levels(data))
     colours = {1: 1, 2: 1, 3: 3, 4: 3}[levels[0].shape[2]]
     top = {"uint8": 255, "uint16": 65535}.get(levels[0].dtype.name, 1)
-    found = [0.0]
+    actual = [0.0]
     for below, level in pairwise(levels):
         difference = (level - enlarged(below, *level.shape[:2]))[..., :colours]
-        found.append(float(np.sqrt(np.mean((difference * 255 / top) ** 2, axis=2)).mean()))
-    return found
+        actual.append(float(np.sqrt(np.mean((difference * 255 / top) ** 2, axis=2)).mean()))
+    return actual
 
 
 def noise(height: int, width: int, components: int, dtype: type, seed: int = 0) -> NDArray:
@@ -110,8 +110,8 @@ def test_what_is_not_finite_differs_from_nothing() -> None:
 def test_the_largest_differences_add_up(components: int) -> None:
     """2^20 times 65,535; of one colour to the last bit."""
     level = np.full((1024, 1024, components), 65535, np.uint16)
-    found = difference_between(level, np.zeros((512, 512, components), np.uint16))
-    assert found == pytest.approx(65535 * 2**20, rel=1e-12 if components > 2 else 0, abs=0)
+    actual = difference_between(level, np.zeros((512, 512, components), np.uint16))
+    assert actual == pytest.approx(65535 * 2**20, rel=1e-12 if components > 2 else 0, abs=0)
 
 
 @given(st.integers(0, 5), st.integers(0, 5), st.integers(1, 4), st.integers(0))

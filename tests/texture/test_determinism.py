@@ -28,7 +28,7 @@ def images() -> dict[str, tuple[NDArray[Any], dict[str, Any]]]:
     y, x = np.mgrid[:90, :101]
     smooth = np.stack([120 + 70 * np.sin(x / 9 + c) + 40 * np.cos(y / 7) for c in range(3)], axis=2)
     photo = np.clip(smooth + rng.normal(0, 3, smooth.shape), 0, 255)
-    found: dict[str, tuple[NDArray[Any], dict[str, Any]]] = {
+    actual: dict[str, tuple[NDArray[Any], dict[str, Any]]] = {
         "photo": (photo.astype(np.uint8), {}),
         "tiles": (photo.astype(np.uint8), {"tile": 32}),
         "grey": (photo[:, :, 0].astype(np.uint8), {}),
@@ -36,12 +36,12 @@ def images() -> dict[str, tuple[NDArray[Any], dict[str, Any]]]:
         "deep": ((photo * 250).astype(np.uint16), {}),
         "float": (np.exp(photo / 20).astype(np.float32), {}),
     }
-    return found
+    return actual
 
 
 def digests(threads: int) -> dict[str, str]:
     """Of every image in every profile: of the file and of what it decodes to."""
-    found = {}
+    actual = {}
     for name, (image, changes) in images().items():
         for profile in PROFILES:
             errors = (0, 2) if profile != "raw" and image.dtype.kind == "u" else (0,)
@@ -50,8 +50,8 @@ def digests(threads: int) -> dict[str, str]:
                 data = encode(image, options, threads=threads)
                 back = decode(data, threads=threads).tobytes()
                 key = f"{profile} {name} {max_error}"
-                found[key] = hashlib.sha256(data).hexdigest() + hashlib.sha256(back).hexdigest()
-    return found
+                actual[key] = hashlib.sha256(data).hexdigest() + hashlib.sha256(back).hexdigest()
+    return actual
 
 
 @pytest.fixture(scope="module")

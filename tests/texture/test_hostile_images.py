@@ -214,8 +214,10 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[str, i
     files["a file of a terabyte"] = sparse
     run = subprocess.run([sys.executable, "-c", CHILD, *files.values()], capture_output=True)
     assert run.returncode == 0, run.stderr.decode()
-    found = json.loads(run.stdout)
-    return {what: (found[str(file)][0], 1024 * found[str(file)][1]) for what, file in files.items()}
+    actual = json.loads(run.stdout)
+    return {
+        what: (actual[str(file)][0], 1024 * actual[str(file)][1]) for what, file in files.items()
+    }
 
 
 @pytest.mark.parametrize("what", [*TOO_LARGE, "a file of a terabyte"])

@@ -49,8 +49,8 @@ def test_grey_and_alpha() -> None:
 
 def test_one_bit_images_become_black_and_white() -> None:
     bits = RNG.integers(0, 2, (9, 7)).astype(np.bool_)
-    found = read_image(saved(Image.fromarray(bits)))
-    np.testing.assert_array_equal(found[:, :, 0], np.where(bits, 255, 0))
+    actual = read_image(saved(Image.fromarray(bits)))
+    np.testing.assert_array_equal(actual[:, :, 0], np.where(bits, 255, 0))
 
 
 def test_palettes() -> None:
@@ -62,10 +62,10 @@ def test_palettes() -> None:
     np.testing.assert_array_equal(read_image(saved(image, "GIF")), colours[index])
 
     alpha = np.array([0, 9, 255, 128, 77], np.uint8)
-    found = read_image(saved(image, transparency=alpha.tobytes()))
-    np.testing.assert_array_equal(found, np.dstack([colours[index], alpha[index]]))
-    found = read_image(saved(image, transparency=3))
-    np.testing.assert_array_equal(found, np.dstack([colours[index], np.where(index == 3, 0, 255)]))
+    actual = read_image(saved(image, transparency=alpha.tobytes()))
+    np.testing.assert_array_equal(actual, np.dstack([colours[index], alpha[index]]))
+    actual = read_image(saved(image, transparency=3))
+    np.testing.assert_array_equal(actual, np.dstack([colours[index], np.where(index == 3, 0, 255)]))
 
 
 def test_colour_keys() -> None:
@@ -88,8 +88,8 @@ def test_what_is_converted_strip_by_strip() -> None:
         wanted = np.asarray(Image.open(io.BytesIO(data)).convert(mode))
         np.testing.assert_array_equal(read_image(data), wanted)
         np.testing.assert_array_equal(load_image(data).texels[431:440], wanted[431:440])
-    found = read_image(saved(Image.fromarray(index), transparency=5))
-    np.testing.assert_array_equal(found[:, :, 1], np.where(index == 5, 0, 255))
+    actual = read_image(saved(Image.fromarray(index), transparency=5))
+    np.testing.assert_array_equal(actual[:, :, 1], np.where(index == 5, 0, 255))
     bits = index > 99
     np.testing.assert_array_equal(read_image(saved(Image.fromarray(bits)))[:, :, 0], bits * 255)
 
@@ -243,9 +243,9 @@ def test_pipes(kind: str, tmp_path: Path) -> None:
         target=(tmp_path / "pipe").write_bytes, args=[plain.read_bytes()], daemon=True
     )
     writer.start()
-    found = load_image(tmp_path / "pipe").array()
+    actual = load_image(tmp_path / "pipe").array()
     writer.join()
-    np.testing.assert_array_equal(found, texels)
+    np.testing.assert_array_equal(actual, texels)
 
 
 def test_paths_that_lead_nowhere(tmp_path: Path) -> None:

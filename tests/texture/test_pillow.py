@@ -205,9 +205,9 @@ def test_a_colour_key_becomes_alpha(mode: str, tmp_path: Path) -> None:
     Image.fromarray(texels).save(tmp_path / "a.png", transparency=key)
     with Image.open(tmp_path / "a.png") as image:
         assert image.mode == mode
-        found = decode(saved(image))
-    np.testing.assert_array_equal(found, load_image(tmp_path / "a.png").array())
-    assert 0 < (found[:, :, -1] == 0).sum() < found[:, :, -1].size
+        actual = decode(saved(image))
+    np.testing.assert_array_equal(actual, load_image(tmp_path / "a.png").array())
+    assert 0 < (actual[:, :, -1] == 0).sum() < actual[:, :, -1].size
 
 
 def test_what_is_no_colour_key() -> None:
@@ -258,10 +258,10 @@ def test_a_file_cut_short(truncated: bool, monkeypatch: pytest.MonkeyPatch) -> N
     image = opened(data)
     assert image.size == (70, 45)
     if truncated:
-        found = np.asarray(image)
-        assert found.shape == (45, 70, 3)
-        np.testing.assert_array_equal(found[:44, :70][::2, ::2], LEVELS[-2])
-        np.testing.assert_array_equal(found[44], found[43])
+        actual = np.asarray(image)
+        assert actual.shape == (45, 70, 3)
+        np.testing.assert_array_equal(actual[:44, :70][::2, ::2], LEVELS[-2])
+        np.testing.assert_array_equal(actual[44], actual[43])
     else:
         with pytest.raises(OSError, match="PTM-I103"):
             image.load()

@@ -47,19 +47,19 @@ def nearest(exact: Fraction, dtype: np.dtype) -> Any:
 @given(st.lists(st.integers(0, 0xFFFF), min_size=4, max_size=4))
 def test_halves_are_rounded_once(patterns: list[int]) -> None:
     level = np.array(patterns, np.uint16).view(np.float16).reshape(2, 2, 1)
-    found = mean_below(level).reshape(-1)
+    actual = mean_below(level).reshape(-1)
     if np.isfinite(level).all():
         exact = sum((Fraction(float(v)) for v in level.reshape(-1)), Fraction()) / 4
-        assert float(found[0]) == float(nearest(exact, np.dtype(np.float16)))
+        assert float(actual[0]) == float(nearest(exact, np.dtype(np.float16)))
 
 
 @given(st.lists(st.floats(width=32, allow_nan=False, allow_infinity=False), min_size=4, max_size=4))
 def test_singles_are_summed_in_float64_in_order_and_rounded_once(values: list[float]) -> None:
     a, b, c, d = values
     expected = np.float32(((a + b) + (c + d)) * 0.25)
-    found = mean_below(block(values, np.float32)).reshape(-1)
-    assert found.view(np.uint32) == np.array([expected]).view(np.uint32)
-    assert np.isfinite(found).all()
+    actual = mean_below(block(values, np.float32)).reshape(-1)
+    assert actual.view(np.uint32) == np.array([expected]).view(np.uint32)
+    assert np.isfinite(actual).all()
 
 
 def test_the_order_of_the_sum_is_that_of_the_rows() -> None:
@@ -130,9 +130,9 @@ def test_any_source_of_rows_will_do(tmp_path: Any) -> None:
     image = np.random.default_rng(2).integers(0, 65536, (2048, 300, 3)).astype(np.uint16)
     expected = build_pyramid(image)
     source = Rows(image)
-    found = build_pyramid(source)
-    assert found[-1] is source
-    for one, other in zip(found[:-1], expected[:-1], strict=True):
+    actual = build_pyramid(source)
+    assert actual[-1] is source
+    for one, other in zip(actual[:-1], expected[:-1], strict=True):
         np.testing.assert_array_equal(one, other)
     assert source.most <= pyramid.STRIP_SAMPLES // (300 * 3)
     mapped = np.memmap(tmp_path / "image", np.uint16, "w+", shape=image.shape)

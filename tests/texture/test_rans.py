@@ -26,10 +26,10 @@ TABLES = 29
 )
 def test_normalised_frequencies(counts: list[int]) -> None:
     row = [*counts, *[0] * (256 - len(counts))]
-    found = tables.normalise(np.array([row], np.int64))[0]
-    assert found.tolist() == normalised(row)
-    assert int(found.sum()) == tables.TABLE_SIZE
-    assert ((found > 0) == (np.array(row) > 0)).all()
+    actual = tables.normalise(np.array([row], np.int64))[0]
+    assert actual.tolist() == normalised(row)
+    assert int(actual.sum()) == tables.TABLE_SIZE
+    assert ((actual > 0) == (np.array(row) > 0)).all()
 
 
 def test_built_in_tables_are_those_of_the_specification() -> None:
@@ -80,7 +80,7 @@ def test_symbols_come_back_row_by_row(coded: Any) -> None:
     state = np.zeros(4, np.uint64)
     kernels.start_states(stream.words, state)
     table, begins = tables.row_tables(frequency)
-    at, escaped, found = 8, 0, []
+    at, escaped, actual = 8, 0, []
     for row in (slice(0, 301), slice(301, 303), slice(303, 600), slice(600, 1000)):
         n = row.stop - row.start
         out = np.zeros(n, np.int32)
@@ -90,8 +90,8 @@ def test_symbols_come_back_row_by_row(coded: Any) -> None:
         )  # fmt: skip
         kernels.rotate_states(state, n)
         escaped = kernels.fill_escapes(out, n, stream.escapes, escaped)
-        found += out.tolist()
-    assert found == symbols.tolist()
+        actual += out.tolist()
+    assert actual == symbols.tolist()
     assert at == stream.limit
     assert escaped == len(stream.escapes)
     assert (state == kernels.STATE_LOW).all()
@@ -102,12 +102,12 @@ def test_symbols_come_back_one_by_one(coded: Any) -> None:
     state = np.zeros(4, np.uint64)
     kernels.start_states(stream.words, state)
     table = tables.single_tables(frequency)
-    at, escapes, found = 8, iter(stream.escapes.tolist()), []
+    at, escapes, actual = 8, iter(stream.escapes.tolist()), []
     for i, context in enumerate(contexts):
         z, used = kernels.decode_single(table, context, state, np.uint64(i & 3), stream.words[at])
         at += used
-        found.append(next(escapes) if z == tables.ESCAPE else z)
-    assert found == symbols.tolist()
+        actual.append(next(escapes) if z == tables.ESCAPE else z)
+    assert actual == symbols.tolist()
     assert at == stream.limit
     assert (state == kernels.STATE_LOW).all()
 

@@ -21,7 +21,7 @@ def zoo() -> dict[str, NDArray[np.uint8]]:
     lines = np.where((x + 2 * y) % 17 == 0, 200, np.where(x % 13 == 0, 90, 20))
     cutout = np.dstack([smooth, 255 * (np.hypot(x - 20, y - 20) < 15)])
     cutout[cutout[:, :, 3] == 0] = 0
-    found = {
+    actual = {
         "flat": np.full((40, 44, 3), 9),
         "tiled": np.tile(rng.integers(0, 256, (10, 11, 3)), (4, 4, 1)),
         "ramp": smooth,
@@ -33,7 +33,7 @@ def zoo() -> dict[str, NDArray[np.uint8]]:
         "cut-out": cutout,
         "specks": np.where((3 * x + 7 * y) % 61 == 0, 122, 120)[:, :, None],
     }
-    return {name: np.clip(image, 0, 255).astype(np.uint8) for name, image in found.items()}
+    return {name: np.clip(image, 0, 255).astype(np.uint8) for name, image in actual.items()}
 
 
 ZOO = zoo()

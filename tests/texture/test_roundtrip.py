@@ -34,19 +34,19 @@ def assert_every_level(
     chosen = EncodeOptions(profile, **options)
     data = encode(image, chosen)
     expected = build_pyramid(image if image.ndim == 3 else image[:, :, None])
-    found = list(decode_levels(data))
-    assert len(found) == len(expected) == len(read_header(data).levels)
+    actual = list(decode_levels(data))
+    assert len(actual) == len(expected) == len(read_header(data).levels)
     for n, level in enumerate(expected):
-        assert found[n].shape == level.shape
-        assert found[n].dtype == level.dtype
+        assert actual[n].shape == level.shape
+        assert actual[n].dtype == level.dtype
         if chosen.max_error:
-            errors = np.abs(found[n].astype(np.int64) - level)
+            errors = np.abs(actual[n].astype(np.int64) - level)
             assert errors.max() <= chosen.max_error, (n, errors.max())
         else:
             # As bytes: a NaN is not equal to itself.
-            assert found[n].tobytes() == level.tobytes(), n
+            assert actual[n].tobytes() == level.tobytes(), n
         if one_by_one:
-            assert decode(data, n).tobytes() == found[n].tobytes()
+            assert decode(data, n).tobytes() == actual[n].tobytes()
     return data
 
 

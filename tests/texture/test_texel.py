@@ -47,19 +47,19 @@ def bits(array: NDArray) -> bytes:
 def assert_exact(level: NDArray) -> bytes:
     below = mean_below(level)
     data, texels = coder.encode(level, below)
-    found = coder.decode(data, below, level.shape)
+    actual = coder.decode(data, below, level.shape)
     assert bits(texels) == bits(level)
-    assert found.dtype == level.dtype
-    assert bits(found) == bits(level)
+    assert actual.dtype == level.dtype
+    assert bits(actual) == bits(level)
     return data
 
 
 def assert_within(level: NDArray, below: NDArray, max_error: int) -> tuple[bytes, NDArray]:
     data, texels = coder.encode(level, below, max_error)
-    found = coder.decode(data, below, level.shape, max_error)
-    assert bits(found) == bits(texels)
-    assert int(np.abs(found.astype(np.int64) - level).max()) <= max_error
-    return data, found
+    actual = coder.decode(data, below, level.shape, max_error)
+    assert bits(actual) == bits(texels)
+    assert int(np.abs(actual.astype(np.int64) - level).max()) <= max_error
+    return data, actual
 
 
 @pytest.mark.parametrize("dtype", DTYPES, ids=str)
@@ -148,8 +148,8 @@ def assert_reference(level: NDArray, max_error: int = 0) -> bytes:
     below = mean_below(level)
     data, texels = coder.encode(level, below, max_error)
     if data[0] in (coder.CODED, coder.CODED_WITH_WEIGHTS):
-        found = reference.decode_texels(data, below, level.shape, max_error)
-        assert bits(found) == bits(texels)
+        actual = reference.decode_texels(data, below, level.shape, max_error)
+        assert bits(actual) == bits(texels)
     assert bits(coder.decode(data, below, level.shape, max_error)) == bits(texels)
     return data
 

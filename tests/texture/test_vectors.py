@@ -29,8 +29,8 @@ def test_every_file_has_its_digests() -> None:
 def test_frozen_file_decodes(name: str) -> None:
     data = read_ptm(VECTORS / f"{name}.ptm")
     assert name.startswith(f"v{read_header(data).version}/")
-    found = [hashlib.sha256(level.tobytes()).hexdigest() for level in decode_levels(data)]
-    assert found == DIGESTS[name]
+    actual = [hashlib.sha256(level.tobytes()).hexdigest() for level in decode_levels(data)]
+    assert actual == DIGESTS[name]
     assert check(data) == []
     for n, digest in enumerate(DIGESTS[name]):
         assert hashlib.sha256(decode(data, n).tobytes()).hexdigest() == digest
@@ -47,16 +47,16 @@ def test_between_them_the_files_use_every_coder() -> None:
 
 
 def test_every_profile_with_every_kind_of_sample() -> None:
-    found = set()
+    actual = set()
     for name in DIGESTS:
         header = read_header(read_ptm(VECTORS / f"{name}.ptm"))
         if header.version == 2:
-            found.add((header.profile, header.kind, header.max_error > 0))
+            actual.add((header.profile, header.kind, header.max_error > 0))
     wanted = {(profile, kind, False) for profile in ("raw", "fast", "small") for kind in KINDS}
     wanted |= {
         (profile, kind, True) for profile in ("fast", "small") for kind in ("uint8", "uint16")
     }
-    assert found >= wanted
+    assert actual >= wanted
 
 
 def test_the_page_of_vectors_is_what_the_decoders_do() -> None:

@@ -80,7 +80,7 @@ def test_clip_never_overruns_a_slot():
 def brute_force_separators(a, b):
     """Every plane through an edge of one polygon and a vertex of the other that has a on its
     one side and b on the other."""
-    found = []
+    actual = []
     for p, q, sign in ((a, b, 1.0), (b, a, -1.0)):
         for i in range(len(p)):
             for v in q:
@@ -90,8 +90,8 @@ def brute_force_separators(a, b):
                 n /= np.linalg.norm(n)
                 for m in (n, -n):
                     if (a @ m).max() <= (b @ m).min() + 1e-9:
-                        found.append(np.append(m, -(b @ m).min() if sign > 0 else -(a @ m).max()))
-    return np.array(found).reshape(-1, 4)
+                        actual.append(np.append(m, -(b @ m).min() if sign > 0 else -(a @ m).max()))
+    return np.array(actual).reshape(-1, 4)
 
 
 @given(rng=RANDOM, na=st.integers(3, 6), nb=st.integers(3, 6))
@@ -249,13 +249,13 @@ def test_sight_is_returned(count):
     bits.return_sight(known, 0, words)
     back = np.arange(count) ^ 1
     expected = sees & sees[back][:, back].T
-    found = np.unpackbits(known.view(np.uint8), axis=1, count=count, bitorder="little")
-    assert np.array_equal(found.astype(bool), expected)
+    actual = np.unpackbits(known.view(np.uint8), axis=1, count=count, bitorder="little")
+    assert np.array_equal(actual.astype(bool), expected)
     # A bit that goes later takes its way back with it.
     p, q = np.argwhere(expected)[0]
     dropped = np.zeros(words, np.uint64)
     dropped[q >> 6] = np.uint64(1) << np.uint64(q & 63)
     bits.drop_unreturned(known, p, dropped)
     expected[q ^ 1, p ^ 1] = False
-    found = np.unpackbits(known.view(np.uint8), axis=1, count=count, bitorder="little")
-    assert np.array_equal(found.astype(bool), expected)
+    actual = np.unpackbits(known.view(np.uint8), axis=1, count=count, bitorder="little")
+    assert np.array_equal(actual.astype(bool), expected)

@@ -105,8 +105,8 @@ def test_a_walk_that_leaves_rooms_out_says_so() -> None:
 
 def test_a_conservative_set_that_misses_a_pair_is_a_failure(tmp_path: Path) -> None:
     for method, status in (("sampled", 0), ("fast", 1)):
-        found = [replace(r, missed_pairs=int(r.method == method)) for r in rows()]
-        pvs_trade.write_csv(found, tmp_path / "pvs.csv")
+        actual = [replace(r, missed_pairs=int(r.method == method)) for r in rows()]
+        pvs_trade.write_csv(actual, tmp_path / "pvs.csv")
         assert pvs_trade.main(["--only-plot", str(tmp_path / "pvs.csv")]) == status
 
 

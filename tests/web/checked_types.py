@@ -38,11 +38,11 @@ def missing() -> str | None:
 
 def complaints(folder: Path | None = None) -> str:
     """Of one folder, or of all packages; empty if there are none."""
-    said = []
+    printed = []
     for package in [folder] if folder else [ROOT / name for name in PACKAGES]:
         command = ["node", str(compiler()), "--project", str(package), "--pretty", "false"]
-        said.append(subprocess.run(command, capture_output=True, text=True).stdout)
-    return "".join(said)
+        printed.append(subprocess.run(command, capture_output=True, text=True).stdout)
+    return "".join(printed)
 
 
 def main() -> int:
@@ -50,9 +50,9 @@ def main() -> int:
     if remedy := missing():
         print(f"The types of {', '.join(PACKAGES)} are not checked; {remedy}")
         return int(os.environ.get("CI", "").lower() == "true")
-    said = complaints()
-    print(said, end="")
-    return int(bool(said))
+    printed = complaints()
+    print(printed, end="")
+    return int(bool(printed))
 
 
 if __name__ == "__main__":

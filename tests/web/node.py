@@ -42,9 +42,11 @@ def missing() -> str | None:
     node = shutil.which("node")
     if node is None:
         return INSTALL
-    told = subprocess.run([node, "--version"], capture_output=True, text=True, check=True).stdout
-    found = re.match(r"v(\d+)", told)
-    return None if found and int(found[1]) >= OLDEST else INSTALL
+    reported = subprocess.run(
+        [node, "--version"], capture_output=True, text=True, check=True
+    ).stdout
+    actual = re.match(r"v(\d+)", reported)
+    return None if actual and int(actual[1]) >= OLDEST else INSTALL
 
 
 def run(*arguments: str | Path, seconds: float = 300) -> str:
@@ -63,8 +65,8 @@ def decode_all(
     cases.write_bytes(b"".join(struct.pack("<I", len(file)) + file for file in files))
     lines = run(HERE / "decode.mjs", cases, *options, seconds=seconds).splitlines()
     assert len(lines) == len(files)
-    told = map(json.loads, lines)
-    return [Decoded(tuple(one["levels"]), one["error"]) for one in told]
+    reported = map(json.loads, lines)
+    return [Decoded(tuple(one["levels"]), one["error"]) for one in reported]
 
 
 @cache

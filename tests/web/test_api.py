@@ -39,8 +39,8 @@ def file() -> bytes:
 def told(tmp_path_factory: pytest.TempPathFactory, file: bytes) -> dict[str, Any]:
     path = tmp_path_factory.mktemp("api") / "image.ptm"
     path.write_bytes(file)
-    found: dict[str, Any] = json.loads(run(HERE / "api.mjs", path))
-    return found
+    actual: dict[str, Any] = json.loads(run(HERE / "api.mjs", path))
+    return actual
 
 
 @pytest.fixture(scope="module")

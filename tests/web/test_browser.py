@@ -60,9 +60,9 @@ def test_workers_decode_what_python_does(browser: Any, tmp_path: Path) -> None:
     (tmp_path / "image.ptm").write_bytes(file)
     visit = browser.visit(browser.REPORTING + PAGE, {"ptm": PACKAGE, "files": tmp_path})
     assert visit.messages == []
-    told = json.loads(visit.body)
+    reported = json.loads(visit.body)
     levels = []
     for level in decode_levels(file):
         opaque = np.dstack([level, np.full(level.shape[:2], 255, np.uint8)])
         levels.append(hashlib.sha256(opaque.tobytes()).hexdigest())
-    assert told == {"levels": levels, "alone": 1, "error": "Error", "failed": True}
+    assert reported == {"levels": levels, "alone": 1, "error": "Error", "failed": True}

@@ -86,20 +86,20 @@ def synthetic() -> dict[str, bytes]:
 
 def test_frozen_files(tmp_path: Path) -> None:
     files = [file.read_bytes() for file in sorted(VECTORS.glob("*.ptm"))]
-    for file, found in zip(files, decode_all(tmp_path, files), strict=True):
+    for file, actual in zip(files, decode_all(tmp_path, files), strict=True):
         if known(file):
-            assert found == by_python(file)
+            assert actual == by_python(file)
         else:
-            assert (found.error, found.levels) == (UNKNOWN, ())
+            assert (actual.error, actual.levels) == (UNKNOWN, ())
     assert sum(map(known, files)) == 23
 
 
 def test_synthetic_files(tmp_path: Path) -> None:
     files = synthetic()
-    found = decode_all(tmp_path, list(files.values()))
+    actual = decode_all(tmp_path, list(files.values()))
     wrong = [
         name
-        for (name, file), one in zip(files.items(), found, strict=True)
+        for (name, file), one in zip(files.items(), actual, strict=True)
         if one.error or one != by_python(file)
     ]
     assert wrong == []
@@ -110,8 +110,8 @@ def test_ready_for_upload(tmp_path: Path) -> None:
     """As RGBA grey is in all three, and what has no alpha is opaque."""
     images = [image("photo", 21, 18, components) for components in range(1, 5)]
     files = [encode(one) for one in images]
-    found = decode_all(tmp_path, files, "rgba")
-    for file, one in zip(files, found, strict=True):
+    actual = decode_all(tmp_path, files, "rgba")
+    for file, one in zip(files, actual, strict=True):
         wanted = []
         for level in decode_levels(file):
             colour = level[:, :, :3] if level.shape[2] > 2 else np.repeat(level[:, :, :1], 3, 2)
@@ -129,12 +129,12 @@ def test_cut_at_every_byte(tmp_path: Path, name: str) -> None:
     file = (VECTORS / f"{name}.ptm").read_bytes()
     header, exact = read_header(file), by_python(file)
     cuts = [file[:size] for size in range(len(file))]
-    for cut, found in zip(cuts, decode_all(tmp_path, cuts), strict=True):
+    for cut, actual in zip(cuts, decode_all(tmp_path, cuts), strict=True):
         if len(cut) < header.description[0]:
-            assert found == by_python(cut)
+            assert actual == by_python(cut)
         else:
             whole = whole_levels(header, len(cut))
-            assert found == Decoded(exact.levels[:whole], None), len(cut)
+            assert actual == Decoded(exact.levels[:whole], None), len(cut)
 
 
 @pytest.mark.parametrize(
@@ -149,10 +149,10 @@ def test_every_byte_flipped(tmp_path: Path, name: str) -> None:
         flipped[at] ^= 1 << (at % 8)
         flips.append(bytes(flipped))
     exact = by_python(file)
-    for at, found in enumerate(decode_all(tmp_path, flips)):
-        assert found.error is not None, at
-        assert found == by_python(flips[at]) or found.error == UNKNOWN
-        assert found.levels == exact.levels[: len(found.levels)]
+    for at, actual in enumerate(decode_all(tmp_path, flips)):
+        assert actual.error is not None, at
+        assert actual == by_python(flips[at]) or actual.error == UNKNOWN
+        assert actual.levels == exact.levels[: len(actual.levels)]
 
 
 def test_flips_behind_right_checksums(tmp_path: Path) -> None:
@@ -166,9 +166,9 @@ def test_flips_behind_right_checksums(tmp_path: Path) -> None:
             flipped[at] ^= 1 << (at % 8)
             flips.append(sealed(bytes(flipped), file))
     passed = 0
-    for flipped, found in zip(flips, decode_all(tmp_path, flips), strict=True):
-        assert found == by_python(flipped)
-        passed += found.error is None
+    for flipped, actual in zip(flips, decode_all(tmp_path, flips), strict=True):
+        assert actual == by_python(flipped)
+        passed += actual.error is None
     assert 0 < passed < len(flips)
 
 
@@ -183,12 +183,12 @@ def test_the_fuzzers_files(tmp_path: Path) -> None:
         files.append(sealed(changed, file) if rng.random() < 0.9 else changed)
     decoded = decode_all(tmp_path, files, "native", str(LIMITS.decoded_bytes))
     outcomes: Counter[str | None] = Counter()
-    for file, found in zip(files, decoded, strict=True):
+    for file, actual in zip(files, decoded, strict=True):
         wanted = by_python(file, LIMITS)
         # Python looks whether the finest level is within its limit before the coarsest.
-        if found.error != UNKNOWN and "PTM-L103" not in (found.error, wanted.error):
-            assert found == wanted
-            outcomes[found.error] += 1
+        if actual.error != UNKNOWN and "PTM-L103" not in (actual.error, wanted.error):
+            assert actual == wanted
+            outcomes[actual.error] += 1
     assert outcomes[None] > 300
     assert outcomes["PTM-I112"] > 200
 
@@ -222,25 +222,25 @@ def test_huge_sizes_are_refused_before_memory_is_taken(tmp_path: Path) -> None:
         hostile_head(components=5),
         hostile_head(components=0),
     ]
-    found = decode_all(tmp_path, huge)
-    assert found == [by_python(file) for file in huge]
-    assert {one.error for one in found} == {None, "PTM-L104", "PTM-I105"}
+    actual = decode_all(tmp_path, huge)
+    assert actual == [by_python(file) for file in huge]
+    assert {one.error for one in actual} == {None, "PTM-L104", "PTM-I105"}
 
 
 def test_memory_stays_within_the_limit(tmp_path: Path) -> None:
     """The largest level that the format allows, of which not one byte is there, takes none."""
     script = Path(__file__).with_name("limits.mjs")
-    told = run(script).split()
-    assert told[:2] == ["PTM-L103", "PTM-L103"]
-    assert int(told[2]) < 1 << 24
+    reported = run(script).split()
+    assert reported[:2] == ["PTM-L103", "PTM-L103"]
+    assert int(reported[2]) < 1 << 24
 
 
 def test_a_large_tile_leaves_nothing_behind(tmp_path: Path) -> None:
     """Of 34 MB: the decoder gives its memory up and begins anew."""
     large = encode(np.full((2600, 2600, 1), 200, np.uint8), EncodeOptions(tile=0))
     small = encode(image("photo", 60, 61, 3))
-    found = decode_all(tmp_path, [small, large, small])
-    assert found == [by_python(file) for file in (small, large, small)]
+    actual = decode_all(tmp_path, [small, large, small])
+    assert actual == [by_python(file) for file in (small, large, small)]
 
 
 def test_a_limit_is_a_limit(tmp_path: Path) -> None:

@@ -186,8 +186,8 @@ def run(
     **settings: Any,
 ) -> tuple[Any, web.Visit]:
     """What the body of an asynchronous function returns; it has ``renderer``, ``settings``."""
-    told = json.dumps({"width": width, "height": height, **settings})
-    page = HEAD + FRAME.replace("SETTINGS", told).replace("SCRIPT", script)
+    reported = json.dumps({"width": width, "height": height, **settings})
+    page = HEAD + FRAME.replace("SETTINGS", reported).replace("SCRIPT", script)
     everything = {**folders(), **served}
     seen = web.visit(page, everything, width=width, height=height, seconds=seconds)
     return json.loads(seen.body), seen

@@ -28,18 +28,18 @@ def missing() -> str | None:
 
 def complaints(log: str) -> list[str]:
     """The warnings of a log, one line each."""
-    found: list[str] = []
+    actual: list[str] = []
     open_ended = False
     for line in log.splitlines():
         if line.startswith("Warning:"):
             open_ended = HARMLESS not in line
             if open_ended:
-                found.append(line)
+                actual.append(line)
         elif line.startswith(BEGINNINGS):
             open_ended = False
         elif open_ended:
-            found[-1] += f" {line.strip()}"
-    return found
+            actual[-1] += f" {line.strip()}"
+    return actual
 
 
 def _run(arguments: list[str], folder: Path, *, display: bool, seconds: float) -> list[str]:
@@ -57,11 +57,11 @@ def _run(arguments: list[str], folder: Path, *, display: bool, seconds: float) -
             timeout=seconds,
         )
         log = Path(config) / "view3dscene" / "view3dscene.log"
-        found = complaints(log.read_text(errors="replace")) if log.exists() else ["no log"]
+        actual = complaints(log.read_text(errors="replace")) if log.exists() else ["no log"]
     if done.returncode:
-        said = done.stderr.decode(errors="replace").strip().replace("\n", " ")
-        found.append(f"exit status {done.returncode}: {said}")
-    return found
+        printed = done.stderr.decode(errors="replace").strip().replace("\n", " ")
+        actual.append(f"exit status {done.returncode}: {printed}")
+    return actual
 
 
 def check(path: Path, *, seconds: float = 60) -> list[str]:
@@ -71,8 +71,8 @@ def check(path: Path, *, seconds: float = 60) -> list[str]:
 
 def check_all(www: Path) -> dict[str, list[str]]:
     """The complaints about every ``.wrl`` below a folder; only files with any are named."""
-    found = {str(p.relative_to(www)): check(p) for p in sorted(www.rglob("*.wrl"))}
-    return {name: lines for name, lines in found.items() if lines}
+    actual = {str(p.relative_to(www)): check(p) for p in sorted(www.rglob("*.wrl"))}
+    return {name: lines for name, lines in actual.items() if lines}
 
 
 def screenshot(

@@ -69,7 +69,7 @@ class Visit:
 def chromium() -> str | None:
     """The program, if it is installed."""
     names = ("chromium", "chromium-browser", "google-chrome")
-    return next((found for name in names if (found := shutil.which(name))), None)
+    return next((actual for name in names if (actual := shutil.which(name))), None)
 
 
 def visit(
@@ -111,8 +111,8 @@ def visit(
             )
             try:
                 if not seen.done.wait(seconds):
-                    said = "; ".join(seen.messages) or "and the console said nothing"
-                    raise TimeoutError(f"the page was not done within {seconds:.0f} s: {said}")
+                    printed = "; ".join(seen.messages) or "and the console said nothing"
+                    raise TimeoutError(f"the page was not done within {seconds:.0f} s: {printed}")
             finally:
                 # A profile of its own: nothing is lost, and asked kindly it takes 10 s.
                 os.killpg(process.pid, signal.SIGKILL)
@@ -162,8 +162,8 @@ class _Handler(SimpleHTTPRequestHandler):
         self.seen.ranges.append((urlsplit(self.path).path, begin, end))
         self.send_response(206 if begin < size else 416)
         self.send_header("Content-Type", "application/octet-stream")
-        told = f"{begin}-{end - 1}" if begin < size else "*"
-        self.send_header("Content-Range", f"bytes {told}/{size}")
+        reported = f"{begin}-{end - 1}" if begin < size else "*"
+        self.send_header("Content-Range", f"bytes {reported}/{size}")
         part = path.read_bytes()[begin:end]
         self.send_header("Content-Length", str(len(part)))
         self.end_headers()

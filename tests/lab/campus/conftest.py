@@ -10,7 +10,7 @@ import pytest
 from ptmtools.arrays import Floats
 from ptmtools.neighbours.campus import CampusOptions, make_campus
 from ptmtools.scene import IngestOptions
-from tests.neighbours.campus.made import house, level, write_campus, write_obj
+from tests.neighbours.campus.models import house, level, write_campus, write_obj
 
 
 def round_(radius: float, k: int) -> Floats:

@@ -88,9 +88,9 @@ def test_the_table(
     asked = ["simulate", str(two_rooms), "--walk", str(walk_file), "--campus", str(rooms)]
     asked += ["--policy", "campus-low,best", "--bandwidth", "512k", "--memory", "inf"]
     assert main([*asked, "--csv", str(table), "--plot", str(plot), "--measure", "rmse"]) == 0
-    said = capsys.readouterr().out.splitlines()
-    assert any(line.startswith("The meshes of the campus leave out e of ") for line in said)
-    best, low = (line.split() for line in said[-2:])
+    printed = capsys.readouterr().out.splitlines()
+    assert any(line.startswith("The meshes of the campus leave out e of ") for line in printed)
+    best, low = (line.split() for line in printed[-2:])
     # Clients of the database come first.
     assert (best[0], low[0]) == ("best", "campus-low")
     assert low[5:8] == ["–"] * 3
@@ -102,8 +102,8 @@ def test_the_table(
     assert all(float(row["e"]) >= 0 for row in campus)
 
     assert main([*asked, "--json"]) == 0
-    told = schemas.read(capsys.readouterr().out.encode(), schemas.SIMULATION)
-    best_run, low_run = told["runs"]
+    reported = schemas.read(capsys.readouterr().out.encode(), schemas.SIMULATION)
+    best_run, low_run = reported["runs"]
     assert low_run["rmse"] is low_run["waste"] is low_run["details"]["quality"]["mean"] is None
     assert best_run["rmse"] > 0
     assert low_run["e"]["mean"] > 0

@@ -23,10 +23,10 @@ def walk(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 def test_all_presets(folder: Path, walk: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["walk-campus", str(folder), "--walk", walk, "--every", "50"]) == 0
-    said = capsys.readouterr().out.splitlines()
-    assert said[0] == "40 m in 40 s, 4 objects, 4Mbit/s, 100ms"
-    assert said[2] == "|  | Low | Medium | High | Ultra | Ultra cached |"
-    assert [line.split(" | ")[0] for line in said[-2:]] == ["| 30", "| 40"]
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[0] == "40 m in 40 s, 4 objects, 4Mbit/s, 100ms"
+    assert printed[2] == "|  | Low | Medium | High | Ultra | Ultra cached |"
+    assert [line.split(" | ")[0] for line in printed[-2:]] == ["| 30", "| 40"]
 
 
 def test_some_objects(folder: Path, walk: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -38,8 +38,8 @@ def test_options_and_json(folder: Path, walk: str, capsys: pytest.CaptureFixture
     asked = ["--preset", "low,ultra-cached", "--bandwidth", "512k", "--nearest", "1", "--memory",
              "1MiB", "--threads", "2", "--no-lightmaps", "--every", "0", "--json"]  # fmt: skip
     assert main(["walk-campus", str(folder), "--walk", walk, *asked]) == 0
-    told = schemas.read(capsys.readouterr().out.encode(), schemas.CAMPUS_WALK)
-    low, cached = told["runs"]
+    reported = schemas.read(capsys.readouterr().out.encode(), schemas.CAMPUS_WALK)
+    low, cached = reported["runs"]
     assert (low["preset"], cached["preset"]) == ("Low", "Ultra cached")
     assert (low["bandwidth"], low["e"], cached["bytes"]) == (512_000, None, 0)
     assert low["bytes"] > 0

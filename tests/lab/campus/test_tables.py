@@ -173,8 +173,8 @@ def test_all_alike(world: CampusWorld, pictures: dict[int, Picture], state: int,
     mesh = np.full(world.stock.objects, state)
     column = np.full(len(world.stock.bases), held)
     for frame in range(4):
-        found = tables(world).wrong(int(world.view[frame]), mesh, column)
-        assert found == pytest.approx(expected(pictures, frame, mesh, column), rel=1e-4, abs=1e-4)
+        actual = tables(world).wrong(int(world.view[frame]), mesh, column)
+        assert actual == pytest.approx(expected(pictures, frame, mesh, column), rel=1e-4, abs=1e-4)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -183,8 +183,8 @@ def test_each_in_its_own_state(world: CampusWorld, pictures: dict[int, Picture],
     mesh = random.integers(0, 3, world.stock.objects)
     column = random.integers(0, 4, len(world.stock.bases))
     for frame in range(4):
-        found = tables(world).wrong(int(world.view[frame]), mesh, column)
-        assert found == pytest.approx(expected(pictures, frame, mesh, column), rel=1e-4, abs=1e-4)
+        actual = tables(world).wrong(int(world.view[frame]), mesh, column)
+        assert actual == pytest.approx(expected(pictures, frame, mesh, column), rel=1e-4, abs=1e-4)
 
 
 def test_nothing_is_wrong_with_all_of_it_and_something_with_less(world: CampusWorld) -> None:
@@ -208,8 +208,8 @@ def test_another_full_picture(folder: Path, world: CampusWorld) -> None:
     same = look(FullPicture(replace(finest), large), finest, coarsest, sizes, *poses)
     mesh, column = np.full(stock.objects, COARSE), np.full(len(stock.bases), 2)
     for frame in range(4):
-        found = same.wrong(frame, mesh, column)
-        assert found == own.wrong(int(world.view[frame]), mesh, column)
+        actual = same.wrong(frame, mesh, column)
+        assert actual == own.wrong(int(world.view[frame]), mesh, column)
     # What the campus does not have at all is wrong in every run.
     nothing = read_surfaces(folder, replace(stock, campus=replace(stock.campus, objects=())), 0)
     empty = look(FullPicture(finest, large), nothing, nothing, sizes, *poses)

@@ -67,16 +67,16 @@ def test_the_front_is_what_no_other_sound_trial_beats(points):
         Trial(Setting(str(i), {}, sound=sound), Measurement(cost, 1, error, error))
         for i, (cost, error, sound) in enumerate(points)
     ]
-    found = pareto(trials)
-    assert [t.measured.seconds for t in found] == sorted(cost for cost, _, _ in points)
+    actual = pareto(trials)
+    assert [t.measured.seconds for t in actual] == sorted(cost for cost, _, _ in points)
     sound = [(cost, error) for cost, error, good in points if good]
     expected = {
         (c, e)
         for c, e in sound
         if not any((a, b) != (c, e) and a <= c and b <= e for a, b in sound)
     }
-    assert {(t.measured.seconds, t.measured.error) for t in found if t.best} == expected
-    assert all(t.setting.sound for t in found if t.best)
+    assert {(t.measured.seconds, t.measured.error) for t in actual if t.best} == expected
+    assert all(t.setting.sound for t in actual if t.best)
 
 
 def test_two_trials_of_a_family_have_no_rate():

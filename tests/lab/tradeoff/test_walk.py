@@ -115,8 +115,8 @@ def test_a_knob_of_some_clients_names_them() -> None:
         "--samples 1", "--samples 8", "--samples", 20, 10**7, (seen(3.3, policy="ach"),)
     )
     text = sentence(rough, WalkTrade(60.0, own, (rough,)))
-    told = "the picture to the client ach is worse by 10 % at 4 Mbit/s (e 3.00 → 3.30)."
-    assert text.endswith(told)
+    reported = "the picture to the client ach is worse by 10 % at 4 Mbit/s (e 3.00 → 3.30)."
+    assert text.endswith(reported)
 
 
 def test_what_cannot_be_built_says_why() -> None:
@@ -131,12 +131,12 @@ def test_of_a_knob_the_best_is_told_then_what_saves_most_then_what_loses_least()
     alike = tried("--k 2", 2.001, 1.001, served=9 * 10**6)
     cheap = tried("--k 3", 2.003, 1.003, served=8 * 10**6)
     bad, worst = tried("--k 4", 2.4, 1.2, served=10**6), tried("--k 5", 4.0, 3.0, served=10**5)
-    for some, told in (
+    for some, reported in (
         ((bad, better, alike), better),
         ((worst, alike, cheap, bad), cheap),
         ((worst, bad), bad),
     ):
-        assert representative(some, OWN) is told
+        assert representative(some, OWN) is reported
 
 
 def test_the_table_has_a_block_for_each_walker_and_the_cheapest() -> None:
@@ -238,17 +238,17 @@ def test_the_command(db, walk_file, tmp_path, capsys) -> None:
     assert main([*asked, *knobs, *links, "--quick", "--json"]) == 0
     out, err = capsys.readouterr()
     assert "3 settings on a walk of 10 s; about" in err
-    (found,) = json.loads(out)
-    assert found["stage"] == "walk"
-    assert [t["option"] for t in found["trials"]] == ["--pvs", "--samples", "--max-side"]
-    assert len(found["sentences"]) == 3
-    side = found["trials"][2]
-    assert side["served"] < found["own"]["served"]
-    by_case = {(s["policy"], s["bandwidth"]): s["e"] for s in found["own"]["seen"]}
+    (actual,) = json.loads(out)
+    assert actual["stage"] == "walk"
+    assert [t["option"] for t in actual["trials"]] == ["--pvs", "--samples", "--max-side"]
+    assert len(actual["sentences"]) == 3
+    side = actual["trials"][2]
+    assert side["served"] < actual["own"]["served"]
+    by_case = {(s["policy"], s["bandwidth"]): s["e"] for s in actual["own"]["seen"]}
     assert set(by_case) == {(p, b) for p in ("best", "ach") for b in (64e3, None)}
     (unlimited,) = (s["e"] for s in side["seen"] if s["bandwidth"] is None)
     assert unlimited > by_case["best", None], "no link brings what was left out"
-    assert {s["policy"] for s in found["trials"][1]["seen"]} == {"ach"}
+    assert {s["policy"] for s in actual["trials"][1]["seen"]} == {"ach"}
     assert files_below(db) == before
     rows = list(csv.DictReader(file.open(encoding="utf-8")))
     assert {row["stage"] for row in rows} == {"walk"}

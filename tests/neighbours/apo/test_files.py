@@ -280,9 +280,9 @@ def test_from_a_mesh_to_a_picture(
     view = tmp_path / "view.png"
     options = ["--faces", 300, "--depth", 7, "--error", 0.2, "--up", "y", "--unit", "m"]
     assert run("apo", model, "-o", target, *options) == 0
-    said = capsys.readouterr()
-    assert "5,120 triangles → 300 faces" in said.out
-    assert said.err == ""
+    printed = capsys.readouterr()
+    assert "5,120 triangles → 300 faces" in printed.out
+    assert printed.err == ""
     assert run("validate", target) == 0
     assert run("info", target) == 0
     assert "octree texture" in capsys.readouterr().out
@@ -314,13 +314,13 @@ def test_a_picture_and_the_record(
     view = tmp_path / "view.png"
     small = ["--width", 8, "--height", 8, "--backend", "embree"]
     assert run("render", written, "-o", view, "--json", *small) == 0
-    said = capsys.readouterr()
-    assert (json.loads(said.out)["file"], said.err) == (str(view), "")
+    printed = capsys.readouterr()
+    assert (json.loads(printed.out)["file"], printed.err) == (str(view), "")
     drawn = view.read_bytes()
     assert run("apo", written, "--render", view, "--json", "--force", *small) == 0
-    said = capsys.readouterr()
-    assert json.loads(said.out)["picture"]["file"] == str(view)
-    assert said.err == "ptm: note: --render of `ptm apo` is now `ptm render DIR -o VIEW.png`\n"
+    printed = capsys.readouterr()
+    assert json.loads(printed.out)["picture"]["file"] == str(view)
+    assert printed.err == "ptm: note: --render of `ptm apo` is now `ptm render DIR -o VIEW.png`\n"
     assert view.read_bytes() == drawn
     assert run("apo", written, "--render", view, "--force", "--faces", 9) == 2
     assert run("apo", tmp_path, "--render", view, "--force") == 3
@@ -394,11 +394,11 @@ def test_bad_inputs_have_one_line_each(
 ) -> None:
     for arguments, code in bad_inputs(model, written, tmp_path):
         status = run(*arguments)
-        said = capsys.readouterr().err
+        printed = capsys.readouterr().err
         assert status in (2, 3, 4, 7), arguments
-        assert said.count("\n") == 1, (arguments, said)
-        assert not code or f"[{code}" in said, (arguments, said)
-        assert "Traceback" not in said
+        assert printed.count("\n") == 1, (arguments, printed)
+        assert not code or f"[{code}" in printed, (arguments, printed)
+        assert "Traceback" not in printed
     assert not (tmp_path / "new").exists()
     assert (tmp_path / "own" / "thesis.doc").read_text() == "mine"
     assert not [name for name in tmp_path.iterdir() if ".part" in name.name]
@@ -413,10 +413,10 @@ def test_frozen_folders() -> None:
     for name, expected in digests.items():
         octree = read_octree(VECTORS / name)
         assert hashlib.sha256(octree.texels.tobytes()).hexdigest() == expected["normals"]
-        found = octree.colors
-        assert (found is None) == ("colors" not in expected)
-        if found is not None:
-            assert hashlib.sha256(found.tobytes()).hexdigest() == expected["colors"]
+        actual = octree.colors
+        assert (actual is None) == ("colors" not in expected)
+        if actual is not None:
+            assert hashlib.sha256(actual.tobytes()).hexdigest() == expected["colors"]
         assert check(VECTORS / name).issues == ()
         with pytest.raises(PtmError):
             read_octree(VECTORS / name, octree.levels + 1)

@@ -26,9 +26,9 @@ OPTIONS = ApoOptions(faces=500, depth=9, error=0.1)
 
 
 def made(points: np.ndarray, triangles: np.ndarray, options: ApoOptions = OPTIONS) -> ApoTexture:
-    found = make_apo(scene_of(points, triangles), options, Executor())
-    assert fault_of(found.octree) is None
-    return found
+    actual = make_apo(scene_of(points, triangles), options, Executor())
+    assert fault_of(actual.octree) is None
+    return actual
 
 
 @pytest.fixture(scope="module")
@@ -60,34 +60,34 @@ def source_normals(points: np.ndarray, triangles: np.ndarray, at: np.ndarray) ->
 
 def test_the_normals_are_those_of_the_source() -> None:
     points, triangles = sphere(4, 0.03)
-    found = made(points, triangles, replace(OPTIONS, faces=300, density=60, error=0.03))
+    actual = made(points, triangles, replace(OPTIONS, faces=300, density=60, error=0.03))
     rng = np.random.default_rng(1)
-    chosen = rng.integers(0, len(found.mesh.triangles), 60)
+    chosen = rng.integers(0, len(actual.mesh.triangles), 60)
     weight = rng.dirichlet([1, 1, 1], 60)
-    at = np.einsum("ij,ijk->ik", weight, found.mesh.points[found.mesh.triangles[chosen]])
-    own = np.einsum("ij,ijk->ik", weight, found.mesh.normals[found.mesh.triangles[chosen]])
+    at = np.einsum("ij,ijk->ik", weight, actual.mesh.points[actual.mesh.triangles[chosen]])
+    own = np.einsum("ij,ijk->ik", weight, actual.mesh.normals[actual.mesh.triangles[chosen]])
     expected = source_normals(points, triangles, at)
-    off = angles(found, at, expected)
+    off = angles(actual, at, expected)
     assert off.mean() < 4
     plain = np.degrees(np.arccos(np.clip((own * expected).sum(axis=1), -1, 1)))
     assert off.mean() < plain.mean() / 2  # what the simplified mesh itself would show
-    assert found.missed == 0
+    assert actual.missed == 0
 
 
 def test_a_closer_bound_makes_a_larger_and_better_octree() -> None:
     points, triangles = sphere(5, 0.03)
     sizes = []
     for error in (0.4, 0.2, 0.1):
-        found = made(points, triangles, replace(OPTIONS, error=error))
-        sizes.append(len(found.octree.texels))
+        actual = made(points, triangles, replace(OPTIONS, error=error))
+        sizes.append(len(actual.octree.texels))
     assert sizes == sorted(set(sizes))
     assert sizes[2] > 2 * sizes[0]
 
 
 def test_a_flat_mesh_is_one_texel() -> None:
     points, triangles = square(30)
-    found = made(points, triangles)
-    assert found.octree.texels.tolist() == [[128, 255, 128, 0]]
+    actual = made(points, triangles)
+    assert actual.octree.texels.tolist() == [[128, 255, 128, 0]]
 
 
 def test_depth_and_density_bound_the_octree() -> None:
@@ -140,14 +140,14 @@ def test_colours_of_corners_are_kept() -> None:
     points, triangles = sphere(5)
     red = np.where(points[triangles][:, :, :1] > 0, [255, 0, 0], [0, 0, 255]).astype(np.uint8)
     scene = scene_of(points, triangles, red)
-    found = make_apo(scene, replace(OPTIONS, color=True), Executor())
-    assert found.octree.colors is not None
-    q = (np.array([[0.9, 0.1, 0.1], [-0.9, 0.1, -0.1]]) - found.octree.low) / found.octree.side
-    address = look_up(found.octree, q).address
-    assert found.octree.colors[address].tolist() == [[255, 0, 0, 255], [0, 0, 255, 255]]
+    actual = make_apo(scene, replace(OPTIONS, color=True), Executor())
+    assert actual.octree.colors is not None
+    q = (np.array([[0.9, 0.1, 0.1], [-0.9, 0.1, -0.1]]) - actual.octree.low) / actual.octree.side
+    address = look_up(actual.octree, q).address
+    assert actual.octree.colors[address].tolist() == [[255, 0, 0, 255], [0, 0, 255, 255]]
     plain = make_apo(scene, OPTIONS, Executor())
     assert plain.octree.colors is None
-    assert len(plain.octree.texels) < len(found.octree.texels)  # the edge of the colours
+    assert len(plain.octree.texels) < len(actual.octree.texels)  # the edge of the colours
 
 
 def sheet(y: float, up: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -164,12 +164,12 @@ def cast(*sheets: tuple[np.ndarray, np.ndarray]) -> tuple[int, float]:
         points.astype(np.float32), triangles.astype(np.int32), np.zeros((0, 3, 3), np.float32)
     )
     hits = nearest(source, np.array([[0.6, 0.5, 0.3]]), np.array([[0.0, 1, 0]]))
-    found = int(hits.triangle[0])
-    if found >= 0:
-        at = hits.weight[0] @ points[triangles[found]]
+    actual = int(hits.triangle[0])
+    if actual >= 0:
+        at = hits.weight[0] @ points[triangles[actual]]
         np.testing.assert_allclose(at[[0, 2]], [0.6, 0.3], atol=1e-5)
         assert abs(abs(at[1] - 0.5) - hits.distance[0]) < 1e-5
-    return (found // 2 if found >= 0 else -1), float(hits.distance[0])
+    return (actual // 2 if actual >= 0 else -1), float(hits.distance[0])
 
 
 def test_a_sample_stands_for_the_nearest_surface_that_faces_its_way() -> None:
@@ -190,11 +190,11 @@ def test_a_sample_stands_for_the_nearest_surface_that_faces_its_way() -> None:
 def test_a_face_with_two_sides_counts_once(turned: bool) -> None:
     points, triangles = square(12, 0.05)
     both = [triangles, triangles[:, ::-1]]
-    found = made(points, np.concatenate(both[::-1] if turned else both))
-    assert found.missed == 0
-    assert found.source == len(triangles)
-    assert any("count once" in note for note in found.notes)
-    assert (found.octree.texels[0, 1] > 128) != turned
+    actual = made(points, np.concatenate(both[::-1] if turned else both))
+    assert actual.missed == 0
+    assert actual.source == len(triangles)
+    assert any("count once" in note for note in actual.notes)
+    assert (actual.octree.texels[0, 1] > 128) != turned
 
 
 @pytest.mark.parametrize("thickness", [0.05, 0.02])
@@ -203,7 +203,7 @@ def test_either_side_of_a_thin_wall_shows_its_own_normal(thickness: float) -> No
     n = len(top)
     points = np.concatenate([top, top - [0, thickness, 0]])
     turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
-    found = made(
+    actual = made(
         points @ turn.T,
         np.concatenate([faces, faces[:, ::-1] + n]),
         ApoOptions(faces=10**6, density=8),
@@ -212,7 +212,7 @@ def test_either_side_of_a_thin_wall_shows_its_own_normal(thickness: float) -> No
     at = np.stack([rng.random(2000), np.zeros(2000), rng.random(2000)], axis=1) @ turn.T
     up = np.broadcast_to(np.array([0.0, 1, 0]) @ turn.T, at.shape)
     up = up * np.sign(np.linalg.det(turn))
-    assert (angles(found, at, up) > 90).mean() < 0.03
+    assert (angles(actual, at, up) > 90).mean() < 0.03
 
 
 def test_memory_does_not_grow_with_a_far_speck(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -223,11 +223,11 @@ def test_memory_does_not_grow_with_a_far_speck(monkeypatch: pytest.MonkeyPatch) 
     divided = blocks.divided
 
     def watched(work: Any) -> Any:
-        found = divided(work)
-        for block in found[1]:
+        actual = divided(work)
+        for block in actual[1]:
             corner = work.surface.corner[block.triangles]
             sizes.append(len(blocks.spread(corner, work.spacing).triangle))
-        return found
+        return actual
 
     monkeypatch.setattr(blocks, "divided", watched)
     made(
@@ -278,8 +278,8 @@ def test_the_warm_up_calls_every_kernel(monkeypatch: pytest.MonkeyPatch) -> None
         return call(self, *arguments)
 
     monkeypatch.setattr(jit._Kernel, "__call__", record)
-    found = make_apo(scene_of(*sphere(5, 0.03)), OPTIONS, Executor())
-    look_up(found.octree, np.full((1, 3), 0.5))
+    actual = make_apo(scene_of(*sphere(5, 0.03)), OPTIONS, Executor())
+    look_up(actual.octree, np.full((1, 3), 0.5))
     needed = set(names)
     names.clear()
     warm_statue()

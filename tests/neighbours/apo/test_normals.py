@@ -40,10 +40,10 @@ def sphere(rows: int = 12) -> tuple[np.ndarray, np.ndarray]:
 
 def test_a_sphere_is_smooth() -> None:
     points, triangles = sphere()
-    found = corner_normals(points, triangles)
-    cosine = (found * points[triangles]).sum(axis=2)
+    actual = corner_normals(points, triangles)
+    cosine = (actual * points[triangles]).sum(axis=2)
     assert np.degrees(np.arccos(cosine.min())) < 1
-    np.testing.assert_allclose(np.linalg.norm(found, axis=2), 1, rtol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(actual, axis=2), 1, rtol=1e-12)
 
 
 def test_a_cube_keeps_its_edges_below_its_angle_and_loses_them_above() -> None:
@@ -69,11 +69,11 @@ def test_only_what_is_near_the_own_normal_counts() -> None:
             for t in ([2 * k, 2 * k + 2, 2 * k + 1], [2 * k + 1, 2 * k + 2, 2 * k + 3])
         ]
     )
-    found = corner_normals(points, triangles, 40)
-    first = np.degrees(np.arctan2(-found[0, :, 0], found[0, :, 2]))
+    actual = corner_normals(points, triangles, 40)
+    first = np.degrees(np.arctan2(-actual[0, :, 0], actual[0, :, 2]))
     assert first[0] == 0
     assert 0 < first[1] < 30
-    np.testing.assert_array_equal(found, corner_normals(points, triangles, 40))
+    np.testing.assert_array_equal(actual, corner_normals(points, triangles, 40))
     np.testing.assert_array_equal(corner_normals(points, triangles, 29)[0], [[0, 0, 1]] * 3)
 
 
@@ -86,9 +86,9 @@ def test_size_and_place_change_nothing(scale: float) -> None:
 
 def test_flat_triangles_and_fans_are_no_trouble(monkeypatch: pytest.MonkeyPatch) -> None:
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [2.0, 0, 0]])
-    found = corner_normals(points, np.array([[0, 1, 2], [0, 3, 1], [3, 3, 3]]))
-    np.testing.assert_array_equal(found[:2], np.broadcast_to([0, 0, 1.0], (2, 3, 3)))
-    np.testing.assert_array_equal(found[2], np.broadcast_to([0, 0, 1.0], (3, 3)))
+    actual = corner_normals(points, np.array([[0, 1, 2], [0, 3, 1], [3, 3, 3]]))
+    np.testing.assert_array_equal(actual[:2], np.broadcast_to([0, 0, 1.0], (2, 3, 3)))
+    np.testing.assert_array_equal(actual[2], np.broadcast_to([0, 0, 1.0], (3, 3)))
     assert corner_normals(points, np.zeros((0, 3), np.int32)).shape == (0, 3, 3)
     count = normals.FAN + 1
     turn = 2 * np.pi * np.arange(count) / count
@@ -96,8 +96,8 @@ def test_flat_triangles_and_fans_are_no_trouble(monkeypatch: pytest.MonkeyPatch)
     cone = np.concatenate([rim, [[0, 0, 0]]])
     k = np.arange(count)
     tip = np.stack([np.full(count, count), k, (k + 1) % count], 1)
-    found = corner_normals(cone, tip)[:, 0]
-    np.testing.assert_allclose(found, np.broadcast_to([0, 0, 1.0], found.shape), atol=1e-9)
+    actual = corner_normals(cone, tip)[:, 0]
+    np.testing.assert_allclose(actual, np.broadcast_to([0, 0, 1.0], actual.shape), atol=1e-9)
 
 
 def plain_corner_normals(points: np.ndarray, triangles: np.ndarray, crease: float) -> np.ndarray:

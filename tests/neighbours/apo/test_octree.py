@@ -32,9 +32,9 @@ def test_samples_are_as_far_apart_as_asked() -> None:
     rng = np.random.default_rng(4)
     corner = rng.random((300, 3, 3))
     points = spread(corner, 0.02)
-    found = np.bincount(points.triangle, minlength=len(corner)) * 0.02**2
+    actual = np.bincount(points.triangle, minlength=len(corner)) * 0.02**2
     large = areas(corner) > 0.05
-    np.testing.assert_allclose(found[large], areas(corner)[large], rtol=0.15)
+    np.testing.assert_allclose(actual[large], areas(corner)[large], rtol=0.15)
     assert points.weight.min() > 0
     np.testing.assert_allclose(points.weight.sum(axis=1), 1)
     assert (np.diff(points.triangle) >= 0).all()
@@ -57,8 +57,8 @@ def test_samples_are_about_as_many_as_asked(seed: int, faces: int, thin: float) 
     corner = random.random((faces, 3, 3)) * [1, thin, thin]
     count = 8 * faces
     spacing = spacing_for(corner, count)
-    found = len(spread(corner, spacing).triangle)
-    assert faces <= found <= 3 * count
+    actual = len(spread(corner, spacing).triangle)
+    assert faces <= actual <= 3 * count
     if thin == 1:
         assert spacing == pytest.approx(np.sqrt(areas(corner).sum() / count))
     assert spacing_for(corner * 0, count) == 0
@@ -195,8 +195,8 @@ def test_parts_make_the_whole() -> None:
         for rows in (slice(0, cut), slice(cut, None))
     ]
     below = joined([pruned(part, whole[1].code) for part in parts], 3)
-    for found, expected in zip(below, whole[1:], strict=True):
-        assert np.array_equal(found.code, expected.code)
-        assert np.array_equal(found.children, expected.children)
+    for actual, expected in zip(below, whole[1:], strict=True):
+        assert np.array_equal(actual.code, expected.code)
+        assert np.array_equal(actual.children, expected.children)
     none = pruned(parts[0], np.zeros(0, np.uint64))
     assert not any(len(level.code) for level in none)

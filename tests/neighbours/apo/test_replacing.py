@@ -118,9 +118,10 @@ def test_the_normals_are_those_of_the_statue(rooms: Scene) -> None:
         expected = source_normals(points, triangles.reshape(-1, 3), at)
         flat = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])[chosen]
         flat /= np.linalg.norm(flat, axis=1, keepdims=True)
-        found = look_up(each.octree, (at - each.octree.low) / each.octree.side).normals
+        actual = look_up(each.octree, (at - each.octree.low) / each.octree.side).normals
         off, plain = (
-            np.degrees(np.arccos(np.clip((n * expected).sum(axis=1), -1, 1))) for n in (found, flat)
+            np.degrees(np.arccos(np.clip((n * expected).sum(axis=1), -1, 1)))
+            for n in (actual, flat)
         )
         assert off.mean() < 2.5
         assert off.mean() < plain.mean() / 2
@@ -141,21 +142,21 @@ def test_borders_of_sides_and_of_colours_stay(rooms: Scene) -> None:
     assert len(own) < 1200
     corner = scene.corners[own]
     red = (scene.colors[own] == [255, 0, 0]).all(axis=(1, 2))
-    for along, said in ((corner[..., 0] - x, red), (corner[..., 1] - y, scene.two_sided[own])):
-        assert along[said].min() > -NARROW
-        assert along[~said].max() < NARROW
+    for along, printed in ((corner[..., 0] - x, red), (corner[..., 1] - y, scene.two_sided[own])):
+        assert along[printed].min() > -NARROW
+        assert along[~printed].max() < NARROW
     rest = scene.triangle_object != scene.objects.index("statue_02")
     assert (scene.colors[rest] == 255).all()
 
 
 def test_light_objects_and_unknown_names(rooms: Scene) -> None:
-    found = replaced(rooms, ReplaceOptions(apo=("*", "bust"), apo_faces=5120), Executor())
-    assert found.scene is rooms
-    assert (found.replacement, found.octrees) == (None, ())
-    unknown, light = found.notes
+    actual = replaced(rooms, ReplaceOptions(apo=("*", "bust"), apo_faces=5120), Executor())
+    assert actual.scene is rooms
+    assert (actual.replacement, actual.octrees) == (None, ())
+    unknown, light = actual.notes
     assert unknown == "--apo: no object is called 'bust'"
     assert light.startswith("15 objects of --apo have no more triangles than --apo-faces 5,120")
-    assert all(isinstance(note, Warned) for note in found.notes)
+    assert all(isinstance(note, Warned) for note in actual.notes)
     some = replaced(rooms, replace(OPTIONS, apo=("*",)), Executor())
     assert [isinstance(note, Warned) for note in some.notes] == [False]
     assert len(some.octrees) == 2
@@ -168,25 +169,25 @@ def test_what_cannot_be_lighter_stays(rooms: Scene) -> None:
     material[own] = len(rooms.materials) + np.arange(len(own))
     materials = (*rooms.materials, *[rooms.materials[0]] * len(own))
     patched = replace(rooms, triangle_material=material, materials=materials)
-    found = replaced(patched, replace(OPTIONS, apo=("statue_01",)), Executor())
-    assert found.scene is patched
-    assert "statue_01 stays as modelled: it cannot have fewer triangles" in found.notes
+    actual = replaced(patched, replace(OPTIONS, apo=("statue_01",)), Executor())
+    assert actual.scene is patched
+    assert "statue_01 stays as modelled: it cannot have fewer triangles" in actual.notes
 
 
 def test_objects_of_one_name_are_two(rooms: Scene) -> None:
     names = tuple("statue" if name in STATUES else name for name in rooms.objects)
-    found = replaced(replace(rooms, objects=names), replace(OPTIONS, apo=("statue",)), Executor())
-    assert [each.name for each in found.octrees] == ["statue", "statue"]
-    assert found.octrees[0].object != found.octrees[1].object
-    for each in found.octrees:
-        corner = found.scene.corners[found.scene.triangle_object == each.object]
+    actual = replaced(replace(rooms, objects=names), replace(OPTIONS, apo=("statue",)), Executor())
+    assert [each.name for each in actual.octrees] == ["statue", "statue"]
+    assert actual.octrees[0].object != actual.octrees[1].object
+    for each in actual.octrees:
+        corner = actual.scene.corners[actual.scene.triangle_object == each.object]
         q = (corner - each.octree.low) / each.octree.side
         assert ((q >= 0) & (q < 1)).all()
 
 
 def test_nothing_is_asked_for(rooms: Scene) -> None:
-    found = replaced(rooms, ReplaceOptions(), Executor())
-    assert found == Replaced(rooms, None, (), ())
+    actual = replaced(rooms, ReplaceOptions(), Executor())
+    assert actual == Replaced(rooms, None, (), ())
 
 
 def test_workers_and_the_way_through_a_file_change_nothing(rooms: Scene, made: Replaced) -> None:
@@ -263,7 +264,7 @@ def test_the_model_is_that_of_the_sample_and_statues(rooms: Scene, tmp_path: Pat
 
 def test_an_object_that_is_far_off_once_simplified_is_told(rooms: Scene) -> None:
     name = rooms.objects[-1]
-    told = replaced(rooms, ReplaceOptions(apo=(name,), apo_faces=12), Executor()).notes
-    assert any(isinstance(note, Warned) and "is off by about" in note for note in told)
+    reported = replaced(rooms, ReplaceOptions(apo=(name,), apo_faces=12), Executor()).notes
+    assert any(isinstance(note, Warned) and "is off by about" in note for note in reported)
     fine = replaced(rooms, ReplaceOptions(apo=(name,), apo_faces=1000), Executor()).notes
     assert not any("is off by about" in note for note in fine)

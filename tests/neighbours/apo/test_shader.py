@@ -42,9 +42,9 @@ def test_texels_of_points_are_those_of_numpy(gl: None, root: Node, levels: int, 
     stop = random.integers(-1, 6, len(q))
     for where in (None, stop):
         address, depth = look_up_by_shader(octree, q, levels, where)
-        found = look_up(octree, q, levels, where)
-        np.testing.assert_array_equal(address, found.address)
-        np.testing.assert_array_equal(depth, found.depth)
+        actual = look_up(octree, q, levels, where)
+        np.testing.assert_array_equal(address, actual.address)
+        np.testing.assert_array_equal(depth, actual.depth)
 
 
 def test_an_octree_of_many_rows_and_nothing_to_look_up(gl: None) -> None:
@@ -75,10 +75,10 @@ def test_pixels_show_what_numpy_finds_at_their_places(gl: None, levels: int) -> 
     shown = drawn(levels, "gl", what="normals", distance=2.5)
     at = shown.covered
     assert 0.02 < at.mean() < 0.5
-    found = look_up(octree, shown.place[at], levels, shown.stop[at])
-    np.testing.assert_array_equal(shown.address[at], found.address)
-    stored = octree.texels[found.address, :3].astype(int)
-    normals = np.rint((unpacked(octree.texels[found.address]) / 2 + 0.5) * 255)
+    actual = look_up(octree, shown.place[at], levels, shown.stop[at])
+    np.testing.assert_array_equal(shown.address[at], actual.address)
+    stored = octree.texels[actual.address, :3].astype(int)
+    normals = np.rint((unpacked(octree.texels[actual.address]) / 2 + 0.5) * 255)
     assert np.abs(shown.picture[at] - normals).max() <= 1
     assert np.abs(stored - normals).max() < 3
     assert not shown.picture[~at].any()

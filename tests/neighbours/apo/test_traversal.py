@@ -64,11 +64,11 @@ def test_an_octree_written_down() -> None:
     q = np.array(
         [[0.7, 0.2, 0.1], [0.1, 0.6, 0.9], [0.4, 0.9, 0.9], [0.4, 0.6, 0.9], [0.1, 0.1, 0]]
     )
-    found = look_up(octree, q)
-    assert found.address.tolist() == [2, 3, 6, 3, 0]
-    assert found.depth.tolist() == [1, 1, 2, 1, 0]
+    actual = look_up(octree, q)
+    assert actual.address.tolist() == [2, 3, 6, 3, 0]
+    assert actual.depth.tolist() == [1, 1, 2, 1, 0]
     red = np.array([255, 128, 128]) / 127.5 - 1
-    np.testing.assert_allclose(found.normals[0], red / np.linalg.norm(red))
+    np.testing.assert_allclose(actual.normals[0], red / np.linalg.norm(red))
     # Child 6 of the root is from (0, ½, ½) to (½, 1, 1).
     assert look_up(octree, np.array([[0.0, 0.5, 0.5]])).address.tolist() == [5]
     assert look_up(octree, q, levels=2).address.tolist() == [2, 3, 3, 3, 0]
@@ -91,11 +91,11 @@ def test_as_the_page_says(case: tuple[Node, list[tuple[float, ...]], int, int]) 
     octree = octree_of(root)
     expected = [walk(octree, list(q), levels, stop) for q in points]
     for way in (look_up, plain_look_up):
-        found = way(octree, np.array(points), levels, stop)
-        assert list(zip(found.address.tolist(), found.depth.tolist(), strict=True)) == expected
-        level = np.searchsorted(octree.start, found.address, side="right") - 1
-        np.testing.assert_array_equal(level, found.depth)
-        np.testing.assert_allclose(np.linalg.norm(found.normals, axis=1), 1)
+        actual = way(octree, np.array(points), levels, stop)
+        assert list(zip(actual.address.tolist(), actual.depth.tolist(), strict=True)) == expected
+        level = np.searchsorted(octree.start, actual.address, side="right") - 1
+        np.testing.assert_array_equal(level, actual.depth)
+        np.testing.assert_allclose(np.linalg.norm(actual.normals, axis=1), 1)
 
 
 @given(cases, st.integers(1, 5))

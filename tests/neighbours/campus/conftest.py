@@ -8,7 +8,7 @@ import pytest
 
 from ptmtools.neighbours.campus import Campus, CampusOptions, make_campus, read_campus
 from ptmtools.scene import IngestOptions
-from tests.neighbours.campus.made import write_campus
+from tests.neighbours.campus.models import write_campus
 
 METRES = IngestOptions(unit="m", up="y")
 

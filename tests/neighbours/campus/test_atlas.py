@@ -8,7 +8,7 @@ from hypothesis import given, strategies as st
 
 from ptmtools.arrays import Floats
 from ptmtools.neighbours.campus.atlas import claim, cover, nearest, unwrap
-from tests.neighbours.campus.made import level
+from tests.neighbours.campus.models import level
 from tests.neighbours.campus.shapes import (
     HOUSE,
     bilinear,

@@ -11,7 +11,7 @@ import pytest
 from ptmtools.cli.main import main
 from ptmtools.errors import PtmError
 from ptmtools.neighbours.campus import read_campus
-from tests.neighbours.campus.made import write_campus, write_gltf
+from tests.neighbours.campus.models import write_campus, write_gltf
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
@@ -95,10 +95,10 @@ def test_one_line(
     given = words(tmp_path)
     light = [] if "--lightmaps" in given else ["--lightmaps", "none"]
     status = main(["campus", *given, *light, "-o", str(tmp_path / "out"), "-j", "1", "-q"])
-    said = capsys.readouterr().err.strip()
+    printed = capsys.readouterr().err.strip()
     assert status in (3, 4, 7)
-    assert said.endswith(f"[{code}]"), said
-    assert "\n" not in said
+    assert printed.endswith(f"[{code}]"), printed
+    assert "\n" not in printed
     assert not (tmp_path / "out" / "campus.json").exists()
     assert not list(tmp_path.glob(".*"))
 

@@ -21,7 +21,7 @@ from ptmtools.parallel import open_executor
 from ptmtools.pipeline.validation import kind_of, validate
 from ptmtools.scene import IngestOptions
 from tests.conftest import files_below
-from tests.neighbours.campus.made import write_gltf
+from tests.neighbours.campus.models import write_gltf
 
 METRES = IngestOptions(unit="m", up="y")
 NONE = CampusOptions(lightmaps="none", faces=20)
@@ -67,12 +67,12 @@ def test_bytes_add_up(made: Path, index: Campus) -> None:
         ends = tuple(f"_{size}_{channel}.jpg" for channel in channels)
         return sum(len(data) for name, data in there.items() if name.endswith(ends))
 
-    found = {preset.name: preset for preset in index.presets}
-    assert list(found) == ["Low", "Medium", "High", "Ultra", "Ultra cached"]
-    assert found["Low"].bytes == meshes + held(128, "dam") + held(512, "l")
-    assert found["High"].bytes == meshes + held(128, "dam") + held(256, "dam") + held(2048, "l")
-    assert found["Ultra"].bytes == found["Ultra cached"].bytes
-    assert found["Ultra cached"].download == 0
+    actual = {preset.name: preset for preset in index.presets}
+    assert list(actual) == ["Low", "Medium", "High", "Ultra", "Ultra cached"]
+    assert actual["Low"].bytes == meshes + held(128, "dam") + held(512, "l")
+    assert actual["High"].bytes == meshes + held(128, "dam") + held(256, "dam") + held(2048, "l")
+    assert actual["Ultra"].bytes == actual["Ultra cached"].bytes
+    assert actual["Ultra cached"].download == 0
     first = sum(len(data) for name, data in there.items() if name.endswith("_0.glb"))
     assert index.start == first + held(128, "dam")
 
@@ -241,14 +241,14 @@ def test_the_command_prints_what_the_paper_has(
     folder = tmp_path / "c"
     words = ["campus", str(model), "-o", str(folder), "--lightmaps", "none", "--unit", "m"]
     assert main([*words, "--up", "y", "-j", "1"]) == 0
-    said = capsys.readouterr()
+    printed = capsys.readouterr()
     for text in ("diffuse", "3.09", "10.63", "78.81", "Ultra cached", "level 1", "mask"):
-        assert text in said.out
-    assert "small objects" in said.err
+        assert text in printed.out
+    assert "small objects" in printed.err
     assert main([*words, "--force", "--json", "-j", "1"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["objects"] == 5
-    assert len(found["presets"]) == 5
+    actual = json.loads(capsys.readouterr().out)
+    assert actual["objects"] == 5
+    assert len(actual["presets"]) == 5
     assert main(["info", str(folder)]) == 0
     assert ": campus" in capsys.readouterr().out
     assert main(["validate", str(folder)]) == 0

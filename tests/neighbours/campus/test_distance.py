@@ -37,22 +37,22 @@ def test_as_a_search_finds_it(eye: tuple, low: tuple, sides: tuple, share: tuple
     at, least, side = (np.array(v, float) for v in (eye, low, sides))
     box = np.concatenate([least, least + side])
     middle = np.clip(least + side * np.array(share), box[:3], box[3:])
-    found = float(distances(at, box[None], middle[None])[0])
+    actual = float(distances(at, box[None], middle[None])[0])
     wanted = searched(at, box, middle)
     # The search lets in what is a billionth outside: on a way that hardly leaves, that is far.
     leaving = np.abs(at - middle) > 1e-6 * np.linalg.norm(at - middle)
     if leaving.all():
-        assert found == pytest.approx(wanted, rel=1e-3, abs=1e-2)
+        assert actual == pytest.approx(wanted, rel=1e-3, abs=1e-2)
     nearest = np.linalg.norm(np.maximum(np.maximum(box[:3] - at, at - box[3:]), 0))
-    assert nearest <= found * (1 + 1e-9) + 1e-9
-    assert found <= np.linalg.norm(at - middle) * (1 + 1e-9)
+    assert nearest <= actual * (1 + 1e-9) + 1e-9
+    assert actual <= np.linalg.norm(at - middle) * (1 + 1e-9)
 
 
 def test_nothing_from_inside() -> None:
     box = np.array([[0.0, 0, 0, 2, 2, 2]])
     eyes = np.array([[1, 1, 1], [0.1, 1.9, 1], [2, 2, 2], [1, 1, 5]], float)
-    found = distances(eyes, box, np.array([[1.0, 1, 1]]))
-    assert found.tolist() == [[0], [0], [0], [3]]
+    actual = distances(eyes, box, np.array([[1.0, 1, 1]]))
+    assert actual.tolist() == [[0], [0], [0], [3]]
 
 
 def test_a_long_object_is_not_as_far_as_its_middle() -> None:

@@ -12,7 +12,7 @@ from ptmtools.neighbours.campus.lightmap import AGREE, bake, fill, vertex_light
 from ptmtools.neighbours.campus.lights import LightImage, Painted, Rays
 from ptmtools.neighbours.campus.occlusion import normals
 from ptmtools.scene.source import SourceWrap
-from tests.neighbours.campus.made import level
+from tests.neighbours.campus.models import level
 from tests.neighbours.campus.shapes import (
     GROUND,
     HOUSE,
@@ -37,8 +37,8 @@ def test_thin_faces_show_their_own_light() -> None:
     wanted = light(face, point, np.zeros(len(face)))
     assert np.ptp(wanted) > 0.5
     maps = bake(light, corner, atlas, light.grain)
-    for found, most in zip(maps, (0.08, 0.04, 0.03), strict=True):
-        assert (np.abs(bilinear(found.value, at)[0] - wanted) > 0.1)[face >= 2].mean() < most
+    for actual, most in zip(maps, (0.08, 0.04, 0.03), strict=True):
+        assert (np.abs(bilinear(actual.value, at)[0] - wanted) > 0.1)[face >= 2].mean() < most
 
 
 def test_a_lightmap_of_a_house_on_the_ground() -> None:
@@ -89,8 +89,8 @@ def test_no_row_of_texels_lies_in_the_ground() -> None:
     atlas = unwrap(points, triangles)
     where = surroundings(HOUSE, GROUND)
     look = Rays(where, HOUSE, 64, 20.0)
-    (found,) = bake(look, HOUSE, atlas, look.grain, (512,))
-    assert found.value.min() > 0.4
+    (actual,) = bake(look, HOUSE, atlas, look.grain, (512,))
+    assert actual.value.min() > 0.4
 
 
 def test_grain_is_smoothed_and_edges_of_light_stay() -> None:
@@ -108,7 +108,7 @@ def test_grain_is_smoothed_and_edges_of_light_stay() -> None:
     apart = np.abs(point[:, 0] - middle) > 1.05 * texel
     wanted = look(face, point, np.full(len(face), 0.5))[apart]
     before, after = (
-        np.abs(bilinear(found.value, at)[0][apart] - wanted) for found in (grained, smooth)
+        np.abs(bilinear(actual.value, at)[0][apart] - wanted) for actual in (grained, smooth)
     )
     assert after.max() < 0.05
     assert after.mean() < 0.6 * before.mean()
@@ -119,13 +119,13 @@ def test_gaps_take_what_is_near(seed: int, height: int, width: int) -> None:
     random = np.random.default_rng(seed)
     value = random.random((height, width)).astype(np.float32)
     known = random.random((height, width)) < 0.2
-    found = fill(value, known)
-    assert np.array_equal(found[known], value[known])
+    actual = fill(value, known)
+    assert np.array_equal(actual[known], value[known])
     if known.any():
-        assert found.min() >= value[known].min() - 1e-6
-        assert found.max() <= value[known].max() + 1e-6
+        assert actual.min() >= value[known].min() - 1e-6
+        assert actual.max() <= value[known].max() + 1e-6
     else:
-        assert (found == 1).all()
+        assert (actual == 1).all()
 
 
 def test_a_gap_has_the_value_of_its_own_side() -> None:
@@ -133,9 +133,9 @@ def test_a_gap_has_the_value_of_its_own_side() -> None:
     known = np.zeros((32, 32), bool)
     known[:, :12] = known[:, 20:] = True
     value[:, 20:] = 1
-    found = fill(value, known)
-    assert (found[:, 12:14] == 0).all()
-    assert (found[:, 18:20] == 1).all()
+    actual = fill(value, known)
+    assert (actual[:, 12:14] == 0).all()
+    assert (actual[:, 18:20] == 1).all()
 
 
 def test_vertices_carry_the_light_of_their_faces() -> None:
@@ -145,17 +145,17 @@ def test_vertices_carry_the_light_of_their_faces() -> None:
     def look(face: object, point: Floats, turn: object) -> Floats:
         return np.asarray(point[:, 0] / 10, np.float32)
 
-    found = vertex_light(look, corner, normals(corner))
-    assert np.allclose(found, corner[..., 0] / 10, atol=0.06)
+    actual = vertex_light(look, corner, normals(corner))
+    assert np.allclose(actual, corner[..., 0] / 10, atol=0.06)
 
 
 def test_a_corner_does_not_blacken_its_faces() -> None:
     where = surroundings(HOUSE, GROUND)
     look = Rays(where, HOUSE, 64, 20.0)
-    found = vertex_light(look, HOUSE, normals(HOUSE))
+    actual = vertex_light(look, HOUSE, normals(HOUSE))
     roof = normals(HOUSE)[:, 1] > 0.9
-    assert found[roof].min() > 0.95
-    assert found.min() > 0.2
+    assert actual[roof].min() > 0.95
+    assert actual.min() > 0.2
 
 
 def test_the_models_own_light_is_looked_up() -> None:
@@ -165,8 +165,8 @@ def test_the_models_own_light_is_looked_up() -> None:
     look = Painted(corner, uv, np.zeros(2, np.int32), (image,), np.arange(2))
     point = np.array([[2.0, 0, 3], [8, 0, 7]])
     face = np.array([1 if z > x else 0 for x, _, z in point])
-    found = look(face, point, np.zeros(2))
-    assert np.allclose(found, [0.2, 0.8], atol=0.02)
+    actual = look(face, point, np.zeros(2))
+    assert np.allclose(actual, [0.2, 0.8], atol=0.02)
     white = Painted(corner, uv, np.full(2, -1, np.int32), (image,), np.arange(2))
     assert (white(face, point, np.zeros(2)) == 1).all()
 
@@ -205,5 +205,5 @@ def test_a_weaker_light_is_nearer_to_white() -> None:
     corner = triangles_of(level((0, 0), (10, 10), 0))
     image = LightImage(np.zeros((2, 2), np.uint8), strength=0.25)
     look = Painted(corner, np.zeros((2, 3, 2)), np.zeros(2, np.int32), (image,), np.arange(2))
-    found = look(np.array([0]), corner[0].mean(axis=0)[None], np.zeros(1))
-    assert found[0] == pytest.approx(0.75)
+    actual = look(np.array([0]), corner[0].mean(axis=0)[None], np.zeros(1))
+    assert actual[0] == pytest.approx(0.75)

@@ -40,8 +40,8 @@ def test_an_endless_plane_is_white() -> None:
 def test_before_a_wall(distance: float, height: float) -> None:
     """The form factor of an endless wall: (1 − d / √(d² + h²)) / 2."""
     wall = quad((0, 0, -FAR), (0, height, -FAR), (0, height, FAR), (0, 0, FAR))
-    found = seen(around(FLOOR, wall), (distance, 0, 0))
-    assert found == pytest.approx((1 + distance / sqrt(distance**2 + height**2)) / 2, abs=0.005)
+    actual = seen(around(FLOOR, wall), (distance, 0, 0))
+    assert actual == pytest.approx((1 + distance / sqrt(distance**2 + height**2)) / 2, abs=0.005)
 
 
 def test_a_wall_sees_the_ground_with_half_of_its_rays() -> None:
@@ -57,8 +57,8 @@ def test_under_a_ceiling(share: float) -> None:
     reach = 10.0
     high = share * reach
     ceiling = quad((-FAR, high, -FAR), (FAR, high, -FAR), (FAR, high, FAR), (-FAR, high, FAR))
-    found = seen(around(FLOOR, ceiling), (0, 0, 0), reach=reach)
-    assert found == pytest.approx(2 * share - share**2, abs=0.005)
+    actual = seen(around(FLOOR, ceiling), (0, 0, 0), reach=reach)
+    assert actual == pytest.approx(2 * share - share**2, abs=0.005)
     assert seen(around(FLOOR, ceiling), (0, 0, 0)) == 0.0
 
 
@@ -81,8 +81,8 @@ def test_the_lighter_side_counts() -> None:
     assert open_sides(where, mixed, np.ones(2, bool), 20.0).tolist() == [1, -1]
     face, point = np.array([0]), sheet[0].mean(axis=0)[None]
     for side, least, most in ((-1.0, 0.9, 1.0), (1.0, 0.0, 0.2)):
-        found = Rays(where, sheet, 64, 20.0, side=side)(face, point, np.zeros(1))[0]
-        assert least <= found <= most
+        actual = Rays(where, sheet, 64, 20.0, side=side)(face, point, np.zeros(1))[0]
+        assert least <= actual <= most
 
 
 def test_a_court_is_outside_however_light_the_halls_around_it_are() -> None:
@@ -101,8 +101,8 @@ def test_a_court_is_outside_however_light_the_halls_around_it_are() -> None:
         for way in (normals(inner), -normals(inner))
     ]
     assert lights[0] > lights[1], "the hall is lighter"
-    found = open_sides(where, walls, np.ones(16, bool), 20.0)
-    assert found.tolist() == [1] * 8 + [-1] * 8
+    actual = open_sides(where, walls, np.ones(16, bool), 20.0)
+    assert actual.tolist() == [1] * 8 + [-1] * 8
 
 
 def test_within_a_closed_house_the_lighter_side_counts() -> None:
@@ -164,10 +164,10 @@ def test_far_from_the_origin_it_is_the_same() -> None:
     floor = quad((-50, 0, -50), (-50, 0, 50), (50, 0, 50), (50, 0, -50))
     corner = np.concatenate([floor, wall])
     triangles = np.arange(12, dtype=np.int32).reshape(-1, 3)
-    found = []
+    actual = []
     for shift in (0.0, 1e7):
         moved = corner.reshape(-1, 3) + shift
         where = Surroundings(moved, triangles, np.full(3, shift), shift - 1, 1e-4)
         at = np.array([[1.0, 0, 0]]) + shift
-        found.append(float(light(where, at, UP, np.zeros(1), 1024, inf)[0]))
-    assert found[0] == pytest.approx(found[1], abs=0.01)
+        actual.append(float(light(where, at, UP, np.zeros(1), 1024, inf)[0]))
+    assert actual[0] == pytest.approx(actual[1], abs=0.01)

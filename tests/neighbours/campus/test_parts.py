@@ -20,7 +20,7 @@ from ptmtools.neighbours.campus.textures import jpeg, squared, weighted
 from ptmtools.pipeline.validation import validate
 from ptmtools.simplification import Mesh
 from tests.conftest import scene_of
-from tests.neighbours.campus.made import TILE, texture, wall, write_obj
+from tests.neighbours.campus.models import TILE, texture, wall, write_obj
 
 
 @given(st.lists(st.text(max_size=80), max_size=30))
@@ -102,20 +102,20 @@ def test_the_size_of_the_source_is_recorded(index: Campus) -> None:
 
 
 def test_materials_say_what_a_client_must_do(index: Campus) -> None:
-    found = {m.name: m for m in index.materials}
-    assert found["facade"].channels == ("d", "m")
-    assert found["fence"].channels == ("d", "a")
-    assert found["fence"].alpha == "blend"
-    assert found["roof"].base is None
-    assert found["roof"].color == (0.5, 0.3, 0.3)
+    actual = {m.name: m for m in index.materials}
+    assert actual["facade"].channels == ("d", "m")
+    assert actual["fence"].channels == ("d", "a")
+    assert actual["fence"].alpha == "blend"
+    assert actual["roof"].base is None
+    assert actual["roof"].color == (0.5, 0.3, 0.3)
 
 
 def test_smaller_textures_are_means(made: Path) -> None:
     source = np.asarray(texture(640, 640, 3), float)
     for size in (128, 256, 512):
         with Image.open(made / f"textures/lawn_{size}_d.jpg") as image:
-            found = np.asarray(image, float)
-        assert np.abs(found.mean(axis=(0, 1)) - source.mean(axis=(0, 1))).max() < 1
+            actual = np.asarray(image, float)
+        assert np.abs(actual.mean(axis=(0, 1)) - source.mean(axis=(0, 1))).max() < 1
     exact = source.reshape(128, 5, 128, 5, 3).mean(axis=(1, 3))
     ours = np.asarray(squared(texture(640, 640, 3), 128), float)
     assert np.abs(ours - exact).max() <= 1
@@ -142,12 +142,12 @@ def test_what_is_not_seen_does_not_fringe_what_is(size: int) -> None:
     clear = np.arange(64) // 7 % 2 == 0
     texels[:, ~clear] = [200, 40, 0]
     alpha = np.where(clear, 0, 255).astype(np.uint8)[None].repeat(64, axis=0)
-    found = np.asarray(weighted(Image.fromarray(texels), Image.fromarray(alpha), size), int)
+    actual = np.asarray(weighted(Image.fromarray(texels), Image.fromarray(alpha), size), int)
     share = np.asarray(squared(Image.fromarray(alpha), size), int)
     assert (share > 8).any()
-    assert np.abs(found - [200, 40, 0])[share > 8].max() <= 1
+    assert np.abs(actual - [200, 40, 0])[share > 8].max() <= 1
     plain = np.asarray(squared(Image.fromarray(texels), size), int)
-    assert np.array_equal(found[share == 0], plain[share == 0])
+    assert np.array_equal(actual[share == 0], plain[share == 0])
 
 
 def test_an_opaque_material_has_no_alpha_channel(tmp_path: Path) -> None:
@@ -162,10 +162,10 @@ def test_an_opaque_material_has_no_alpha_channel(tmp_path: Path) -> None:
     whole[:, 3:] = 0.1 + 0.2 * (whole[:, 3:] > 0)
     write_obj(tmp_path / "campus.obj", [("a", {"whole": whole}), ("b", {"cut": cut})])
     made = make_campus(tmp_path / "campus.obj", tmp_path / "c", CampusOptions(lightmaps="none"))
-    found = {m.name: m for m in made.campus.materials}
-    assert found["whole"].base == found["cut"].base == "leaf"
-    assert (found["whole"].alpha, found["whole"].channels) == ("opaque", ("d",))
-    assert (found["cut"].alpha, found["cut"].channels) == ("blend", ("d", "a"))
+    actual = {m.name: m for m in made.campus.materials}
+    assert actual["whole"].base == actual["cut"].base == "leaf"
+    assert (actual["whole"].alpha, actual["whole"].channels) == ("opaque", ("d",))
+    assert (actual["cut"].alpha, actual["cut"].channels) == ("blend", ("d", "a"))
     assert validate(tmp_path / "c").issues == ()
 
 
@@ -188,24 +188,24 @@ def facade(steps: int) -> Mesh:
 
 def test_a_facade_keeps_its_texture_through_the_levels() -> None:
     whole = facade(16)
-    found = levels(whole, 3, 0.25, 4, 0.01)
-    faces = [len(level.source) for level in found]
+    actual = levels(whole, 3, 0.25, 4, 0.01)
+    faces = [len(level.source) for level in actual]
     assert faces == sorted(faces)
     assert faces[0] < 0.2 * len(whole.triangles)
-    for level in found:
+    for level in actual:
         expected = level.mesh.points[level.mesh.triangles][..., :2] / TILE
         assert level.mesh.uv is not None
         assert np.abs(level.mesh.uv - expected).max() < 1e-6
-    assert found[-1].error == 0.0
+    assert actual[-1].error == 0.0
 
 
 @given(st.integers(1, 10**6), st.integers(1, 8), st.floats(0.01, 1), st.integers(1, 1000))
 def test_how_many_faces_a_level_may_have(faces: int, lods: int, ratio: float, least: int) -> None:
-    found = level_faces(faces, lods, ratio, least)
-    assert len(found) == lods
-    assert found == sorted(found)
-    assert found[-1] == faces
-    assert min(found) >= min(faces, least)
+    actual = level_faces(faces, lods, ratio, least)
+    assert len(actual) == lods
+    assert actual == sorted(actual)
+    assert actual[-1] == faces
+    assert min(actual) >= min(faces, least)
 
 
 def test_a_mesh_comes_back_from_its_file() -> None:

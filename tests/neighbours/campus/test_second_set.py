@@ -17,7 +17,7 @@ from ptmtools.neighbours.campus.lights import LightImage
 from ptmtools.neighbours.campus.making import _light_source
 from ptmtools.neighbours.campus.second_set import ModelLight, model_light, model_masks
 from ptmtools.scene import IngestOptions, ingest
-from tests.neighbours.campus.made import MTL, write_campus, write_gltf
+from tests.neighbours.campus.models import MTL, write_campus, write_gltf
 
 METRES = IngestOptions(unit="m", up="y")
 
@@ -35,8 +35,8 @@ def test_the_sampler_and_the_strength_count(tmp_path: Path) -> None:
         document["textures"][1]["sampler"] = 0
         document["materials"][0]["occlusionTexture"]["strength"] = 0.5
 
-    found = model_light(edited(write_gltf(tmp_path), change), IngestOptions())
-    (image,) = found.images
+    actual = model_light(edited(write_gltf(tmp_path), change), IngestOptions())
+    (image,) = actual.images
     assert image.wrap == ("clamp", "mirror")
     assert image.strength == 0.5
 
@@ -48,10 +48,10 @@ def test_materials_share_the_texels_of_an_image(tmp_path: Path) -> None:
         document["materials"].append({**first, "occlusionTexture": weaker})
         document["meshes"][1]["primitives"][0]["material"] = 1
 
-    found = model_light(edited(write_gltf(tmp_path), change), IngestOptions())
-    assert [image.strength for image in found.images] == [1.0, 0.5]
-    assert found.images[0].texels is found.images[1].texels
-    assert set(found.image.tolist()) == {0, 1}
+    actual = model_light(edited(write_gltf(tmp_path), change), IngestOptions())
+    assert [image.strength for image in actual.images] == [1.0, 0.5]
+    assert actual.images[0].texels is actual.images[1].texels
+    assert set(actual.image.tolist()) == {0, 1}
 
 
 @pytest.mark.parametrize("both", [True, False], ids=["of all", "of one"])
@@ -89,8 +89,8 @@ def masks(folder: Path, library: str, said: str = "mtllib campus.mtl") -> tuple[
     model = write_campus(folder)
     (folder / "campus.mtl").write_text(library)
     model.write_text(model.read_text().replace("mtllib campus.mtl", said))
-    found, notes = model_masks(model, ingest(model, METRES), METRES)
-    return len(found), list(notes)
+    actual, notes = model_masks(model, ingest(model, METRES), METRES)
+    return len(actual), list(notes)
 
 
 def test_a_statement_that_goes_on_in_the_next_line(tmp_path: Path) -> None:

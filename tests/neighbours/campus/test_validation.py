@@ -151,8 +151,8 @@ def test_a_flipped_bit_in_any_file(copy: Path) -> None:
         data = bytearray(file.read_bytes())
         data[len(data) // 2] ^= 4
         file.write_bytes(data)
-        found = [i for i in validate(copy).issues if i.file == file.relative_to(copy).as_posix()]
-        assert [i.code for i in found] == ["PTM-D804"]
+        actual = [i for i in validate(copy).issues if i.file == file.relative_to(copy).as_posix()]
+        assert [i.code for i in actual] == ["PTM-D804"]
         data[len(data) // 2] ^= 4
         file.write_bytes(data)
         if file.suffix == ".jpg" and "512_d" in file.name:
@@ -268,9 +268,9 @@ def test_an_object_of_fewer_meshes_is_no_surprise(
 ) -> None:
     change(copy, lambda d: d["objects"][1]["meshes"].pop())
     assert main(["info", str(copy)]) == 3
-    told = capsys.readouterr().err
-    assert "objects[1].meshes: has 1 items, not 2" in told
-    assert "PTM-I821" in told
+    reported = capsys.readouterr().err
+    assert "objects[1].meshes: has 1 items, not 2" in reported
+    assert "PTM-I821" in reported
 
 
 def test_an_index_that_cannot_be_read(copy: Path, tmp_path: Path) -> None:
@@ -292,8 +292,8 @@ def mesh_with(folder: Path, alter: Callable[[Document], object]) -> None:
 
 
 def primitives(document: Document) -> list[Document]:
-    found: list[Document] = document["meshes"][0]["primitives"]
-    return found
+    actual: list[Document] = document["meshes"][0]["primitives"]
+    return actual
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from ptmtools.neighbours.campus.objects import parts_of
 from ptmtools.neighbours.campus.occlusion import Surroundings
 from ptmtools.neighbours.campus.viewpoints import EYE, STEP, viewpoint
 from ptmtools.scene import IngestOptions, Scene, ingest
-from tests.neighbours.campus.made import level
+from tests.neighbours.campus.models import level
 from tests.neighbours.campus.shapes import prism, surroundings, triangles_of
 
 SCRIPT = Path(__file__).resolve().parents[3] / "sample_data" / "make_campus.py"
@@ -46,8 +46,8 @@ def share_seen(corner: Floats, object_corner: Floats, eye: Floats) -> float:
     )
     face = random.choice(len(area), 40, p=area / area.sum())
     point = np.einsum("nk,nkx->nx", random.dirichlet([1, 1, 1], 40), object_corner[face])
-    found = [hits(corner, eye, target - eye) for target in point]
-    return float(np.mean([not len(far) or far[0] > 1 - 1e-4 for far in found]))
+    actual = [hits(corner, eye, target - eye) for target in point]
+    return float(np.mean([not len(far) or far[0] > 1 - 1e-4 for far in actual]))
 
 
 def over_ground(corner: Floats, eye: Floats, ground: float) -> tuple[float, bool]:

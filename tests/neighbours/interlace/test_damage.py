@@ -332,8 +332,8 @@ def test_other_axes_are_joined_as_they_say(tmp_path: Path) -> None:
 
 def test_every_code_is_found_somewhere() -> None:
     assert {kind for _, kind in DAMAGES.values()} == set(KINDS)
-    found = {finding for _, finding, _ in KINDS.values()}
-    assert found | {"PTM-D806", "PTM-D713", "PTM-D808"} == set(FOLDER_CODES)
+    actual = {finding for _, finding, _ in KINDS.values()}
+    assert actual | {"PTM-D806", "PTM-D713", "PTM-D808"} == set(FOLDER_CODES)
 
 
 def test_no_manifest_however_damaged_ends_in_a_traceback(

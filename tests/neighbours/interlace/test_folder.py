@@ -49,9 +49,9 @@ def test_exact(
     interlaced = read_manifest(folder)
     assert interlaced.lossless
     assert interlaced.original == (interlaced.width, interlaced.height) == size[::-1]
-    found = deinterlace(folder)
-    assert found.dtype == texels.dtype
-    np.testing.assert_array_equal(found, texels)
+    actual = deinterlace(folder)
+    assert actual.dtype == texels.dtype
+    np.testing.assert_array_equal(actual, texels)
     assert validate_interlaced(folder).issues == ()
 
 
@@ -94,8 +94,8 @@ def test_every_step_from_the_first_files_alone(tmp_path: Path) -> None:
     assert [part.joined for part in parts] == [(16, 4), (32, 4), (32, 8), (64, 8), (64, 16)]
     for step in range(len(parts), 0, -1):
         width, height = parts[step - 1].joined
-        found = deinterlace(folder, step)
-        np.testing.assert_array_equal(found, texels[:: 16 // height, :: 64 // width])
+        actual = deinterlace(folder, step)
+        np.testing.assert_array_equal(actual, texels[:: 16 // height, :: 64 // width])
         (folder / parts[step - 1].name).unlink()
 
 
@@ -153,8 +153,8 @@ def test_upright_with_a_note() -> None:
     texels = image(8, 16)
     written = interlace(Picture(texels, Description(orientation=6)), InterlaceOptions(SMALL))
     assert any("EXIF" in note for note in written.notes)
-    found = [load_image(data).array() for data in written.files]
-    np.testing.assert_array_equal(found[0], texels.swapaxes(0, 1)[:, ::-1][::2, ::2])
+    actual = [load_image(data).array() for data in written.files]
+    np.testing.assert_array_equal(actual[0], texels.swapaxes(0, 1)[:, ::-1][::2, ::2])
 
 
 @pytest.mark.parametrize(

@@ -14,9 +14,9 @@ from ptmtools.neighbours.interlace.steps import nearest_power, scaled
 
 @given(st.integers(1, 1 << 16))
 def test_the_nearest_power_of_two(side: int) -> None:
-    found = nearest_power(side)
-    assert found == 1 << round(math.log2(side))
-    assert max(found, side) <= math.sqrt(2) * min(found, side)
+    actual = nearest_power(side)
+    assert actual == 1 << round(math.log2(side))
+    assert max(actual, side) <= math.sqrt(2) * min(actual, side)
 
 
 def test_powers_of_two_stay() -> None:
@@ -31,17 +31,17 @@ def test_a_plain_image_stays_plain(kind: str, components: int) -> None:
     if components in (2, 4):
         texel[-1] = 1 + top // 2
     image = np.broadcast_to(texel, (23, 45, components))
-    found = scaled(np.ascontiguousarray(image), 64, 16)
-    assert found.dtype == np.dtype(kind)
-    assert found.shape == (16, 64, components)
-    np.testing.assert_array_equal(found, np.broadcast_to(texel, found.shape))
+    actual = scaled(np.ascontiguousarray(image), 64, 16)
+    assert actual.dtype == np.dtype(kind)
+    assert actual.shape == (16, 64, components)
+    np.testing.assert_array_equal(actual, np.broadcast_to(texel, actual.shape))
 
 
 def test_a_ramp_stays_a_ramp() -> None:
     ramp = np.tile(np.arange(0, 192, 2, np.uint8), (96, 1))[:, :, None]
-    found = scaled(ramp, 128, 128)[5, 4:-4, 0].astype(float)
+    actual = scaled(ramp, 128, 128)[5, 4:-4, 0].astype(float)
     want = ((np.arange(128) + 0.5) * 0.75 - 0.5)[4:-4] * 2
-    assert abs(found - want).max() <= 0.5 + 1e-9
+    assert abs(actual - want).max() <= 0.5 + 1e-9
 
 
 def test_transposed_is_the_same() -> None:
@@ -57,8 +57,8 @@ def test_inside_it_is_the_cubic_of_pillow(size: tuple[int, int]) -> None:
     image = np.random.default_rng(6).integers(0, 65536, (90, 91, 1), np.uint16)
     real = Image.fromarray(image[:, :, 0].astype(np.float32))
     want = np.asarray(real.resize(size, Image.Resampling.BICUBIC))[4:-4, 4:-4]
-    found = scaled(image, *size)[4:-4, 4:-4, 0]
-    assert abs(found - want.clip(0, 65535)).max() < 0.6
+    actual = scaled(image, *size)[4:-4, 4:-4, 0]
+    assert abs(actual - want.clip(0, 65535)).max() < 0.6
 
 
 def test_strips_do_not_show() -> None:
@@ -72,6 +72,6 @@ def test_what_is_transparent_does_not_bleed() -> None:
     image = np.zeros((48, 48, 4), np.uint8)
     image[:, :24] = 200, 100, 50, 255
     image[:, 24:] = 0, 255, 0, 0  # what nobody sees
-    found = scaled(image, 64, 64)
-    seen = found[found[:, :, 3] > 0][:, :3].astype(int)
+    actual = scaled(image, 64, 64)
+    seen = actual[actual[:, :, 3] > 0][:, :3].astype(int)
     assert abs(seen - (200, 100, 50)).max() <= 1

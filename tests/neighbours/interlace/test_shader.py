@@ -34,9 +34,9 @@ def test_a_step(
     random = np.random.default_rng(components)
     top = np.iinfo(kind).max
     first, second = random.integers(0, top, (2, *size, components), kind, endpoint=True)
-    found = shader.join(first, second, axis)
-    assert found.dtype == first.dtype
-    np.testing.assert_array_equal(found, join(first, second, axis))
+    actual = shader.join(first, second, axis)
+    assert actual.dtype == first.dtype
+    np.testing.assert_array_equal(actual, join(first, second, axis))
 
 
 @pytest.mark.parametrize("axis", ["rows", "columns"])
@@ -51,10 +51,10 @@ def test_a_step_to_the_longest_side(shader: StepShader, axis: Axis) -> None:
 def test_all_steps_of_an_image(shader: StepShader, size: tuple[int, int]) -> None:
     image = np.random.default_rng(2).integers(0, 256, (*size, 3), np.uint8)
     axes = axes_of(size[1], size[0], 4)
-    found, *rest = split(image, axes)
+    actual, *rest = split(image, axes)
     for part, axis in zip(rest, axes, strict=True):
-        found = shader.join(found, part, axis)
-    np.testing.assert_array_equal(found, image)
+        actual = shader.join(actual, part, axis)
+    np.testing.assert_array_equal(actual, image)
 
 
 def test_the_page_has_this_shader() -> None:

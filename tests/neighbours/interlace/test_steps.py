@@ -60,8 +60,8 @@ def test_files_of_512_texels() -> None:
 
 def test_four_by_four_by_hand() -> None:
     image = np.arange(16).reshape(4, 4, 1)
-    found = [part[:, :, 0].tolist() for part in split(image, axes_of(4, 4, 1))]
-    assert found == [
+    actual = [part[:, :, 0].tolist() for part in split(image, axes_of(4, 4, 1))]
+    assert actual == [
         [[0]],
         [[2]],
         [[8, 10]],
@@ -83,9 +83,9 @@ def test_joined_is_what_was_split(image: NDArray, smallest: int) -> None:
 def test_every_step_is_a_decimation(image: NDArray, smallest: int) -> None:
     height, width, _ = image.shape
     axes = axes_of(width, height, smallest)
-    for step, found in enumerate(joined(split(image, axes), axes), 1):
+    for step, actual in enumerate(joined(split(image, axes), axes), 1):
         rows, columns = stride(axes, step)
-        np.testing.assert_array_equal(found, image[::rows, ::columns])
+        np.testing.assert_array_equal(actual, image[::rows, ::columns])
 
 
 @given(powers, powers, minima)

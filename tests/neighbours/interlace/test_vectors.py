@@ -23,11 +23,11 @@ def test_frozen_folder_decodes(name: str) -> None:
 
 
 def test_between_them_they_have_everything() -> None:
-    found = [read_manifest(VECTORS / name) for name in DIGESTS]
-    assert {one.components for one in found} == {1, 2, 3, 4}
-    assert {(one.container, one.kind) for one in found} == {
+    actual = [read_manifest(VECTORS / name) for name in DIGESTS]
+    assert {one.components for one in actual} == {1, 2, 3, 4}
+    assert {(one.container, one.kind) for one in actual} == {
         ("png", "uint8"),
         ("png", "uint16"),
         ("webp", "uint8"),
     }
-    assert {len(one.parts) for one in found} >= {1, 5, 7}
+    assert {len(one.parts) for one in actual} >= {1, 5, 7}

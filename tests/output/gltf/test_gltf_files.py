@@ -69,9 +69,9 @@ def corners(shape: Node, values: str, index: str) -> np.ndarray:
 def test_trimesh_finds_the_triangles_of_the_vrml_files(gltf_finished: Path) -> None:
     textured = 0
     for c in range(3):
-        found, wanted = meshes(gltf_finished / f"gltf/c{c:04d}.glb"), shapes(gltf_finished, c)
-        assert len(found) == len(wanted) > 3
-        for mesh, shape in zip(found, wanted, strict=True):
+        actual, wanted = meshes(gltf_finished / f"gltf/c{c:04d}.glb"), shapes(gltf_finished, c)
+        assert len(actual) == len(wanted) > 3
+        for mesh, shape in zip(actual, wanted, strict=True):
             np.testing.assert_array_equal(mesh.triangles, corners(shape, "coord", "coordIndex"))
             if "texCoord" in shape.fields["geometry"].fields:
                 uv = corners(shape, "texCoord", "texCoordIndex")

@@ -383,10 +383,10 @@ def compressed(doc: Gltf, extension: str = "EXT_meshopt_compression", version: i
         else:
             rows, mode = np.frombuffer(data, np.uint8).reshape(count, stride), "ATTRIBUTES"
             stream = meshopt.encode_vertex_buffer_level(rows, 2, version)
-        told = {"buffer": 0, "byteOffset": start, "byteLength": len(stream), "count": count}
+        reported = {"buffer": 0, "byteOffset": start, "byteLength": len(stream), "count": count}
         view |= {
             "buffer": 1,
-            "extensions": {extension: told | {"byteStride": stride, "mode": mode}},
+            "extensions": {extension: reported | {"byteStride": stride, "mode": mode}},
         }
         if mode == "ATTRIBUTES":
             view["byteStride"] = stride
@@ -420,11 +420,14 @@ def draco(doc: Gltf, quad: dict[str, Any]) -> dict[str, Any]:
     faces = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
     data = DracoPy.encode(corners, faces, quantization_bits=20, tex_coord=coords)
     ids = {row["attribute_type"]: row["unique_id"] for row in DracoPy.decode(data).attributes}
-    told = {"bufferView": doc.view(data), "attributes": {"POSITION": ids[0], "TEXCOORD_0": ids[3]}}
+    reported = {
+        "bufferView": doc.view(data),
+        "attributes": {"POSITION": ids[0], "TEXCOORD_0": ids[3]},
+    }
     for accessor in (*quad["attributes"].values(), quad["indices"]):
         del doc.tree["accessors"][accessor]["bufferView"]
     doc.tree["extensionsRequired"] = ["KHR_draco_mesh_compression"]
-    return quad | {"extensions": {"KHR_draco_mesh_compression": told}}
+    return quad | {"extensions": {"KHR_draco_mesh_compression": reported}}
 
 
 @feature("glTF", "Draco compression", "carried over", four)
@@ -439,8 +442,8 @@ def _draco_beside_plain_data(put: Put) -> str:
     """What is compressed need not be read, and here cannot be."""
     doc = Gltf()
     quad = doc.quad()
-    told = {"bufferView": doc.view(b"DRACO"), "attributes": {"POSITION": 0}}
-    doc.place(quad | {"extensions": {"KHR_draco_mesh_compression": told}})
+    reported = {"bufferView": doc.view(b"DRACO"), "attributes": {"POSITION": 0}}
+    doc.place(quad | {"extensions": {"KHR_draco_mesh_compression": reported}})
     return glb(put, doc)
 
 

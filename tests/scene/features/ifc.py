@@ -52,8 +52,8 @@ def _(put: Put) -> str:
 
 
 def two_storeys(scene: Scene) -> None:
-    found = [(storey.name, round(storey.height, 6)) for storey in scene.storeys]
-    assert found == [("EG", 0.0), ("OG", 3.0)]
+    actual = [(storey.name, round(storey.height, 6)) for storey in scene.storeys]
+    assert actual == [("EG", 0.0), ("OG", 3.0)]
 
 
 @feature("IFC", "names of storeys", "carried over", two_storeys)

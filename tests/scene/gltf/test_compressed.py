@@ -80,13 +80,13 @@ def by_draco(put: Put) -> Scene:
             {"componentType": 5125, "count": faces.size, "type": "SCALAR"},
         ]
         first = len(doc.tree["accessors"]) - 3
-        told: dict[str, Any] = {"bufferView": doc.view(data)}
-        told["attributes"] = {"POSITION": ids[0], "TEXCOORD_0": ids[3]}
+        reported: dict[str, Any] = {"bufferView": doc.view(data)}
+        reported["attributes"] = {"POSITION": ids[0], "TEXCOORD_0": ids[3]}
         primitive = {
             "attributes": {"POSITION": first, "TEXCOORD_0": first + 1},
             "indices": first + 2,
             "material": n % 2,
-            "extensions": {"KHR_draco_mesh_compression": told},
+            "extensions": {"KHR_draco_mesh_compression": reported},
         }
         doc.place(primitive, name=f"part {n}")
     return ingest(put("draco.glb", doc.glb()))

@@ -47,23 +47,23 @@ def test_the_step_is_the_encoders(seed: int) -> None:
     points[0], points[1] = 0.0, [width, 0, 0]
     points += random.choice([0.0, 1.0, 1000.0]) * width * random.random(3)
     try:
-        found, attribute = decoded(points, bits)
+        actual, attribute = decoded(points, bits)
     except DracoPy.EncodingFailedException:  # of triangles without area
         assume(False)
-    told = found.step(attribute)
-    assert told is not None
+    reported = actual.step(attribute)
+    assert reported is not None
     expected = float(np.ptp(points, axis=0).max()) / (2**bits - 1)
-    assert told == pytest.approx(expected, rel=1e-3) or expected < np.spacing(
+    assert reported == pytest.approx(expected, rel=1e-3) or expected < np.spacing(
         np.float32(np.abs(points).max())
     )
 
 
 def test_what_is_not_known_is_0() -> None:
-    found, attribute = decoded(np.random.default_rng(1).random((9, 3)), 14)
-    assert found.step(attribute + 99) == 0
-    assert Decoded(found.triangles, found.attributes, b"").step(attribute) == 0
-    whole = {attribute: found.attributes[attribute].astype(np.int16)}
-    assert Decoded(found.triangles, whole, found.data).step(attribute) is None
+    actual, attribute = decoded(np.random.default_rng(1).random((9, 3)), 14)
+    assert actual.step(attribute + 99) == 0
+    assert Decoded(actual.triangles, actual.attributes, b"").step(attribute) == 0
+    whole = {attribute: actual.attributes[attribute].astype(np.int16)}
+    assert Decoded(actual.triangles, whole, actual.data).step(attribute) is None
 
 
 def blocks(scale: float) -> Gltf:

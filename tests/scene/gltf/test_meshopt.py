@@ -61,9 +61,9 @@ def test_the_example_of_the_specification() -> None:
     """One byte of each of 16 elements of 4; the others stay what the baseline says."""
     tail = bytes(28) + bytes([0, 7, 8, 9])
     stream = bytes([0xA0, 0b10]) + EXAMPLE + bytes([0, 0, 0]) + tail
-    found = np.frombuffer(decode(stream, told("ATTRIBUTES", 16, 4)), np.uint8).reshape(16, 4)
-    assert np.diff(found[:, 0].astype(int), prepend=0).astype(np.int8).tolist() == DELTAS
-    assert (found[:, 1:] == [7, 8, 9]).all()
+    actual = np.frombuffer(decode(stream, told("ATTRIBUTES", 16, 4)), np.uint8).reshape(16, 4)
+    assert np.diff(actual[:, 0].astype(int), prepend=0).astype(np.int8).tolist() == DELTAS
+    assert (actual[:, 1:] == [7, 8, 9]).all()
 
 
 @settings(max_examples=150)
@@ -95,10 +95,10 @@ def test_triangles_come_back(peer: Any, seed: int) -> None:
     stream = peer.encode_index_buffer(index.ravel())
     expected = np.asarray(peer.decode_index_buffer(stream, index.size, 4)).ravel()
     for stride, kind in ((4, np.uint32), (2, np.uint16)):
-        found = np.frombuffer(decode(stream, told("TRIANGLES", index.size, stride)), kind)
-        assert np.array_equal(found, expected.astype(kind))
-    found = np.frombuffer(decode(stream, told("TRIANGLES", index.size, 4)), np.uint32)
-    assert np.array_equal(turned(found), turned(index))
+        actual = np.frombuffer(decode(stream, told("TRIANGLES", index.size, stride)), kind)
+        assert np.array_equal(actual, expected.astype(kind))
+    actual = np.frombuffer(decode(stream, told("TRIANGLES", index.size, 4)), np.uint32)
+    assert np.array_equal(turned(actual), turned(index))
 
 
 def turned(index: np.ndarray) -> np.ndarray:
@@ -150,14 +150,14 @@ def test_filters(peer: Any, name: str, version: int) -> None:
         data = np.ascontiguousarray(filtered).view(np.uint8).reshape(500, -1)
         stride = data.shape[1]
         stream = peer.encode_vertex_buffer_level(data, 2, version)
-        found = decode(stream, told("ATTRIBUTES", 500, stride, name))
+        actual = decode(stream, told("ATTRIBUTES", 500, stride, name))
         wanted = np.asarray(peer.decode_gltf_buffer(stream, 500, stride, "ATTRIBUTES", name))
         if name == "EXPONENTIAL":
-            assert found == wanted.tobytes()
+            assert actual == wanted.tobytes()
             continue
         kind = np.dtype(kinds[stride])
         kind = np.dtype(f"u{kind.itemsize}") if name == "COLOR" else kind
-        apart = np.frombuffer(found, kind).astype(int) - np.frombuffer(wanted.tobytes(), kind)
+        apart = np.frombuffer(actual, kind).astype(int) - np.frombuffer(wanted.tobytes(), kind)
         assert np.abs(apart).max() <= 1
 
 
@@ -223,9 +223,9 @@ def test_what_unpacks_to_more_than_can_be_meant(put: Put, monkeypatch: pytest.Mo
         block = min(count, 256)
         control = bytes([0xAA]) * (3 * -(-count // block))
         data = bytes([0xA1]) + control + bytes(9) + bytes(15)
-        told = {"buffer": 0, "byteOffset": 0, "byteLength": len(data), "count": count}
-        told |= {"byteStride": 12, "mode": "ATTRIBUTES"}
-        extension = {"KHR_meshopt_compression": told}
+        reported = {"buffer": 0, "byteOffset": 0, "byteLength": len(data), "count": count}
+        reported |= {"byteStride": 12, "mode": "ATTRIBUTES"}
+        extension = {"KHR_meshopt_compression": reported}
         view = {"buffer": 0, "byteLength": 12 * count, "extensions": extension}
         tree = doc.tree | {"bufferViews": [view]}
         made = module.Document(put("a.glb", b""), tree, [module.Buffer(data, None)])

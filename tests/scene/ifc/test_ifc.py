@@ -315,8 +315,8 @@ class TestFarAway:
         product.ObjectPlacement = made.building.ObjectPlacement
         made.represent(product, surface, "Tessellation")
         source, _ = read(made.write(tmp_path / "tip.ifc"))
-        found = np.unique(source.points, axis=0)
-        assert np.abs(found - np.unique(points, axis=0)).max() < 1e-8
+        actual = np.unique(source.points, axis=0)
+        assert np.abs(actual - np.unique(points, axis=0)).max() < 1e-8
         assert len(source.triangles) == 4
 
 
@@ -337,8 +337,8 @@ class TestMaterials:
         chosen = source.triangle_material[
             np.flatnonzero(np.diff(source.triangle_object, prepend=-1))
         ]
-        found = [source.materials[i] for i in chosen]
-        assert [(m.name, m.color, m.opacity) for m in found] == [
+        actual = [source.materials[i] for i in chosen]
+        assert [(m.name, m.color, m.opacity) for m in actual] == [
             ("Brick", (0.6, 0.2, 0.0), 1.0),
             ("Brick", (0.6, 0.2, 0.0), 1.0),
             ("Brick", (0.2, 0.2, 0.2), 1.0),
@@ -526,11 +526,11 @@ class TestTriangles:
         if cut:
             made.opening(wall, (4, 0, 0), (7, 4, 1))
         source, findings = read(made.write(tmp_path / "solid.ifc"))
-        found = corners(source, "IfcWall Wall")
+        actual = corners(source, "IfcWall Wall")
         low = [5, mapped, cut]
-        assert np.allclose(found.reshape(-1, 3).min(axis=0), low, rtol=0, atol=1e-9)
-        assert size(found) == [1, 2, 3 - cut]
-        assert np.isclose(volume(found), 6 - 2 * cut)
+        assert np.allclose(actual.reshape(-1, 3).min(axis=0), low, rtol=0, atol=1e-9)
+        assert size(actual) == [1, 2, 3 - cut]
+        assert np.isclose(volume(actual), 6 - 2 * cut)
         assert [source.materials[i].name for i in np.unique(source.triangle_material)] == ["Blue"]
         assert all(re.search("^lengths|not drawn$", note.message) for note in findings.notes)
 
@@ -661,12 +661,12 @@ class TestDamage:
         try:
             scene = ingest(file)
         except InputError as error:
-            said = str(error)
+            printed = str(error)
         else:
-            said = str(file)
+            printed = str(file)
             Scene.from_arrays(scene.to_arrays())
-        assert str(file) in said
-        assert "\n" not in said
+        assert str(file) in printed
+        assert "\n" not in printed
 
     def test_a_product_that_is_damaged(self, tmp_path: Path) -> None:
         """All others are drawn, and storeys with no sound placement have their elevations."""

@@ -73,8 +73,8 @@ class Read:
 
     def uv_at(self, x: float, y: float) -> list[float]:
         corners, uv = self.corners.reshape(-1, 3), self.source.uv.reshape(-1, 2)
-        (found,) = np.unique(uv[(corners[:, :2] == (x, y)).all(axis=1)].round(6), axis=0)
-        return list(found.tolist())
+        (actual,) = np.unique(uv[(corners[:, :2] == (x, y)).all(axis=1)].round(6), axis=0)
+        return list(actual.tolist())
 
 
 @pytest.fixture

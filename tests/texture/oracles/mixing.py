@@ -329,15 +329,15 @@ def _texel(
         where.append(hashed(27, w * 256 + n, ne, k))
     places = [(i, h & own.value_mask) for i, h in enumerate(where)]
     matches = [own.values.get(place, (0, 0)) for place in places]
-    found = [v if times and lo <= v <= hi else -1 for v, times in matches]
+    actual = [v if times and lo <= v <= hi else -1 for v, times in matches]
     matched = 0
     for i in (0, 1):
-        if found[i] >= 0:
+        if actual[i] >= 0:
             matched += (1, 3)[i] * (2 if matches[i][1] > 3 else 1)
 
     times = [t for _, t in matches]
     near_row = 320 + s1 * 36 + matched
-    decide = _decider(own, context, found, times, k * 64, near_row, bool(refs))
+    decide = _decider(own, context, actual, times, k * 64, near_row, bool(refs))
     v = _value(decide, m, mu, inverse, lo, hi, step, last)
 
     own.texel[y, x] = v

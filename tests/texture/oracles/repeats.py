@@ -113,19 +113,19 @@ class _Level:
         ]  # fmt: skip
         sources = [self.guesses[i].get(keys[i]) for i in range(3)]
         context = 12 + 4 * near + (sources[0] is not None) + 2 * (sources[1] is not None)
-        found = self.symbols.next(context)
+        actual = self.symbols.next(context)
         for i in range(3):
             self.guesses[i][keys[i]] = (2 * y, 2 * x)
-        if found < 3:
-            source = sources[found]
+        if actual < 3:
+            source = sources[actual]
             block = (mean,) * 4 if source is None else self.at(*source)
-            if found == 2 and source is not None:
+            if actual == 2 and source is not None:
                 change = _minus(mean, self.below[source[0] // 2][source[1] // 2])
                 p, q, r, s = (_plus(texel, change) for texel in block)
                 block = (p, q, r, s)
             self.put(y, x, block)
             return 0
-        if found == 3:
+        if actual == 3:
             self.put(y, x, self.texel_by_texel(mean, w0, w1, n0, n1, nw, ne, near))
         else:
             diagonal = (self.mean(y + 1, x - 1), self.mean(y + 1, x + 1))
@@ -168,9 +168,9 @@ class _Level:
         w, n, nw, ne = (texel for texel, _ in key[1:])
         seen = self.seen[self.key(key)]
         context = 24 + 12 * position + 4 * near + (w == n) + 2 * (seen in (w, n))
-        found = self.symbols.next(context)
-        if found < 5:
-            return (seen, w, n, nw, ne)[found]
+        actual = self.symbols.next(context)
+        if actual < 5:
+            return (seen, w, n, nw, ne)[actual]
         out = [0] * self.components
         reference = 0
         for j, c in enumerate(self.order):
@@ -231,9 +231,9 @@ class _Level:
         nw = self.texels[y - 1][x - 1] if y and x else n
         key = self.key([(w, 4), (n, 3), (nw, 2)])
         seen = self.seen[key]
-        found = self.symbols.next(72 + (w == n) + 2 * (seen in (w, n)))
-        texel = (seen, w, n, nw, nw)[found] if found < 5 else ()
-        if found >= 5:
+        actual = self.symbols.next(72 + (w == n) + 2 * (seen in (w, n)))
+        texel = (seen, w, n, nw, nw)[actual] if actual < 5 else ()
+        if actual >= 5:
             for a, b, c in zip(w, n, nw, strict=True):
                 guess = sorted((a, b, a + b - c))[1]
                 texel += ((guess + self.symbols.signed(84)) & 255,)

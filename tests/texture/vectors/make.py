@@ -62,7 +62,7 @@ def images() -> dict[str, tuple[Samples, EncodeOptions]]:
     spikes = photo(40, 44, 3)
     spikes[::7, ::9] = (noise((6, 5, 3), 3) % 256).astype(np.uint8)
     tile = photo(12, 10, 3)
-    found: dict[str, tuple[Samples, EncodeOptions]] = {
+    actual: dict[str, tuple[Samples, EncodeOptions]] = {
         "paper-rgb-17x10": (photo(17, 10, 3), EncodeOptions("paper")),
         "paper-deep-9x14": (deep(9, 14, 1), EncodeOptions("paper")),
     }
@@ -94,8 +94,8 @@ def images() -> dict[str, tuple[Samples, EncodeOptions]]:
                 "deep-error-300": (deep(22, 31, 3), {"max_error": 300}),
             }
         for name, (image, options) in kinds.items():
-            found[f"{profile}-{name}"] = image, EncodeOptions(profile, **options)
-    return found
+            actual[f"{profile}-{name}"] = image, EncodeOptions(profile, **options)
+    return actual
 
 
 def expected(image: Samples, options: EncodeOptions, data: bytes) -> list[Samples]:

@@ -233,10 +233,10 @@ def slots() -> str:
     level = object.__new__(repeats_reference._Level)
     lines = ["| key | slot, b = 6 | slot, b = 13 |", "|---|---|---|"]
     for key in (0, 1, 0x9E3779B1, 0x80000000, 0xFFFFFFFF):
-        found = []
+        actual = []
         for level.bits in (6, 13):
-            found.append(level.hashed(key))
-        lines.append(f"| {key:08X} | {found[0]} | {found[1]} |")
+            actual.append(level.hashed(key))
+        lines.append(f"| {key:08X} | {actual[0]} | {actual[1]} |")
     minus = repeats_reference._minus((1, 200, 0, 255), (2, 100, 255, 255))
     return (
         "\n".join(lines)

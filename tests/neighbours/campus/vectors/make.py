@@ -15,7 +15,7 @@ from PIL import Image
 
 from ptmtools.neighbours.campus import CampusOptions, make_campus
 from ptmtools.scene import IngestOptions
-from tests.neighbours.campus.made import level, wall, write_obj
+from tests.neighbours.campus.models import level, wall, write_obj
 
 
 def main(folder: str) -> None:

@@ -40,12 +40,12 @@ MADE = {
 
 def digests(folder: Path) -> list[str]:
     """SHA-256 of the texels after each step, 16-bit samples little endian."""
-    found = []
+    actual = []
     for step in range(1, len(read_manifest(folder).parts) + 1):
         texels = deinterlace(folder, step)
         little = texels.astype(texels.dtype.newbyteorder("<"), copy=False)
-        found.append(hashlib.sha256(little.tobytes()).hexdigest())
-    return found
+        actual.append(hashlib.sha256(little.tobytes()).hexdigest())
+    return actual
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""A small campus made on the spot: an OBJ with its materials and images, and a glTF."""
+"""Builds a small campus: an OBJ with its materials and images, and a glTF."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def wall(start: Sequence[float], end: Sequence[float], high: float, steps: int =
             for s, t in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)):
                 p = a + (b - a) * s / steps
                 rows.append([p[0], high * t / steps, p[1], long * s / steps, high * t / steps])
-    found = np.array(rows)
-    found[:, 3:] /= TILE
-    return found
+    actual = np.array(rows)
+    actual[:, 3:] /= TILE
+    return actual
 
 
 def level(low: Sequence[float], high: Sequence[float], y: float) -> Floats:
