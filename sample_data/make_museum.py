@@ -120,7 +120,7 @@ def users_pictures(folder: Path) -> list[Picture]:
     PNG and JPEG files are copied byte for byte unless a camera's orientation must be applied;
     everything else becomes PNG. Files that Pillow cannot read are named on stderr.
     """
-    found: list[Picture] = []
+    actual: list[Picture] = []
     for path in sorted(p for p in folder.iterdir() if p.is_file()):
         try:
             with Image.open(path) as image:
@@ -136,14 +136,14 @@ def users_pictures(folder: Path) -> list[Picture]:
             if kept
             else png(upright.convert("RGBA" if "A" in upright.getbands() else "RGB"))
         )
-        found.append(
+        actual.append(
             Picture(
-                f"painting_{len(found) + 1:02d}{suffix}",
+                f"painting_{len(actual) + 1:02d}{suffix}",
                 upright.width / upright.height,
                 constant(data),
             )
         )
-    return found
+    return actual
 
 
 def mtl_text(things: list[Thing], surfaces: list[str], pictures: list[Picture]) -> str:

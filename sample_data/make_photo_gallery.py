@@ -50,14 +50,14 @@ class Photo:
 def photos(count: int) -> list[Photo]:
     """So many images, of the styles in turn."""
     by_name = {name: (paint, aspect) for name, paint, aspect in PAINTINGS}
-    found = []
+    actual = []
     for k in range(count):
         paint, aspect = by_name[STYLES[k % len(STYLES)]]
         side = SIDES[k % len(SIDES)]
         longer = METRES[side]
         width, height = (longer, longer / aspect) if aspect > 1 else (longer * aspect, longer)
-        found.append(Photo(f"photo_{k + 1:02d}", side, width, height, paint))
-    return found
+        actual.append(Photo(f"photo_{k + 1:02d}", side, width, height, paint))
+    return actual
 
 
 def hung(images: list[Photo], least: float = 2.0) -> tuple[float, list[Thing]]:

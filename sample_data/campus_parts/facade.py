@@ -118,7 +118,7 @@ def facades(
             number += 1
             spans = columns(wall, look)
             us = sorted({0.0, wall.length, *(u for span in spans for u in span)})
-            found = []
+            actual = []
             for i, (u, U) in enumerate(spans):
                 for k, (v, V) in enumerate(rows):
                     kind = choose(number, k, i, len(spans))
@@ -127,8 +127,8 @@ def facades(
                     elif kind == "balcony":
                         v = look.floors[k] + (0.05 if k else 0)
                     if kind != "blank":
-                        found.append(Bay(wall, k, (u, v, U, V), kind))
-            faces += cells(wall, materials, us, cuts, [b.hole for b in found], 0)
+                        actual.append(Bay(wall, k, (u, v, U, V), kind))
+            faces += cells(wall, materials, us, cuts, [b.hole for b in actual], 0)
             low: list[Point] = [(u, cuts[0], 0) for u in us]
             high: list[Point] = [(u, cuts[-1], 0) for u in us]
             floor: list[Point] = [(0, 0, 0), (wall.length, 0, 0)]
@@ -136,9 +136,9 @@ def facades(
             edge: list[Point] = [(u, v, 0) for u, v in tops.get(number, level)]
             faces += [wall.face(look.ground, p) for p in zipped(floor, low)]
             faces += [wall.face(look.wall, p) for p in zipped(high, edge)]
-            for bay in found:
+            for bay in actual:
                 faces += _filled(bay, us, cuts, look, rng)
-            bays += found
+            bays += actual
     return faces, bays
 
 

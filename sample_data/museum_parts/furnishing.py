@@ -51,18 +51,18 @@ def places(panels: list[Panel], wanted: int) -> list[Place]:
     """
     walls = [p for p in panels if p.top - p.bottom > 3500 and p.high - p.low > 1300]
     for pitch, rows, tall in HANGINGS:
-        found = []
+        actual = []
         for panel in walls:
             length = (panel.high - panel.low) / 1000 - 0.3
             count = int(length / pitch)
             for k in range(count):
                 along = panel.low / 1000 + 0.15 + length * (2 * k + 1) / (2 * count)
-                found += [
+                actual += [
                     Place(panel, along, panel.bottom / 1000 + row, pitch - 0.45, tall)
                     for row in rows
                 ]
-        if len(found) >= wanted:
-            return found
+        if len(actual) >= wanted:
+            return actual
     raise ValueError(f"{wanted} pictures do not fit on the walls")
 
 
@@ -74,14 +74,14 @@ def hang(
     ``aspects`` gives width over height of each picture; picture k has the material
     ``painting_%02d`` % (k + 1).
     """
-    found = places(panels, len(aspects))
-    count = min(len(found), max(2 * len(aspects), 8 * rooms)) if aspects else 0
-    chosen = sorted(int(k) for k in rng.permutation(len(found))[:count])
+    actual = places(panels, len(aspects))
+    count = min(len(actual), max(2 * len(aspects), 8 * rooms)) if aspects else 0
+    chosen = sorted(int(k) for k in rng.permutation(len(actual))[:count])
     order: list[int] = []
     while len(order) < count:
         order += [int(k) for k in rng.permutation(len(aspects))]
     return [
-        _picture(f"painting_{i + 1:02d}", order[i], aspects[order[i]], found[k], rng)
+        _picture(f"painting_{i + 1:02d}", order[i], aspects[order[i]], actual[k], rng)
         for i, k in enumerate(chosen)
     ]
 

@@ -118,12 +118,12 @@ def _open_sides(plan: Plan, box: Box) -> Iterator[tuple[int, bool, str, list[Rec
         u, v = _axes(axis)
         whole = (box.low[u], box.low[v], box.high[u], box.high[v])
         holes = [_contact(box, axis, high, other) for other in plan.boxes if other is not box]
-        found = [h for h in holes if h]
+        actual = [h for h in holes if h]
         if box.kind == "window":  # its outer side is open to the outside, if it is an outer side
             outside = plan.high[axis] if high else plan.low[axis]
             if (box.high[axis] if high else box.low[axis]) == outside:
-                found = [whole]
-        yield axis, high, name, rectangles(whole, found)
+                actual = [whole]
+        yield axis, high, name, rectangles(whole, actual)
 
 
 def make_shell(plan: Plan) -> tuple[list[Thing], list[Panel]]:

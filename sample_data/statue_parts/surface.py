@@ -53,15 +53,15 @@ def mesh(
     cube = float(extent.max()) / 40
     best: tuple[Values, Ints, float] | None = None
     for _ in range(TRIES):
-        points, found = _march(field, np.array(low), extent, cube)
-        if best is None or abs(len(found) - triangles) < abs(len(best[1]) - triangles):
-            best = points, found, cube
-        if abs(len(found) - triangles) <= WITHIN * triangles:
+        points, actual = _march(field, np.array(low), extent, cube)
+        if best is None or abs(len(actual) - triangles) < abs(len(best[1]) - triangles):
+            best = points, actual, cube
+        if abs(len(actual) - triangles) <= WITHIN * triangles:
             break
-        cube *= (len(found) / triangles) ** 0.5
+        cube *= (len(actual) / triangles) ** 0.5
     assert best is not None
-    points, found = _main_part(*best[:2])
-    return _slid(field, points, found, best[2]), found
+    points, actual = _main_part(*best[:2])
+    return _slid(field, points, actual, best[2]), actual
 
 
 def _main_part(points: Values, triangles: Ints) -> tuple[Values, Ints]:
