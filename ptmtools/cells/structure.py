@@ -27,6 +27,7 @@ from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, neighbours, unite
 from ptmtools.cells.roles import Designated, detail_by_shape
 from ptmtools.cells.search import Bins, Nearby, Tries
+from ptmtools.embree import ray_tree
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
 
@@ -268,9 +269,6 @@ class Surroundings:
     """Ray tests on (T, 3, 3) triangles, counter-clockwise as seen from their front."""
 
     def __init__(self, corners: Floats, tolerance: Tolerance) -> None:
-        from embreex.mesh_construction import TriangleMesh
-        from embreex.rtcore_scene import EmbreeScene
-
         self._corners = corners
         self._middle = (corners.min(axis=(0, 1)) + corners.max(axis=(0, 1))) / 2
         self._scale = 1 / (float(np.ptp(corners.reshape(-1, 3), axis=0).max()) or 1.0)
@@ -280,8 +278,7 @@ class Surroundings:
         self._scenes = []
         for step in (tolerance.plane, -tolerance.plane):
             local = (corners + step * self._front[:, None] - self._middle) * self._scale
-            self._scenes.append(EmbreeScene(robust=True))
-            TriangleMesh(self._scenes[-1], np.ascontiguousarray(local, dtype=np.float32))
+            self._scenes.append(ray_tree(local))
         angle = 2 * np.pi * (np.arange(_RAYS) + 0.5) / _RAYS
         self._level = np.stack([np.cos(angle), np.zeros(_RAYS), np.sin(angle)], axis=1)
 

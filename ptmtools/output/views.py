@@ -31,6 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import normals
+from ptmtools.embree import ray_tree
 from ptmtools.output.model import TextureRecord
 from ptmtools.output.storeys import triangle_section
 from ptmtools.scene.model import Scene
@@ -133,12 +134,8 @@ class Pictures:
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """(k,) the first triangle that each of (k, 3) rays hits, or -1, and (k,) its distance in
         lengths of ``way``."""
-        from embreex.mesh_construction import TriangleMesh
-        from embreex.rtcore_scene import EmbreeScene
-
         if self._tree is None:
-            self._tree = EmbreeScene(robust=True)
-            TriangleMesh(self._tree, self._local)
+            self._tree = ray_tree(self._local)
         hits = self._tree.run(self._normalised(origin), way.astype(np.float32), output=True)
         far = hits["tfar"].astype(np.float64) / self._scale
         return hits["primID"].astype(np.int64), far

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints, normals
+from ptmtools.embree import ray_tree
 from ptmtools.output.served import Surfaces
 from ptmtools.rendering.records import Sight
 
@@ -80,9 +81,6 @@ class Caster:
     """Casts rays at surfaces."""
 
     def __init__(self, surfaces: Surfaces) -> None:
-        from embreex.mesh_construction import TriangleMesh
-        from embreex.rtcore_scene import EmbreeScene
-
         corner = surfaces.corner
         self._which = np.flatnonzero(~surfaces.glass)
         self._corner = corner
@@ -94,9 +92,7 @@ class Caster:
         self._step = 1e-6 * max(1.0, float((high - low).max()))
         self._tree: Any = None
         if len(self._which):
-            self._tree = EmbreeScene(robust=True)
-            local = (corner[self._which] - self._middle).astype(np.float32)
-            TriangleMesh(self._tree, np.ascontiguousarray(local))
+            self._tree = ray_tree(corner[self._which] - self._middle)
 
     def look(self, camera: Camera, eye: Floats, direction: Floats) -> Sight:
         """What is seen from an eye (3,) in a direction (3,)."""

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles, areas, fans, volumes
 from ptmtools.cells.model import Cells
+from ptmtools.embree import ray_tree
 from ptmtools.errors import InputError
 from ptmtools.progress import Progress, silent
 from ptmtools.visibility.model import Pvs
@@ -238,16 +239,12 @@ class Blockers:
     """The structural triangles in Embree, brought to the unit cube in float64 first."""
 
     def __init__(self, structural: Floats, box: Floats) -> None:
-        from embreex.mesh_construction import TriangleMesh
-        from embreex.rtcore_scene import EmbreeScene
-
         corners = np.concatenate([structural.reshape(-1, 3), box])
         self._middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
         self._scale = 1 / (float(np.ptp(corners, axis=0).max()) or 1.0)
         self._scene: Any = None
         if len(structural):
-            self._scene = EmbreeScene(robust=True)
-            TriangleMesh(self._scene, self._local(structural))
+            self._scene = ray_tree(self._local(structural))
 
     def _local(self, points: Floats) -> Singles:
         local = (points - self._middle) * self._scale

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.coverage.item_buffer import BEFORE, VIEWS, Surfaces
 from ptmtools.coverage.sample_points import SamplePoints
+from ptmtools.embree import ray_tree
 
 #: Rays that are cast together: their arrays stay within the processor's cache.
 RAYS = 2**16
@@ -93,15 +94,10 @@ class _Tree:
     """A committed Embree scene over some of the surfaces."""
 
     def __init__(self, surfaces: Surfaces, which: Ints) -> None:
-        from embreex.mesh_construction import TriangleMesh
-        from embreex.rtcore_scene import EmbreeScene
-
         self._which = np.append(which, -1).astype(np.int32)
         self._tree: Any = None
         if len(which):
-            self._tree = EmbreeScene(robust=True)
-            mesh = surfaces.vertex.astype(np.float32), surfaces.triangle[which]
-            TriangleMesh(self._tree, *mesh)
+            self._tree = ray_tree(surfaces.vertex, surfaces.triangle[which])
             ray = np.ones((1, 3), dtype=np.float32)
             self._tree.run(ray, ray)  # builds the tree now
 

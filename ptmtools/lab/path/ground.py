@@ -26,6 +26,7 @@ import numpy as np
 from ptmtools.arrays import Bools, Floats, Ints, ranges
 from ptmtools.cells.model import Cells, EyeRegion
 from ptmtools.cells.options import Walker
+from ptmtools.embree import ray_tree
 from ptmtools.scene.model import Scene
 
 
@@ -95,18 +96,13 @@ class Obstacles:
     """The triangles of a scene that block a walker."""
 
     def __init__(self, scene: Scene, cells: Cells) -> None:
-        from embreex.mesh_construction import TriangleMesh
-        from embreex.rtcore_scene import EmbreeScene
-
         solid = np.ones(len(scene.triangles), dtype=np.bool_)
         solid[cells.opened] = False
         self._which = np.append(np.flatnonzero(solid), -1)
         self._middle = (scene.points.min(axis=0) + scene.points.max(axis=0)) / 2
         self._tree: Any = None
         if solid.any():
-            self._tree = EmbreeScene(robust=True)
-            corners = scene.points[scene.triangles[solid]] - self._middle
-            TriangleMesh(self._tree, np.ascontiguousarray(corners, dtype=np.float32))
+            self._tree = ray_tree(scene.points[scene.triangles[solid]] - self._middle)
 
     def crossed(self, start: Floats, end: Floats) -> Bools:
         """(n,) whether a surface lies between (n, 3) points and (n, 3) others, metres."""

@@ -11,6 +11,7 @@ from importlib.metadata import version
 import numpy as np
 
 from ptmtools.arrays import Floats, Ints
+from ptmtools.embree import ray_tree
 from ptmtools.neighbours.apo.model import Octree
 from ptmtools.neighbours.apo.traversal import look_up, stop_depth
 from ptmtools.neighbours.apo.view import Frame, Look, View
@@ -62,11 +63,7 @@ def _first_hits(corners: Floats, eye: Floats, rays: Floats) -> Ints:
     result = np.full(len(rays), -1, dtype=np.int64)
     if not len(corners):
         return result
-    from embreex.mesh_construction import TriangleMesh
-    from embreex.rtcore_scene import EmbreeScene
-
-    tree = EmbreeScene(robust=True)
-    TriangleMesh(tree, np.ascontiguousarray(corners, dtype=np.float32))
+    tree = ray_tree(corners)
     for first in range(0, len(rays), _RAYS):
         along = np.ascontiguousarray(rays[first : first + _RAYS], dtype=np.float32)
         start = np.tile(eye.astype(np.float32), (len(along), 1))

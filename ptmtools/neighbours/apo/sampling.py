@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles, areas
+from ptmtools.embree import ray_tree
 from ptmtools.scene.model import Scene
 
 #: Factor of the spacing while there are too many points.
@@ -200,12 +201,7 @@ class Source:
     @cached_property
     def tree(self) -> Any:
         """Embree's tree."""
-        from embreex.mesh_construction import TriangleMesh
-        from embreex.rtcore_scene import EmbreeScene
-
-        tree = EmbreeScene(robust=True)
-        TriangleMesh(tree, self.points, self.triangles)
-        return tree
+        return ray_tree(self.points, self.triangles)
 
     def __getstate__(self) -> dict[str, Any]:
         """Without derived members: Embree's tree cannot be pickled."""

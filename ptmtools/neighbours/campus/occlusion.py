@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from ptmtools import arrays
 from ptmtools.arrays import Bools, Floats, Ints, Singles
+from ptmtools.embree import ray_tree
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import DEPTH_SHARE
 
@@ -70,12 +71,7 @@ class Surroundings:
         """Embree's tree; None without faces."""
         if not len(self.triangles):
             return None
-        from embreex.mesh_construction import TriangleMesh
-        from embreex.rtcore_scene import EmbreeScene
-
-        tree = EmbreeScene(robust=True)
-        TriangleMesh(tree, (self.points - self.middle).astype(np.float32), self.triangles)
-        return tree
+        return ray_tree(self.points - self.middle, self.triangles)
 
     def free(self, origin: Floats, target: Floats) -> Bools:
         """(n,) whether nothing is between (n, 3) points and their targets, (n, 3), on surfaces."""
