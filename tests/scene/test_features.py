@@ -60,7 +60,7 @@ TABLE = Path(__file__).parents[2] / "docs/guide/prepare.md"
 
 def rows_of_the_table() -> dict[tuple[str, str], str]:
     """(format, feature) → outcome, as the user's manual has them."""
-    _, _, text = TABLE.read_text().partition("## What is read of each format\n\n")
+    _, _, text = TABLE.read_text().partition("## Supported features of each format\n\n")
     head, _, *rows = [
         [cell.strip() for cell in line.strip("|").split("|")]
         for line in text.split("\n\n")[0].splitlines()

@@ -61,7 +61,7 @@ def orange(scene: Scene) -> None:
     assert np.allclose(scene.materials[0].color, (1.0, 0.735357, 0.0), atol=1e-6)
 
 
-@feature("glTF", "colours of materials", "carried over", orange, "PTM-N215")
+@feature("glTF", "material colours", "carried over", orange, "PTM-N215")
 def _(put: Put) -> str:
     """Linear light of a half is 0.735 in sRGB (IEC 61966-2-1)."""
     doc = Gltf()
@@ -73,7 +73,7 @@ def _(put: Put) -> str:
 CORNERS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]], np.float32)
 
 
-@feature("glTF", "colours of vertices", "carried over", vertex_colors)
+@feature("glTF", "vertex colours", "carried over", vertex_colors)
 def _(put: Put) -> str:
     doc = Gltf()
     quad = doc.quad()
@@ -82,7 +82,7 @@ def _(put: Put) -> str:
     return glb(put, doc)
 
 
-@feature("glTF", "colours of vertices", "carried over", vertex_colors)
+@feature("glTF", "vertex colours", "carried over", vertex_colors)
 def _colours_of_bytes(put: Put) -> str:
     """Normalised, with an alpha that an opaque material does not heed."""
     doc = Gltf()
@@ -100,7 +100,7 @@ def multiplied(scene: Scene) -> None:
     assert scene.materials[0].color == (1, 1, 1)
 
 
-@feature("glTF", "colours of vertices", "carried over", multiplied, "PTM-N215")
+@feature("glTF", "vertex colours", "carried over", multiplied, "PTM-N215")
 def _colours_times_a_factor(put: Put) -> str:
     doc = Gltf()
     doc.tree["materials"] = [{"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1]}}]
@@ -119,7 +119,7 @@ def _(put: Put) -> str:
     return glb(put, doc)
 
 
-@feature("glTF", "alpha of textures", "carried over", cut_out)
+@feature("glTF", "texture alpha", "carried over", cut_out)
 def _(put: Put) -> str:
     doc = Gltf()
     image = png(np.dstack([FOUR, ALPHA]))
@@ -167,7 +167,7 @@ def _below_the_cutoff(put: Put) -> str:
     return glb(put, doc)
 
 
-@feature("glTF", "moved and scaled textures", "baked", twice, "PTM-N215")
+@feature("glTF", "texture transforms", "baked", twice, "PTM-N215")
 def _(put: Put) -> str:
     doc = Gltf()
     use = {"extensions": {"KHR_texture_transform": {"scale": [2, 1]}}}
@@ -181,7 +181,7 @@ def turned(scene: Scene) -> None:
     assert quarters == [BLUE, RED, WHITE, GREEN]
 
 
-@feature("glTF", "moved and scaled textures", "baked", turned, "PTM-N215")
+@feature("glTF", "texture transforms", "baked", turned, "PTM-N215")
 def _turned_texture(put: Put) -> str:
     """u' = cos·u + sin·v + offset, v' = −sin·u + cos·v + offset (KHR_texture_transform)."""
     doc = Gltf()

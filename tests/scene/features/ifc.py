@@ -24,7 +24,7 @@ def brick(scene: Scene) -> None:
     assert scene.materials[0].color == (1.0, 0.5, 0.0)
 
 
-@feature("IFC", "colours of materials", "carried over", brick)
+@feature("IFC", "material colours", "carried over", brick)
 def _(put: Put) -> str:
     made = building()
     made.box("IfcWall", "W", (0, 0, 0), (5, 1, 3), style=made.style("Brick", (1.0, 0.5, 0.0), None))
@@ -43,7 +43,7 @@ def told(scene: Scene) -> None:
     assert kinds == {"IfcWall W": "structural", "IfcDoor D": "door", "IfcRailing R": "detail"}
 
 
-@feature("IFC", "roles of products", "carried over", told)
+@feature("IFC", "product classes", "carried over", told)
 def _(put: Put) -> str:
     made = building()
     for n, (kind, name) in enumerate((("IfcWall", "W"), ("IfcDoor", "D"), ("IfcRailing", "R"))):
@@ -56,7 +56,7 @@ def two_storeys(scene: Scene) -> None:
     assert actual == [("EG", 0.0), ("OG", 3.0)]
 
 
-@feature("IFC", "names of storeys", "carried over", two_storeys)
+@feature("IFC", "storey names", "carried over", two_storeys)
 def _(put: Put) -> str:
     made = building()
     for name, height in (("EG", 0.0), ("OG", 3.0)):

@@ -36,7 +36,7 @@ def _(put: Put) -> str:
     return obj(put, "map_Kd four.png", four_png=png(FOUR))
 
 
-@feature("OBJ", "colours of materials", "carried over", tinted)
+@feature("OBJ", "material colours", "carried over", tinted)
 def _(put: Put) -> str:
     return obj(put, "Kd 1 0.5 0")
 
@@ -44,20 +44,20 @@ def _(put: Put) -> str:
 COLORED = "v 0 0 0 1 0 0\nv 10 0 0 0 1 0\nv 10 4 0 0 0 1\nv 0 4 0 0 0 0\n"
 
 
-@feature("OBJ", "colours of vertices", "carried over", vertex_colors)
+@feature("OBJ", "vertex colours", "carried over", vertex_colors)
 def _(put: Put) -> str:
     put("a.obj", COLORED + "f 1 2 3 4\n")
     return "a.obj"
 
 
-@feature("OBJ", "colours of vertices", "carried over", vertex_colors)
+@feature("OBJ", "vertex colours", "carried over", vertex_colors)
 def _colours_beyond_1(put: Put) -> str:
     """By rounding, and of a vertex that no face has."""
     put("a.obj", COLORED.replace("0 1 0 0", "0 1.000001 0 0", 1) + "f 1 2 3 4\nv 0 0 9 1.4 0 0\n")
     return "a.obj"
 
 
-@feature("OBJ", "colours of vertices", "carried over", vertex_colors)
+@feature("OBJ", "vertex colours", "carried over", vertex_colors)
 def _colours_to_255(put: Put) -> str:
     """As some scanners write them; and they take the place of Kd."""
     put("a.mtl", "newmtl wall\nKd 0.2 0.2 0.2\n")
@@ -71,12 +71,12 @@ def _(put: Put) -> str:
     return obj(put, "d 0.5")
 
 
-@feature("OBJ", "alpha of textures", "carried over", cut_out)
+@feature("OBJ", "texture alpha", "carried over", cut_out)
 def _(put: Put) -> str:
     return obj(put, "map_Kd four.png", four_png=png(np.dstack([FOUR, ALPHA])))
 
 
-@feature("OBJ", "images of opacities", "baked", cut_out, "PTM-N215")
+@feature("OBJ", "opacity maps", "baked", cut_out, "PTM-N215")
 def _(put: Put) -> str:
     return obj(put, "map_Kd four.png\nmap_d mask.png", four_png=png(FOUR), mask_png=png(ALPHA))
 
@@ -87,12 +87,12 @@ def stencil(scene: Scene) -> None:
     assert [shown(scene, u, 0.8) for u in (0.2, 0.8)] == [[255, 0], [255, 255]]
 
 
-@feature("OBJ", "images of opacities", "baked", stencil, "PTM-N215")
+@feature("OBJ", "opacity maps", "baked", stencil, "PTM-N215")
 def _mask_alone(put: Put) -> str:
     return obj(put, "Kd 1 0.5 0\nmap_d mask.png", mask_png=png(ALPHA))
 
 
-@feature("OBJ", "moved and scaled textures", "baked", twice, "PTM-N215")
+@feature("OBJ", "texture transforms", "baked", twice, "PTM-N215")
 def _(put: Put) -> str:
     return obj(put, "map_Kd -s 2 1 1 four.png", four_png=png(FOUR))
 

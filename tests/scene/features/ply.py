@@ -16,7 +16,7 @@ PLY_ROWS = "".join(
 )
 
 
-@feature("PLY", "colours of vertices", "carried over", vertex_colors)
+@feature("PLY", "vertex colours", "carried over", vertex_colors)
 def _(put: Put) -> str:
     colors = "".join(f"property uchar {name}\n" for name in ("red", "green", "blue"))
     axes = "".join(f"property float {axis}\n" for axis in "xyz")

@@ -49,14 +49,14 @@ def _(put: Put) -> str:
     return written(put, on, four=FOUR)
 
 
-@feature("USD", "colours of materials", "carried over", tinted, "PTM-N215")
+@feature("USD", "material colours", "carried over", tinted, "PTM-N215")
 def _(put: Put) -> str:
     on = made().stage()
     made().bind(made().mesh(on), made().material(on, "/World/m", diffuseColor=(1, LIGHT, 0)))
     return written(put, on)
 
 
-@feature("USD", "colours of vertices", "carried over", vertex_colors, "PTM-N215")
+@feature("USD", "vertex colours", "carried over", vertex_colors, "PTM-N215")
 def _(put: Put) -> str:
     on = made().stage()
     corners = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, 0)]
@@ -82,7 +82,7 @@ def with_alpha(on: Any, **inputs: Any) -> None:
     made().bind(quad, paint)
 
 
-@feature("USD", "alpha of textures", "carried over", cut_out)
+@feature("USD", "texture alpha", "carried over", cut_out)
 def _(put: Put) -> str:
     on = made().stage()
     with_alpha(on)
@@ -101,7 +101,7 @@ def _(put: Put) -> str:
     return written(put, on, four=np.dstack([FOUR, ALPHA]))
 
 
-@feature("USD", "moved and scaled textures", "baked", twice, "PTM-N215")
+@feature("USD", "texture transforms", "baked", twice, "PTM-N215")
 def _(put: Put) -> str:
     on = made().stage()
     coords = made().reader(on, "/World/m/st", "st")
