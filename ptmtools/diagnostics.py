@@ -36,7 +36,7 @@ FOLDER_CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D803": ("error", "a file that the index lists is missing or cannot be read"),
     "PTM-D804": ("error", "a file is damaged, or not the file that the index describes"),
     "PTM-D806": ("warning", "a file or a texture that the index does not use"),
-    "PTM-D808": ("warning", "an image is split otherwise than its minimum asks for"),
+    "PTM-D808": ("warning", "the sizes of an interlaced image do not match its minimum size"),
 }
 
 

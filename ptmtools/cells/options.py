@@ -58,31 +58,31 @@ class SubdivideOptions:
 
     wall_area: float = option(
         2.0,
-        "Area of the smallest wall that divides the building into leaves (its convex parts). "
-        "Smaller values give more and smaller cells, and make the visibility stage slower.",
+        "Minimum area of a wall that divides the building into leaves (its convex parts). Smaller "
+        "values give more and smaller cells, and make the visibility stage slower.",
         metavar="M2",
     )
     wall_thickness: float = option(
         0.5,
-        "Largest distance between the two faces of a wall. Jambs, lintels and sills between them "
+        "Maximum distance between the two faces of a wall. Jambs, lintels and sills between them "
         "divide the building, whatever their area.",
         metavar="METRES",
     )
     max_leaves: int = option(
         10_000,
-        "Largest number of leaves. The most useful divisions come first.",
+        "Maximum number of leaves. The most useful divisions are made first.",
         was=("max-cells",),
     )
     structural: tuple[str, ...] = option(
         (),
-        "Objects or materials (names; * and ? are wildcards) that divide the building, whatever "
-        "their area. Repeatable.",
+        "Names of objects or materials that divide the building, whatever their area; * and ? are "
+        "wildcards. Repeatable.",
         metavar="NAME",
     )
     detail: tuple[str, ...] = option(
         (),
-        "Objects or materials (names; * and ? are wildcards) that neither divide the building "
-        "nor hide anything, such as furniture. --structural takes precedence. Repeatable.",
+        "Names of objects or materials that neither divide the building nor hide anything, such "
+        "as furniture; * and ? are wildcards. --structural takes precedence. Repeatable.",
         metavar="NAME",
         basic=True,
     )
@@ -108,7 +108,7 @@ class SubdivideOptions:
     )
     reach: Reach = option(
         "all",
-        "Space that the starting point does not reach, such as rooms behind closed doors: all "
+        "Space that cannot be reached from the viewpoint, such as rooms behind closed doors: all "
         "keeps it where it is walkable, main drops it.",
     )
     standing: Standing = option(
@@ -119,18 +119,19 @@ class SubdivideOptions:
     doors: DoorState = option(
         "open",
         "Doors between rooms: open ones are drawn but hide nothing, hidden ones are not drawn, "
-        "closed ones act as walls. Entrances stay shut.",
+        "closed ones act as walls. Exterior doors stay shut.",
         basic=True,
     )
     door: tuple[str, ...] = option(
         (),
-        "Objects or materials (names; * and ? are wildcards) that are door leaves, in addition "
-        "to those recognised by name and shape. --structural takes precedence. Repeatable.",
+        "Names of objects or materials that are door leaves, in addition to door leaves that ptm "
+        "recognises by name and shape; * and ? are wildcards. --structural takes precedence. "
+        "Repeatable.",
         metavar="NAME",
     )
     viewpoints: tuple[Position, ...] = option(
         (),
-        "Starting point inside the building: position in metres, Y up, and yaw in degrees, "
+        "Viewpoint inside the building: position in metres, Y up, and yaw in degrees, "
         "counter-clockwise from -Z. Default: chosen automatically. Repeatable.",
         name="viewpoint",
         metavar="X,Y,Z[,YAW]",

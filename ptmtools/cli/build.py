@@ -48,8 +48,8 @@ report_option = option(
     "--report",
     "wanted",
     is_flag=True,
-    help="Print the sizes of the sets, the most expensive portals, and openings through which "
-    "suspiciously much is visible.",
+    help="Print the sizes of the sets, the most expensive portals, and openings through which an "
+    "unusually large part of the building is visible.",
 )
 #: Textures that are listed without ``-v``.
 SHOWN_TEXTURES = 5
@@ -169,7 +169,7 @@ def _of_database(stage: Stage[Any]) -> Callable[..., None]:
 @json_option
 @with_console
 def status(console: Console, db: str) -> None:
-    """Show which stages of DB are done, stale or damaged, and which process is writing it."""
+    """Show which stages of DB are done, stale or damaged, and which process is writing to it."""
     from ptmtools.pipeline.status import database_status
 
     state = database_status(db)
@@ -181,7 +181,7 @@ def status(console: Console, db: str) -> None:
         line = f"{stage.stage:<9}{stage.state:>8}   {files:<22} {stage.why or summary}"
         lines.append(line.rstrip())
     if state.writer:
-        lines.append(f"locked by {state.writer}, which is writing it")
+        lines.append(f"locked by {state.writer}, which is writing to it")
     if state.interrupted:
         kept = f"; the next one keeps {count(state.waiting, 'finished texture')}"
         lines.append(f"a run was interrupted{kept if state.waiting else ''}")
@@ -195,8 +195,8 @@ def status(console: Console, db: str) -> None:
 def warm_up(console: Console) -> None:
     """Compile the code that the first build, encoding or octree texture would compile.
 
-    This takes a minute, once per release and user. The first build compiles too; use this command
-    for container images, and before the workers of a cluster start.
+    This takes a minute, once per release and user. Without this command, the first build compiles
+    the code; use it for container images, and before the workers of a cluster start.
     """
     from ptmtools.jit import compilations
     from ptmtools.pipeline.warm_up import warm_building, warm_statue

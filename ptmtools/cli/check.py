@@ -57,8 +57,8 @@ def _print_codes(context: click.Context, option: click.Option, given: bool) -> N
     type=click.IntRange(0),
     default=0,
     metavar="N",
-    help="Also test N random lines between points in cells: where nothing blocks the line, each of "
-    "the two cells must be in the visible set of the other.",
+    help="Also test N random line segments. If nothing blocks a segment, the cells of its two end "
+    "points must be in each other's visible sets.",
 )
 @option("--strict/--no-strict", help="Fail on warnings too.")
 @option(
@@ -83,8 +83,8 @@ def validate(
 ) -> None:
     """Check a database, another folder written by ptm, or a .ptm file.
 
-    The command prints the worst finding of each file first, and at the end the command that
-    repairs them. The exit status is 8 if there are errors.
+    The findings of each file are sorted by severity. The last line names the command that repairs
+    the damage. The exit status is 8 if there are errors.
     """
     if not target:
         raise no_name()

@@ -49,13 +49,13 @@ if TYPE_CHECKING:
 @click.command("encode", cls=Command)
 @click.argument("images", metavar="IMAGE...", nargs=-1, required=True, type=click.Path())
 @output_option(
-    "File to write, or - for stdout; a folder for several images or if it ends with /. "
-    "Default: beside each image."
+    "File to write, or - for stdout; a folder if there are several images or the path ends with "
+    "/. Default: beside each image."
 )
 @options_of(EncodeOptions)
 @option(
     "--orient / --no-orient",
-    help="Rotate the texels by the EXIF orientation of the image instead of storing the "
+    help="Rotate the texels according to the EXIF orientation of the image instead of storing the "
     "orientation.",
 )
 @many_files
@@ -187,8 +187,8 @@ def _share(part: int, whole: int) -> str:
     help="Decode only W x H texels of the level, from column X and row Y on.",
 )
 @output_option(
-    "Image to write (.png, .npy, .tif, .hdr, .exr); - for stdout; a folder for several "
-    "files or if it ends with /. Default: a .png beside each file, or an .npy for floats."
+    "Image to write (.png, .npy, .tif, .hdr, .exr); - for stdout; a folder if there are several "
+    "files or the path ends with /. Default: a .png beside each file, or an .npy for floats."
 )
 @many_files
 def decode(
@@ -200,9 +200,9 @@ def decode(
 ) -> int:
     """Decode .ptm files to images.
 
-    FILE is a .ptm, or the beginning of one; a pattern such as 'textures/*.ptm'; a folder (all .ptm
-    files in it); or - for stdin. After a file that cannot be decoded, the command continues with
-    the others.
+    FILE is a .ptm file, or the beginning of one; a pattern such as 'textures/*.ptm'; a folder (all
+    .ptm files in it); or - for stdin. After a file that cannot be decoded, the command continues
+    with the others.
     """
     from ptmtools.texture.images import WRITTEN, write_to
     from ptmtools.texture.images.files import writer
@@ -313,9 +313,10 @@ def compare(
 ) -> None:
     """Compare the size and speed of .ptm with other lossless image formats.
 
-    IMAGE is a file, a pattern such as 'scans/*.tif' or a folder (all images in it). A .ptm holds
-    all levels; other formats are measured with one file of the finest level, and with one file for
-    each level. Speeds are MB of raw texels of the finest level per second, on one thread.
+    IMAGE is a file, a pattern such as 'scans/*.tif' or a folder (all images in it). A .ptm file
+    holds all levels; other formats are measured with one file of the finest level, and with one
+    file for each level. Speeds are in MB/s of uncompressed texels of the finest level, on one
+    thread.
     """
     from ptmtools.texture.comparison import codecs, measure, total
     from ptmtools.texture.images import SUFFIXES, load_image
@@ -386,10 +387,10 @@ def interlace(
     limits: Limits,
     **values: Any,
 ) -> None:
-    """Split an image into files that sharpen it step by step (GPU image interlacing).
+    """Split an image into files that add detail step by step (GPU image interlacing).
 
     The first file is a small picture; each further one doubles the rows or the columns, up to the
-    whole image. Sides are scaled to the nearest power of two.
+    whole image. Width and height are scaled to the nearest powers of two.
     """
     from ptmtools.neighbours.interlace.writing import FORM, interlace as split, write_folder
     from ptmtools.texture.images import load_image

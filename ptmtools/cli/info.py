@@ -39,9 +39,11 @@ _SHOWN = 5
 @json_option
 @with_console
 def info(console: Console, target: str, **values: Any) -> None:
-    """Describe a model before a build, a database, or the levels of a .ptm file (- for stdin).
+    """Describe a database, the levels of a .ptm file (- for stdin), or a model that has not been
+    built yet.
 
-    The options apply to models, which are read as by build-scene. Only the head of a .ptm is read.
+    The options apply to models, which `ptm` reads as `build-scene` does. Of a .ptm file it reads
+    only the head.
     """
     if not target:
         raise no_name()

@@ -54,7 +54,7 @@ WALKS = "Walk and reference"
 reference = partial(option, heading=WALKS)
 #: ``--trace``, as ``trace_file``.
 trace_option = file_option(
-    "trace", "File with the changes of the link over time, JSON or CSV.", WALKS
+    "trace", "File with the bandwidth, latency and loss of the link over time, JSON or CSV.", WALKS
 )
 
 
@@ -66,9 +66,10 @@ trace_option = file_option(
 @json_option
 @with_console
 def path_command(console: Console, db: str, output: str, force: bool, **values: Any) -> None:
-    """Make a walk through every room of DB: on floors and through doors, with stops at pictures.
+    """Generate a walk through every room of DB: on floors and through doors, with stops at
+    pictures.
 
-    The walk begins at a viewpoint. The same seed makes the same walk.
+    The walk begins at a viewpoint. The same seed always gives the same walk.
     """
     options = take(PathOptions, values)
     check_writable(output, force=force)
@@ -110,21 +111,22 @@ def path_command(console: Console, db: str, output: str, force: bool, **values: 
 @reference(
     "--db",
     type=click.Path(),
-    help="Database of the same model. Its fully loaded picture replaces that of the campus as "
-    "the reference.",
+    help="Database of the same model. The reference is then an image of this database fully "
+    "loaded, not of the campus.",
 )
 @options_of(CampusWalkOptions)
 @reference(
     "--every",
     type=click.IntRange(0),
     default=5,
-    help="Measure the picture of every Nth frame, of five per second; 0 for none.",
+    help="Measure the image of every Nth frame (the walk has five frames per second); 0 measures "
+    "none.",
 )
 @reference(
     "--only",
     default="*",
     metavar="NAMES",
-    help="Keep only these objects (names; * and ? are wildcards).",
+    help="Keep only objects with these names; * and ? are wildcards.",
 )
 @trace_option
 @json_option
@@ -139,8 +141,8 @@ def walk_campus(
     trace_file: str | None,
     **values: Any,
 ) -> None:
-    """Simulate a walk through CAMPUS, which `ptm campus` wrote, with each preset: downloads, late
-    objects, and the error of the picture.
+    """Simulate a walk through CAMPUS, which `ptm campus` wrote, with each preset, and report
+    downloads, objects shown late, and the image error.
 
     The output is Markdown: a row for each measure, and the MB received per half minute.
     """
@@ -182,8 +184,8 @@ def walk_campus(
     "--against",
     type=click.Path(),
     metavar="DB",
-    help="Another database of the same model, such as one without --max-error. Its fully loaded "
-    "picture replaces that of DB as the reference.",
+    help="Another database of the same model, such as one without --max-error. The reference is "
+    "then an image of that database fully loaded, not of DB.",
 )
 @reference(
     "--campus",
@@ -223,8 +225,8 @@ def walk_campus(
 )
 @file_option(
     "strip",
-    "Also draw one PNG with the pictures at the start of the walk after 10, 35 and 80 s, "
-    "and the full picture, for the same run as --frames.",
+    "Also write one PNG with the view from the start of the walk after 10, 35 and 80 s of "
+    "loading, and fully loaded, for the same run as --frames.",
 )
 @force_option()
 @json_option
@@ -247,7 +249,8 @@ def simulate(
     force: bool,
     **values: Any,
 ) -> None:
-    """Simulate clients that walk through DB over a modelled link, and measure their pictures.
+    """Simulate visitors who walk through DB and clients that load it over a modelled link, and
+    measure the images that they see.
 
     The command simulates every policy with every link and every amount of memory. It does not
     change DB.

@@ -60,7 +60,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
         "decode": Entry("Decode .ptm files to images.", "images:decode"),
         "compare": Entry("Compare .ptm with other image formats.", "images:compare"),
         "interlace": Entry(
-            "Split an image into a series of files, from coarse to fine.", "images:interlace"
+            "Split an image into files that add detail step by step.", "images:interlace"
         ),
         "deinterlace": Entry("Join the files of an interlaced image.", "images:deinterlace"),
     },
@@ -72,9 +72,11 @@ GROUPS: dict[str, dict[str, Entry]] = {
             "Convert a model to objects with levels of detail.", "representations:campus"
         ),
     },
-    "Laboratory": {
-        "path": Entry("Make a walk through every room of a database.", "lab:path_command"),
-        "simulate": Entry("Simulate clients that walk through a database.", "lab:simulate"),
+    "Experiments": {
+        "path": Entry("Generate a walk through every room of a database.", "lab:path_command"),
+        "simulate": Entry(
+            "Simulate visitors and the clients that load a database for them.", "lab:simulate"
+        ),
         "walk-campus": Entry("Simulate a walk through a campus.", "lab:walk_campus"),
         "tradeoff": Entry("Measure the cost and the benefit of each option.", "tradeoff:tradeoff"),
     },
@@ -111,7 +113,7 @@ class Commands(click.Group):
             heading: [(name, entry.about) for name, entry in group.items() if not entry.hidden]
             for heading, group in GROUPS.items()
         }
-        tables["Single stages of build-scene"] = [(n, s.about) for n, s in _stages().items()]
+        tables["Individual stages of build-scene"] = [(n, s.about) for n, s in _stages().items()]
         width = max(len(name) for rows in tables.values() for name, _ in rows)
         for heading, rows in tables.items():
             with formatter.section(heading):

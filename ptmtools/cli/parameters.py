@@ -421,7 +421,7 @@ limit_option: Decorator = option(
     default=1024,
     metavar="MIB",
     callback=_limits,
-    help="Largest decoded size of an image.",
+    help="Maximum decoded size of an image.",
 )
 
 

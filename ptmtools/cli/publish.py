@@ -131,7 +131,7 @@ def publish(console: Console, db: str, folder: str, force: bool, **values: Any) 
         f"{folder}: {count(len(done.written), 'file')} written, "
         f"{len(done.unchanged):,} unchanged{removed}",
         f"download: page {size(weight.page)}; with the first room {size(weight.first_room)} "
-        f"(textures up to {COARSE} texels a side)",
+        f"(textures up to {COARSE} texels per side)",
         f"each further room {size(weight.mean_room)} on average, at most "
         f"{size(weight.worst_room)} (cell {weight.worst_cell}); everything {size(weight.whole)}",
     )

@@ -35,9 +35,10 @@ from ptmtools.rendering.drawing import ViewOptions, draw_view
 @json_option
 @with_console
 def render(console: Console, target: str, output: str, force: bool, **values: Any) -> None:
-    """Draw a view of DB from its finest textures, or of DIR, a folder that `ptm apo` wrote.
+    """Draw a view of DB with its finest textures, or of DIR, a folder that `ptm apo` wrote.
 
-    DB is a database or the folder that it serves. The view is that of a viewpoint, or --eye.
+    DB is a database or its folder `www`. The view is taken from a viewpoint of the database, or
+    from --eye.
     """
     from ptmtools.neighbours.apo.files import INDEX
 

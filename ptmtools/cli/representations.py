@@ -133,8 +133,8 @@ def campus(
     workers: int,
     **values: Any,
 ) -> None:
-    """Convert MODEL to a campus: each object in several levels of detail with its own lightmap,
-    textures by size and channel, and the files of each quality preset.
+    """Convert MODEL to a campus: objects in several levels of detail, a lightmap for each object,
+    one texture file for each size and channel, and a file list for each quality preset.
 
     A client loads the coarsest meshes first, and refines the nearest objects.
     """

@@ -58,38 +58,40 @@ DURATION, QUICK = 60.0, 30.0
 )
 @file_option(
     "walk",
-    f"Walk that `ptm path` wrote. Default: a new one of {DURATION:.0f} s, with --quick of "
-    f"{QUICK:.0f} s.",
+    f"Walk that `ptm path` wrote. Default: a new walk of {DURATION:.0f} s, or of {QUICK:.0f} s "
+    "with --quick.",
     "Experiments",
 )
 @options_of(WalkOptions)
 @experiment(
+    "--option",
     "--knob",
     "knobs",
     type=click.Choice([knob.option.removeprefix("--") for knob in KNOBS]),
     multiple=True,
-    help="Try only this option on the walk, also with its slow values. Repeatable. Default: all.",
+    help="Test only this option on the walk, including values that build slowly. Repeatable. "
+    "Default: all.",
 )
-@experiment("--quick", is_flag=True, help="Try one value of each option, on a shorter walk.")
+@experiment("--quick", is_flag=True, help="Test one value of each option, on a shorter walk.")
 @experiment(
     "--error",
     "wanted",
     type=click.FloatRange(0, min_open=True),
-    help="Also name the cheapest setting of each stage within this error.",
+    help="Also print the cheapest setting of each stage within this error.",
 )
 @experiment(
     "--cells-tried",
     type=click.IntRange(1),
     default=16,
-    help="Cells in which coverage hints are tested, a sample of all.",
+    help="Number of cells, evenly spread over the database, in which coverage hints are tested.",
 )
 @experiment(
     "--reference",
     type=click.IntRange(LEAST_POINTS, MAX_SAMPLES),
     default=MAX_SAMPLES,
     metavar="POINTS",
-    help="Sample points per cell of the reference for coverage hints. Only settings with fewer "
-    "points are tried.",
+    help="Number of sample points per cell in the reference hints. Only settings with fewer points "
+    "are tested.",
 )
 @file_option("csv", "Also write all trials as CSV.")
 @file_option("plot", "Also plot error against cost, as a PNG.")
@@ -111,7 +113,8 @@ def tradeoff(
     force: bool,
     **values: Any,
 ) -> None:
-    """Measure the cost and the benefit of settings on the scene of DB, which is not changed.
+    """Measure the cost and the benefit of settings on the scene of DB. The command does not change
+    DB.
 
     The first part is the effect on a walk through the building, in sentences and as a table. The
     second part is the accuracy of each stage; a star marks settings that no cheaper one surpasses.
@@ -119,7 +122,7 @@ def tradeoff(
     options = take(WalkOptions, values)
     stages = stages or (WALK, *EXPERIMENTS)
     if WALK not in stages and (walk_file or knobs):
-        given = "--walk" if walk_file else "--knob"
+        given = "--walk" if walk_file else "--option"
         raise click.UsageError(f"{given} needs --stage {WALK}")
     walk = read_walk(walk_file) if walk_file else None
     for file in (csv_file, plot_file):

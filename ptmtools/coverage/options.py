@@ -45,24 +45,24 @@ class AchOptions:
     )
     samples: int | None = option(
         None,
-        "Number of sample points in each cell; with --tolerance, the upper limit. Default: "
-        "set by --preset.",
+        "Number of sample points per cell; with --tolerance, the maximum. Default: set by "
+        "--preset.",
     )
     face: int | None = option(
         None,
-        "Side of the six square views of a sample point. More sample points improve the hints "
-        "far more than larger views. Default: set by --preset.",
+        "Width and height of the six square views of a sample point. More sample points improve "
+        "the hints far more than larger views. Default: set by --preset.",
         metavar="PIXELS",
     )
     placement: Placement | None = option(
         None,
-        "Distribution of the sample points in a cell: sobol, evenly spread; kd, in the middles "
-        "of equal parts, best for fewer than 16 points; uniform, at random. Default: set by "
+        "Distribution of the sample points in a cell: sobol, evenly spread; kd, at the centres of "
+        "parts of equal size, best for fewer than 16 points; uniform, at random. Default: set by "
         "--preset.",
     )
     tolerance: float | None = option(
         None,
-        "Largest error of the hints of a cell, as total variation, with about 95 % confidence. "
+        "Maximum error of the hints of a cell, as total variation, with about 95 % confidence. "
         "Sample points are added until the error is below this or --samples is reached.",
     )
     weighting: Weighting = option(
@@ -74,7 +74,7 @@ class AchOptions:
     gpu: int | None = option(None, "Graphics device to use, by number. Default: the first.")
     clearance: float | None = option(
         None,
-        "Smallest distance between a sample point and any surface. Default: a quarter of the "
+        "Minimum distance between a sample point and any surface. Default: a quarter of the "
         "smallest cell thickness.",
         metavar="METRES",
     )

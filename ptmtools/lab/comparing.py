@@ -41,8 +41,8 @@ class SimulateOptions:
     )
     bandwidth: str = option(
         "512k,4M",
-        "Bandwidth of the link in bit/s: 56k, 4M (powers of ten) or inf. Commas separate several "
-        "values.",
+        "Bandwidth of the link in bit/s: 56k, 4M (k = 1,000, M = 1,000,000) or inf. Commas "
+        "separate several values.",
         metavar="RATE[,RATE]",
     )
     latency: str = option(
@@ -56,8 +56,8 @@ class SimulateOptions:
     )
     memory: str = option(
         "4MiB,10%",
-        "Texture memory: 4MiB, 10% of that of all textures, or inf. Commas separate several "
-        "values.",
+        "Texture memory: an amount (4MiB), a share of the memory of all textures (10%), or inf. "
+        "Commas separate several values.",
         metavar="SIZE[,SIZE]",
     )
     paper_bytes: bool = option(
@@ -66,7 +66,9 @@ class SimulateOptions:
     )
     one_range: bool = option(False, "Request one range of a file at a time, as browsers do.")
     lit: bool = option(
-        False, "Light the pictures, so that relief is visible; policies of octree textures need it."
+        False,
+        "Light the scene with a lamp, so that relief is visible; policies of octree textures "
+        "need it.",
     )
 
     def __post_init__(self) -> None:

@@ -152,7 +152,7 @@ class WriterOptions:
     )
     viewpoints: tuple[GivenViewpoint, ...] = option(
         (),
-        "Starting point inside the building: position in metres, Y up, and yaw in degrees, "
+        "Viewpoint inside the building: position in metres, Y up, and yaw in degrees, "
         "counter-clockwise from -Z; without YAW, towards the best view. Default: the model's "
         "cameras, or the best views in the largest rooms. Repeatable.",
         name="viewpoint",
@@ -163,13 +163,14 @@ class WriterOptions:
     )
     viewpoint_count: int = option(
         32,
-        "Largest number of further rooms that get a viewpoint; the largest rooms come first. The "
-        "viewpoints are listed in the order of a walk.",
+        "Maximum number of viewpoints in addition to those of --viewpoint and of the model's "
+        "cameras: one per room, largest rooms first. They are listed in the order in which a walk "
+        "passes them.",
     )
     avatar_size: Vector | None = option(
         None,
         "Size of the visitor in VRML browsers: distance from walls, eye height and highest step, "
-        "in metres. Default: the size of --walker, with the eyes at 0.94 of its height.",
+        "in metres. Default: the size of --walker, with the eyes at 0.94 times its height.",
         metavar="RADIUS,EYE,STEP",
         default_before=(6, (0.25, 1.6, 0.75)),
     )
@@ -181,14 +182,14 @@ class WriterOptions:
     )
     first_look: int = option(
         0,
-        "Also write one file for each cell with the levels, up to this side, of all textures "
-        "visible from the cell; 0 writes none.",
+        "For each cell, also write one file that holds the levels up to this width and height of "
+        "all textures visible from the cell; 0 writes none.",
         metavar="TEXELS",
     )
     need: int = option(
         16,
-        "Number of sample points in each cell that measure the resolution that each texture "
-        "needs there; 0 omits this measurement.",
+        "Number of sample points per cell for measuring the required resolution of each texture; "
+        "0 omits this measurement.",
         default_before=(8, 0),
     )
     gzip: bool = option(
@@ -288,7 +289,7 @@ class PlotOptions:
         1.2, "Height of the horizontal cut above the floor of each storey.", metavar="METRES"
     )
     storey_gap: float = option(
-        1.5, "Smallest vertical distance between the floors of two storeys.", metavar="METRES"
+        1.5, "Minimum vertical distance between the floors of two storeys.", metavar="METRES"
     )
     width: float = option(12.0, "Width of the picture.", metavar="INCHES")
     dpi: int = option(110, "Resolution, in dots per inch.")

@@ -41,14 +41,14 @@ class TextureOptions(EncodeOptions):
     )
     fallback_size: int = option(
         0,
-        "Largest side of the PNGs; each holds the finest level that fits. 0 sets no limit.",
+        "Maximum width and height of the PNGs; each holds the finest level that fits. 0 sets no "
+        "limit.",
         metavar="TEXELS",
     )
     trim: bool = option(
         False,
-        "Leave out levels that no screen of --trim-height resolves from any place where a "
-        "visitor can stand. On larger screens and with flying cameras, textures then look "
-        "blurred.",
+        "Omit levels finer than a screen of --trim-height can show from any place where a visitor "
+        "can stand. On larger screens and with flying cameras, textures then look blurred.",
         basic=True,
     )
     trim_height: int = option(
@@ -57,10 +57,10 @@ class TextureOptions(EncodeOptions):
     trim_fov: float = option(60.0, "Vertical field of view that --trim assumes.", metavar="DEGREES")
     trim_distance: float = option(
         0.25,
-        "Smallest distance between the eye and a surface that --trim assumes.",
+        "Minimum distance between the eye and a surface that --trim assumes.",
         metavar="METRES",
     )
-    limit: int = option(1024, "Largest decoded size of an image.", metavar="MIB", compare=False)
+    limit: int = option(1024, "Maximum decoded size of an image.", metavar="MIB", compare=False)
 
     def __post_init__(self) -> None:
         """Raises InputError PTM-I111 for values out of range."""

@@ -45,8 +45,8 @@ class ViewOptions:
     )
     eye: tuple[float, ...] | None = option(
         None,
-        "Position of the eye instead, in metres, Y up, and yaw in degrees, counter-clockwise from "
-        "-Z.",
+        "Position of the eye, in metres, Y up, and yaw in degrees, counter-clockwise from -Z; "
+        "overrides --viewpoint.",
         metavar="X,Y,Z[,YAW]",
         numbers=(3, 4),
     )
@@ -55,16 +55,17 @@ class ViewOptions:
     )
     field_of_view: float | None = option(
         None,
-        f"Vertical field of view. Default: that of the viewpoint, or {FIELD_OF_VIEW:g}.",
+        "Vertical field of view. Default: the field of view of the viewpoint, or "
+        f"{FIELD_OF_VIEW:g}.",
         metavar="DEGREES",
     )
     width: int = option(1280, "Width of the picture.", metavar="PIXELS")
     height: int = option(720, "Height of the picture.", metavar="PIXELS")
     max_side: int = option(
-        0, "Use texture levels of at most this side; 0 for the finest.", metavar="TEXELS"
+        0, "Maximum width and height of the texture levels; 0 uses the finest.", metavar="TEXELS"
     )
     lit: bool = option(
-        False, "Light the picture by a lamp, and draw the relief of octree textures."
+        False, "Light the scene with a lamp, and draw the relief of octree textures."
     )
 
     def __post_init__(self) -> None:

@@ -48,9 +48,9 @@ class IngestOptions:
     )
     allow_outside: bool = option(False, "Also read files outside the model's folder.")
     # Limits either end a build or have no effect, so a changed limit does not invalidate a stage.
-    limit: int = option(1024, "Largest decoded size of an image.", metavar="MIB", compare=False)
+    limit: int = option(1024, "Maximum decoded size of an image.", metavar="MIB", compare=False)
     max_triangles: int = option(
-        20_000_000, "Largest number of triangles of the model.", compare=False
+        20_000_000, "Maximum number of triangles of the model.", compare=False
     )
 
     def __post_init__(self) -> None:

@@ -106,15 +106,15 @@ class SiteOptions:
     title: str = option("", "Title of the page. Default: the name of the database.")
     poster: str = option(
         "",
-        "Picture (JPEG, PNG or WebP) to show while the building loads. Default: a drawn picture "
-        "of the first viewpoint.",
+        "Picture (JPEG, PNG or WebP) to show while the building loads. Default: a rendered image "
+        "from the first viewpoint.",
         metavar="FILE",
     )
-    pictures: bool = option(True, "Draw a poster and pictures of the viewpoints.")
+    pictures: bool = option(True, "Render a poster and images of the viewpoints.")
     clients: Literal["page", "vrml"] = option(
         "page",
-        "Clients of the site: only its own page, or also VRML browsers, which need more files "
-        "and images.",
+        "Clients that the site supports: page (only its own page) or vrml (also VRML browsers, "
+        "which adds files).",
         name="for",
     )
 

@@ -48,7 +48,7 @@ class ServeOptions:
     )
     bandwidth: str = option(
         "inf",
-        "Bandwidth of all connections together, in bit/s: 56k, 4M (powers of ten) or inf.",
+        "Total bandwidth of all connections, in bit/s: 56k, 4M (k = 1,000, M = 1,000,000) or inf.",
         metavar="RATE",
     )
     latency: str = option(

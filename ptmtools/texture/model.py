@@ -28,24 +28,25 @@ class EncodeOptions:
     profile: str = option("fast", "Coding of the levels", choices=PROFILES)
     max_error: int = option(
         0,
-        "Largest error of any sample of any level; 0 is lossless. An error of 4 (of 255) is hard "
-        "to see and makes most files about half as large. Integer images only.",
+        "Maximum error of any sample of any level; 0 is lossless. An error of 4 per 8-bit sample "
+        "(range 0 to 255) is hard to see and makes most files about half as large. Integer images "
+        "only.",
         basic=True,
     )
     tile: int = option(
         512,
-        "Side of the tiles into which large levels are cut, for parallel work, bounded memory "
-        "and random access; 0 disables tiles.",
+        "Width and height of the tiles into which large levels are cut, for parallel work, "
+        "bounded memory and random access; 0 disables tiles.",
         metavar="TEXELS",
     )
     min_side: int = option(
         1,
-        "Leave out levels whose shorter side is below this. Clients can compute them.",
+        "Omit levels whose width or height is below this. Clients can compute them.",
         metavar="TEXELS",
     )
     max_side: int = option(
         0,
-        "Leave out levels whose longer side is above this; 0 keeps all. Sides halve from level to "
+        "Omit levels whose width or height is above this; 0 keeps all. Both halve from level to "
         "level, so the finest level kept may be much smaller.",
         metavar="TEXELS",
         basic=True,

@@ -25,9 +25,8 @@ class PvsOptions:
     )
     budget: int = option(
         200_000,
-        "Largest number of operations (tests and clips of portals) in the search from one side "
-        "of a portal. Beyond it, undecided cells count as visible: sets become larger, never "
-        "wrong.",
+        "Maximum number of operations (tests and clips of portals) in the search from one side of "
+        "a portal. Beyond it, undecided cells count as visible: sets become larger, never wrong.",
         name="pvs-budget",
     )
     lines: int = option(

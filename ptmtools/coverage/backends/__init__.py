@@ -73,6 +73,6 @@ BACKENDS: dict[str, Backend] = {
     )
 }
 
-_AUTO = SimpleNamespace(about="whichever can run here and should be fastest")
+_AUTO = SimpleNamespace(about="the faster of the available renderers")
 #: The values of ``--backend``, each with its `about`.
 CHOICES: ChainMap[str, Any] = ChainMap(BACKENDS, {AUTO: _AUTO})

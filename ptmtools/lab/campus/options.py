@@ -49,13 +49,13 @@ class CampusWalkOptions:
 
     preset: str = option(
         "low,medium,high,ultra,ultra-cached",
-        "Sides of textures and of lightmaps, in texels",
+        "Width and height of textures and of lightmaps, in texels",
         choices=QUALITIES,
         several=True,
     )
     bandwidth: str = option(
         "4M",
-        "Bandwidth of the link in bit/s: 56k, 4M (powers of ten) or inf.",
+        "Bandwidth of the link in bit/s: 56k, 4M (k = 1,000, M = 1,000,000) or inf.",
         metavar="RATE",
     )
     latency: str = option(

@@ -241,7 +241,7 @@ class CampusPolicy:
 CAMPUS_POLICIES = {
     f"campus-{name}": CampusPolicy(
         f"campus-{name}",
-        f"client of --campus; sides of textures and lightmaps in texels: {choice.about}",
+        f"client of --campus; width and height of textures and lightmaps in texels: {choice.about}",
         choice.quality,
     )
     for name, choice in QUALITIES.items()

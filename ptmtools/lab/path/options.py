@@ -23,13 +23,13 @@ class PathOptions:
 
     seed: int = option(
         1,
-        "Seed of the walk: 1 begins at the first viewpoint, 2 at the next, and so on; each looks "
-        "at the pictures in another order.",
+        "Seed of the walk: seed 1 starts at the first viewpoint, 2 at the next, and so on; each "
+        "seed gives a different order of the pictures.",
     )
     duration: float | None = option(
         None,
-        "Length of the walk, which starts again if time is left after all rooms. Default: the "
-        "time that all rooms take.",
+        "Duration of the walk. A walk that has visited all rooms earlier starts again. Default: "
+        "the time needed to visit all rooms.",
         metavar="SECONDS",
     )
     speed: float = option(1.4, "Walking speed.", metavar="M/S")
@@ -37,8 +37,7 @@ class PathOptions:
     stop: float = option(5.0, "Average stop before a picture.", metavar="SECONDS")
     eye: float | None = option(
         None,
-        "Height of the eyes above the floor. Default: 0.94 of the height of --walker, as in the "
-        "hints.",
+        "Height of the eyes above the floor. Default: 0.94 times the height of --walker.",
         metavar="METRES",
     )
     field_of_view: float = option(

@@ -72,13 +72,13 @@ _LIST = (
     PolicyEntry("lru", "whole files in order of use, with a cache", LruClient),
     PolicyEntry(
         "gpuii",
-        "client of Englert et al., §3.3: interlaced images by rings around the camera",
+        "client of Englert et al., §3.3: interlaced images, in rings around the camera",
         GpuiiClient,
         form="interlaced",
     ),
     PolicyEntry(
         "ach",
-        "average coverage hints, in the engine that most policies share",
+        "average coverage hints, with the loader that most policies share",
         _engine(Weighted(shares.coverage_shares)),
     ),
     PolicyEntry(
@@ -94,20 +94,22 @@ _LIST = (
     ),
     PolicyEntry("distance", "nearest cells first", _engine(Weighted(shares.distance_shares))),
     PolicyEntry(
-        "bbox", "screen area of boxes, without occlusion", _engine(Weighted(shares.by_box))
+        "bbox", "screen area of bounding boxes, without occlusion", _engine(Weighted(shares.by_box))
     ),
-    PolicyEntry("screen", "pixels of an item buffer", _engine(Screen())),
-    PolicyEntry("screen+distance", "screen, and near cells", _engine(Screen(shares.by_distance))),
+    PolicyEntry("screen", "screen area of each texture, from an item buffer", _engine(Screen())),
+    PolicyEntry("screen+distance", "screen area and distance", _engine(Screen(shares.by_distance))),
     PolicyEntry(
-        "screen+ach", "screen, and average coverage hints", _engine(Screen(shares.by_coverage))
+        "screen+ach", "screen area and average coverage hints", _engine(Screen(shares.by_coverage))
     ),
     PolicyEntry(
         "screen+need",
-        "screen, and the resolution needed in the cell",
+        "screen area and the resolution needed in the cell",
         _engine(Screen(shares.by_need)),
         needs=("need", "measure it with `ptm emit DB --need 16`"),
     ),
-    PolicyEntry("best", "policy of the viewer: screen, need and distance", _engine(BEST)),
+    PolicyEntry(
+        "best", "policy of the viewer: screen area, needed resolution and distance", _engine(BEST)
+    ),
     PolicyEntry(
         "apo",
         "client of Lacoste et al., §4.2: octree textures level by level; other textures as in best",
@@ -115,10 +117,10 @@ _LIST = (
         form="octree",
     ),
     PolicyEntry("best+apo", "best, also for octree textures", _engine(BEST), form="octree"),
-    PolicyEntry("oracle", "knows the walk; greedy", _oracle),
+    PolicyEntry("oracle", "greedy, with knowledge of the whole walk", _oracle),
     PolicyEntry(
         "oracle-exchange",
-        "knows the walk; also exchanges levels in memory",
+        "as oracle, but also exchanges levels in memory",
         partial(_oracle, exchanging=True),
     ),
 )

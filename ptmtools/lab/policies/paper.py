@@ -59,10 +59,10 @@ class PaperOptions:
     heading: ClassVar[str] = "Policy paper"
 
     delta_t: float = option(
-        0.5, "Longest time to download a level while the viewpoint moves.", metavar="SECONDS"
+        0.5, "Maximum time to download a level while the viewpoint moves.", metavar="SECONDS"
     )
     delta_t_static: float = option(
-        20.0, "Longest time to download a level while the viewpoint is static.", metavar="SECONDS"
+        20.0, "Maximum time to download a level while the viewpoint is static.", metavar="SECONDS"
     )
     static_memory: str = option(
         "",

@@ -56,8 +56,8 @@ class WalkOptions(SimulateOptions):
     policy: str = option("best", "Policies of the clients", choices=_OF_DATABASES, several=True)
     memory: str = option(
         "10%",
-        "Texture memory: 4MiB, 10% of that of all textures, or inf. Commas separate several "
-        "values.",
+        "Texture memory: an amount (4MiB), a share of the memory of all textures (10%), or inf. "
+        "Commas separate several values.",
         metavar="SIZE[,SIZE]",
     )
 

@@ -22,20 +22,22 @@ class ApoOptions:
 
     heading: ClassVar[str] = "Octree texture"
 
-    faces: int = option(10_000, "Largest number of faces of the simplified mesh.")
+    faces: int = option(10_000, "Maximum number of faces of the simplified mesh.")
     error: float = option(
         0.05,
-        "Largest deviation of the normals in a leaf of the octree from their mean, as a root "
-        "mean square from 0 to 2. Leaves that exceed it are divided.",
+        "Maximum deviation of the normals in a leaf of the octree from their mean, as a root mean "
+        "square from 0 to 2. Leaves that exceed it are divided.",
     )
     depth: int = option(
-        13, "Greatest depth of the octree. Leaves of depth 13 are 1/8192 of its cube wide."
+        13,
+        "Maximum depth of the octree. A leaf at depth 13 has 1/8192 of the width of the "
+        "mesh's bounding cube.",
     )
     density: float = option(8.0, "Samples per triangle of the mesh, on average.")
     method: Literal["quadric", "meshlab"] = option(
         "quadric",
-        "Method of simplification: quadric, that of ptmtools, or meshlab, that of "
-        "pymeshlab and the paper.",
+        "Method of simplification: quadric (implemented in ptmtools) or meshlab (implemented in "
+        "pymeshlab; used by Lacoste et al.).",
     )
     color: bool = option(False, "Also keep the colours of vertices or of the texture.")
     color_error: float = option(

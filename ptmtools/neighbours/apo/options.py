@@ -43,22 +43,24 @@ class ReplaceOptions:
 
     apo: tuple[str, ...] = option(
         (),
-        "Objects (names; * and ? are wildcards), such as scanned statues, to replace by a "
-        "simplified mesh and an octree of their normals. Repeatable.",
+        "Replace objects with these names, such as scanned statues, with a simplified mesh and an "
+        "octree of their normals; * and ? are wildcards. Repeatable.",
         metavar="NAME",
     )
     apo_faces: int = option(
         2_000,
-        "Largest number of faces of a simplified mesh. Objects with fewer triangles stay "
+        "Maximum number of faces of a simplified mesh. Objects with fewer triangles stay "
         "unchanged.",
     )
     apo_error: float = option(
         0.05,
-        "Largest deviation of the normals in a leaf of the octree from their mean, as a root "
-        "mean square from 0 to 2. Leaves that exceed it are divided.",
+        "Maximum deviation of the normals in a leaf of the octree from their mean, as a root mean "
+        "square from 0 to 2. Leaves that exceed it are divided.",
     )
     apo_depth: int = option(
-        11, "Greatest depth of the octree. Leaves of depth 11 are 1/2048 of the object wide."
+        11,
+        "Maximum depth of the octree. A leaf at depth 11 has 1/2048 of the width of the "
+        "object's bounding cube.",
     )
     apo_density: float = option(8.0, "Samples per triangle of an object, on average.")
 

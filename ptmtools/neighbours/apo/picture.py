@@ -38,8 +38,8 @@ class RenderOptions:
     elevation: float = option(15.0, "Direction of the view above the horizon.", metavar="DEGREES")
     distance: float = option(
         0.0,
-        "Distance from the centre of the mesh, in diameters; 0 for the smallest that shows all of "
-        "it.",
+        "Distance from the centre of the mesh, in diameters; 0 selects the smallest distance at "
+        "which the whole mesh is visible.",
     )
     field_of_view: float = option(FIELD_OF_VIEW, "Vertical field of view.", metavar="DEGREES")
     width: int = option(1024, "Width of the picture.", metavar="PIXELS")
@@ -48,7 +48,9 @@ class RenderOptions:
         "shaded", "Draw the mesh lit from the upper left, or its normals as colours."
     )
     backend: Literal["auto", "gl", "embree"] = option(
-        "auto", "Renderer: OpenGL, rays on the processor, or whichever can run here."
+        "auto",
+        "Renderer: gl (OpenGL), embree (rays on the processor), or auto (gl if available, "
+        "otherwise embree).",
     )
 
     def __post_init__(self) -> None:

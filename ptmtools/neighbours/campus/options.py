@@ -18,23 +18,23 @@ class CampusOptions:
 
     heading: ClassVar[str] = "Campus"
 
-    lods: int = option(2, "Number of meshes of each object. The finest is that of the model.")
+    lods: int = option(2, "Number of meshes of each object. The finest mesh is the original.")
     ratio: float = option(
         0.1,
-        "Number of faces of a mesh, as a share of those of the next finer mesh.",
+        "Face count of each mesh divided by the face count of the next finer mesh.",
         metavar="SHARE",
     )
-    faces: int = option(100, "Smallest number of faces of a simplified mesh.")
+    faces: int = option(100, "Minimum number of faces of a simplified mesh.")
     error: float = option(
         0.01,
-        "Largest error of each step of the simplification, as a share of the diagonal of the "
+        "Maximum error of each step of the simplification, as a share of the diagonal of the "
         "object's bounding box.",
         metavar="SHARE",
     )
     small: float = option(
         10.0,
-        "Join objects whose bounding box has a diagonal below this with small objects nearby; 0 "
-        "joins none.",
+        "Merge nearby objects whose bounding-box diagonals are all below this length; 0 merges "
+        "none.",
         metavar="METRES",
     )
     lightmaps: Literal["bake", "model", "none"] = option(

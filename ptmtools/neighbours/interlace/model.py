@@ -28,7 +28,7 @@ class InterlaceOptions:
 
     heading: ClassVar[str] = "Interlaced image"
 
-    min: int = option(128, "Smallest side of the first file.", metavar="TEXELS")
+    min: int = option(128, "Minimum width and height of the first file.", metavar="TEXELS")
     format: str = option("png", "Format of the files", choices=CONTAINERS)
     quality: int = option(90, "Quality of JPEG files, 1 to 100.")
 

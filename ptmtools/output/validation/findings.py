@@ -12,19 +12,25 @@ CODES: dict[str, tuple[Severity, str]] = {
     ),
     "PTM-D651": ("error", "a file of the database is missing or cannot be read"),
     "PTM-D652": ("error", "the hash of a file differs from the manifest: the file was changed"),
-    "PTM-D653": ("warning", "a file in a folder of ptmtools that no stage wrote"),
+    "PTM-D653": ("warning", "a file that no stage wrote, in a folder of ptmtools"),
     "PTM-D655": ("warning", "the database is not finished: the stage `emit` has not run"),
     "PTM-D656": (
         "error",
         "a stage is out of date: its inputs have changed since, or another release ran it",
     ),
-    "PTM-D657": ("error", "a link that leads out, a linked folder, a pipe or a device is served"),
-    "PTM-D661": ("error", "a VRML file is not in the emission pattern: its text, nodes or numbers"),
-    "PTM-D671": ("error", "a URL is malformed, leads out of the served folder or names no file"),
+    "PTM-D657": (
+        "error",
+        "a link that points outside the database, a linked folder, a pipe or a device is served",
+    ),
+    "PTM-D661": (
+        "error",
+        "a VRML file does not have the form that ptmtools writes: its text, nodes or numbers",
+    ),
+    "PTM-D671": ("error", "a URL is malformed, points outside the served folder or names no file"),
     "PTM-D675": ("warning", "names of served files differ only in case"),
     "PTM-D676": ("error", "a .gz copy is damaged, or differs from the file without .gz"),
     "PTM-D677": ("warning", "a texture or an octree texture that no other file names or uses"),
-    "PTM-D683": ("error", "a hull or a leaf is not convex and closed, or lies out of place"),
+    "PTM-D683": ("error", "a hull or a leaf is not convex and closed, or is in the wrong position"),
     "PTM-D690": ("error", "a list of cells is out of order"),
     "PTM-D692": ("error", "ach values do not sum to 1, or are not aligned"),
     "PTM-D699": ("error", "a count, a GLB, a portal or a viewpoint does not fit the cells"),
@@ -38,7 +44,7 @@ CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D710": ("error", "a texture file, its fallback or its interlaced image is damaged"),
     "PTM-D713": TOO_LARGE,
     "PTM-D720": ("error", "the arrays of a stage cannot be read, or do not fit other stages"),
-    "PTM-D731": ("error", "a GLB is damaged, or not in the emission pattern"),
+    "PTM-D731": ("error", "a GLB is damaged, or does not have the form that ptmtools writes"),
 }
 
 #: Codes of changed files: a build detects these by itself.

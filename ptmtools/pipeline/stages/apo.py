@@ -182,7 +182,7 @@ def _summary(n: Mapping[str, Any]) -> str:
 
 APO: Stage[Scene] = Stage(
     name="apo",
-    about="Replace objects by simplified meshes with octree textures.",
+    about="Replace objects with simplified meshes and octree textures.",
     recipe=3,
     options=ReplaceOptions,
     changed="meshes with many small holes, handles or parts are simplified as far as others",

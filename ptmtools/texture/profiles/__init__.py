@@ -57,7 +57,7 @@ PROFILES = {
         ),
         Profile("small", 2, "for archives; smaller, but 30 to 60 times slower", lossy=True),
         Profile("raw", 0, "uncompressed, the layout of Marvie & Bouatouch, 2003", since=1),
-        Profile("paper", 3, "the same with lossless JPEG, for comparison"),
+        Profile("paper", 3, "the layout of raw with lossless JPEG, for comparison"),
     )
 }
 
