@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ptmtools.output.gltf import WRAPS, BufferWriter, flipped, linear, pack
+from ptmtools.output.gltf import WRAPS, CellBufferWriter, flipped, linear, pack
 from ptmtools.scene.model import Material, Scene
 
 UNLIT = "KHR_materials_unlit"
@@ -23,7 +23,7 @@ _LINEAR, _MIPMAPS = 9729, 9987
 def whole_glb(scene: Scene, images: Sequence[bytes] = (), media: str = "") -> bytes:
     """The GLB of all triangles of a scene, with its images in order, of one media type, or
     without."""
-    buffer = BufferWriter()
+    buffer = CellBufferWriter()
     shown = np.stack([scene.triangle_material, scene.two_sided], axis=1)
     kinds, kind = np.unique(shown, axis=0, return_inverse=True)
     primitives = [
@@ -45,7 +45,7 @@ def whole_glb(scene: Scene, images: Sequence[bytes] = (), media: str = "") -> by
         "meshes": [{"primitives": primitives}],
         "materials": materials,
     }
-    members, binary = buffer.finish()
+    members, binary = buffer.members(), buffer.bytes()
     if images:
         # A texture for each material, since wraps differ; equal images are shared.
         rows = [scene.materials[material] for material, _ in kinds.tolist()]
@@ -68,7 +68,7 @@ def whole_glb(scene: Scene, images: Sequence[bytes] = (), media: str = "") -> by
     return pack(kept, binary)
 
 
-def _primitive(scene: Scene, rows: Any, material: int, buffer: BufferWriter) -> dict[str, Any]:
+def _primitive(scene: Scene, rows: Any, material: int, buffer: CellBufferWriter) -> dict[str, Any]:
     points = scene.corners[rows].reshape(-1, 3).astype(np.float32)
     uv = flipped(scene.uv[rows].reshape(-1, 2))
     vertices, triangle = np.unique(
@@ -77,7 +77,7 @@ def _primitive(scene: Scene, rows: Any, material: int, buffer: BufferWriter) -> 
     return {
         "attributes": {
             "POSITION": buffer.positions(vertices[:, :3]),
-            "TEXCOORD_0": buffer.coordinates(vertices[:, 3:]),
+            "TEXCOORD_0": buffer.vectors(vertices[:, 3:]),
         },
         "indices": buffer.indices(triangle.reshape(-1, 3), len(vertices)),
         "material": material,
