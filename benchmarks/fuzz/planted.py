@@ -21,7 +21,7 @@ FAULTS = {
     "an error of ours": "",
     "another error": "ZeroDivisionError",
     "memory that is not to be had": "memory ran out",
-    "the same, told as an error of ours": "memory ran out",
+    "the same, raised as an error of ours": "memory ran out",
     "more memory than is allowed": "took 6",
     "too slow": "took",
     "writes beside": "for writing",
@@ -64,7 +64,7 @@ class Planted:
                 return str(1 // self._warm.imag)
             case "memory that is not to be had":
                 np.zeros(1 << 45)
-            case "the same, told as an error of ours":
+            case "the same, raised as an error of ours":
                 try:
                     np.zeros(1 << 45)
                 except MemoryError as error:

@@ -138,7 +138,7 @@ def watch(browser: Any, entrant: Entrant, link: Throttle, *, seconds: float = 60
         try:
             context.add_init_script(script.replace("COMPLETE", entrant.complete))
             page, messages = context.new_page(), []
-            page.on("console", lambda said: messages.append(f"{said.type}: {said.text}"))
+            page.on("console", lambda message: messages.append(f"{message.type}: {message.text}"))
             page.on("pageerror", lambda error: messages.append(f"error: {error}"))
             page.goto(url, wait_until="commit")
             with suppress(TooLong):
@@ -162,7 +162,7 @@ def watch(browser: Any, entrant: Entrant, link: Throttle, *, seconds: float = 60
         # What was complete may be seen a moment later, and bytes between two looks are guessed.
         everything=float(meter.at(clock + max(1e-3 * (done or now), *stamps))),
         requests=len(visits),
-        messages=tuple(said for said in messages if RECORDING not in said),
+        messages=tuple(text for text in messages if RECORDING not in text),
     )
 
 

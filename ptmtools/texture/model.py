@@ -78,7 +78,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Description:
-    """How the texels are to be shown, as the image file said; none of it changes a texel.
+    """How to display the texels, from the image file; none of it changes a texel.
 
     Attributes
     ----------

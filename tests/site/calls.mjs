@@ -30,14 +30,14 @@ const functions = {
     const stock = {
       T: levels.length, K: memory[0].length, memory: reals(memory), levels: whole(levels),
     };
-    const held = whole(column), told = [];
+    const held = whole(column), report = [];
     for (let round = 0; round < rounds; round++) {
       const share = new Float64Array(stock.T);
       shareOut(stock, cells, held, budget[round], share);
       const asks = refresh(stock, share, whole(have), budget[round], held);
-      told.push([[...share], asks, [...held]]);
+      report.push([[...share], asks, [...held]]);
     }
-    return told;
+    return report;
   },
   estimate({ calls, size }) {
     const estimate = new Estimate();
@@ -80,4 +80,4 @@ const functions = {
 
 const calls = JSON.parse(readFileSync(process.argv[2], "utf8"));
 const plain = (_, value) => (value === Infinity ? "infinite" : value);
-console.log(JSON.stringify(calls.map(([name, told]) => functions[name](told)), plain));
+console.log(JSON.stringify(calls.map(([name, report]) => functions[name](report)), plain));

@@ -67,10 +67,10 @@ const emit = (name, event) => listeners[name]?.forEach((tell) => tell(event));
 const ui = attachUi(app);
 const paint = canvas.getContext("2d");
 let last = performance.now();
-const told = [];
+const report = [];
 function frame(now) {
   const wishes = ui.wishes();
-  told.push(wishes);
+  report.push(wishes);
   walker.step((now - last) / 1000, wishes);
   last = now;
   frames++;
@@ -90,4 +90,4 @@ function frame(now) {
   requestAnimationFrame(frame);
 }
 requestAnimationFrame(frame);
-window.fake = { app, emit, calls, told, walker };
+window.fake = { app, emit, calls, report, walker };

@@ -53,7 +53,7 @@ for (let k = 0; goal < samples.length - 1 && k < 60000; k++) {
   offs.push(Math.min(...samples.slice(Math.max(0, goal - 20), goal + 1).map((at) => flat(eye, at))));
   cells.add(locate(eye));
 }
-// And anywhere, as a child would: of all eyes so many are in no cell.
+// Random walks: counts eyes outside all cells.
 let seed = 1, astray = 0, wild = 0;
 const random = () => (seed = (seed * 48271) % 2147483647) / 2147483647;
 for (const { position } of index.viewpoints) {

@@ -17,7 +17,7 @@ const estimate = { bandwidth: 1e5, latency: 0.1 };
 let state = 1e6 * seed;
 const random = () => (state = (state * 48271) % 2147483647) / 2147483647;
 
-const told = { overlaps: 0, beyond: 0, above: 0, early: 0, failures: 0, again: 0 };
+const report = { overlaps: 0, beyond: 0, above: 0, early: 0, failures: 0, again: 0 };
 const waiting = [], received = new Float64Array(T), rests = new Map();
 
 /** Seen from the first cell: all textures of what is there, and placeholders of what is not. */
@@ -35,7 +35,7 @@ function seen() {
 function settle(request) {
   const { kind, number, begin, end } = request, luck = random();
   if (luck < 0.2) {
-    told.failures++;
+    report.failures++;
     rests.set(`${kind} ${number}`, now + 1);
     return client.failed(request, now + 1);
   }
@@ -54,20 +54,20 @@ for (let step = 0; step < 4000; step++, now += 0.1) {
   client.look({ now, cell: 0, frustum, still: true, ...seen() });
   let used = 0;
   for (let t = 0; t < T; t++) {
-    if (client.column[t] > client.have[t]) told.beyond++;
+    if (client.column[t] > client.have[t]) report.beyond++;
     used += stock.memory[t * K + client.column[t]];
   }
-  if (used > client.budget) told.above++;
+  if (used > client.budget) report.above++;
   if (step === 1000) {
     client.forgetGeometry(0);
-    told.forgotten = client.missing() > 0;
+    report.forgotten = client.missing() > 0;
   }
   for (let request; (request = client.next(estimate)); waiting.push(request)) {
     const { kind, number, begin } = request;
-    if (waiting.some((other) => other.kind === kind && other.number === number)) told.overlaps++;
-    if (kind === "texture" && begin !== received[number]) told.overlaps++;
-    if (now < (rests.get(`${kind} ${number}`) ?? 0)) told.early++;
-    if (step >= 1000 && kind === "geometry" && number === 0) told.again++;
+    if (waiting.some((other) => other.kind === kind && other.number === number)) report.overlaps++;
+    if (kind === "texture" && begin !== received[number]) report.overlaps++;
+    if (now < (rests.get(`${kind} ${number}`) ?? 0)) report.early++;
+    if (step >= 1000 && kind === "geometry" && number === 0) report.again++;
   }
   while (waiting.length && random() < 0.7) {
     settle(waiting.splice(Math.floor(random() * waiting.length), 1)[0]);
@@ -76,5 +76,5 @@ for (let step = 0; step < 4000; step++, now += 0.1) {
 client.budget = stock.whole;
 client.look({ now, cell: 0, frustum, still: true, ...seen() });
 console.log(JSON.stringify({
-  ...told, missing: client.missing(), column: [...client.column], have: [...client.have],
+  ...report, missing: client.missing(), column: [...client.column], have: [...client.have],
 }));

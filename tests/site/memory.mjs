@@ -25,7 +25,7 @@ const stages = [
   { budget: half, want: (t) => (t >= count - whole ? all : all - 1) },
   { budget: half, want: (t) => (t < whole ? all : t % 2 ? all - 2 : 0) },
 ];
-const told = [];
+const report = [];
 for (const { budget, want } of stages) {
   memory.budget = budget;
   memory.peak = 0;
@@ -37,6 +37,6 @@ for (const { budget, want } of stages) {
       memory.pump(look, () => false);
     }
   }
-  told.push({ wanted: [...wanted], held: [...memory.held], peak: memory.peak, budget });
+  report.push({ wanted: [...wanted], held: [...memory.held], peak: memory.peak, budget });
 }
-console.log(JSON.stringify(told));
+console.log(JSON.stringify(report));

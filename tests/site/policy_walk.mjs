@@ -40,4 +40,4 @@ const acts = {
   },
 };
 
-console.log(JSON.stringify(events.map(({ act, ...told }) => acts[act](told))));
+console.log(JSON.stringify(events.map(({ act, ...report }) => acts[act](report))));

@@ -272,8 +272,8 @@ def page() -> str:
     return "\n".join(
         [
             "# The `.ptm` format: test vectors\n",
-            "Small files and groups, with the numbers that a decoder meets on its way, for whoever "
-            "implements\n[ptm.md](ptm.md) and finds that something is off. Bytes and "
+            "Small files and groups with the intermediate values of their decoding, to debug an "
+            "implementation of\n[ptm.md](ptm.md). Bytes and "
             "texels are in hexadecimal,\nother numbers in decimal unless they begin with 0x. "
             "`tests/texture/vectors/page.py` writes this page,\nfrom decoders that were written "
             "line by line from the specification.\n",
