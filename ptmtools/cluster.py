@@ -74,7 +74,7 @@ class Cluster(Executor):
                 "PTM-W001",
                 "no scheduler answers",
                 file=address,
-                remedy="start one with `dask scheduler`, and give the address that it prints, such "
+                remedy="start one with `dask scheduler`, and use the address that it prints, such "
                 "as tcp://10.0.0.1:8786",
             ) from fault
         try:

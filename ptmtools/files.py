@@ -52,7 +52,7 @@ def write_with(
     if blocked:  # renaming would replace a device
         kind = "a folder" if target.is_dir() else "a device"
         raise OutputError(
-            "PTM-O002", f"is {kind}, not a file", file=target, remedy="name a file instead"
+            "PTM-O002", f"is {kind}, not a file", file=target, remedy="specify a file instead"
         )
     if not force:
         refuse_existing(target)
@@ -111,7 +111,7 @@ def writing(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def refuse_existing(
-    path: str | os.PathLike[str], remedy: str = "use --force to replace it, or name another file"
+    path: str | os.PathLike[str], remedy: str = "use --force to replace it, or specify another file"
 ) -> None:
     """Raises OutputError PTM-O001 if ``path`` exists."""
     if os.path.lexists(path):
@@ -185,7 +185,7 @@ def real_folder(root: Path, relative: str = "", *, make: bool = True) -> Path:
                     "PTM-O002",
                     "is not a folder",
                     file=here,
-                    remedy="move it away, or name another output",
+                    remedy="move it away, or specify another output",
                 )
     return here
 
@@ -241,7 +241,7 @@ def _link(path: Path) -> OutputError:
         "PTM-O005",
         "is a symbolic link, which is not followed when writing",
         file=path,
-        remedy="put a real folder or file in its place, or name another output",
+        remedy="put a real folder or file in its place, or specify another output",
     )
 
 

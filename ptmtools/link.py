@@ -54,7 +54,7 @@ def read_trace(path: str | PathLike[str]) -> Trace:
     with naming(path):
         if len(data) > LARGEST << 20:
             raise LimitError(
-                "PTM-L204", f"more than {LARGEST} MiB", remedy="give a shorter trace: it repeats"
+                "PTM-L204", f"more than {LARGEST} MiB", remedy="use a shorter trace: it repeats"
             )
         try:
             if str(path).lower().endswith(".csv"):

@@ -96,4 +96,4 @@ def _quantity(text: str, units: Mapping[str, int | Fraction]) -> Fraction | None
 
 
 def _refused(text: str, what: str, remedy: str) -> InputError:
-    return InputError("PTM-I111", f"{text[:40]!r} is no {what}", remedy=f"give {remedy}")
+    return InputError("PTM-I111", f"{text[:40]!r} is no {what}", remedy=f"use {remedy}")

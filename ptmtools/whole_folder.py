@@ -54,7 +54,7 @@ class FolderForm:
                     "PTM-O010",
                     f"is not a folder that `{self.command}` wrote, and was not changed",
                     file=folder,
-                    remedy="name another with -o; --force does not replace it either",
+                    remedy="specify another with -o; --force does not replace it either",
                 )
             foreign = next((n for n, plain in _paths(target) if not (plain and self.owns(n))), None)
             if foreign is not None:
@@ -63,10 +63,10 @@ class FolderForm:
                     f"holds {foreign[:80]}, which `{self.command}` did not write; nothing was "
                     "changed",
                     file=folder,
-                    remedy="move it away, or name another folder with -o",
+                    remedy="move it away, or specify another folder with -o",
                 )
             if not force:
-                refuse_existing(folder, "use --force to replace it, or name another folder")
+                refuse_existing(folder, "use --force to replace it, or specify another folder")
 
     def write(
         self,

@@ -22,7 +22,7 @@ def test_bandwidths(text: str, bits: int | None) -> None:
 
 @pytest.mark.parametrize("text", [*NO_NUMBERS, "4m", "4K", "4MB", "4MiB", "0", "0.5", "10%"])
 def test_what_is_no_bandwidth(text: str) -> None:
-    with pytest.raises(InputError, match=r"is no bandwidth; give bit/s.*\[PTM-I111\]"):
+    with pytest.raises(InputError, match=r"is no bandwidth; use bit/s.*\[PTM-I111\]"):
         parse_bandwidth(text)
 
 
@@ -35,7 +35,7 @@ def test_durations(text: str, seconds: float) -> None:
 
 @pytest.mark.parametrize("text", [*NO_NUMBERS, "1min", "1S", "10%", "inf"])
 def test_what_is_no_duration(text: str) -> None:
-    with pytest.raises(InputError, match=r"is no duration; give seconds.*\[PTM-I111\]"):
+    with pytest.raises(InputError, match=r"is no duration; use seconds.*\[PTM-I111\]"):
         parse_duration(text)
 
 
@@ -51,7 +51,7 @@ def test_memory(text: str, of_1000: int | None) -> None:
 
 @pytest.mark.parametrize("text", [*NO_NUMBERS, "4M", "4mb", "4KB", "0", "0.5", "0%", "0MB", "%"])
 def test_what_is_no_memory(text: str) -> None:
-    with pytest.raises(InputError, match=r"is no amount of memory; give bytes.*\[PTM-I111\]"):
+    with pytest.raises(InputError, match=r"is no amount of memory; use bytes.*\[PTM-I111\]"):
         parse_memory(text)
 
 

@@ -47,7 +47,7 @@ def door_notes(leaves: list[DoorLeaf], opened: Bools, hidden: bool) -> list[str]
     """Notes on door leaves; those ``opened``, (d,), do not block, and are not drawn if
     ``hidden``."""
     notes = []
-    drawn = "not drawn" if hidden else "drawn, without blocking"
+    drawn = "not drawn" if hidden else "drawn, but hiding nothing"
     for which, state in (
         (opened, f"open: {drawn}; --doors closed shuts all doors"),
         (~opened, "shut: no walkable floor lies beyond; --detail NAME opens it"),
@@ -93,17 +93,19 @@ def unreached_notes(unreached: Unreached, kept: bool, place: float, strict: bool
     InputError: PTM-I305 if more than `MUCH` is left out under ``strict``.
     """
     rooms, outside = unreached.rooms, unreached.outside
-    fate = "kept as rooms" if kept else "left out"
+    fate = "cannot be reached from the viewpoint and is left out"
+    if kept:
+        fate = "cannot be reached from the viewpoint and is kept as a room"
     notes = [
-        f"{_place(room)} cannot be reached from the starting point; {fate}; "
-        f"--viewpoint {_position(room)} starts there"
+        f"{_place(room)} {fate}; use --viewpoint {_position(room)} to start there"
         for room in rooms[:NAMED]
     ]
     if rest := rooms[NAMED:]:
         area = sum(room.place for room in rest)
-        notes.append(f"{count(len(rest), 'more such area')}, {area:.1f} m² in total; {fate}")
+        fate = "kept as rooms" if kept else "left out"
+        notes.append(f"{count(len(rest), 'more such area')}, {area:.1f} m² in total: {fate}")
     if rooms and kept:
-        notes[0] += "; --reach main leaves out all unreachable areas"
+        notes[0] += ", or --reach main to leave out all unreachable areas"
     if outside:
         notes.append(
             Warned(

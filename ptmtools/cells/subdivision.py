@@ -135,7 +135,7 @@ def _check(scene: Scene, options: SubdivideOptions) -> None:
         raise InputError(
             "PTM-I247",
             "a single triangle is not a room",
-            remedy="give a model with floors and walls",
+            remedy="use a model with floors and walls",
         )
     names = (*scene.objects, *(material.name for material in scene.materials))
     for pattern in (*options.structural, *options.detail, *options.door):
@@ -143,7 +143,7 @@ def _check(scene: Scene, options: SubdivideOptions) -> None:
             raise InputError(
                 "PTM-I302",
                 f"no object or material is called {pattern!r}",
-                remedy="names are matched with * and ?, upper and lower case distinct",
+                remedy="patterns may contain * and ?, and are case-sensitive",
             )
 
 
@@ -155,7 +155,7 @@ def _thickened(low: Floats, high: Floats, tolerance: Tolerance) -> Floats:
 
 def _open_note(space: Space, roofed: float, box: Floats) -> str:
     if roofed < ROOFED:
-        state = f"open above: {1 - roofed:.0%} of the floor has no ceiling"
+        state = f"open at the top: {1 - roofed:.0%} of the floor has no ceiling"
     elif not space.reached.any():
         state = "open: no room is closed off from the outside"
     else:
@@ -286,13 +286,13 @@ def check_seen(scene: Scene, cells: Cells) -> None:
         raise InputError(
             "PTM-I304",
             "no face of the model lies in or around a cell",
-            remedy="give a --viewpoint X,Y,Z inside a room",
+            remedy="use --viewpoint X,Y,Z with a point inside a room",
         )
     raise InputError(
         "PTM-I304",
-        "nothing of the model is visible from inside: no face around its cells is turned towards "
-        "them or has a back",
-        remedy="give --two-sided to draw every face from both sides, or turn the normals",
+        "no part of the model is visible from inside: no face around its cells is two-sided or "
+        "faces them",
+        remedy="use --two-sided to draw both sides of every face, or flip the normals",
     )
 
 

@@ -89,7 +89,7 @@ def many_files(function: Callable[..., Any]) -> Callable[..., Any]:
         **values: Any,
     ) -> Any:
         if force and skip_existing:
-            raise click.UsageError("give either --force or --skip-existing, not both")
+            raise click.UsageError("use either --force or --skip-existing, not both")
         return function(Batch(console, force, skip_existing, workers, limits), **values)
 
     return command
@@ -170,8 +170,8 @@ def jobs_for(
         return nameless + _apart({n: _beside(n, folder, suffix) for n in named}, folder)
     if len(named) > 1:
         raise click.BadParameter(
-            f"{output} is one file, but there are {len(named)} to write: name a folder, or end the "
-            "name with a slash",
+            f"{output} is one file, but there are {len(named)} to write: specify a folder, or end "
+            "the name with a slash",
             None,
             None,
             "-o",
@@ -340,7 +340,7 @@ def check_writable(file: str, *, force: bool) -> None:
         refuse_existing(file)
     path = Path(file).absolute()
     if path.exists() and not path.is_file():
-        raise OutputError("PTM-O002", "is not a file", file=file, remedy="name a file instead")
+        raise OutputError("PTM-O002", "is not a file", file=file, remedy="specify a file instead")
     with writing(file):
         os.stat(path.parent / ".")  # fails if the parent is a file
         if not os.access(path.parent, os.W_OK | os.X_OK):

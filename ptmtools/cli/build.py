@@ -245,12 +245,15 @@ def print_report(console: Console, report: BuildReport) -> None:
         console.json(asdict(report))
         return
     memory = f", peak memory {size(report.peak_memory)}" if report.peak_memory else ""
-    console.print(f"{'all':<9}{report.seconds:>8.1f} s{memory}")
+    console.print(f"{'total':<9}{report.seconds:>8.1f} s{memory}")
     further = [n for stage in report.stages for n in stage.further if not _is_runner_up(n)]
     for note in further if console.verbose else ():
         console.print(f"note: {note}")
     if further and not console.verbose:
-        console.print(f"{count(len(further), 'more note')}; -v lists them")
+        console.print(
+            f"{count(len(further), 'note')} not shown; -v lists "
+            f"{'it' if len(further) == 1 else 'them'}"
+        )
     for line in visitor_lines(report.visitor):
         console.print(line)
     if any(stage.stage == EMIT.name for stage in report.stages):
@@ -285,7 +288,7 @@ def _is_runner_up(note: str) -> bool:
 def visitor_lines(visitor: Visitor | None) -> Iterator[str]:
     """The text on the downloads of a visitor of the database, if they are known."""
     for number, line in enumerate(visitor.lines() if visitor else ()):
-        yield f"{'' if number else 'visitor':<9} {line}".rstrip()
+        yield f"{'' if number else 'download':<9} {line}".rstrip()
 
 
 def _tasks(stage: StageReport) -> str:

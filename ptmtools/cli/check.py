@@ -97,8 +97,8 @@ def validate(
     console.result(document, _lines(target, report, shot, every=console.verbose))
     if shot and shot.tried < segments and not console.as_json:
         console.warn(
-            f"only {shot.tried:,} of {segments:,} segments begin at a possible eye and end in a "
-            "cell"
+            f"only {shot.tried:,} of {segments:,} segments begin at a possible eye position and "
+            "end in a cell"
         )
     if failed:
         repair = document["repair"]
@@ -182,14 +182,14 @@ def _lines(
     for pair in shot.missed if shot else ():
         a, b = pair.cells
         lines.append(
-            f"{target}: error: a free line connects cells {a} and {b}, which are not in each "
-            "other's visible sets"
+            f"{target}: error: an unobstructed segment connects cells {a} and {b}, which are not "
+            "in each other's visible sets"
         )
     if shot:
         lines.append(
-            f"{target}: {count(shot.tried, 'random segment')}, {shot.unoccluded:,} of them free; "
-            f"{shot.missed_segments:,} between cells that are not in each other's visible sets, "
-            f"{shot.hairlines:,} too close to an edge to decide"
+            f"{target}: tested {count(shot.tried, 'random segment')}: {shot.unoccluded:,} "
+            f"unobstructed; {shot.missed_segments:,} of these connect cells missing from each "
+            f"other's visible sets; {shot.hairlines:,} undecided (too close to an edge)"
         )
     totals = (
         f"{target}: {count(report.files, 'file')}, {size(report.bytes)}; "

@@ -119,10 +119,10 @@ def encode(
             return
         raw, stored, image = (report[f"{what}_bytes"] for what in ("raw", "ptm", "image"))
         name = "the input" if report["image"] == STANDARD else os.path.basename(report["image"])
-        compared = f", {_share(stored, image)} {name} ({size(image)})" if image else ""
+        compared = f", {_share(stored, image)} the size of {name} ({size(image)})" if image else ""
         yield (
             f"{report['file']}: {count(report['levels'], 'level')}, {size(stored)}: "
-            f"{_share(stored, raw)} the raw texels ({size(raw)}){compared}"
+            f"{_share(stored, raw)} the uncompressed size ({size(raw)}){compared}"
         )
         if note := _note_on_sides(report, options.max_side):
             yield f"  {note}"
@@ -143,8 +143,8 @@ def _note_on_sides(report: Report, max_side: int) -> str | None:
     if not (above := report["left_out"]):
         return None
     return (
-        f"sides halve from level to level: the finest within --max-side {max_side} is {width} x "
-        f"{height}; the next, {above['width']} x {above['height']}, would add about "
+        f"width and height halve from level to level: the finest within --max-side {max_side} is "
+        f"{width} x {height}; the next, {above['width']} x {above['height']}, would add about "
         f"{size(above['bytes'])}"
     )
 
@@ -163,8 +163,9 @@ def _hint_on_lossy(reports: list[Report], options: EncodeOptions) -> str | None:
     kinds = " and ".join(sorted({report["lossy"] for report in grown}))
     return (
         f"hint: {kinds} files discard detail; a lossless .ptm keeps every decoded texel, noise "
-        "included. For pictures, --max-error 4 about halves the .ptm: errors of up to 4 (of 255) "
-        "are hard to see. Keep 0 where texels are data, such as normals, masks or heights."
+        "included. For pictures, --max-error 4 about halves the .ptm: errors of up to 4 per "
+        "sample (range 0 to 255) are hard to see. Keep 0 where texels are data, such as normals, "
+        "masks or heights."
     )
 
 
@@ -274,7 +275,7 @@ def _refuse_image_suffix(output: str) -> None:
     if suffix in (*SUFFIXES, *WRITTEN, *LOSSY):
         raise OutputError(
             "PTM-O101",
-            f"the suffix {suffix!r} is that of an image, but a .ptm would be written",
+            f"{suffix!r} is a suffix of images, but the output is a .ptm file",
             file=output,
             remedy="name the output .ptm",
         )
@@ -338,7 +339,7 @@ def compare(
     sums = total(measured)
     each = [[asdict(one) for one in rows] for rows in measured]
     tables = [{"image": name, "codecs": codecs} for name, codecs in zip(sources, each, strict=True)]
-    lines = ["", *_table(f"all {len(sources)} images", sums)] if len(sources) > 1 else []
+    lines = ["", *_table(f"total of {len(sources)} images", sums)] if len(sources) > 1 else []
     console.result({"images": tables, "total": [asdict(one) for one in sums]}, lines)
 
 
@@ -347,17 +348,17 @@ def _table(title: str, rows: list[Measured]) -> Iterator[str]:
     png = next((one.finest_bytes for one in rows if one.codec == "PNG"), None)
     yield title
     yield (
-        f"{'':<20}{'finest level':>14}{'/ PNG':>8}{'all levels':>14}{'/ PNG':>8}"
-        f"{'encode':>12}{'decode':>12}"
+        f"{'':<26}{'finest level':>14}{'ratio to PNG':>14}"
+        f"{'all levels':>14}{'ratio to PNG':>14}{'encode':>12}{'decode':>12}"
     )
     for one in rows:
         if one.problem:
-            yield f"{one.codec:<20}{one.problem}"
+            yield f"{one.codec:<26}{one.problem}"
             continue
         finest = "–" if one.finest_bytes is None else f"{one.finest_bytes:,}"
         yield (
-            f"{one.codec:<20}{finest:>14}{_ratio(one.finest_bytes, png):>8}"
-            f"{one.all_bytes:>14,}{_ratio(one.all_bytes, png):>8}"
+            f"{one.codec:<26}{finest:>14}{_ratio(one.finest_bytes, png):>14}"
+            f"{one.all_bytes:>14,}{_ratio(one.all_bytes, png):>14}"
             f"{_speed(one.raw_bytes, one.encode_seconds):>12}"
             f"{_speed(one.raw_bytes, one.decode_seconds):>12}"
         )
@@ -416,7 +417,7 @@ def interlace(
     compared = ""
     if image_bytes:
         share, name = interlaced.bytes / image_bytes, os.path.basename(image)
-        compared = f": {share:.1%} of {name} ({size(image_bytes)})"
+        compared = f": {share:.1%} of the size of {name} ({size(image_bytes)})"
     line = (
         f"{folder}: {interlaced.width} x {interlaced.height}, "
         f"{count(len(interlaced.parts), 'file')}, {size(interlaced.bytes)}{compared}; first file "

@@ -124,7 +124,7 @@ def _info_ptm(console: Console, target: str) -> None:
         "whole_levels": whole,
     }
     exact = "lossless" if not header.max_error else f"errors up to {header.max_error}"
-    trimmed = f", {count(header.trimmed, 'finer level')} left out" if header.trimmed else ""
+    trimmed = f", {count(header.trimmed, 'finer level')} omitted" if header.trimmed else ""
     lines = [
         f"{target}: {header.width} x {header.height}, {count(header.components, 'component')} of "
         f"{header.kind}, profile {header.profile}, {exact}{trimmed}, {size(file_bytes)}"
@@ -134,8 +134,8 @@ def _info_ptm(console: Console, target: str) -> None:
     elif fields:
         lines.append("; ".join(f"{name} {value}" for name, value in fields.items()))
     lines.append(
-        "level       size       tiles         bytes   share  bits/texel      up to here"
-        "   in GPU memory  RGB as RGBA"
+        "level       size       tiles         bytes   share  bits/texel      cumulative   in GPU "
+        "memory  padded to RGBA"
     )
     for n, level in enumerate(levels):
         extent = f"{level['width']} x {level['height']}"
@@ -145,7 +145,7 @@ def _info_ptm(console: Console, target: str) -> None:
         lines.append(
             f"{n:>5}  {extent:>14} {tiles:>8} {level['length']:>13,} {level['share']:>7.2%} "
             f"{level['bits_per_texel']:>11.2f} {level['end']:>15,} {level['gpu_bytes']:>15,} "
-            f"{level['gpu_bytes_padded']:>12,}{cut}"
+            f"{level['gpu_bytes_padded']:>15,}{cut}"
         )
     console.result(document, lines)
 
@@ -206,7 +206,7 @@ def _info_model(console: Console, target: str, options: IngestOptions) -> None:
     by = f", written by {model.generator}" if model.generator else ""
     head = f"{target}: {model.format}, {size(model.bytes)}{by}"
     rows = _rows(model, around, every=console.verbose)
-    lines = (f"{name:<10} {text}" for name, text in rows)
+    lines = (f"{name:<11} {text}" for name, text in rows)
     console.result(_record(model, around), [head, *lines])
 
 
@@ -233,11 +233,11 @@ def _rows(model: Inspection, around: Enclosure, *, every: bool) -> Iterator[tupl
     width, height, depth = _size(scene)
     yield "size", f"{width:.3g} x {depth:.3g} m, {height:.3g} m high"
     yield "unit", f"{space.metres:g} m ({'guessed' if space.unit_guessed else 'given'})"
-    yield "up axis", f"{space.up} ({'guessed' if space.up_guessed else 'given'})"
-    yield "looks like", _guess(model.best)
+    yield "up axis", f"{space.up.upper()} ({'guessed' if space.up_guessed else 'given'})"
+    yield "best guess", _guess(model.best)
     for place, other in enumerate(model.others):
         if place == 0 or other.rival:
-            yield "or like", _guess(other)
+            yield "alternative", _guess(other)
     yield "closed", _closed(around)
     names = f": {some(list(around.doors))}" if around.doors else ""
     yield "doors", f"{len(around.doors)} recognised{names}"
@@ -275,17 +275,20 @@ def _images(model: Inspection) -> str:
 
 
 def _guess(guess: Guess) -> str:
-    why = f" ({', '.join(guess.reasons)})" if guess.reasons else ""
-    return f"{guess.unit}, {guess.up} up: {guess.size}{why}"
+    why = f" (reasons: {', '.join(guess.reasons)})" if guess.reasons else ""
+    return f"unit {guess.unit}, {guess.up.upper()} up: {guess.size}{why}"
 
 
 def _closed(around: Enclosure) -> str:
     if not around.rooms:
         return "unknown: no place has a roof above and walls around it"
     if around.closed:
-        return "looks closed: no sight line from its rooms leaves it"
+        return "probably; no sight line from a room leaves the building"
     roof = "" if around.roofed > 0.99 else f"; {1 - around.roofed:.0%} of the floor has no ceiling"
-    return f"looks open: {around.leaving:.1%} of the sight lines from its rooms leave it{roof}"
+    return (
+        f"probably not; {around.leaving:.1%} of the sight lines from the rooms leave the "
+        f"building{roof}"
+    )
 
 
 def _record(model: Inspection, around: Enclosure) -> dict[str, Any]:

@@ -208,7 +208,9 @@ def walk_campus(
     heading="Output",
     type=click.Choice(list(figures.MEASURES)),
     default="e",
-    help="Measure to plot.",
+    help="Measure to plot: e (mean error per pixel), rmse (root mean square error), missing (share "
+    "of the wanted levels that is not loaded) or quality (loaded levels as a share of all "
+    "levels).",
 )
 @file_option(
     "frames",
@@ -260,7 +262,7 @@ def simulate(
     if paper != PaperOptions() and not with_paper:
         raise click.UsageError(f"{arguments([paper])[0]} needs --policy paper")
     if walk_file and seeds:
-        raise click.UsageError("give either --walk or --seed")
+        raise click.UsageError("use either --walk or --seed")
     files = [file for file in (csv_file, plot_file, strip_file) if file]
     for file in files:
         check_writable(file, force=force)
@@ -343,10 +345,10 @@ def _check_folder(folder: Path, force: bool) -> None:
             "PTM-O002",
             f"cannot be created: {nearest.name} is not a folder",
             file=folder,
-            remedy="name another folder",
+            remedy="specify another folder",
         )
     if not force and nearest == folder and any(folder.iterdir()):
-        refuse_existing(folder, "use --force to replace frames in it, or name another folder")
+        refuse_existing(folder, "use --force to replace frames in it, or specify another folder")
 
 
 def _new_walks(db: str, seeds: tuple[int, ...]) -> dict[str, Walk]:
@@ -356,7 +358,7 @@ def _new_walks(db: str, seeds: tuple[int, ...]) -> dict[str, Walk]:
             "PTM-I701",
             "is a served folder, which does not record the walkable floor",
             file=db,
-            remedy="give a walk with --walk FILE, or the database that the folder belongs to",
+            remedy="use a walk with --walk FILE, or the database that the folder belongs to",
         )
     artifacts = Artifacts(open_database(db))
     return {

@@ -235,7 +235,7 @@ def options_of(*classes: type, layered: bool = False, hidden: bool = False) -> D
                 if given not in (None, ()):
                     source = click.get_current_context().get_parameter_source(_variable(new))
                     if source == ParameterSource.COMMANDLINE:
-                        raise click.UsageError(f"--{old} is now called --{new}; give one of them")
+                        raise click.UsageError(f"--{old} is now called --{new}; use one of them")
                     click.echo(f"ptm: note: --{old} is now called --{new}", err=True)
                     values[_variable(new)] = given
             for name, (default, reason) in deprecated.items():

@@ -100,10 +100,10 @@ class AchOptions:
             ("gpu", self.gpu or 0, 0, 255),
         ):
             if not low <= value <= high:
-                raise _refused(f"{name} is {value}", f"give a number from {low} to {high}")
+                raise _refused(f"{name} is {value}", f"use a number from {low} to {high}")
         if self.clearance is not None and not 0 < self.clearance < float("inf"):
             raise _refused(
-                f"a clearance of {self.clearance} m is out of range", "give a distance above 0"
+                f"a clearance of {self.clearance} m is out of range", "use a distance above 0"
             )
         if self.tolerance is not None:
             self._check_tolerance(self.tolerance)
@@ -129,7 +129,7 @@ class AchOptions:
         if not 0 < tolerance < 1:
             raise _refused(
                 f"a tolerance of {tolerance} is out of range",
-                "give a total variation above 0 and below 1, such as 0.01",
+                "use a total variation above 0 and below 1, such as 0.01",
             )
         if self.points < GROUPS:  # each group needs one
             raise _refused(

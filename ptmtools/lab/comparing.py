@@ -79,7 +79,7 @@ class SimulateOptions:
             raise InputError(
                 "PTM-I701",
                 f"policy {unseen[0]} fetches relief, which only lit pictures show",
-                remedy="give --lit, too",
+                remedy="use --lit, too",
             )
         if self.campus_policies and self.lit:
             raise InputError(

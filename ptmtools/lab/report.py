@@ -24,10 +24,10 @@ from ptmtools.quantities import count, size
 FORMAT, SCHEMA = "ptmtools simulation", 1
 #: Explanation of the table.
 INTRODUCTION = (
-    "e says how far the picture is from the full one: the root mean square over red, green and",
-    "blue (0 to 255), averaged over the pixels. 0 is the full picture, 1 a step of 8-bit colour.",
-    "Waste is what was received and never on the screen. For who stands where the walk begins, e",
-    "has halved after the seconds under 50%, and so on.",
+    "e is the difference from the fully loaded image: the root mean square over red, green and",
+    "blue (0 to 255), averaged over the pixels. 0 is no difference, 1 a step of 8-bit colour.",
+    "Waste is the share of received bytes that no frame used. For a visitor who stays at the start",
+    "of the walk, the columns 50%, 90% and 99% give the seconds until e has fallen by that share.",
 )
 #: Columns of the CSV.
 COLUMNS = (
@@ -48,24 +48,25 @@ def table(
     """Lines of text: a block for each link and memory, a row for each policy, means over walks."""
     lines = [*INTRODUCTION]
     if lit:
-        lines.append("All is lit.")
+        lines.append("A lamp lights the scene.")
     if against is not None:
-        lines.append(f"The full picture is that of {against}.")
+        lines.append(f"The reference is {against}, fully loaded.")
     if campuses:
         lacking = np.mean([place.lacking for place in campuses.values()])
         lines.append(
-            f"The meshes of the campus leave out e of {lacking:.2f}; they count as memory, too."
+            f"The fully loaded campus has an e of {lacking:.2f}, because its meshes are "
+            "simplified. They count as memory, too."
         )
     several, flip = len(worlds) > 1, any(p.flip is not None for p in played)
     if flip:
         lines.append(
-            f"FLIP: mean over {FRAMES} frames of {PIXELS:,} pixels, {PER_DEGREE:g} to a degree; 0 "
+            f"FLIP: mean over {FRAMES} frames of {PIXELS:,} pixels, {PER_DEGREE:g} per degree; 0 "
             "to 1."
         )
     lines.append("")
     lines += [
-        f"{name}: {world.time[-1]:.0f} s, {world.frames:,} frames, "
-        f"the viewpoint still in {world.still.mean():.0%} of them"
+        f"{name}: {world.time[-1]:.0f} s, {world.frames:,} frames, the viewpoint at rest in "
+        f"{world.still.mean():.0%} of them"
         for name, world in worlds.items()
     ]
     wide = max(len(p.run.policy) for p in played)
@@ -91,7 +92,7 @@ def table(
 def rate_text(bandwidth: float | None) -> str:
     """A bandwidth in bit/s with a decimal prefix."""
     if bandwidth is None:
-        return "no limit of bandwidth"
+        return "unlimited bandwidth"
     power, unit = next((p, u) for p, u in _UNITS if bandwidth >= p or p == 1)
     return f"{bandwidth / power:g} {unit}"
 

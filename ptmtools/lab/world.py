@@ -197,7 +197,7 @@ def prepare(
         raise InputError(
             "PTM-I700",
             f"{astray.mean():.0%} of the walk lies in none of the cells",
-            remedy="give a walk through this very database, such as `ptm path DB` makes",
+            remedy="use a walk through this very database, such as `ptm path DB` makes",
         )
     known = np.maximum.accumulate(np.where(astray, -1, np.arange(len(cell))))
     cell = cell[np.where(known < 0, int(np.argmax(~astray)), known)]
@@ -270,7 +270,7 @@ def frame_times(walk: Walk, rate: float) -> Floats:
         raise LimitError(
             "PTM-L400",
             f"a walk of {walk.duration:g} s has more than {MOST_FRAMES:,} frames",
-            remedy="give a shorter one",
+            remedy="use a shorter one",
         )
     return np.asarray(np.arange(int(np.floor(walk.duration * rate + 1e-9)) + 1) / rate)
 
@@ -304,7 +304,7 @@ def relief_of(
                 "PTM-I700",
                 "has other textures than what is walked through",
                 file=against.folder,
-                remedy="give a database of the same model, with --against",
+                remedy="use a database of the same model, with --against",
             )
         full = read_pyramids(against, progress)
         same = all(np.array_equal(full[k], pyramids[k]) for k in range(len(full)))
@@ -329,7 +329,7 @@ def _require_fitting(browser: Browser, served: Served) -> None:
         raise InputError(
             "PTM-I700",
             f"was recorded among {len(browser.record_bytes)} cells, not {served.cell_count}",
-            remedy="give the database whose site it was recorded on",
+            remedy="use the database whose site it was recorded on",
         )
 
 

@@ -232,7 +232,7 @@ def _tetrahedron(points: list[_Whole]) -> list[_Face]:
         raise DatabaseError(
             "PTM-D601",
             "a cell is flat after rounding to single precision",
-            remedy="give the model's unit with --unit, or make fewer and larger cells",
+            remedy="use the model's unit with --unit, or make fewer and larger cells",
         )
     a, b = (0, n - 1) if side < 0 else (n - 1, 0)
     return [_face(points, *f) for f in ((a, b, c), (b, a, d), (c, b, d), (a, c, d))]

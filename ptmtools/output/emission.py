@@ -192,7 +192,7 @@ def emit(
     owned = [name for emitter in emitters for name in emitter.owns]
     for name in owned:
         if not force:
-            remedy = "name another folder, or give --force to overwrite it"
+            remedy = "specify another folder, or use --force to overwrite it"
             refuse_existing(folder / name, remedy)
     viewpoints, notes = place_viewpoints(scene, cells, options, textures)
     content = Content(

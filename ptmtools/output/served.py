@@ -342,7 +342,7 @@ def _check_record(
     elif any(first + len(levels) > len(textures[t]["ends"]) for t, first, *levels in need):
         fault = "needs levels that do not exist"
     elif record["cell"] != cell or record["visible"][:1] != [cell]:
-        fault = "is not that of its cell"
+        fault = "belongs to another cell"
     if fault:
         raise DatabaseError("PTM-D006", fault, file=file, remedy=BUILD)
 
@@ -358,7 +358,7 @@ def _glb(file: Path, data: bytes, cell: int, textures: int, octrees: int) -> Rea
     octree = [p.octree for p in read.primitives if p.octree is not None]
     out_of_range = max(used, default=-1) >= textures or max(octree, default=-1) >= octrees
     if read.cell != cell or out_of_range:
-        raise DatabaseError("PTM-D006", "is not that of its cell", file=file, remedy=BUILD)
+        raise DatabaseError("PTM-D006", "belongs to another cell", file=file, remedy=BUILD)
     return read
 
 

@@ -235,7 +235,7 @@ def _given(
             raise InputError(
                 "PTM-I111",
                 f"the viewpoint {x:g},{y:g},{z:g} is {fault}",
-                remedy=f"give world metres, Y up, {remedy}",
+                remedy=f"use world metres, Y up, {remedy}",
             )
         if given.yaw is None:
             yaw = outlook.best(position[None], float(position[1])).yaw

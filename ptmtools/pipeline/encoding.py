@@ -76,7 +76,7 @@ class TextureOptions(EncodeOptions):
             raise InputError(
                 "PTM-I111",
                 f"{name} is {getattr(self, name):g}",
-                remedy="give a number above 0, and for an angle below 180",
+                remedy="use a number above 0, and for an angle below 180",
             )
 
 

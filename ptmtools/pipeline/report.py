@@ -54,7 +54,9 @@ class Visitor:
         if self.model is not None and self.images is not None:
             whole = self.model + self.images
             parts = f" (model files {size(self.model)}, image files {size(self.images)})"
-            lines.append(f"source model: {size(whole)}{parts if self.images else ''}")
+            lines.append(
+                f"source model, for comparison: {size(whole)}{parts if self.images else ''}"
+            )
 
         def compared(count: int) -> str:
             larger = whole and count > LARGER * whole
@@ -67,7 +69,7 @@ class Visitor:
             shares = f"{visit[f'{key}_volume']:.1%} of the volume"
             if visit[f"{key}_texels"] is not None:
                 shares += f" and {visit[f'{key}_texels']:.1%} of the texels"
-            lines.append(f"resident {when}: {shares}, {compared(visit[f'{key}_at_hand'])}")
+            lines.append(f"in memory {when}: {shares}, {compared(visit[f'{key}_at_hand'])}")
         return lines
 
 

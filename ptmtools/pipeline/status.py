@@ -190,7 +190,7 @@ def _plan(
     tasks = stage.job.tasks(artifacts, work)
     plan: Plan = "run" if why else "maybe" if anew else "current"
     if plan == "maybe":
-        why = (f"if {' or '.join(anew)} changes its files",)
+        why = (f"if the stage {' or '.join(f'`{name}`' for name in anew)} changes its files",)
     known = plan == "run" and stage.job.foresee(artifacts, work)
     if plan != "current" and not known:
         changing.add(stage)

@@ -81,12 +81,12 @@ class ViewOptions:
                     f"--{name.replace('_', '-')} {value:g} is not between {low} and {high}"
                 )
         if self.eye and self.viewpoint is not None:
-            raise _refused("--viewpoint and --eye exclude each other", "give one of them")
+            raise _refused("--viewpoint and --eye exclude each other", "use one of them")
         for name, place in (("eye", self.eye), ("look", self.look)):
             if place and not all(map(math.isfinite, place)):
                 raise _refused(f"--{name} is not finite")
         if self.eye and self.look and len(self.eye) > 3:
-            raise _refused("--look and a yaw of --eye exclude each other", "give one of them")
+            raise _refused("--look and a yaw of --eye exclude each other", "use one of them")
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ def eye_of(served: Served, options: ViewOptions) -> Eye:
                 "PTM-I111",
                 f"has no viewpoint {number}",
                 file=served.folder,
-                remedy=f"give 0 to {len(rows) - 1}, or --eye" if rows else "give --eye",
+                remedy=f"use 0 to {len(rows) - 1}, or --eye" if rows else "use --eye",
             )
         row = rows[number]
         position = np.array(row["position"], dtype=np.float64)

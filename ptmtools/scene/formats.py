@@ -83,7 +83,7 @@ def read_other(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES
             "PTM-I243",
             f"unsupported format {suffix or '(no suffix)'}",
             file=path,
-            remedy=f"give one of {' '.join(SUFFIXES)}",
+            remedy=f"use one of {' '.join(SUFFIXES)}",
         )
     if suffix in IFC:
         from ptmtools.scene.ifc.reader import read_ifc
@@ -144,7 +144,7 @@ def _read_trimesh(path: Path, findings: Findings) -> Source:
 
 
 def _no_faces(path: Path) -> InputError:
-    return InputError("PTM-I247", "no faces", file=path, remedy="give a model with faces")
+    return InputError("PTM-I247", "no faces", file=path, remedy="use a model with faces")
 
 
 def _colors(mesh: Any, faces: NDArray[np.int64], findings: Findings) -> NDArray[np.uint8] | None:

@@ -138,7 +138,7 @@ def ingest(
         findings.note(
             "PTM-N235",
             f"the model seems to be inside out: {share:.0%} of the surfaces around its rooms face "
-            "away from them and are invisible; give --two-sided to draw both sides of every face, "
+            "away from them and are invisible; use --two-sided to draw both sides of every face, "
             "or flip the normals",
         )
     tolerance = tolerance_of(points, triangles, source.step * space.metres)
@@ -180,13 +180,15 @@ def check_file(model: Path) -> None:
             if not stream.read(1):
                 raise InputError("PTM-I243", "empty file", file=model)
     except (FileNotFoundError, NotADirectoryError, ValueError):  # also a NUL byte in the name
-        raise InputError("PTM-I120", "no such file", file=model) from None
+        raise InputError("PTM-I120", "no such file", file=model, remedy="check the path") from None
     except OSError as error:
         if os.path.isdir(model):  # also one that may not be read
-            remedy = "name the model file in it"
-            raise InputError("PTM-I122", "is a directory", file=model, remedy=remedy) from None
+            remedy = "specify the model file in it"
+            raise InputError(
+                "PTM-I122", "is a folder, not a file", file=model, remedy=remedy
+            ) from None
         if reason := _NO_FILE.get(error.errno or 0):
-            raise InputError("PTM-I120", reason, file=model) from None
+            raise InputError("PTM-I120", reason, file=model, remedy="check the path") from None
         raise InputError("PTM-I122", error.strerror or str(error), file=model) from None
 
 

@@ -217,7 +217,7 @@ def read_obj(
             "not an OBJ file" if garbage else "no faces",
             file=path,
             place=f"line {garbage[0]}" if garbage else None,
-            remedy="give a model with f statements",
+            remedy="use a model with f statements",
         )
     start = np.frombuffer(statements.face_start, dtype=np.int64)
     line = np.frombuffer(statements.face_line, dtype=np.int64)

@@ -55,12 +55,12 @@ class IngestOptions:
 
     def __post_init__(self) -> None:
         if self.up not in (None, "y", "z"):
-            raise InputError("PTM-I111", f"unknown up axis {self.up!r}", remedy="give y or z")
+            raise InputError("PTM-I111", f"unknown up axis {self.up!r}", remedy="use y or z")
         if self.limit < 1 or self.max_triangles < 1:
             raise InputError(
                 "PTM-I111",
                 "a limit is below 1",
-                remedy="give --limit and --max-triangles of 1 or more",
+                remedy="use --limit and --max-triangles of 1 or more",
             )
         if self.unit is not None:
             from ptmtools.scene.space import parse_unit

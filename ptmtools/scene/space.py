@@ -52,7 +52,7 @@ def parse_unit(unit: str | float) -> float:
         raise InputError(
             "PTM-I111",
             f"unknown unit {unit!r}",
-            remedy=f"give {', '.join(UNITS)} or the metres in one unit",
+            remedy=f"use {', '.join(UNITS)} or the metres in one unit",
         )
     return metres
 
@@ -103,7 +103,7 @@ def settle(
             "PTM-L204",
             f"the extent of the scene would be {extent:.3g} m",
             file=model,
-            remedy=f"give a --unit that makes it {SMALLEST_EXTENT:g} to {LARGEST_EXTENT:g} m",
+            remedy=f"use a --unit that makes it {SMALLEST_EXTENT:g} to {LARGEST_EXTENT:g} m",
         )
     origin = low + side / 2
     floor = 1 if up == "y" else 2
@@ -132,41 +132,42 @@ def _judge_axis(ranked: list[Candidate], by_format: Up | None, findings: Finding
         if lead < CLOSE_AXIS:
             findings.note(
                 "PTM-N232",
-                f"the up axis is uncertain: the format has {by_format} up, {rival.size}"
-                f"{for_rival}, but {best.up} is more likely, {best.size}{for_best}; give "
-                f"--up {by_format} or --up {best.up}",
+                f"the up axis is uncertain: the format prescribes {by_format.upper()}, "
+                f"{rival.size}{for_rival}, but {best.up.upper()} is more likely, "
+                f"{best.size}{for_best}; use --up {by_format} or --up {best.up}",
             )
         else:
             findings.note(
                 "PTM-N234",
-                f"the format has {by_format} up, but the model seems to lie on its side: with "
-                f"{by_format} up it is {rival.size}, with {best.up} up {best.size}{for_best}; give "
-                f"--up {best.up} to rotate it",
+                f"the format prescribes {by_format.upper()} as the up axis, but the model seems "
+                f"to lie on its side: with {by_format.upper()} up it is {rival.size}, with "
+                f"{best.up.upper()} up {best.size}{for_best}; use --up {best.up} to rotate it",
             )
     elif lead < CLOSE_AXIS:
         findings.note(
             "PTM-N232",
-            f"the up axis is uncertain: assuming {best.up}, {best.size}{for_best}, but "
-            f"{rival.up} is nearly as likely, {rival.size}{for_rival}; give --up {best.up} or "
-            f"--up {rival.up}",
+            f"the up axis is uncertain: assuming {best.up.upper()}, {best.size}{for_best}, but "
+            f"{rival.up.upper()} is nearly as likely, {rival.size}{for_rival}; use --up {best.up} "
+            f"or --up {rival.up}",
         )
     else:
         findings.note(
-            "PTM-N202", f"up axis guessed: {best.up}, {best.size}{for_best}; give --up to override"
+            "PTM-N202",
+            f"up axis guessed: {best.up.upper()}, {best.size}{for_best}; use --up to override",
         )
         if rival.rivals(best):
-            unit = f" in {rival.unit}" if rival.unit != best.unit else ""
+            unit = f", unit {rival.unit}" if rival.unit != best.unit else ""
             findings.note(
                 "PTM-N238",
-                f"the runner-up is {rival.up} up{unit}: {rival.size}{for_rival}; give "
-                f"--up {rival.up} to select it",
+                f"second-best guess: {rival.up.upper()} as the up axis{unit}, "
+                f"{rival.size}{for_rival}; use --up {rival.up} to select it",
             )
     return best.up
 
 
 def _reasons(candidate: Candidate, other: Candidate) -> str:
     reasons = candidate.reasons(other)[:_REASONS]
-    return f" ({', '.join(reasons)})" if reasons else ""
+    return f" (reasons: {', '.join(reasons)})" if reasons else ""
 
 
 def _judge_unit(ranked: list[Candidate], by_format: float | None, findings: Findings) -> float:
@@ -177,11 +178,11 @@ def _judge_unit(ranked: list[Candidate], by_format: float | None, findings: Find
             findings.note(
                 "PTM-N233",
                 f"the unit is uncertain: assuming {best.unit} ({best.size}), but {rival.unit} is "
-                f"nearly as likely ({rival.size}); give --unit {best.unit} or --unit {rival.unit}",
+                f"nearly as likely ({rival.size}); use --unit {best.unit} or --unit {rival.unit}",
             )
         else:
             findings.note(
-                "PTM-N201", f"unit guessed: {best.unit} ({best.size}); give --unit to override"
+                "PTM-N201", f"unit guessed: {best.unit} ({best.size}); use --unit to override"
             )
         return best.metres
     known = by_format in UNITS.values()  # other units are not among the candidates
@@ -189,7 +190,7 @@ def _judge_unit(ranked: list[Candidate], by_format: float | None, findings: Find
         unit = "metres" if by_format == 1 else f"units of {by_format:g} m"
         findings.note(
             "PTM-N227",
-            f"the format is in {unit}, but {best.unit} is more likely ({best.size}); give --unit "
+            f"the format is in {unit}, but {best.unit} is more likely ({best.size}); use --unit "
             "to override",
         )
     return by_format

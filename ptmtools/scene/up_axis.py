@@ -276,11 +276,13 @@ class Candidate:
         """Its size in words."""
         measured, metres = self.evidence, self.metres
         width, height = measured.width * metres, measured.height * metres
-        rooms = f", free height mostly {measured.room * metres:.3g} m" if measured.room else ""
+        rooms = (
+            f", clear height of most rooms {measured.room * metres:.3g} m" if measured.room else ""
+        )
         return f"{width:.3g} m wide and {height:.3g} m high{rooms}"
 
     def rivals(self, best: Candidate) -> bool:
-        """Whether its cost is low enough to print it as the runner-up."""
+        """Whether its cost is low enough to print it as the second-best guess."""
         return self.cost <= RUNNER_UP * best.cost
 
     def reasons(self, other: Candidate) -> list[str]:
@@ -320,7 +322,7 @@ def _costs(measured: Evidence, other: Evidence, unit: str, metres: float) -> dic
     rooms = _higher(measured.median, other.median) if measured.room and other.room else 0.5
     return {
         "more level faces": 1 - measured.level / level if level else 0.5,
-        "wider than high": 0.75 * _higher(measured.height, other.height),
+        "building wider than high": 0.75 * _higher(measured.height, other.height),
         "rooms wider than high": 1.5 * rooms,
         "walls in two directions": 1.5 * (1 - measured.crossed),
         "fewer sloping faces": 1 - measured.upright,

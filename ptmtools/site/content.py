@@ -322,7 +322,7 @@ def _picture_file(file: str) -> tuple[str, str, bytes]:
     for begin, media, suffix in _MAGIC:
         if re.match(begin, data, re.DOTALL):
             return media, suffix, data
-    remedy = "give a JPEG, PNG or WebP"
+    remedy = "use a JPEG, PNG or WebP"
     raise InputError("PTM-I125", "is no picture that browsers show", file=file, remedy=remedy)
 
 

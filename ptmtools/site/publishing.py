@@ -95,7 +95,7 @@ def publish(
     for name in names:
         if name not in before and not force:
             with writing(root):
-                refuse_existing(root / name, "move it away, or give --force to replace it")
+                refuse_existing(root / name, "move it away, or use --force to replace it")
     with writing(root):
         root.mkdir(parents=True, exist_ok=True)
     now = {name: _digest(files[name]) for name in names}
@@ -117,7 +117,7 @@ def _checked(root: Path, force: bool) -> dict[str, str]:
     """The list of a folder, name → SHA-256; empty for a new one, or one that was forced."""
     if root.exists() and not root.is_dir():
         raise OutputError(
-            "PTM-O001", "exists and is not a folder", file=root, remedy="name another with -o"
+            "PTM-O001", "exists and is not a folder", file=root, remedy="specify another with -o"
         )
     with writing(root):
         if not root.exists() or not any(root.iterdir()):
@@ -128,7 +128,7 @@ def _checked(root: Path, force: bool) -> dict[str, str]:
             "PTM-O010",
             "the folder is not empty and not a site that `ptm publish` wrote",
             file=root,
-            remedy="name another folder with -o, or give --force to write into it",
+            remedy="specify another folder with -o, or use --force to write into it",
         )
     return listed or {}
 

@@ -155,8 +155,8 @@ def _listening(host: str, port: int) -> socket.socket:
         return listener
     except (OSError, OverflowError, UnicodeError) as fault:
         reason = f"cannot be listened on ({getattr(fault, 'strerror', None) or fault})"
-        remedy = "give an address of this machine with --host, and a port from 1024 to 65535"
+        remedy = "use an address of this machine with --host, and a port from 1024 to 65535"
         if getattr(fault, "errno", None) == errno.EADDRINUSE:
             reason = "the port is taken by another program"
-            remedy = "give another one with --port, or none for any free one"
+            remedy = "use another one with --port, or none for any free one"
         raise InputError("PTM-I920", reason, file=f"{host}:{port}", remedy=remedy) from None

@@ -104,7 +104,7 @@ class Manifest:
             raise damaged_manifest(file, f"nested more than {_MAX_DEPTH} deep")
         if not isinstance(document, dict) or document.get("format") != FORMAT:
             raise DatabaseError(
-                "PTM-D001", "not a ptmtools database", file=file, remedy="give a database folder"
+                "PTM-D001", "not a ptmtools database", file=file, remedy="use a database folder"
             )
         if document.get("schema") != SCHEMA:
             raise DatabaseError(

@@ -76,7 +76,7 @@ class DatabaseWriter(DatabaseFolder):
                 "PTM-O001",
                 "exists and is not a folder",
                 file=folder,
-                remedy="name another folder with -o",
+                remedy="specify another folder with -o",
             )
         created = [p for p in (*reversed(folder.parents), folder) if not p.exists()]
         try:
@@ -86,7 +86,7 @@ class DatabaseWriter(DatabaseFolder):
         except BaseException as fault:
             _remove_empty(created)
             if isinstance(fault, OutputError) and fault.code == "PTM-O002":
-                fault.remedy = "name a folder that you may write to with -o"
+                fault.remedy = "specify a folder that you may write to with -o"
             raise
 
     def __enter__(self) -> DatabaseWriter:
@@ -128,14 +128,14 @@ def admitted(folder: Path, model: str, *, force: bool) -> Manifest:
             "PTM-O010",
             f"holds the database of another model, {manifest.model}",
             file=folder,
-            remedy="name another folder with -o, or give --force to replace it",
+            remedy="specify another folder with -o, or use --force to replace it",
         )
     if not force and _has_foreign_files(folder):
         raise OutputError(
             "PTM-O010",
-            "the folder is not empty and not a ptmtools database",
+            "the folder is neither empty nor a ptmtools database",
             file=folder,
-            remedy="name another folder with -o, or give --force to write into it",
+            remedy="specify another folder with -o, or use --force to write into it",
         )
     return Manifest(model)
 

@@ -184,7 +184,7 @@ def _rivals() -> list[Codec]:
         for effort in (1, 3, 7)
     ]
     jpeg_2000 = _by_imagecodecs("JPEG 2000", "jpeg2k", level=0, reversible=True, codecformat="j2k")
-    jpeg_ls = _by_imagecodecs("JPEG-LS, less green", "jpegls")
+    jpeg_ls = _by_imagecodecs("JPEG-LS, green subtracted", "jpegls")
     return [
         Codec("PNG", png_bytes, _by_pillow, _INTEGERS),
         Codec("WebP lossless", _webp, _by_pillow, ("uint8",), remedy=webp),
@@ -247,7 +247,8 @@ def _by_pillow(data: bytes, shape: tuple[int, ...]) -> Samples:
 
 
 def _jpeg_ls(image: Samples) -> bytes:
-    """Each plane by itself, red and blue less green: JPEG-LS has no colour transform."""
+    """Each plane by itself, with green subtracted from red and blue: JPEG-LS has no colour
+    transform."""
     import imagecodecs
 
     planes = [np.ascontiguousarray(image[:, :, c]) for c in range(image.shape[2])]

@@ -212,7 +212,7 @@ def _check_magic(data: bytes) -> None:
         raise _cut_head(len(data))
     raise InputError(
         "PTM-I101",
-        "is not a progressive texture map (wrong first bytes)",
+        "is not a progressive texture map (wrong file signature)",
         remedy="if it is an image, encode it with: ptm encode",
     )
 

@@ -52,7 +52,7 @@ def check_options(options: EncodeOptions) -> None:
     for field in fields(options):
         value = getattr(options, field.name)
         if isinstance(field.default, int) and type(value) is not type(field.default):
-            raise _impossible(f"{field.name} is {value!r}", "give a whole number")
+            raise _impossible(f"{field.name} is {value!r}", "use a whole number")
     if options.profile not in PROFILES:
         raise _impossible(
             f"there is no profile {options.profile!r}", f"use one of {', '.join(PROFILES)}"

@@ -395,7 +395,7 @@ def faults_of(data: bytes, limits: Limits = _LIMITS) -> list[str]:
                 what = f"the last whole level is {whole - 1}" if whole else "no level is complete"
                 problems.append(f"cut after {len(data)} of {header.file_size} bytes: {what}")
             if len(data) > header.file_size:
-                problems.append(f"{len(data) - header.file_size} bytes behind the last group")
+                problems.append(f"{len(data) - header.file_size} bytes after the last group")
             problems += ptm.wrong_checksums()
             if not problems:
                 ptm.description()

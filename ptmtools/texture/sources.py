@@ -116,10 +116,10 @@ def open_file(path: str | os.PathLike[str]) -> BinaryIO:
             stack.pop_all()
             return file
     except FileNotFoundError:
-        raise InputError("PTM-I120", "there is no such file", file=path) from None
+        raise InputError("PTM-I120", "no such file", file=path, remedy="check the path") from None
     except IsADirectoryError:
         raise InputError(
-            "PTM-I122", "is a folder, not a file", file=path, remedy="name a file in it"
+            "PTM-I122", "is a folder, not a file", file=path, remedy="specify a file in it"
         ) from None
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         reason = getattr(error, "strerror", None) or error

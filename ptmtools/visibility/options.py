@@ -46,7 +46,7 @@ class PvsOptions:
             raise InputError(
                 "PTM-I111",
                 f"budget {self.budget} is out of range",
-                remedy="give a budget of at least 0",
+                remedy="use a budget of at least 0",
             )
         if self.method not in ("full", "fast", "sampled") or self.lines < 1:
             raise InputError(

@@ -139,10 +139,13 @@ def report_lines(report: PvsReport, *, verbose: bool = False) -> Iterator[str]:
             yield f"  {portal.operations:10,}  {_place(portal)}{cut}"
     if not report.leaks:
         if report.cells > 1:
-            yield "no leaks: no cell sees suspiciously much through a single opening"
+            yield (
+                "no leaks: no cell sees an unusually large part of the building through a single "
+                "opening"
+            )
         return
-    yield "cells that see more than three times the median, each with the smallest opening"
-    yield "through which it sees at least half of that (an unintended gap?):"
+    yield "cells whose visible set is more than three times the median, each with the smallest"
+    yield "opening through which at least half of its set is visible (an unintended gap?):"
     shown = len(report.leaks) if verbose else SHOWN_LEAKS
     for leak in report.leaks[:shown]:
         yield (
@@ -168,11 +171,11 @@ def _share(share: float, sees: int) -> str:
     """The most cells that this share of the cells see."""
     match share:
         case 0.0:
-            return f"least {sees:,}"
+            return f"minimum {sees:,}"
         case 0.5:
             return f"median {sees:,}"
         case 1.0:
-            return f"most {sees:,}"
+            return f"maximum {sees:,}"
     return f"{share:.0%} of cells ≤ {sees:,}"
 
 

@@ -157,7 +157,7 @@ def test_a_door_parts_no_building(name: str, hole: Hole, door: Faces, leaves: in
     assert cells.closed
     assert together(cells, A, B)
     assert see(cells, A, B)
-    assert not any("cannot be reached from the starting point" in note for note in cells.notes)
+    assert not any("cannot be reached from the viewpoint" in note for note in cells.notes)
     assert len(said(cells)) == 1
     assert set(cells.triangle_source[cells.emitted(made.two_sided)[0]]) >= set(cells.opened)
     shut = subdivide(made, SubdivideOptions(doors="closed"))
@@ -334,7 +334,7 @@ def test_a_thick_floor_is_no_roof(slab: float) -> None:
     faces = [f for f in rooms() if not all(y == 4 for _, y, _ in f)]
     made = scene(faces, solid((-0.2, -slab, -2.2), (8.4, -0.001, 2.2)), Door=leaf(4.05))
     cells = subdivide(made)
-    assert any("open above" in note for note in cells.notes)
+    assert any("open at the top" in note for note in cells.notes)
     assert together(cells, A, B)
 
 
@@ -593,9 +593,7 @@ def test_another_building_is_one_too() -> None:
     cells = subdivide(made)
     assert cells.closed
     assert together(cells, (41.0, 1.0, 1.2), (47.0, 1.0, 1.2))
-    (reported,) = [
-        note for note in cells.notes if "cannot be reached from the starting point" in note
-    ]
+    (reported,) = [note for note in cells.notes if "cannot be reached from the viewpoint" in note]
     assert float(reported.split(" ")[0]) == pytest.approx(2 * 3.5 * 3.5, abs=0.5)
     # Nobody is in the leaf of the door only.
     assert cells.leaf_count == 1 + 3

@@ -193,8 +193,8 @@ def test_sizes_are_printed_beside_those_of_the_input(
     assert main(["encode", "l.jpg", "a.png", "-o", "new"]) == 0
     first, second, hint = capsys.readouterr().out.splitlines()
     stored, given = os.path.getsize("new/l.ptm"), os.path.getsize("l.jpg")
-    assert first.endswith(f", {stored / given:.1f} times l.jpg ({given / 1000:.1f} kB)")
-    assert f"% of a.png ({os.path.getsize('a.png') / 1000:.1f} kB)" in second
+    assert first.endswith(f", {stored / given:.1f} times the size of l.jpg ({given / 1000:.1f} kB)")
+    assert f"% of the size of a.png ({os.path.getsize('a.png') / 1000:.1f} kB)" in second
     assert hint.startswith("hint: JPEG files discard detail")
     assert "--max-error 4" in hint
     assert main(["encode", "a.png", "n.webp", "-o", "new", "--force"]) == 0
@@ -442,7 +442,7 @@ def test_info_counts(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert finest["gpu_bytes_padded"] * 3 == finest["gpu_bytes"] * 4
     assert main(["info", "x.ptm"]) == 0
     out = capsys.readouterr().out
-    assert "1 finer level left out" in out
+    assert "1 finer level omitted" in out
     assert out.splitlines()[-1].endswith("cut off")
     assert "orientation 6" in out
 
@@ -473,7 +473,7 @@ def test_compare(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["compare", "a.png", "b.PNG", "--profiles", "raw"]) == 0
     out = capsys.readouterr().out
     assert out.count("ptm raw") == 3
-    assert "all 2 images" in out
+    assert "total of 2 images" in out
     assert main(["compare", "a.png", "--profiles", "raw,tiny"]) == 2
 
 
@@ -483,7 +483,7 @@ def test_compare_says_what_cannot_be(
     monkeypatch.setitem(sys.modules, "imagecodecs", None)
     write_image("f.npy", RGB.astype(np.float32))
     assert main(["compare", "f.npy", "--profiles", "raw"]) == 0
-    lines = {line[:20].strip(): line[20:] for line in capsys.readouterr().out.splitlines()}
+    lines = {line[:26].strip(): line[26:] for line in capsys.readouterr().out.splitlines()}
     assert lines["JPEG XL effort 7"] == "not installed: pip install 'ptmtools[codecs]'"
     assert "does not hold 34 x 21, 3 components of float32" in lines["PNG"]
     assert "MB/s" in lines["ptm raw"]

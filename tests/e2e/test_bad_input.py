@@ -339,7 +339,7 @@ def test_bad_input(name: str, folder: Path, ptm: Ptm) -> None:
     assert LINE.fullmatch(outcome.err), outcome.err
     assert f"[PTM-{code}" in outcome.err
     assert outcome.status == status
-    # Finished stages are reported, with the runner-up of the up axis.
+    # Finished stages are reported, with the second-best guess of the up axis.
     assert all(line.startswith(("scene ", "note: ")) for line in outcome.out.splitlines())
     assert listing(folder) == before
 

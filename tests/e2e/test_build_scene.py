@@ -54,7 +54,7 @@ def ran(report: dict[str, Any]) -> list[str]:
 def test_two_rooms(tmp_path: Path) -> None:
     done = run("build-scene", TWO_ROOMS / "two_rooms.obj", "-o", "rooms.db", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
-    assert "2 cells of 3 leaves, 2 portals; closed" in done.stdout
+    assert "2 cells of 3 convex leaves, 2 portals; closed to the outside" in done.stdout
     assert "visibility culling gains little" in done.stdout
     assert "ptm validate rooms.db" in done.stdout
 

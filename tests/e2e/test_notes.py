@@ -34,14 +34,14 @@ def test_warnings_come_with_their_stage_and_notes_are_counted(ptm: Ptm, lying: P
     assert lines[0].startswith("scene ")
     assert lines[1].startswith("warning: the format has y up, but the model seems to lie on its")
     assert lines[2].startswith("cells ")
-    assert lines[-1].endswith(" more notes; -v lists them")
+    assert lines[-1].endswith(" notes not shown; -v lists them")
     assert "note: " not in done.out
 
     again = ptm("cells", lying, "-v").out.splitlines()
     assert again[0].startswith("scene     unchanged")
     assert again[1] == lines[1]
     notes = [line for line in again if line.startswith("note: ")]
-    assert f"{len(notes)} more notes; -v lists them" == lines[-1]
+    assert f"{len(notes)} notes not shown; -v lists them" == lines[-1]
     for verbose in ([], ["-v"]):
         reported = ptm("info", lying.with_suffix(".db"), *verbose).out
         assert reported.count(lines[1].removeprefix("warning: ")) == 1
@@ -92,7 +92,7 @@ def test_an_empty_world_is_an_error_and_leaves_no_database(ptm: Ptm, tmp_path: P
     done = ptm("build-scene", path)
     assert done.status == 3
     assert "warning: the model seems to be inside out: " in done.out
-    assert done.err.startswith(f"ptm: {path}: nothing of the model is visible from inside: ")
+    assert done.err.startswith(f"ptm: {path}: no part of the model is visible from inside: ")
     assert "--two-sided" in done.err
     assert done.err.endswith("[PTM-I304]\n")
     assert not (tmp_path / "out.db" / "manifest.json").exists()
@@ -113,7 +113,9 @@ def test_the_runner_up_of_the_up_axis_is_shown_with_its_stage(ptm: Ptm, tmp_path
     path = tmp_path / "house.obj"
     path.write_text(obj_text(house()))
     lines = ptm("cells", path).out.splitlines()
-    assert lines[1].startswith("note: the runner-up is y up: 19.2 m wide and 11.6 m high, ")
-    assert lines[1].endswith("; give --up y to select it [PTM-N238]")
+    assert lines[1].startswith(
+        "note: second-best guess: Y as the up axis, 19.2 m wide and 11.6 m high, "
+    )
+    assert lines[1].endswith("; use --up y to select it [PTM-N238]")
     assert sum("PTM-N238" in line for line in ptm("cells", path, "-v").out.splitlines()) == 1
     assert "PTM-N238" not in ptm("cells", MODEL, "-o", tmp_path / "rooms.db").out

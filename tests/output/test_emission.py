@@ -325,7 +325,7 @@ def test_faults_before_anything_is_written(artifacts, tmp_path: Path) -> None:
 
 def test_what_is_there_stays(artifacts, tmp_path: Path) -> None:
     (tmp_path / "root.wrl").write_text("mine")
-    with pytest.raises(OutputError, match=r"name another folder.*PTM-O001"):
+    with pytest.raises(OutputError, match=r"specify another folder.*PTM-O001"):
         write(artifacts, tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["root.wrl"]
     write(artifacts, tmp_path, force=True)

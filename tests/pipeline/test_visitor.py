@@ -34,17 +34,17 @@ VISIT = {
 
 def test_what_is_heavier_than_the_model_is_said_to_be() -> None:
     assert Visitor(500_000, 1_500_000, VISIT).lines() == [
-        "source model: 2.0 MB (model files 500.0 kB, image files 1.5 MB)",
+        "source model, for comparison: 2.0 MB (model files 500.0 kB, image files 1.5 MB)",
         "a VRML browser downloads 4.0 MB, more than the source model",
         "the first room is complete after 1.0 MB",
-        "resident on average: 25.0% of the volume and 30.0% of the texels, 1.5 MB",
-        "resident at most: 50.0% of the volume and 100.0% of the texels, 2.5 MB, more than the "
+        "in memory on average: 25.0% of the volume and 30.0% of the texels, 1.5 MB",
+        "in memory at most: 50.0% of the volume and 100.0% of the texels, 2.5 MB, more than the "
         "source model",
     ]
 
 
 def test_images_inside_the_model_are_not_counted_apart() -> None:
-    assert Visitor(1_500_000, 0, VISIT).lines()[0] == "source model: 1.5 MB"
+    assert Visitor(1_500_000, 0, VISIT).lines()[0] == "source model, for comparison: 1.5 MB"
 
 
 @pytest.mark.parametrize(("model", "heavier"), [(3_960_000, False), (3_700_000, True)])
@@ -58,8 +58,8 @@ def test_what_is_not_known_is_left_out() -> None:
     bare = {**VISIT, "browser": None, "mean_texels": None, "most_texels": None}
     assert Visitor(None, None, bare).lines() == [
         "the first room is complete after 1.0 MB",
-        "resident on average: 25.0% of the volume, 1.5 MB",
-        "resident at most: 50.0% of the volume, 2.5 MB",
+        "in memory on average: 25.0% of the volume, 1.5 MB",
+        "in memory at most: 50.0% of the volume, 2.5 MB",
     ]
 
 
@@ -95,7 +95,7 @@ def test_the_model_as_it_was(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     reported = capsys.readouterr().out
     lines = Visitor.of(DatabaseFolder.open(db).manifest).lines()  # type: ignore[union-attr]
     assert len(lines) == 5
-    assert [line.removeprefix("visitor").strip() for line in reported.splitlines()[-5:]] == lines
+    assert [line.removeprefix("download").strip() for line in reported.splitlines()[-5:]] == lines
 
 
 @pytest.mark.parametrize(("volume", "little"), [(91.0, True), (1.0, False)])
@@ -107,11 +107,11 @@ def test_culling_gains_little_where_most_of_the_volume_is_at_hand(
     sees[0] = sees[:, 0] = True
     pvs = Pvs.from_matrix(sees, volume=np.array([volume] + [1.0] * 9))
     assert pvs.average_share < 0.3
-    assert any("gains little" in note for note in PVS.notes(pvs, PvsOptions())) is little
+    assert any("saves little" in note for note in PVS.notes(pvs, PvsOptions())) is little
     assert PVS.counts is not None
     printed = PVS.summarize(PVS.counts(pvs))
     share = f"{pvs.volume_at_hand[0]:.1%}"
-    assert printed == f"{share} of the volume stays resident on average, 100.0% at most"
+    assert printed == f"a client keeps {share} of the volume in memory on average, 100.0% at most"
 
 
 def test_only_what_is_served_means_something(tmp_path: Path) -> None:

@@ -98,7 +98,7 @@ def test_it_is_noted_with_the_remedy(put: Put) -> None:
     (note,) = scene.notes
     assert note.code == "PTM-N235"
     assert note.message.startswith("the model seems to be inside out: ")
-    assert "give --two-sided" in note.message
+    assert "use --two-sided" in note.message
     scene = ingest(path, IngestOptions(two_sided=True))
     assert scene.two_sided.all()
     assert scene.notes == ()

@@ -99,8 +99,9 @@ def test_guesses_are_told(put: Put) -> None:
     scene = ingest(put("a.obj", QUAD + FACE))
     messages = {note.code: note.message for note in scene.notes}
     assert messages["PTM-N201"].startswith("unit guessed: m (")
-    assert messages["PTM-N201"].endswith("give --unit to override")
-    assert messages["PTM-N202"].startswith("up axis guessed: z, 10 m wide and 0 m high (more level")
+    assert messages["PTM-N201"].endswith("use --unit to override")
+    guess = "up axis guessed: Z, 10 m wide and 0 m high (reasons: more level"
+    assert messages["PTM-N202"].startswith(guess)
     assert not ingest(put("a.obj", QUAD + FACE), IngestOptions(unit="m", up="y")).notes
 
 

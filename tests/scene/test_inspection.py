@@ -48,16 +48,16 @@ def rooms(doors: bool = True, roof: bool = True) -> str:
 
 def test_what_is_said(put: Put, capsys: pytest.CaptureFixture[str]) -> None:
     text = info(put("house.obj", rooms()), capsys)
-    rows = {line[:10].strip(): line[11:] for line in text.splitlines() if line[:10].strip()}
+    rows = {line[:11].strip(): line[12:] for line in text.splitlines() if line[:11].strip()}
     assert "house.obj: Wavefront OBJ, " in text
     assert rows["triangles"] == "20 in 10 objects"
     assert rows["images"] == "none"
     assert rows["size"] == "8 x 4 m, 2.6 m high"
     assert rows["unit"] == "1 m (guessed)"
-    assert rows["up axis"] == "y (guessed)"
-    assert rows["looks like"].startswith("m, y up: 8 m wide and 2.6 m high, ")
-    assert rows["or like"].split(",")[0] in ("cm", "mm", "in", "ft", "m")
-    assert rows["closed"] == "looks closed: no sight line from its rooms leaves it"
+    assert rows["up axis"] == "Y (guessed)"
+    assert rows["best guess"].startswith("unit m, Y up: 8 m wide and 2.6 m high, ")
+    assert rows["alternative"].split(",")[0].removeprefix("unit ") in ("cm", "mm", "in", "ft", "m")
+    assert rows["closed"] == "probably; no sight line from a room leaves the building"
     assert rows["doors"] == "1 recognised: Door_12"
 
 
@@ -114,7 +114,7 @@ def test_of_a_gltf_model(put: Put, capsys: pytest.CaptureFixture[str]) -> None:
     assert not actual["space"]["unit_guessed"]
     assert "PTM-N204" in {note["code"] for note in actual["notes"]}
     text = info(put("a.glb", doc.glb()), capsys)
-    assert "warning    material 1: texture 1: has no image [PTM-N204]" in text
+    assert "warning     material 1: texture 1: has no image [PTM-N204]" in text
 
 
 def test_options_count_as_in_a_build(put: Put, capsys: pytest.CaptureFixture[str]) -> None:

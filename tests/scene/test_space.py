@@ -64,12 +64,14 @@ def test_guesses_are_noted() -> None:
     assert (space.metres, space.up, space.unit_guessed, space.up_guessed) == (0.0254, "z", 1, 1)
     assert list(notes) == ["PTM-N202", "PTM-N238", "PTM-N201"]
     assert notes["PTM-N202"].startswith(
-        "up axis guessed: z, 19.2 m wide and 3.5 m high, free height"
+        "up axis guessed: Z, 19.2 m wide and 3.5 m high, clear height"
     )
     assert "rooms wider than high" in notes["PTM-N202"]
     assert notes["PTM-N201"].startswith("unit guessed: in (19.2 m wide")
-    assert notes["PTM-N238"].startswith("the runner-up is y up in cm: 7.56 m wide and 4.57 m high")
-    assert notes["PTM-N238"].endswith("give --up y to select it")
+    assert notes["PTM-N238"].startswith(
+        "second-best guess: Y as the up axis, unit cm, 7.56 m wide and 4.57 m high"
+    )
+    assert notes["PTM-N238"].endswith("use --up y to select it")
 
 
 def test_a_runner_up_far_behind_is_not_noted() -> None:
@@ -83,8 +85,8 @@ def test_a_runner_up_far_behind_is_not_noted() -> None:
 def test_an_uncertain_courtyard_is_noted_although_a_convention_decides() -> None:
     space, notes = settled(y_up(atrium()) * 100)
     assert (space.up, space.metres) == ("y", 0.01)
-    assert "assuming y, 37.2 m wide and 15.6 m high" in notes["PTM-N232"]
-    assert "z is nearly as likely, 37.2 m wide and 22.9 m high" in notes["PTM-N232"]
+    assert "assuming Y, 37.2 m wide and 15.6 m high" in notes["PTM-N232"]
+    assert "Z is nearly as likely, 37.2 m wide and 22.9 m high" in notes["PTM-N232"]
 
 
 def test_what_is_uncertain_is_noted_with_the_runner_up() -> None:
@@ -92,12 +94,12 @@ def test_what_is_uncertain_is_noted_with_the_runner_up() -> None:
     assert space.metres == 0.01
     assert list(notes) == ["PTM-N232", "PTM-N201"]
     assert space.up == "y"
-    assert notes["PTM-N232"].endswith("give --up y or --up z")
+    assert notes["PTM-N232"].endswith("use --up y or --up z")
     _, notes = settled(house() / 0.3048)
     assert list(notes) == ["PTM-N202", "PTM-N238", "PTM-N233"]
     assert "assuming m" in notes["PTM-N233"]
     assert "ft is nearly as likely (19.2 m wide" in notes["PTM-N233"]
-    assert notes["PTM-N233"].endswith("give --unit m or --unit ft")
+    assert notes["PTM-N233"].endswith("use --unit m or --unit ft")
 
 
 def test_what_is_given_is_not_judged() -> None:
@@ -116,9 +118,9 @@ def test_a_format_is_believed_and_doubted() -> None:
     assert settled(y_up(house()), by_format=gltf)[1] == {}
     space, notes = settled(house(), by_format=gltf)
     assert (space.up, space.up_guessed, list(notes)) == ("y", False, ["PTM-N234"])
-    assert "with y up it is 19.2 m wide and 11.6 m high" in notes["PTM-N234"]
-    assert "with z up 19.2 m wide and 3.5 m high" in notes["PTM-N234"]
-    assert notes["PTM-N234"].endswith("give --up z to rotate it")
+    assert "with Y up it is 19.2 m wide and 11.6 m high" in notes["PTM-N234"]
+    assert "with Z up 19.2 m wide and 3.5 m high" in notes["PTM-N234"]
+    assert notes["PTM-N234"].endswith("use --up z to rotate it")
     space, notes = settled(house(), DeclaredSpace(up="z"), gltf)
     assert (space.up, notes) == ("z", {})
     space, notes = settled(y_up(house()) * 100, by_format=gltf)
@@ -132,9 +134,9 @@ def test_a_format_is_doubted_where_the_other_axis_is_somewhat_likelier() -> None
     gltf = DeclaredSpace(1.0, "y")
     space, notes = settled(tower(), by_format=gltf)
     assert (space.up, space.up_guessed, list(notes)) == ("y", False, ["PTM-N232"])
-    assert "the format has y up, 64.2 m wide and 8 m high" in notes["PTM-N232"]
-    assert "z is more likely, 8 m wide and 64.2 m high" in notes["PTM-N232"]
-    assert notes["PTM-N232"].endswith("give --up y or --up z")
+    assert "the format prescribes Y, 64.2 m wide and 8 m high" in notes["PTM-N232"]
+    assert "Z is more likely, 8 m wide and 64.2 m high" in notes["PTM-N232"]
+    assert notes["PTM-N232"].endswith("use --up y or --up z")
     assert settled(y_up(tower()), by_format=gltf)[1] == {}
     assert settled(tower(), DeclaredSpace(up="y"), gltf)[1] == {}
     for plain in (box((0, 0, 0), (3, 3, 3)), corridor(40, 2, 3, rooms=False)):

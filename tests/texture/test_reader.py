@@ -69,7 +69,7 @@ def test_errors_name_the_file(tmp_path: Path) -> None:
         assert ptm.whole == len(ptm.header.levels) - 1
         with pytest.raises(InputError, match=r"a\.ptm: level 6: is cut.*PTM-I103"):
             ptm.level(6)
-    with pytest.raises(InputError, match=r"b\.ptm: there is no such file.*PTM-I120"):
+    with pytest.raises(InputError, match=r"b\.ptm: no such file.*PTM-I120"):
         texture.open(tmp_path / "b.ptm")
 
 

@@ -19,17 +19,17 @@ def table(runs: Sequence[CampusRun]) -> list[str]:
     """Rows of measures, a column for each preset."""
     rows: list[tuple[str, Callable[[CampusRun], str]]] = [
         ("textures / lightmaps", lambda r: f"{r.quality.diffuse} / {r.quality.light}"),
-        ("all coarsest meshes are there after, s", lambda r: _or(r.begun, "{:.1f}")),
-        ("graphics memory of these, MB", lambda r: _mega(r.floor)),
-        ("graphics memory at most, MB", lambda r: _mega(int(r.memory.max()))),
+        ("time until all coarsest meshes are loaded, s", lambda r: _or(r.begun, "{:.1f}")),
+        ("graphics memory of these meshes, MB", lambda r: _mega(r.floor)),
+        ("maximum graphics memory, MB", lambda r: _mega(int(r.memory.max()))),
         ("received, MB", lambda r: _mega(r.body + r.overhead)),
         ("requests", lambda r: f"{r.requests:,}"),
         ("link idle", lambda r: f"{r.idle_share:.0%}"),
         (f"pauses of {PAUSE:g} s or more", lambda r: f"{r.pauses}"),
-        ("one of the nearest is not in full", lambda r: f"{r.late:.0%}"),
-        ("from near to in full, s", lambda r: _or(r.delay, "{:.1f}")),
-        ("came too late, of all that became near", lambda r: f"{r.never} of {_all(r)}"),
-        ("textures that were there already", lambda r: f"{r.reused:.0%}"),
+        ("time with an incomplete nearest object", lambda r: f"{r.late:.0%}"),
+        ("mean time from near to complete, s", lambda r: _or(r.delay, "{:.1f}")),
+        ("objects completed too late, of all that came near", lambda r: f"{r.never} of {_all(r)}"),
+        ("textures already loaded when first needed", lambda r: f"{r.reused:.0%}"),
         ("e", lambda r: _or(r.e, "{:.2f}")),
     ]
     return [*_head("", runs), *(_row(name, [of(run) for run in runs]) for name, of in rows)]

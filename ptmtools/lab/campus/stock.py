@@ -136,7 +136,7 @@ def read_stock(folder: str | os.PathLike[str], only: str = "*") -> Stock:
             "PTM-I302",
             f"has no object {only}",
             file=folder / INDEX,
-            remedy="give names that it has",
+            remedy="use names that it has",
         )
     campus = replace(campus, objects=kept)
     index = _bytes(folder, INDEX, LONGEST)

@@ -220,7 +220,7 @@ def prepare_campus(
         raise InputError(
             "PTM-I701",
             "a walk that was recorded in a browser is of its client, not of one of a campus",
-            remedy="give a walk of `ptm path`",
+            remedy="use a walk of `ptm path`",
         )
     folder = Path(folder)
     stock = read_stock(folder, only)

@@ -83,7 +83,7 @@ class PaperOptions:
                 raise InputError(
                     "PTM-I111",
                     f"--{name.replace('_', '-')} {getattr(self, name):g} is out of range",
-                    remedy="give 0 or more, finite",
+                    remedy="use 0 or more, finite",
                 )
 
     @property

@@ -54,7 +54,7 @@ def table(trade: Trade, wanted: float | None = None) -> list[str]:
             if cheapest
             else "none of these; the last one with a star comes closest"
         )
-        lines.append(f"  cheapest for an error of at most {wanted:g}: {answer}")
+        lines.append(f"  cheapest with an error of at most {wanted:g}: {answer}")
     return lines
 
 
@@ -112,7 +112,7 @@ def _draw(trade: Trade, axes: Any) -> None:
 
 
 #: Name of the unchanged database.
-_AS_IS = "as it is"
+_AS_IS = "unchanged"
 #: Least visible change of e, as a share of it and in steps of 8-bit colour.
 _SHARE, _STEPS = 0.005, 0.01
 #: Least relevant share of bytes, and of seconds, which are no more exact.
@@ -144,7 +144,7 @@ def representative(some: Sequence[WalkTrial], own: WalkTrial) -> WalkTrial:
 def sentence(tried: WalkTrial, trade: WalkTrade) -> str:
     """The savings of a setting, and its visible effect."""
     if tried.problem:
-        return f"{tried.name} cannot be tried: {tried.problem}."
+        return f"{tried.name} cannot be tested: {tried.problem}."
     own = trade.own
     saved = _saved(tried, own)
     pairs = _pairs(tried, own)
@@ -160,9 +160,9 @@ def sentence(tried: WalkTrial, trade: WalkTrade) -> str:
     policies = {seen.policy for _, seen in pairs} - {seen.policy for seen in own.seen[:1]}
     client = f" to the client {policies.pop()}" if len(policies) == 1 else ""
     if not changes:
-        seen = f"no difference{client} that can be seen"
+        seen = f"no visible difference{client}"
     else:
-        seen = f"the picture{client} is {_and(changes)}"
+        seen = f"the image{client} is {_and(changes)}"
         if len(noticed) < len(pairs):
             seen += ", and the same otherwise"
     return f"{tried.name} instead of {tried.own} {saved}; {seen}."
@@ -173,8 +173,8 @@ def _saved(tried: WalkTrial, own: WalkTrial) -> str:
     more = tried.served / max(own.served, 1) - 1
     if abs(more) >= _BYTES:
         parts.append(
-            f"adds {_percent(more)} to the bytes" if more > 0 else
-            f"saves {_percent(-more)} of the bytes"
+            f"increases the total size by {_percent(more)}" if more > 0 else
+            f"reduces the total size by {_percent(-more)}"
         )  # fmt: skip
     longer = tried.build - own.build
     if abs(longer) >= _SECONDS * own.build:
@@ -222,11 +222,11 @@ def settings_table(trade: WalkTrade, wanted: float | None = None) -> list[str]:
     """Lines of text: the sentences, then all settings, a block for each walker."""
     lines = [*sentences(trade), ""]
     lines += [
-        "e says how far the picture is from the full one of the database as it is: 0 to 255, on",
-        "average over pixels and frames, and what 95 % of the frames do not exceed. build: seconds",
-        "of one core, all stages after the scene. served: all that clients of the hints can fetch.",
-        f"fetched: on the walk, of {trade.seconds:.0f} s. first: until {FIRST:.0%} of the first "
-        "picture is there.",
+        "e is the difference from the fully loaded image of the unchanged database, 0 to 255: the",
+        "mean over pixels and frames, and (95%) the 95th percentile over frames. build: seconds of",
+        "one core, all stages after the scene. served: total size of the files that clients of the",
+        f"hints can fetch. fetched: downloaded on the walk of {trade.seconds:.0f} s. first: time "
+        f"until {FIRST:.0%} of the first image is loaded.",
     ]
     wide = max(map(len, [_AS_IS, *(tried.name for tried in trade.trials)]))
     head = f"  {'setting':<{wide}} {'build':>8} {'served':>9} {'e':>7} {'change':>7} {'95%':>7} "
@@ -238,7 +238,7 @@ def settings_table(trade: WalkTrade, wanted: float | None = None) -> list[str]:
         if wanted is not None:
             cheapest = _trade(trade, case).cheapest(wanted)
             name = cheapest.setting.name if cheapest else "none of these"
-            lines.append(f"  cheapest for an error of at most {wanted:g}: {name}")
+            lines.append(f"  cheapest with an error of at most {wanted:g}: {name}")
     problems = [f"{tried.name}: {tried.problem}" for tried in trade.trials if tried.problem]
     return [*lines, "", *problems] if problems else lines
 

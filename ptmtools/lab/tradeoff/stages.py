@@ -250,7 +250,7 @@ def textures_experiment(images: Sequence[SourceImage], own: EncodeOptions) -> Ex
             worst=float((stored / raw).max(initial=0.0)),
         )
 
-    error = "bytes of all levels, as a share of the uncompressed finest"
+    error = "ratio of the bytes of all levels to the uncompressed finest level"
     return Experiment("texels", error, settings, measure)
 
 
@@ -297,5 +297,5 @@ def visibility_experiment(cells: Cells, budget: int) -> Experiment:
         Setting(f"--pvs full --pvs-budget {n}", {"method": "full", "budget": n}, "budget")
         for n in sorted({*BUDGETS, budget})
     ]
-    error = "wrong pairs of cells, as a share of the right ones"
+    error = "ratio of wrong to right pairs of cells"
     return Experiment("operations", error, settings, measure)

@@ -200,7 +200,7 @@ def read_index(folder: str | os.PathLike[str]) -> Index:
             "PTM-I120",
             f"holds no octree texture: there is no {INDEX} in it" if exists else "is no folder",
             file=folder,
-            remedy="name a folder that `ptm apo` wrote",
+            remedy="specify a folder that `ptm apo` wrote",
         )
     data = _bytes_of(folder, INDEX, _INDEX_MOST)
     with naming(file):
@@ -275,7 +275,7 @@ def read_octree(folder: str | os.PathLike[str], levels: int | None = None) -> Oc
             "PTM-I111",
             f"there is no octree of {wanted} levels",
             file=folder,
-            remedy=f"give 1 to {index.levels}",
+            remedy=f"use 1 to {index.levels}",
         )
     texels = _texels(folder, index, index.normals, wanted)
     colors = _texels(folder, index, index.colors, wanted) if index.colors else None

@@ -248,7 +248,7 @@ def check_count(texels: int) -> None:
             "PTM-L400",
             f"the octree has {texels:,} texels, more than the {1 << ADDRESS_BITS:,} that addresses "
             f"of {ADDRESS_BITS} bits can tell apart",
-            remedy="give a greater --error, a smaller --depth or a smaller --density",
+            remedy="use a greater --error, a smaller --depth or a smaller --density",
         )
 
 
@@ -320,7 +320,7 @@ def fault_of(octree: Octree) -> tuple[str, str] | None:
         each = popcount(children)
         first = start[k + 1] + addresses(below)[np.cumsum(each) - each]
         if (pointer[:, :3].astype(np.int64) @ _BYTE != first).any():
-            return f"level {k}", "an address is not that of the first child"
+            return f"level {k}", "an address does not point to the first child"
         if k == octree.levels - 1:
             return f"level {k}", "has inner nodes, and there is no level below"
         inner = below

@@ -28,7 +28,7 @@ def check_range(name: str, value: float, prefix: str = "") -> None:
         raise InputError(
             "PTM-I111",
             f"--{prefix}{name.replace('_', '-')} {value:g} is not possible",
-            remedy=f"give {least:g} to {most:g}",
+            remedy=f"use {least:g} to {most:g}",
         )
 
 
@@ -71,5 +71,5 @@ class ReplaceOptions:
                 raise InputError(
                     "PTM-I111",
                     f"--apo-{name} does nothing without --apo",
-                    remedy="name the objects with --apo",
+                    remedy="specify the objects with --apo",
                 )

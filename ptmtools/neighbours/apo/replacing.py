@@ -206,7 +206,7 @@ def replaced(
             notes.append(
                 Warned(
                     f"{scene.objects[i]} is off by about {simplified.error:.2g} m once simplified, "
-                    f"of {size:.2g} m; give more --apo-faces, or leave it out of --apo"
+                    f"of {size:.2g} m; use more --apo-faces, or leave it out of --apo"
                 )
             )
         parts.append(part)
@@ -303,7 +303,7 @@ def _octree(
         )
     except LimitError as fault:
         fault.place = name
-        fault.remedy = "give a greater --apo-error, a smaller --apo-depth or --apo-density"
+        fault.remedy = "use a greater --apo-error, a smaller --apo-depth or --apo-density"
         raise
     faces = len(part.triangles)
     return ReplacedObject(number, name, octree, len(own), faces, simplified.error, missed)

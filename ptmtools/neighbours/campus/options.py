@@ -67,5 +67,5 @@ class CampusOptions:
                 raise InputError(
                     "PTM-I111",
                     f"{name} of {getattr(self, name)} is out of range",
-                    remedy=f"give --{name} {wanted}",
+                    remedy=f"use --{name} {wanted}",
                 )

@@ -46,7 +46,7 @@ def read_campus(folder: str | os.PathLike[str]) -> Campus:
             data = stream.read(LONGEST + 1)
     except (OSError, ValueError) as fault:
         why = getattr(fault, "strerror", None) or str(fault)
-        remedy = "name a folder that `ptm campus` wrote"
+        remedy = "specify a folder that `ptm campus` wrote"
         raise InputError("PTM-I122", f"cannot be read ({why})", file=file, remedy=remedy) from None
     if len(data) > LONGEST:
         raise LimitError("PTM-L204", "is too long for the index of a campus", file=file)

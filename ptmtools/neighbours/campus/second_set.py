@@ -65,7 +65,7 @@ def model_light(model: Path, options: IngestOptions) -> ModelLight:
             "PTM-I701",
             "has no lightmaps",
             file=model,
-            remedy="give --lightmaps bake, or a glTF with occlusionTexture",
+            remedy="use --lightmaps bake, or a glTF with occlusionTexture",
         )
     used = np.unique(read.source.triangle_material[read.faces]).tolist()
     index = np.full(len(read.source.materials), -1, np.int32)
@@ -101,8 +101,8 @@ def _missing(model: Path, material: str, number: int, read: _Read) -> InputError
         "PTM-I701",
         f"the lightmap of material {material}, {fault}",
         file=model,
-        remedy="put it where the model says (or give --allow-outside, where it lies elsewhere), or "
-        "give --lightmaps bake",
+        remedy="put it where the model says (or use --allow-outside, where it lies elsewhere), or "
+        "use --lightmaps bake",
     )
 
 
@@ -111,7 +111,7 @@ def _red(texture: Texture, material: str, options: IngestOptions) -> NDArray[np.
     try:
         image = decoded_lightmap(texture.read(), options.limit << 20, texture.label)
     except InputError as fault:
-        place, remedy = f"lightmap of material {material}", "mend it, or give --lightmaps bake"
+        place, remedy = f"lightmap of material {material}", "mend it, or use --lightmaps bake"
         raise InputError(
             fault.code, fault.message, file=texture.label, place=place, remedy=remedy
         ) from None

@@ -138,9 +138,9 @@ class _Check:
             at.add("PTM-D804", f"{faces} faces, not {mesh.faces}")
         low, high = each.box[:3], each.box[3:]
         if any(((p.point < low) | (p.point > high)).any() for p in primitives):
-            at.add("PTM-D804", "leaves the box of its object, which is not that of the meshes")
+            at.add("PTM-D804", "extends beyond the bounding box of its object")
         if not {p.material for p in primitives} <= set(each.materials):
-            at.add("PTM-D804", "the materials are not those of its object")
+            at.add("PTM-D804", "the materials do not match its object")
             return
         for part in primitives:
             part_at = at.at(f"material {part.material}")

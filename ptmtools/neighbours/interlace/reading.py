@@ -50,7 +50,7 @@ def read_manifest(folder: str | os.PathLike[str]) -> Interlaced:
             "PTM-I120",
             f"is not an interlaced image: it has no {INDEX}" if exists else "is not a folder",
             file=folder,
-            remedy="name a folder that `ptm interlace` wrote",
+            remedy="specify a folder that `ptm interlace` wrote",
         )
     data = _bytes_of(Path(folder), INDEX, _MANIFEST_MOST, "a manifest")
     with naming(file):

@@ -127,13 +127,13 @@ def _check_options(options: InterlaceOptions) -> None:
     for name, value, most in (("min", options.min, MAX_SIDE), ("quality", options.quality, 100)):
         if not 1 <= value <= most:
             raise InputError(
-                "PTM-I111", f"--{name} {value} is not possible", remedy=f"give 1 to {most}"
+                "PTM-I111", f"--{name} {value} is not possible", remedy=f"use 1 to {most}"
             )
     if options.format not in CONTAINERS:
         raise InputError(
             "PTM-I111",
             f"--format {options.format[:20]} is not known",
-            remedy=f"give one of {', '.join(CONTAINERS)}",
+            remedy=f"use one of {', '.join(CONTAINERS)}",
         )
 
 

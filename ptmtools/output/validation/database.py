@@ -66,7 +66,7 @@ def validate_database(
     folder = Path(db)
     if not folder.is_dir():
         raise DatabaseError(
-            "PTM-D001", "no such folder", file=folder, remedy="give a database or a .ptm file"
+            "PTM-D001", "no such folder", file=folder, remedy="use a database or a .ptm file"
         )
     check = _Check(folder, limits)
     # Damaged files may hold any number; overflows only make comparisons fail.

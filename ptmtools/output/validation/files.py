@@ -222,7 +222,7 @@ class ServedDatabase:
             return "", "is not percent-encoded UTF-8"
         path = posixpath.normpath(posixpath.join(base, plain))
         if path.startswith(("../", "/")) or path in ("..", ".") or "\\" in path:
-            return "", "leads out of the served folder"
+            return "", "points outside the served folder"
         if path in self.files:
             return path, ""
         other = self._folded.get(path.casefold())

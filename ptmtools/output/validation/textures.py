@@ -80,9 +80,9 @@ def check_record(
     }
     for name, value in actual.items():
         if record.get(name, value) != value:
-            at.add("PTM-D704", f"{name} is {value} in the file")
+            at.add("PTM-D704", f"{name} does not match the file, which has {value}")
     if "differences" in record and len(record["differences"]) != len(header.levels):
-        at.add("PTM-D704", "differences are not those of the levels in the file")
+        at.add("PTM-D704", "differences do not match the levels in the file")
     if (record["fallback"] is None) != (record["fallbackLevel"] is None):
         at.add("PTM-D704", "only one of fallback and fallbackLevel is null")
     elif image is not None:

@@ -30,9 +30,11 @@ def _counts(cells: Cells) -> Mapping[str, Any]:
 
 
 def _summary(n: Mapping[str, Any]) -> str:
-    leaves = f" of {count(n['leaves'], 'leaf', 'leaves')}" if n["leaves"] != n["cells"] else ""
-    state = "closed" if n["closed"] else "open"
-    view = f" ({n['view_only']:,} view-only)" if n.get("view_only") else ""
+    leaves = ""
+    if n["leaves"] != n["cells"]:
+        leaves = f" of {count(n['leaves'], 'convex leaf', 'convex leaves')}"
+    state = f"{'closed' if n['closed'] else 'open'} to the outside"
+    view = f" ({n['view_only']:,} view-only, never entered)" if n.get("view_only") else ""
     return f"{count(n['cells'], 'cell')}{view}{leaves}, {count(n['portals'], 'portal')}; {state}"
 
 

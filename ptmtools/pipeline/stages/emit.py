@@ -112,7 +112,10 @@ def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
 def _summary(n: Mapping[str, Any]) -> str:
     of = ""
     if "owners" in n:  # missing in databases of earlier releases
-        of = f" from {n['visible']:,} of the model ({n['owners']:,} without cuts)"
+        of = (
+            f" in all cells, from {n['visible']:,} of the model ({n['owners']:,} if none were cut "
+            "at cell boundaries)"
+        )
     looks = n.get("first_look")
     bundles = f" ({size(looks)} of first-look bundles)" if looks else ""
     return (

@@ -39,8 +39,8 @@ def _notes(pvs: Pvs, _: PvsOptions) -> Iterator[str]:
     # The cells stage warns about a single cell.
     if share > CULLING_GAINS_LITTLE and pvs.cell_count > 1:
         yield Warned(
-            f"visibility culling gains little here: on average {share:.0%} of the volume stays "
-            "resident, as in a single hall"
+            f"visibility culling saves little here: a client keeps {share:.0%} of the volume in "
+            "memory on average, about as much as in a single hall"
         )
     if not pvs.conservative:
         yield Warned(
@@ -69,8 +69,8 @@ PVS: Stage[Pvs] = Stage(
     counts=_counts,
     notes=_notes,
     summary=lambda n: (
-        f"{n['mean_volume']:.1%} of the volume stays resident on average, {n['most_volume']:.1%} "
-        "at most"
+        f"a client keeps {n['mean_volume']:.1%} of the volume in memory on average, "
+        f"{n['most_volume']:.1%} at most"
     ),
     fits={CELLS: _fits_cells},
 )

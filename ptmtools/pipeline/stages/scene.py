@@ -269,7 +269,8 @@ def _summary(n: Mapping[str, Any]) -> str:
         extent = f"; {width:.3g} × {depth:.3g} m, {height:.3g} m high"
     return (
         f"{count(n['triangles'], 'triangle')} in {count(n['objects'], 'object')}, "
-        f"{count(n['images'], 'image')}; 1 unit = {n['metres']:g} m, {n['up']} up{how}{extent}"
+        f"{count(n['images'], 'image')}; 1 unit = {n['metres']:g} m, {str(n['up']).upper()} up"
+        f"{how}{extent}"
     )
 
 

@@ -345,7 +345,7 @@ def _summary(n: Mapping[str, Any]) -> str:
     share = f" ({stored / raw:.1%})" if raw else ""
     trim = ""
     if unresolved := n.get("unresolved"):
-        trim = f"; of {count(unresolved, 'texture')} {size(n['unresolved_bytes'])} left out"
+        trim = f"; {size(n['unresolved_bytes'])} of {count(unresolved, 'texture')} omitted"
     return f"{count(n['textures'], 'texture')}, {size(raw)} → {size(stored)}{share}{trim}"
 
 

@@ -251,7 +251,7 @@ def _external(path: Path, folder: Folder, uri: str, place: str) -> Path:
             f"{uri[:80]}: " + ("lies outside the model's folder" if outside else "not found"),
             file=path,
             place=place,
-            remedy="give --allow-outside" if outside else "put it into the model's folder",
+            remedy="use --allow-outside" if outside else "put it into the model's folder",
         )
     return result.path.resolve()
 

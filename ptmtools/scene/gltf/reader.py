@@ -205,7 +205,7 @@ def _read(
     every = (draw for node in world_of for draw in _draws(document, node, findings))
     draws = list(_limited(document, every, max_triangles))
     if not draws:
-        raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with triangles")
+        raise InputError("PTM-I247", "no faces", file=path, remedy="use a model with triangles")
     materials = MaterialReader(document, findings, texture_of)
     uses = [
         materials.read(draw.primitive.get("material"), "COLOR_0" in draw.attributes)

@@ -95,7 +95,7 @@ def _unpacked(path: Path, folder: Path) -> Path:
                 raise InputError(
                     "PTM-I266",
                     f"contains {len(names) or 'no'} IFC files instead of one",
-                    remedy="unpack it, and give the .ifc file",
+                    remedy="unpack it, and use the .ifc file",
                 )
             file = folder / "model.ifc"
             with archive.open(names[0]) as packed, open(file, "wb") as unpacked:
@@ -115,6 +115,6 @@ def _copy(packed: IO[bytes], unpacked: IO[bytes]) -> None:
             raise LimitError(
                 "PTM-L204",
                 f"unpacks to more than {_LARGEST} GiB",
-                remedy="unpack it, and give the .ifc file",
+                remedy="unpack it, and use the .ifc file",
             )
         unpacked.write(chunk)

@@ -235,7 +235,7 @@ def _make(
     if group.triangles > most or group.places > most:
         raise too_many_triangles(most, path)
     if not group.triangles:
-        raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with meshes")
+        raise InputError("PTM-I247", "no faces", file=path, remedy="use a model with meshes")
     painter = Painter(MaterialReader(findings, path), findings)
     shapes: dict[str, Shape] = {}
     rows = Rows()
@@ -251,7 +251,7 @@ def _make(
             columns = frames.transpose(0, 2, 1)  # the library's are for row vectors
             rows.add(columns, shape.points, shape.triangles, uv, material, colors, first)
     if not rows.names:
-        raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with meshes")
+        raise InputError("PTM-I247", "no faces", file=path, remedy="use a model with meshes")
     source = rows.source(
         materials=painter.materials,
         cameras=_cameras(traversal.cameras, findings),

@@ -94,7 +94,7 @@ def test_the_table_names_the_best_and_the_cheapest():
     ]
     assert "  standard error of the reference: 0.0100" in lines
     assert "  steps: error ∝ work^-0.50" in lines
-    assert lines[-1] == "  cheapest for an error of at most 0.06: --steps 400"
+    assert lines[-1] == "  cheapest with an error of at most 0.06: --steps 400"
     assert "none of these" in table(run("made", MADE), 1e-9)[-1]
 
 

@@ -51,7 +51,7 @@ def test_all_stages(db, tmp_path, capsys) -> None:
     for stage in ("cells:", "pvs:", "ach:", "textures:"):
         assert output.count(stage) == 1
     assert output.startswith("--pvs fast instead of --pvs full ")
-    assert output.count("cheapest for an error of at most 0.05") == 5
+    assert output.count("cheapest with an error of at most 0.05") == 5
     assert files_below(db) == before
     rows = table.read_text().splitlines()
     assert {row.split(",")[0] for row in rows[1:]} == {"walk", "cells", "pvs", "ach", "textures"}

@@ -93,19 +93,20 @@ def test_a_sentence_tells_what_is_saved_and_what_is_seen() -> None:
     small = tried("--max-side 512", 2.001, 1.021, build=17.1, served=3_900_000)
     trade = WalkTrade(60.0, OWN, (small,))
     assert sentence(small, trade) == (
-        "--max-side 512 instead of --max-side 0 saves 61 % of the bytes and builds 2.9 s faster; "
-        "the picture is worse by 2.1 % at 4 Mbit/s (e 1.00 → 1.02), and the same otherwise."
+        "--max-side 512 instead of --max-side 0 reduces the total size by 61 % and "
+        "builds 2.9 s faster; the image is worse by 2.1 % at 4 Mbit/s (e 1.00 → 1.02), "
+        "and the same otherwise."
     )
 
 
 def test_who_sees_nothing_is_told_so() -> None:
     same = tried("--samples 8", 2.0, 1.004, build=23.0, served=10_400_000)
     assert sentence(same, WalkTrade(60.0, OWN, (same,))) == (
-        "--samples 8 instead of --samples 0 adds 4.0 % to the bytes and builds 3.0 s slower; "
-        "no difference that can be seen."
+        "--samples 8 instead of --samples 0 increases the total size by 4.0 % and "
+        "builds 3.0 s slower; no visible difference."
     )
     assert sentence(tried("--a 1", 2.0, 1.0), WalkTrade(60.0, OWN, ())) == (
-        "--a 1 instead of --a 0 costs the same; no difference that can be seen."
+        "--a 1 instead of --a 0 costs the same; no visible difference."
     )
 
 
@@ -122,7 +123,7 @@ def test_a_knob_of_some_clients_names_them() -> None:
 def test_what_cannot_be_built_says_why() -> None:
     failed = WalkTrial("--cells leaf", "--cells room", "--cells", 0, 0, problem="is too much")
     trade = WalkTrade(60.0, OWN, (failed,))
-    assert sentences(trade) == ["--cells leaf cannot be tried: is too much."]
+    assert sentences(trade) == ["--cells leaf cannot be tested: is too much."]
     assert table(trade)[-1] == "--cells leaf: is too much"
 
 
@@ -142,7 +143,7 @@ def test_of_a_knob_the_best_is_told_then_what_saves_most_then_what_loses_least()
 def test_the_table_has_a_block_for_each_walker_and_the_cheapest() -> None:
     trade = WalkTrade(60.0, OWN, (tried("--k 1", 1.9, 0.9, build=30), tried("--k 2", 3.0, 2.0)))
     lines = table(trade, 1.95)
-    assert lines[0].startswith("--k 1 instead of --k 0 builds 10.0 s slower; the picture is better")
+    assert lines[0].startswith("--k 1 instead of --k 0 builds 10.0 s slower; the image is better")
     assert sum("setting" in line and "served" in line for line in lines) == 2
     assert [line.split()[-2:] for line in lines if "cheapest" in line] == [
         ["--k", "1"],  # at 512 kbit/s
