@@ -1,7 +1,7 @@
-"""Simplified meshes: fewer faces for the same shape, materials and texture.
+"""Simplifies meshes to fewer faces and preserves shape, materials and texture.
 
-It knows arrays only. `simplify` takes and gives a `Mesh`; what was tried and measured is said in
-`simplification`.
+The package depends on arrays only: `simplify` takes a `Mesh` and returns a `Simplified`. Sources
+and rejected variants: `simplification.simplification`.
 """
 
 from __future__ import annotations

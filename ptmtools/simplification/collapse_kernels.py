@@ -1,7 +1,8 @@
-"""Compiled collapses of edges: what they cost, in which order they come, what they leave.
+"""Compiled edge collapses: costs, the order of the heap, and the update of the mesh.
 
-An edge may collapse in three ways: into either end, or to the best place where both ends are free
-and nothing is painted on the faces. Which ones are allowed, `legality_kernels` says.
+An edge has up to three targets: a half-edge collapse into either end, or the optimal position
+between two free vertices of a mesh without attributes. `legality_kernels` decides which collapses
+are legal.
 """
 
 from __future__ import annotations
@@ -10,303 +11,313 @@ import numpy as np
 
 from ptmtools.jit import plain_kernel as kernel
 from ptmtools.simplification.legality_kernels import (
-    has_counterparts,
-    is_linked,
-    keeps_faces,
-    may_close,
+    has_counterpart_wedges,
+    may_change_topology,
+    preserves_faces,
+    satisfies_link_condition,
 )
 from ptmtools.simplification.quadrics import (
     add,
-    best_place,
+    optimal_position,
     shift,
     shift_wedge,
     value_at,
     wedge_value_at,
 )
 from ptmtools.simplification.state_kernels import (
+    COLLAPSES,
     ENTRIES,
     FACES,
-    KEEP,
-    MADE,
+    KEEP_TOPOLOGY,
     MARKS,
-    REFUSED,
+    REJECTIONS,
     TOPOLOGY,
     Heap,
     State,
+    copy_entry,
+    drop_stale,
+    faces_of_edge,
     heapify,
-    meet,
-    move,
     prune,
-    rise,
-    sink,
-    without_stale,
+    sift_down,
+    sift_up,
 )
 from ptmtools.simplification.surface import FREE, LINE
 from ptmtools.tolerance import ROUNDING_SHARE
 
-#: When costs have grown so many times, what was refused before is tried again first: others have
-#: gone since, and on flat walls it costs nothing.
-AGAIN = 4.0
-#: The ways of a collapse: into the second end, into the first, to the best place; none.
-SECOND, FIRST, PLACED, NONE = 0, 1, 2, 3
-#: Share of the weight that pulls the best place to the middle of the edge.
-PULL = 1e-5
-#: Share of weight times squared length that is added to the cost for the order alone: where
-#: everything is flat the shortest edges go first.
-SHORTEST = ROUNDING_SHARE
-#: A best place must be better than an end by this share of weight times squared length: ends are
-#: exact, and corners of a box stay where they are.
-BETTER = ROUNDING_SHARE
+#: The heap is rebuilt when the cost has grown by this factor since the last retry: collapses that
+#: were illegal may have become legal, and on flat walls they cost nothing.
+RETRY_FACTOR = 4.0
+#: Targets of a collapse: the second end, the first end, the optimal position, or none.
+INTO_SECOND, INTO_FIRST, TO_OPTIMUM, NO_TARGET = 0, 1, 2, 3
+#: Weight of the midpoint of an edge in the optimal position, as a share of the total weight.
+MIDPOINT_WEIGHT = 1e-5
+#: Share of weight times squared length added to the cost as the key of the heap: on flat regions
+#: the shortest edges collapse first.
+LENGTH_WEIGHT = ROUNDING_SHARE
+#: The optimal position must improve on both ends by this share of weight times squared length: ends
+#: are exact, so the corners of a box do not move.
+OPTIMUM_MARGIN = ROUNDING_SHARE
 
 
 @kernel
-def cost_into(state: State, a: int, b: int, count: int, x: float, y: float, z: float) -> float:
-    """What it costs to move vertex a into b, (x, y, z) away."""
+def half_edge_cost(state: State, a: int, b: int, count: int, x: float, y: float, z: float) -> float:
+    """Returns the cost of the half-edge collapse of vertex a into b, where (x, y, z) is b - a.
+
+    The first ``count`` rows of ``state.shared`` hold the faces at the edge, seen from a.
+    """
     cost = value_at(state.quadric, a, x, y, z) + state.quadric[b, 9]
     if state.attribute.shape[1] == 0:
         return float(cost)
     for i in range(count):
-        known = False
+        duplicate = False
         for j in range(i):
-            known |= state.shared[j, 0] == state.shared[i, 0]
-        if not known:
-            here, there = state.shared[i, 0], state.shared[i, 1]
-            cost += wedge_value_at(state.texture, state.attribute, here, there, x, y, z)
-            cost += state.texture[there, 9]
+            duplicate |= state.shared[j, 0] == state.shared[i, 0]
+        if not duplicate:
+            wedge_u, wedge_v = state.shared[i, 0], state.shared[i, 1]
+            cost += wedge_value_at(state.wedge_quadric, state.attribute, wedge_u, wedge_v, x, y, z)
+            cost += state.wedge_quadric[wedge_v, 9]
     return float(cost)
 
 
 @kernel
-def weigh(state: State, a: int, b: int, tried: int) -> int:
-    """The cheapest way to collapse an edge, a < b, of those that were not tried.
+def cheapest_target(state: State, a: int, b: int, rejected: int) -> int:
+    """Returns the cheapest target of an edge, a < b, whose bit is not set in ``rejected``.
 
-    Leaves in ``state.shown`` what it costs, and what it costs for the order; for `PLACED` the place
-    is left in ``state.place``, as seen from a.
+    Writes the cost of the collapse and its key in the heap to ``state.edge_cost``, and for
+    `TO_OPTIMUM` the position relative to a to ``state.optimum``.
     """
     free_a, free_b = state.freedom[a] == FREE, state.freedom[b] == FREE
-    painted = state.attribute.shape[1] > 0
+    has_attributes = state.attribute.shape[1] > 0
     count = 0
     to_b, to_a = free_a, free_b
-    if painted or not (free_a or free_b):
-        count = meet(state, a, b)
+    if has_attributes or not (free_a or free_b):
+        count = faces_of_edge(state, a, b)
         if count < 1:
-            return NONE
+            return NO_TARGET
         if state.shared[0, 3]:
             to_b, to_a = state.freedom[a] == LINE, state.freedom[b] == LINE
     point = state.point
     x, y, z = point[b, 0] - point[a, 0], point[b, 1] - point[a, 1], point[b, 2] - point[a, 2]
     weight = (state.quadric[a, 10] + state.quadric[b, 10]) * (x * x + y * y + z * z)
-    way, least = NONE, np.inf
-    if to_b and not tried & 1:
-        cost = cost_into(state, a, b, count, x, y, z)
-        if cost < least:
-            way, least = SECOND, cost
-    if to_a and not tried & 2:
+    target, lowest = NO_TARGET, np.inf
+    if to_b and not rejected & 1:
+        cost = half_edge_cost(state, a, b, count, x, y, z)
+        if cost < lowest:
+            target, lowest = INTO_SECOND, cost
+    if to_a and not rejected & 2:
         for i in range(count):
-            here = state.shared[i, 0]
+            wedge_a = state.shared[i, 0]
             state.shared[i, 0] = state.shared[i, 1]
-            state.shared[i, 1] = here
-        cost = cost_into(state, b, a, count, -x, -y, -z)
-        if cost < least:
-            way, least = FIRST, cost
-    if free_a and free_b and not painted and not tried & 4:
-        cost = best_place(state.quadric, a, b, x, y, z, PULL, state.place)
-        if cost < least - BETTER * weight:
-            way, least = PLACED, cost
-    least = max(least, 0.0)
-    state.shown[0] = least
-    state.shown[1] = least + SHORTEST * weight
-    return way
+            state.shared[i, 1] = wedge_a
+        cost = half_edge_cost(state, b, a, count, -x, -y, -z)
+        if cost < lowest:
+            target, lowest = INTO_FIRST, cost
+    if free_a and free_b and not has_attributes and not rejected & 4:
+        cost = optimal_position(state.quadric, a, b, x, y, z, MIDPOINT_WEIGHT, state.optimum)
+        if cost < lowest - OPTIMUM_MARGIN * weight:
+            target, lowest = TO_OPTIMUM, cost
+    lowest = max(lowest, 0.0)
+    state.edge_cost[0] = lowest
+    state.edge_cost[1] = lowest + LENGTH_WEIGHT * weight
+    return target
 
 
 @kernel
-def push(state: State, heap: Heap, a: int, b: int, tried: int) -> None:
-    """Puts an edge into the heap, if it may collapse in a way that was not tried."""
+def push(state: State, heap: Heap, a: int, b: int, rejected: int) -> None:
+    """Pushes an edge onto the heap, unless ``rejected`` covers all its targets."""
     if a > b:
         a, b = b, a
-    if weigh(state, a, b, tried) == NONE:
+    if cheapest_target(state, a, b, rejected) == NO_TARGET:
         return
-    number = state.number
-    if number[ENTRIES] + 2 > len(heap.cost):
-        number[ENTRIES] = without_stale(heap, number[ENTRIES], state.version)
-    put(state, heap, a, b, tried, state.shown[1])
-    rise(heap, number[ENTRIES], number[ENTRIES] - 1)
+    counters = state.counters
+    if counters[ENTRIES] + 2 > len(heap.cost):
+        counters[ENTRIES] = drop_stale(heap, counters[ENTRIES], state.version)
+    append_entry(state, heap, a, b, rejected, state.edge_cost[1])
+    sift_up(heap, counters[ENTRIES], counters[ENTRIES] - 1)
 
 
 @kernel
-def put(state: State, heap: Heap, a: int, b: int, tried: int, cost: float) -> None:
-    """Writes an entry behind the last of the heap."""
-    at = state.number[ENTRIES]
+def append_entry(state: State, heap: Heap, a: int, b: int, rejected: int, cost: float) -> None:
+    """Appends an entry to the heap without restoring its order."""
+    at = state.counters[ENTRIES]
     heap.cost[at] = cost
     heap.ends[at, 0] = a
     heap.ends[at, 1] = b
     heap.version[at] = state.version[a] + state.version[b]
-    heap.tried[at] = tried
-    state.number[ENTRIES] = at + 1
+    heap.rejected[at] = rejected
+    state.counters[ENTRIES] = at + 1
 
 
 @kernel
-def fill(state: State, heap: Heap) -> None:
-    """Puts all edges into an empty heap."""
+def fill_heap(state: State, heap: Heap) -> None:
+    """Rebuilds the heap from all edges and resets the number of rejections."""
     triangle = state.triangle
-    state.number[ENTRIES] = state.number[REFUSED] = 0
+    state.counters[ENTRIES] = state.counters[REJECTIONS] = 0
     for t in range(len(triangle)):
         if triangle[t, 0] < 0:
             continue
         for k in range(3):
             a, b = triangle[t, k], triangle[t, (k + 1) % 3]
-            # Edges that are not kept have two faces, each of which begins them at another end.
+            # The two faces of an unconstrained edge traverse it in opposite directions.
             if a > b:
-                if not (state.kept[t] >> k) & 1:
+                if not (state.constraint[t] >> k) & 1:
                     continue
                 a, b = b, a
-            if weigh(state, a, b, 0) != NONE:
-                put(state, heap, a, b, 0, state.shown[1])
-    heapify(heap, state.number[ENTRIES])
+            if cheapest_target(state, a, b, 0) != NO_TARGET:
+                append_entry(state, heap, a, b, 0, state.edge_cost[1])
+    heapify(heap, state.counters[ENTRIES])
 
 
 @kernel
-def keep_edges(state: State, v: int, count: int) -> None:
-    """Where an edge that was kept has fallen onto one of v that was not, that is kept now."""
-    triangle, kept, shared = state.triangle, state.kept, state.shared
+def propagate_constraints(state: State, v: int, count: int) -> None:
+    """Sets the constraint bit of edges of v onto which a collapse moved a constrained edge."""
+    triangle, constraint, shared = state.triangle, state.constraint, state.shared
     for i in range(count):
         if not (shared[i, 4] or shared[i, 5]):
             continue
         third, corner = shared[i, 2], state.head[v]
         while corner >= 0:
             t, k = corner // 3, corner % 3
-            corner = state.beyond[corner]
+            corner = state.next_corner[corner]
             if triangle[t, (k + 1) % 3] == third:
-                kept[t] |= np.uint8(1 << k)
+                constraint[t] |= np.uint8(1 << k)
             if triangle[t, (k + 2) % 3] == third:
-                kept[t] |= np.uint8(1 << ((k + 2) % 3))
+                constraint[t] |= np.uint8(1 << ((k + 2) % 3))
 
 
 @kernel
-def cancel(state: State, v: int) -> None:
-    """Takes away the faces of v that lie back to back."""
+def remove_opposite_faces(state: State, v: int) -> None:
+    """Removes pairs of faces of v that coincide with opposite orientation."""
     triangle = state.triangle
     corner = state.head[v]
     while corner >= 0:
         t, k = corner // 3, corner % 3
-        corner = state.beyond[corner]
+        corner = state.next_corner[corner]
         if triangle[t, 0] < 0:
             continue
         x, y = triangle[t, (k + 1) % 3], triangle[t, (k + 2) % 3]
         other = corner
         while other >= 0:
             s, j = other // 3, other % 3
-            other = state.beyond[other]
+            other = state.next_corner[other]
             alive = triangle[s, 0] >= 0
             if alive and triangle[s, (j + 1) % 3] == y and triangle[s, (j + 2) % 3] == x:
                 triangle[t, 0] = triangle[s, 0] = -1
-                state.number[FACES] -= 2
+                state.counters[FACES] -= 2
                 break
 
 
 @kernel
 def collapse(state: State, u: int, v: int, count: int, px: float, py: float, pz: float) -> None:
-    """Moves u into v, and v to that place; ``shared`` holds the faces between them."""
+    """Collapses u into v and moves v to (px, py, pz).
+
+    The first ``count`` rows of ``state.shared`` hold the faces at the edge, seen from u.
+    """
     triangle, wedge, shared, point = state.triangle, state.wedge, state.shared, state.point
-    texture, attribute = state.texture, state.attribute
+    wedge_quadric, attribute = state.wedge_quadric, state.attribute
     x, y, z = px - point[u, 0], py - point[u, 1], pz - point[u, 2]
     shift(state.quadric, u, x, y, z)
     shift(state.quadric, v, px - point[v, 0], py - point[v, 1], pz - point[v, 2])
     add(state.quadric, v, u)
     if attribute.shape[1]:
         for i in range(count):
-            known = False
+            duplicate = False
             for j in range(i):
-                known |= shared[j, 0] == shared[i, 0]
-            if not known:
-                here, there = shared[i, 0], shared[i, 1]
-                shift_wedge(texture, attribute, here, there, x, y, z)
-                add(texture, there, here)
+                duplicate |= shared[j, 0] == shared[i, 0]
+            if not duplicate:
+                wedge_u, wedge_v = shared[i, 0], shared[i, 1]
+                shift_wedge(wedge_quadric, attribute, wedge_u, wedge_v, x, y, z)
+                add(wedge_quadric, wedge_v, wedge_u)
     point[v, 0], point[v, 1], point[v, 2] = px, py, pz
     corner = state.head[u]
     while corner >= 0:
         t, k = corner // 3, corner % 3
-        corner = state.beyond[corner]
+        corner = state.next_corner[corner]
         if triangle[t, (k + 1) % 3] == v or triangle[t, (k + 2) % 3] == v:
             triangle[t, 0] = -1
-            state.number[FACES] -= 1
+            state.counters[FACES] -= 1
             continue
         triangle[t, k] = v
         for i in range(count):
             if shared[i, 0] == wedge[t, k]:
                 wedge[t, k] = shared[i, 1]
                 break
-    state.beyond[state.tail[v]] = state.head[u]
+    state.next_corner[state.tail[v]] = state.head[u]
     state.tail[v] = state.tail[u]
     prune(state, v)
-    if state.number[TOPOLOGY] != KEEP:
-        cancel(state, v)
+    if state.counters[TOPOLOGY] != KEEP_TOPOLOGY:
+        remove_opposite_faces(state, v)
         prune(state, v)
     state.head[u] = state.tail[u] = -1
-    keep_edges(state, v, count)
+    propagate_constraints(state, v, count)
     state.version[u] += 1
     state.version[v] += 1
-    state.number[MADE] += 1
+    state.counters[COLLAPSES] += 1
 
 
 @kernel
-def push_around(state: State, heap: Heap, v: int) -> None:
-    """Puts the edges of a vertex into the heap, each once."""
+def push_edges_of(state: State, heap: Heap, v: int) -> None:
+    """Pushes each edge of a vertex onto the heap once."""
     triangle, mark = state.triangle, state.mark
-    seen = state.number[MARKS] + 1
-    state.number[MARKS] = seen
-    mark[v] = seen
+    visited = state.counters[MARKS] + 1
+    state.counters[MARKS] = visited
+    mark[v] = visited
     corner = state.head[v]
     while corner >= 0:
         t = corner // 3
         for k in range(3):
             other = triangle[t, k]
-            if mark[other] != seen:
-                mark[other] = seen
+            if mark[other] != visited:
+                mark[other] = visited
                 push(state, heap, v, other, 0)
-        corner = state.beyond[corner]
+        corner = state.next_corner[corner]
 
 
 @kernel
 def collapse_edges(state: State, heap: Heap, faces: int) -> None:
-    """Collapses edges, the cheapest first, until so many faces are left or no edge."""
-    number, version = state.number, state.version
-    while number[FACES] > faces and number[ENTRIES] > 0:
+    """Collapses edges in ascending order of cost until ``faces`` faces are left or the heap is
+    empty."""
+    counters, version = state.counters, state.version
+    while counters[FACES] > faces and counters[ENTRIES] > 0:
         a, b = heap.ends[0, 0], heap.ends[0, 1]
-        tried, stamp = heap.tried[0], heap.version[0]
-        if number[REFUSED] > 0 and heap.cost[0] > state.worst[2]:
-            state.worst[2] = AGAIN * heap.cost[0]
-            fill(state, heap)
+        rejected, stamp = heap.rejected[0], heap.version[0]
+        if counters[REJECTIONS] > 0 and heap.cost[0] > state.errors[2]:
+            state.errors[2] = RETRY_FACTOR * heap.cost[0]
+            fill_heap(state, heap)
             continue
-        number[ENTRIES] -= 1
-        move(heap, 0, number[ENTRIES])
-        sink(heap, number[ENTRIES], 0)
+        counters[ENTRIES] -= 1
+        copy_entry(heap, 0, counters[ENTRIES])
+        sift_down(heap, counters[ENTRIES], 0)
         if stamp != version[a] + version[b]:
             continue
-        way = weigh(state, a, b, tried)
-        cost = state.shown[0]
+        target = cheapest_target(state, a, b, rejected)
+        cost = state.edge_cost[0]
         weight = state.quadric[a, 10] + state.quadric[b, 10]
-        if cost > state.worst[1] * weight:
+        if cost > state.errors[1] * weight:
             continue
-        u, v = (a, b) if way == SECOND else (b, a)
+        u, v = (a, b) if target == INTO_SECOND else (b, a)
         px, py, pz = state.point[v, 0], state.point[v, 1], state.point[v, 2]
-        if way == PLACED:
-            px, py, pz = px + state.place[0], py + state.place[1], pz + state.place[2]
+        if target == TO_OPTIMUM:
+            px, py, pz = px + state.optimum[0], py + state.optimum[1], pz + state.optimum[2]
         prune(state, u)
         prune(state, v)
-        count = meet(state, u, v)
-        keep = number[TOPOLOGY] == KEEP
-        fits = is_linked(state, u, v, count) if keep else may_close(state, u, v, count)
-        if count < 1 or not fits:
-            number[REFUSED] += 1
+        count = faces_of_edge(state, u, v)
+        if counters[TOPOLOGY] == KEEP_TOPOLOGY:
+            legal = satisfies_link_condition(state, u, v, count)
+        else:
+            legal = may_change_topology(state, u, v, count)
+        if count < 1 or not legal:
+            counters[REJECTIONS] += 1
             continue
-        fits = has_counterparts(state, u, v, count) and keeps_faces(state, u, v, px, py, pz)
-        if not fits or (way == PLACED and not keeps_faces(state, v, u, px, py, pz)):
-            number[REFUSED] += 1
-            push(state, heap, a, b, tried | (1 << way))
+        legal = has_counterpart_wedges(state, u, v, count)
+        legal = legal and preserves_faces(state, u, v, px, py, pz)
+        if not legal or (target == TO_OPTIMUM and not preserves_faces(state, v, u, px, py, pz)):
+            counters[REJECTIONS] += 1
+            push(state, heap, a, b, rejected | (1 << target))
             continue
-        if cost > state.worst[0] * weight:
-            state.worst[0] = cost / weight
-        state.moved[v] |= way == PLACED
+        if cost > state.errors[0] * weight:
+            state.errors[0] = cost / weight
+        state.moved[v] |= target == TO_OPTIMUM
         collapse(state, u, v, count, px, py, pz)
-        push_around(state, heap, v)
+        push_edges_of(state, heap, v)

@@ -1,4 +1,4 @@
-"""A mesh as arrays, what may be asked of its simplification, and what comes of it."""
+"""Arrays of a mesh, the options of its simplification, and the result."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats
 
-#: Our collapses, or those of pymeshlab, for plain meshes only.
+#: The edge collapses of this package, or pymeshlab (meshes without attributes only).
 Method = Literal["quadric", "meshlab"]
 
 
 @dataclass(frozen=True)
 class Mesh:
-    """Triangles with what is painted on them.
+    """Triangles with optional materials, texture coordinates and colours.
 
     Attributes
     ----------
-    points: (V, 3) float64, in any unit. Equal ones are one vertex, whatever their indices.
+    points: (V, 3) float64, in any unit. Equal points are one vertex, whatever their indices.
     triangles: (T, 3) int32 indices of points, counter-clockwise from the front.
     material: (T,) int32, or None.
     uv: (T, 3, 2) float64 texture coordinates of each corner, or None.
@@ -36,22 +36,26 @@ class Mesh:
 
     @property
     def is_plain(self) -> bool:
-        """Whether it has neither materials nor texture coordinates nor colours."""
+        """Whether the mesh has neither materials nor texture coordinates nor colours."""
         return self.material is None and self.uv is None and self.colors is None
 
 
 @dataclass(frozen=True)
 class SimplifyOptions:
-    """What may be asked for.
+    """Options of `simplify`.
 
     Attributes
     ----------
-    faces: keep at most so many, where seams and borders allow it.
-    error: make no collapse with a greater error (`Simplified.error`), in the unit of the points,
-        even if more faces are left; for `quadric` alone.
-    method: what makes them fewer.
-    keep_parts: fill no hole, and let no part with a border vanish, however many there are: of a
-        building, through whose windows one sees. For `quadric` alone; pymeshlab keeps nothing.
+    faces: target face count, at least 1; seams and boundaries may leave more faces.
+    error: maximum error of a collapse (`Simplified.error`), in the unit of the points; takes
+        precedence over the target face count. Method ``quadric`` only.
+    method: ``quadric`` (this package) or ``meshlab`` (pymeshlab).
+    keep_parts: fill no hole and keep every connected part that has a boundary, such as the panes of
+        a building. Method ``quadric`` only; pymeshlab may drop any part.
+
+    Raises
+    ------
+    ValueError: `faces` is less than 1, or `error` is negative or NaN.
     """
 
     faces: int = 10_000
@@ -68,16 +72,16 @@ class SimplifyOptions:
 
 @dataclass(frozen=True)
 class Simplified:
-    """A mesh of fewer faces.
+    """Result of a simplification.
 
     Attributes
     ----------
-    mesh: what is left; points that no face uses are dropped.
-    source: (T',) int32, the face of the given mesh that each face came from.
-    error: the largest error of a collapse, as a distance in the unit of the points: the root of the
-        mean square over the planes that met there, how far the texture moves counted in.
-        NaN where the method does not say.
-    notes: what the user should know, such as a number of faces that could not be reached.
+    mesh: the simplified mesh, without unused points.
+    source: (T',) int32, the source face of each face.
+    error: the largest error of a collapse, as a distance in the unit of the points: root mean
+        square over the planes merged into the vertex, including the movement of the texture. NaN
+        if the method does not report it.
+    notes: messages for the user, such as a missed target face count.
     """
 
     mesh: Mesh
@@ -86,12 +90,14 @@ class Simplified:
     notes: tuple[str, ...] = ()
 
 
-def too_many(left: int, faces: int, turned: int = 0) -> tuple[str, ...]:
-    """The note for a mesh that has more faces than it should, of which so many edges join two faces
-    that disagree on their front."""
-    if left <= faces:
+def missed_target_notes(count: int, faces: int, inconsistent: int = 0) -> tuple[str, ...]:
+    """Returns the note for a mesh that misses its target face count, or no note.
+
+    ``inconsistent`` is the number of edges between two faces of inconsistent orientation.
+    """
+    if count <= faces:
         return ()
-    why = "borders, seams, small parts or the greatest error do not allow it"
-    if turned:
-        why += f"; {turned:,} edges join faces that do not look the same way"
-    return (f"{left:,} faces are left, not {faces:,}: {why}",)
+    reason = "borders, seams, small parts or the greatest error do not allow it"
+    if inconsistent:
+        reason += f"; {inconsistent:,} edges join faces that do not look the same way"
+    return (f"{count:,} faces are left, not {faces:,}: {reason}",)

@@ -1,21 +1,22 @@
-"""Simplifies a surface by edge collapses, in ascending order of their error.
+"""Simplifies a surface by edge collapses in ascending order of their error.
 
 After Garland & Heckbert, "Surface simplification using quadric error metrics", 1997, with the
 attributes of Hoppe, "New quadric metric for simplifying meshes with appearance attributes", 1999.
 
-Tried (`benchmarks/simplification.py`; other simplifiers: docs/design/simplification.md):
+Rejected variants (`benchmarks/simplification.py`; other simplifiers:
+docs/design/simplification.md):
 
-- A stronger pull to the middle of an edge (`collapse_kernels.PULL`): a thousand times leaves 1.13
-  times the mean distance (100,000 faces); none leaves flat parts without a best place.
-- Refusing thin faces outright: on flat walls collapses that cost nothing were refused, and dear
-  ones made instead. Now a thin face is refused where its normal turns, and only at first.
-- Penalties in place of a line's freedom (seams as steep quadrics, as for borders in 1997): texture
-  coordinates are then no longer exact.
+- A larger weight of the midpoint (`collapse_kernels.MIDPOINT_WEIGHT`): a factor of 1,000 gives 1.13
+  times the mean distance (100,000 faces); a weight of zero leaves the optimum of flat regions
+  undefined.
+- An unconditional test for thin faces: on flat walls it rejects collapses of zero cost in favour of
+  expensive ones. The test now rejects a thin face only if its normal turns, and only at first.
+- Penalties instead of constraints (seams as steep quadrics, as for boundaries in 1997): texture
+  coordinates are then inexact.
 
 pymeshlab, the tool of the paper on octree textures, serves for comparison and on request. It is
-GPL-3 and needs libGL: it is imported in one function, and only here. It knows plain meshes only,
-and neither a face's source nor an error: the source goes through it as a quality of faces, which
-collapses keep.
+GPL-3 and needs libGL, so one function imports it. It supports neither attributes nor source faces
+nor errors; source faces pass through it as a quality of faces, which its collapses preserve.
 """
 
 from __future__ import annotations
@@ -27,32 +28,40 @@ import numpy as np
 from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.lazy import pymeshlab_absence
 from ptmtools.progress import Progress, silent
-from ptmtools.simplification.collapse_kernels import collapse_edges, fill
-from ptmtools.simplification.legality_kernels import CAREFUL, CARELESS
-from ptmtools.simplification.model import Mesh, Simplified, SimplifyOptions, too_many
+from ptmtools.simplification.collapse_kernels import collapse_edges, fill_heap
+from ptmtools.simplification.legality_kernels import RELAXED_LIMITS, STRICT_LIMITS
+from ptmtools.simplification.model import Mesh, Simplified, SimplifyOptions, missed_target_notes
 from ptmtools.simplification.quadrics import attributes, vertex_quadrics, wedge_quadrics
 from ptmtools.simplification.state_kernels import (
-    CLOSE,
-    DROP,
+    CLOSE_HANDLES,
+    COLLAPSES,
+    DROP_PARTS,
     ENTRIES,
     FACES,
-    KEEP,
-    MADE,
-    MOST_AT_EDGE,
+    KEEP_TOPOLOGY,
+    MAX_EDGE_FACES,
     TOPOLOGY,
     Heap,
     State,
     link_corners,
 )
-from ptmtools.simplification.surface import Surface, check, edges_of, surface_of
-from ptmtools.simplification.topology import HELD, PER_HANDLE, filled, parts_of, topology
+from ptmtools.simplification.surface import Surface, check_mesh, edges_of, surface_of
+from ptmtools.simplification.topology import (
+    FACES_PER_HANDLE,
+    MAX_IRREDUCIBLE_SHARE,
+    fill_small_holes,
+    parts_of,
+    topology,
+)
 
 
 def by_meshlab(mesh: Mesh, surface: Surface, faces: int) -> Simplified:
-    """A plain mesh with about so many faces; its error is not known (NaN).
+    """Simplifies a plain mesh by pymeshlab to about ``faces`` faces; the error is NaN.
 
-    Raises InputError PTM-I111 for a mesh with materials, texture coordinates or colours, and
-    MissingComponentError PTM-M100 where pymeshlab cannot be used.
+    Raises
+    ------
+    InputError: PTM-I111 the mesh has materials, texture coordinates or colours.
+    MissingComponentError: PTM-M100 pymeshlab cannot be used.
     """
     if not mesh.is_plain:
         raise InputError(
@@ -78,12 +87,12 @@ def by_meshlab(mesh: Mesh, surface: Surface, faces: int) -> Simplified:
     points = np.asarray(reduced.vertex_matrix(), np.float64) * surface.scale + surface.centre
     triangles = np.ascontiguousarray(reduced.face_matrix(), dtype=np.int32)
     return Simplified(
-        Mesh(points, triangles), source, float("nan"), too_many(len(triangles), faces)
+        Mesh(points, triangles), source, float("nan"), missed_target_notes(len(triangles), faces)
     )
 
 
-#: Progress is told after so many parts of the work.
-PARTS = 50
+#: Number of progress reports.
+PROGRESS_STEPS = 50
 
 DEFAULTS = SimplifyOptions()
 
@@ -91,113 +100,121 @@ DEFAULTS = SimplifyOptions()
 def simplify(
     mesh: Mesh, options: SimplifyOptions = DEFAULTS, progress: Progress = silent
 ) -> Simplified:
-    """A mesh with at most ``options.faces`` faces, where seams and borders allow it.
+    """Simplifies a mesh to at most ``options.faces`` faces, where seams and boundaries allow it.
 
-    A mesh that has no more is returned as it is. Raises ValueError for arrays that do not fit each
-    other, and for numbers that are not finite; for the method ``meshlab`` what `by_meshlab` raises.
+    A mesh with at most that many faces is returned unchanged.
+
+    Raises
+    ------
+    ValueError: arrays do not match, or a number is not finite.
+    InputError, MissingComponentError: see `by_meshlab`; method ``meshlab`` only.
     """
-    check(mesh)
+    check_mesh(mesh)
     count = len(mesh.triangles)
     if count <= options.faces:
         return Simplified(mesh, np.arange(count, dtype=np.int32), 0.0)
     surface = surface_of(mesh)
     if options.method == "meshlab":
         return by_meshlab(mesh, surface, options.faces)
-    mended = None if options.keep_parts else filled(mesh, surface, options.faces)
-    if mended is None:
-        return _simplified(mesh, surface, options, progress)
-    simplified = _simplified(mended.mesh, surface_of(mended.mesh), options, progress)
-    note = f"{mended.holes:,} small holes are filled: they would hold many of the faces"
-    source = mended.like[simplified.source].astype(np.int32)
+    filled = None if options.keep_parts else fill_small_holes(mesh, surface, options.faces)
+    if filled is None:
+        return _simplify_surface(mesh, surface, options, progress)
+    simplified = _simplify_surface(filled.mesh, surface_of(filled.mesh), options, progress)
+    note = f"{filled.holes:,} small holes are filled: they would hold many of the faces"
+    source = filled.source[simplified.source].astype(np.int32)
     return replace(simplified, source=source, notes=(note, *simplified.notes))
 
 
-def _simplified(
+def _simplify_surface(
     mesh: Mesh, surface: Surface, options: SimplifyOptions, progress: Progress
 ) -> Simplified:
-    counts = topology(surface)
-    state = _state(mesh, surface)
-    bound = options.error / surface.scale
-    state.worst[1] = bound * bound
-    held = PER_HANDLE * counts.handles if options.keep_parts else counts.held
-    if held > HELD * options.faces:
-        state.number[TOPOLOGY] = CLOSE if options.keep_parts else DROP
-    _collapse(state, options.faces, progress)
+    before = topology(surface)
+    state = _initial_state(mesh, surface)
+    max_error = options.error / surface.scale
+    state.errors[1] = max_error * max_error
+    irreducible = (
+        FACES_PER_HANDLE * before.handles if options.keep_parts else before.irreducible_faces
+    )
+    if irreducible > MAX_IRREDUCIBLE_SHARE * options.faces:
+        state.counters[TOPOLOGY] = CLOSE_HANDLES if options.keep_parts else DROP_PARTS
+    _collapse_all(state, options.faces, progress)
     result = _result(mesh, surface, state, options)
-    if state.number[TOPOLOGY] == KEEP:
+    if state.counters[TOPOLOGY] == KEEP_TOPOLOGY:
         return result
-    # That of which no face stands for any is gone.
+    # A part is gone if it is the source of no face.
     part = np.empty(len(mesh.triangles), np.int64)
     part[surface.source] = parts_of(
         edges_of(surface.triangle, len(surface.point)), len(surface.source)
     )
     left = len(np.unique(part[result.source]))
-    if left == counts.parts:
+    if left == before.parts:
         return result
-    gone = f"{counts.parts - left:,} of {counts.parts:,} parts are gone"
+    gone = f"{before.parts - left:,} of {before.parts:,} parts are gone"
     return replace(result, notes=(f"{gone}: they would hold many of the faces", *result.notes))
 
 
-def _state(mesh: Mesh, surface: Surface) -> State:
+def _initial_state(mesh: Mesh, surface: Surface) -> State:
     attribute = attributes(mesh, surface)
     vertices, corners = len(surface.point), surface.triangle.size
     head, tail = np.full(vertices, -1, np.int32), np.full(vertices, -1, np.int32)
-    beyond = np.empty(corners, np.int32)
-    link_corners(surface.triangle, head, tail, beyond)
+    next_corner = np.empty(corners, np.int32)
+    link_corners(surface.triangle, head, tail, next_corner)
     return State(
         point=surface.point,
         triangle=surface.triangle,
-        kept=surface.kept,
+        constraint=surface.constraint,
         wedge=surface.wedge,
         freedom=surface.freedom,
         quadric=vertex_quadrics(surface),
-        texture=wedge_quadrics(mesh, surface, attribute),
+        wedge_quadric=wedge_quadrics(mesh, surface, attribute),
         attribute=attribute,
         head=head,
         tail=tail,
-        beyond=beyond,
+        next_corner=next_corner,
         version=np.zeros(vertices, np.int32),
         mark=np.zeros(vertices, np.int64),
         moved=np.zeros(vertices, bool),
-        number=np.array([len(surface.triangle), 0, 0, 0, 0, 0]),
-        place=np.empty(3),
-        shared=np.empty((MOST_AT_EDGE, 6), np.int32),
-        shown=np.empty(2),
-        limits=np.array(CAREFUL),
-        worst=np.zeros(3),
+        counters=np.array([len(surface.triangle), 0, 0, 0, 0, 0]),
+        optimum=np.empty(3),
+        shared=np.empty((MAX_EDGE_FACES, 6), np.int32),
+        edge_cost=np.empty(2),
+        turn_limits=np.array(STRICT_LIMITS),
+        errors=np.zeros(3),
     )
 
 
-def _collapse(state: State, faces: int, progress: Progress) -> None:
-    """Collapses edges until so many faces are left, or nothing more can be done.
+def _collapse_all(state: State, faces: int, progress: Progress) -> None:
+    """Collapses edges until ``faces`` faces are left or no legal collapse remains.
 
-    What was refused may be possible after others have gone: the heap is filled again as long as
-    that brings something.
+    Collapses that were illegal may become legal after others, so the heap is rebuilt until a pass
+    makes no collapse; then the relaxed limits apply.
     """
-    number = state.number
-    begin = int(number[FACES])
+    counters = state.counters
+    begin = int(counters[FACES])
     total = begin - faces
     heap = Heap.of(state.triangle.size + 64)
-    for limits in (CAREFUL, CARELESS):
-        state.limits[:] = limits
-        made = -1
-        while number[FACES] > faces and number[MADE] > made:
-            made = int(number[MADE])
-            fill(state, heap)
-            while number[FACES] > faces and number[ENTRIES] > 0:
-                collapse_edges(state, heap, max(faces, int(number[FACES]) - total // PARTS - 1))
-                progress(min(begin - int(number[FACES]), total), total, "faces collapsed")
+    for turn_limits in (STRICT_LIMITS, RELAXED_LIMITS):
+        state.turn_limits[:] = turn_limits
+        previous = -1
+        while counters[FACES] > faces and counters[COLLAPSES] > previous:
+            previous = int(counters[COLLAPSES])
+            fill_heap(state, heap)
+            while counters[FACES] > faces and counters[ENTRIES] > 0:
+                collapse_edges(
+                    state, heap, max(faces, int(counters[FACES]) - total // PROGRESS_STEPS - 1)
+                )
+                progress(min(begin - int(counters[FACES]), total), total, "faces collapsed")
 
 
 def _result(mesh: Mesh, surface: Surface, state: State, options: SimplifyOptions) -> Simplified:
-    alive = np.flatnonzero(state.triangle[:, 0] >= 0)
-    source = surface.source[alive]
-    used, triangles = np.unique(state.triangle[alive], return_inverse=True)
-    points = mesh.points[surface.given[used]].astype(np.float64)
+    remaining = np.flatnonzero(state.triangle[:, 0] >= 0)
+    source = surface.source[remaining]
+    used, triangles = np.unique(state.triangle[remaining], return_inverse=True)
+    points = mesh.points[surface.source_point[used]].astype(np.float64)
     moved = state.moved[used]
     points[moved] = state.point[used[moved]] * surface.scale + surface.centre
-    # The corner that each corner has its attributes from.
-    corner = surface.corner[state.wedge[alive]]
+    # Source corner of the attributes of each corner.
+    corner = surface.corner[state.wedge[remaining]]
     face, side = surface.source[corner // 3], corner % 3
     left = Mesh(
         points,
@@ -206,9 +223,9 @@ def _result(mesh: Mesh, surface: Surface, state: State, options: SimplifyOptions
         None if mesh.uv is None else mesh.uv[face, side],
         None if mesh.colors is None else mesh.colors[face, side],
     )
-    turned = 0
+    inconsistent = 0
     if len(source) > options.faces:
         edges = edges_of(triangles.reshape(-1, 3), len(used))
-        turned = int((edges.faces == 2).sum()) - len(edges.pairs[0])
-    notes = too_many(len(source), options.faces, turned)
-    return Simplified(left, source, float(np.sqrt(state.worst[0])) * surface.scale, notes)
+        inconsistent = int((edges.faces == 2).sum()) - len(edges.pairs[0])
+    notes = missed_target_notes(len(source), options.faces, inconsistent)
+    return Simplified(left, source, float(np.sqrt(state.errors[0])) * surface.scale, notes)

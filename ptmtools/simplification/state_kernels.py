@@ -1,12 +1,12 @@
-"""A mesh between collapses, and compiled ways around it: corners at a vertex, faces at an edge.
+"""Mutable state of a mesh during edge collapses, its compiled traversal, and the heap of edges.
 
-The corners at a vertex are a linked list, so that two lists become one at once, and memory is
-linear. Corners of faces that are gone stay in it until `prune`.
+The corners of a vertex form a linked list, so two lists merge in constant time and memory stays
+linear. Corners of removed faces stay in the list until `prune`.
 
-The heap of edges has the cheapest first; ties go by their vertices. An entry is ``cost[i]``, the
-vertices ``ends[i]`` (the lower first), the sum of their versions when it was made, and the ways
-that were tried in vain. It is stale when a vertex has another version by now: it stays until it
-comes up, or until room is wanted.
+The heap has the cheapest edge first; ties follow the vertex indices. An entry consists of
+``cost[i]``, the vertices ``ends[i]`` (the lower first), the sum of their versions at its insertion,
+and the bits of its rejected targets. An entry is stale if the version of a vertex has changed; it
+stays until it is popped or the heap is full.
 """
 
 from __future__ import annotations
@@ -19,56 +19,57 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, Ints
 from ptmtools.jit import plain_kernel as kernel
 
-#: So many faces at an edge at most; an edge with more does not collapse.
-MOST_AT_EDGE = 64
+#: Maximum number of faces of an edge that may collapse.
+MAX_EDGE_FACES = 64
 
-#: A vertex of so many corners is a hub.
-HUB = 32
+#: Valence from which `faces_of_edge` searches the faces of the other end instead.
+HIGH_VALENCE = 32
 
-#: Where `State.number` counts faces, entries of the heap, marks given out, collapses made, and
-#: edges refused since all were tried; and says what collapses may do to the topology.
-FACES, ENTRIES, MARKS, MADE, REFUSED, TOPOLOGY = 0, 1, 2, 3, 4, 5
-#: Nothing; close handles, and let closed parts vanish; let parts with a border vanish, too.
-KEEP, CLOSE, DROP = 0, 1, 2
+#: Indices of `State.counters`: faces, heap entries, marks, collapses, rejections since the last
+#: rebuild of the heap, and the permitted change of the topology.
+FACES, ENTRIES, MARKS, COLLAPSES, REJECTIONS, TOPOLOGY = 0, 1, 2, 3, 4, 5
+#: Permitted changes of the topology: none; close handles and drop closed parts; drop all parts.
+KEEP_TOPOLOGY, CLOSE_HANDLES, DROP_PARTS = 0, 1, 2
 
 
 class State(NamedTuple):
-    """A mesh between collapses, all of it changed in place.
+    """A mesh during edge collapses; kernels change all arrays in place.
 
     Attributes
     ----------
-    point, triangle, kept, wedge, freedom: as `Surface` has them; faces that are gone begin with -1.
-    quadric, texture, attribute: (V, SIZE), (W, 10 + 5 m) and (W, m), as `quadrics` has them.
-    head, tail: (V,) the first and the last corner at each vertex; beyond: (3 T,) the next one.
-    version: (V,) how often each vertex has changed.
-    moved: (V,) whether it has left its place.
-    number: (6,) counts, by `FACES` and so on.
-    limits: (3,) say when faces turn, such as `CAREFUL`.
-    worst: (3,) the largest error of a collapse, squared, the largest that is allowed, and the cost
-        up to which what was refused has been tried again.
-    mark, place, shared, shown: (V,), (3,), (`MOST_AT_EDGE`, 6) and (2,), storage.
+    point, triangle, constraint, wedge, freedom: see `Surface`; rows of removed faces begin with -1.
+    quadric, wedge_quadric, attribute: (V, SIZE), (W, 10 + 5 m) and (W, m), see `quadrics`.
+    head, tail: (V,) the first and the last corner of each vertex, -1 for none.
+    next_corner: (3 T,) the next corner of the same vertex, -1 for none.
+    version: (V,) number of changes of each vertex.
+    moved: (V,) whether a vertex has left its original position.
+    counters: (6,) indexed by `FACES` … `TOPOLOGY`.
+    turn_limits: (3,) limits of a face's turn, such as `legality_kernels.STRICT_LIMITS`.
+    errors: (3,) the largest squared error of a collapse, the maximum squared error, and the cost
+        above which rejected edges are retried.
+    mark, optimum, shared, edge_cost: (V,), (3,), (`MAX_EDGE_FACES`, 6) and (2,) scratch buffers.
     """
 
     point: Floats
     triangle: NDArray[np.int32]
-    kept: NDArray[np.uint8]
+    constraint: NDArray[np.uint8]
     wedge: NDArray[np.int32]
     freedom: NDArray[np.int8]
     quadric: Floats
-    texture: Floats
+    wedge_quadric: Floats
     attribute: Floats
     head: NDArray[np.int32]
     tail: NDArray[np.int32]
-    beyond: NDArray[np.int32]
+    next_corner: NDArray[np.int32]
     version: NDArray[np.int32]
     mark: Ints
     moved: NDArray[np.bool_]
-    number: Ints
-    place: Floats
+    counters: Ints
+    optimum: Floats
     shared: NDArray[np.int32]
-    shown: Floats
-    limits: Floats
-    worst: Floats
+    edge_cost: Floats
+    turn_limits: Floats
+    errors: Floats
 
 
 @kernel
@@ -76,24 +77,24 @@ def link_corners(
     triangle: NDArray[np.int32],
     head: NDArray[np.int32],
     tail: NDArray[np.int32],
-    beyond: NDArray[np.int32],
+    next_corner: NDArray[np.int32],
 ) -> None:
-    """Makes the lists of corners at each vertex; heads and tails are -1 before."""
+    """Builds the list of corners of each vertex; heads and tails are -1 on entry."""
     for t in range(len(triangle)):
         for k in range(3):
             corner, v = 3 * t + k, triangle[t, k]
-            beyond[corner] = -1
+            next_corner[corner] = -1
             if head[v] < 0:
                 head[v] = corner
             else:
-                beyond[tail[v]] = corner
+                next_corner[tail[v]] = corner
             tail[v] = corner
 
 
 @kernel
 def prune(state: State, v: int) -> None:
-    """Takes the corners of faces that are gone out of a vertex's list."""
-    triangle, head, tail, beyond = state.triangle, state.head, state.tail, state.beyond
+    """Removes the corners of removed faces from the list of a vertex."""
+    triangle, head, tail, next_corner = state.triangle, state.head, state.tail, state.next_corner
     last, corner = -1, head[v]
     head[v] = -1
     while corner >= 0:
@@ -101,40 +102,45 @@ def prune(state: State, v: int) -> None:
             if last < 0:
                 head[v] = corner
             else:
-                beyond[last] = corner
+                next_corner[last] = corner
             last = corner
-        corner = beyond[corner]
+        corner = next_corner[corner]
     tail[v] = last
     if last >= 0:
-        beyond[last] = -1
+        next_corner[last] = -1
 
 
 @kernel
-def is_hub(state: State, v: int) -> bool:
-    """Whether a vertex has many corners."""
+def has_high_valence(state: State, v: int) -> bool:
+    """Whether a vertex has at least `HIGH_VALENCE` corners."""
     corner = state.head[v]
-    for _ in range(HUB):
+    for _ in range(HIGH_VALENCE):
         if corner < 0:
             return False
-        corner = state.beyond[corner]
+        corner = state.next_corner[corner]
     return True
 
 
 @kernel
-def meet(state: State, a: int, b: int) -> int:
-    """Finds the faces at an edge and returns how many they are, -1 if too many.
+def faces_of_edge(state: State, a: int, b: int) -> int:
+    """Writes the faces of an edge to ``shared``; returns their number, -1 beyond `MAX_EDGE_FACES`.
 
-    Into each row of ``shared``: the wedges at the two ends, the third vertex, and whether the edge
-    itself and those from its ends to that vertex are kept.
+    A row holds the wedges at a and b, the third vertex, and the constraint bits of the edge itself
+    and of the edges from a and b to the third vertex.
     """
-    triangle, kept, wedge, shared = state.triangle, state.kept, state.wedge, state.shared
-    # Of the hub of a wheel every spoke would look at all others.
-    one, two = (b, a) if is_hub(state, a) else (a, b)
-    mine, theirs = (1, 0) if one == b else (0, 1)
+    triangle, constraint, wedge, shared = (
+        state.triangle,
+        state.constraint,
+        state.wedge,
+        state.shared,
+    )
+    # Searching the faces of a high-valence vertex for each of its edges takes quadratic time.
+    one, two = (b, a) if has_high_valence(state, a) else (a, b)
+    column_one, column_two = (1, 0) if one == b else (0, 1)
     count, corner = 0, state.head[one]
     while corner >= 0:
         t, k = corner // 3, corner % 3
-        corner = state.beyond[corner]
+        corner = state.next_corner[corner]
         if triangle[t, 0] < 0:
             continue
         after, last = (k + 1) % 3, (k + 2) % 3
@@ -143,28 +149,28 @@ def meet(state: State, a: int, b: int) -> int:
             other, third = last, after
         elif triangle[t, after] != two:
             continue
-        if count == MOST_AT_EDGE:
+        if count == MAX_EDGE_FACES:
             return -1
-        # The edge after a corner has the corner's bit; the one before it that of the last.
+        # The edge after a corner has the bit of that corner, the edge before it that of ``last``.
         to_other = k if other == after else last
         to_third = last if other == after else k
-        shared[count, mine] = wedge[t, k]
-        shared[count, theirs] = wedge[t, other]
+        shared[count, column_one] = wedge[t, k]
+        shared[count, column_two] = wedge[t, other]
         shared[count, 2] = triangle[t, third]
-        shared[count, 3] = (kept[t] >> to_other) & 1
-        shared[count, 4 + mine] = (kept[t] >> to_third) & 1
-        shared[count, 4 + theirs] = (kept[t] >> after) & 1
+        shared[count, 3] = (constraint[t] >> to_other) & 1
+        shared[count, 4 + column_one] = (constraint[t] >> to_third) & 1
+        shared[count, 4 + column_two] = (constraint[t] >> after) & 1
         count += 1
     return count
 
 
 class Heap(NamedTuple):
-    """Storage, each with a row for each entry there may be."""
+    """Buffers of the heap, with a row for each possible entry (see the module)."""
 
     cost: Floats
     ends: NDArray[np.int32]
     version: NDArray[np.int32]
-    tried: NDArray[np.int8]
+    rejected: NDArray[np.int8]
 
     @staticmethod
     def of(capacity: int) -> Heap:
@@ -177,8 +183,8 @@ class Heap(NamedTuple):
 
 
 @kernel
-def before(heap: Heap, i: int, j: int) -> bool:
-    """Whether one entry is to come before another."""
+def precedes(heap: Heap, i: int, j: int) -> bool:
+    """Whether entry i precedes entry j."""
     cost, ends = heap[0], heap[1]
     if cost[i] != cost[j]:
         return bool(cost[i] < cost[j])
@@ -188,61 +194,61 @@ def before(heap: Heap, i: int, j: int) -> bool:
 
 
 @kernel
-def move(heap: Heap, to: int, at: int) -> None:
+def copy_entry(heap: Heap, to: int, at: int) -> None:
     """Copies an entry."""
-    cost, ends, version, tried = heap
+    cost, ends, version, rejected = heap
     cost[to] = cost[at]
     ends[to, 0] = ends[at, 0]
     ends[to, 1] = ends[at, 1]
     version[to] = version[at]
-    tried[to] = tried[at]
+    rejected[to] = rejected[at]
 
 
 @kernel
-def sink(heap: Heap, size: int, at: int) -> None:
-    """Lets an entry go down to where it belongs. The row behind the last is storage."""
-    move(heap, size, at)
+def sift_down(heap: Heap, size: int, at: int) -> None:
+    """Sifts an entry down. The row behind the last entry is a scratch buffer."""
+    copy_entry(heap, size, at)
     while True:
         child = 2 * at + 1
         if child >= size:
             break
-        if child + 1 < size and before(heap, child + 1, child):
+        if child + 1 < size and precedes(heap, child + 1, child):
             child += 1
-        if not before(heap, child, size):
+        if not precedes(heap, child, size):
             break
-        move(heap, at, child)
+        copy_entry(heap, at, child)
         at = child
-    move(heap, at, size)
+    copy_entry(heap, at, size)
 
 
 @kernel
-def rise(heap: Heap, size: int, at: int) -> None:
-    """Lets an entry go up to where it belongs. The row behind the last is storage."""
-    move(heap, size, at)
+def sift_up(heap: Heap, size: int, at: int) -> None:
+    """Sifts an entry up. The row behind the last entry is a scratch buffer."""
+    copy_entry(heap, size, at)
     while at > 0:
         parent = (at - 1) // 2
-        if not before(heap, size, parent):
+        if not precedes(heap, size, parent):
             break
-        move(heap, at, parent)
+        copy_entry(heap, at, parent)
         at = parent
-    move(heap, at, size)
+    copy_entry(heap, at, size)
 
 
 @kernel
 def heapify(heap: Heap, size: int) -> None:
-    """Orders entries that are in any order."""
+    """Establishes the order of the heap."""
     for at in range(size // 2 - 1, -1, -1):
-        sink(heap, size, at)
+        sift_down(heap, size, at)
 
 
 @kernel
-def without_stale(heap: Heap, size: int, version: NDArray[np.int32]) -> int:
-    """Drops the entries that are stale, orders the others, and returns how many they are."""
+def drop_stale(heap: Heap, size: int, version: NDArray[np.int32]) -> int:
+    """Drops stale entries, restores the order, and returns the number of entries."""
     ends, stamp = heap[1], heap[2]
-    left = 0
+    remaining = 0
     for i in range(size):
         if stamp[i] == version[ends[i, 0]] + version[ends[i, 1]]:
-            move(heap, left, i)
-            left += 1
-    heapify(heap, left)
-    return left
+            copy_entry(heap, remaining, i)
+            remaining += 1
+    heapify(heap, remaining)
+    return remaining

@@ -1,13 +1,14 @@
-"""A mesh made ready for collapses: welded, centred, its seams found.
+"""Welded, centred mesh with constrained edges and wedges: the input of the edge collapses.
 
-Equal points become one *vertex*. Of faces that have the same three vertices (a leaf with two
-sides, a poster on its wall) each is in a *layer* of its own, with vertices of its own: together
-they would be edges of four faces, along which nothing can move.
+Equal points become one *vertex*. Faces with the same three vertices (a two-sided leaf, a poster on
+its wall) go into separate *layers* with separate vertices: welded, they would form edges of four
+faces, which cannot collapse.
 
-An edge is *kept* if it is a border (one face), if more than two faces meet there or two that
-disagree on their front, or if material, texture coordinates or colours change across it. The
-corners about a vertex that hang together across the other edges are a *wedge*: it has one value of
-each attribute. A vertex is free if no kept edge ends there, on a line if two do; else it stays.
+An edge is *constrained* if it is a boundary (one face), if it is non-manifold (more than two faces,
+or two faces of inconsistent orientation), or if it is a seam: material, texture coordinates or
+colours change across it. A *wedge* is a set of corners of a vertex connected across unconstrained
+edges; it has one value of each attribute. A vertex without constrained edges is free, a vertex of
+two moves along their line, any other is fixed.
 """
 
 from __future__ import annotations
@@ -24,13 +25,12 @@ from ptmtools.cells.search import connected, distinct
 from ptmtools.simplification.model import Mesh
 from ptmtools.tolerance import FILE_SHARE
 
-#: What a vertex may do: go anywhere, go along its line of kept edges, nothing.
+#: Freedom of a vertex: moves anywhere, moves along its line of constrained edges, does not move.
 FREE, LINE, FIXED = 0, 1, 2
-#: Texture coordinates count as equal if they differ by less than this share of the largest: files
-#: have them in single precision.
+#: Relative tolerance of equal texture coordinates: files hold them in single precision.
 UV_SHARE = FILE_SHARE
-#: The distance, as a share of the largest side of the mesh, that a channel of a colour counts as
-#: moved by if it changes from 0 to 255.
+#: Distance equivalent to a change of a colour channel from 0 to 255, as a share of the largest side
+#: of the mesh.
 COLOR_SHARE = 0.02
 
 Indices = NDArray[np.int32]
@@ -38,65 +38,67 @@ Indices = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class Surface:
-    """A mesh in a cube about the origin of side 1 to 2.
+    """A welded mesh, scaled into a cube of side 1 to 2 about the origin.
 
     Attributes
     ----------
     point: (V, 3), centred, and scaled by a power of two.
-    given: (V,) index of the point of the mesh that each vertex is.
-    centre, scale: a given point is ``point * scale + centre``.
-    source: (T,) index of the face of the mesh; faces with fewer than three vertices are left out.
+    source_point: (V,) index of the source point of each vertex.
+    centre, scale: a source point is ``point * scale + centre``.
+    source: (T,) index of the source face; faces with fewer than three vertices are dropped.
     triangle: (T, 3) vertices.
-    kept: (T,) uint8, bit k is set if the edge from corner k to the next is kept.
+    constraint: (T,) uint8, bit k is set if the edge from corner k to the next is constrained.
     wedge: (T, 3) index of each corner's wedge.
-    corner: (W,) the first corner (3 t + k, of faces of `triangle`) of each wedge.
+    corner: (W,) the first corner of each wedge, 3 t + k for corner k of face t of `triangle`.
     freedom: (V,) int8, one of `FREE`, `LINE`, `FIXED`.
     """
 
     point: Floats
-    given: Ints
+    source_point: Ints
     centre: Floats
     scale: float
     source: Indices
     triangle: Indices
-    kept: NDArray[np.uint8]
+    constraint: NDArray[np.uint8]
     wedge: Indices
     corner: Ints
     freedom: NDArray[np.int8]
 
 
 def surface_of(mesh: Mesh) -> Surface:
-    """Welds a mesh and finds its seams. ValueError where arrays do not fit each other."""
-    check(mesh)
-    given, vertex = distinct(mesh.points)
+    """Welds a mesh and finds its constrained edges. Raises ValueError as `check_mesh`."""
+    check_mesh(mesh)
+    source_point, vertex = distinct(mesh.points)
     corners = vertex[mesh.triangles]
-    whole = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
-    source = np.flatnonzero(whole).astype(np.int32)
-    corners, given = _layered(corners[whole], given)
+    nondegenerate = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    source = np.flatnonzero(nondegenerate).astype(np.int32)
+    corners, source_point = _separate_layers(corners[nondegenerate], source_point)
     used, vertices = np.unique(corners, return_inverse=True)
-    given = given[used]
+    source_point = source_point[used]
     triangle = vertices.reshape(-1, 3).astype(np.int32)
-    point = mesh.points[given]
+    point = mesh.points[source_point]
     low, high = point.min(axis=0, initial=np.inf), point.max(axis=0, initial=-np.inf)
     centre = low / 2 + high / 2 if len(point) else np.zeros(3)
     side = float((high / 2 - low / 2).max()) if len(point) else 0.0
     scale = ldexp(1.0, min(max(frexp(side)[1], -1021), 1023)) if side > 0 else 1.0
     point = (point - centre) / scale
 
-    count = len(given)
-    kept, leader, ends = _seams(mesh, source, triangle, count)
+    count = len(source_point)
+    constraint, leader, ends = _constraints(mesh, source, triangle, count)
     corner, number = np.unique(leader, return_inverse=True)
     wedge = number.reshape(-1, 3).astype(np.int32)
     freedom = np.full(count, FIXED, np.int8)
     freedom[ends == 2] = LINE
     wedges = np.bincount(triangle.reshape(-1)[corner], minlength=count)
     freedom[(ends == 0) & (wedges == 1)] = FREE
-    return Surface(point, given, centre, scale, source, triangle, kept, wedge, corner, freedom)
+    return Surface(
+        point, source_point, centre, scale, source, triangle, constraint, wedge, corner, freedom
+    )
 
 
-def check(mesh: Mesh) -> None:
-    """ValueError for arrays that are of other shapes, for indices out of range, and for numbers
-    that are not finite."""
+def check_mesh(mesh: Mesh) -> None:
+    """Raises ValueError for arrays of the wrong shape, indices out of range, and numbers that are
+    not finite."""
     faces = len(mesh.triangles)
     shapes: dict[str, tuple[NDArray[Any] | None, tuple[int, ...]]] = {
         "points": (mesh.points, (len(mesh.points), 3)),
@@ -114,31 +116,33 @@ def check(mesh: Mesh) -> None:
         raise ValueError("triangles has an index out of range")
 
 
-def _layered(triangle: Ints, given: Ints) -> tuple[Ints, Ints]:
-    """The same with vertices of their own for faces that coincide with earlier ones."""
+def _separate_layers(triangle: Ints, source_point: Ints) -> tuple[Ints, Ints]:
+    """(T, 3) triangles and (V,) source points with separate vertices for coincident faces."""
     first, group = distinct(np.sort(triangle, axis=1))
     if len(first) == len(group):
-        return triangle, given
+        return triangle, source_point
     order = np.argsort(group, kind="stable")
     begin = np.searchsorted(group[order], np.arange(len(first)))
     layer = np.empty(len(order), np.int64)
     layer[order] = np.arange(len(order)) - begin[group[order]]
-    place, index = np.unique(layer[:, None] * len(given) + triangle, return_inverse=True)
-    return index.reshape(-1, 3), given[place % len(given)]
+    vertex, index = np.unique(layer[:, None] * len(source_point) + triangle, return_inverse=True)
+    return index.reshape(-1, 3), source_point[vertex % len(source_point)]
 
 
 @dataclass(frozen=True)
 class Edges:
-    """The edges of faces, which meet in some.
+    """Edges of a mesh and their half-edges.
 
-    An edge of a face is 3 t + k, from the corner k of the face t to the next.
+    Half-edge 3 t + k runs from corner k of face t to its next corner.
 
     Attributes
     ----------
-    order: (3 T,) the edges of faces, those that are the same edge of the mesh side by side.
-    start: (E,) where each edge of the mesh begins in it. faces: (E,) how many faces it has.
-    key: (E,) a number for each, ascending: of its vertices the lesser times V, and the other.
-    count: V. begin: (3 T,) the vertex at which an edge of a face begins.
+    order: (3 T,) half-edges, grouped by edge.
+    start: (E,) first index of each edge in `order`.
+    faces: (E,) number of faces of each edge.
+    key: (E,) ascending keys of the edges: lower vertex times V plus higher vertex.
+    count: V.
+    begin: (3 T,) first vertex of each half-edge.
     """
 
     order: Ints
@@ -150,13 +154,13 @@ class Edges:
 
     @property
     def ends(self) -> tuple[Ints, Ints]:
-        """The vertices of each edge of the mesh."""
+        """(E,) lower and (E,) higher vertices of the edges."""
         one, two = np.divmod(self.key, max(self.count, 1))
         return one, two
 
     @property
     def pairs(self) -> tuple[Ints, Ints]:
-        """The edges of faces of which each is that of two, which agree on their front."""
+        """(P,) and (P,) opposite half-edges of the edges of two faces of consistent orientation."""
         first = self.start[self.faces == 2]
         one, two = self.order[first], self.order[first + 1]
         agree = self.begin[one] != self.begin[two]
@@ -164,7 +168,7 @@ class Edges:
 
 
 def edges_of(triangle: NDArray[np.integer[Any]], count: int) -> Edges:
-    """Those of (T, 3) triangles of so many vertices."""
+    """Edges of (T, 3) triangles over ``count`` vertices."""
     begin = triangle.reshape(-1).astype(np.int64)
     end = np.roll(triangle, -1, axis=1).reshape(-1).astype(np.int64)
     edge = np.minimum(begin, end) * count + np.maximum(begin, end)
@@ -176,44 +180,46 @@ def edges_of(triangle: NDArray[np.integer[Any]], count: int) -> Edges:
     return Edges(order, start, faces, edge[order[start]], count, begin)
 
 
-def _seams(
+def _constraints(
     mesh: Mesh, source: Indices, triangle: Indices, count: int
 ) -> tuple[NDArray[np.uint8], Ints, Ints]:
-    """Which edges are kept, bit by bit; the first corner of each corner's wedge, (3 T,); and how
-    many kept edges end in each vertex."""
+    """(T,) constraint bits; (3 T,) the first corner of each corner's wedge; (V,) the number of
+    constrained edges of each vertex."""
     edges = edges_of(triangle, count)
     one, two = edges.pairs
-    across = _continued(mesh, source, one, two)
-    one, two = one[across], two[across]
+    continuous = _is_continuous(mesh, source, one, two)
+    one, two = one[continuous], two[continuous]
 
-    open_ = np.ones(triangle.size, bool)
-    open_[one] = open_[two] = False
-    kept = np.packbits(open_.reshape(-1, 3), axis=1, bitorder="little").reshape(-1)
-    lone = open_[edges.order[edges.start]]
-    ends = np.bincount(np.concatenate([end[lone] for end in edges.ends]), minlength=count)
-    pairs = [[one, following(two)], [following(one), two]]
-    return kept, connected(triangle.size, np.concatenate(pairs, axis=1).T), ends
+    is_constrained = np.ones(triangle.size, bool)
+    is_constrained[one] = is_constrained[two] = False
+    constraint = np.packbits(is_constrained.reshape(-1, 3), axis=1, bitorder="little").reshape(-1)
+    is_edge_constrained = is_constrained[edges.order[edges.start]]
+    ends = np.bincount(
+        np.concatenate([end[is_edge_constrained] for end in edges.ends]), minlength=count
+    )
+    pairs = [[one, next_corner(two)], [next_corner(one), two]]
+    return constraint, connected(triangle.size, np.concatenate(pairs, axis=1).T), ends
 
 
-def following(corner: Ints) -> Ints:
+def next_corner(corner: Ints) -> Ints:
     """The next corner of the same face."""
     return np.where(corner % 3 == 2, corner - 2, corner + 1)
 
 
-def _continued(mesh: Mesh, source: Indices, one: Ints, two: Ints) -> Bools:
-    """Whether what is painted goes on across edges, given by the corner at which each of their two
-    faces begins them."""
-    here, there = source[one // 3], source[two // 3]
-    ends = ((one % 3, following(two) % 3), (following(one) % 3, two % 3))
+def _is_continuous(mesh: Mesh, source: Indices, one: Ints, two: Ints) -> Bools:
+    """(P,) whether material, texture coordinates and colours are continuous across edges, given
+    by their opposite half-edges."""
+    face_one, face_two = source[one // 3], source[two // 3]
+    ends = ((one % 3, next_corner(two) % 3), (next_corner(one) % 3, two % 3))
     same = np.ones(len(one), bool)
     if mesh.material is not None:
-        same &= mesh.material[here] == mesh.material[there]
+        same &= mesh.material[face_one] == mesh.material[face_two]
     if mesh.uv is not None:
         for a, b in ends:
-            mine, other = mesh.uv[here, a], mesh.uv[there, b]
-            slack = UV_SHARE * np.maximum(np.abs(mine), np.abs(other))
-            same &= (np.abs(mine - other) <= slack).all(axis=1)
+            uv_one, uv_two = mesh.uv[face_one, a], mesh.uv[face_two, b]
+            tolerance = UV_SHARE * np.maximum(np.abs(uv_one), np.abs(uv_two))
+            same &= (np.abs(uv_one - uv_two) <= tolerance).all(axis=1)
     if mesh.colors is not None:
         for a, b in ends:
-            same &= (mesh.colors[here, a] == mesh.colors[there, b]).all(axis=1)
+            same &= (mesh.colors[face_one, a] == mesh.colors[face_two, b]).all(axis=1)
     return same

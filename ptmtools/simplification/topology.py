@@ -1,16 +1,15 @@
-"""Handles, parts and small holes: the faces that no collapse can remove.
+"""Handles, connected parts and small holes: faces that no topology-preserving collapse removes.
 
-A part is a set of faces connected by edges; faces that only touch in a vertex are several. A
-closed surface of V vertices, E edges and F faces, in c parts with g handles, has V - E + F =
-2 c - 2 g. As every face has three edges, each of two faces, F = 2 (V - 2 c) + 4 g: a handle holds
-four faces, however small it is, and so does a closed part; one with a border holds one. Marching
-cubes of what a scanner saw leave thousands of either.
+A part is a set of faces connected by edges; faces that touch only in a vertex belong to different
+parts. A closed surface of V vertices, E edges and F faces, in c parts with g handles (its genus),
+has V - E + F = 2 c - 2 g. Each face has three edges and each edge two faces, so F = 2 (V - 2 c) +
+4 g: a handle costs four faces, however small it is, as does a closed part; a part with a boundary
+costs one. Marching cubes of scanned volumes produce thousands of both.
 
-Small holes are filled where they are too many. A hole that shares its three corners with no other
-holds five faces, however small it is: six, as three vertices do in a closed surface, without its
-own. Scanners leave thousands where they could not see. Those are filled that are smaller than the
-faces that will be left, and far smaller than the part that they are in, so that no sheet is closed
-by its own outline.
+A hole that shares no corner with another costs five faces, however small it is: three vertices
+stand for six faces in a closed surface, less the hole itself. Scans with occlusion have thousands
+of holes. Where they cost too many faces, `fill_small_holes` fills the holes that are smaller than
+the faces of the result and much smaller than their part, so that the outline of a sheet stays open.
 """
 
 from __future__ import annotations
@@ -25,131 +24,131 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.search import connected
 from ptmtools.jit import plain_kernel as kernel
 from ptmtools.simplification.model import Mesh
-from ptmtools.simplification.surface import Edges, Surface, edges_of, following
+from ptmtools.simplification.surface import Edges, Surface, edges_of, next_corner
 
-#: Faces that a handle, a closed part and one with a border hold.
-PER_HANDLE, PER_CLOSED, PER_OPEN = 4, 4, 1
-#: What holds a greater share of the faces that are to be left gives way.
-HELD = 0.1
+#: Faces required by a handle, by a closed part and by a part with a boundary.
+FACES_PER_HANDLE, FACES_PER_CLOSED_PART, FACES_PER_OPEN_PART = 4, 4, 1
+#: Handles, parts or holes that require a larger share of the target faces are removed.
+MAX_IRREDUCIBLE_SHARE = 0.1
 
 
 @dataclass(frozen=True)
 class Topology:
-    """What a mesh has of each.
+    """Topological counts of a mesh.
 
     Attributes
     ----------
-    handles: 0 if more than two faces meet in an edge, where nobody can say.
-    closed, bordered: parts without a border, and with one.
+    handles: genus, summed over parts; 0 if an edge has more than two faces, where it is undefined.
+    closed_parts, open_parts: numbers of parts without and with a boundary.
     """
 
     handles: int
-    closed: int
-    bordered: int
+    closed_parts: int
+    open_parts: int
 
     @property
     def parts(self) -> int:
-        """How many there are."""
-        return self.closed + self.bordered
+        """Number of parts."""
+        return self.closed_parts + self.open_parts
 
     @property
-    def held(self) -> int:
-        """Faces that handles hold, and parts beside one."""
-        parts = PER_CLOSED * self.closed + PER_OPEN * self.bordered
-        return PER_HANDLE * self.handles + parts * (self.parts > 1)
+    def irreducible_faces(self) -> int:
+        """Number of faces required by handles and, if there is more than one part, by parts."""
+        parts = FACES_PER_CLOSED_PART * self.closed_parts + FACES_PER_OPEN_PART * self.open_parts
+        return FACES_PER_HANDLE * self.handles + parts * (self.parts > 1)
 
 
 def topology(surface: Surface) -> Topology:
-    """That of a mesh. A border counts as closed by one face of many corners."""
+    """Counts handles and parts. A boundary loop counts as closed by one polygon."""
     triangle = surface.triangle
     edges = edges_of(triangle, len(surface.point))
     part = parts_of(edges, len(triangle))
-    lone = edges.order[edges.start[edges.faces == 1]]
-    parts, bordered = len(np.unique(part)), len(np.unique(part[lone // 3]))
+    boundary = edges.order[edges.start[edges.faces == 1]]
+    parts, open_parts = len(np.unique(part)), len(np.unique(part[boundary // 3]))
     handles = 0
     if not (edges.faces > 2).any():
-        # Where fans of faces touch in a vertex each has one of its own.
+        # Count a vertex once for each fan of faces that touches there.
         fan = _fans(edges, triangle.size)
-        begin, end = fan[lone], fan[following(lone)]
-        borders = len(np.unique(connected(triangle.size, np.stack([begin, end], axis=1))[begin]))
+        begin, end = fan[boundary], fan[next_corner(boundary)]
+        loops = len(np.unique(connected(triangle.size, np.stack([begin, end], axis=1))[begin]))
         characteristic = len(np.unique(fan)) - len(edges.start) + len(triangle)
-        handles = max(0, (2 * parts - borders - characteristic) // 2)
-    return Topology(handles, parts - bordered, bordered)
+        handles = max(0, (2 * parts - loops - characteristic) // 2)
+    return Topology(handles, parts - open_parts, open_parts)
 
 
 def parts_of(edges: Edges, faces: int) -> Ints:
-    """(T,) of each face the least of its part."""
-    same = np.ones(len(edges.order), np.bool_)
-    same[edges.start] = False
-    later = np.flatnonzero(same)
+    """(T,) the lowest face index in the part of each face."""
+    shares_edge = np.ones(len(edges.order), np.bool_)
+    shares_edge[edges.start] = False
+    later = np.flatnonzero(shares_edge)
     return connected(faces, edges.order[np.stack([later - 1, later], axis=1)] // 3)
 
 
 def _fans(edges: Edges, corners: int) -> Ints:
-    """(3 T,) of each corner the least of those about its vertex that edges of two faces join."""
+    """(3 T,) the lowest corner in the fan of each corner: the corners of its vertex that edges of
+    two faces connect."""
     first = edges.start[edges.faces == 2]
     one, two = edges.order[first], edges.order[first + 1]
     agree = edges.begin[one] != edges.begin[two]
-    begin, end = np.where(agree, following(two), two), np.where(agree, two, following(two))
-    return connected(corners, np.concatenate([[one, begin], [following(one), end]], axis=1).T)
+    begin, end = np.where(agree, next_corner(two), two), np.where(agree, two, next_corner(two))
+    return connected(corners, np.concatenate([[one, begin], [next_corner(one), end]], axis=1).T)
 
 
-Kind = TypeVar("Kind", bound=np.generic)
+Scalar = TypeVar("Scalar", bound=np.generic)
 
-#: Faces that a hole holds.
-PER_HOLE = 5
-#: A hole is small in its part if its diagonal is no larger than this share of the part's.
-SHARE = 0.1
-#: No hole of more corners is filled.
-MOST = 64
-#: In place of the edge on the other side: there is none, or it cannot be told.
-BORDER, TANGLED = -1, -2
+#: Faces required by a hole.
+FACES_PER_HOLE = 5
+#: Maximum diagonal of a small hole, as a share of the diagonal of its part.
+MAX_HOLE_SHARE = 0.1
+#: Maximum number of corners of a filled hole.
+MAX_HOLE_CORNERS = 64
+#: Values instead of an opposite half-edge: boundary, or ambiguous.
+BOUNDARY, NON_MANIFOLD = -1, -2
 
 
 @dataclass(frozen=True)
-class Filled:
+class FilledMesh:
     """A mesh whose small holes are filled.
 
     Attributes
     ----------
-    mesh: what fills a hole has the material of a face beside it, and the attributes of the corners
-        around it.
-    like: (T + n,) the face of the given mesh that each face is, or is like.
-    holes: how many there were.
+    mesh: new faces have the material of an adjacent face and the attributes of adjacent corners.
+    source: (T + n,) the source face of each face; a new face has that of an adjacent face.
+    holes: number of filled holes.
     """
 
     mesh: Mesh
-    like: Ints
+    source: Ints
     holes: int
 
 
-class Work(NamedTuple):
-    """Storage, whose place is -1 before and after.
+class HoleBuffers(NamedTuple):
+    """Buffers of `fill_holes`; ``position`` is -1 on entry and return.
 
     Attributes
     ----------
-    seen: (3 T,) the edges of faces that are at no hole, or that were followed.
-    place: (V,) where each vertex is on the way. loop: (n,) edges on it.
+    visited: (3 T,) whether a half-edge is interior or already processed.
+    position: (V,) index of each vertex in the current loop. loop: (n,) half-edges of the loop.
     """
 
-    seen: Bools
-    place: Ints
+    visited: Bools
+    position: Ints
     loop: Ints
 
 
-def filled(mesh: Mesh, surface: Surface, faces: int) -> Filled | None:
-    """The mesh with its small holes filled, if they hold too many of the ``faces`` that are to be
-    left; else None."""
-    if not surface.kept.any():
+def fill_small_holes(mesh: Mesh, surface: Surface, faces: int) -> FilledMesh | None:
+    """Fills the small holes of a mesh if they cost too large a share of the ``faces`` target faces;
+    returns None otherwise."""
+    if not surface.constraint.any():
         return None
     triangle = surface.triangle.astype(np.int64)
     edges = edges_of(triangle, len(surface.point))
-    opposite = np.full(triangle.size, TANGLED)
-    opposite[edges.order[edges.start[edges.faces == 1]]] = BORDER
+    opposite = np.full(triangle.size, NON_MANIFOLD)
+    opposite[edges.order[edges.start[edges.faces == 1]]] = BOUNDARY
     one, two = edges.pairs
     opposite[one], opposite[two] = two, one
-    following = np.full(triangle.size, TANGLED)
-    follow(opposite, following)
+    next_edge = np.full(triangle.size, NON_MANIFOLD)
+    link_boundaries(opposite, next_edge)
 
     part = connected(len(surface.point), np.stack(edges.ends, axis=1))
     low, high = np.full(surface.point.shape, np.inf), np.full(surface.point.shape, -np.inf)
@@ -157,96 +156,102 @@ def filled(mesh: Mesh, surface: Surface, faces: int) -> Filled | None:
     np.maximum.at(high, part, surface.point)
     a, b, c = (surface.point[triangle[:, k]] for k in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
-    # The side of the faces that will be left, if all are alike.
+    # Side of a face of the result, if all faces were equilateral and of equal area.
     side = np.sqrt(4 / np.sqrt(3) * area / max(faces, 1))
-    most = np.minimum(SHARE * np.linalg.norm(high - low, axis=1), side)[part]
-    corner, number = np.empty((int((opposite == BORDER).sum()), 3), np.int64), np.zeros(2, np.int64)
-    work = Work(following < 0, np.full(len(surface.point), -1), np.empty(len(corner), np.int64))
-    fill_holes(triangle, surface.point, following, most, edges.key, work, corner, number)
-    holes, corner = int(number[0]), corner[: number[1]]
-    if PER_HOLE * holes <= HELD * faces:
+    max_diagonal = np.minimum(MAX_HOLE_SHARE * np.linalg.norm(high - low, axis=1), side)[part]
+    corner = np.empty((int((opposite == BOUNDARY).sum()), 3), np.int64)
+    counts = np.zeros(2, np.int64)
+    buffers = HoleBuffers(
+        next_edge < 0, np.full(len(surface.point), -1), np.empty(len(corner), np.int64)
+    )
+    fill_holes(triangle, surface.point, next_edge, max_diagonal, edges.key, buffers, corner, counts)
+    holes, corner = int(counts[0]), corner[: counts[1]]
+    if FACES_PER_HOLE * holes <= MAX_IRREDUCIBLE_SHARE * faces:
         return None
 
     face, at = surface.source[corner // 3].astype(np.int64), corner % 3
-    like = np.concatenate([np.arange(len(mesh.triangles)), face[:, 0]])
-    more = Mesh(
+    source = np.concatenate([np.arange(len(mesh.triangles)), face[:, 0]])
+    filled_mesh = Mesh(
         mesh.points,
-        _with(mesh.triangles, face, at),
-        None if mesh.material is None else mesh.material[like],
-        None if mesh.uv is None else _with(mesh.uv, face, at),
-        None if mesh.colors is None else _with(mesh.colors, face, at),
+        _append_corners(mesh.triangles, face, at),
+        None if mesh.material is None else mesh.material[source],
+        None if mesh.uv is None else _append_corners(mesh.uv, face, at),
+        None if mesh.colors is None else _append_corners(mesh.colors, face, at),
     )
-    return Filled(more, like, holes)
+    return FilledMesh(filled_mesh, source, holes)
 
 
-def _with(values: NDArray[Kind], face: Ints, at: Ints) -> NDArray[Kind]:
-    """What corners of faces have, and behind it the same of some corners."""
+def _append_corners(values: NDArray[Scalar], face: Ints, at: Ints) -> NDArray[Scalar]:
+    """Appends the values of some corners to (T, 3, …) values of corners."""
     return np.concatenate([values, values[face, at]])
 
 
 @kernel
-def follow(opposite: Ints, following: Ints) -> None:
-    """Of each edge at a border, 3 t + k, the next one around the same hole; `TANGLED` where faces
-    between them disagree."""
+def link_boundaries(opposite: Ints, next_edge: Ints) -> None:
+    """Links each boundary half-edge to the next one of the same hole; `NON_MANIFOLD` where faces
+    between them have inconsistent orientation."""
     for edge in range(len(opposite)):
-        if opposite[edge] != BORDER:
+        if opposite[edge] != BOUNDARY:
             continue
         at = edge - 2 if edge % 3 == 2 else edge + 1
         while opposite[at] >= 0:
             at = opposite[at]
             at = at - 2 if at % 3 == 2 else at + 1
-        if opposite[at] == BORDER:
-            following[edge] = at
+        if opposite[at] == BOUNDARY:
+            next_edge[edge] = at
 
 
 @kernel
 def fill_holes(
     triangle: Ints,
     point: Floats,
-    following: Ints,
-    most: Floats,
+    next_edge: Ints,
+    max_diagonal: Floats,
     key: Ints,
-    work: Work,
+    buffers: HoleBuffers,
     corner: Ints,
-    number: Ints,
+    counts: Ints,
 ) -> None:
-    """Fills the holes whose diagonal is no larger than ``most`` (V,) of their vertices.
+    """Fills the holes whose diagonal is at most ``max_diagonal`` (V,) of their vertices.
 
-    Writes faces to ``corner`` (n, 3), three corners of ``triangle`` each, and to ``number`` how
-    many holes and faces there are. ``key`` (E,) has all edges, ascending. Where a border comes to a
-    vertex again two holes touch, and what lies between is one.
+    Writes new faces to ``corner`` (n, 3), as corners of ``triangle``, and the numbers of holes and
+    faces to ``counts`` (2,). ``key`` (E,) holds the keys of all edges, ascending. Where a boundary
+    visits a vertex twice, two holes touch; the loop between the visits is one hole.
     """
-    seen, place, loop = work.seen, work.place, work.loop
-    for begin in range(len(following)):
-        if seen[begin]:
+    visited, position, loop = buffers.visited, buffers.position, buffers.loop
+    for begin in range(len(next_edge)):
+        if visited[begin]:
             continue
         count, edge = 0, begin
         while edge >= 0:
             v = triangle[edge // 3, edge % 3]
-            first = place[v]
+            first = position[v]
             if first >= 0:
                 for i in range(first, count):
-                    place[triangle[loop[i] // 3, loop[i] % 3]] = -1
+                    position[triangle[loop[i] // 3, loop[i] % 3]] = -1
                 hole = loop[first:count]
-                small = 3 <= len(hole) <= MOST and span(triangle, point, hole) <= most[v] ** 2
-                open_ = small and not is_outline(triangle, point, hole)
-                if open_ and cut_ears(triangle, point, hole, key, corner[number[1] :]):
-                    number[0] += 1
-                    number[1] += count - first - 2
+                small = (
+                    3 <= len(hole) <= MAX_HOLE_CORNERS
+                    and squared_diagonal(triangle, point, hole) <= max_diagonal[v] ** 2
+                )
+                fillable = small and not is_outer_boundary(triangle, point, hole)
+                if fillable and clip_ears(triangle, point, hole, key, corner[counts[1] :]):
+                    counts[0] += 1
+                    counts[1] += count - first - 2
                 count = first
-            if seen[edge]:
+            if visited[edge]:
                 break
-            seen[edge] = True
-            place[v], loop[count] = count, edge
+            visited[edge] = True
+            position[v], loop[count] = count, edge
             count += 1
-            edge = following[edge]
+            edge = next_edge[edge]
         for i in range(count):
-            place[triangle[loop[i] // 3, loop[i] % 3]] = -1
+            position[triangle[loop[i] // 3, loop[i] % 3]] = -1
 
 
 @kernel
-def span(triangle: Ints, point: Floats, loop: Ints) -> float:
-    """The square of the diagonal of the box around where edges begin."""
+def squared_diagonal(triangle: Ints, point: Floats, loop: Ints) -> float:
+    """Squared diagonal of the bounding box of a loop."""
     square = 0.0
     for k in range(3):
         low, high = np.inf, -np.inf
@@ -258,10 +263,10 @@ def span(triangle: Ints, point: Floats, loop: Ints) -> float:
 
 
 @kernel
-def is_outline(triangle: Ints, point: Floats, loop: Ints) -> bool:
-    """Whether a loop goes around its faces instead of a hole between them: what would fill it
-    looks the other way."""
-    alike = 0.0
+def is_outer_boundary(triangle: Ints, point: Floats, loop: Ints) -> bool:
+    """Whether a loop is the outer boundary of its faces instead of a hole: a filling would have the
+    opposite orientation."""
+    agreement = 0.0
     o = triangle[loop[0] // 3, loop[0] % 3]
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
@@ -273,21 +278,22 @@ def is_outline(triangle: Ints, point: Floats, loop: Ints) -> bool:
                 triangle[t, (edge + 1) % 3],
                 triangle[t, (edge + 2) % 3],
             )
-            # The loop has the faces on its left; what fills it goes around the other way.
+            # The loop has its faces on the left, so the filling runs in the opposite direction.
             fill += (point[b, i] - point[o, i]) * (point[a, j] - point[o, j])
             fill -= (point[b, j] - point[o, j]) * (point[a, i] - point[o, i])
             face += (point[b, i] - point[a, i]) * (point[c, j] - point[a, j])
             face -= (point[b, j] - point[a, j]) * (point[c, i] - point[a, i])
-        alike += fill * face
-    return alike <= 0.0
+        agreement += fill * face
+    return agreement <= 0.0
 
 
 @kernel
-def cut_ears(
+def clip_ears(
     triangle: Ints, point: Floats, loop: Ints, key: Ints, corner: NDArray[np.int64]
 ) -> bool:
-    """Fills a loop by faces, the shortest new edge first; False if every way has an edge twice."""
-    count, made = len(loop), 0
+    """Triangulates a loop by ear clipping, the shortest new edge first; False if every ear would
+    duplicate an edge."""
+    count, clipped = len(loop), 0
     while count > 3:
         least, best = np.inf, -1
         for i in range(count):
@@ -304,12 +310,12 @@ def cut_ears(
                 least, best = square, i
         if best < 0:
             return False
-        corner[made, 0] = loop[best + 1 if best + 1 < count else 0]
-        corner[made, 1] = loop[best]
-        corner[made, 2] = loop[best - 1 if best else count - 1]
-        made += 1
+        corner[clipped, 0] = loop[best + 1 if best + 1 < count else 0]
+        corner[clipped, 1] = loop[best]
+        corner[clipped, 2] = loop[best - 1 if best else count - 1]
+        clipped += 1
         count -= 1
         for i in range(best, count):
             loop[i] = loop[i + 1]
-    corner[made, 0], corner[made, 1], corner[made, 2] = loop[2], loop[1], loop[0]
+    corner[clipped, 0], corner[clipped, 1], corner[clipped, 2] = loop[2], loop[1], loop[0]
     return True

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ptmtools.simplification import Mesh, SimplifyOptions, simplify
 from ptmtools.simplification.surface import surface_of
-from ptmtools.simplification.topology import filled
+from ptmtools.simplification.topology import fill_small_holes
 from tests.simplification.shapes import edge_faces, euler, facade, grid, normals, sphere
 
 
@@ -45,10 +45,10 @@ def spread(count: int) -> NDArray[np.float64]:
 
 
 def fill(mesh: Mesh, faces: int) -> Mesh:
-    actual = filled(mesh, surface_of(mesh), faces)
+    actual = fill_small_holes(mesh, surface_of(mesh), faces)
     assert actual is not None
-    assert len(actual.like) == len(actual.mesh.triangles)
-    assert actual.like.max() < len(mesh.triangles)
+    assert len(actual.source) == len(actual.mesh.triangles)
+    assert actual.source.max() < len(mesh.triangles)
     assert (actual.mesh.triangles[: len(mesh.triangles)] == mesh.triangles).all()
     return actual.mesh
 
@@ -89,7 +89,7 @@ def test_few_holes_stay() -> None:
     """Holes that hold no tenth of the faces are kept, as anything else that one sees."""
     whole = sphere(40)
     holed = without(whole, around(whole, spread(10)))
-    assert filled(holed, surface_of(holed), 1000) is None
+    assert fill_small_holes(holed, surface_of(holed), 1000) is None
     assert euler(simplify(holed, SimplifyOptions(1000)).mesh) == 2 - 10
 
 
@@ -98,7 +98,7 @@ def test_large_holes_stay() -> None:
     whole = sphere(40)
     far = np.linalg.norm(whole.points[whole.triangles].mean(axis=1)[:, None] - spread(30), axis=2)
     holed = without(whole, (far < 0.15).any(axis=1))
-    assert filled(holed, surface_of(holed), 1000) is None
+    assert fill_small_holes(holed, surface_of(holed), 1000) is None
 
 
 @pytest.mark.parametrize("sheets", [1, 400])
@@ -108,7 +108,7 @@ def test_sheets_are_not_closed_by_their_outlines(sheets: int) -> None:
     pair = np.array([[0, 1, 2], [0, 2, 3]])
     triangles = (pair + 4 * np.arange(sheets)[:, None, None]).reshape(-1, 3).astype(np.int32)
     given = Mesh(points, triangles)
-    assert filled(given, surface_of(given), 1) is None
+    assert fill_small_holes(given, surface_of(given), 1) is None
 
 
 def test_a_hole_takes_over_what_is_painted_around_it() -> None:
@@ -159,12 +159,12 @@ def test_whatever_is_missing(seed: int, share: float, faces: int) -> None:
     assert len(actual.mesh.triangles) > 0
     assert (np.diff(np.sort(actual.mesh.triangles, axis=1), axis=1) > 0).all()
     assert 0 <= actual.source.min() <= actual.source.max() < len(holed.triangles)
-    more = filled(holed, surface_of(holed), faces)
+    more = fill_small_holes(holed, surface_of(holed), faces)
     if more is not None:
         assert edge_faces(more.mesh).max() <= 2
-        assert len(np.unique(np.sort(more.mesh.triangles, axis=1), axis=0)) == len(more.like)
+        assert len(np.unique(np.sort(more.mesh.triangles, axis=1), axis=0)) == len(more.source)
 
 
 def test_nothing_to_fill() -> None:
     given = Mesh(np.zeros((3, 3)), grid(1, 1)[:1] * 0)
-    assert filled(given, surface_of(given), 1) is None
+    assert fill_small_holes(given, surface_of(given), 1) is None

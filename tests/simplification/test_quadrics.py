@@ -14,7 +14,7 @@ from ptmtools.simplification.quadrics import (
     SIZE,
     add,
     attributes,
-    best_place,
+    optimal_position,
     shift,
     shift_wedge,
     value_at,
@@ -134,22 +134,22 @@ def test_a_shifted_quadric_says_the_same_of_every_place(seed: int) -> None:
 
 
 @given(SEEDS)
-def test_nowhere_is_better_than_the_best_place(seed: int) -> None:
+def test_nowhere_is_better_than_the_optimal_position(seed: int) -> None:
     rng = np.random.default_rng(seed)
     rows = np.stack([planes(rng, 3), planes(rng, 3)])
     away, place = rng.normal(size=3), np.empty(3)
-    actual = best_place(rows, 0, 1, *away, 1e-12, place)
+    actual = optimal_position(rows, 0, 1, *away, 1e-12, place)
     both = rows[0] + shifted(rows[1], -away)
     assert actual == pytest.approx(value(both, place), rel=1e-6, abs=1e-9)
     exact = np.linalg.lstsq(_matrix(both), -both[6:9], rcond=None)[0]
     assert actual <= value(both, exact) + 1e-6 * (1 + abs(both[9]))
 
 
-def test_the_best_place_in_a_plane_is_the_middle() -> None:
+def test_the_optimal_position_in_a_plane_is_the_middle() -> None:
     rows = np.zeros((2, SIZE))
     rows[:, 5] = rows[:, 10] = 1.0
     place = np.empty(3)
-    assert best_place(rows, 0, 1, 2.0, 4.0, 0.0, 1e-3, place) == pytest.approx(0)
+    assert optimal_position(rows, 0, 1, 2.0, 4.0, 0.0, 1e-3, place) == pytest.approx(0)
     assert place == pytest.approx([1, 2, 0])
 
 

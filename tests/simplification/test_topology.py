@@ -140,7 +140,7 @@ def test_nobody_can_say_where_three_faces_meet() -> None:
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0]], dtype=np.float64)
     assert topology(surface_of(Mesh(points, fan))).handles == 0
     nothing = Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32))
-    assert topology(surface_of(nothing)).held == 0
+    assert topology(surface_of(nothing)).irreducible_faces == 0
 
 
 def test_many_handles_are_closed_and_the_plate_stays() -> None:
@@ -233,7 +233,7 @@ def test_many_parts_give_way_to_the_body(chip: Mesh, closed: bool) -> None:
     are dearest, would be a tetrahedron."""
     given = beside(sphere(40), chip, 2000)
     there = topology(surface_of(given))
-    assert (there.parts, there.closed) == (2001, 2001 if closed else 1)
+    assert (there.parts, there.closed_parts) == (2001, 2001 if closed else 1)
     actual = simplify(given, SimplifyOptions(1000))
     assert len(actual.mesh.triangles) <= 1000
     assert any("parts are gone" in note for note in actual.notes)
