@@ -1,1 +1,1 @@
-"""Pictures of a served database: rays, sampled textures, shaded frames."""
+"""Renders a served database: rays, sampled textures, shaded frames."""

@@ -1,8 +1,8 @@
-"""Draws a view of a served database from the finest levels of its textures.
+"""Draws a view of a served database with the finest levels of its textures.
 
 Embree finds the surface of each ray, and the kernels of the simulator sample the textures. A lit
-picture has the lamp of `ptmtools.rendering.light` and the relief of octree textures; in
-others, surfaces without texture are shaded by the angle to the viewer, as on the page.
+picture has the lamp of `ptmtools.rendering.light` and the relief of octree textures; an unlit one
+shades surfaces without texture by the angle to the viewer, like the web page.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from ptmtools.rendering.light import as_bytes
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.rendering.records import Sight, Triangles, own_levels, triangles_of
 
-#: Largest side of a picture, pixels.
-WIDEST = 4096
-#: Field of view where no viewpoint gives one, degrees.
+#: Maximum side of a picture, pixels.
+MAX_SIDE = 4096
+#: Default field of view, degrees.
 FIELD_OF_VIEW = 60.0
-#: Rays per pixel each way, and the largest picture, in pixels, that has several; larger ones have
-#: one ray.
+#: Rays per pixel along each axis, and the largest picture, in pixels, that has several; larger
+#: pictures have one.
 _SAMPLES, _MANY_PIXELS = 2, 1 << 22
-#: Colour of the sky, 0 to 255, and the least light on surfaces without texture, as on the page.
+#: Colour of the sky, 0 to 255, and minimum light on surfaces without texture, as on the web page.
 _SKY, _AMBIENT = (0.16 * 255, 0.17 * 255, 0.19 * 255), 0.25
 
 
@@ -70,8 +70,8 @@ class ViewOptions:
 
     def __post_init__(self) -> None:
         for name, low, high in (
-            ("width", 1, WIDEST),
-            ("height", 1, WIDEST),
+            ("width", 1, MAX_SIDE),
+            ("height", 1, MAX_SIDE),
             ("max_side", 0, 1 << 16),
             ("field_of_view", 1, 170),
         ):
@@ -91,7 +91,7 @@ class ViewOptions:
 
 @dataclass(frozen=True)
 class Eye:
-    """A place to look from: position (3,) in metres, unit direction (3,), vertical field of view in
+    """A viewpoint: position (3,) in metres, unit direction (3,), vertical field of view in
     radians."""
 
     position: Floats
@@ -100,7 +100,7 @@ class Eye:
 
 
 def eye_of(served: Served, options: ViewOptions) -> Eye:
-    """The eye that the options name. Raises InputError PTM-I111 if there is no such viewpoint."""
+    """Returns the selected viewpoint. Raises InputError PTM-I111 if it does not exist."""
     angle = FIELD_OF_VIEW
     if options.eye:
         position = np.array(options.eye[:3], dtype=np.float64)
@@ -130,12 +130,12 @@ def eye_of(served: Served, options: ViewOptions) -> Eye:
 def draw_view(
     served: Served, options: ViewOptions, progress: Progress = silent
 ) -> NDArray[np.uint8]:
-    """Draws a picture (height, width, 3), sRGB. It decodes only visible textures.
+    """Draws an sRGB picture (height, width, 3); decodes visible textures only.
 
     Raises
     ------
-    InputError: PTM-I111 there is no such viewpoint.
-    DatabaseError, LimitError: those of `read_pyramids` and `read_octrees`.
+    InputError: PTM-I111 the viewpoint does not exist.
+    DatabaseError, LimitError: see `read_pyramids` and `read_octrees`.
     """
     from ptmtools.rendering.kernels import shade
     from ptmtools.rendering.light import lamps, lit
@@ -178,7 +178,7 @@ def draw_view(
 
 
 def _vertical(degrees: float, options: ViewOptions) -> float:
-    """The vertical field of view of a picture whose smaller one is ``degrees``."""
+    """Vertical field of view, degrees, of a picture whose smaller field of view is ``degrees``."""
     if options.width >= options.height:
         return degrees
     half = math.tan(math.radians(degrees) / 2) * options.height / options.width
@@ -186,7 +186,7 @@ def _vertical(degrees: float, options: ViewOptions) -> float:
 
 
 def _shade_plain(sight: Sight, triangles: Triangles, shown: Floats) -> None:
-    """Multiplies the colours of surfaces without texture by their angle to the viewer."""
+    """Multiplies the colours of surfaces without texture by the cosine to the viewer."""
     plain = np.flatnonzero(sight.triangle >= 0)
     plain = plain[triangles.texture[sight.triangle[plain]] < 0]
     normal, ray = triangles.normal[sight.triangle[plain]], sight.ray[plain]

@@ -1,9 +1,9 @@
-"""Compiled sampling of textures, and the sums of errors by level (see `tables`).
+"""Compiled texture sampling, and sums of errors by level (see `ptmtools.lab.tables`).
 
-Functions that run for every pixel are inlined: a call with all arrays of the records takes half as
-long again.
+Functions called for every pixel are inlined: a call that passes all arrays of the records takes
+1.5 times as long.
 
-`shade` computes colours of pixels by the loaded levels, with the same sampling as the errors.
+`shade` computes colours of pixels from the loaded levels, with the sampling used for the errors.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.jit import inlined_kernel, kernel, plain_kernel
 from ptmtools.rendering.records import Pyramids, Shows, Sight, Triangles
 
-#: What is shown where nothing is known: 0 to 255.
+#: Colour of pixels without data, 0 to 255.
 GREY = 128.0
 
 
 class Sums(NamedTuple):
-    """What frames show, by pair of cell and texture.
+    """Sums over the pixels of frames, by pair of cell and texture.
 
     Attributes
     ----------
-    pair: (m,) of each triangle.
-    error, square: (P, L + 2) root mean squares over R, G and B, and their squares, with nothing,
-        the mean colour, level 0, level 1, … as the finest that is there; or the columns of `Shows`
-        in place of levels.
-    need, sight: (P, L) how much each level is wanted, 0 to 1 a pixel, of all pixels and of those of
-        a client's item buffer; the first stands for surfaces without texture.
+    pair: (m,) pair of each triangle.
+    error, square: (P, L + 2) root mean squares over R, G and B, and their squares. Columns: nothing
+        loaded, the mean colour, then level 0, level 1, … as the finest loaded level, or the columns
+        of `Shows` instead of levels.
+    need, sight: (P, L) demand for each level, 0 to 1 per pixel, over all pixels and over the pixels
+        of a client's item buffer; column 0 counts surfaces without texture.
     """
 
     pair: Ints
@@ -42,15 +42,15 @@ class Sums(NamedTuple):
 
 @plain_kernel
 def wrapped(at: float, side: int) -> int:
-    """Which texel is at a whole number along a side of a texture that repeats."""
-    if 0.0 <= at < side:  # most are, and divisions are dear
+    """Wraps a whole number of texels into the side of a repeating texture."""
+    if 0.0 <= at < side:  # the usual case, without a division
         return int(at)
     return int(at - np.floor(at / side) * side) % side
 
 
 @plain_kernel
 def around(at: float, side: int, clamped: bool) -> tuple[int, int, float]:
-    """The two texels around a texture coordinate along a side, and the share of the second."""
+    """Returns the two texels adjacent to a texture coordinate and the weight of the second."""
     place = at * side - 0.5
     low = np.floor(place)
     if clamped:
@@ -67,7 +67,7 @@ def sample(
     textures: Pyramids, t: int, level: int, u: float, v: float, clamped: Bools, color: Floats
 ) -> None:
     """Writes the bilinear sample of a level of a texture at (u, v) to ``color`` (3,), 0 to 255;
-    ``clamped`` (2,) as of `Surfaces`."""
+    ``clamped`` (2,): see `Surfaces`."""
     texel, start = textures.texel, textures.start[t, level]
     width, height = textures.size[t, level, 0], textures.size[t, level, 1]
     x0, x1, across = around(u, width, clamped[0])
@@ -91,8 +91,8 @@ def blend(
     color: Floats,
     coarse: Floats,
 ) -> None:
-    """As `sample`, between the two levels around a level of detail, of 0 and up to the coarsest;
-    ``coarse`` (3,) to work in."""
+    """Writes the trilinear sample at a level of detail, from 0 to the coarsest level, to ``color``
+    (3,), 0 to 255; ``coarse`` (3,) is a scratch buffer."""
     sharp = textures.levels[t] - 1 - int(detail)
     sample(textures, t, sharp, u, v, clamped, color)
     sample(textures, t, max(sharp - 1, 0), u, v, clamped, coarse)
@@ -104,14 +104,15 @@ def blend(
 def level_of_detail(
     ray: Floats, axes: Floats, normal: Floats, offset: Floats, gradient: Floats, pixel: float
 ) -> float:
-    """log2 of the texels of the finest level that a pixel covers, as OpenGL has it: the larger of
-    the derivatives across and up the screen; -99 where it covers none.
+    """Returns log2 of the number of finest texels per pixel, as defined by OpenGL: the larger of
+    the derivatives across and up the screen; -99 for a constant texture, 99 for a plane seen
+    edge-on.
 
     Parameters
     ----------
     ray: (3,) with component 1 along the view. axes: (2, 3) right and up.
     normal: (3,) of the plane, any length. offset: (3,) from the eye to a point of the plane.
-    gradient: (2, 3) texels per metre of u and v. pixel: its side at depth 1.
+    gradient: (2, 3) texels per metre of u and v. pixel: side of a pixel at depth 1.
     """
     facing = normal[0] * ray[0] + normal[1] * ray[1] + normal[2] * ray[2]
     if facing == 0.0:
@@ -133,17 +134,17 @@ def level_of_detail(
 
 @inlined_kernel
 def texel_under(
-    sight: Sight, i: int, triangles: Triangles, textures: Pyramids, t: int, room: Floats
+    sight: Sight, i: int, triangles: Triangles, textures: Pyramids, t: int, scratch: Floats
 ) -> tuple[float, float, float]:
-    """Texture coordinates of what a pixel shows, and its level of detail (see `level_of_detail`) in
-    a pyramid, which is 0 at least and at most that of the coarsest level.
+    """Returns the texture coordinates at pixel ``i`` and its level of detail (`level_of_detail`) in
+    pyramid ``t``, clamped to 0 … coarsest level.
 
-    ``i`` is the pixel, ``t`` the pyramid; ``room`` (3, 3) to work in.
+    ``scratch`` (3, 3) is overwritten.
     """
     f = sight.triangle[i]
     finest = textures.levels[t] - 1
     ray, normal, gradient = sight.ray[i], triangles.normal[f], triangles.gradient[f]
-    offset, scaled = room[0], room[1:]
+    offset, scaled = scratch[0], scratch[1:]
     facing, depth = 0.0, 0.0
     for k in range(3):
         offset[k] = triangles.corner[f, 0, k] - sight.eye[k]
@@ -163,7 +164,7 @@ def texel_under(
 
 @plain_kernel
 def distance(color: Floats, exact: Floats) -> float:
-    """The mean square over R, G and B by which two colours (3,) differ."""
+    """Mean squared difference of two colours (3,) over R, G and B."""
     total = 0.0
     for k in range(3):
         total += (color[k] - exact[k]) ** 2
@@ -179,17 +180,17 @@ def add_frame(
     full: Pyramids,
     same: bool,
     sums: Sums,
-    room: Floats,
+    scratch: Floats,
 ) -> None:
-    """Adds what the pixels of one frame show.
+    """Adds the errors and demands of the pixels of a frame to ``sums``.
 
     Parameters
     ----------
-    seen: (n,) whether the pixel is also one of the client's own item buffer.
-    full: what the picture is compared with; ``same`` if these are the textures.
-    room: (L + 7, 3) to work in.
+    seen: (n,) whether the pixel belongs to the client's item buffer.
+    full: reference textures; ``same`` if they are ``textures``.
+    scratch: (L + 7, 3), overwritten.
     """
-    exact, coarse, work, shown = room[0], room[1], room[2:5], room[5:]
+    exact, coarse, work, shown = scratch[0], scratch[1], scratch[2:5], scratch[5:]
     shown[0] = GREY
     for i in range(len(sight.triangle)):
         f = sight.triangle[i]
@@ -211,7 +212,7 @@ def add_frame(
             u, v, detail = texel_under(sight, i, triangles, full, t, work)
             blend(full, t, detail, u, v, clamped, exact, coarse)
         u, v, detail = texel_under(sight, i, triangles, textures, t, work)
-        sharp = finest - int(detail)  # the finest level that is sampled
+        sharp = finest - int(detail)  # finest sampled level
         for n in range(sharp + 1):
             sample(textures, t, n, u, v, clamped, shown[n + 2])
         below = max(sharp - 1, 0)
@@ -224,7 +225,7 @@ def add_frame(
             exact[k] *= color[k]
             for n in range(1, sharp + 3):
                 shown[n, k] *= color[k]
-        # Levels that are finer than what is sampled change nothing.
+        # Levels finer than the sampled one do not change the picture.
         last = sharp if same else finest
         for n in range(last + 3):
             square = distance(shown[min(n, sharp + 2)], exact)
@@ -245,15 +246,14 @@ def add_columns(
     shows: Shows,
     full: Pyramids,
     sums: Sums,
-    room: Floats,
+    scratch: Floats,
 ) -> None:
-    """As `add_frame`, of textures each column of which has levels of its own.
+    """Adds the errors and demands of a frame, for textures whose columns have levels of their own.
 
-    A column is wanted as far as the finest level of the one before it is too coarse: where texels
-    of its own finest level are no smaller than pixels, or, between that and half of it, in part;
-    the first always is.
+    The demand for a column is 1 if texels of its finest level are at least as large as a pixel, and
+    falls to 0 at half that size; the demand for the first column is 1.
     """
-    exact, coarse, work, color = room[0], room[1], room[2:5], room[5]
+    exact, coarse, work, color = scratch[0], scratch[1], scratch[2:5], scratch[5]
     for i in range(len(sight.triangle)):
         f = sight.triangle[i]
         if f < 0:
@@ -305,10 +305,11 @@ def shade(
     column: Ints,
     shown: Floats,
 ) -> None:
-    """Writes to ``shown`` (n, 3) what the pixels of one frame show, 0 to 255: grey where the
-    geometry is not there, the mean colour of textures of which nothing is, black where nothing is.
+    """Writes the colours of the pixels of a frame, 0 to 255, to ``shown`` (n, 3).
 
-    ``there`` (C,) geometry, and ``column`` (T,) of each texture.
+    Pixels without loaded geometry are grey, textures without loaded levels have their mean colour,
+    the background is black. ``loaded`` (C,): whether the geometry of a cell is loaded; ``column``
+    (T,): loaded column of each texture.
     """
     work, coarse = np.zeros((3, 3)), np.zeros(3)
     for i in range(len(sight.triangle)):
@@ -324,7 +325,7 @@ def shade(
         if held > 0:
             textures, row = shows.pyramids, shows.row[t, held]
             u, v, detail = texel_under(sight, i, triangles, textures, row, work)
-            # The finest level that is there bounds the level of detail from below.
+            # The finest loaded level bounds the level of detail from below.
             detail = max(detail, float(textures.levels[row] - shows.held[t, held]))
             blend(textures, row, detail, u, v, triangles.clamped[f], pixel, coarse)
         else:

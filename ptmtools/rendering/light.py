@@ -1,7 +1,7 @@
-"""The light of lit pictures: one distant lamp, and ambient light.
+"""Light of lit pictures: a distant lamp and ambient light.
 
-The lamp wraps around (half Lambert, squared), so that relief shows on all sides of a statue. It
-multiplies colours as sRGB encodes them, as the rest of the simulator does.
+The lamp wraps around objects (half Lambert, squared), so relief is visible on all sides of a
+statue. It multiplies sRGB values, like the rest of the simulator.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, normals
 from ptmtools.output.served import Served
 
-#: Share of the light that comes from everywhere, and a unit vector towards the lamp.
+#: Share of ambient light, and unit vector towards the lamp.
 AMBIENT = 0.3
 LAMP = tuple(float(v) for v in np.array([0.5, 0.7, 0.6]) / np.linalg.norm([0.5, 0.7, 0.6]))
 
 
 def lamps(corner: Floats) -> Floats:
-    """(n,) how much light falls on triangles (n, 3, 3), which are flat: `AMBIENT` to 1."""
+    """(n,) light on triangles (n, 3, 3) with flat shading, `AMBIENT` to 1."""
     normal = normals(corner)
     length = np.linalg.norm(normal, axis=1)
     along = np.divide(normal @ LAMP, length, out=np.zeros(len(corner)), where=length > 0)
@@ -29,12 +29,12 @@ def lamps(corner: Floats) -> Floats:
 
 
 def lit(served: Served) -> Served:
-    """The same under the lamp."""
+    """Returns the database with colours multiplied by the light of the lamp."""
     surfaces = served.surfaces
     color = surfaces.color * lamps(surfaces.corner)[:, None]
     return replace(served, surfaces=replace(surfaces, color=color))
 
 
 def as_bytes(colors: Floats) -> NDArray[np.uint8]:
-    """Colours as 8 bits hold them."""
+    """Rounds colours to 8 bits."""
     return np.rint(np.clip(colors, 0, 255)).astype(np.uint8)

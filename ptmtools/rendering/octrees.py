@@ -1,4 +1,4 @@
-"""The octree textures of a served folder as arrays for kernels."""
+"""Octree textures of a served folder as arrays for kernels."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from ptmtools.output.served import BUILD, Served, Surfaces
 
 
 class Octrees(NamedTuple):
-    """Octree textures, one after the other.
+    """Concatenated octree textures.
 
     Attributes
     ----------
-    texel: (N, 4) uint8. begin: (O + 1,) where each octree begins in it.
+    texel: (N, 4) uint8. begin: (O + 1,) first texel of each octree.
     levels: (O,) number of levels.
-    low, side: (O, 3), (O,) of the cubes, metres.
-    of: (m,) int32 the octree of each triangle of the surfaces, -1 without.
+    low, side: (O, 3), (O,) lower corner and side of the cubes, metres.
+    of: (m,) int32 octree of each triangle of the surfaces, -1 for none.
     """
 
     texel: NDArray[np.uint8]
@@ -40,7 +40,7 @@ class Octrees(NamedTuple):
 
 
 def read_octrees(served: Served) -> Octrees:
-    """Reads the octree textures of a served folder, which may have none.
+    """Reads the octree textures of a served folder, if any.
 
     Raises DatabaseError: PTM-D005 a file is missing; PTM-D006 it is damaged, or does not match the
     index.

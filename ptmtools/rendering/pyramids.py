@@ -1,4 +1,4 @@
-"""All levels of all textures as 8-bit RGB, in one array, for kernels that sample them."""
+"""All levels of all textures as one array of 8-bit RGB, for kernels that sample them."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from ptmtools.texture.detail import difference_between
 from ptmtools.texture.model import Limits
 from ptmtools.texture.samples import in_eight_bits
 
-#: A texture that needs more memory than this to decode is refused.
+#: Limit on the memory that decoding a texture may take.
 _LIMITS = Limits(decoded_bytes=1 << 33)
 
 
 def read_pyramids(
     served: Served, progress: Progress = silent, only: Collection[int] | None = None
 ) -> Pyramids:
-    """Decodes all textures, or ``only`` those of these numbers; the others have no levels.
+    """Decodes all textures, or only those whose number is in ``only``; the others get no levels.
 
     Raises
     ------
-    DatabaseError: PTM-D005, D006 a texture is missing or damaged, or not what the index says.
-    LimitError: those of `ptmtools.texture.open` and `PtmReader.levels`.
+    DatabaseError: PTM-D005, D006 a texture is missing, damaged or does not match the index.
+    LimitError: see `ptmtools.texture.open` and `PtmReader.levels`.
     """
     try:
         return _pyramids(served, progress, only)
@@ -74,8 +74,10 @@ def _pyramids(served: Served, progress: Progress, only: Collection[int] | None =
 
 
 def packed(chains: list[list[NDArray[np.uint8]]]) -> Pyramids:
-    """Textures of (h, w, 3) levels, the coarsest first, without means and differences. Empties each
-    list as soon as it is copied."""
+    """Packs textures of (h, w, 3) levels, the coarsest first, without means and differences.
+
+    Empties each list after copying it, to limit peak memory.
+    """
     levels = np.array([len(chain) for chain in chains], dtype=np.int64)
     start = np.zeros((len(chains), int(levels.max(initial=1))), np.int64)
     size = np.zeros((*start.shape, 2), np.int64)
@@ -101,7 +103,7 @@ def full_colors(sight: Sight, triangles: Triangles, pyramids: Pyramids) -> Float
 
 
 def mip_sizes(width: int, height: int) -> Iterator[tuple[int, int]]:
-    """Sizes of an image and of its mip levels, the finest first."""
+    """Yields the sizes of an image and of its mip levels, the finest first."""
     yield width, height
     while max(width, height) > 1:
         width, height = max(1, width >> 1), max(1, height >> 1)
@@ -109,8 +111,8 @@ def mip_sizes(width: int, height: int) -> Iterator[tuple[int, int]]:
 
 
 def mip_levels(image: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
-    """An (h, w, 3) image, of powers of two, with its mip levels, the coarsest first: rounded means
-    of 2 × 2 texels."""
+    """Returns the mip levels of an (h, w, 3) image with power-of-two sides, the coarsest first:
+    rounded means of 2 × 2 texels."""
     levels = [image]
     while max(image.shape[:2]) > 1:
         for axis in (0, 1):
@@ -125,7 +127,7 @@ def mip_levels(image: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
 
 
 def rgb(samples: NDArray[Any]) -> NDArray[np.uint8]:
-    """(h, w, 3) of (h, w, c) samples of any kind."""
+    """Converts (h, w, c) samples of any type to (h, w, 3) RGB."""
     shown = in_eight_bits(samples)
     color = shown[:, :, :3] if shown.shape[2] >= 3 else np.repeat(shown[:, :, :1], 3, axis=2)
     return np.ascontiguousarray(color)

@@ -1,6 +1,6 @@
-"""Camera rays: the first surface along each, by Embree, and the boxes and hulls in the frustum.
+"""Camera rays: the first surface along each, by Embree, and frustum tests of boxes and hulls.
 
-One-sided surfaces are passed through from behind, and glass always: it shows what is behind it.
+A ray passes through one-sided surfaces from behind, and through glass always.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from ptmtools.embree import ray_tree
 from ptmtools.output.served import Surfaces
 from ptmtools.rendering.records import Sight
 
-#: Lines of the screen that pictures are made for.
+#: Lines of the target screen.
 LINES = 1080
-#: Rays that are cast at a time.
-_RAYS = 1 << 18
-#: Surfaces that a ray passes through before it is given up.
-_LAYERS = 16
+#: Rays per call of Embree.
+_BATCH = 1 << 18
+#: Maximum number of surfaces along a ray.
+_MAX_HITS = 16
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Camera:
     Attributes
     ----------
     width, height: pixels. field_of_view: vertical, radians. aspect: width over height of the view,
-        whatever its pixels are. lines: of the screen that the picture is made for.
+        independent of the number of pixels. lines: lines of the target screen.
     """
 
     width: int
@@ -42,7 +42,7 @@ class Camera:
 
     @property
     def sparse(self) -> Bools:
-        """(height * width,) which pixels a client's own item buffer has: every other one each way,
+        """(height * width,) pixels of a client's item buffer: every second pixel along each axis,
         from the second on."""
         odd = [np.arange(side) % 2 == 1 for side in (self.height, self.width)]
         result: Bools = np.outer(*odd).ravel()
@@ -50,12 +50,13 @@ class Camera:
 
     @property
     def pixel(self) -> float:
-        """Side of a pixel of the screen at depth 1, whatever the pixels of the camera are."""
+        """Side of a pixel of the target screen at depth 1, independent of the camera's own
+        pixels."""
         return float(2 * np.tan(self.field_of_view / 2) / self.lines)
 
     def rays(self, direction: Floats) -> tuple[Floats, Floats]:
-        """(F, height, width, 3) rays of which the component along the view is 1, from the top left,
-        and (F, 2, 3) right and up, for (F, 3) unit directions of view."""
+        """(F, height, width, 3) rays with component 1 along the view, from the top left, and
+        (F, 2, 3) right and up vectors, for (F, 3) unit view directions."""
         right, up = axes(direction)
         tall = np.tan(self.field_of_view / 2)
         across = ((np.arange(self.width) + 0.5) / self.width * 2 - 1) * tall * self.aspect
@@ -69,8 +70,7 @@ class Camera:
 
 
 def axes(direction: Floats) -> tuple[Floats, Floats]:
-    """(F, 3) right and up of (F, 3) unit directions of view; who looks straight up or down has x to
-    the right."""
+    """(F, 3) right and up vectors of (F, 3) unit view directions; right is x for vertical views."""
     right = np.stack([-direction[:, 2], np.zeros(len(direction)), direction[:, 0]], axis=1)
     length = np.linalg.norm(right, axis=1, keepdims=True)
     right = np.where(length > 1e-9, right / np.maximum(length, 1e-9), [1.0, 0.0, 0.0])
@@ -78,7 +78,7 @@ def axes(direction: Floats) -> tuple[Floats, Floats]:
 
 
 class Caster:
-    """Casts rays at surfaces."""
+    """Ray caster over the surfaces of a scene."""
 
     def __init__(self, surfaces: Surfaces) -> None:
         corner = surfaces.corner
@@ -88,28 +88,28 @@ class Caster:
         self._one_sided, self._seen = ~surfaces.two_sided, surfaces.seen
         low, high = corner.min(axis=(0, 1), initial=0), corner.max(axis=(0, 1), initial=0)
         self._middle = (low + high) / 2
-        #: Metres by which a ray goes on behind what it passed through.
+        #: Offset of a ray's new origin behind a surface that it passed through, metres.
         self._step = 1e-6 * max(1.0, float((high - low).max()))
         self._tree: Any = None
         if len(self._which):
             self._tree = ray_tree(corner[self._which] - self._middle)
 
     def look(self, camera: Camera, eye: Floats, direction: Floats) -> Sight:
-        """What is seen from an eye (3,) in a direction (3,)."""
+        """Casts all rays of a camera from an eye (3,) in a direction (3,)."""
         rays, axes = camera.rays(direction[None])
         ray = rays.reshape(-1, 3)
-        parts = np.array_split(ray, -(-len(ray) // _RAYS))
+        parts = np.array_split(ray, -(-len(ray) // _BATCH))
         triangle = np.concatenate([self.first(eye, part) for part in parts])
         return Sight(triangle, ray, axes[0], eye, camera.pixel)
 
     def first(self, eye: Floats, along: Floats) -> Ints:
-        """(n,) the triangle that each of (n, 3) rays from a point (3,) shows, or -1."""
+        """(n,) first visible triangle along each of (n, 3) rays from a point (3,), -1 for none."""
         result = np.full(len(along), -1, np.int64)
         if self._tree is None:
             return result
         waiting = np.arange(len(along))
         start = np.repeat((eye - self._middle)[None], len(along), axis=0)
-        for _ in range(_LAYERS):
+        for _ in range(_MAX_HITS):
             origin = start[waiting].astype(np.float32)
             hit = self._tree.run(origin, along[waiting].astype(np.float32), query="INTERSECT")
             met = hit >= 0
@@ -128,13 +128,13 @@ class Caster:
         return result
 
 
-#: Nothing nearer than this is in front of the camera, metres.
+#: Distance of the near plane, metres.
 NEAR = 0.05
 _CORNERS = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], dtype=np.float64)
 
 
 class Frustum:
-    """Of a camera at ``eye`` (3,) along ``direction`` (3,); ``angle`` is vertical, radians."""
+    """View frustum at ``eye`` (3,) along ``direction`` (3,); ``angle`` is vertical, radians."""
 
     def __init__(self, eye: Floats, direction: Floats, angle: float, aspect: float) -> None:
         self.eye, self.direction = eye, direction
@@ -147,31 +147,32 @@ class Frustum:
 
     @cached_property
     def _planes(self) -> Floats:
-        """(5, 3) inward normals of the sides, and the view itself."""
+        """(5, 3) inward normals of the four sides, and the view direction."""
         right, up = self._axes
         ahead = self.direction
         wide, tall = ahead * self._wide, ahead * self._tall
         return np.array([wide + right, wide - right, tall + up, tall - up, ahead])
 
     def meets_boxes(self, low: Floats, high: Floats) -> Bools:
-        """(n,) which boxes reach into it; some that just pass by a corner count, too."""
+        """(n,) whether each box may meet the frustum; conservative near its corners."""
         normal = self._planes
-        # The corner of each box that is farthest along a normal.
+        # Corner of each box farthest along each normal.
         far = np.where(normal[:, None] > 0, high[None], low[None]) - self.eye
         inside: Bools = (np.einsum("pij,pj->pi", far, normal) > 0).all(axis=0)
         return inside
 
     def meets_hull(self, points: Floats) -> bool:
-        """Whether the convex hull of (n, 3) points reaches into it, or passes by a corner."""
+        """Whether the convex hull of (n, 3) points may meet the frustum; conservative near its
+        corners."""
         return bool(((points - self.eye) @ self._planes.T).max(axis=0).min() > 0)
 
     def distance(self, low: Floats, high: Floats) -> Floats:
-        """(n,) metres from the eye to the nearest point of each box."""
+        """(n,) distance from the eye to the nearest point of each box, metres."""
         outside = np.maximum(np.maximum(low - self.eye, self.eye - high), 0)
         return np.asarray(np.linalg.norm(outside, axis=1))
 
     def covered(self, low: Floats, high: Floats) -> Floats:
-        """(n,) the share of the screen that the projected box around each box covers; all of it if
+        """(n,) share of the screen covered by the bounding rectangle of each projected box; 1 if
         the box reaches behind the camera."""
         right, up = self._axes
         corner = low[:, None] + (high - low)[:, None] * _CORNERS - self.eye

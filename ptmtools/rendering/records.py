@@ -1,4 +1,4 @@
-"""Records of the kernels: textures, triangles, and the surfaces that a camera sees."""
+"""Records of the kernels: textures, triangles, and visible surfaces."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from ptmtools.scene.colors import gradients
 
 
 class Pyramids(NamedTuple):
-    """Levels count from the coarsest, 0.
+    """Mip pyramids; level 0 is the coarsest.
 
     Attributes
     ----------
     texel: (N,) uint8 RGB, level by level, rows from the top.
-    start: (T, L) where each level begins in it.
-    size: (T, L, 2) int64 width and height; 0 beyond the finest.
-    levels: (T,) how many each texture has.
-    mean: (T, 3) the mean of the coarsest level, 0 to 255.
-    differences: (T, L) of a level to the level below it, as `ptmtools.texture.detail` has them, of
-        what is shown; 0 for the coarsest.
+    start: (T, L) index of the first texel of each level.
+    size: (T, L, 2) int64 width and height; 0 beyond the finest level.
+    levels: (T,) number of levels.
+    mean: (T, 3) mean of the coarsest level, 0 to 255.
+    differences: (T, L) difference of each level to the next coarser one, as defined by
+        `ptmtools.texture.detail`; 0 for the coarsest.
     """
 
     texel: NDArray[np.uint8]
@@ -35,14 +35,14 @@ class Pyramids(NamedTuple):
 
 
 class Shows(NamedTuple):
-    """What the columns of textures show (`Catalogue`): each the coarsest levels of a pyramid.
+    """Pictures of the columns of textures (`Catalogue`): each the coarsest levels of a pyramid.
 
     Attributes
     ----------
-    pyramids: any number of them.
-    row: (T, K) which of them each column shows. held: (T, K) how many of its levels.
-    last: (T,) column of each texture; the first is nothing.
-    mean: (T, 3) what is shown where nothing is there, 0 to 255.
+    pyramids: any number of pyramids.
+    row: (T, K) pyramid of each column. held: (T, K) number of its levels.
+    last: (T,) last column of each texture; column 0 has no picture.
+    mean: (T, 3) colour shown without levels, 0 to 255.
     """
 
     pyramids: Pyramids
@@ -53,7 +53,7 @@ class Shows(NamedTuple):
 
 
 def own_levels(pyramids: Pyramids) -> Shows:
-    """Of textures with a pyramid each, whose columns are its levels."""
+    """Returns the columns of textures with one pyramid each: its levels."""
     shape = pyramids.start.shape[0], pyramids.start.shape[1] + 1
     held = np.minimum(np.arange(shape[1]), pyramids.levels[:, None])
     row = np.repeat(np.arange(shape[0])[:, None], shape[1], axis=1)
@@ -61,7 +61,7 @@ def own_levels(pyramids: Pyramids) -> Shows:
 
 
 class Triangles(NamedTuple):
-    """All that are drawn.
+    """Drawn triangles.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class Triangles(NamedTuple):
 
 
 class Sight(NamedTuple):
-    """What the pixels of a frame show.
+    """Visible triangles of the pixels of a frame.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class Sight(NamedTuple):
 
 
 def triangles_of(surfaces: Surfaces) -> Triangles:
-    """All of them."""
+    """Returns the triangles of surfaces, with normals and gradients."""
     corner, uv = surfaces.corner, surfaces.uv
     return Triangles(
         corner, normals(corner), uv, gradients(corner, uv), surfaces.cell, surfaces.texture,

@@ -1,7 +1,7 @@
-"""The light of octree textures on the screen (`ptm build-scene --apo`), as compiled kernels.
+"""Compiled shading of octree textures (`ptm build-scene --apo`).
 
-A pixel shows the normal of the node around its point: at most as deep as nodes are no smaller than
-a pixel (Lacoste et al., section 4.2), and as far as levels are loaded.
+A pixel shows the normal of the deepest loaded node around its point that is no smaller than a pixel
+(Lacoste et al., section 4.2).
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from ptmtools.rendering.light import AMBIENT, LAMP
 from ptmtools.rendering.octrees import Octrees
 from ptmtools.rendering.records import Sight, Triangles
 
-#: The greatest coordinate in a cube.
+#: Largest coordinate in a unit cube.
 _LAST = float(np.nextafter(1.0, 0.0))
-#: Deeper than any octree.
+#: Depth beyond that of any octree.
 DEEP = 64
 _X, _Y, _Z = LAMP
 
 
 @plain_kernel
 def lamp(x: float, y: float, z: float) -> float:
-    """As `ptmtools.rendering.light.lamps`, of a normal of any length."""
+    """Light on a normal of any length, see `ptmtools.rendering.light.lamps`."""
     length = np.sqrt(x * x + y * y + z * z)
     along = (x * _X + y * _Y + z * _Z) / length if length > 0.0 else 0.0
     return AMBIENT + (1.0 - AMBIENT) * ((1.0 + along) / 2.0) ** 2
@@ -32,7 +32,7 @@ def lamp(x: float, y: float, z: float) -> float:
 
 @plain_kernel
 def depth_of(sight: Sight, i: int, triangles: Triangles) -> float:
-    """Distance along the view to the triangle of a pixel; infinite without one."""
+    """Distance along the view to the triangle of a pixel, infinite for none."""
     f = sight.triangle[i]
     if f < 0:
         return np.inf
@@ -45,8 +45,8 @@ def depth_of(sight: Sight, i: int, triangles: Triangles) -> float:
 
 @plain_kernel
 def stop_of(sight: Sight, i: int, triangles: Triangles, depth: float, side: float) -> int:
-    """The depth of the nodes no larger than a pixel of the screen, in a cube of this ``side``:
-    ⌈log₂(1 / D)⌉ of the smaller step D to the next pixel beside or above (paper 2, §4.2)."""
+    """Depth of the first nodes no larger than a pixel of the screen, in a cube of this ``side``:
+    ⌈log₂(1 / D)⌉ for the smaller step D to the adjacent pixels beside and above (paper 2, §4.2)."""
     f = sight.triangle[i]
     ray, normal = sight.ray[i], triangles.normal[f]
     facing = normal[0] * ray[0] + normal[1] * ray[1] + normal[2] * ray[2]
@@ -68,8 +68,8 @@ def stop_of(sight: Sight, i: int, triangles: Triangles, depth: float, side: floa
 def descend(
     octrees: Octrees, o: int, x: float, y: float, z: float, stop: int, light: Floats
 ) -> int:
-    """Writes to ``light`` (L,) the light on a point (metres) by the normals of the nodes around it,
-    from the root to depth ``stop`` or the last node; returns their number."""
+    """Writes the light on a point (metres) by the normals of the nodes around it, from the root to
+    depth ``stop`` or a leaf, to ``light`` (L,); returns their number."""
     texel = octrees.texel[octrees.begin[o] : octrees.begin[o + 1]]
     low, side = octrees.low[o], octrees.side[o]
     x = min(max((x - low[0]) / side, 0.0), _LAST)
@@ -98,8 +98,9 @@ def relieve(
     held: Ints,
     shown: Floats,
 ) -> None:
-    """Lights the pixels ``shown`` (n, 3) by the levels ``held`` (O,) of the octrees; pixels without
-    an octree keep their light. ``loaded`` (C,) is the loaded geometry."""
+    """Lights the pixels ``shown`` (n, 3) by the loaded levels ``held`` (O,) of the octrees; pixels
+    without an octree keep their colours. ``loaded`` (C,): whether the geometry of a cell is
+    loaded."""
     light = np.zeros(DEEP)
     for i in range(len(shown)):
         f = sight.triangle[i]
