@@ -1,11 +1,11 @@
-"""A walk: position and view direction of a visitor's eye over time.
+"""Walk: position and view direction of a visitor's eye over time.
 
-`ptm path` makes walks, and the page records those of visitors, at any rate and not always evenly.
-Both are the same JSON document with a published schema (docs/design/walkthrough.md).
+`ptm path` generates walks; the web page records those of visitors, at any rate, possibly unevenly.
+Both use one JSON document with a published schema (docs/design/walkthrough.md).
 
-A recording in a browser also holds its conditions, so that a simulated client can repeat it: the
-time of each frame and how long it kept the page busy, the age of the item buffer, the lines of the
-screen, the sizes of the files, and the requests of the page before its first frame.
+A recording in a browser also holds its conditions, so that a simulated client can repeat it: frame
+times and how long each frame kept the page busy, the age of the item buffer, the lines of the
+screen, file sizes, and the requests of the page before its first frame.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError, LimitError, naming
 from ptmtools.files import open_regular
 
-#: Kinds of files that arrive without a client's request; ``page`` are the files of the page itself.
+#: Kinds of files that arrive without a request of the client; ``page``: files of the page itself.
 KINDS = ("page", "index", "record", "geometry")
 
 
 class PushedFile(NamedTuple):
-    """A file that arrived without the client's request: s since navigation, one of `KINDS`, the
-    number of the cell, bytes on the link."""
+    """A file that arrived without a request of the client: seconds since navigation, one of
+    `KINDS`, number of the cell, bytes on the link."""
 
     asked: float
     kind: str
@@ -40,12 +40,12 @@ class PushedFile(NamedTuple):
 
 
 class Waits:
-    """Waiting times, by their beginning.
+    """Waiting times by their start.
 
     Parameters
     ----------
     waited: (m, 2) s, intervals in which a request or response waited.
-    busy: (k, 2) s, intervals in which any would have waited.
+    busy: (k, 2) s, intervals in which any request or response would have waited.
     """
 
     def __init__(self, waited: Floats, busy: Floats | None = None) -> None:
@@ -54,8 +54,8 @@ class Waits:
         self._ends = np.sort(waited[:, 1])
 
     def until(self, moment: float) -> float:
-        """The end of a wait that begins at a moment, s: at once, or, within an interval of waiting,
-        at the next recorded end."""
+        """Returns the end of a wait that starts at ``moment``, s: ``moment`` itself, or the next
+        recorded end if it lies within a waiting interval."""
         row = int(np.searchsorted(self._spans[:, 0], moment, "right")) - 1
         if row < 0 or moment >= self._spans[row, 1]:
             return moment
@@ -77,9 +77,11 @@ class Browser:
     files: pushed files, by time.
     cell: (n,) the page's cell at each sample, -1 for none.
     age: (n,) age of the available item buffer, s, -1 for none.
-    sent: waits of requests until their sending. taken: waits of responses until their handling.
+    sent: delays of requests until sent. taken: delays of responses until handled.
 
-    Raises InputError PTM-I801 for values that no browser records.
+    Raises
+    ------
+    InputError: PTM-I801 the values are inconsistent.
     """
 
     begun: float
@@ -106,8 +108,10 @@ class Browser:
 
 
 def browser_of(recorded: Mapping[str, Any], time: Floats) -> Browser:
-    """The conditions in the document of a walk with samples at (n,) seconds, by its schema; raises
-    InputError PTM-I801."""
+    """Reads the conditions of a recording, valid by its schema, with samples at (n,) seconds.
+
+    Raises InputError PTM-I801.
+    """
     samples = len(time)
     if len(recorded["frames"]) != samples:
         raise InputError(
@@ -119,9 +123,9 @@ def browser_of(recorded: Mapping[str, Any], time: Floats) -> Browser:
         np.array(recorded[k], dtype=np.float64).reshape(-1, 2) for k in ("sent", "taken")
     )
     time = recorded["begun"] + time
-    # The page was busy since its last recorded event, and before it had a client.
-    signs = np.sort(np.concatenate([[0.0], time, taken[:, 1], sent[:, 0]]))
-    since = signs[np.maximum(np.searchsorted(signs, taken[:, 0], "right") - 1, 0)]
+    # The page was busy since its last recorded event, and before its client started.
+    events = np.sort(np.concatenate([[0.0], time, taken[:, 1], sent[:, 0]]))
+    since = events[np.maximum(np.searchsorted(events, taken[:, 0], "right") - 1, 0)]
     taken = np.column_stack([np.minimum(since, taken[:, 0]), taken[:, 1]])
     busy = np.column_stack([time - frames[:, 2], time])
     return Browser(
@@ -140,7 +144,7 @@ def browser_of(recorded: Mapping[str, Any], time: Floats) -> Browser:
 
 
 def _merged(spans: Floats) -> Floats:
-    """(m, 2) intervals of time, overlapping ones joined."""
+    """Merges overlapping (m, 2) intervals of time."""
     intervals: list[list[float]] = []
     for begin, end in sorted(spans.tolist()):
         if intervals and begin <= intervals[-1][1]:
@@ -151,12 +155,12 @@ def _merged(spans: Floats) -> Floats:
 
 
 FORMAT, SCHEMA = "ptmtools walk", 1
-#: Largest file of a walk, bytes: a day at 60 samples a second.
-LARGEST = 1 << 30
-#: Digits after the point in a file: 0.1 µm and 0.1 µs.
+#: Maximum size of a walk file, bytes: a day at 60 samples a second.
+MAX_BYTES = 1 << 30
+#: Decimals in a file: 0.1 µm and 0.1 µs.
 DIGITS = 7
-#: Largest deviation of a direction's length from 1 that is kept, and that is corrected.
-_UNIT, _NEARLY = 1e-6, 1e-3
+#: Maximum deviation of a direction's length from 1 that is preserved, and that is corrected.
+_EXACT_LENGTH, _NEAR_LENGTH = 1e-6, 1e-3
 
 
 @dataclass(frozen=True)
@@ -167,16 +171,16 @@ class Walk:
     ----------
     time: (n,) seconds, from 0, strictly increasing; n >= 2.
     eye: (n, 3) world metres, Y up.
-    direction: (n, 3) unit vectors, where the eye looks.
+    direction: (n, 3) unit view directions.
     field_of_view: vertical, radians.
-    aspect: width of the picture by its height.
+    aspect: width of the picture over its height.
     browser: conditions of a recording in a browser, or None.
 
     Raises
     ------
-    InputError: PTM-I801 a number is not finite, the arrays do not fit together, there are fewer
-        than two samples, times do not increase from 0, a direction is no unit vector (deviations up
-        to 1e-3 are corrected), or field of view or aspect are out of range.
+    InputError: PTM-I801 a number is not finite, array shapes do not match, there are fewer than two
+        samples, times do not increase from 0, a direction is no unit vector (deviations up to 1e-3
+        are corrected), or field of view or aspect are out of range.
     """
 
     time: Floats
@@ -194,13 +198,13 @@ class Walk:
         _refuse(~np.isfinite(rows).all(axis=1), "PTM-I801", "a number is not finite")
         if count < 2:
             raise InputError("PTM-I801", f"a walk of {count} samples", remedy="record at least two")
-        early = np.diff(self.time, prepend=-1.0) <= 0
-        early[0] = self.time[0] != 0
-        _refuse(early, "PTM-I801", "times do not increase from 0")
+        unordered = np.diff(self.time, prepend=-1.0) <= 0
+        unordered[0] = self.time[0] != 0
+        _refuse(unordered, "PTM-I801", "times do not increase from 0")
         length = np.linalg.norm(self.direction, axis=1)
-        _refuse(abs(length - 1) > _NEARLY, "PTM-I801", "the direction is no unit vector")
-        whole = np.where(abs(length - 1) > _UNIT, length, 1.0)
-        object.__setattr__(self, "direction", self.direction / whole[:, None])
+        _refuse(abs(length - 1) > _NEAR_LENGTH, "PTM-I801", "the direction is no unit vector")
+        divisor = np.where(abs(length - 1) > _EXACT_LENGTH, length, 1.0)
+        object.__setattr__(self, "direction", self.direction / divisor[:, None])
         if not 0 < self.field_of_view < math.pi:
             raise InputError(
                 "PTM-I801",
@@ -211,17 +215,17 @@ class Walk:
 
     @property
     def duration(self) -> float:
-        """Seconds."""
+        """Duration, seconds."""
         return float(self.time[-1])
 
     @property
     def length(self) -> float:
-        """Metres that the eye moved."""
+        """Path length of the eye, metres."""
         return float(np.linalg.norm(np.diff(self.eye, axis=0), axis=1).sum())
 
     def at(self, times: Floats) -> tuple[Floats, Floats]:
-        """(m, 3) eyes and (m, 3) unit directions at (m,) times, seconds; beyond the ends those at
-        the ends.
+        """Interpolates (m, 3) eyes and (m, 3) unit directions at (m,) times, seconds, clamped to
+        the walk.
 
         Half-way between opposite directions the first one holds.
         """
@@ -231,13 +235,13 @@ class Walk:
         eye = (1 - share) * self.eye[row] + share * self.eye[row + 1]
         direction = (1 - share) * self.direction[row] + share * self.direction[row + 1]
         length = np.linalg.norm(direction, axis=1, keepdims=True)
-        turned = np.divide(direction, length, out=self.direction[row], where=length > _UNIT)
+        turned = np.divide(direction, length, out=self.direction[row], where=length > _EXACT_LENGTH)
         return eye, turned
 
 
 def walk_text(walk: Walk) -> str:
-    """The document of a walk, a line for each sample, with `DIGITS` digits after the point; without
-    the conditions of a browser."""
+    """Serialises a walk, one line per sample, with `DIGITS` decimals and without the conditions of
+    a browser."""
     rows = np.column_stack([walk.time, walk.eye, walk.direction]).round(DIGITS) + 0.0  # no -0
     head = json.dumps(
         {
@@ -254,18 +258,21 @@ def walk_text(walk: Walk) -> str:
 def read_walk(path: str | os.PathLike[str]) -> Walk:
     """Reads a walk from a file.
 
-    Raises InputError: PTM-I122 the file cannot be read; PTM-I801 it is no walk, does not match its
-    schema, or is refused by `Walk` or `Browser`. LimitError PTM-L204: it is larger than any walk.
+    Raises
+    ------
+    InputError: PTM-I122 the file cannot be read; PTM-I801 it is no walk, does not match its schema,
+        or is rejected by `Walk` or `Browser`.
+    LimitError: PTM-L204 it is larger than `MAX_BYTES`.
     """
     try:
         with open_regular(Path(path)) as stream:
-            data = stream.read(LARGEST + 1)
+            data = stream.read(MAX_BYTES + 1)
     except (OSError, ValueError) as fault:
         reason = getattr(fault, "strerror", None) or fault
         raise InputError("PTM-I122", f"cannot be read ({reason})", file=path) from fault
     with naming(path):
-        if len(data) > LARGEST:
-            raise LimitError("PTM-L204", f"more than {LARGEST >> 20} MiB, which is no walk")
+        if len(data) > MAX_BYTES:
+            raise LimitError("PTM-L204", f"more than {MAX_BYTES >> 20} MiB, which is no walk")
         return parse_walk(data)
 
 
@@ -294,14 +301,14 @@ def parse_walk(data: bytes) -> Walk:
     return Walk(rows[:, 0], rows[:, 1:4], rows[:, 4:], *view, browser)
 
 
-def _no_walk(what: str) -> InputError:
+def _no_walk(problem: str) -> InputError:
     return InputError(
-        "PTM-I801", f"is no walk: {what}", remedy="make one with `ptm path DB -o walk.json`"
+        "PTM-I801", f"is no walk: {problem}", remedy="make one with `ptm path DB -o walk.json`"
     )
 
 
 def _refuse(wrong: Any, code: str, message: str) -> None:
-    """Raises for the first wrong sample, if any."""
+    """Raises InputError for the first invalid sample, if any."""
     if wrong.any():
         place = f"samples[{int(wrong.argmax())}]"
         raise InputError(code, message, place=place)

@@ -129,9 +129,9 @@ def test_what_cannot_be_read(name: str, tmp_path: Path) -> None:
 def test_a_file_that_is_too_large(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "walk.json"
     file.write_bytes(document())
-    monkeypatch.setattr(module, "LARGEST", len(document()))
+    monkeypatch.setattr(module, "MAX_BYTES", len(document()))
     assert read_walk(file).duration == 1.75
-    monkeypatch.setattr(module, "LARGEST", len(document()) - 1)
+    monkeypatch.setattr(module, "MAX_BYTES", len(document()) - 1)
     with pytest.raises(LimitError, match="PTM-L204"):
         read_walk(file)
 
