@@ -348,7 +348,7 @@ class _Attached(_Costs):
 #: Shares of a triangle that differ by less are equal, in digits.
 GAIN_DIGITS = 6
 #: The warning on a model of one cell.
-ONE_HALL = Warned("visibility culling gains nothing here: the model is a single hall")
+ONE_HALL = Warned("visibility culling saves nothing here: the model is a single hall")
 
 
 def grouped(cells: Cells, options: SubdivideOptions) -> Cells:

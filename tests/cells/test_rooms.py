@@ -109,7 +109,7 @@ def test_a_hall_is_one_cell_and_says_so(quads: BuildScene, room_faces: Faces) ->
     assert subdivide(scene, SubdivideOptions(cells="leaf", wall_area=1)).cell_count > 4
     hall = subdivide(scene, SubdivideOptions(cells="room", wall_area=1))
     assert hall.cell_count == 1
-    assert hall.notes[-1] == "visibility culling gains nothing here: the model is a single hall"
+    assert hall.notes[-1] == "visibility culling saves nothing here: the model is a single hall"
 
 
 @pytest.fixture

@@ -55,7 +55,7 @@ def test_two_rooms(tmp_path: Path) -> None:
     done = run("build-scene", TWO_ROOMS / "two_rooms.obj", "-o", "rooms.db", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert "2 cells of 3 convex leaves, 2 portals; closed to the outside" in done.stdout
-    assert "visibility culling gains little" in done.stdout
+    assert "visibility culling saves little" in done.stdout
     assert "ptm validate rooms.db" in done.stdout
 
     db = tmp_path / "rooms.db"
@@ -275,7 +275,7 @@ def test_gallery_is_one_hall_and_said_to_be(
     done = ptm("validate", db, "--segments", 100_000)
     assert done.status == 0, done.out
     printed = [note for stage in report["stages"] for note in stage["notes"] if "culling" in note]
-    assert printed == ["visibility culling gains nothing here: the model is a single hall"]
+    assert printed == ["visibility culling saves nothing here: the model is a single hall"]
 
 
 def test_progress_is_not_shown_to_a_pipe(tmp_path: Path) -> None:

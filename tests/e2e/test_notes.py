@@ -32,7 +32,9 @@ def test_warnings_come_with_their_stage_and_notes_are_counted(ptm: Ptm, lying: P
     assert (done.status, done.err) == (0, "")
     lines = done.out.splitlines()
     assert lines[0].startswith("scene ")
-    assert lines[1].startswith("warning: the format has y up, but the model seems to lie on its")
+    assert lines[1].startswith(
+        "warning: the format prescribes Y as the up axis, but the model seems to lie on its"
+    )
     assert lines[2].startswith("cells ")
     assert lines[-1].endswith(" notes not shown; -v lists them")
     assert "note: " not in done.out
@@ -48,7 +50,7 @@ def test_warnings_come_with_their_stage_and_notes_are_counted(ptm: Ptm, lying: P
 
     turned = ptm("cells", lying, "--up", "z").out
     assert "warning: " not in turned
-    assert "1 unit = 1 m, z up; 19.2 × 11.6 m, 3.5 m high" in turned
+    assert "1 unit = 1 m, Z up; 19.2 × 11.6 m, 3.5 m high" in turned
 
 
 def test_the_json_report_is_complete(ptm: Ptm, lying: Path) -> None:
@@ -105,7 +107,7 @@ def test_a_house_of_walls_stands_up(ptm: Ptm, tmp_path: Path) -> None:
     path = tmp_path / "walls.obj"
     path.write_text(obj_text(house(floor=False, roof=False)))
     out = ptm("cells", path).out
-    assert "z up (unit and up axis guessed); 19.2 × 11.6 m, 3 m high" in out
+    assert "Z up (unit and up axis guessed); 19.2 × 11.6 m, 3 m high" in out
 
 
 def test_the_runner_up_of_the_up_axis_is_shown_with_its_stage(ptm: Ptm, tmp_path: Path) -> None:

@@ -89,5 +89,5 @@ def test_links_have_names() -> None:
         "4 Mbit/s",
         "1 Gbit/s",
         "0.5 bit/s",
-        "no limit of bandwidth",
+        "unlimited bandwidth",
     ]

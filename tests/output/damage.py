@@ -23,7 +23,7 @@ KINDS = {
     "coord_index": ("D661", r"^coordIndex"),
     "tex_coord_index": ("D661", r"^texCoordIndex"),
     "colour": ("D661", "colour"),
-    "leads_out": ("D671", "leads out|is no relative URL"),
+    "leads_out": ("D671", "points outside|is no relative URL"),
     "no_file": ("D671", "no such file"),
     "malformed_url": ("D671", "percent-encoded"),
     "twice": ("D671", r"is named \d+ times"),

@@ -142,7 +142,7 @@ def test_a_taken_port(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         port = urlsplit(url_of(other)).port
         status, printed = failing(capsys, folder, "--port", port)
     assert status == 3
-    assert f"127.0.0.1:{port}: the port is taken by another program; give another" in printed
+    assert f"127.0.0.1:{port}: the port is taken by another program; use another" in printed
     assert "[PTM-I920]" in printed
 
 

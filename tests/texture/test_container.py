@@ -124,7 +124,7 @@ def test_no_such_level(data: bytes) -> None:
 
 def test_what_lies_behind_the_last_group_is_reported() -> None:
     data = encode(IMAGE)
-    assert check(data + b"xyz") == ["3 bytes behind the last group"]
+    assert check(data + b"xyz") == ["3 bytes after the last group"]
     np.testing.assert_array_equal(decode(data + b"xyz"), IMAGE)
 
 

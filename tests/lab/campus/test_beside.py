@@ -89,7 +89,7 @@ def test_the_table(
     asked += ["--policy", "campus-low,best", "--bandwidth", "512k", "--memory", "inf"]
     assert main([*asked, "--csv", str(table), "--plot", str(plot), "--measure", "rmse"]) == 0
     printed = capsys.readouterr().out.splitlines()
-    assert any(line.startswith("The meshes of the campus leave out e of ") for line in printed)
+    assert any(line.startswith("The fully loaded campus has an e of ") for line in printed)
     best, low = (line.split() for line in printed[-2:])
     # Clients of the database come first.
     assert (best[0], low[0]) == ("best", "campus-low")

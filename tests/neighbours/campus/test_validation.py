@@ -70,7 +70,7 @@ KINDS = {
     "schema": ("PTM-D800", ""),
     "missing": ("PTM-D803", ""),
     "recorded": ("PTM-D804", "bytes|CRC-32"),
-    "mesh": ("PTM-D804", "that of the meshes|faces|materials|coordinates"),
+    "mesh": ("PTM-D804", "bounding box|faces|materials|coordinates"),
     "texture": ("PTM-D800", "is not listed"),
     "material": ("PTM-D800", "material .* does not exist"),
     "levels": ("PTM-D800", "has [0-9]+ items"),
