@@ -1,14 +1,14 @@
-"""Makes the sample campus: forty buildings along a street of 1 km, as OBJ, MTL and PNG files.
+"""Generates the sample campus: forty buildings along a street of 1 km, as OBJ, MTL and PNG files.
 
     python sample_data/make_campus.py -o build/campus
     python sample_data/make_campus.py -o build/few --buildings 3 --length 100
 
-Metres, Y up. It stands in for the campus of the paper on levels of detail (section IV): the first
-third has buildings of which no two share a wall's texture, the last third is homogeneous. Beside
-colours some materials have an image of where they reflect (``map_Ks``), the trees one of where
-they are (``map_d``). ``campus_way.json`` is a walk along the street at 11 km/h, for ``ptm
-simulate``. The same seed gives the same bytes, whatever the machine (for the same numpy and
-Pillow). Needs numpy and Pillow, not ptmtools.
+Metres, Y up. The campus stands in for that of the paper on levels of detail (section IV): in the
+first third no two buildings share a wall texture, the last third is homogeneous. Some materials
+also have a specular mask (``map_Ks``), the trees an opacity mask (``map_d``).
+``campus_way.json`` is a walk along the street at 11 km/h, for ``ptm simulate``. The same seed gives
+the same bytes on every machine (for the same numpy and Pillow). Needs numpy and Pillow, not
+ptmtools.
 """
 
 from __future__ import annotations
@@ -36,13 +36,14 @@ from museum_parts.noise import bytes_of
 from museum_parts.obj import number, obj_text
 from PIL import Image
 
-#: What stands along the way, in its order: no two walls alike, then what recurs, then one kind.
+#: Recipes in order along the street: all different, then recurring ones, then a single kind.
 RECIPES = [*HETEROGENEOUS, *MIXED, *(residence(k) for k in range(14))]
 
 
 @dataclass(frozen=True)
 class CampusOptions:
-    """What `make_campus` builds; ``length`` in metres, textures are square, ``texture`` wide."""
+    """Options of `make_campus`: ``length`` in metres, ``texture`` the side of the square
+    textures."""
 
     buildings: int = 40
     length: float = 1000
@@ -51,17 +52,18 @@ class CampusOptions:
 
 
 def generator(seed: int, *stream: int) -> np.random.Generator:
-    """An independent stream of random numbers for each part of the campus."""
+    """Returns an independent stream of random numbers for a part of the campus."""
     return np.random.Generator(np.random.PCG64([seed, *stream]))
 
 
 def chosen(buildings: int) -> list[Recipe]:
-    """A recipe for each building: few of them come from the whole length of the way."""
+    """Selects a recipe for each building; small numbers are spread over the whole list."""
     return [RECIPES[k * len(RECIPES) // buildings] for k in range(buildings)]
 
 
 def make_things(options: CampusOptions) -> tuple[list[Thing], Street, tuple[float, float]]:
-    """All objects in the world, the street, and the (x, z) that the model was centred by."""
+    """Returns all objects in world coordinates, the street, and the (x, z) offset that centres
+    them."""
     street = Street(options.buildings, options.length)
     recipes = chosen(options.buildings)
     things: list[Thing] = make_ground(street)
@@ -76,7 +78,7 @@ def make_things(options: CampusOptions) -> tuple[list[Thing], Street, tuple[floa
         things.append(Thing(f"building_{plot.number + 1:02d}_{recipe.name}", faces))
     things += furnish(street, recipes, depths, generator(options.seed, 2))
     xs, zs = ([p[i] for t in things for f in t.faces for p in f.points] for i in (0, 2))
-    # Whole tenths of millimetres, so that rounding is that of the uncentred places.
+    # Whole tenths of millimetres, so centring does not change the rounding.
     x, z = (round((min(c) + max(c)) / 2, 4) for c in (xs, zs))
     for thing in things:
         thing.faces = [
@@ -107,7 +109,7 @@ def mtl_text(materials: dict[str, Material]) -> str:
 
 
 def pictures(materials: dict[str, Material], options: CampusOptions) -> Iterator[File]:
-    """The images of the materials, each with its further channels."""
+    """Returns the images of the materials with their masks."""
     size, seed = options.texture, options.seed
     streams = {name: k for k, name in enumerate(IMAGES)}
     masked = {m.image for m in materials.values() if m.mask}
@@ -152,7 +154,8 @@ def pictures(materials: dict[str, Material], options: CampusOptions) -> Iterator
 
 
 def make_campus(options: CampusOptions) -> Iterator[File]:
-    """The campus's files: relative path and a function that returns the bytes; the OBJ last.
+    """Returns the files of the campus: relative path and a function that returns the bytes; the OBJ
+    comes last.
 
     Raises ValueError if the buildings do not fit along the street.
     """
@@ -182,10 +185,20 @@ def main(arguments: list[str] | None = None) -> int:
     )
     add = parser.add_argument
     add("-o", "--output", type=Path, required=True, metavar="DIR", help="folder to write")
-    add("--buildings", type=between(1, 400), default=default.buildings, help="on both sides")
-    add("--length", type=between(50, 20000), default=default.length, help="m of street")
-    add("--seed", type=between(0, 2**63), default=default.seed, help="another campus")
-    add("--texture", type=between(8, 8192), default=default.texture, help="texels of a side")
+    add(
+        "--buildings",
+        type=between(1, 400),
+        default=default.buildings,
+        help="number of buildings, on both sides",
+    )
+    add("--length", type=between(50, 20000), default=default.length, help="length of the street, m")
+    add("--seed", type=between(0, 2**63), default=default.seed, help="seed of the random numbers")
+    add(
+        "--texture",
+        type=between(8, 8192),
+        default=default.texture,
+        help="side of the textures, texels",
+    )
     add("--force", action="store_true", help="write into a folder that holds other files")
     given = parser.parse_args(arguments)
     options = CampusOptions(given.buildings, given.length, given.seed, given.texture)

@@ -1,14 +1,14 @@
-"""Makes the sample museum: a building to try ptmtools on, as OBJ, MTL and PNG files.
+"""Generates the sample museum, a building to try ptmtools on, as OBJ, MTL and PNG files.
 
     python sample_data/make_museum.py -o sample_data/museum
     python sample_data/make_museum.py -o big --rooms 200 --textures 120
     python sample_data/make_museum.py -o mine --images ~/Pictures
     python sample_data/make_museum.py --two-rooms -o sample_data/two_rooms
 
-Metres, Y up. Rooms on floors, joined by doorways, corridors and stairwells; walls with
-thickness; windows of transparent glass (``--no-windows`` leaves them out: then the building is
-closed); pictures, statues and benches. The same seed gives the same bytes, whatever the machine
-(for the same numpy and Pillow). Needs numpy and Pillow, not ptmtools.
+Metres, Y up. Floors of rooms, joined by doorways, corridors and stairwells; walls with thickness;
+windows of transparent glass (without them, by ``--no-windows``, the building is closed); pictures,
+statues and benches. The same seed gives the same bytes on every machine (for the same numpy and
+Pillow). Needs numpy and Pillow, not ptmtools.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from PIL import Image, ImageOps
 
 Color = tuple[float, float, float]
 
-#: Material: its texture, the tint of the texture, the colour without it.
+#: Material: texture, tint of the texture, colour without the texture.
 MATERIALS: dict[str, tuple[str, Color, Color]] = {
     "plaster_cream": ("plaster_cream", (1, 1, 1), (0.87, 0.84, 0.77)),
     "plaster_red": ("plaster_red", (1, 1, 1), (0.45, 0.15, 0.14)),
@@ -59,7 +59,7 @@ GLASS = "newmtl glass\nKd 0.75 0.85 0.9\nd 0.3\nillum 1\n"
 
 @dataclass(frozen=True)
 class MuseumOptions:
-    """What `make_museum` builds; textures are square, ``size`` texels wide."""
+    """Options of `make_museum`; ``size`` is the side of the square textures, texels."""
 
     rooms: int = 12
     textures: int = 31
@@ -71,7 +71,7 @@ class MuseumOptions:
 
 @dataclass(frozen=True)
 class Picture:
-    """A file of the museum's textures folder: name, width over height as hung, and its bytes."""
+    """A file in the textures folder: name, width over height as hung, and bytes."""
 
     name: str
     aspect: float
@@ -79,14 +79,14 @@ class Picture:
 
 
 def generator(seed: int, *stream: int) -> np.random.Generator:
-    """An independent stream of random numbers for each part of the museum."""
+    """Returns an independent stream of random numbers for a part of the museum."""
     return np.random.Generator(np.random.PCG64([seed, *stream]))
 
 
 def surface_names(things: list[Thing], textures: int) -> list[str]:
-    """At most a third of the textures covers walls and floors, the rest are paintings."""
+    """Returns the textures of walls and floors, at most a third of all; the rest are paintings."""
     used = {MATERIALS[f.material][0] for t in things for f in t.faces if f.material in MATERIALS}
-    used.add("gilt")  # frames, which are hung later
+    used.add("gilt")  # frames are hung later
     return [name for name in SURFACES if name in used][: textures // 3]
 
 
@@ -115,10 +115,10 @@ def generated_pictures(count: int, options: MuseumOptions) -> list[Picture]:
 
 
 def users_pictures(folder: Path) -> list[Picture]:
-    """The images of a folder, in the order of their names, under names that are safe anywhere.
+    """Returns the images of a folder, ordered by name, under names safe on every system.
 
-    PNG and JPEG files are copied byte for byte unless a camera's orientation must be applied;
-    everything else becomes PNG. Files that Pillow cannot read are named on stderr.
+    PNG and JPEG files are copied byte for byte unless the camera orientation must be applied; other
+    formats are converted to PNG. Files that Pillow cannot read are named on stderr.
     """
     actual: list[Picture] = []
     for path in sorted(p for p in folder.iterdir() if p.is_file()):
@@ -147,7 +147,7 @@ def users_pictures(folder: Path) -> list[Picture]:
 
 
 def mtl_text(things: list[Thing], surfaces: list[str], pictures: list[Picture]) -> str:
-    """The materials that are used, in a fixed order."""
+    """Returns the used materials in a fixed order."""
     used = {face.material for thing in things for face in thing.faces}
     blocks = [f"{HEAD} museum: materials\n"]
     for name, (texture, tint, plain) in MATERIALS.items():
@@ -165,9 +165,10 @@ def mtl_text(things: list[Thing], surfaces: list[str], pictures: list[Picture]) 
 
 
 def make_museum(options: MuseumOptions) -> Iterator[File]:
-    """The museum's files: relative path and a function that returns the bytes; the OBJ last.
+    """Returns the files of the museum: relative path and a function that returns the bytes; the OBJ
+    comes last.
 
-    Raises ValueError if there are more pictures than walls, or none of the user's can be read.
+    Raises ValueError if there are more pictures than walls, or if no image of the user can be read.
     """
     plan = make_plan(options.rooms, generator(options.seed, 0), windows=options.windows)
     shell, panels = make_shell(plan)
@@ -204,9 +205,14 @@ def main(arguments: list[str] | None = None) -> int:
     add = parser.add_argument
     add("-o", "--output", type=Path, required=True, metavar="DIR", help="folder to write")
     add("--rooms", type=between(1, 2000), default=default.rooms, help="rooms besides corridors")
-    add("--textures", type=between(1, 5000), default=default.textures, help="images made")
-    add("--size", type=between(4, 8192), default=default.size, help="texels of an image's side")
-    add("--seed", type=between(0, 2**63), default=default.seed, help="another museum")
+    add(
+        "--textures",
+        type=between(1, 5000),
+        default=default.textures,
+        help="number of generated images",
+    )
+    add("--size", type=between(4, 8192), default=default.size, help="side of an image, texels")
+    add("--seed", type=between(0, 2**63), default=default.seed, help="seed of the random numbers")
     add("--images", type=Path, metavar="DIR", help="hang the images of this folder instead")
     add("--no-windows", action="store_true", help="a closed building")
     add("--two-rooms", action="store_true", help="write the hand-checkable two rooms instead")

@@ -1,12 +1,12 @@
-"""Makes a gallery of photographs: one hall, its walls full of large images, all different.
+"""Generates a gallery of photographs: one hall whose walls are full of large, distinct images.
 
     python sample_data/make_photo_gallery.py -o build/photo_gallery
 
-The scene that systems for large image collections are made for: nearly all bytes are images, of
-1024 to 4096 texels a side, powers of two; there is one room, and most images are in view at once.
-The images are landscapes, portraits and still lifes by the museum's painters, which stand in for
-photographs. Metres, Y up; closed. The same options give the same bytes, whatever the machine (for
-the same numpy and Pillow). Needs numpy and Pillow, not ptmtools.
+The target scene of systems for large image collections: nearly all bytes are images with 1024 to
+4096 texels a side (powers of two), in one room that shows most of them at once. The images are
+landscapes, portraits and still lifes of the museum, in place of photographs. Metres, Y up; closed.
+The same options give the same bytes on every machine (for the same numpy and Pillow). Needs numpy
+and Pillow, not ptmtools.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ from museum_parts.obj import obj_text
 from museum_parts.paintings import PAINTINGS, Painting
 
 HEAD = "# ptmtools sample gallery of photographs"
-#: The painters whose pictures come nearest to photographs.
+#: Styles closest to photographs.
 STYLES = ("landscape", "portrait", "seascape", "still_life", "night")
 #: Texels of a side → metres of the longer side on the wall.
 METRES = {4096: 3.6, 2048: 2.4, 1024: 1.4}
-#: Of every twelve images so many have this side, each after the other where there is one left.
+#: Cycle of texture sides, texels.
 SIDES = (4096, 1024, 1024, 2048, 1024, 1024, 2048, 1024, 1024, 2048, 1024, 1024)
-#: Metres: between images and at corners, the middle of an image above the floor, off the wall.
-GAP, CORNER, MIDDLE, OFF = 0.6, 0.8, 1.9, 0.02
-#: Width of the hall by its length, and its height, metres.
-DEEP, HIGH = 0.45, 5.0
+#: Metres: gap between images, gap at corners, height of an image's centre, distance from the wall.
+GAP, CORNER, CENTRE_HEIGHT, WALL_DISTANCE = 0.6, 0.8, 1.9, 0.02
+#: Width of the hall over its length; height, metres.
+WIDTH_RATIO, HEIGHT = 0.45, 5.0
 COLORS = {"wall": (0.92, 0.91, 0.88), "floor": (0.5, 0.4, 0.3), "ceiling": (0.97, 0.97, 0.96)}
 
 
 @dataclass(frozen=True)
 class Photo:
-    """An image: name, texels of a side, metres on the wall, and who makes it."""
+    """An image: name, texels of a side, width and height on the wall in metres, and painter."""
 
     name: str
     side: int
@@ -48,7 +48,7 @@ class Photo:
 
 
 def photos(count: int) -> list[Photo]:
-    """So many images, of the styles in turn."""
+    """Returns ``count`` images with the styles in turn."""
     by_name = {name: (paint, aspect) for name, paint, aspect in PAINTINGS}
     actual = []
     for k in range(count):
@@ -61,7 +61,8 @@ def photos(count: int) -> list[Photo]:
 
 
 def hung(images: list[Photo], least: float = 2.0) -> tuple[float, list[Thing]]:
-    """The length of the hall in which they fill all walls, or ``least``, and the images on them."""
+    """Returns the least length, from ``least`` on, of a hall that holds all images, and the hung
+    images."""
     length = least
     while (walls := _filled(images, length)) is None:
         length += 0.5
@@ -69,15 +70,15 @@ def hung(images: list[Photo], least: float = 2.0) -> tuple[float, list[Thing]]:
 
 
 def _filled(images: list[Photo], length: float) -> list[Thing] | None:
-    """The images on the walls of a hall of that length, or None if they do not fit."""
-    deep = round(length * DEEP, 3)
+    """Hangs the images on the walls of a hall of the given length; None if they do not fit."""
+    deep = round(length * WIDTH_RATIO, 3)
     waiting, things = list(images), []
-    # North, east, south, west: where each begins at its left, and which way it goes.
+    # North, east, south, west: length, and position at s metres from the left end.
     walls: list[tuple[float, Callable[[float], tuple[float, float]]]] = [
-        (length, lambda s: (s, OFF)),
-        (deep, lambda s: (length - OFF, s)),
-        (length, lambda s: (length - s, deep - OFF)),
-        (deep, lambda s: (OFF, deep - s)),
+        (length, lambda s: (s, WALL_DISTANCE)),
+        (deep, lambda s: (length - WALL_DISTANCE, s)),
+        (length, lambda s: (length - s, deep - WALL_DISTANCE)),
+        (deep, lambda s: (WALL_DISTANCE, deep - s)),
     ]
     for room, place in walls:
         at = CORNER
@@ -89,7 +90,7 @@ def _filled(images: list[Photo], length: float) -> list[Thing] | None:
 
 
 def _image(image: Photo, left: tuple[float, float], right: tuple[float, float]) -> Thing:
-    low, high = MIDDLE - image.height / 2, MIDDLE + image.height / 2
+    low, high = CENTRE_HEIGHT - image.height / 2, CENTRE_HEIGHT + image.height / 2
     points: tuple[Point, ...] = (
         (left[0], low, left[1]),
         (right[0], low, right[1]),
@@ -101,24 +102,24 @@ def _image(image: Photo, left: tuple[float, float], right: tuple[float, float]) 
 
 
 def hall(length: float) -> list[Thing]:
-    """Its walls, floor and ceiling, seen from inside."""
-    x, z = length, round(length * DEEP, 3)
+    """Returns the walls, floor and ceiling of a hall, facing inwards."""
+    x, z = length, round(length * WIDTH_RATIO, 3)
     ground = ((0.0, 0.0), (x, 0.0), (x, z), (0.0, z))
     flat: list[Point] = [(a, 0.0, b) for a, b in reversed(ground)]
     things = [
         Thing("floor", [tiled("floor", tuple(flat), 1.0)]),
-        Thing("ceiling", [tiled("ceiling", tuple((a, HIGH, b) for a, b in ground), 1.0)]),
+        Thing("ceiling", [tiled("ceiling", tuple((a, HEIGHT, b) for a, b in ground), 1.0)]),
     ]
     for k, name in enumerate(("north", "east", "south", "west")):
         (a, b), (c, d) = ground[k], ground[(k + 1) % 4]
-        points: tuple[Point, ...] = ((a, 0.0, b), (c, 0.0, d), (c, HIGH, d), (a, HIGH, b))
+        points: tuple[Point, ...] = ((a, 0.0, b), (c, 0.0, d), (c, HEIGHT, d), (a, HEIGHT, b))
         things.append(Thing(f"wall_{name}", [tiled("wall", points, 1.0)]))
     return things
 
 
 def make_gallery(count: int, seed: int) -> Iterator[File]:
-    """The files of the gallery: relative path and a function that returns the bytes; the OBJ
-    last."""
+    """Returns the files of the gallery: relative path and a function that returns the bytes; the
+    OBJ comes last."""
     images = photos(count)
     length, pictures = hung(images)
     plain = [
@@ -149,8 +150,8 @@ def main(arguments: list[str] | None = None) -> int:
     )
     add = parser.add_argument
     add("-o", "--output", type=Path, required=True, metavar="DIR", help="folder to write")
-    add("--images", type=int, default=24, help="how many, 1 to 200")
-    add("--seed", type=int, default=1, help="other images")
+    add("--images", type=int, default=24, help="number of images, 1 to 200")
+    add("--seed", type=int, default=1, help="seed of the random numbers")
     add("--force", action="store_true", help="write into a folder that holds other files")
     given = parser.parse_args(arguments)
     if not (1 <= given.images <= 200 and given.seed >= 0):

@@ -1,11 +1,12 @@
-"""Makes a hall of statues: one room, pictures on its walls, and heavy statues down its middle.
+"""Generates a hall of statues: one room with pictures on its walls and heavy statues along its
+axis.
 
     python sample_data/make_statue_hall.py -o build/statue_hall
     python sample_data/make_statue_hall.py -o build/statue_hall --statues 12 --triangles 200000
 
-The scene that octree textures are made for: nearly all bytes are triangles (`make_statues.py`), few
-are images (the museum's painters). Metres, Y up; closed. The same options give the same bytes,
-whatever the machine (for the same numpy and Pillow). Needs numpy and Pillow, not ptmtools.
+The target scene of octree textures: nearly all bytes are triangles (`make_statues.py`), few are
+images. Metres, Y up; closed. The same options give the same bytes on every machine (for the same
+numpy and Pillow). Needs numpy and Pillow, not ptmtools.
 """
 
 from __future__ import annotations
@@ -17,22 +18,22 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from make_museum import File, generator, png, write
-from make_photo_gallery import COLORS, DEEP, Photo, hall, hung, photos
+from make_photo_gallery import COLORS, WIDTH_RATIO, Photo, hall, hung, photos
 from make_statues import STATUES, StatueOptions, make_statue
 from museum_parts.obj import obj_text
 
 HEAD = "# ptmtools sample hall of statues"
-#: Texels of a side of all images.
+#: Side of all images, texels.
 SIDE = 1024
-#: Metres: a statue's height and width at most, from the middle of one to that of the next, and to
-#: the walls.
-HEIGHT, WIDTH, APART, ENDS = 2.0, 2.0, 2.6, 3.0
+#: Metres: maximum height and width of a statue, distance between the centres of two, and to the end
+#: walls.
+STATUE_HEIGHT, STATUE_WIDTH, SPACING, END_SPACING = 2.0, 2.0, 2.6, 3.0
 STONE = (0.85, 0.83, 0.78)
 
 
 @dataclass(frozen=True)
 class HallOptions:
-    """What is built; ``triangles`` of each statue, met within some percent."""
+    """Options of `make_hall`; ``triangles`` per statue, met within some percent."""
 
     statues: int = 6
     triangles: int = 100_000
@@ -41,22 +42,28 @@ class HallOptions:
 
 
 def images_of(count: int) -> list[Photo]:
-    """So many images, all of the same size in texels."""
+    """Returns ``count`` images of equal size in texels."""
     return [replace(image, side=SIDE) for image in photos(count)]
 
 
 def statue_rows(options: HallOptions, length: float, first: int) -> list[str]:
-    """The statues as statements of an OBJ whose points so far are ``first``."""
+    """Returns the OBJ statements of the statues; ``first`` is the number of preceding points."""
     rows = []
-    gap = (length - 2 * ENDS) / max(options.statues - 1, 1)
+    gap = (length - 2 * END_SPACING) / max(options.statues - 1, 1)
     for k in range(options.statues):
         name = list(STATUES)[k % len(STATUES)]
         made = make_statue(name, StatueOptions(options.triangles, options.seed + k // len(STATUES)))
         low, high = made.points.min(axis=0), made.points.max(axis=0)
         foot = (low + high) / 2 * [1, 0, 1] + low * [0, 1, 0]
-        at = [ENDS + k * gap if options.statues > 1 else length / 2, 0.0, length * DEEP / 2]
+        at = [
+            END_SPACING + k * gap if options.statues > 1 else length / 2,
+            0.0,
+            length * WIDTH_RATIO / 2,
+        ]
         wide, tall, deep = (high - low).tolist()
-        points = (made.points - foot) * min(HEIGHT / tall, WIDTH / max(wide, deep)) + at
+        points = (made.points - foot) * min(
+            STATUE_HEIGHT / tall, STATUE_WIDTH / max(wide, deep)
+        ) + at
         rows += [f"o statue_{k + 1:02d}_{name}", "usemtl stone"]
         rows += [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in points.tolist()]
         rows += [f"f {a} {b} {c}" for a, b, c in (made.triangles + first + 1).tolist()]
@@ -65,9 +72,10 @@ def statue_rows(options: HallOptions, length: float, first: int) -> list[str]:
 
 
 def make_hall(options: HallOptions) -> Iterator[File]:
-    """The files of the hall: relative path and a function that returns the bytes; the OBJ last."""
+    """Returns the files of the hall: relative path and a function that returns the bytes; the OBJ
+    comes last."""
     images = images_of(options.images)
-    length, pictures = hung(images, 2 * ENDS + (options.statues - 1) * APART)
+    length, pictures = hung(images, 2 * END_SPACING + (options.statues - 1) * SPACING)
     plain = [
         f"newmtl {name}\nKd {' '.join(map(str, color))}\nillum 1\n"
         for name, color in {**COLORS, "stone": STONE}.items()
@@ -103,10 +111,15 @@ def main(arguments: list[str] | None = None) -> int:
     )
     add = parser.add_argument
     add("-o", "--output", type=Path, required=True, metavar="DIR", help="folder to write")
-    add("--statues", type=int, default=HallOptions.statues, help="how many, 1 to 100")
-    add("--triangles", type=int, default=HallOptions.triangles, help="of each statue")
-    add("--images", type=int, default=HallOptions.images, help="on the walls, 1 to 100")
-    add("--seed", type=int, default=HallOptions.seed, help="other statues and images")
+    add("--statues", type=int, default=HallOptions.statues, help="number of statues, 1 to 100")
+    add("--triangles", type=int, default=HallOptions.triangles, help="triangles per statue")
+    add(
+        "--images",
+        type=int,
+        default=HallOptions.images,
+        help="number of images on the walls, 1 to 100",
+    )
+    add("--seed", type=int, default=HallOptions.seed, help="seed of the random numbers")
     add("--force", action="store_true", help="write into a folder that holds other files")
     given = parser.parse_args(arguments)
     if not (1 <= given.statues <= 100 and 1 <= given.images <= 100 and given.seed >= 0):

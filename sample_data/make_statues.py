@@ -1,11 +1,11 @@
-"""Makes sample statues: solids with fine relief, as triangles, to try `ptm apo` on.
+"""Generates sample statues: solids with fine relief, as triangle meshes, to try `ptm apo` on.
 
     python sample_data/make_statues.py -o build/statues
     python sample_data/make_statues.py -o build/statues --triangles 1000000 --only bust --colors
 
 Metres, Y up, facing +Z: a bust, a relief, a dragon and the capital of a column. Each is one closed
-surface of triangles of about even size, 50,000 to 1,000,000 of them. The same seed gives the same
-bytes, whatever the machine. Needs numpy, not ptmtools.
+surface of triangles of about equal size, 50,000 to 1,000,000 of them. The same seed gives the same
+bytes on every machine. Needs numpy, not ptmtools.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 from statue_parts import bust, column, dragon, relief
 from statue_parts.files import FORMATS, HEAD
-from statue_parts.surface import ask, mesh
+from statue_parts.surface import evaluate, mesh
 
-#: By name: what makes the solid of random numbers, and the box that it lies in.
+#: Name: class of the solid, and its bounding box.
 STATUES: dict[str, tuple[Any, tuple[float, ...], tuple[float, ...]]] = {
     "bust": (bust.Bust, bust.LOW, bust.HIGH),
     "relief": (relief.Relief, relief.LOW, relief.HIGH),
@@ -34,7 +34,7 @@ STATUES: dict[str, tuple[Any, tuple[float, ...], tuple[float, ...]]] = {
 
 @dataclass(frozen=True)
 class StatueOptions:
-    """What `make_statue` builds; the number of triangles is met within some percent."""
+    """Options of `make_statue`; the number of triangles is met within some percent."""
 
     triangles: int = 50_000
     seed: int = 1
@@ -51,20 +51,22 @@ class Statue:
 
 
 def make_statue(name: str, options: StatueOptions) -> Statue:
-    """The statue of that name in `STATUES`."""
+    """Generates the statue of a name in `STATUES`."""
     kind, low, high = STATUES[name]
     stream = list(STATUES).index(name)
     solid = kind(np.random.Generator(np.random.PCG64([options.seed, stream])))
     points, triangles = mesh(solid, low, high, options.triangles)
     colors = None
     if options.colors:
-        share = np.stack([ask(lambda p, k=k: solid.colors(p)[k], points.T) for k in range(3)], 1)
+        share = np.stack(
+            [evaluate(lambda p, k=k: solid.colors(p)[k], points.T) for k in range(3)], 1
+        )
         colors = np.rint(255 * np.clip(share, 0, 1)).astype(np.uint8)
     return Statue(points.astype(np.float32), triangles, colors)
 
 
 def write(path: Path, data: bytes, *, force: bool) -> None:
-    """Beside the target first; a file of other origin is refused without ``force``."""
+    """Writes a file atomically; refuses to replace a file of other origin without ``force``."""
     if path.exists() and not force:
         with path.open("rb") as file:
             if HEAD.encode() not in file.read(4096):
@@ -94,11 +96,16 @@ def main(arguments: list[str] | None = None) -> int:
     add = parser.add_argument
     add("-o", "--output", type=Path, required=True, metavar="DIR", help="folder to write")
     most = _between(1000, 4_000_000)
-    add("--triangles", type=most, default=default.triangles, help="of each, about")
-    add("--only", choices=list(STATUES), action="append", help="these alone")
-    add("--format", choices=list(FORMATS), default="ply", help="of the files")
-    add("--colors", action="store_true", help="with colours of points")
-    add("--seed", type=_between(0, 2**63), default=default.seed, help="other statues")
+    add(
+        "--triangles",
+        type=most,
+        default=default.triangles,
+        help="approximate number of triangles per statue",
+    )
+    add("--only", choices=list(STATUES), action="append", help="generate this statue only")
+    add("--format", choices=list(FORMATS), default="ply", help="file format")
+    add("--colors", action="store_true", help="include vertex colours")
+    add("--seed", type=_between(0, 2**63), default=default.seed, help="seed of the random numbers")
     add("--force", action="store_true", help="replace files of other origin")
     given = parser.parse_args(arguments)
     options = StatueOptions(given.triangles, given.seed, given.colors)

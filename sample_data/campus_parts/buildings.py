@@ -1,4 +1,4 @@
-"""A recipe becomes a building: walls, roof, and what is put before and above them."""
+"""Builds a building from its recipe: walls, roof, and attachments before and above them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from campus_parts.solids import Flat, Ring, Wall, box, extruded, lid, prism, swe
 
 @dataclass(frozen=True)
 class Building:
-    """Faces in the building's own frame, and its footprint there."""
+    """Faces in the local frame of the building, and its footprint."""
 
     faces: list[Face]
     rings: list[Ring]
@@ -75,19 +75,19 @@ def build(recipe: Recipe, rng: np.random.Generator) -> Building:
 
 
 def _wing(rings: list[Ring]) -> float:
-    """The least width of the building, across which a hipped roof spans."""
+    """Returns the narrowest width of the building, the span of a hipped roof."""
     if len(rings) == 2:
         return abs(rings[1][0][1])
     lengths = [w.length for w in walls_of(rings[0])]
     if len(lengths) == 4:
         return min(lengths)
-    if len(lengths) == 8 and lengths[1] < 3:  # a middle that comes forward
+    if len(lengths) == 8 and lengths[1] < 3:  # projecting centre
         return min(lengths[2], lengths[5])
     return min(x for x in lengths if x > 3)
 
 
 def _entrance(recipe: Recipe, walls: list[Wall], bays: list[Bay]) -> list[Face]:
-    """Stairs up to every door, and a canopy or a portico over it."""
+    """Adds stairs to every door, and a canopy or a portico over it."""
     look, faces = recipe.look, []
     for bay in bays:
         if bay.kind != "door":
@@ -144,7 +144,7 @@ def _column(
 
 
 def _portico(recipe: Recipe, wall: Wall, middle: float, wide: float, out: float) -> list[Face]:
-    """Columns before the entrance, with an entablature and a pediment."""
+    """Adds columns before the entrance, with an entablature and a pediment."""
     look = recipe.look
     low = look.plinth - 0.01
     tall = look.ground_height + (look.height if "columns" in recipe.extras else 0) - 0.5
@@ -177,7 +177,7 @@ def _portico(recipe: Recipe, wall: Wall, middle: float, wide: float, out: float)
 
 
 def _dressed(recipe: Recipe, rings: list[Ring], bays: list[Bay]) -> list[Face]:
-    """What stands before the walls."""
+    """Adds attachments before the walls."""
     look, extras, faces = recipe.look, recipe.extras, []
     top = look.top
     for ring in rings:
@@ -223,7 +223,7 @@ def _dressed(recipe: Recipe, rings: list[Ring], bays: list[Bay]) -> list[Face]:
 def _above(
     recipe: Recipe, rings: list[Ring], run: float, rise: float, rng: np.random.Generator
 ) -> list[Face]:
-    """What stands on the roof."""
+    """Adds attachments on the roof."""
     look, extras, faces = recipe.look, recipe.extras, []
     ring, roof = rings[0], recipe.roof[1]
     top = look.top
@@ -262,16 +262,16 @@ def _above(
 
 
 def _ridge(rings: list[Ring], depth: float) -> float:
-    """The z along which the widest part of the building has its middle."""
+    """Returns the z of the centre of the widest part of the building."""
     ring, wing = rings[0], _wing(rings)
-    if len(ring) == 8 and ring[0][1] < 0:  # its middle comes forward
+    if len(ring) == 8 and ring[0][1] < 0:  # projecting centre
         return (ring[0][1] - depth) / 2
     back = len(ring) == 8 and ring[2][1] < 0 and ring[2][0] < 0  # a U, open to the front
     return -depth + wing / 2 if back else -wing / 2
 
 
 def _dome(centre: Flat, y: float) -> list[Face]:
-    """A drum with a cupola of copper, opened by a slit that is a rib."""
+    """Adds a drum with a copper dome, split by a rib."""
     r, drum = 4.2, 2.6
     faces = prism(centre, [(r, y - 0.02), (r, y + drum)], 24, "brick_yellow")
     rim = [(r + 0.3, y + drum - 0.1), (r + 0.3, y + drum + 0.15), (r, y + drum + 0.2)]
@@ -283,7 +283,7 @@ def _dome(centre: Flat, y: float) -> list[Face]:
 
 
 def _belfry(material: str, top: float) -> list[Face]:
-    """A small tower on the ridge above the front, with louvres and a spire."""
+    """Adds a small tower with louvres and a spire on the ridge above the front."""
     wall = Wall((-1.5, -1.2), (1, 0), 3)
     base = top + 3
     faces = box(wall, material, (0, base, -3), (3, base + 8, 0))

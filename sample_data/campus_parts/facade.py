@@ -1,4 +1,4 @@
-"""The walls of a building: a grid of bays and storeys, holes in it, and what fills them."""
+"""Walls of a building: a grid of bays and storeys, with holes and their fillings."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from campus_parts.solids import Flat, Ring, Wall, box, walls_of, zipped
 
 @dataclass(frozen=True)
 class Look:
-    """Materials and measures of a building's facades; metres.
+    """Materials and dimensions of the facades of a building; metres.
 
     ``ground`` covers the ground floor up to the first string course. ``ratio``: width of a window
-    by that of its bay; ``sill`` and ``head``: heights above the storey's floor. ``ground_style``:
-    of the windows of the ground floor.
+    over that of its bay; ``sill`` and ``head``: heights above the floor of the storey.
+    ``ground_style``: style of the ground-floor windows.
     """
 
     wall: str
@@ -42,14 +42,14 @@ class Look:
     ratio: float = 0.45
     sill: float = 0.9
     head: float = 2.6
-    band: float = 0.7  # of wall above the topmost storey
+    band: float = 0.7  # height of wall above the topmost storey
     door: str = "door_oak"
     reveals: str = "stone_trim"
     balconies: bool = False
 
     @property
     def floors(self) -> list[float]:
-        """Heights of the storeys' floors."""
+        """Heights of the floors."""
         first = self.plinth + self.ground_height
         return [self.plinth, *(first + self.height * k for k in range(self.storeys - 1))]
 
@@ -67,7 +67,7 @@ class Look:
 
 
 def columns(wall: Wall, look: Look) -> list[tuple[float, float]]:
-    """The bays' openings from left to right; none on walls too short for one."""
+    """Returns the openings of the bays from left to right; none on walls shorter than a bay."""
     count = int((wall.length - 0.9) / look.bay)
     if count < 1:
         return []
@@ -77,13 +77,13 @@ def columns(wall: Wall, look: Look) -> list[tuple[float, float]]:
     return [(m - wide / 2, m + wide / 2) for m in middles]
 
 
-#: What stands in a bay: from wall, storey and bay to "window", "door", "blank" or "balcony".
+#: Content of a bay, by wall, storey, bay and number of bays: "window", "door", "blank", "balcony".
 Choice = Callable[[int, int, int, int], str]
 
 
 @dataclass(frozen=True)
 class Bay:
-    """An opening as built, for what is put before it."""
+    """A built opening, for attachments before it."""
 
     wall: Wall
     storey: int
@@ -98,10 +98,10 @@ def facades(
     tops: dict[int, list[Flat]],
     rng: np.random.Generator,
 ) -> tuple[list[Face], list[Bay]]:
-    """The closed walls from the ground to ``look.top``, and the openings.
+    """Returns the closed walls from the ground to ``look.top``, and the openings.
 
-    ``choose(wall, storey, bay, bays)`` says what is where; ``tops`` gives, by wall, an outline
-    (u, v) of its upper edge other than level.
+    ``choose(wall, storey, bay, bays)`` selects the content of a bay; ``tops`` gives by wall an
+    outline (u, v) of an upper edge that is not level.
     """
     rows = look.rows()
     cuts = sorted({look.plinth, *(v for row in rows for v in row)})
@@ -159,7 +159,7 @@ def _filled(
 
 
 def balcony(bay: Bay, material: str, railing: str) -> list[Face]:
-    """A slab before a window door, with posts and a rail, or a sheet of glass."""
+    """A slab before a French window, with posts and a rail, or a sheet of glass."""
     u, v, U, _ = bay.hole
     u, U, v = u - 0.35, U + 0.35, v - 0.03
     out = 1.25
@@ -209,7 +209,7 @@ def louvres(bay: Bay, material: str) -> list[Face]:
 
 
 def pilasters(walls: list[Wall], look: Look, material: str, top: float) -> list[Face]:
-    """Between the bays, with base and capital."""
+    """Adds pilasters with base and capital between the bays."""
     faces = []
     for wall in walls:
         spans = columns(wall, look)

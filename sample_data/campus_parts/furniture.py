@@ -1,4 +1,4 @@
-"""Trees, lamps, benches, bollards, hedges, shelters and signs: objects of their own."""
+"""Trees, lamps, benches, bollards, hedges, shelters and signs as separate objects."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from campus_parts.layout import CURB_HEIGHT, FRONT, KERB, PAVEMENT, Frame, Plot,
 from campus_parts.recipes import Recipe
 from campus_parts.solids import Wall, box, prism
 
-#: A wall to put boxes on: u along the street, d towards it, all from the frame's origin.
-HERE = Wall((0.0, 0.0), (1.0, 0.0), 1.0)
+#: Local frame of boxes: u along the street, d towards it, from the origin of the frame.
+LOCAL = Wall((0.0, 0.0), (1.0, 0.0), 1.0)
 
 
 def tree(kind: str, tall: float, turn: float) -> list[Face]:
-    """Two crossed planes with the picture of a tree, and a stem that has a thickness."""
+    """Two crossed planes with the picture of a tree, and a stem with thickness."""
     half = tall * 0.5
     faces = prism(
         (0, 0),
@@ -35,22 +35,22 @@ def lamp() -> list[Face]:
     """A mast with an arm over the street."""
     mast = [(0.14, 0.0), (0.14, 0.5), (0.07, 0.55), (0.05, 5.6)]
     faces = prism((0, 0), mast, 10, "metal_dark")
-    faces += box(HERE, "metal_dark", (-0.04, 5.45, -0.02), (0.04, 5.53, 1.3))
-    faces += box(HERE, "metal", (-0.14, 5.4, 0.9), (0.14, 5.5, 1.6))
-    return faces + box(HERE, "paint_white", (-0.1, 5.37, 0.95), (0.1, 5.405, 1.55))
+    faces += box(LOCAL, "metal_dark", (-0.04, 5.45, -0.02), (0.04, 5.53, 1.3))
+    faces += box(LOCAL, "metal", (-0.14, 5.4, 0.9), (0.14, 5.5, 1.6))
+    return faces + box(LOCAL, "paint_white", (-0.1, 5.37, 0.95), (0.1, 5.405, 1.55))
 
 
 def bench() -> list[Face]:
     faces: list[Face] = []
     for x in (-0.8, 0.7):
-        faces += box(HERE, "metal_dark", (x, 0, -0.2), (x + 0.08, 0.42, 0.22))
-        faces += box(HERE, "metal_dark", (x, 0.4, -0.26), (x + 0.08, 0.85, -0.18))
+        faces += box(LOCAL, "metal_dark", (x, 0, -0.2), (x + 0.08, 0.42, 0.22))
+        faces += box(LOCAL, "metal_dark", (x, 0.4, -0.26), (x + 0.08, 0.85, -0.18))
     for k in range(4):
         faces += box(
-            HERE, "bench_wood", (-0.95, 0.41, -0.17 + 0.1 * k), (0.95, 0.45, -0.09 + 0.1 * k)
+            LOCAL, "bench_wood", (-0.95, 0.41, -0.17 + 0.1 * k), (0.95, 0.45, -0.09 + 0.1 * k)
         )
     for y in (0.55, 0.68, 0.81):
-        faces += box(HERE, "bench_wood", (-0.95, y, -0.19), (0.95, y + 0.09, -0.15))
+        faces += box(LOCAL, "bench_wood", (-0.95, y, -0.19), (0.95, y + 0.09, -0.15))
     return faces
 
 
@@ -64,26 +64,26 @@ def bollards(count: int, pitch: float) -> list[Face]:
 
 def shelter() -> list[Face]:
     """A bus stop: a roof on posts, panes behind and at the ends, a seat."""
-    faces = box(HERE, "metal", (-2.2, 2.4, -0.1), (2.2, 2.52, 1.7))
+    faces = box(LOCAL, "metal", (-2.2, 2.4, -0.1), (2.2, 2.52, 1.7))
     for x in (-2.1, -0.04, 2.02):
-        faces += box(HERE, "metal_dark", (x, 0, 0), (x + 0.08, 2.41, 0.08))
+        faces += box(LOCAL, "metal_dark", (x, 0, 0), (x + 0.08, 2.41, 0.08))
     for x, X in ((-1.98, -0.08), (0.08, 1.98)):
-        faces += box(HERE, "glass_clear", (x, 0.3, 0.03), (X, 2.3, 0.05))
+        faces += box(LOCAL, "glass_clear", (x, 0.3, 0.03), (X, 2.3, 0.05))
     for x in (-2.07, 2.05):
-        faces += box(HERE, "glass_clear", (x, 0.3, 0.12), (x + 0.02, 2.3, 1.3))
-    return faces + box(HERE, "bench_wood", (-1.7, 0.44, 0.15), (1.7, 0.5, 0.6))
+        faces += box(LOCAL, "glass_clear", (x, 0.3, 0.12), (x + 0.02, 2.3, 1.3))
+    return faces + box(LOCAL, "bench_wood", (-1.7, 0.44, 0.15), (1.7, 0.5, 0.6))
 
 
 def hedge(length: float, tall: float) -> list[Face]:
-    return box(HERE, "hedge", (-length / 2, 0, -0.4), (length / 2, tall, 0.4))
+    return box(LOCAL, "hedge", (-length / 2, 0, -0.4), (length / 2, tall, 0.4))
 
 
 def sign(number: int) -> list[Face]:
-    """A board on two posts; its label is one of forty in the picture of all."""
+    """A board on two posts; its label is one of forty in a shared picture."""
     faces: list[Face] = []
     for x in (-0.75, 0.67):
-        faces += box(HERE, "metal", (x, 0, -0.04), (x + 0.08, 2.0, 0.04))
-    faces += box(HERE, "metal_dark", (-0.95, 1.2, 0.03), (0.95, 2.1, 0.08))
+        faces += box(LOCAL, "metal", (x, 0, -0.04), (x + 0.08, 2.0, 0.04))
+    faces += box(LOCAL, "metal_dark", (-0.95, 1.2, 0.03), (0.95, 2.1, 0.08))
     k = number % 40
     u, v = k % 4 / 4, 1 - (k // 4 + 1) / 10
     board: list[Point] = [
@@ -97,7 +97,7 @@ def sign(number: int) -> list[Face]:
 
 
 class _Placer:
-    """Numbers things as they come, and puts them where they belong."""
+    """Numbers objects in order of placement, and transforms them to world coordinates."""
 
     def __init__(self) -> None:
         self.things: list[Thing] = []
@@ -115,7 +115,7 @@ def furnish(
     depths: list[float],
     rng: np.random.Generator,
 ) -> list[Thing]:
-    """The furniture of every plot; ``depths`` of the plots' buildings."""
+    """Returns the furniture of every plot; ``depths`` are those of the buildings."""
     place = _Placer()
     slots = max(p.slot for p in street.plots) + 1
     for plot, recipe, depth in zip(street.plots, recipes, depths, strict=True):

@@ -1,4 +1,4 @@
-"""Streets, pavements, gardens and paths: one open surface, and the paint on it."""
+"""Streets, pavements, gardens and paths as one open surface, with road markings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from campus_parts.solids import Flat
 
 #: Shares of a plot's frontage: a lane, garden, the path to the door, garden, a margin.
 COLUMNS = (0.0, 0.06, 0.42, 0.58, 0.94, 1.0)
-#: What covers the front gardens and the paths, by turns.
+#: Materials of front gardens and paths, in turn.
 GARDENS = [
     ("cobbles", "cobbles"),
     ("grass", "paving"),
@@ -23,12 +23,12 @@ PAINT = 0.015
 
 
 def has_lane(plot: Plot) -> bool:
-    """Whether a lane leads between this plot and the one before it."""
+    """Whether a lane separates this plot from the previous one."""
     return plot.slot % 3 == 1
 
 
 def garden(plot: Plot, plots: int) -> tuple[str, str]:
-    """The material of the front garden and of the path; lawns only in the last third."""
+    """Returns the materials of the front garden and of the path; the last third has lawns only."""
     if plot.slot * 3 >= plots:
         return ("grass", "paving")
     return GARDENS[(plot.slot * 2 + (plot.side > 0)) % len(GARDENS)]
@@ -51,7 +51,7 @@ def _patch(
 
 
 def _kerb(a: Flat, b: Flat, side: int) -> Face:
-    """The kerb's face from a to b along the street."""
+    """The face of the kerb from a to b along the street."""
     p, q = (b, a) if side > 0 else (a, b)
     (x, z), (X, Z) = p, q
     long = ((X - x) * (X - x) + (Z - z) * (Z - z)) ** 0.5
@@ -131,7 +131,7 @@ def _ends(street: Street) -> Thing:
 
 
 def _markings(street: Street) -> Thing:
-    """A broken line in the middle, and a crossing at each bend."""
+    """A broken centre line, and a crossing at each bend."""
     thing = Thing("ground_markings")
     for segment in range(len(street.headings)):
         count = int(street.segment_length / 9)

@@ -1,8 +1,8 @@
-"""Layout of the campus: the line of the street, the plots beside it, and frames to place objects.
+"""Layout of the campus: the line of the street, the plots beside it, and frames for objects.
 
-The street bends a little every 250 m. Along it runs s, and t across it, to the right as seen by
-who walks on. Cosines and sines of its headings are rational, so that nothing depends on a
-library's last bit.
+The street bends slightly every 250 m. s runs along it, t across it, positive to the right in the
+direction of travel. Cosines and sines of its headings are rational, so results do not depend on the
+last bit of a library.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from museum_parts.mesh import Face, Point
 from campus_parts.solids import Flat
 
 HEADINGS: list[Flat] = [(60 / 61, -11 / 61), (1.0, 0.0), (40 / 41, 9 / 41), (1.0, 0.0)]
-#: Metres: how far the street goes on at either end; half of the street; to the end of the
-#: pavement; of the front gardens; of the campus; from the middle to the buildings' fronts.
+#: Metres: extension of the street at either end; then distances from its centre line: kerb, end of
+#: the pavement, end of the front gardens, end of the campus, fronts of the buildings.
 BEYOND, KERB, PAVEMENT, GARDEN, EDGE, FRONT = 30.0, 5.0, 8.5, 24.0, 66.0, 15.0
 CURB_HEIGHT = 0.12
-#: The least frontage of a plot, m: the widest building, and room at the bends.
+#: Minimum frontage of a plot, m: the widest building, and a margin at the bends.
 LEAST_PLOT = 46.0
 
 
 @dataclass(frozen=True)
 class Frame:
-    """A place to build on: x runs along ``right``, z along ``out``, y up from ``origin``."""
+    """A local frame: x runs along ``right``, z along ``out``, y up from ``origin``."""
 
     origin: Point
     right: Flat
@@ -41,7 +41,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Plot:
-    """A building's ground: its part of the street's segment, on the right (1) or left (-1)."""
+    """The plot of a building: its interval of a street segment, on the right (1) or left (-1)."""
 
     number: int
     segment: int
@@ -82,7 +82,7 @@ class Street:
                 slot += 1
 
     def across(self, node: int) -> Flat:
-        """How far a node's cross-section moves for a metre of t: the mitre of two segments."""
+        """Displacement of the cross-section at a node per metre of t: the mitre of two segments."""
         a = self.headings[max(node - 1, 0)]
         b = self.headings[min(node, len(self.headings) - 1)]
         (ax, az), (bx, bz) = (-a[1], a[0]), (-b[1], b[0])
@@ -97,13 +97,13 @@ class Street:
         return a[0] + (b[0] - a[0]) * f, a[1] + (b[1] - a[1]) * f
 
     def frame(self, segment: int, s: float, t: float, y: float, side: int) -> Frame:
-        """At s metres along a segment, t across it; facing the street from the side given."""
+        """The frame at s metres along a segment and t across it, facing the street from a side."""
         (x, z), (hx, hz) = self.nodes[segment], self.headings[segment]
         out = (hz * side, -hx * side)
         return Frame((x + hx * s - hz * t, y, z + hz * s + hx * t), (out[1], -out[0]), out)
 
     def line(self) -> list[Flat]:
-        """The middle of the street from one end to the other, beyond the plots too."""
+        """The centre line of the street from end to end, including the parts beyond the plots."""
         (hx, hz), (kx, kz) = self.headings[0], self.headings[-1]
         (x, z), (X, Z) = self.nodes[0], self.nodes[-1]
         first, last = (x - hx * BEYOND, z - hz * BEYOND), (X + kx * BEYOND, Z + kz * BEYOND)
@@ -111,7 +111,7 @@ class Street:
 
 
 def along(line: list[Flat], s: float) -> Flat:
-    """The point of a polyline at s metres from its beginning."""
+    """The point of a polyline at s metres from its start."""
     for (x, z), (X, Z) in pairwise(line):
         length = ((X - x) * (X - x) + (Z - z) * (Z - z)) ** 0.5
         if s <= length:

@@ -1,4 +1,4 @@
-"""Textures of walls and roofs; all of them tile. See `museum_parts.noise` for the arithmetic."""
+"""Tiling textures of walls and roofs. See `museum_parts.noise` for the arithmetic."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def shaded(color: Color, factor: float) -> Color:
 def courses(
     rng: np.random.Generator, size: int, rows: int, blocks: int, joint: float, wobble: float = 0.0
 ) -> tuple[Field, Field, Field]:
-    """Running bond: a tone 0…1 for each block, the joints 0…1, and height within a course 0…1.
+    """Running bond: a tone 0…1 for each block, the joints 0…1, and the height within a course 0…1.
 
-    ``joint``: its width as a share of a course's height; ``wobble``: how far edges are off, in
+    ``joint``: width as a share of the height of a course; ``wobble``: deviation of the edges, in
     courses.
     """
     x, y = axes(size)
@@ -222,7 +222,7 @@ def roof_tiles(rng: np.random.Generator, size: int) -> Field:
     """Plain tiles with round ends, each row in the shadow of that above."""
     x, y = axes(size)
     rows, tiles = 14, 11
-    # Rows are counted downwards; a tile's lower end is round, so it dips into the next row.
+    # Rows count downwards; the round lower end of a tile overlaps the next row.
     t = x * np.float32(tiles)
     row = np.floor(y * np.float32(rows))
     shift = (row % 2) * np.float32(0.5)

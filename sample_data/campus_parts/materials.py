@@ -1,4 +1,4 @@
-"""The campus's materials: the image of each, the metres it covers, and its further channels."""
+"""Materials of the campus: image, metres per repetition, and masks."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from museum_parts.noise import Color
 
 @dataclass(frozen=True)
 class Material:
-    """``tile``: metres that one repetition covers; 0 where the coordinates are given as such.
+    """``tile``: metres per repetition; 0 if texture coordinates are explicit.
 
-    ``mask``: whether there is an image of where it reflects (``map_Ks``); ``alpha``: of where it is
-    (``map_d``).
+    ``mask``: whether there is a specular mask (``map_Ks``); ``alpha``: an opacity mask (``map_d``).
     """
 
     image: str
@@ -74,7 +73,7 @@ MATERIALS: dict[str, Material] = {
     "gravel": Material("gravel", 3),
     "grass": Material("grass", 5),
     "marking": Material("paint", 1),
-    # what grows and stands
+    # plants and furniture
     "hedge": Material("hedge", 2),
     "bark": Material("bark", 1),
     "bench_wood": Material("bark", 1, (1, 0.8, 0.6)),

@@ -1,4 +1,4 @@
-"""The first third of the way: every building of other walls, "where no textures can be reused"."""
+"""Recipes of the first third of the street: all walls differ, so no texture can be reused."""
 
 from __future__ import annotations
 

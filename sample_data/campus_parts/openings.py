@@ -1,7 +1,7 @@
-"""Windows and doors: reveals, frames with their bars, panes, sills and surrounds.
+"""Windows and doors: reveals, frames with glazing bars, panes, sills and surrounds.
 
-An opening fills a hole of its wall completely, so that the wall stays closed: from the hole's edge
-the reveal goes back to the frame, from the frame's edges to the panes.
+An opening fills a hole of its wall completely, so the wall stays closed: the reveal leads from the
+edge of the hole to the frame, and the frame encloses the panes.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ Hole = tuple[float, float, float, float]  # low u, low v, high u, high v
 
 @dataclass(frozen=True)
 class Style:
-    """How the windows of a building are made; metres.
+    """Dimensions and materials of windows; metres.
 
-    ``panes``: across and up; a ``transom`` makes the topmost row lower. ``glass``: one of these is
-    chosen for each window. ``arched``: a round head within the opening.
+    ``panes``: columns and rows; a ``transom`` makes the topmost row lower. ``glass``: materials,
+    one chosen for each window. ``arched``: a round head within the opening.
     """
 
     panes: tuple[int, int] = (2, 2)
@@ -46,7 +46,7 @@ def cells(
     holes: Sequence[Hole],
     d: float,
 ) -> list[Face]:
-    """The rectangles of a grid outside the holes, whose edges lie on its lines.
+    """Returns the rectangles of a grid outside the holes, whose edges lie on grid lines.
 
     ``material`` may be given for each row.
     """
@@ -61,7 +61,7 @@ def cells(
 
 
 def around(us: Sequence[float], vs: Sequence[float], d: float) -> list[list[Point]]:
-    """The four sides of a rectangle with the points of its grid, counter-clockwise from below."""
+    """Returns the four sides of a rectangle with its grid points, counter-clockwise from below."""
     (u, *_, U), (v, *_, V) = us, vs
     return [
         [(x, v, d) for x in us],
@@ -74,19 +74,19 @@ def around(us: Sequence[float], vs: Sequence[float], d: float) -> list[list[Poin
 def reveal(
     wall: Wall, material: str, near: list[list[Point]], far: list[list[Point]]
 ) -> list[Face]:
-    """What leads from an outline to the one behind it, seen from within the opening."""
+    """Connects an outline to the one behind it, facing into the opening."""
     return [
         wall.face(material, piece) for a, b in zip(near, far, strict=True) for piece in zipped(a, b)
     ]
 
 
 def within(low: float, high: float, cuts: Sequence[float]) -> list[float]:
-    """The cuts of a wall between two of them, both included."""
+    """Returns the grid lines of a wall between two of them, inclusive."""
     return [c for c in cuts if low - 1e-9 <= c <= high + 1e-9]
 
 
 def _pane(wall: Wall, material: str, hole: Hole, pane: Hole, d: float) -> Face:
-    """One sheet of glass; all of a window show one image."""
+    """One sheet of glass; all sheets of a window show one image."""
     u, v, U, V = pane
     wide, tall = hole[2] - hole[0], hole[3] - hole[1]
     uv = [((a - hole[0]) / wide, (b - hole[1]) / tall) for a, b in ((u, v), (U, v), (U, V), (u, V))]
@@ -102,7 +102,8 @@ def glazed(
     glass: str,
     reveals: str,
 ) -> list[Face]:
-    """A rectangular window in a hole whose edges carry the wall's cuts ``us`` and ``vs``."""
+    """A rectangular window in a hole whose edges carry the grid lines ``us`` and ``vs`` of the
+    wall."""
     u, v, U, V = hole
     across, up = style.panes
     bar = min(style.bar, (U - u) / (across * 4), (V - v) / (up * 4))
@@ -166,7 +167,7 @@ def arched(
     glass: str,
     reveals: str,
 ) -> list[Face]:
-    """A window with a round head; the rest of the hole is its surround, level with the wall."""
+    """A window with a round head; its surround, level with the wall, fills the rest of the hole."""
     u, v, U, V = hole
     m = 0.14
     edge = around(us, vs, 0)
@@ -185,7 +186,7 @@ def arched(
     outline = [p for side in deep for p in side[:-1]]
     uv = [((p[0] - u) / (U - u), (p[1] - v) / (V - v)) for p in outline]
     faces.append(wall.face(glass, outline, uv))
-    # Bars before the glass, closed by themselves.
+    # Bars in front of the glass are closed solids.
     middle, back, front = (u + U) / 2, -style.depth - 0.07, -style.depth - 0.02
     half = style.bar / 2
     low, high = v + m + bar / 2, V - m - bar / 2
@@ -202,7 +203,7 @@ def arched(
 
 
 def dressing(wall: Wall, hole: Hole, style: Style, *, sill: bool) -> list[Face]:
-    """Sill, lintel or surround of a window: solids that stand before the wall."""
+    """Sill, lintel or surround of a window: solids in front of the wall."""
     u, v, U, V = hole
     trim, faces = style.trim, []
     if sill and style.sill:

@@ -40,7 +40,7 @@ def court(w: float, d: float, wing: float) -> list[Ring]:
 
 
 def risalit(w: float, d: float, middle: float, out: float) -> list[Ring]:
-    """A bar whose middle comes forward."""
+    """A bar with a projecting centre."""
     x, m = w / 2, middle / 2
     front = [(-x, -out), (-m, -out), (-m, 0), (m, 0), (m, -out), (x, -out)]
     return [[*front, (x, -d), (-x, -d)]]

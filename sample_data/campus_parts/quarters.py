@@ -1,4 +1,4 @@
-"""The last two thirds of the way: buildings of what was there before, and halls of residence."""
+"""Recipes of the last two thirds of the street: buildings with recurring walls, and residences."""
 
 from __future__ import annotations
 
@@ -198,7 +198,7 @@ MIXED = [
 
 
 def residence(k: int) -> Recipe:
-    """Halls of residence: two brick rows with flat roofs, then plastered ones with tiles."""
+    """Halls of residence: two brick rows with flat roofs, then plastered rows with tiled roofs."""
     letter = chr(ord("A") + k)
     wall = ("brick_red", "brick_red", "plaster_white")[k % 3]
     pitched = k % 3 == 2

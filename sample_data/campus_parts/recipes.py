@@ -1,4 +1,4 @@
-"""Recipes of buildings, and their styles of windows."""
+"""Recipes of buildings, and their window styles."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from campus_parts.solids import Ring
 
 @dataclass(frozen=True)
 class Recipe:
-    """A building: its footprint, facades, roof, and what is added.
+    """A building: footprint, facades, roof, and attachments.
 
-    ``roof``: kind, surface, and rise over run of sloped ones. ``door_wall``: number of the wall
-    that has the entrance. ``extras``: names that `campus_parts.buildings` knows.
+    ``roof``: kind, surface, and rise over run of sloped roofs. ``door_wall``: number of the wall
+    with the entrance. ``extras``: names that `campus_parts.buildings` implements.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Roofs: what closes the walls above, and what stands on it."""
+"""Roofs, cornices and the structures on roofs."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def flat(rings: list[Ring], top: float, coping: str, inside: str, surface: str) 
 def sloped(
     rings: list[Ring], top: float, run: float, rise: float, surface: str, crown: str
 ) -> list[Face]:
-    """Slopes up from every wall: a hipped roof, a mansard, a pyramid; its crown is level."""
+    """Slopes up from every wall: a hipped roof, a mansard, a pyramid; the crown is level."""
     faces = []
     for ring in rings:
         faces += swept(ring, [(0, top), (-run, top + rise)], surface, closed=False)
@@ -47,7 +47,7 @@ def gable(width: float, rise: float, top: float) -> list[Flat]:
 
 
 def barrel(width: float, rise: float, top: float, steps: int = 14) -> list[Flat]:
-    """The same of a vault: part of a circle."""
+    """The upper edge of the end wall of a vault: a circular arc."""
     radius = (width * width / 4 + rise * rise) / (2 * rise)
     half = math.asin(width / 2 / radius)
     edge = []
@@ -59,10 +59,10 @@ def barrel(width: float, rise: float, top: float, steps: int = 14) -> list[Flat]
 
 
 def spanned(end: Wall, length: float, edge: list[Flat], surface: str) -> list[Face]:
-    """The roof between an end wall and the opposite one ``length`` behind it, and its eaves.
+    """The roof between an end wall and the opposite wall at ``length``, and its eaves.
 
-    ``edge``: the upper edge (u, v) of the end wall. The roof closes the walls; over it lies a
-    thicker one with overhanging eaves, closed by itself.
+    ``edge``: the upper edge (u, v) of the end wall. The inner roof closes the walls; a thicker,
+    closed roof with overhanging eaves covers it.
     """
     faces = []
     far = 0.0
@@ -72,7 +72,7 @@ def spanned(end: Wall, length: float, edge: list[Flat], surface: str) -> list[Fa
         uv = [(0, far), (length, far), (length, far + step), (0, far + step)]
         faces.append(end.face(surface, quad, uv))
         far += step
-    # The overhanging roof: the edge a little higher, prolonged at both ends.
+    # The overhanging roof: the edge raised slightly and extended at both ends.
     (u0, v0), (u1, v1) = edge[0], edge[1]
     share = 0.5 / math.sqrt((u1 - u0) ** 2 + (v1 - v0) ** 2)
     tip = (u0 - (u1 - u0) * share, v0 - (v1 - v0) * share)
@@ -86,7 +86,7 @@ def spanned(end: Wall, length: float, edge: list[Flat], surface: str) -> list[Fa
         (u, v), (U, V) = upper[k], upper[k + 1]
         (p, q), (P, Q) = lower[k], lower[k + 1]
         step = math.sqrt((U - u) ** 2 + (V - v) ** 2)
-        # As seen from the eaves: along them to the right, v up the slope on either side.
+        # Seen from the eaves: u along them to the right, v up the slope on either side.
         a, b = (far, far + step) if v < V or width / 2 > U else (-far, -far - step)
         uv = [(0, a), (front - back, a), (front - back, b), (0, b)]
         faces.append(
@@ -114,7 +114,7 @@ def spanned(end: Wall, length: float, edge: list[Flat], surface: str) -> list[Fa
 
 
 def cornice(ring: Ring, y: float, material: str, out: float = 0.4, tall: float = 0.5) -> list[Face]:
-    """A moulding whose top is at y, with dentils below where there is room for them."""
+    """A moulding with its top at y, with dentils below if they fit."""
     profile = [
         (-0.02, y - tall),
         (out * 0.25, y - tall),
@@ -151,13 +151,13 @@ def dentils(ring: Ring, y: float, material: str, pitch: float = 0.6) -> list[Fac
 
 
 def dormer(wall: Wall, u: float, v: float, run: float, rise: float, roof: str) -> list[Face]:
-    """A small house on the slope above a wall's edge at height v (``run`` in, ``rise`` up)."""
+    """A dormer on the slope above the edge of a wall at height v (``run`` in, ``rise`` up)."""
     half, tall, d = 0.8, 1.25, -0.25 * run
     low = v + 0.2 * rise
     back = -min(run, 3.0) - 0.2
     faces = box(wall, "plaster_white", (u - half, low, back), (u + half, low + tall, d))
     top = low + tall - 0.01
-    # Its own gabled roof is a profile across the wall, from the slope to the front.
+    # The gabled roof of a dormer is a profile across the wall, from the slope to the front.
     front = d + 0.2
     a, b, c = (u - half - 0.2, top), (u + half + 0.2, top), (u, top + 0.75)
     faces += [

@@ -1,8 +1,8 @@
-"""Closed solids from a few strokes: boxes on walls, swept rings, extruded profiles, prisms.
+"""Closed solids: boxes on walls, swept rings, extruded profiles, prisms.
 
-All of it in a building's own frame: x along its front, y up, z out of the front. Footprints are
-rings of (x, z), rectilinear, with the solid on the left as seen from above (a court is a ring the
-other way round). Every solid is closed without T-junctions and faces outwards.
+Coordinates are local to a building: x along its front, y up, z out of the front. Footprints are
+rectilinear rings of (x, z), with the solid on the left as seen from above (a court runs in the
+opposite direction). Every solid is closed, has no T-junctions and faces outwards.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ Ring = list[Flat]
 
 
 def face(material: str, points: Sequence[Point], uv: Sequence[Uv]) -> Face:
-    """A face from coordinates in metres, which become those of the material's image."""
+    """A face with texture coordinates in metres, scaled to repetitions of the image."""
     tile = MATERIALS[material].tile or 1
     return Face(material, tuple(points), tuple((u / tile, v / tile) for u, v in uv))
 
 
 @dataclass(frozen=True)
 class Wall:
-    """A vertical plane: u to the right as seen from its front, v up, d out of it; metres."""
+    """A vertical plane: u to the right as seen from its front, v up, d outwards; metres."""
 
     start: Flat
     right: Flat
@@ -39,9 +39,9 @@ class Wall:
         return x + rx * u - rz * d, v, z + rz * u + rx * d
 
     def face(self, material: str, corners: Sequence[Point], uv: Sequence[Uv] = ()) -> Face:
-        """Corners as (u, v, d), counter-clockwise from the front of the face.
+        """A face with corners (u, v, d), counter-clockwise from its front.
 
-        Mapped by the two of u, v, d that it extends in, or as ``uv`` says.
+        Texture coordinates are ``uv``, or the two of u, v, d along which the face extends.
         """
         us, vs, _ = (max(c) - min(c) for c in zip(*corners, strict=True))
         if not uv:
@@ -63,7 +63,7 @@ def walls_of(ring: Ring) -> list[Wall]:
 
 
 def zipped(a: Sequence[Point], b: Sequence[Point]) -> list[tuple[Point, ...]]:
-    """Triangles and quads between two lines of corners that run the same way, ``a`` below ``b``."""
+    """Triangulates the strip between two polylines of the same direction, ``a`` below ``b``."""
 
     def shares(line: Sequence[Point]) -> list[float]:
         steps = [math.dist(p, q) for p, q in pairwise(line)]
@@ -73,7 +73,7 @@ def zipped(a: Sequence[Point], b: Sequence[Point]) -> list[tuple[Point, ...]]:
     s, t, i, j = shares(a), shares(b), 0, 0
     pieces: list[tuple[Point, ...]] = []
     while i < len(a) - 1 or j < len(b) - 1:
-        # By the middles of the next steps, so that both ends of a long one get their share.
+        # Advance by the midpoints of the next steps: both ends of a long step get triangles.
         x = (s[i] + s[i + 1]) / 2 if i < len(a) - 1 else 2.0
         y = (t[j] + t[j + 1]) / 2 if j < len(b) - 1 else 2.0
         ends = i < len(a) - 1 and j < len(b) - 1 and abs(s[i + 1] - t[j + 1]) < 0.02
@@ -92,7 +92,7 @@ def zipped(a: Sequence[Point], b: Sequence[Point]) -> list[tuple[Point, ...]]:
 def box(
     wall: Wall, material: str, low: Point, high: Point, without: frozenset[str] = frozenset()
 ) -> list[Face]:
-    """A solid box in a wall's u, v, d."""
+    """A solid box in the u, v, d of a wall."""
     (u, v, d), (U, V, D) = low, high
     sides = {
         "front": ((u, v, D), (U, v, D), (U, V, D), (u, V, D)),
@@ -106,7 +106,7 @@ def box(
 
 
 def offset(ring: Ring, d: float) -> Ring:
-    """The ring with every wall moved outwards by d."""
+    """Offsets every wall of a ring outwards by d."""
     walls = walls_of(ring)
     out = []
     for k, (x, z) in enumerate(ring):
@@ -116,9 +116,9 @@ def offset(ring: Ring, d: float) -> Ring:
 
 
 def swept(ring: Ring, profile: Sequence[Flat], material: str, *, closed: bool) -> list[Face]:
-    """A profile of (d, y) carried around a ring; solid on its left, going up the outside.
+    """A profile of (d, y) swept around a ring; solid on its left, going up the outside.
 
-    ``closed`` joins the profile's end with its beginning: a moulding by itself.
+    ``closed`` joins the end of the profile with its start, which gives a separate moulding.
     """
     points = [*profile, profile[0]] if closed else list(profile)
     faces = []
@@ -144,7 +144,8 @@ def swept(ring: Ring, profile: Sequence[Flat], material: str, *, closed: bool) -
 
 
 def ears(ring: Sequence[Flat]) -> list[tuple[int, int, int]]:
-    """Triangles of a simple polygon, counter-clockwise in (x, -z) or any other plane's axes."""
+    """Triangulates a simple polygon by ear clipping, counter-clockwise in (x, -z) or other plane
+    axes."""
 
     def turn(a: Flat, b: Flat, c: Flat) -> float:
         return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
@@ -171,7 +172,7 @@ def lid(rings: list[Ring], y: float, material: str, *, up: bool = True) -> list[
     """The level surface of a footprint: one ring, or a ring of four corners around a court."""
     if len(rings) == 2:
         outer, court = rings
-        # A court runs the other way round: its corner k faces the outer corner (4 - k) % 4.
+        # A court runs in the opposite direction: its corner k faces outer corner (4 - k) % 4.
         polygons = [
             [outer[k], outer[(k + 1) % 4], court[(3 - k) % 4], court[(4 - k) % 4]] for k in range(4)
         ]

@@ -1,7 +1,7 @@
-"""Textures of glass, doors, ground and plants, and the further channels of some.
+"""Textures of glass, doors, ground and plants, and masks.
 
-`IMAGES` draws what a material shows; `MASKS` where it reflects, from the same picture; `ALPHAS`
-where a plant is.
+`IMAGES` draws colours; `MASKS` derives specular masks from the same picture; `ALPHAS` draws opacity
+masks of plants.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def louvre(rng: np.random.Generator, size: int) -> Field:
 
 
 def _interior(rng: np.random.Generator, size: int) -> Field:
-    """A dark room with a reflection of the sky above and of trees below."""
+    """A dark room with reflections of the sky above and of trees below."""
     _, y = axes(size)
     up = np.float32(1) - y
     clouds = fractal(rng, size, 3, 4, 5)
@@ -203,7 +203,7 @@ def bark(rng: np.random.Generator, size: int) -> Field:
 
 
 def crown(width: float, stem: float) -> Surface:
-    """Where a tree is, 0 or 255: its crown of leaves with gaps, and the stem."""
+    """Opacity of a tree, 0 or 255: its crown of leaves with gaps, and the stem."""
 
     def draw(rng: np.random.Generator, size: int) -> Field:
         x, y = axes(size)
@@ -290,7 +290,7 @@ ALPHAS: dict[str, Surface] = {
 
 
 def mask(name: str, image: Field, rng: np.random.Generator, size: int) -> Field:
-    """How much a texel reflects: glass but for what hangs behind it, stone, metal."""
+    """Specular mask: glass without curtains, stone, metal."""
     light = image[..., 0] * np.float32(0.3) + image[..., 1] * np.float32(0.5)
     light = light + image[..., 2] * np.float32(0.2)
     smears = fractal(rng, size, 5, 5, 5)

@@ -1,4 +1,4 @@
-"""The way of the visitor: a walk document (docs/design/walkthrough.md) along the street."""
+"""The walk of the visitor along the street (format: docs/design/walkthrough.md)."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from campus_parts.layout import BEYOND, Street, along
 
 SPEED = 11 / 3.6  # m/s: 11 km/h, as in the campus paper, section IV
 EYE = 1.6
-RATE = 5  # samples a second
-#: Bends are rounded over this many metres before and behind them.
+RATE = 5  # samples per second
+#: Length over which a bend is rounded, on either side, m.
 ROUNDING = 12.0
 FIELD_OF_VIEW, ASPECT = 1.0472, 1.7778
 
 
 def way_points(street: Street, length: float) -> list[tuple[float, float]]:
-    """Points of (x, z) every RATE-th of a second along ``length`` metres of the rounded street."""
+    """Returns points (x, z) at `RATE` per second along ``length`` metres of the rounded street."""
     line = street.line()
 
     def rounded(s: float) -> tuple[float, float]:
@@ -43,14 +43,14 @@ def way_points(street: Street, length: float) -> list[tuple[float, float]]:
 
 
 def way_text(street: Street, length: float, origin: tuple[float, float]) -> str:
-    """The walk, its places relative to ``origin``, the centre of the model's floor."""
+    """Returns the walk with positions relative to ``origin``, the centre of the model's floor."""
     points = way_points(street, length)
     rows = []
     for k, (x, z) in enumerate(points):
         t = k / RATE
         ahead, behind = points[min(k + 10, len(points) - 1)], points[max(k - 2, 0)]
         heading = math.atan2(ahead[1] - behind[1], ahead[0] - behind[0])
-        # Glances to the houses on either side, and a little up to them.
+        # Look at the houses on either side, slightly upwards.
         turn = 0.32 * math.sin(2 * math.pi * t / 23) * math.sin(2 * math.pi * t / 61)
         up = 0.03 + 0.03 * math.sin(2 * math.pi * t / 31)
         heading += turn

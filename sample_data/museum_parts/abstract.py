@@ -1,4 +1,4 @@
-"""Colour fields, thrown paint, rectangles, marbled paper."""
+"""Abstract paintings: colour fields, drip paintings, rectangles, marbled paper."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def color_field(rng: np.random.Generator, size: int) -> Image.Image:
 
 
 def drips(rng: np.random.Generator, size: int) -> Image.Image:
-    """Threads of paint thrown over a canvas."""
+    """Threads of paint dripped over a canvas."""
     image = ramp(fractal(rng, size, 4, 4, 6, 0.6), (0.2, (196, 184, 160)), (0.8, (226, 216, 196)))
     canvas = Image.fromarray(bytes_of(image)).resize((2 * size, 2 * size), Image.Resampling.NEAREST)
     draw = ImageDraw.Draw(canvas)
@@ -124,7 +124,7 @@ def _pick_palette(rng: np.random.Generator) -> list[Color]:
 
 
 def marbled(rng: np.random.Generator, size: int) -> Image.Image:
-    """Marbled paper: bands of colour drawn out twice."""
+    """Marbled paper: bands of colour distorted twice."""
     bands = fractal(rng, size, 3, 3, 3)
     for reach in (0.5, 0.25):
         dx, dy = (fractal(rng, size, 3, 3, 5) - np.float32(0.5) for _ in range(2))

@@ -27,10 +27,11 @@ def painted(
     passes: list[tuple[int, float, float]],
     swirl: float = 0.0,
 ) -> Image.Image:
-    """``image`` in strokes; a pass is (strokes, length, width), both as shares of the size.
+    """Repaints ``image`` in strokes; a pass is (strokes, length, width), lengths as shares of the
+    size.
 
-    Strokes run along the contours of the brightness, turned towards a slow noise field by
-    ``swirl`` (0…1).
+    Strokes run along the contours of the brightness, turned towards a slow noise field by ``swirl``
+    (0…1).
     """
     size = image.shape[0]
     canvas = Image.fromarray(bytes_of(image)).resize((2 * size, 2 * size), Image.Resampling.NEAREST)

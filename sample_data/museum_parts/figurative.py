@@ -30,7 +30,7 @@ def _sky(rng: np.random.Generator, size: int, horizon: float) -> Field:
 
 
 def landscape(rng: np.random.Generator, size: int) -> Image.Image:
-    """Hills one behind the other under a sky, trees before them."""
+    """Ranges of hills under a sky, with trees in front."""
     _, y = axes(size)
     horizon = 0.42 + 0.16 * float(rng.random())
     image = _sky(rng, size, horizon)

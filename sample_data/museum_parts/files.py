@@ -1,4 +1,4 @@
-"""Writes a sample: all files or none, and never over foreign files."""
+"""Writes the files of a sample: all or none, and never over foreign files."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pathlib import Path
 from PIL import Image
 
 HEAD = "# ptmtools sample"
-#: A path in the folder that is written, and a function that returns the bytes.
+#: A path in the output folder, and a function that returns the bytes.
 File = tuple[str, Callable[[], bytes]]
 
 
@@ -29,7 +29,8 @@ def png(image: Image.Image) -> bytes:
 
 
 def ours(folder: Path, stem: str) -> set[str]:
-    """The files that an earlier run wrote into ``folder``, or nothing if it holds no such model."""
+    """Returns the files of an earlier sample in ``folder``; none if the folder holds no such
+    model."""
     try:
         with (folder / f"{stem}.obj").open(encoding="utf-8") as file:
             if not file.readline().startswith(HEAD):
@@ -47,8 +48,8 @@ def ours(folder: Path, stem: str) -> set[str]:
 def write(folder: Path, files: list[File], *, force: bool) -> None:
     """Writes the files, all or (short of a power cut during the renames) none.
 
-    A folder that holds something and no sample is refused without ``force``; what is not ours is
-    left alone. Textures of an earlier sample that this one does not have are removed.
+    A folder that is not empty and holds no sample is refused without ``force``; foreign files are
+    left alone. Textures of an earlier sample that the new one lacks are removed.
     """
     before = ours(folder, Path(files[-1][0]).stem) if folder.is_dir() else set()
     if folder.exists() and not folder.is_dir():

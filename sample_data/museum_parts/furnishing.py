@@ -1,7 +1,7 @@
 """Pictures, statues, benches, stairs and the entrance: the detail inside the shell.
 
-Nothing here closes or opens a cell. Pictures are the hard case on purpose: thin closed frames
-that hang 2 mm to 2 cm off their wall.
+These objects neither close nor open a cell. Pictures are a hard case on purpose: thin closed frames
+2 mm to 2 cm in front of their wall.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from museum_parts.shell import TILE, Panel
 
 #: Distance of a frame's back, and of its canvas, from the wall; mm.
 HANG = (2, 20)
-#: How far a frame's front stands before its back; m.
+#: Depth of a frame; m.
 FRAME_DEPTH = 0.025
-#: Ways to hang pictures, from airy to crowded: metres of wall a picture, heights of the rows'
-#: centres above the floor, greatest height of a canvas; m.
+#: Hanging schemes by decreasing spacing: metres of wall per picture, heights of the row centres
+#: above the floor, maximum height of a canvas; m.
 HANGINGS = [
     (2.6, (1.65,), 1.7),
     (1.9, (1.65,), 1.3),
@@ -34,8 +34,8 @@ FLIGHT_GAP = 0.3
 
 @dataclass(frozen=True)
 class Place:
-    """Where a picture may hang: its panel, the centre along the wall and above the model's
-    origin, and the room for the canvas; m."""
+    """A position for a picture: its panel, the centre along the wall and above the model's origin,
+    and the maximum size of the canvas; m."""
 
     panel: Panel
     along: float
@@ -45,9 +45,9 @@ class Place:
 
 
 def places(panels: list[Panel], wanted: int) -> list[Place]:
-    """Places for at least ``wanted`` pictures, hung as airily as possible.
+    """Returns positions for at least ``wanted`` pictures, with as much spacing as possible.
 
-    Raises ValueError if they do not fit even when crowded.
+    Raises ValueError if they do not fit even with the least spacing.
     """
     walls = [p for p in panels if p.top - p.bottom > 3500 and p.high - p.low > 1300]
     for pitch, rows, tall in HANGINGS:
@@ -69,7 +69,7 @@ def places(panels: list[Panel], wanted: int) -> list[Place]:
 def hang(
     panels: list[Panel], aspects: list[float], rooms: int, rng: np.random.Generator
 ) -> list[Thing]:
-    """Every picture once, then again until the walls are well hung.
+    """Hangs every picture once, then repeats them until the walls are full.
 
     ``aspects`` gives width over height of each picture; picture k has the material
     ``painting_%02d`` % (k + 1).
@@ -126,7 +126,8 @@ def _picture(
 
 
 def furnish(plan: Plan, rng: np.random.Generator) -> list[Thing]:
-    """Statues and benches in the rooms, benches in the corridors, the entrance, the stairs."""
+    """Returns statues and benches of the rooms, benches of the corridors, the entrance, the
+    stairs."""
     statues: list[Thing] = []
     benches: list[Thing] = []
     for box in plan.of_kind("room"):
@@ -144,7 +145,7 @@ def furnish(plan: Plan, rng: np.random.Generator) -> list[Thing]:
         ]
     ground = next(box for box in plan.of_kind("corridor") if box.storey == 0)
     z = _between(ground, 2, 0.5)
-    # Two leaves on either side of the wall, which stays whole behind them.
+    # Two leaves on either side of the wall, which stays closed behind them.
     leaves = [
         face
         for x, X in ((0.005, 0.06), (plan.low[0] / 1000 - 0.06, plan.low[0] / 1000 - 0.005))
@@ -174,7 +175,7 @@ def _bench(number: int, box: Box, share: float, turned: int) -> Thing:
 
 
 def _stairs(shaft: Box, storeys: int) -> list[Thing]:
-    """Two flights and a landing a storey, with guards; the steps are the boxes' exact height."""
+    """Two flights and a landing per storey, with guards; step heights divide the storey exactly."""
     things: list[Thing] = []
     x0 = shaft.low[0] / 1000
     z0, z1 = shaft.low[2] / 1000, shaft.high[2] / 1000
@@ -192,7 +193,7 @@ def _stairs(shaft: Box, storeys: int) -> list[Thing]:
         )
         south, north = (middle + FLIGHT_GAP / 2, z1), (z0, middle - FLIGHT_GAP / 2)
         up = _flight(x0, landing, y, rise, south, inner=0)
-        under = half - 2 * rise  # the flight ends lower than the landing is thick
+        under = half - 2 * rise  # the flight ends below the underside of the landing
         end = [(under, south[1]), (under, south[0]), (half - 0.2, south[0]), (half - 0.2, south[1])]
         up.append(tiled("stone", tuple((landing, h, z) for h, z in end), 2.0))
         things.append(Thing(f"{name}_flight{storey}_up", up))
@@ -213,8 +214,8 @@ def _flight(
 ) -> list[Face]:
     """A flight from (start, y) to stop: treads, risers, inner side, underside and guard.
 
-    The last riser belongs to what the flight leads to. ``inner`` says which of the two z is the
-    side towards the other flight; the other one touches the wall.
+    The floor or landing above provides the last riser. ``inner`` selects the z of the side towards
+    the other flight; the opposite side touches the wall.
     """
     run = (stop - start) / (RISERS - 1)
     towards = 1 if run > 0 else -1
@@ -323,7 +324,7 @@ def _smooth(
 
 
 def _plinth(x: float, y: float, z: float, height: float, half: float = 0.3) -> list[Face]:
-    """A base, a shaft and a cornice; what touches is left out."""
+    """A base, a shaft and a cornice; touching faces are left out."""
     h, levels = half, [(0.0, 0.12, 0.06), (0.12, height - 0.08, 0.0), (height - 0.08, height, 0.04)]
     faces: list[Face] = []
     for bottom, top, out in levels:

@@ -42,7 +42,7 @@ def tiled(material: str, points: tuple[Point, ...], tile: float) -> Face:
     """A face whose image repeats every ``tile`` metres.
 
     A steep face is mapped upright as seen from its front: u to the viewer's right, v up. A flat
-    one has u along x and v along -z. u and v begin near 0, so that they stay small.
+        face has u along x and v along -z. u and v start near 0, which keeps them small.
     """
     normal = cross(subtract(points[1], points[0]), subtract(points[2], points[0]))
     x, y, z = (abs(c) for c in normal)
@@ -60,7 +60,7 @@ def tiled(material: str, points: tuple[Point, ...], tile: float) -> Face:
 def block(
     material: str, low: Point, high: Point, tile: float, *, without: frozenset[str] = frozenset()
 ) -> list[Face]:
-    """The faces of a solid box, facing outwards; ``without`` names sides (+x, -y, …) to omit."""
+    """The outward faces of a solid box; ``without`` names sides (+x, -y, …) to omit."""
     (x, y, z), (X, Y, Z) = low, high
     sides: dict[str, tuple[Point, ...]] = {
         "-x": ((x, y, z), (x, y, Z), (x, Y, Z), (x, Y, z)),

@@ -1,9 +1,9 @@
 """Noise, ramps and waves in plain arithmetic.
 
-The textures must be the same bytes on every machine. numpy's sine, exponential and power differ
-in the last bit from one processor to the next (they dispatch to vector instructions), and sums
-may differ in their order; +, −, ×, ÷, √, floor and comparisons do not. Only those are used here,
-on float32 arrays; random numbers are taken as raw uniforms.
+The textures must have the same bytes on every machine. numpy's sine, exponential and power differ
+in the last bit between processors (they dispatch to vector instructions), and sums may differ in
+their order; +, −, ×, ÷, √, floor and comparisons do not. The module uses only the latter, on
+float32 arrays; random numbers are raw uniforms.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def fractal(
 ) -> Field:
     """Octaves of `value_noise`, each with doubled lattice and ``gain`` times the strength; 0…1.
 
-    Octaves finer than the texels are left out.
+    Octaves finer than a texel are left out.
     """
     total = np.zeros((size, size), dtype=np.float32)
     strength, sum_ = 1.0, 0.0
@@ -90,7 +90,7 @@ def ridge(rng: np.random.Generator, size: int, cells: int, octaves: int) -> Fiel
 
 
 def warped(field: Field, dx: Field, dy: Field) -> Field:
-    """``field`` (periodic) looked up dx, dy (shares of its size) further right and down."""
+    """Samples the periodic ``field`` displaced by dx, dy (shares of its size), right and down."""
     size = field.shape[0]
     x, y = axes(size)
     column = np.floor((x + dx) * np.float32(size)).astype(np.int64) % size
@@ -110,11 +110,11 @@ def ramp(t: Field, *stops: tuple[float, Color]) -> Field:
 
 
 def blend(image: Field, color: Color | Field, mask: Field) -> Field:
-    """``image`` with ``color`` laid over it where ``mask`` (0…1) says."""
+    """Lays ``color`` over ``image`` with the opacity ``mask`` (0…1)."""
     over = np.asarray(color, dtype=np.float32)
     return np.asarray(image + (over - image) * mask[..., None])
 
 
 def bytes_of(image: Field) -> NDArray[np.uint8]:
-    """Rounded to 0…255."""
+    """Rounds to 0…255."""
     return np.asarray(np.clip(np.floor(image + np.float32(0.5)), 0, 255), dtype=np.uint8)

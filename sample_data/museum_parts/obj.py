@@ -12,10 +12,10 @@ def number(value: float, digits: int) -> str:
 
 
 def obj_text(things: list[Thing], head: list[str], library: str) -> str:
-    """The objects with shared vertices (0.1 mm) and texture coordinates (1e-5)."""
+    """Returns the objects with shared vertices (0.1 mm) and texture coordinates (1e-5)."""
     points: dict[str, int] = {}
     coordinates: dict[str, int] = {}
-    numbers: dict[Point, int] = {}  # most corners are there before: writing them out is slow
+    numbers: dict[Point, int] = {}  # most corners repeat, and formatting is slow
     pairs: dict[Uv, int] = {}
     body: list[str] = []
     for thing in things:

@@ -1,8 +1,8 @@
-"""The styles of painting, in the order in which a museum uses them.
+"""Painting styles in the order in which a museum uses them.
 
-A composition is a (size, size, 3) field of colours in layered noise and gradients; most are then
-covered with three passes of strokes, from broad to fine, that take their colour from it and
-follow its contours (`brush.py`). Each style takes a generator and a size and returns an image.
+A composition is a (size, size, 3) field of colours in layered noise and gradients. Most styles then
+cover it with three passes of strokes, from broad to fine, that follow its colours and contours
+(`brush.py`). Each style takes a generator and a size and returns an image.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from museum_parts.printed import manuscript, poster
 
 Painting = Callable[[np.random.Generator, int], Image.Image]
 
-#: Name, style, and the width over height of the canvas that it is meant for.
+#: Name, style, and width over height of the canvas.
 PAINTINGS: list[tuple[str, Painting, float]] = [
     ("landscape", landscape, 4 / 3),
     ("portrait", portrait, 3 / 4),

@@ -1,14 +1,14 @@
-"""The museum's plan: boxes of air in a block of solid, in whole millimetres.
+"""The plan of the museum: boxes of air in a solid block, in whole millimetres.
 
-A building is described by the air in it. Rooms, corridors, stairwells, doorways and windows are
-axis-aligned boxes that do not overlap; where two of them touch there is an opening, and whatever
-lies between them is wall. So walls have a thickness by themselves, and the model cannot have a
-gap: its surface is the boundary of the union of the boxes, plus the outside of the block
-(`shell.py`). Whole millimetres make "touch" an exact question.
+Air describes a building. Rooms, corridors, stairwells, doorways and windows are axis-aligned boxes
+that do not overlap; an opening arises where two boxes touch, and the rest between them is wall.
+Thus walls have a thickness, and the model cannot have a gap: its surface is the boundary of the
+union of the boxes, plus the outside of the block (`shell.py`). Whole millimetres make contact
+exact.
 
-X points east, Y up, Z south. On each floor parallel wings follow one another in z; a wing is a
-strip of rooms, a corridor and a second strip of rooms, with a stairwell at the corridor's east
-end. A stairwell is one shaft through all floors, with an entry on each.
+X points east, Y up, Z south. Each floor is a row of parallel wings along z; a wing is a strip of
+rooms, a corridor and a second strip of rooms, with a stairwell at the east end of the corridor. A
+stairwell is one shaft through all floors, with an entry on each.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ SLAB = 300
 ROOM_HEIGHT = 4200
 STOREY = ROOM_HEIGHT + SLAB
 CORRIDOR_WIDTH = 4000
-#: The stairwell in x: an entry with a floor on each storey, two flights beside each other that
+#: Lengths of the stairwell along x: an entry with a floor on each storey, two parallel flights that
 #: rise half a storey each, and the landing between them.
 STAIR_ENTRY = 1600
 STAIR_RUN = 4200
 STAIR_LANDING = 1600
 STAIRWELL = STAIR_ENTRY + STAIR_RUN + STAIR_LANDING
-#: What a doorway keeps free of the ends of the wall that it is in.
+#: Minimum distance of a doorway from the ends of its wall.
 DOOR_MARGIN = 300
 WALLS = ("plaster_cream", "plaster_red", "plaster_green", "plaster_blue")
 FLOORS = ("parquet", "carpet", "parquet")
@@ -40,7 +40,7 @@ Mm = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class Box:
-    """A box of air [low, high] in mm and the names of its surfaces' materials.
+    """A box of air [low, high] in mm and the names of its surface materials.
 
     ``kind`` is room, corridor, entry, shaft, door or window; ``storey`` counts from 0.
     """
@@ -57,7 +57,7 @@ class Box:
 
 @dataclass
 class Plan:
-    """All boxes of air, and the outside [low, high] of the block that they are cut from."""
+    """All boxes of air, and the bounds [low, high] of the solid block."""
 
     boxes: list[Box] = field(default_factory=list)
     low: Mm = (0, 0, 0)
@@ -69,20 +69,20 @@ class Plan:
 
 
 def storeys_for(rooms: int) -> int:
-    """Two floors for the usual museum, more for large ones."""
+    """Returns the number of storeys: two, or more for large museums."""
     if rooms < 4:
         return 1
     return 2 if rooms <= 24 else 3 if rooms <= 90 else 4
 
 
 def make_plan(rooms: int, rng: np.random.Generator, *, windows: bool = True) -> Plan:
-    """A museum of ``rooms`` rooms besides its corridors and stairwells."""
+    """Plans a museum of ``rooms`` rooms besides its corridors and stairwells."""
     storeys = storeys_for(rooms)
     per_storey = math.ceil(rooms / storeys)
     wings = math.ceil(per_storey / 16)
     strips = min(2 * wings, per_storey)
     columns = math.ceil(per_storey / strips)
-    # Narrower than this the corridor would have no length beside the stairwell.
+    # A narrower block would leave no corridor beside the stairwell.
     least = math.ceil((STAIRWELL + INNER_WALL + 4000) / columns / 500) * 500
     widths = [max(least, 500 * int(rng.integers(13, 20))) for _ in range(columns)]
     depths = [500 * int(rng.integers(14, 17)) for _ in range(strips)]
@@ -92,7 +92,7 @@ def make_plan(rooms: int, rng: np.random.Generator, *, windows: bool = True) -> 
     number = 0
     for storey in range(storeys):
         here = min(per_storey, rooms - number)
-        # The same widths in another order: the block stays, the rooms differ.
+        # The same widths in another order: rooms differ within the same block.
         order = [widths[k] for k in rng.permutation(columns)] if storey else widths
         starts = np.cumsum([0, *[w + INNER_WALL for w in order]]).tolist()
         slots = [(c, s) for c in range(columns) for s in range(strips)][:here]
@@ -111,7 +111,7 @@ def make_plan(rooms: int, rng: np.random.Generator, *, windows: bool = True) -> 
 
 
 def _strip_start(strip: int, depths: list[int]) -> int:
-    """Where a strip of rooms begins in z."""
+    """Returns the z at which a strip of rooms starts."""
     corridors = (strip + 1) // 2
     walls = strip // 2 + 2 * corridors
     return sum(depths[:strip]) + corridors * CORRIDOR_WIDTH + walls * INNER_WALL
@@ -128,13 +128,13 @@ def _storey(
     rng: np.random.Generator,
     windows: bool,
 ) -> None:
-    """One floor: rooms in their slots (column, strip), corridors, doorways, windows."""
+    """Plans one floor: rooms in their slots (column, strip), corridors, doorways, windows."""
     base = storey * STOREY
     length = starts[-1] - INNER_WALL
     room: dict[tuple[int, int], Box] = {}
     for k, (column, strip) in enumerate(slots):
         z = _strip_start(strip, depths)
-        # The last room of a strip takes what is left of it: no mass of solid that is not wall.
+        # The last room takes the rest of its strip, so all solid is wall.
         last = (column + 1, strip) not in slots
         end = length if last else starts[column] + widths[column]
         room[column, strip] = Box(
@@ -169,7 +169,7 @@ def _storey(
     for (column, strip), box in room.items():
         on_corridor = _door(plan, box, corridors[strip // 2], 2, rng, (1400, 1900))
         east = room.get((column + 1, strip))
-        # Corridor doors suffice; some rooms also open into the next one.
+        # Corridor doors suffice for access; some rooms also open into the next one.
         if east and (not on_corridor or _past_corridor(east, corridors) or rng.random() < 0.6):
             _door(plan, box, east, 0, rng, (1300, 2000))
         south = room.get((column, strip + 1))
@@ -199,7 +199,7 @@ def _storey(
 
 
 def _past_corridor(box: Box, corridors: list[Box]) -> bool:
-    """Whether a room lies so far east that it cannot open into a corridor."""
+    """Whether a room lies east of the corridor, so it cannot open into it."""
     least = box.low[0] + 2 * DOOR_MARGIN + 1900
     return all(least > corridor.high[0] for corridor in corridors)
 
@@ -281,7 +281,7 @@ def _window(
 
 
 def _stairwell(plan: Plan, wing: int, length: int, z: int, windows: bool) -> None:
-    """The shaft that joins the storeys' entries: one box of air from the ground to the top."""
+    """The shaft between the entries of the storeys: one box of air from the ground to the top."""
     shaft = Box(
         name=f"stair{chr(97 + wing)}_shaft",
         kind="shaft",
@@ -293,7 +293,7 @@ def _stairwell(plan: Plan, wing: int, length: int, z: int, windows: bool) -> Non
         ceiling="ceiling",
     )
     plan.boxes.append(shaft)
-    if windows:  # each a little above a landing
+    if windows:  # each slightly above a landing
         for storey in range(max(1, plan.storeys - 1)):
             sill = storey * STOREY + STOREY // 2 + 600 if plan.storeys > 1 else 1000
             _window(plan, shaft, 0, 1, 1, 1800, sill=sill, first=storey + 1)

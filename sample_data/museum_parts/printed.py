@@ -1,4 +1,4 @@
-"""Pictures with lettering to read: posters and pages."""
+"""Posters and pages with legible lettering."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from museum_parts.noise import (
 
 
 def poster(rng: np.random.Generator, size: int) -> Image.Image:
-    """An exhibition's poster: a bold figure and large lettering."""
+    """A poster of an exhibition: a bold figure and large lettering."""
     x, y = axes(size)
     ink = pick(rng, [(24, 38, 64), (92, 22, 24), (30, 62, 50), (44, 34, 30)])
     paper = pick(rng, [(240, 226, 192), (232, 214, 176), (244, 236, 214)])

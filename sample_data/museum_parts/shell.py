@@ -1,9 +1,9 @@
 """The surface of a plan: walls, floors and ceilings with their openings, facing the air.
 
-Each side of a box of air is a rectangle less the rectangles in which other boxes touch it. What
-is left is cut into few rectangles: vertical strips between the openings' edges, merged where
-neighbouring strips have the same free intervals. Edges of neighbouring rectangles lie on exactly
-the same lines, so the surface is closed although it has T-junctions.
+Each side of a box of air is a rectangle less its contacts with other boxes. The remainder is cut
+into few rectangles: vertical strips between the edges of openings, merged where adjacent strips
+have the same free intervals. Edges of adjacent rectangles lie on exactly the same lines, so the
+surface is closed although it has T-junctions.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from itertools import pairwise
 from museum_parts.mesh import Face, Point, Thing, block, tiled
 from museum_parts.plan import Box, Plan
 
-#: Metres that one repetition of a surface's image covers.
+#: Metres per repetition of the image of a surface.
 TILE = {
     "plaster_cream": 3.0,
     "plaster_red": 2.0,
@@ -36,10 +36,10 @@ Rectangle = tuple[int, int, int, int]  # low u, low v, high u, high v
 
 @dataclass(frozen=True)
 class Panel:
-    """A rectangle of a room's wall, mm: where pictures may hang.
+    """A rectangle of a room's wall for pictures, mm.
 
     The wall lies at ``position`` on ``axis`` and faces the air towards ``side`` (+1 or -1); the
-    rectangle spans ``low`` to ``high`` on the other horizontal axis and the height given.
+    rectangle spans ``low`` to ``high`` on the other horizontal axis and the given height.
     """
 
     room: str
@@ -53,7 +53,7 @@ class Panel:
 
 
 def rectangles(whole: Rectangle, holes: list[Rectangle]) -> list[Rectangle]:
-    """``whole`` less ``holes``, as few upright rectangles."""
+    """Returns ``whole`` less ``holes`` as few upright rectangles."""
     u0, v0, u1, v1 = whole
     cuts = sorted({u0, u1, *(u for h in holes for u in (h[0], h[2]) if u0 < u < u1)})
     strips: list[tuple[int, int, list[tuple[int, int]]]] = []
@@ -73,7 +73,7 @@ def rectangles(whole: Rectangle, holes: list[Rectangle]) -> list[Rectangle]:
 
 
 def _contact(box: Box, axis: int, high: bool, other: Box) -> Rectangle | None:
-    """Where ``other`` touches one side of ``box``."""
+    """Returns the contact of ``other`` with a side of ``box``."""
     here = box.high[axis] if high else box.low[axis]
     there = other.low[axis] if high else other.high[axis]
     if here != there:
@@ -85,12 +85,12 @@ def _contact(box: Box, axis: int, high: bool, other: Box) -> Rectangle | None:
 
 
 def _axes(axis: int) -> tuple[int, int]:
-    """The axes (u, v) of a side; v is up on walls, so that strips are upright."""
+    """Returns the axes (u, v) of a side; v is up on walls, so strips are upright."""
     return ((2, 1), (0, 2), (0, 1))[axis]
 
 
 def _side(axis: int, position: int, facing: int, r: Rectangle) -> tuple[Point, ...]:
-    """The corners of a rectangle, counter-clockwise seen from the side that it faces; metres."""
+    """Returns the corners of a rectangle, counter-clockwise seen from its front; metres."""
     u, v = _axes(axis)
     corners = [(r[0], r[1]), (r[2], r[1]), (r[2], r[3]), (r[0], r[3])]
     points = []
@@ -113,13 +113,14 @@ SIDES = [
 
 
 def _open_sides(plan: Plan, box: Box) -> Iterator[tuple[int, bool, str, list[Rectangle]]]:
-    """Axis, whether the high side, name and remaining rectangles of each side of a box."""
+    """Yields axis, whether the side is the high one, name and remaining rectangles of each side of
+    a box."""
     for axis, high, name in SIDES:
         u, v = _axes(axis)
         whole = (box.low[u], box.low[v], box.high[u], box.high[v])
         holes = [_contact(box, axis, high, other) for other in plan.boxes if other is not box]
         actual = [h for h in holes if h]
-        if box.kind == "window":  # its outer side is open to the outside, if it is an outer side
+        if box.kind == "window":  # the outer side of a window is open
             outside = plan.high[axis] if high else plan.low[axis]
             if (box.high[axis] if high else box.low[axis]) == outside:
                 actual = [whole]
@@ -127,7 +128,7 @@ def _open_sides(plan: Plan, box: Box) -> Iterator[tuple[int, bool, str, list[Rec
 
 
 def make_shell(plan: Plan) -> tuple[list[Thing], list[Panel]]:
-    """The objects of the shell, and the wall panels of rooms and corridors."""
+    """Returns the objects of the shell, and the wall panels of rooms and corridors."""
     things, panels = [], []
     for box in plan.boxes:
         whole = Thing(box.name)
@@ -158,7 +159,7 @@ def make_shell(plan: Plan) -> tuple[list[Thing], list[Panel]]:
 
 
 def _pane(box: Box) -> list[Thing]:
-    """The glass in the middle of a window, and the bars that divide it."""
+    """The glass in the middle of a window, and its glazing bars."""
     axis = 0 if box.high[0] - box.low[0] < box.high[2] - box.low[2] else 2
     u, v = _axes(axis)
     middle = (box.low[axis] + box.high[axis]) // 2
@@ -183,7 +184,7 @@ def _pane(box: Box) -> list[Thing]:
 
 
 def _outside(plan: Plan) -> list[Thing]:
-    """The block's outside with its window openings."""
+    """The outside of the block with its window openings."""
     names = {"floor": "ground_slab", "ceiling": "roof"}
     things = []
     for axis, high, name in SIDES:

@@ -1,8 +1,8 @@
-"""Textures of walls, floors, frames and stone; all of them tile.
+"""Tiling textures of walls, floors, frames and stone.
 
 Each function takes a generator and a size and returns (size, size, 3) colours 0…255. `SURFACES`
-lists them in the order of their use to a museum: with few textures only the first are made, and
-the materials of the others are plain colours.
+lists them by priority: a museum of few textures has only the first ones, and plain colours for the
+other materials.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def wood(rng: np.random.Generator, size: int) -> Field:
 
 
 def parquet(rng: np.random.Generator, size: int) -> Field:
-    """Basket weave: squares of four strips, lying and standing by turns."""
+    """Basket weave: squares of four strips in alternating directions."""
     x, y = axes(size)
     squares, strips = 6, 4
     i, j = np.floor(x * np.float32(squares)), np.floor(y * np.float32(squares))
@@ -169,7 +169,7 @@ def gilt(rng: np.random.Generator, size: int) -> Field:
 
 
 def facade(rng: np.random.Generator, size: int) -> Field:
-    """Ashlar: courses of blocks, every other one moved by half a block."""
+    """Ashlar: courses of blocks, every second one offset by half a block."""
     x, y = axes(size)
     rows, blocks = 8, 4
     j = np.floor(y * np.float32(rows))

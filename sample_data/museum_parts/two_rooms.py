@@ -47,7 +47,7 @@ Kd 1 0.8 0.6
 map_Kd doorway.png
 """
 DOOR = (15, 0, 25, 20)  # decimetres: low z, low y, high z, high y
-#: Five by seven dots: no font, whose pixels may change, in files that stand in the repository.
+#: Letters of 5 × 7 dots: pixels of a font may change, and the repository contains the images.
 LETTERS = {
     "A": ".###. #...# #...# ##### #...# #...# #...#",
     "B": "####. #...# #...# ####. #...# #...# ####.",
@@ -126,7 +126,7 @@ def _things() -> list[Thing]:
 
 
 def _image(color: Color, letter: str) -> bytes:
-    """64 × 64 texels: a checkerboard with a letter, so that a mirrored image is noticed."""
+    """64 × 64 texels: a checkerboard with a letter, which reveals mirroring."""
     i, j = np.indices((64, 64)) // 8
     image = np.asarray(color, dtype=np.int64) + 16 * ((i + j) % 2)[..., None]
     if letter:

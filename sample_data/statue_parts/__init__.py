@@ -1,1 +1,1 @@
-"""The parts of `make_statues.py`."""
+"""Parts of the sample statues."""

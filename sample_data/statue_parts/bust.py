@@ -1,4 +1,4 @@
-"""A bust: head with curls, a cloak over the shoulders, a round foot. 0.7 m high, looks to +Z."""
+"""A bust: head with curls, a cloak over the shoulders, a round foot. 0.7 m high, facing +Z."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Bust:
 
     def __call__(self, p: Points) -> Values:
         x, y, z = p
-        # Both halves of the face are one, but for the marks of the tool and the curls.
+        # The face is symmetric except for tool marks and curls.
         half = np.stack([np.abs(x), y, z])
         head = self._head(half)
         hair = self._hair(p)
@@ -53,7 +53,7 @@ class Bust:
         return blend(whole, foot, 0.01) + marks
 
     def _head(self, p: Points) -> Values:
-        """Of points with x ≥ 0; the middle of the eyes is at y = 0.575."""
+        """The head at points with x ≥ 0; the centre of the eyes is at y = 0.575."""
         skull = ellipsoid(p, (0, 0.585, -0.012), (0.078, 0.1, 0.1))
         jaw = ellipsoid(p, (0, 0.527, 0.022), (0.056, 0.065, 0.062))
         head = blend(skull, jaw, 0.05)
@@ -95,7 +95,7 @@ class Bust:
     def _hair(self, p: Points) -> Values:
         x, y, z = p
         cap = ellipsoid(p, (0, 0.592, -0.022), (0.088, 0.103, 0.102))
-        # Not over the face, nor under the hairline.
+        # Curls neither cover the face nor extend below the hairline.
         face = ellipsoid(p, (0, 0.545, 0.12), (0.074, 0.098, 0.105))
         cap = carve(cap, face, 0.012)
         cap = carve(cap, y - 0.52 - 0.35 * (z + 0.05), 0.015)
@@ -134,7 +134,7 @@ class Bust:
             cloak, capsule(p, (-0.2, 0.24, -0.03), (-0.1, 0.345, -0.03), 0.052, 0.05), 0.05
         )
         cloak = blend(cloak, capsule(p, (0.2, 0.24, -0.03), (0.1, 0.34, -0.03), 0.05, 0.045), 0.05)
-        # Open over the breast, thrown over one shoulder.
+        # The cloak is open over the breast and covers one shoulder.
         opening = ellipsoid(p, (0.035, 0.36, 0.11), (0.095, 0.12, 0.1))
         warp = self.noise(p, 0.09, 2)
         fan = turn(x - 0.16, y - 0.4)
@@ -148,7 +148,7 @@ class Bust:
         clasp = sphere(p, (-0.1, 0.33, 0.052), 0.02)
         clasp = carve(clasp, sphere(p, (-0.104, 0.333, 0.071), 0.008), 0.003)
         body = union(blend(body, cloak, 0.004), clasp)
-        # Cut off below in a curve.
+        # The lower end is a curve.
         return carve(body, y - 0.155 - 1.1 * x * x + 0.25 * np.minimum(z, 0), 0.012)
 
     def colors(self, p: Points) -> Points:

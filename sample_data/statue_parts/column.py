@@ -1,5 +1,5 @@
-"""The upper end of a column: a shaft with flutes that meet in sharp edges, a capital of leaves, and
-a plate with moulded sides. 1 m high."""
+"""The upper end of a column: a shaft with sharp-edged flutes, a capital of leaves, and a plate with
+moulded sides. 1 m high."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ FLUTES = ((0.9914448614, 0.1305261922), (0.9238795325, 0.3826834324), (0.7933533
 
 
 def folded(p: Points) -> Points:
-    """An eighth of the space around the axis stands for all of it: 0 ≤ z ≤ x."""
+    """Maps points to the sector 0 ≤ z ≤ x, an eighth of the space around the axis."""
     x, y, z = p
     x, z = np.abs(x), np.abs(z)
     return np.stack([np.maximum(x, z), y, np.minimum(x, z)])
@@ -46,7 +46,7 @@ class Column:
         shaft = np.maximum((out - radius) * 0.99, np.maximum(-y, y - 0.56))
         for c, s in FLUTES:
             away = np.sqrt((q[0] - radius * 1.03 * c) ** 2 + (q[2] - radius * 1.03 * s) ** 2)
-            # They end round, above and below.
+            # Flutes have round ends.
             flute = np.maximum(away - 0.125 * radius, np.abs(y - 0.27) - 0.235)
             shaft = np.maximum(shaft, -flute)
         necking = union(
@@ -65,16 +65,16 @@ class Column:
         return whole + chipped + 0.0003 * self.noise(p, 0.005)
 
     def _beads(self, q: Points, p: Points) -> Points:
-        """A row of 48 beads: three folds more."""
+        """A row of 48 beads, by three further foldings."""
         x, y, z = q
         for c, s in ((0.9238795325, 0.3826834324), (0.9807852804, 0.1950903220)):
-            # Beyond the middle of the sector, mirrored back.
+            # Mirror points beyond the middle of the sector.
             over = np.maximum(z * c - x * s, 0)
             x, z = x + 2 * over * s, z - 2 * over * c
         return np.stack([x, y, z])
 
     def _leaf(self, q: Points, diagonal: float, foot: float, high: float) -> Values:
-        """Leaves on the axes, or between them, that lean out and curl over."""
+        """Leaves on the axes, or between them, that lean outwards and curl over."""
         x, y, z = q
         if diagonal:
             x, z = (x + z) * 0.7071067812, (x - z) * 0.7071067812
@@ -115,7 +115,7 @@ class Column:
         upper = box(p, (0, 0.99, 0), (0.31, 0.022, 0.31), 0.002)
         hollow = disc(p, (0, 0.967, 0), 2.0, 0.008)
         plate = carve(union(lower, upper), np.maximum(hollow, 0.27 - q[0]), 0.003)
-        # Sides that swing in, and a flower in the middle of each.
+        # Concave sides with a flower in the middle of each.
         swing = np.sqrt((q[0] - 1.27) ** 2 + q[2] * q[2]) - 0.99
         plate = np.maximum(plate, -np.maximum(swing, 0.2 - q[0]))
         flower = sphere(q, (0.275, 0.968, 0), 0.02)
@@ -124,7 +124,8 @@ class Column:
         return union(plate, flower)
 
     def colors(self, p: Points) -> Points:
-        """(3, n): sandstone in layers, sooty where rain does not reach."""
+        """(3, n) red, green and blue, 0 to 1: layered sandstone, sooty in places sheltered from
+        rain."""
         layer = wave(p[1] * 11 + 0.7 * self.noise(p, 0.2, 3))
         grain = self.noise(p, 0.012, 2)
         light = 0.74 + 0.06 * layer + 0.05 * grain

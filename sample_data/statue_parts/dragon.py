@@ -20,9 +20,9 @@ from statue_parts.fields import (
 )
 
 LOW, HIGH = (-0.56, -0.32, -0.56), (0.56, 0.32, 0.56)
-#: Of the ring that the knot winds around, and of its windings.
+#: Radius of the ring that the knot winds around, and of its windings; metres.
 RING, WIND = 0.33, 0.125
-#: Scales along the whole body and around it, and spines along its back.
+#: Numbers of scales along the body and around it, and of spines along its back.
 ALONG, AROUND, SPINES = 150, 14, 46
 
 
@@ -31,14 +31,14 @@ class Dragon:
         self.noise = Noise(random)
 
     def _body(self, p: Points) -> tuple[Values, Values, Values, Values]:
-        """Distance to the tube without scales, how far along it (0 head, 1 tail), how far around it
-        (turns, 0 is the back), and its thickness."""
+        """Returns the distance to the tube without scales, the position along it (0 head, 1 tail)
+        and around it (turns, 0 is the back), and its thickness."""
         x, y, z = p
         out = np.sqrt(x * x + z * z)
         cosine, sine = x / np.maximum(out, 1e-9), z / np.maximum(out, 1e-9)
         half = np.sqrt(np.maximum(1 + cosine, 0) / 2)
         halved = np.sqrt(np.maximum(1 - cosine, 0) / 2) * np.where(sine < 0, -1.0, 1.0)
-        # Turned back by three half turns a round, both strands lie on one line.
+        # Rotation by three half turns per round aligns both strands.
         c, s = cosine * half - sine * halved, sine * half + cosine * halved
         u, v = out - RING, y
         u, v = c * u + s * v, c * v - s * u
@@ -52,7 +52,7 @@ class Dragon:
 
     def __call__(self, p: Points) -> Values:
         body, along, around, thick = self._body(p)
-        # Rows of scales, each moved by half of one against the row before.
+        # Rows of scales, each offset by half a scale from the previous row.
         row = along * ALONG
         number = np.floor(row)
         back = row - number
@@ -70,9 +70,9 @@ class Dragon:
         return whole + 0.0006 * self.noise(p, 0.012, 2)
 
     def _head(self, p: Points) -> Values:
-        """Where the tube begins: at x < 0, z = 0, facing −Z."""
+        """The head at the start of the tube: x < 0, z = 0, facing −Z."""
         at = np.array([-RING, WIND, 0.0])[:, None]
-        # The tube is turned by three quarters there: its beginning is above the ring.
+        # The tube starts above the ring, after three quarters of a turn.
         x, y, z = p - at
         q = np.stack([np.abs(x), y, z])
         skull = ellipsoid(q, (0, 0.015, -0.03), (0.062, 0.05, 0.085))
@@ -104,7 +104,7 @@ class Dragon:
         return blend(head, whisker, 0.006)
 
     def colors(self, p: Points) -> Points:
-        """(3, n): green with a golden belly, darker in the grooves."""
+        """(3, n) red, green and blue, 0 to 1: green with a golden belly, darker in the grooves."""
         body, _, around, thick = self._body(p)
         belly = step(np.abs(around), 0.34, 0.4)
         raised = np.clip(body / thick / 0.16, 0, 1)

@@ -1,7 +1,7 @@
-"""Solids as functions of space: negative inside, about the distance to the surface.
+"""Solids as implicit functions: negative inside, approximately the signed distance.
 
-As in `museum_parts.noise`, only +, −, ×, ÷, √, floor and comparisons are used, so that statues are
-the same bytes on every machine. Points are (3, n) float64: x, y and z, metres, Y up.
+Like `museum_parts.noise`, the module uses only +, −, ×, ÷, √, floor and comparisons, so statues
+have the same bytes on every machine. Points are (3, n) float64: x, y and z, metres, Y up.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def ellipsoid(p: Points, middle: Place, radii: Place) -> Values:
 
 
 def capsule(p: Points, a: Place, b: Place, thick: float, end: float | None = None) -> Values:
-    """A round bar from a to b, ``thick`` there and ``end`` here."""
+    """A round bar from a to b, with radius ``thick`` at a and ``end`` at b."""
     along = np.array(b) - np.array(a)
     x, y, z = moved(p, a)
     square = float(along[0] ** 2 + along[1] ** 2 + along[2] ** 2)
@@ -54,7 +54,7 @@ def box(p: Points, middle: Place, half: Place, rounding: float = 0.0) -> Values:
 
 
 def disc(p: Points, middle: Place, radius: float, half: float, rounding: float = 0.0) -> Values:
-    """A round plate, upright axis."""
+    """A round plate with an upright axis."""
     x, y, z = moved(p, middle)
     out, up = _length(x, z) - (radius - rounding), np.abs(y) - (half - rounding)
     outside = _length(np.maximum(out, 0), np.maximum(up, 0))
@@ -62,7 +62,7 @@ def disc(p: Points, middle: Place, radius: float, half: float, rounding: float =
 
 
 def ring(p: Points, middle: Place, radius: float, thick: float) -> Values:
-    """A torus, upright axis."""
+    """A torus with an upright axis."""
     x, y, z = moved(p, middle)
     return _length(_length(x, z) - radius, y) - thick
 
@@ -75,13 +75,13 @@ def union(*solids: Values) -> Values:
 
 
 def blend(a: Values, b: Values, width: float) -> Values:
-    """The union, filled to a fillet of that width."""
+    """Smooth union with a fillet of the given width."""
     overlap = np.maximum(width - np.abs(a - b), 0)
     return np.minimum(a, b) - overlap * overlap / (4 * width)
 
 
 def carve(a: Values, b: Values, width: float) -> Values:
-    """a without b, the edge rounded to that width."""
+    """Smooth difference a − b with an edge rounded to the given width."""
     return -blend(-a, b, width)
 
 
@@ -92,18 +92,18 @@ def step(t: Values, low: float, high: float) -> Values:
 
 
 def wave(t: Values) -> Values:
-    """Like a sine of period 1, between −1 and 1, made of parabolas."""
+    """A sine-like wave of period 1 between −1 and 1, made of parabolas."""
     f = (t - np.floor(t)) * 2 - 1
     return 4 * f * (np.abs(f) - 1)
 
 
 def saw(t: Values) -> Values:
-    """0 to 1 and back in a period of 1."""
+    """A triangle wave between 0 and 1 with period 1."""
     return np.abs((t - np.floor(t)) * 2 - 1)
 
 
 def turn(x: Values, y: Values) -> Values:
-    """The angle of (x, y), in turns between −½ and ½, within a thousandth."""
+    """The angle of (x, y), in turns between −½ and ½, accurate to a thousandth."""
     wide, tall = np.abs(x), np.abs(y)
     share = np.minimum(wide, tall) / np.maximum(np.maximum(wide, tall), 1e-12)
     eighth = share * (0.125 + 0.0434 * (1 - share))
@@ -113,14 +113,14 @@ def turn(x: Values, y: Values) -> Values:
 
 
 class Noise:
-    """Smooth noise in space between −1 and 1 from a periodic lattice of random values."""
+    """Smooth 3D noise between −1 and 1 from a periodic lattice of random values."""
 
     def __init__(self, random: np.random.Generator, side: int = 32) -> None:
         self._side = side
         self._value = 2 * random.random(side**3) - 1
 
     def __call__(self, p: Points, size: float, octaves: int = 1) -> Values:
-        """Of grains about ``size`` wide, and finer ones of half the height and size."""
+        """Evaluates octaves with grains from ``size`` on, each of half the size and height."""
         total = np.zeros(p.shape[1])
         share, whole = 1.0, 0.0
         for _ in range(octaves):

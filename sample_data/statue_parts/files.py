@@ -1,4 +1,4 @@
-"""Triangles as the bytes of a PLY, OBJ or GLB file."""
+"""Serialises triangles as PLY, OBJ or GLB."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Colors = NDArray[np.uint8] | None
 
 
 def ply(points: Singles, triangles: Ints, colors: Colors, about: str) -> bytes:
-    """Binary, little-endian, with colours of points."""
+    """Binary, little-endian PLY with vertex colours."""
     names = [("float", "x"), ("float", "y"), ("float", "z")]
     fields: list[tuple[str, str]] = [(name, "<f4") for _, name in names]
     if colors is not None:
@@ -33,7 +33,7 @@ def ply(points: Singles, triangles: Ints, colors: Colors, about: str) -> bytes:
 
 
 def obj(points: Singles, triangles: Ints, colors: Colors, about: str) -> bytes:
-    """Colours follow the coordinates, as many programs have them."""
+    """OBJ with colours after the coordinates, a common extension."""
     rows = [f"# {HEAD}: {about}", "# metres, Y up"]
     if colors is None:
         rows += [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in points.tolist()]
@@ -48,7 +48,7 @@ def obj(points: Singles, triangles: Ints, colors: Colors, about: str) -> bytes:
 
 
 def glb(points: Singles, triangles: Ints, colors: Colors, about: str) -> bytes:
-    """One primitive; colours as normalised bytes, of which each is linear, as glTF has it."""
+    """GLB of one primitive; colours are normalised bytes in linear space, as glTF requires."""
     parts = [points.astype("<f4").tobytes(), triangles.astype("<u4").tobytes()]
     attributes = {"POSITION": 0}
     low, high = (f(axis=0).tolist() for f in (points.min, points.max))

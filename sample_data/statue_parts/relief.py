@@ -1,4 +1,4 @@
-"""A panel with three figures raised from it, in a border of ornament. 1.2 m wide, faces +Z."""
+"""A panel with three raised figures in an ornamental border. 1.2 m wide, facing +Z."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from statue_parts.fields import (
 )
 
 LOW, HIGH = (-0.62, -0.42, -0.05), (0.62, 0.42, 0.14)
-#: Half of the panel within the border, and ornaments along its sides.
+#: Half the width and height of the panel within the border; metres.
 HALF = (0.5, 0.3)
 EGG = 0.05
 
@@ -30,7 +30,7 @@ EGG = 0.05
 class Relief:
     def __init__(self, random: np.random.Generator) -> None:
         self.noise = Noise(random)
-        # Where each stands, whether it is mirrored, how high, and where its hands are.
+        # Position, mirroring, height, and positions of the hands of each figure.
         self._figures = [
             (-0.3, 1.0, 0.97, (0.13, 0.08), (-0.04, -0.02)),
             (0.02, -1.0, 1.0, (0.09, 0.18), (-0.11, -0.06)),
@@ -120,7 +120,7 @@ class Relief:
         return blend(figure, foot, 0.006)
 
     def _border(self, p: Points) -> Values:
-        """Two mouldings, and between them eggs and darts."""
+        """Two mouldings with eggs and darts between them."""
         x, y, z = p
         wide, tall = np.abs(x) - HALF[0], np.abs(y) - HALF[1]
         across = np.maximum(wide, tall)  # 0 at the inner edge, 0.1 at the outer
@@ -149,7 +149,8 @@ class Relief:
         return np.maximum(union(bed, cord, outer, row, rosette), ends)
 
     def colors(self, p: Points) -> Points:
-        """(3, n): a blue ground, white figures and gilt ornament, as glazed clay has them."""
+        """(3, n) red, green and blue, 0 to 1: a blue ground, white figures and gilt ornament, like
+        glazed clay."""
         spots = 0.04 * self.noise(p, 0.02, 3)
         raised = step(p[2], 0.004, 0.012)
         across = np.maximum(np.abs(p[0]) - HALF[0], np.abs(p[1]) - HALF[1])

@@ -1,13 +1,13 @@
-"""The surface of a solid as triangles of even size: closed, and everywhere a surface.
+"""Meshes an implicit solid: a closed manifold surface of triangles of even size.
 
-Space is filled with the tetrahedra of a body-centred cubic lattice, which are all alike; each that
-has corners inside and outside gives one triangle or two (marching tetrahedra). Neighbours share
-what crosses their common edges, so the surface is closed and each edge has two triangles, whatever
-the function is. Then points slide along the surface towards the middle of their neighbours, and are
-put back on it by Newton's method, which makes slivers into triangles.
+Marching tetrahedra on a body-centred cubic lattice, whose tetrahedra are congruent: each
+tetrahedron with corners inside and outside gives one or two triangles. Neighbours share the
+vertices on their common edges, so the surface is closed and each edge has two triangles, for any
+function. Tangential smoothing then moves vertices towards the centroid of their neighbours, and
+Newton's method projects them back onto the surface, which removes slivers.
 
-The function is only asked near the surface: where a block's middle is farther from it than `STEEP`
-times the way to the block's corners, the whole block is on one side.
+The function is evaluated only near the surface: a block lies on one side if the distance at its
+centre exceeds `MAX_GRADIENT` times the distance to its corners.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from statue_parts.fields import Points, Values
 Field = Callable[[Points], Values]
 Ints = NDArray[np.int64]
 
-#: Points that the function is asked for at a time.
-PART = 1 << 13
-#: Cubes along a block's side, and how much less than the distance the function may be.
-BLOCK, STEEP = 4, 2.2
-#: The number of triangles may differ from what was asked for by this share.
-WITHIN, TRIES = 0.07, 5
-#: How often points slide, how far of the way, and at most by which share of a cube.
-SLIDES, SHARE, FARTHEST = 3, 0.6, 0.25
-#: The function is smoothed over this share of a cube, lest points jump across sharp edges.
-AROUND = 0.3
+#: Points per evaluation of the function.
+BATCH = 1 << 13
+#: Cubes along the side of a block; maximum gradient of the function.
+BLOCK, MAX_GRADIENT = 4, 2.2
+#: Tolerance of the number of triangles, as a share; maximum number of attempts.
+TOLERANCE, TRIES = 0.07, 5
+#: Smoothing: iterations, step as a share of the way, and maximum step as a share of a cube.
+SMOOTHING_STEPS, STEP_SHARE, MAX_STEP = 3, 0.6, 0.25
+#: Distance of gradient samples as a share of a cube: keeps points from jumping across sharp edges.
+GRADIENT_STEP = 0.3
 
 
-def ask(field: Field, p: Points) -> Values:
-    """The function at (3, n) points, a part at a time, on all processors."""
-    parts = [p[:, first : first + PART] for first in range(0, p.shape[1], PART)]
+def evaluate(field: Field, p: Points) -> Values:
+    """Evaluates the function at (3, n) points in batches, on all processors."""
+    parts = [p[:, first : first + BATCH] for first in range(0, p.shape[1], BATCH)]
     if not parts:
         return np.zeros(0)
     with ThreadPoolExecutor(os.cpu_count()) as threads:
@@ -48,7 +48,8 @@ def ask(field: Field, p: Points) -> Values:
 def mesh(
     field: Field, low: tuple[float, ...], high: tuple[float, ...], triangles: int
 ) -> tuple[Values, Ints]:
-    """(P, 3) points and (T, 3) triangles, about so many, of the solid within a box."""
+    """Returns (P, 3) points and (T, 3) triangles, approximately ``triangles``, of the solid in a
+    box."""
     extent = np.array(high) - np.array(low)
     cube = float(extent.max()) / 40
     best: tuple[Values, Ints, float] | None = None
@@ -56,7 +57,7 @@ def mesh(
         points, actual = _march(field, np.array(low), extent, cube)
         if best is None or abs(len(actual) - triangles) < abs(len(best[1]) - triangles):
             best = points, actual, cube
-        if abs(len(actual) - triangles) <= WITHIN * triangles:
+        if abs(len(actual) - triangles) <= TOLERANCE * triangles:
             break
         cube *= (len(actual) / triangles) ** 0.5
     assert best is not None
@@ -65,7 +66,7 @@ def mesh(
 
 
 def _main_part(points: Values, triangles: Ints) -> tuple[Values, Ints]:
-    """The largest of the surfaces that hang together; crumbs are left out."""
+    """Returns the largest connected component; drops the others."""
     label = np.arange(len(points))
     while True:
         parent = np.arange(len(points))
@@ -122,11 +123,11 @@ def _places(ids: Ints, first: int, count: Ints, low: Values, cube: float) -> Val
 
 
 def _values(field: Field, low: Values, cube: float, blocks: Ints) -> tuple[Values, Values]:
-    """At the corners and in the middles of all cubes; outside along the border."""
+    """Evaluates the function at the corners and centres of all cubes; border values are outside."""
     side = BLOCK * cube
     at = np.stack(np.indices(blocks), axis=-1).reshape(-1, 3)
-    centre = ask(field, (low + (at + 0.5) * side).T)
-    near = at[np.abs(centre) < STEEP * side * 3**0.5 / 2] * BLOCK
+    centre = evaluate(field, (low + (at + 0.5) * side).T)
+    near = at[np.abs(centre) < MAX_GRADIENT * side * 3**0.5 / 2] * BLOCK
     whole = centre.reshape(blocks)
     for axis in range(3):
         whole = np.repeat(whole, BLOCK, axis=axis)
@@ -138,7 +139,7 @@ def _values(field: Field, low: Values, cube: float, blocks: Ints) -> tuple[Value
         here = (near[:, None] + steps).reshape(-1, 3)
         asked[tuple(here.T)] = True
         here = np.argwhere(asked)
-        array[asked] = ask(field, (low + (here + offset) * cube).T)
+        array[asked] = evaluate(field, (low + (here + offset) * cube).T)
     for axis in range(3):
         for end in (0, -1):
             edge: list[int | slice] = [slice(None)] * 3
@@ -153,8 +154,8 @@ def _tetrahedra(
     number: Callable[[Ints], Ints],
     middle_number: Callable[[Ints], Ints],
 ) -> Iterator[Ints]:
-    """(n, 4) lattice points of those that the surface crosses, and some more: the middles of two
-    cubes beside each other, and two corners beside each other of the face between them."""
+    """(n, 4) lattice points of the tetrahedra that may cross the surface: the centres of two
+    adjacent cubes, and two adjacent corners of their common face."""
     corner, middle = inside
     for axis in range(3):
         one, two = (axis + 1) % 3, (axis + 2) % 3
@@ -178,8 +179,8 @@ def _tetrahedra(
 
 
 def _cases() -> dict[int, list[list[list[int]]]]:
-    """For each set of corners inside, triangles of edges that face outwards."""
-    # Middles along x, corners around it: as `_tetrahedra` has them, for every axis alike.
+    """Returns, for each set of corners inside, outward triangles as triples of edges."""
+    # Centres along x and corners around it, see `_tetrahedra`; the same for every axis.
     place = np.array([[-0.5, 0, 0], [0.5, 0, 0], [0, -0.5, -0.5], [0, 0.5, -0.5]])
     cases = {}
     for mask in range(1, 15):
@@ -200,10 +201,10 @@ CASES = _cases()
 
 
 def _gradient(field: Field, p: Values, step: float) -> tuple[Values, Values]:
-    """The function and its gradient at (n, 3) points, from four beside them."""
+    """Returns the function and its gradient at (n, 3) points, by differences at four points."""
     ways = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=np.float64)
     asked = np.concatenate([p + step * way for way in ways]).T
-    values = ask(field, np.ascontiguousarray(asked)).reshape(4, -1)
+    values = evaluate(field, np.ascontiguousarray(asked)).reshape(4, -1)
     gradient = np.stack(
         [(values[0] + ways[1, k] * values[1] + ways[2, k] * values[2] + ways[3, k] * values[3])
          for k in range(3)], axis=1) / (4 * step)  # fmt: skip
@@ -213,8 +214,8 @@ def _gradient(field: Field, p: Values, step: float) -> tuple[Values, Values]:
 def _slid(field: Field, points: Values, triangles: Ints, cube: float) -> Values:
     a, b = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).T
     count = np.bincount(a, minlength=len(points))[:, None]
-    for share in (*[SHARE] * SLIDES, 0.0):
-        value, gradient = _gradient(field, points, AROUND * cube)
+    for share in (*[STEP_SHARE] * SMOOTHING_STEPS, 0.0):
+        value, gradient = _gradient(field, points, GRADIENT_STEP * cube)
         square = (gradient[:, 0] ** 2 + gradient[:, 1] ** 2 + gradient[:, 2] ** 2)[:, None]
         square = np.maximum(square, 1e-6)
         means = np.stack(
@@ -225,5 +226,5 @@ def _slid(field: Field, points: Values, triangles: Ints, cube: float) -> Values:
         way -= gradient * dot[:, None] / square
         way -= gradient * value[:, None] / square
         length = np.sqrt(way[:, 0] ** 2 + way[:, 1] ** 2 + way[:, 2] ** 2)[:, None]
-        points = points + way * np.minimum(1.0, FARTHEST * cube / np.maximum(length, 1e-12))
+        points = points + way * np.minimum(1.0, MAX_STEP * cube / np.maximum(length, 1e-12))
     return points

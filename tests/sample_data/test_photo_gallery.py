@@ -12,13 +12,13 @@ import pytest
 from tests.sample_data.conftest import SAMPLE_DATA
 
 sys.path.append(str(SAMPLE_DATA))
-from make_photo_gallery import DEEP, HIGH, OFF, hung, make_gallery, photos
+from make_photo_gallery import HEIGHT, WALL_DISTANCE, WIDTH_RATIO, hung, make_gallery, photos
 
 
 @pytest.mark.parametrize("count", [1, 2, 24, 60])
 def test_images_hang_apart_on_the_walls(count: int) -> None:
     length, things = hung(photos(count))
-    deep = round(length * DEEP, 3)
+    deep = round(length * WIDTH_RATIO, 3)
     assert len(things) == count
     walls = defaultdict(list)
     for thing in things:
@@ -26,7 +26,7 @@ def test_images_hang_apart_on_the_walls(count: int) -> None:
         point = np.array(face.points)
         low, high = point.min(axis=0), point.max(axis=0)
         assert (low >= 0).all()
-        assert (high <= [length, HIGH, deep]).all()
+        assert (high <= [length, HEIGHT, deep]).all()
         across = 0 if low[2] == high[2] else 2
         right = face.points[1][across] - face.points[0][across]
         # Seen from inside the first corner is at the left, and above the second edge is up.
@@ -37,7 +37,7 @@ def test_images_hang_apart_on_the_walls(count: int) -> None:
         wall = (across, bool(right > 0))
         assert min(
             low[2 - across], (deep, length)[across // 2] - high[2 - across]
-        ) == pytest.approx(OFF)
+        ) == pytest.approx(WALL_DISTANCE)
         walls[wall].append((low[across], high[across]))
     for spans in walls.values():
         spans.sort()

@@ -11,8 +11,8 @@ import pytest
 from tests.sample_data.conftest import SAMPLE_DATA
 
 sys.path.append(str(SAMPLE_DATA))
-from make_photo_gallery import DEEP, HIGH
-from make_statue_hall import APART, HEIGHT, HallOptions, main, make_hall, statue_rows
+from make_photo_gallery import HEIGHT, WIDTH_RATIO
+from make_statue_hall import SPACING, STATUE_HEIGHT, HallOptions, main, make_hall, statue_rows
 
 SMALL = HallOptions(statues=5, triangles=1500, images=2)
 
@@ -44,9 +44,9 @@ def test_they_stand_apart_on_the_floor() -> None:
     boxes = [(p.min(axis=0), p.max(axis=0)) for p in actual.values()]
     for low, high in boxes:
         assert low[1] == pytest.approx(0, abs=1e-6)
-        assert 0.5 < high[1] <= HEIGHT + 1e-3
+        assert 0.5 < high[1] <= STATUE_HEIGHT + 1e-3
         assert (low >= 0).all()
-        assert (high <= [length, HIGH, length * DEEP]).all()
+        assert (high <= [length, HEIGHT, length * WIDTH_RATIO]).all()
     for (_, before), (after, _) in pairwise(boxes):
         assert before[0] < after[0]
 
@@ -59,7 +59,7 @@ def test_the_same_again_and_another_seed() -> None:
     assert model == again["statue_hall.obj"]() != other["statue_hall.obj"]()
     # A hall for so many, though two pictures need less.
     xs = [float(line.split()[1]) for line in model.decode().splitlines() if line.startswith("v ")]
-    assert max(xs) >= 4 * APART
+    assert max(xs) >= 4 * SPACING
 
 
 def test_numbers_out_of_range(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:

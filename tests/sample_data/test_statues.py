@@ -95,7 +95,7 @@ def test_parts_on_threads_change_nothing(statues, monkeypatch) -> None:
     from statue_parts import surface
 
     one = statues.make_statue("relief", statues.StatueOptions(2000))
-    monkeypatch.setattr(surface, "PART", 999)
+    monkeypatch.setattr(surface, "BATCH", 999)
     other = statues.make_statue("relief", statues.StatueOptions(2000))
     assert one.points.tobytes() == other.points.tobytes()
 
