@@ -1,26 +1,27 @@
-"""Coverage hints: what accuracy costs. ``make bench-ach``, or
+"""Accuracy and cost of coverage hints. ``make bench-ach``, or
 
     python benchmarks/ach.py [MODEL…] [--cells N] [--only presets rates tolerance agreement …]
 
-For every model, cut with the default options, up to ``--cells`` cells stand for all. CPU seconds
-are those of all threads of this process, for the whole model; errors are total variations (half
-the sum of absolute differences) between a cell's hints and those of 16,384 other points.
+Each model is cut with the default options; up to ``--cells`` cells represent all. CPU seconds are
+those of all threads of this process, for the whole model; errors are total variations (half the sum
+of absolute differences) between the hints of a cell and those of 16,384 other points.
 
 presets     the presets with both backends and with ``auto``: error, missed mass, rays, CPU seconds,
-            and both as a share of the paper's preset with ``auto``. Is ``auto`` the faster one?
-            OpenGL in software is tried on three cells beyond the paper's preset, and not on `high`
-rates       how the error falls with the rays, by least squares over `CoverageTrade`'s grid of
-            settings, which goes into `ach.csv` and `ach.png`
-tolerance   achieved errors under ``--tolerance``, and how often the truth lies within
-            the error bars
+            and both as a share of the paper's preset with ``auto``; shows whether ``auto`` picks
+            the faster backend. Software OpenGL runs on three cells beyond the paper's preset, and
+            not on `high`
+rates       decrease of the error with the number of rays, by least squares over `CoverageTrade`'s
+            grid of settings, also written to `ach.csv` and `ach.png`
+tolerance   achieved errors under ``--tolerance``, and how often the truth lies within the error
+            bars
 agreement   pixels that differ between the backends
-speed       rays and sample points a second of each backend, and what the whole takes over what
-            Embree or the draws take in it, which is a bare loop
+speed       rays and sample points per second of each backend, and the ratio of the total time to
+            that of the bare loop of Embree or the draw calls
 processes   two processes against one
 
-Each part is a table in Markdown on the standard output, so that one ``--only`` prints what
-docs/design/tradeoffs.md shows of it. Everything else goes to the standard error, and all of it,
-under headings, into `build/bench/ach.md`.
+The standard output has a Markdown table for each part, so one ``--only`` prints the section of
+docs/design/tradeoffs.md. All other output goes to the standard error, and everything, under
+headings, to ``build/bench/ach.md``.
 """
 
 from __future__ import annotations

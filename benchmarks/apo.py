@@ -1,10 +1,10 @@
-"""Octree textures of heavy meshes beside the paper's table 1, and what their levels take.
+"""Octree textures of heavy meshes compared with table 1 of the paper, and the size of their levels.
 
     python benchmarks/apo.py [FILE...] [--triangles 50000 200000 1000000] [--faces 10000] [--jobs 2]
 
-Without files, the statues of sample_data/make_statues.py. Times are of `make_apo`, without reading
-the file, on this machine; "a second a core" divides by the processor time of all workers. The
-paper's machine is of 2008, its simplification is not in its times, and its models are other ones.
+Without files, the statues of sample_data/make_statues.py. Times are those of `make_apo` on this
+machine, without reading the file; "a second a core" divides by the processor time of all workers.
+The paper used a machine of 2008 and other models, and its times exclude simplification.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
-"""Cost and gain of the portal flow's budget and of the decision of near ties.
+"""Cost and gain of the budget of the portal flow and of the decision of near ties.
 
     python benchmarks/budget.py MODEL... [--wall-area 2] [--budgets 0 2000 20000 200000 1000000]
 
-Two Markdown tables, a row for each model. First, for each budget: the average share of all leaves
-that a leaf may see, CPU seconds, and portals cut short. Second, for the default budget: near ties,
-those decided in double-double, those found open; then leaf pairs, pairs of default cells and CPU
-seconds where near ties are decided, where all count as visible, and where all count as hidden
-(which is not conservative).
+Prints two Markdown tables with a row for each model. The first gives, for each budget, the mean
+share of visible leaves per leaf, CPU seconds, and portals cut short. The second, for the default
+budget, gives near ties, near ties decided in double-double, and near ties decided as open; then
+leaf pairs, pairs of default cells and CPU seconds if near ties are decided, if all count as
+visible, and if all count as hidden (which is not conservative).
 """
 
 from __future__ import annotations

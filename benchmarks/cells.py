@@ -1,15 +1,15 @@
-"""The test models in cells: ``python benchmarks/cells.py [MODEL…] [OPTION]``
+"""Cells of the test models: ``python benchmarks/cells.py [MODEL…] [OPTION]``
 
-Prints a Markdown table with a row for each model at the default options: triangles, cells, how many
-of them are view-only, leaves, how many of them are dropped, portals, and the share of the volume
-that is at hand, on average over where one can stand and at most. With ``--wall-area 8 4 2 1`` a row
-for each least wall area, where each leaf is a cell. With ``--joined`` how many triangles of each
-model some cell emits; how many that are if each counts once for every cell that emits some of it;
-and how many triangles are emitted, as cut to the leaves and joined again.
+Prints a Markdown table with a row for each model at the default options: triangles, cells,
+view-only cells, leaves, dropped leaves, portals, and the resident share of the volume, mean over
+walkable places and maximum. ``--wall-area 8 4 2 1`` prints a row for each minimum wall area, with
+each leaf as a cell. ``--joined`` prints the number of triangles of each model that cells emit, the
+same counted once per emitting cell, and the number of emitted triangles, cut to the leaves and
+rejoined.
 
-All figures are exact: the same on every machine. What the settings cost in seconds is in the tables
-of pvs_trade.py. The museum is made on the spot, with textures of 16 texels, which change none of
-this.
+All figures are exact, the same on every machine. The tables of pvs_trade.py give the cost of the
+settings in seconds. The script generates the museum with textures of 16 texels, which do not affect
+the figures.
 """
 
 from __future__ import annotations

@@ -1,14 +1,14 @@
 """Draws the pictures of the docs: ``python benchmarks/docs_pictures.py build/museum.db``
 
-Reads the database of the sample museum and its images (`make sample`), and writes into
+Reads the database of the sample museum and its images (`make sample`), and writes to
 ``docs/pictures``:
 
-plan.png     both floors, with what the middle room sees shaded by its coverage hints
-levels.jpg   a painting, as its levels show it while the `.ptm` arrives
-view.jpg     the view from a viewpoint with the first levels of all textures, and with all of them:
-             rays cast at the model, no browser
+plan.png     both floors, with the area visible from the middle room shaded by coverage hints
+levels.jpg   a painting at the levels that it shows while the `.ptm` arrives
+view.jpg     the view from a viewpoint with the first levels of all textures, and with all of them,
+             by rays cast at the model
 walk.jpg     the page of `ptm serve` in Chromium, with the map and the details open
-door-*.png   two rooms with a door leaf in the doorway: with the door closed one is lost
+door-*.png   two rooms with a door leaf in the doorway; a closed door makes one unreachable
 interlace.jpg  two paintings at an eighth and a quarter of their sides: means of texels (a level of
              the `.ptm`) beside the texels of the first interlaced files, with bytes and PSNR
 apo.jpg      a bust as modelled, simplified, and with some levels of its octree

@@ -1,16 +1,16 @@
-"""Speed of emission, and sizes of the files beside those of other writers.
+"""Speed of emission, and file sizes compared with other writers.
 
     python benchmarks/emission.py [MODEL…]
 
-First the formatting of numbers alone, in megabytes of text a second: ours, and Python's own
-conversion. Then for every model the VRML and GLB files of a database
-beside what pymeshlab (VRML97) and trimesh (GLB) write of the model itself, images left out; the
-last three columns are their ratios to ours: of bytes, of bytes a triangle, and of seconds. A
-database has more triangles than the model, since cells cut them, and what hangs in a boundary is
-in two files; and its VRML files also hold the hulls, visible sets and hints of the cells. Last the
-first model again with its triangles quartered until there are many.
+The first table gives the speed of number formatting, in megabytes of text per second, of ptmtools
+and of Python's own conversion. The second gives, for every model, the VRML and GLB files of a
+database beside those written by pymeshlab (VRML97) and trimesh (GLB) for the model itself, without
+images; the last three columns are ratios of their bytes, bytes per triangle and seconds to those of
+ptmtools. A database has more triangles than the model because cells cut them, and faces in a
+boundary belong to two files; its VRML files also hold hulls, visible sets and hints. The last table
+repeats the first model with its triangles quartered several times.
 
-Seconds are of the processor, the best of three; waiting for the disk is not among them.
+Seconds are processor time, the best of three, without waiting for the disk.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """Adds triangles to a model without adding rooms: ``enlarged(scene, kind, triangles, library)``
 
-walls       the opaque surfaces are subdivided, each triangle into k² alike, so that all are about
-            as large: the structure itself has the triangles, with T-junctions where k differs
-furniture   copies of curved meshes stand in the rooms, eight a room: sofas with round edges,
-            vases, figures, plants of loose leaves; their triangles are what is added
+walls       subdivides each triangle of the opaque surfaces into k² congruent ones of about equal
+            size: the structure itself gets the triangles, with T-junctions where k differs
+furniture   adds copies of curved meshes, eight per room: sofas with round edges, vases, figures,
+            plants of loose leaves
 
-A copy of the model with its materials, as OBJ, in numbers of single precision. The same arguments
+The result is an OBJ copy of the model with its materials, in single precision. The same arguments
 give the same bytes.
 """
 

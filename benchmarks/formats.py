@@ -1,10 +1,10 @@
-"""A million triangles in each format: seconds and memory of reading, beside the plain GLB.
+"""Time and memory of reading a million triangles in each format, beside a plain GLB.
 
     python benchmarks/formats.py [--triangles 1000000] [--runs 3]
 
-A wavy floor of triangles with texture coordinates is written as a GLB, plain, with meshopt and with
-Draco, as OBJ and as USD. Each is read by `ptmtools.scene.ingest` in a process of its own, runs
-taking turns; memory is the most that it, or a process that it starts, had at a time.
+The script writes a wavy floor of triangles with texture coordinates as a GLB (plain, with meshopt,
+with Draco), as OBJ and as USD. `ptmtools.scene.ingest` reads each in a separate process, runs
+taking turns; memory is the peak of a process and of its child processes.
 """
 
 from __future__ import annotations

@@ -2,27 +2,27 @@
 
 rooms         sample museums of 12, 50, 200 and 800 rooms (`sample_data/make_museum.py`)
 walls         the museum of 12 rooms, its walls subdivided into 200,000 to 5 million triangles
-furniture     the same with curved furniture of as many triangles (`enlarging.py`)
+furniture     the same with an equal number of triangles of curved furniture (`enlarging.py`)
 
-They have the least textures, are made in a temporary folder, or in ``--folder``, and go through the
-stages with default options:
+The models have minimal textures, are written to a temporary folder, or to ``--folder``, and pass
+through the stages with default options:
 
 scene         reading the model
 leaves        the subdivision into convex leaves with their portals
 rooms         grouping the leaves into cells
 pvs           the portal flow
 ach           coverage hints, Embree, the default preset
-emit          the served files but for textures, which know nothing of cells
+emit          the served files except textures, which do not depend on cells
 
-Every stage of every model runs in a process of its own, after the two rooms of the sample data,
-which compile the kernels and load the libraries. *CPU* and *wall* are seconds of the stage alone;
-what it reads and writes between stages does not count. *Peak* is the most memory that was resident
-during the stage over what was resident before it, inputs read; where the system does not tell, it
-is that of the process.
+Every stage of every model runs in a separate process, after a warm-up on the two rooms of the
+sample data, which compiles the kernels and loads the libraries. *CPU* and *wall* are seconds of the
+stage alone, without reading and writing between stages. *Peak* is the maximum resident memory of
+the stage less that before it, with inputs read; on systems without this figure it is that of the
+process.
 
-The last rows are the exponents b of seconds or megabytes = a · leavesᵇ, or of triangles in place of
-leaves where the rooms stay the same, by least squares in the logarithms, with the standard error of
-b. A museum that hit `--max-leaves` is marked.
+The last rows are the exponents b of seconds or megabytes = a · leavesᵇ (for models with constant
+rooms, of triangles instead of leaves) by least squares in the logarithms, with the standard error
+of b. An asterisk marks a museum that hit `--max-leaves`.
 """
 
 from __future__ import annotations

@@ -1,16 +1,16 @@
-"""Measures the code: files, lines, statements, imports between packages, circles.
+"""Measures the code: files, lines, statements, imports between packages, import cycles.
 
     python benchmarks/house.py [ROOT …]     tables for each checkout, as Markdown
     python benchmarks/house.py --check      exit 1 if an import goes up, and name it
 
-Logical lines are statements without docstrings. An import counts wherever it stands: at the top of
-a file, inside a function, under ``if TYPE_CHECKING``, or as text in a table
-(``"package.module:function"``). A *package* here is what stands directly below ``ptmtools``: a
-folder or a single file.
+Logical lines are statements without docstrings. An import counts in any position: at the top of a
+file, inside a function, under ``if TYPE_CHECKING``, or as text in a table
+(``"package.module:function"``). A *package* is a direct child of ``ptmtools``: a folder or a single
+file.
 
-Imports go down if packages can be put in an order in which each imports only later ones, that is,
-if they form no circle. ``ptmtools.lab`` simulates clients and compares settings: only its own
-commands may import it, and nothing imports the command line.
+Imports go down if the packages have an order in which each imports only later ones, that is, if the
+graph of imports has no cycle. ``ptmtools.lab`` simulates clients and compares settings: only its
+own commands may import it, and no package imports the command line.
 """
 
 from __future__ import annotations

@@ -1,16 +1,17 @@
-"""Interlaced images beside `.ptm`, Adam7 and a chain of mip files; what previews look like; and the
-claims of the paper, row by row.
+"""Compares interlaced images with `.ptm`, Adam7 and a chain of mip files.
+
+Also measures previews and checks the claims of the paper row by row.
 
     python benchmarks/interlace.py [--quick] [--only bytes previews claims]
 
-Runs on the images of `../shared/textures`: of the photographs the 512 × 512 texels in the middle,
-so that nothing is scaled, and the textures of 1024 × 1024. Prints the tables of
+Runs on the images of `../shared/textures`: the central 512 × 512 texels of the photographs, so
+that no image is scaled, and the textures of 1024 × 1024. Prints the tables of
 docs/formats/interlace.md.
 
-- Adam7: a PNG written here, one deflate stream, filters and settings as Pillow's own; Pillow reads
-  it back. Until a resolution: the bytes from which zlib has given the last row of the pass.
-- mip chain: a PNG of each box-filtered level from 128² on, fetched one after the other.
-- FLIP (flip-evaluator): at 67 pixels a degree, one texel a pixel, both pictures of the same size.
+- Adam7: a PNG written by this script, one deflate stream, filters and settings of Pillow; Pillow
+  reads it back. Bytes until a resolution: those from which zlib returns the last row of the pass.
+- mip chain: a PNG of each box-filtered level from 128² on, fetched in order.
+- FLIP (flip-evaluator): at 67 pixels per degree, one texel per pixel, both pictures of equal size.
 """
 
 from __future__ import annotations

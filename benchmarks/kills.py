@@ -1,12 +1,11 @@
-"""Kills a build again and again, and looks whether the next one makes good what it left.
+"""Kills a build repeatedly and verifies that the next build repairs the result.
 
-Builds the model once undisturbed. Then, again and again in a new folder, starts the build, kills
-it (SIGKILL) at a random instant, or before its n-th change of a name on the disk (rename, link,
-unlink, mkdir, rmdir) for every n, and lets it run again. What is there in the end must be the
-undisturbed database, byte for byte, and nothing else.
+Builds the model once undisturbed. Then, repeatedly and in a new folder, starts the build, kills it
+(SIGKILL) at a random instant, or before its n-th change of a name on the disk (rename, link,
+unlink, mkdir, rmdir) for every n, and runs it again. The result must equal the undisturbed
+database byte for byte and contain nothing else.
 
-With ``--update`` the killed build is one that brings a finished database up to date, with other
-options.
+With ``--update`` the killed build updates a finished database with other options.
 
     python benchmarks/kills.py MODEL [--random 50] [--names] [--update]
 """

@@ -1,18 +1,18 @@
-"""Compares a browser's picture with our own outside edges.
+"""Compares a browser's picture with a ray-cast reference outside edges.
 
-Along an edge two renderers may differ by a whole pixel: one takes the pixel for this surface, one
-for that, a third mixes them (X_ITE smooths edges, view3dscene does not). Such pixels say nothing
-of the files, so they are left out. What is an edge is decided by our own rays alone, three by three
-a pixel: between two neighbouring rays the material changes, or the surface's plane does (by
-more than `BEND`, or by a step of more than `STEP` of the distance), or one of them hits nothing;
-also behind glass. A pixel is masked if there is an edge within it or within one of its eight
-neighbours. Texture is no edge: what a browser makes of that is modelled (render.py), not excused.
+Along an edge two renderers may differ by a whole pixel: the pixel may show either surface or a mix
+(X_ITE smooths edges, view3dscene does not). Such pixels carry no information about the files and
+are masked. Reference rays alone define edges, three by three per pixel: between two adjacent rays
+the material changes, or the plane of the surface changes (by more than `BEND`, or by a step of more
+than `STEP` of the distance), or one of them hits nothing; also behind glass. A pixel is masked if
+it or one of its eight neighbours contains an edge. Texture is no edge: render.py models the
+browser's treatment of textures.
 
-Sky is left out of the PSNR too, since to show nothing where nothing is would raise it; how much of
-the sky shows something else is counted separately.
+The PSNR excludes the sky too, since empty background would raise it; the share of sky pixels that
+show something else is counted separately.
 
-(Tried: a threshold of 40 levels on the colour's step to the next pixel as well. It masks up to 4 %
-more of a picture and changes no PSNR by more than 1 dB.)
+(Rejected: an additional threshold of 40 levels on the colour's step to the next pixel. It masks up
+to 4 % more of a picture and changes no PSNR by more than 1 dB.)
 """
 
 from __future__ import annotations

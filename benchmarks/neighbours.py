@@ -1,19 +1,19 @@
-"""Compares systems by their pictures after the same bytes: ``python benchmarks/neighbours.py``
+"""Compares systems by their pictures after equal bytes: ``python benchmarks/neighbours.py``
 
-The viewer's client and others that take `.ptm`s, and the clients of the neighbouring systems, on
-the same walks: the sample museum (`make sample`), and a hall of large photographs, all different
-(`sample_data/make_photo_gallery.py`), which interlaced images are made for. `h1`, 100 ms to the
-first byte, 300 bytes of headers a request; geometry, records and hints are on the link, too. What
-is missing is made in ``build/bench/neighbours`` first, which takes minutes.
+The viewer's client, other clients of `.ptm` files, and the clients of the neighbouring systems, on
+the same walks: the sample museum (`make sample`), and a hall of large, distinct photographs
+(`sample_data/make_photo_gallery.py`), the target scene of interlaced images. `h1`, 100 ms to the
+first byte, 300 bytes of headers per request; geometry, records and hints use the link, too. The
+script first builds missing data in ``build/bench/neighbours``, which takes minutes.
 
 e             mean over pixels and frames of the root mean square error over R, G and B, 0 to 255,
-              against the picture of all `.ptm`s with all of their levels
+              against the picture of all `.ptm` files with all of their levels
 / best        e over that of `best`
-p95           what e does not exceed in 95 % of the frames
-50 %, …, s    until a visitor at the start has that share of the picture, at most a minute
-e at 100 kB   of a visitor who stands before a picture, at `PLACES` places of the walk, after that
-              many bytes over a link of 512 kbit/s with all memory, and over that of `best`; then
-              at the end, after a minute, and the bytes by then
+p95           95th percentile of e over the frames
+50 %, …, s    time until a visitor at the start has that share of the picture, at most a minute
+e at 100 kB   e for a visitor in front of a picture, at `PLACES` places of the walk, after that
+              number of bytes over a link of 512 kbit/s with all memory, and over that of `best`;
+              then the final e, after a minute, and the bytes by then
 complete      e over the walk with all files present: the effect of scaling to powers of two and of
               other mip levels
 """

@@ -1,16 +1,16 @@
-"""Portal flow of a Quake map against the answer of ericw-tools' ``vis``, leaf by leaf.
+"""Compares the portal flow on a Quake map with ericw-tools' ``vis``, leaf by leaf.
 
     python benchmarks/prt.py MAP.prt -o OUT.npz [--reference MAP.visible.npz] [--exact]
 
 Reads PRT2 (N A B then N points in brackets per portal, then one line of leafs per cluster), runs
 `ptmtools.portal_flow.flow.portal_flow` over the clusters, lifts the result to leafs and writes
-``shape`` and ``visible`` (rows of big-endian bits). The reference is taken as the AND with its
-transpose, which is still conservative. Leafs that only the reference joins are put to the test
-twice: ``--lines`` random lines from a portal of one to a portal of the other are walked through the
-portals; and every sequence of portals from the one to the other is clipped in double-double. A
-line that arrives would prove that our flow misses a pair (exit status 1); if nothing is left of any
-sequence, there is none. CPU time is that of the process, after one warm-up that loads or compiles
-the kernels, those of the decisions of near ties with them.
+``shape`` and ``visible`` (rows of big-endian bits). The reference is its AND with its transpose,
+which is still conservative. Two tests check leaf pairs that only the reference contains:
+``--lines`` random lines from a portal of one leaf to a portal of the other pass through the
+portals; and double-double arithmetic clips every sequence of portals between them. A line that
+arrives proves that the flow misses a pair (exit status 1); if every sequence is clipped to nothing,
+no such line exists. CPU time is that of the process, after one warm-up that loads or compiles the
+kernels, including those that decide near ties.
 """
 
 from __future__ import annotations

@@ -1,34 +1,34 @@
-"""Cells and visibility: what is traded for what. ``make bench-pvs``, or
+"""Trade-offs of cells and visibility. ``make bench-pvs``, or
 
     python benchmarks/pvs_trade.py [MODEL…] [--wall-areas 2 1 0.5] [--segments 1000000]
     python benchmarks/pvs_trade.py --only-plot build/bench/pvs.csv
 
-For every model, several least wall areas, leaves and rooms as cells, and each method of
-visibility, a row of the CSV:
+The CSV has a row for every model, minimum wall area, kind of cell (leaves and rooms) and method of
+visibility:
 
 leaves, cells, portals     of the subdivision
-pvs                        mean share of all cells that a cell may see
+pvs                        mean share of visible cells per cell
 cut                        portals whose search the budget ended
-walk_reached, walk_stops   rooms that the standard walk (`walk.py`) leads through, and was to
+walk_reached, walk_stops   rooms that the standard walk (`walk.py`) reaches, and its planned rooms
 walk_files, walk_mb        cell files fetched along the walk, each once, and their megabytes
-at_hand_mb                 megabytes that the walker's visible set holds, on average over the way
+at_hand_mb                 megabytes of the walker's visible set, mean over the way
 at_hand_volume, at_hand_texels
                            the same as a share of the building's volume, and of all texels in use
 cells_cpu_s, cells_s       processor and wall seconds of the subdivision, grouping included
-flow_cpu_s, flow_s         the same of the visibility, compilation excluded; it is that of leaves,
-                           whatever the cells are
-flow_mb                    most memory that it took, beyond what its process held before
+flow_cpu_s, flow_s         the same of the visibility, compilation excluded; that of leaves for any
+                           kind of cell
+flow_mb                    peak memory of the visibility, beyond the memory of its process before
 missed_pairs, missed_segments, cracks
-                           what `check_conservative` shows to be missing (``--segments`` tried)
-lacks                      pairs of cells of the full set that are not in this one
+                           pairs, segments and cracks that `check_conservative` finds missing
+                           (``--segments`` tested)
+lacks                      pairs of cells of the full set that are missing here
 
-The walk is made from the default cells and is the same for all; hints are not computed, numbers as
-long take their place in the files. Every measurement has a process of its own. Cells of one wall
-area have the same leaves and the same segments are shot at all, so a set that holds all pairs of
-one that misses nothing needs no segments: the full set of leaves is tried, and others only where it
-fails or they are sampled.
+The walk is planned on the default cells and is the same for all rows; placeholders of equal length
+replace the hints in the files. Every measurement runs in a separate process. Cells of one wall area
+have the same leaves and are tested with the same segments, so a superset of a complete set needs no
+segments: the full set of leaves is tested, and others only if it fails or if they are sampled.
 
-The tables for the documentation go to the standard output and into `pvs.md`; beside it `pvs.png`.
+Prints the tables of the documentation and writes them to `pvs.md`, with `pvs.png` beside it.
 """
 
 from __future__ import annotations

@@ -1,25 +1,25 @@
-"""A reference picture of a model or database, by ray casting.
+"""Renders a reference picture of a model or database by ray casting.
 
     python benchmarks/render.py MODEL|DB --eye 2 1.6 3 --look 0 1.6 0 -o out.png
 
-One ray a pixel (``--samples 2`` for 2 × 2) through Embree; transparent surfaces are looked
-through, and a face that is not two-sided shows on its front only, as in the emitted files.
-``--look-of`` says how surfaces look:
+One ray per pixel (``--samples 2`` for 2 × 2) through Embree; rays pass through transparent
+surfaces, and a face that is not two-sided is visible from its front only, as in the emitted files.
+``--look-of`` selects the shading:
 
 ===========  ======================================================================
 headlight    all darkened by the cosine between surface and ray; bilinear texture
-x_ite        what VRML97 browsers make of the emitted files (`database.vrml.cell`):
-             only what has a Material is lit, by the cosine to the direction of view,
-             and glows if it has no image; trilinear texture; a black sky
-view3dscene  the same, with what Castle Game Engine adds of its own where a file says
-             nothing: an ambient light of 0.2, of which a Material takes its
-             ambientIntensity of 0.2, and a dark grey sky
-flat         nothing lit; bilinear texture
+x_ite        shading of the emitted files by VRML97 browsers (`database.vrml.cell`):
+             only surfaces with a Material are lit, by the cosine to the direction of
+             view, and glow if they have no image; trilinear texture; a black sky
+view3dscene  the same with the defaults of Castle Game Engine: an ambient light of
+             0.2, of which a Material takes its ambientIntensity of 0.2, and a dark
+             grey sky
+flat         no lighting; bilinear texture
 ===========  ======================================================================
 
-It shares nothing with the stages but ingest's arrays, so that it can be held against what
-browsers make of the emitted files. Coordinates are the world's: metres, Y up, origin at the
-centre of the model's floor; ``--model-space`` takes the model's own.
+The script shares only the arrays of ingest with the stages, so it is an independent reference for
+browsers that show the emitted files. Coordinates are those of the world: metres, Y up, origin at
+the centre of the model's floor; ``--model-space`` takes the model's own.
 """
 
 from __future__ import annotations

@@ -1,22 +1,22 @@
-"""Leaves or rooms as cells: what each costs a client. ``python benchmarks/rooms.py [MODEL…]``
+"""Cost of leaves and of rooms as cells to a client: ``python benchmarks/rooms.py [MODEL…]``
 
-For every model, and for leaves, rooms parted at several `--gain`s, whole rooms, and rooms for
+For every model, and for leaves, rooms split at several `--gain`s, whole rooms, and rooms for
 cameras that fly (`--standing anywhere`):
 
-cells         cell files, and how many of them are view-only
-volume        share of the volume that the walker's PVS holds, on average over the way
+cells         cell files, and the number of view-only ones
+volume        share of the volume in the walker's PVS, mean over the way
 walk          cell files fetched along a walk, and their megabytes
-at hand       megabytes of cell files that the walker's PVS holds, on average over the way
-texels        share of all texels in use that the walker's PVS holds, on average over the way
-ACH error     how far the hints are from what is seen (below), with the standard error
+at hand       megabytes of cell files in the walker's PVS, mean over the way
+texels        share of all texels in use in the walker's PVS, mean over the way
+ACH error     deviation of the hints from the actual coverage (below), with the standard error
 CPU s         grouping, portal flow and coverage hints; the subdivision is the same
 
-The **walk** is that of `walk.py`; leaf by leaf it is the same for all kinds of cells.
+The **walk** is that of `walk.py`; it visits the same leaves for all kinds of cells.
 
-The **ACH error** is the mean total variation between the hints of the cell in which a random place
-lies and the coverage seen from that place, both summed up room by room (whole rooms, so that all
-kinds are held against the same): 0 is exact, 1 is all wrong. An eye that stands elsewhere in the
-cell sees something else, so even exact averages have one; fewer cells have a larger one.
+The **ACH error** is the mean total variation between the hints of the cell of a random place and
+the coverage seen from that place, both summed by room (whole rooms, for comparability): 0 is exact,
+1 is the maximum. Coverage varies within a cell, so even exact averages have an error, and fewer
+cells have a larger one.
 """
 
 from __future__ import annotations

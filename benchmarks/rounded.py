@@ -1,9 +1,10 @@
-"""Cells of a model whose meshes Draco has quantised, each on its own grid.
+"""Compares the cells of a model with those of its copy whose meshes Draco has quantised.
 
     python benchmarks/rounded.py [MODEL] [--bits 14 12 11]
 
-The triangles of each opaque material are a mesh of a GLB. Cells, leaves and portals of the plain
-GLB, of the compressed one, and of the compressed one where its grid does not count as tolerance.
+The triangles of each opaque material are a mesh of a GLB, quantised on its own grid. Prints cells,
+leaves and portals of the plain GLB, of the compressed one, and of the compressed one without its
+grid as tolerance.
 """
 
 from __future__ import annotations

@@ -1,16 +1,16 @@
-"""The test models, and the databases and walks of the simulator's benchmarks.
+"""Test models, databases and walks of the simulator's benchmarks.
 
     python benchmarks/scenes.py [museum rooms mixed hospital]
 
-makes the databases that are missing in ``build/bench/walks``, each with three walks of 150 seconds:
+builds missing databases in ``build/bench/walks``, each with three walks of 150 seconds:
 
 museum        the sample museum (`make sample`): 12 rooms, 31 textures of 1024 × 1024 texels
 rooms         a museum of 40 rooms and 120 textures of 1024 × 1024 texels
-mixed         the same, the side of each texture drawn from 256, 512, 1024 and 2048 texels
+mixed         the same with random texture sides of 256, 512, 1024 and 2048 texels
 hospital      of the shared data: 9 small textures, and much furniture
 
-Two scenes are made at a time. The museums of 40 rooms take longest: their pictures are painted
-first.
+Two processes build scenes in parallel. The museums of 40 rooms take longest; painting their
+pictures comes first.
 """
 
 from __future__ import annotations

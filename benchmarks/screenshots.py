@@ -1,16 +1,16 @@
-"""Databases in real browsers, held against our own rays from the same viewpoints.
+"""Compares databases in real browsers with ray-cast pictures from the same viewpoints.
 
     python benchmarks/screenshots.py DB… [-o build/bench/browsers] [--viewpoints 0 3 5]
 
-Prints, for each viewpoint of `root.wrl` in view3dscene and in X_ITE in headless Chromium, how like
-the picture is to ours (likeness.py) and what the browser complained about, and in the end the
-worst and the middle of each scene; writes a contact sheet for each database (ours, the browser's,
-twice the difference around grey with what is left out as an edge in black). The browsers show the
-emitted VRML files; ours is cast from the scene that ingest made, so whatever differs was lost or
-bent on the way. view3dscene also reads every file by itself.
+Prints, for each viewpoint of `root.wrl` in view3dscene and in X_ITE in headless Chromium, the
+similarity of the picture to the reference (likeness.py) and the messages of the browser, then the
+minimum and the median of each scene; writes a contact sheet for each database (reference, browser,
+twice the difference around grey with masked edges in black). The browsers show the emitted VRML
+files; the reference is cast from the ingested scene, so a difference indicates an error of
+emission. view3dscene also reads every file separately.
 
 X_ITE in a software renderer takes minutes for large textures; databases built with
-``--fallback-size 512`` are shown faster, and ours uses the same level of them.
+``--fallback-size 512`` are faster, and the reference uses the same level of them.
 """
 
 from __future__ import annotations

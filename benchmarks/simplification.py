@@ -1,28 +1,30 @@
 """Cost and error of simplification: `python benchmarks/simplification.py`
 
-Generated statues (a sphere from a cube, with seeded waves and folds; ``--shape squashed`` is flat
-and long, ``column`` the sample column, which has thousands of handles, ``holed`` lacks a twentieth
-of the faces, ``littered`` has thousands of small parts around it) become 10,000 faces, each method
-in a process of its own; one that is not installed is left out:
+Each method reduces generated statues (a sphere from a cube, with seeded waves and folds; ``--shape
+squashed`` is flat and long, ``column`` the sample column with thousands of handles, ``holed`` lacks
+a twentieth of the faces, ``littered`` has thousands of small parts around it) to 10,000 faces in a
+separate process; methods that are not installed are left out:
 
-- ``quadric``: ours;
+- ``quadric``: ptmtools;
 - ``fast``: fast-simplification;
 - ``meshlab``: pymeshlab;
 - ``meshopt``: meshoptimizer's simplifier with attributes, by almeshopt (`pip install almeshopt`,
-  x86-64 with AVX2); vertices keep their places;
-- ``update``: the same with places and attributes that move (``meshopt_simplifyWithUpdate``);
+  x86-64 with AVX2); vertices keep their positions;
+- ``update``: the same with variable positions and attributes (``meshopt_simplifyWithUpdate``);
 - ``pruned``: ``update`` with the option to drop parts.
 
-Times are the processor's, the least of some runs, without compiling; memory is the peak beyond what
-the process held. Errors are against the given mesh, both ways, at points spread evenly (seeded):
-the distance along the normal, by Embree, and the angle between the normals there. Distances are in
-millionths of the box's diagonal. Ratios to ``quadric`` stand in parentheses.
+Times are processor seconds, the minimum of several runs, without compilation; memory is the peak
+above that of the process before. Errors are measured against the given mesh, in both directions, at
+evenly distributed (seeded) points: the distance along the normal, by Embree, and the angle between
+the normals. Distances are in millionths of the diagonal of the bounding box. Ratios to ``quadric``
+are in parentheses.
 
-``--painted`` compares the methods that know textures: statues with six charts, one for each side of
-the cube; ``--shape wall``, a wall of bricks with windows; ``--shape furniture``, shelves of turned
-bowls and framed panes, each surface with a chart of its own. It adds the movement of the texture,
-the share of the given surface that has nothing before or behind it, and how many parts and handles
-there are. ``--model FILE`` does the same for the objects of a model, as `ptm campus` does.
+``--painted`` compares the methods that support textures: statues with six charts, one for each side
+of the cube; ``--shape wall``, a wall of bricks with windows; ``--shape furniture``, shelves of
+turned bowls and framed panes, each surface with a chart of its own. It adds the movement of the
+texture, the share of the given surface without a counterpart in front of or behind it, and the
+numbers of parts and handles. ``--model FILE`` does the same for the objects of a model, with the
+objects of `ptm campus`.
 """
 
 from __future__ import annotations

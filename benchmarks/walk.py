@@ -1,9 +1,9 @@
-"""A standard walk through a model, and what it makes a client fetch.
+"""Standard walk through a model, and the files that a client fetches along it.
 
-The walk goes through the middle of the twelve largest rooms, at the height of eyes, always on to
-the nearest one left, through leaves in which one can stand and portals of at least 1 m². It is a
-line in space, so that subdivisions of other cell sizes are held against the same one; the rooms are
-those of the subdivision it is made from.
+The walk visits the centres of the twelve largest rooms at eye height, always the nearest remaining
+one next, through walkable leaves and portals of at least 1 m². It is a curve in space, independent
+of the cell size, so that subdivisions are compared on the same walk; the rooms are those of the
+subdivision that it is planned on.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
 """Times the simulator: ``python benchmarks/walk_speed.py [SCENE…]``
 
 A walk of five minutes through the sample museum and through the museum of 40 rooms (`scenes.py`):
-processor seconds of preparing it, and of what in that; then of a run of each policy at 512
-kbit/s and 10 % of texture memory. Machine code is loaded before.
+processor seconds of the preparation and its parts; then of a run of each policy at 512 kbit/s and
+10 % of texture memory. Machine code is loaded before.
 
 served        documents and geometry
 decoding      textures, all levels
-rays          the first surface that each pixel shows
+rays          the first surface of each pixel
 sampling      textures at each pixel, at all levels
 rest          of the preparation
 total         the preparation and a run of the slowest policy

@@ -2,22 +2,22 @@
 
 Every policy of the simulator, on four links and with three amounts of texture memory, on three
 walks of 150 seconds through each of four scenes (`scenes.py`): `h1`, 100 ms to the first byte, 300
-bytes of headers a request; geometry, records and hints are on the link, too. Databases and runs
-that are missing are made, in two processes. Runs are rows of a file of JSON lines, keyed by what
-they depend on: the sources of the simulator, the manifest of the database, the walk, the policy,
-the link and the memory. An interrupted benchmark therefore continues where it stopped.
+bytes of headers per request; geometry, records and hints use the link, too. Two processes produce
+missing databases and runs. Runs are rows of a file of JSON lines, with their inputs as keys: the
+sources of the simulator, the manifest of the database, the walk, the policy, the link and the
+memory. An interrupted benchmark continues with the next run.
 
 e             mean over pixels and frames of the root mean square error over R, G and B, 0 to 255
-p95           what e does not exceed in 95 % of the frames
-waste         share of the bytes received that was never on the screen
+p95           95th percentile of e over the frames
+waste         share of the bytes received that never were on the screen
 / oracle      e over that of `oracle` on the same walk under the same conditions, on average
 ± walks       standard deviation of that ratio over the walks through a scene, root mean square
 p95 / ach     p95 on average over that of `ach`, which is 0 on some walks
-90 %, s       until a visitor who stands at the start has 90 % of the picture, at most a minute
-s             processor seconds of a run; a table of its own has those of preparing a walk
+90 %, s       time until a visitor at the start has 90 % of the picture, at most a minute
+s             processor seconds of a run; a separate table gives those of preparing a walk
 
-The last table is beside the figures of the research prototype, which had geometry and hints for
-nothing, and other walks: e over the prototype's, over the scenes and conditions that it had.
+The last table gives e over that of the research prototype, over its scenes and conditions. The
+prototype did not transmit geometry and hints, and used other walks.
 """
 
 from __future__ import annotations

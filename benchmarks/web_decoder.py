@@ -1,10 +1,10 @@
-"""Speed of the browser's decoder beside Python's: `python benchmarks/web_decoder.py [NAME…]`
+"""Speed of the browser's decoder and of Python's: `python benchmarks/web_decoder.py [NAME…]`
 
-Names are those of the sets of `benchmarks/codec/images.py`. All levels of every image are decoded
-on one thread: by Python and numba, and in node by WebAssembly, in turn, several times over; of each
-the least time counts. MB are those of the finest level. ``--browser``
-does the same in a worker of headless Chromium, beside `createImageBitmap` of the same images as PNG
-(which may decode on a thread of its own). Last come the sizes of what a page downloads.
+Names are those of the sets of `benchmarks/codec/images.py`. Python with numba, and WebAssembly in
+node, decode all levels of every image on one thread, in turn and several times; the minimum time
+counts. MB are those of the finest level. ``--browser`` does the same in a worker of headless
+Chromium, beside `createImageBitmap` of the same images as PNG (which may decode on a separate
+thread). The last table gives the download sizes of a page.
 """
 
 from __future__ import annotations
