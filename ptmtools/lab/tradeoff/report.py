@@ -158,7 +158,7 @@ def sentence(tried: WalkTrial, trade: WalkTrade) -> str:
         ]
         changes.append(f"{way} {_and(parts)}")
     policies = {seen.policy for _, seen in pairs} - {seen.policy for seen in own.seen[:1]}
-    client = f" to the client {policies.pop()}" if len(policies) == 1 else ""
+    client = f" for the client {policies.pop()}" if len(policies) == 1 else ""
     if not changes:
         seen = f"no visible difference{client}"
     else:
