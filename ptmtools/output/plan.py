@@ -87,9 +87,12 @@ _EVEN = 0.005
 _DARK = 0.02
 #: Numbers are left out of cells narrower than this many points on paper.
 _NARROWEST = 9.0
-#: Inches: around everything, above the panels for title and legend, above each panel, below it
-#: for the scale bar, between panels, and for the colour bar.
-_MARGIN, _HEAD, _CAPTION, _FOOT, _GAP, _BAR = 0.15, 0.5, 0.26, 0.3, 0.25, 0.75
+#: Inches: around everything, above each panel, below it for the scale bar, between panels, and for
+#: the colour bar.
+_MARGIN, _CAPTION, _FOOT, _GAP, _BAR = 0.15, 0.26, 0.3, 0.25, 0.75
+#: Inches: from the top to the middle of the first line of the heading, from the middle of the last
+#: line to the panels, between lines, and at least between the heading and a legend beside it.
+_FIRST_LINE, _BELOW_LINES, _LINE, _APART = 0.27, 0.23, 0.2, 0.3
 #: Paper around the cells, as a share of the larger side: lines lie half outside of them.
 _RIM = 0.004
 #: A building deeper than this many times its width is turned by 90°.
@@ -142,8 +145,7 @@ def plot_plan(
             "PTM-D600", "there are no cells", remedy="subdivide a model that has rooms"
         )
     floors = storeys(cells, options.height, options.storey_gap)
-    figure = _Plan(scene, cells, pvs, ach, options, floors, way).draw()
-    agg.FigureCanvasAgg(figure)
+    figure = _Plan(scene, cells, pvs, ach, options, floors, way).draw(agg.FigureCanvasAgg)
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": None}, facecolor=_PAPER)
     data = buffer.getvalue()
@@ -186,8 +188,8 @@ class _Plan:
         rim = _RIM * float((high - low).max())
         self._low, self._high = low - rim, high + rim
 
-    def draw(self) -> Any:
-        """The whole figure."""
+    def draw(self, canvas: Callable[[Any], Any]) -> Any:
+        """The whole figure; ``canvas`` attaches a renderer, which measures text."""
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import LogNorm
         from matplotlib.figure import Figure
@@ -200,13 +202,16 @@ class _Plan:
         rows = -(-len(self._floors) // columns)
         panel = (width - 2 * _MARGIN - bar - (columns - 1) * _GAP) / columns
         tall = panel * float(span[1] / span[0])
-        height = _HEAD + rows * (_CAPTION + tall + _FOOT) + _MARGIN
-        figure = Figure(figsize=(width, height), dpi=self._options.dpi, facecolor=_PAPER)
+        figure = Figure(figsize=(width, 1), dpi=self._options.dpi, facecolor=_PAPER)
+        canvas(figure)
+        head = self._head(figure)
+        height = head + rows * (_CAPTION + tall + _FOOT) + _MARGIN
+        figure.set_size_inches(width, height)
         shades = ScalarMappable(LogNorm(_FAINTEST, 1), _SHADES)
         for i, floor in enumerate(self._floors):
             row, column = divmod(i, columns)
             left = _MARGIN + column * (panel + _GAP)
-            bottom = height - _HEAD - (row + 1) * (_CAPTION + tall + _FOOT) + _FOOT
+            bottom = height - head - (row + 1) * (_CAPTION + tall + _FOOT) + _FOOT
             axis = figure.add_axes((left / width, bottom / height, panel / width, tall / height))
             axis.set_axis_off()
             axis.set(xlim=(self._low[0], self._high[0]), ylim=(self._high[1], self._low[1]))
@@ -216,11 +221,10 @@ class _Plan:
             if self._way is not None:
                 draw_way(axis, self._way, self._floors, i, self._shown)
         if barred:
-            long = min(0.8 * (height - _HEAD), 4.0)
-            low = height - _HEAD - _CAPTION - long
+            long = min(0.8 * (height - head), 4.0)
+            low = height - head - _CAPTION - long
             place = (1 - (_MARGIN + 0.58) / width, low / height, 0.14 / width, long / height)
             self._colour_bar(figure, place, shades)
-        self._title(figure, height)
         return figure
 
     def _shown(self, plan: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -344,28 +348,81 @@ class _Plan:
         bar.tick_params(labelsize=7, colors=_INK, length=2)
         bar.minorticks_off()
 
-    def _title(self, figure: Any, height: float) -> None:
-        from matplotlib.lines import Line2D
+    def _head(self, figure: Any) -> float:
+        """Writes the heading and the legend, below each other unless one line has room for both;
+        returns their height, inches. The height of ``figure`` may change afterwards."""
+        from matplotlib.transforms import ScaledTranslation
 
-        cells, chosen = self._cells, self._options.cell
-        parts = [
-            count(cells.cell_count, "cell"),
+        width, renderer = self._options.width, figure.canvas.get_renderer()
+        room = width - 2 * _MARGIN
+        top = figure.dpi_scale_trans + ScaledTranslation(0, 1, figure.transFigure)
+
+        def size(artist: Any) -> tuple[float, float]:
+            box = artist.get_window_extent(renderer)
+            artist.remove()
+            return box.width / figure.dpi, box.height / figure.dpi
+
+        def line(text: str, number: int) -> Any:
+            style = {"fontsize": 11, "weight": "bold", "color": _INK, "transform": top}
+            y = -_FIRST_LINE - number * _LINE
+            return figure.text(_MARGIN, y, text, ha="left", va="center", **style)
+
+        def legend(columns: int, loc: str, x: float, y: float) -> Any:
+            return figure.legend(
+                handles=handles,
+                loc=loc,
+                bbox_to_anchor=(x, y),
+                bbox_transform=top,
+                ncols=columns,
+                frameon=False,
+                fontsize=9,
+                labelcolor=_INK,
+                handlelength=1.3,
+                columnspacing=1.4,
+                borderpad=0,
+                borderaxespad=0,
+            )
+
+        lines: list[str] = []
+        for part in self._facts():
+            longer = f"{lines[-1]}  ·  {part}" if lines else part
+            if lines and size(line(longer, 0))[0] <= room:
+                lines[-1] = longer
+            else:
+                lines.append(part)
+        for number, text in enumerate(lines):
+            line(text, number)
+        handles = self._handles()
+        columns = len(handles)
+        while columns > 1 and size(legend(columns, "upper left", 0, 0))[0] > room:
+            columns -= 1
+        wide, high = size(legend(columns, "upper left", 0, 0))
+        beside = len(lines) == 1 and columns == len(handles)
+        if beside and size(line(lines[0], 0))[0] + _APART + wide <= room:
+            legend(columns, "center right", width - _MARGIN, -_FIRST_LINE)
+            return _FIRST_LINE + _BELOW_LINES
+        y = _FIRST_LINE + (len(lines) - 0.3) * _LINE
+        legend(columns, "upper left", _MARGIN, -y)
+        return y + high + _BELOW_LINES - 0.1
+
+    def _facts(self) -> list[str]:
+        """The parts of the heading."""
+        facts = [
+            count(self._cells.cell_count, "cell"),
             f"{count(len(self._doors()), 'portal')} between them",
         ]
         if self._pvs is not None:
-            parts.append(f"{100 * self._pvs.volume_at_hand[0]:.1f} % of the volume stays resident")
+            share = 100 * self._pvs.volume_at_hand[0]
+            facts.append(f"a client keeps {share:.1f} % of the volume in memory")
         if len(self._floors) > 1:
-            parts.append(f"{len(self._floors)} storeys")
-        place = {"ha": "left", "va": "center", "color": _INK}
-        y = 1 - 0.27 / height
-        figure.text(
-            _MARGIN / self._options.width,
-            y,
-            "  ·  ".join(parts),
-            fontsize=11,
-            weight="bold",
-            **place,
-        )
+            facts.append(f"{len(self._floors)} storeys")
+        return facts
+
+    def _handles(self) -> list[Any]:
+        """The entries of the legend."""
+        from matplotlib.lines import Line2D
+
+        chosen = self._options.cell
         lines = [(_WALL, "opaque"), (_PORTAL, "portal")]
         if not self._opaque.all():
             lines.insert(1, (_SEE_THROUGH, "transparent"))
@@ -375,21 +432,10 @@ class _Plan:
             lines.append((WAY, "walk"))
         if chosen is not None and self._shade is not None:
             lines.append((_CHOSEN, f"cell {chosen}, sees {len(self._shade)} cells"))
-        handles = [Line2D([], [], color=c, linewidth=2.5, label=label) for c, label in lines]
-        handles += hatches(cells)
-        figure.legend(
-            handles=handles,
-            loc="center right",
-            bbox_to_anchor=(1 - _MARGIN / self._options.width, y),
-            ncols=len(handles),
-            frameon=False,
-            fontsize=9,
-            labelcolor=_INK,
-            handlelength=1.3,
-            columnspacing=1.4,
-            borderpad=0,
-            borderaxespad=0,
-        )
+        handles: list[Any] = [
+            Line2D([], [], color=colour, linewidth=2.5, label=label) for colour, label in lines
+        ]
+        return handles + hatches(self._cells)
 
 
 def _outlines(

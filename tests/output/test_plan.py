@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -75,6 +77,31 @@ def test_storeys_have_their_names(
     plain_bytes = (tmp_path / "unnamed.png").read_bytes()
     assert (tmp_path / "0.9.png").read_bytes() == plain_bytes
     assert (tmp_path / "0.5.png").read_bytes() != plain_bytes
+
+
+@pytest.mark.parametrize("width", [5, 8, 12])
+def test_heading_and_legend_do_not_overlap(
+    artifacts, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, width: float
+) -> None:
+    from matplotlib.figure import Figure
+
+    figures: list[Figure] = []
+    save = Figure.savefig
+
+    def kept(self: Figure, *place: Any, **style: Any) -> None:
+        save(self, *place, **style)
+        figures.append(self)
+
+    monkeypatch.setattr(Figure, "savefig", kept)
+    options = PlotOptions(cell=1, width=width, dpi=60)
+    draw(artifacts, tmp_path / "a.png", options, ach=None)
+    (figure,) = figures
+    caption = figure.axes[0]._left_title  # type: ignore[attr-defined]
+    parts = [*figure.texts, *figure.legends, caption]
+    boxes = [part.get_window_extent() for part in parts]
+    assert all(box.x0 >= 0 and box.x1 <= figure.bbox.x1 for box in boxes)
+    assert all(box.y0 >= 0 and box.y1 <= figure.bbox.y1 for box in boxes)
+    assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
 
 
 def test_a_walk_is_drawn(artifacts, tmp_path: Path) -> None:
