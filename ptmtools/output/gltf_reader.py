@@ -200,7 +200,7 @@ class _Reader:
             with np.errstate(over="ignore"):
                 same = np.array_equal(written.astype(np.float32), actual)
             if not same:
-                message = f"{name} does not match the data, {actual.tolist()}"
+                message = f"{name} does not match the data, which has {actual.tolist()}"
                 raise FileError("PTM-D731", place, message)
 
     def _material(self, index: int) -> ReadMaterial:

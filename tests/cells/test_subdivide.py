@@ -293,9 +293,9 @@ def test_bad_options(room_row, options: dict[str, Any], code: str) -> None:
 def test_places_out_of_reach_are_a_note_each(quads: Any, room_faces: Any) -> None:
     rooms = [((0, 0, -4), (20, 4, 4)), ((30, 0, -2), (34, 4, 2)), ((40, 0, -2), (43, 4, 2))]
     scene = quads([face for low, high in rooms for face in room_faces(low, high)])
-    printed = [note for note in subdivide(scene).notes if "reached from the start" in note]
+    printed = [note for note in subdivide(scene).notes if "reached from the viewpoint" in note]
     assert len(printed) == 2
     assert ["--reach main" in note for note in printed] == [True, False], (
-        "the first tells it of all"
+        "the first note names the remedy for all"
     )
     assert not any("--reach" in note for note in subdivide(scene).notes if note not in printed)

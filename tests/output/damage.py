@@ -51,7 +51,7 @@ KINDS = {
     "other_schema": ("D656", "this ptmtools reads"),
     "glb_accessor": ("D731", "end|index or a size|bytes of|multiple"),
     "glb_indices": ("D731", r"indices up to"),
-    "glb_numbers": ("D731", "is not finite|is not that of the data"),
+    "glb_numbers": ("D731", "is not finite|does not match the data"),
 }
 
 

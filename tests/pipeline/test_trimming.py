@@ -60,7 +60,7 @@ def test_a_fine_ceiling_is_trimmed_and_a_picture_is_not(room: Path) -> None:
     (textures,) = (stage for stage in report.stages if stage.stage == "textures")
     less = (CEILING**2 - (CEILING // 2) ** 2) * 3
     assert (textures.counts["unresolved"], textures.counts["unresolved_bytes"]) == (1, less)
-    assert "of 1 texture 2.4 MB left out" in TEXTURES.summarize(textures.counts)
+    assert "2.4 MB of 1 texture omitted" in TEXTURES.summarize(textures.counts)
     (note,) = (note for note in textures.notes if "--trim" in note)
     assert "1 level of textures/ceiling.ptm" in note
     assert "512 x 512 of 1024 x 1024, about" in note
