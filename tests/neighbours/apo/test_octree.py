@@ -59,8 +59,10 @@ def test_samples_are_about_as_many_as_asked(seed: int, faces: int, thin: float) 
     spacing = spacing_for(corner, count)
     actual = len(spread(corner, spacing).triangle)
     assert faces <= actual <= 3 * count
-    if thin == 1:
-        assert spacing == pytest.approx(np.sqrt(areas(corner).sum() / count))
+    by_area = np.sqrt(areas(corner).sum() / count)
+    assert spacing >= by_area * (1 - 1e-9)
+    if thin == 1 and faces >= 30:  # of a few random triangles, all may be needles
+        assert spacing == pytest.approx(by_area)
     assert spacing_for(corner * 0, count) == 0
 
 
