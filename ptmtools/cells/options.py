@@ -87,7 +87,7 @@ class SubdivideOptions:
         basic=True,
     )
     detail_by_shape: bool = option(
-        True, "Treat small, dense, round objects as detail: sofas, statues, plants."
+        True, "Treat small, rounded objects with many triangles as detail: sofas, statues, plants."
     )
     cells: CellKind = option(
         "room",

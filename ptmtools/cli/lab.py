@@ -107,7 +107,9 @@ def path_command(console: Console, db: str, output: str, force: bool, **values: 
 
 @click.command("walk-campus", cls=Command)
 @click.argument("campus", type=click.Path())
-@file_option("walk", "Walk that `ptm path` wrote.", WALKS, required=True)
+@file_option(
+    "walk", "Walk: a file of `ptm path`, or a recording of the viewer.", WALKS, required=True
+)
 @reference(
     "--db",
     type=click.Path(),
@@ -119,8 +121,8 @@ def path_command(console: Console, db: str, output: str, force: bool, **values: 
     "--every",
     type=click.IntRange(0),
     default=5,
-    help="Measure the image of every Nth frame (the walk has five frames per second); 0 measures "
-    "none.",
+    help="Measure the image of every Nth frame (the simulation draws five frames per second); "
+    "0 measures none.",
 )
 @reference(
     "--only",
@@ -168,7 +170,8 @@ def walk_campus(
 @database_argument
 @file_option(
     "walk",
-    f"Walk that `ptm path` wrote. Repeatable. Default: a new walk of {DURATION:.0f} s.",
+    f"Walk: a file of `ptm path`, or a recording of the viewer. Repeatable. "
+    f"Default: a new walk of {DURATION:.0f} s.",
     WALKS,
     multiple=True,
 )
@@ -177,7 +180,7 @@ def walk_campus(
     "seeds",
     type=click.IntRange(0),
     multiple=True,
-    help="Seed of the new walk without --walk; 1 by default. Repeatable.",
+    help="Seed of the walk that is generated if --walk is not given; 1 by default. Repeatable.",
 )
 @options_of(SimulateOptions, PaperOptions)
 @reference(

@@ -69,8 +69,8 @@ DURATION, QUICK = 60.0, 30.0
     "knobs",
     type=click.Choice([knob.option.removeprefix("--") for knob in KNOBS]),
     multiple=True,
-    help="Test only this option on the walk, including values that build slowly. Repeatable. "
-    "Default: all.",
+    help="Test only this option on the walk, including values that make the build slow. "
+    "Repeatable. Default: all.",
 )
 @experiment("--quick", is_flag=True, help="Test one value of each option, on a shorter walk.")
 @experiment(

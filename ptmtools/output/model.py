@@ -145,7 +145,7 @@ class WriterOptions:
     heading: ClassVar[str] = "Served files"
 
     title: str = option(
-        "ptmtools database", "Title of the database, which browsers show.", basic=True
+        "ptmtools database", "Title of the database, which VRML browsers show.", basic=True
     )
     fallback: bool = option(
         True, "Also refer to the PNG of each texture, for clients that cannot read .ptm."
@@ -169,8 +169,9 @@ class WriterOptions:
     )
     avatar_size: Vector | None = option(
         None,
-        "Size of the visitor in VRML browsers: distance from walls, eye height and highest step, "
-        "in metres. Default: the size of --walker, with the eyes at 0.94 times its height.",
+        "Size of the visitor in the viewer and in VRML browsers: distance from walls, eye height "
+        "and highest step, in metres. Default: the size of --walker, with the eyes at 0.94 times "
+        "its height.",
         metavar="RADIUS,EYE,STEP",
         default_before=(6, (0.25, 1.6, 0.75)),
     )

@@ -45,7 +45,7 @@ def _fits_scene(cells: Cells, scene: Scene) -> str:
 
 CELLS: Stage[Cells] = Stage(
     name="cells",
-    about="Read a model and cut it into cells and portals.",
+    about="Read a model and divide its space into cells and portals.",
     recipe=6,
     options=SubdivideOptions,
     reads=(APO,),
