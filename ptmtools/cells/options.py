@@ -108,8 +108,9 @@ class SubdivideOptions:
     )
     reach: Reach = option(
         "all",
-        "Space that cannot be reached from the viewpoint, such as rooms behind closed doors: all "
-        "keeps it where it is walkable, main drops it.",
+        "Space that cannot be reached from a --viewpoint or, without that option, from the "
+        "largest room, such as rooms behind closed doors: all keeps it where it is walkable, main "
+        "drops it.",
     )
     standing: Standing = option(
         "places",

@@ -271,7 +271,7 @@ def _images(model: Inspection) -> str:
     texels = sum(image.width * image.height for image in model.images)
     files = ", ".join(f"{number:,} {kind}" for kind, number in kinds.most_common())
     total = sum(image.bytes for image in model.images)
-    return f"{files}; {size(total)}, {texels / 1e6:,.1f} million texels"
+    return f"{files}; {size(total)}, {texels:,} texels"
 
 
 def _guess(guess: Guess) -> str:

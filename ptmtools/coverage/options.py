@@ -75,7 +75,7 @@ class AchOptions:
     clearance: float | None = option(
         None,
         "Minimum distance between a sample point and any surface. Default: a quarter of the "
-        "smallest cell thickness.",
+        "minimum thickness of a cell.",
         metavar="METRES",
     )
     seed: int = option(0, "Seed of the random sample points.")

@@ -28,15 +28,16 @@ class IngestOptions:
 
     unit: str | float | None = option(
         None,
-        "Unit of the model: m, cm, mm, in, ft, or its length in metres. Default: guessed from "
-        "the size of the model and its rooms.",
+        "Unit of the model: m, cm, mm, in, ft, or its length in metres. Default: the unit "
+        "that the file records or its format prescribes (glTF: m); otherwise guessed from the size "
+        "of the model and its rooms.",
         metavar="UNIT",
         basic=True,
     )
     up: Literal["y", "z"] | None = option(
         None,
-        "Up axis of the model. Default: the axis that the format prescribes (glTF: y); otherwise "
-        "guessed from floors and walls.",
+        "Up axis of the model. Default: the axis that the file records or its format prescribes "
+        "(glTF: y); otherwise guessed from floors and walls.",
         basic=True,
     )
     two_sided: bool = option(False, "Draw both sides of every face.")

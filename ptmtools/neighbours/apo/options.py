@@ -43,8 +43,8 @@ class ReplaceOptions:
 
     apo: tuple[str, ...] = option(
         (),
-        "Replace objects with these names, such as scanned statues, with a simplified mesh and an "
-        "octree of their normals; * and ? are wildcards. Repeatable.",
+        "Names of objects, such as scanned statues, to replace with a simplified mesh and an "
+        "octree of normals; * and ? are wildcards. Repeatable.",
         metavar="NAME",
     )
     apo_faces: int = option(
