@@ -303,7 +303,7 @@ NO_PLACES = {
         seen={(8, 2.5, 0.7): None},
         sees=("a b",),
     ),
-    "the tunnel, for somebody 1.3 m tall": BuildingCase(
+    "the tunnel, for a visitor 1.3 m tall": BuildingCase(
         TUNNEL,
         {"a": IN_A, "tunnel": (8, 2.5, 0.7), "b": (14, 2.5, 1.6)},
         rooms=("a", "b"),

@@ -37,7 +37,7 @@ def taken_apart(monkeypatch: pytest.MonkeyPatch, scene: Scene, **options: Any) -
     return tuple(given[0])
 
 
-def of_somebody(owner: np.ndarray) -> np.ndarray:
+def with_owner(owner: np.ndarray) -> np.ndarray:
     """The same owners, but what is nobody's belongs to one more cell."""
     return np.where((owner < 0).all(axis=1, keepdims=True), owner.max() + 1, owner)
 
@@ -145,7 +145,7 @@ def test_joined_pieces(given: tuple[Any, ...]) -> None:
 
 def test_nothing_gapes_that_did_not(given: tuple[Any, ...]) -> None:
     scene, pieces, owner, tolerance = given
-    mesh = joined(scene, pieces, of_somebody(owner), tolerance)
+    mesh = joined(scene, pieces, with_owner(owner), tolerance)
     assert len(gaping(scene, corners_of(mesh))) == 0
     assert len(gaping(scene, piece_corners(scene, pieces))) > 0, "cutting alone leaves gaps"
 

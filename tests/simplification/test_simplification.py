@@ -320,7 +320,7 @@ def test_no_faces_cannot_be_asked_for() -> None:
 
 def test_progress_reaches_its_end() -> None:
     printed: list[tuple[int, int, str]] = []
-    simplify(torus(30, 20), SimplifyOptions(200), lambda *told: printed.append(told))
+    simplify(torus(30, 20), SimplifyOptions(200), lambda *call: printed.append(call))
     assert printed[-1][0] == printed[-1][1] == 1000
     assert [done for done, _, _ in printed] == sorted(done for done, _, _ in printed)
 

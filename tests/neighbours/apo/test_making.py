@@ -36,10 +36,10 @@ def ball() -> ApoTexture:
     return made(*sphere(5, 0.03))
 
 
-def angles(found: ApoTexture, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def angles(texture: ApoTexture, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Degrees between normals and those that the octree has at points of the simplified mesh."""
-    q = (points - found.octree.low) / found.octree.side
-    cosine = np.einsum("ij,ij->i", look_up(found.octree, q).normals, normals)
+    q = (points - texture.octree.low) / texture.octree.side
+    cosine = np.einsum("ij,ij->i", look_up(texture.octree, q).normals, normals)
     return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
 
 

@@ -38,12 +38,12 @@ def _(put: Put) -> str:
     return written(put, made)
 
 
-def told(scene: Scene) -> None:
+def classes_decide(scene: Scene) -> None:
     kinds = dict(zip(scene.objects, scene.kinds, strict=True))
     assert kinds == {"IfcWall W": "structural", "IfcDoor D": "door", "IfcRailing R": "detail"}
 
 
-@feature("IFC", "product classes", "carried over", told)
+@feature("IFC", "product classes", "carried over", classes_decide)
 def _(put: Put) -> str:
     made = building()
     for n, (kind, name) in enumerate((("IfcWall", "W"), ("IfcDoor", "D"), ("IfcRailing", "R"))):

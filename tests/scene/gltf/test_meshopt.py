@@ -29,7 +29,7 @@ def peer(require: Callable[[str, str], None]) -> Any:
     return meshopt
 
 
-def told(mode: str, count: int, stride: int, filtered: str = "NONE") -> dict[str, Any]:
+def extension(mode: str, count: int, stride: int, filtered: str = "NONE") -> dict[str, Any]:
     return {"mode": mode, "count": count, "byteStride": stride, "filter": filtered}
 
 
@@ -61,7 +61,7 @@ def test_the_example_of_the_specification() -> None:
     """One byte of each of 16 elements of 4; the others stay what the baseline says."""
     tail = bytes(28) + bytes([0, 7, 8, 9])
     stream = bytes([0xA0, 0b10]) + EXAMPLE + bytes([0, 0, 0]) + tail
-    actual = np.frombuffer(decode(stream, told("ATTRIBUTES", 16, 4)), np.uint8).reshape(16, 4)
+    actual = np.frombuffer(decode(stream, extension("ATTRIBUTES", 16, 4)), np.uint8).reshape(16, 4)
     assert np.diff(actual[:, 0].astype(int), prepend=0).astype(np.int8).tolist() == DELTAS
     assert (actual[:, 1:] == [7, 8, 9]).all()
 
@@ -75,7 +75,7 @@ def test_elements_come_back(peer: Any, seed: int) -> None:
     for version in (0, 1):
         for level in range(4):
             stream = peer.encode_vertex_buffer_level(data, level, version)
-            assert decode(stream, told("ATTRIBUTES", *data.shape)) == data.tobytes()
+            assert decode(stream, extension("ATTRIBUTES", *data.shape)) == data.tobytes()
 
 
 @settings(max_examples=150)
@@ -95,9 +95,9 @@ def test_triangles_come_back(peer: Any, seed: int) -> None:
     stream = peer.encode_index_buffer(index.ravel())
     expected = np.asarray(peer.decode_index_buffer(stream, index.size, 4)).ravel()
     for stride, kind in ((4, np.uint32), (2, np.uint16)):
-        actual = np.frombuffer(decode(stream, told("TRIANGLES", index.size, stride)), kind)
+        actual = np.frombuffer(decode(stream, extension("TRIANGLES", index.size, stride)), kind)
         assert np.array_equal(actual, expected.astype(kind))
-    actual = np.frombuffer(decode(stream, told("TRIANGLES", index.size, 4)), np.uint32)
+    actual = np.frombuffer(decode(stream, extension("TRIANGLES", index.size, 4)), np.uint32)
     assert np.array_equal(turned(actual), turned(index))
 
 
@@ -115,8 +115,8 @@ def test_indices_come_back(peer: Any, seed: int) -> None:
     steps = random.integers(-(2 ** random.integers(1, 20)), 2 ** random.integers(1, 20), 400)
     index = np.abs(np.cumsum(steps))[: random.integers(1, 400)].astype(np.uint32)
     stream = peer.encode_index_sequence(index)
-    assert decode(stream, told("INDICES", len(index), 4)) == index.tobytes()
-    assert decode(stream, told("INDICES", len(index), 2)) == index.astype(np.uint16).tobytes()
+    assert decode(stream, extension("INDICES", len(index), 4)) == index.tobytes()
+    assert decode(stream, extension("INDICES", len(index), 2)) == index.astype(np.uint16).tobytes()
 
 
 @pytest.mark.parametrize("version", [0, 1])
@@ -150,7 +150,7 @@ def test_filters(peer: Any, name: str, version: int) -> None:
         data = np.ascontiguousarray(filtered).view(np.uint8).reshape(500, -1)
         stride = data.shape[1]
         stream = peer.encode_vertex_buffer_level(data, 2, version)
-        actual = decode(stream, told("ATTRIBUTES", 500, stride, name))
+        actual = decode(stream, extension("ATTRIBUTES", 500, stride, name))
         wanted = np.asarray(peer.decode_gltf_buffer(stream, 500, stride, "ATTRIBUTES", name))
         if name == "EXPONENTIAL":
             assert actual == wanted.tobytes()
@@ -169,13 +169,16 @@ def test_what_is_damaged_is_told(peer: Any, seed: int) -> None:
     kind = int(random.integers(4))
     if kind < 2:
         data = rows(random, 300, 12)
-        stream, how = peer.encode_vertex_buffer_level(data, 2, kind), told("ATTRIBUTES", 300, 12)
+        stream, how = (
+            peer.encode_vertex_buffer_level(data, 2, kind),
+            extension("ATTRIBUTES", 300, 12),
+        )
     elif kind == 2:
         index = random.integers(0, 200, 300).astype(np.uint32)
-        stream, how = peer.encode_index_buffer(index), told("TRIANGLES", 300, 4)
+        stream, how = peer.encode_index_buffer(index), extension("TRIANGLES", 300, 4)
     else:
         index = random.integers(0, 200, 300).astype(np.uint32)
-        stream, how = peer.encode_index_sequence(index), told("INDICES", 300, 4)
+        stream, how = peer.encode_index_sequence(index), extension("INDICES", 300, 4)
     whole = decode(stream, how)
     spoilt = bytearray(stream)
     for _ in range(int(random.integers(1, 4))):
@@ -192,20 +195,20 @@ def test_what_is_damaged_is_told(peer: Any, seed: int) -> None:
 def test_a_count_that_no_data_could_hold(mode: str) -> None:
     head = {"ATTRIBUTES": 0xA1, "TRIANGLES": 0xE1, "INDICES": 0xD1}[mode]
     with pytest.raises(ValueError, match="bytes for 9000000000000000 "):
-        decode(bytes([head]) + bytes(2000), told(mode, 9 * 10**15, 4))
+        decode(bytes([head]) + bytes(2000), extension(mode, 9 * 10**15, 4))
 
 
 @pytest.mark.parametrize(
     ("how", "match"),
     [
-        (told("ATTRIBUTES", 1, 6), "stride of 6"),
-        (told("ATTRIBUTES", 1, 260), "stride of 260"),
-        (told("ATTRIBUTES", 1, 12, "QUATERNION"), "'QUATERNION' with a stride of 12"),
-        (told("ATTRIBUTES", 1, 12, "COLOR"), "stride of 12"),
-        (told("ATTRIBUTES", 1, 4, "SQUARE"), "'SQUARE' with"),
-        (told("TRIANGLES", 3, 1), "stride of 1"),
-        (told("INDICES", 3, 4, "COLOR"), "filter COLOR"),
-        (told("POINTS", 3, 4), "'POINTS'"),
+        (extension("ATTRIBUTES", 1, 6), "stride of 6"),
+        (extension("ATTRIBUTES", 1, 260), "stride of 260"),
+        (extension("ATTRIBUTES", 1, 12, "QUATERNION"), "'QUATERNION' with a stride of 12"),
+        (extension("ATTRIBUTES", 1, 12, "COLOR"), "stride of 12"),
+        (extension("ATTRIBUTES", 1, 4, "SQUARE"), "'SQUARE' with"),
+        (extension("TRIANGLES", 3, 1), "stride of 1"),
+        (extension("INDICES", 3, 4, "COLOR"), "filter COLOR"),
+        (extension("POINTS", 3, 4), "'POINTS'"),
     ],
 )
 def test_what_contradicts_itself(how: dict[str, Any], match: str) -> None:
