@@ -113,8 +113,9 @@ def visit_of(content: Content, sizes: Mapping[str, int]) -> Visit:
         paints[cell, places] = True
     sees = np.array([paints[pvs.row(c)].any(axis=0) for c in range(pvs.cell_count)])
     used = np.flatnonzero(paints.any(axis=0))
-    whole, coarsest = (
-        np.array([r.levels[n].end if r.levels else 0 for r in records], np.int64) for n in (-1, 0)
+    coarsest, whole = (
+        np.array([end(r) if r.levels else 0 for r in records], np.int64)
+        for end in (lambda record: record.levels[0].end, finest_bytes)
     )
     at_hand = pvs.at_hand(geometry) + sees @ whole
     first = content.viewpoints[0].cell
@@ -125,7 +126,7 @@ def visit_of(content: Content, sizes: Mapping[str, int]) -> Visit:
         whole[paints[first]].sum(),
         coarsest[sees[first] & ~paints[first]].sum(),
     ]
-    texels = np.array([r.width * r.height for r in records], np.float64)
+    texels = np.array([r.finest[0] * r.finest[1] for r in records], np.float64)
     shares: tuple[float, float] | tuple[None, None] = (None, None)
     if len(used):
         shares = over_places(sees @ texels / texels[used].sum(), pvs.viewers)
@@ -143,6 +144,13 @@ def visit_of(content: Content, sizes: Mapping[str, int]) -> Visit:
         mean_texels=shares[0],
         most_texels=shares[1],
     )
+
+
+def finest_bytes(record: TextureRecord) -> int:
+    """Bytes of a texture with its finest level: the `.ptm`, and the preview of a level that it
+    lacks."""
+    image = record.previews[-1].preview.bytes if record.level_count > len(record.levels) else 0
+    return record.levels[-1].end + image
 
 
 def _geometry(content: Content, form: Emitter, sizes: Mapping[str, int]) -> NDArray[np.int64]:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ptmtools.cells.model import Cells
 from ptmtools.output.convexity import portal_polygons, slack_of
 from ptmtools.output.first_look import FirstLooks
-from ptmtools.output.model import OctreeRecord, TextureRecord, Viewpoint
+from ptmtools.output.model import OctreeRecord, PreviewRecord, TextureRecord, Viewpoint
 from ptmtools.output.names import (
     FIRST_LOOK_FILES,
     HINTS,
@@ -122,7 +122,23 @@ def _texture(record: TextureRecord, fallback: bool) -> Mapping[str, Any]:
     if record.detail:
         row["differences"] = [whole(value) for value in record.detail.differences]
         row["color"] = list(record.detail.color)
+    if record.previews:
+        row["previews"] = [_preview(each) for each in record.previews]
     return row
+
+
+def _preview(record: PreviewRecord) -> Mapping[str, Any]:
+    preview = record.preview
+    row: dict[str, Any] = {
+        "file": quote(record.file),
+        "level": preview.level,
+        "width": preview.width,
+        "height": preview.height,
+        "bytes": preview.bytes,
+        "difference": whole(preview.difference),
+        "error": whole(preview.error),
+    }
+    return row | ({"exact": True} if preview.exact else {})
 
 
 def _octree(record: OctreeRecord) -> Mapping[str, Any]:
@@ -257,7 +273,11 @@ def statistics_text(content: Content) -> str:
         "schema": SCHEMA,
         "coverage": {"backend": ach.backend, "renderer": ach.renderer},
     }
-    textures = [{"sha256": record.sha256} for record in content.textures]
+    textures = [
+        {"sha256": record.sha256}
+        | ({"errors": [whole(error) for error in record.errors]} if record.errors else {})
+        for record in content.textures
+    ]
     cells = [_cell(content, c) for c in range(content.cells.cell_count)]
     return document_text(head, {"textures": textures, "cells": cells})
 

@@ -26,6 +26,7 @@ from ptmtools.parallel import ordered
 from ptmtools.texture import reader
 from ptmtools.texture.images import Picture
 from ptmtools.texture.model import Limits
+from ptmtools.texture.previews import decoded_preview
 from ptmtools.texture.samples import in_eight_bits
 
 #: Files that a set's manifest does not name; the check of the database reports them.
@@ -56,15 +57,18 @@ def interlaced_files(content: Content) -> Iterator[tuple[str, str | bytes]]:
 
 def _interlaced(record: TextureRecord) -> Written:
     assert record.stored
-    finest = record.levels[-1]
+    width, height = record.finest
     # Enough for all levels of a texture that has been encoded.
-    limits = Limits(64 * finest.width * finest.height * record.components + (1 << 20))
+    limits = Limits(64 * width * height * record.components + (1 << 20))
     with naming(record.stored):
-        return interlace(Picture(_finest(record.stored, limits)), limits=limits)
+        return interlace(Picture(_finest(record, record.stored, limits)), limits=limits)
 
 
-def _finest(file: Path, limits: Limits) -> NDArray[Any]:
-    """The finest level of a `.ptm`, floats in eight bits."""
+def _finest(record: TextureRecord, file: Path, limits: Limits) -> NDArray[Any]:
+    """The finest level of a texture, floats in eight bits."""
+    if record.level_count > len(record.levels):
+        preview = file.parents[1] / record.previews[-1].file
+        return decoded_preview(preview.read_bytes(), record.components)
     with reader.open(file, limits=limits) as ptm:
         texels = ptm.level(len(ptm.header.levels) - 1)
     return np.ascontiguousarray(in_eight_bits(texels) if texels.dtype.kind == "f" else texels)

@@ -21,11 +21,20 @@ if TYPE_CHECKING:
     from ptmtools.scene.model import Scene
     from ptmtools.texture.detail import Detail
     from ptmtools.texture.model import Level
+    from ptmtools.texture.previews import Preview
 
 
 Vector = tuple[float, float, float]
 #: Height of the eyes as a share of the body's: 1.6 m of 1.7.
 EYE = 1.6 / 1.7
+
+
+@dataclass(frozen=True)
+class PreviewRecord:
+    """A preview of a texture: its file, relative to the served folder, and its properties."""
+
+    file: str
+    preview: Preview
 
 
 @dataclass(frozen=True)
@@ -36,15 +45,17 @@ class TextureRecord:
     ----------
     image: index into `Scene.images`.
     file: the `.ptm`, relative to the served folder, "textures/NAME.ptm".
-    fallback: the fallback image, a PNG, relative to the served folder, or None.
-    width, height, components: of the finest level stored.
+    fallback: the fallback image, a PNG or a preview, relative to the served folder, or None.
+    width, height, components: of the finest level in the `.ptm`.
     levels: as the header has them, coarsest first.
     sha256: hex digest of the `.ptm`'s bytes.
-    fallback_level: index into `levels` of the level in the fallback image; None without an image,
-        or if it is the finest.
+    fallback_level: number of the level in the fallback image; None without an image, or if it is
+        the finest of the `.ptm`.
     fallback_bytes: of the fallback image; 0 without.
-    detail: mean colour and differences of the levels; None if unknown.
+    detail: mean colour and differences of all levels; None if unknown.
     stored: the `.ptm` on the disk; None if it was not encoded.
+    errors: root mean square of each level from the finest, 0 to 255; empty if unknown.
+    previews: by ascending level; the finest may be of levels that the `.ptm` lacks.
     """
 
     image: int
@@ -59,6 +70,22 @@ class TextureRecord:
     fallback_bytes: int = 0
     detail: Detail | None = None
     stored: Path | None = field(default=None, compare=False)
+    errors: tuple[float, ...] = ()
+    previews: tuple[PreviewRecord, ...] = ()
+
+    @property
+    def level_count(self) -> int:
+        """Number of levels, those that exist as images only included."""
+        finest = self.previews[-1].preview.level + 1 if self.previews else 0
+        return max(len(self.levels), finest)
+
+    @property
+    def finest(self) -> tuple[int, int]:
+        """Width and height of the finest level."""
+        if self.level_count == len(self.levels):
+            return self.width, self.height
+        preview = self.previews[-1].preview
+        return preview.width, preview.height
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Encodes one image as a task: a `.ptm`, the `Detail` of its levels, a fallback image.
+"""Encodes one image as a task: a `.ptm`, its previews, the `Steps` of both, a fallback image.
 
 `encoded_image` takes and returns bytes. `encoded_on_disk` is for processes, of this machine or
 others, that see the disk of the database: only names and digests travel. (Sending the bytes of
@@ -9,32 +9,62 @@ writes nowhere.
 
 from __future__ import annotations
 
-import io
 import json
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from ptmtools.errors import InputError, WorkerError, naming
 from ptmtools.options import option
-from ptmtools.store.layout import IMAGES, STAGING, sha256
+from ptmtools.store.layout import IMAGES, SERVED, STAGES_FOLDER, STAGING, sha256
 from ptmtools.texture.model import EncodeOptions
+from ptmtools.texture.previews import FORMATS, Preview, PreviewOptions
 
 if TYPE_CHECKING:
     from ptmtools.executor import Executor
     from ptmtools.store.transaction import Transaction
-    from ptmtools.texture.detail import Detail
+    from ptmtools.texture.images import Picture
     from ptmtools.texture.model import PtmHeader
+    from ptmtools.texture.previews import Steps
 
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
+#: Folders of the served files: `.ptm`s with fallback images and lossy sources; other previews.
+FOLDER, PREVIEWS = "textures", "previews"
+
+
+def ptm_file(stem: str) -> str:
+    """The `.ptm` of the image with that stem, relative to the served folder."""
+    return f"{FOLDER}/{stem}.ptm"
+
+
+def steps_file(stem: str) -> str:
+    """The `Steps` of a texture, relative to the database."""
+    return f"{STAGES_FOLDER}/{FOLDER}/{stem}.json"
+
+
+def preview_file(stem: str, preview: Preview) -> str:
+    """A preview, relative to the served folder. Stems have no dots; the longer sides of levels
+    differ."""
+    suffix = FORMATS[preview.format].suffix
+    if preview.exact:
+        return f"{FOLDER}/{stem}{suffix}"
+    return f"{PREVIEWS}/{stem}-{max(preview.width, preview.height)}{suffix}"
+
+
+def stem_of(file: str) -> str:
+    """The stem of the image that an output of the stage belongs to."""
+    stem = Path(file).stem
+    return stem.rpartition("-")[0] if f"/{PREVIEWS}/" in file else stem
 
 
 @dataclass(frozen=True)
-class TextureOptions(EncodeOptions):
+class TextureOptions(PreviewOptions, EncodeOptions):
     """Options of the textures stage."""
+
+    heading: ClassVar[str] = "Textures"
 
     fallback: bool = option(
         True, "Also write a PNG of each texture, for clients that cannot read .ptm."
@@ -66,6 +96,7 @@ class TextureOptions(EncodeOptions):
         """Raises InputError PTM-I111 for values out of range."""
         from ptmtools.texture.encoder import check_options
 
+        super().__post_init__()
         check_options(self)
         possible = {
             "trim_height": self.trim_height > 0,
@@ -80,36 +111,67 @@ class TextureOptions(EncodeOptions):
             )
 
 
-def encoded_image(options: TextureOptions, image: tuple[str, bytes, int]) -> list[bytes]:
-    """The bytes of a `.ptm`, of its `Detail` as JSON and, if the options ask for one, of its
-    fallback image; from an image (name, bytes of its file, number of its finest levels to leave
-    out).
+@dataclass(frozen=True)
+class ImageFile:
+    """An image to encode.
 
-    Raises as `encode` and `read_image`.
+    Attributes
+    ----------
+    name: as in the list of the scene's images, "wood.png". data: the bytes of its file.
+    unresolved: number of its finest levels to leave out.
     """
-    from ptmtools.texture import Limits, decode, encode_to, read_header, read_image
-    from ptmtools.texture.images import png_bytes
 
-    name, source, unresolved = image
-    with naming(name):
-        texels = read_image(source, Limits(options.limit << 20))
-        height, width = texels.shape[:2]
-        kept = without_finest(options, unresolved, width, height)
-        buffer = io.BytesIO()
-        detail = json.dumps(asdict(encode_to(buffer, texels, kept))).encode() + b"\n"
-        data = buffer.getvalue()
-    if not options.fallback:
-        return [data, detail]
-    header = read_header(data)
+    name: str
+    data: bytes
+    unresolved: int = 0
+
+
+def encoded_image(options: TextureOptions, image: ImageFile) -> list[tuple[str, bytes]]:
+    """The files of a texture, named relative to the database: its `.ptm`, its `Steps` as JSON, its
+    previews and, if the options ask for one, its fallback image.
+
+    Raises as `encode_steps` and `load_image`.
+    """
+    from ptmtools.texture import load_image
+    from ptmtools.texture.images.files import check_depth
+    from ptmtools.texture.model import Description, Limits
+    from ptmtools.texture.steps import encode_steps
+
+    with naming(image.name):
+        picture = load_image(image.data, Limits(options.limit << 20))
+        check_depth(picture)
+        picture = replace(picture, description=Description())
+        height, width = picture.texels.shape[:2]
+        levels = without_finest(options, image.unresolved, width, height)
+        encoded = encode_steps(picture, image.data, levels, options)
+    stem = image.name.rpartition(".")[0]
+    files = [
+        (f"{SERVED}/{ptm_file(stem)}", encoded.ptm),
+        (steps_file(stem), steps_text(encoded.steps)),
+    ]
+    files += [
+        (f"{SERVED}/{preview_file(stem, preview)}", data)
+        for preview, data in zip(encoded.steps.previews, encoded.previews, strict=True)
+    ]
+    if options.fallback and fallback_preview(encoded.steps, options.fallback_size) is None:
+        png = _png(options, image.data, picture, encoded.ptm)
+        files.append((f"{SERVED}/{FOLDER}/{stem}.png", png))
+    return files
+
+
+def _png(options: TextureOptions, source: bytes, picture: Picture, data: bytes) -> bytes:
+    """The fallback image."""
+    from ptmtools.texture import decode, read_header
+    from ptmtools.texture.images import png_bytes
+    from ptmtools.texture.images.bare import bare
+    from ptmtools.texture.model import Limits
+
+    header, texels = read_header(data), picture.array()
     level = fallback_level(header, options.fallback_size)
     if level < len(header.levels) - 1 or options.max_error or header.trimmed:
         # Decoding takes more than the image, which is within the limit.
-        png = png_bytes(decode(data, level=level, limits=Limits(64 * texels.nbytes + (1 << 20))))
-    elif source.startswith(PNG_MAGIC):
-        png = bare_png(source)
-    else:
-        png = png_bytes(texels)
-    return [data, detail, png]
+        return png_bytes(decode(data, level=level, limits=Limits(64 * texels.nbytes + (1 << 20))))
+    return bare(source, "PNG") if source.startswith(PNG_MAGIC) else png_bytes(texels)
 
 
 @dataclass(frozen=True)
@@ -158,19 +220,21 @@ def shared_disk(
         shutil.rmtree(out, ignore_errors=True)
 
 
-def encoded_on_disk(disk: SharedDisk, image: ImageTask) -> list[tuple[str, str]]:
-    """Writes the results of `encoded_image` to the shared disk: (file, SHA-256) of each.
+def encoded_on_disk(disk: SharedDisk, image: ImageTask) -> list[tuple[str, str, str]]:
+    """Writes the results of `encoded_image` to the shared disk: (name, file, SHA-256) of each.
 
     Raises as that; WorkerError PTM-W005 where the disk cannot be seen.
     """
     from ptmtools.files import write_bytes
 
-    results = encoded_image(disk.options, (image.name, _image(disk, image), image.unresolved))
+    results = encoded_image(
+        disk.options, ImageFile(image.name, _image(disk, image), image.unresolved)
+    )
     files = []
-    for number, data in enumerate(results):
+    for number, (name, data) in enumerate(results):
         file = Path(disk.out, f"{image.stem}-{number}")
         write_bytes(file, data, force=True)
-        files.append((str(file), sha256(data)))
+        files.append((name, str(file), sha256(data)))
     return files
 
 
@@ -197,14 +261,35 @@ def _half_seen(disk: SharedDisk) -> WorkerError:
     )
 
 
-def read_detail(data: bytes) -> Detail:
-    """The `Detail` that `encoded_image` has written as JSON; raises ValueError, LookupError or
-    TypeError if it is damaged."""
+def steps_text(steps: Steps) -> bytes:
+    """The `Steps` of a texture as JSON."""
+    fields = asdict(steps)
+    return json.dumps(fields.pop("detail") | fields).encode() + b"\n"
+
+
+def read_steps(data: bytes) -> Steps:
+    """Inverse of `steps_text`; raises ValueError, LookupError or TypeError if it is damaged."""
     from ptmtools.texture.detail import Detail
+    from ptmtools.texture.previews import Steps
 
     fields = json.loads(data)
     red, green, blue = map(int, fields["color"])
-    return Detail(tuple(map(float, fields["differences"])), (red, green, blue))
+    detail = Detail(tuple(map(float, fields["differences"])), (red, green, blue))
+    errors = tuple(map(float, fields["errors"]))
+    previews = tuple(Preview(**row) for row in fields["previews"])
+    if any(preview.format not in FORMATS for preview in previews):
+        raise ValueError("a preview of another format")
+    return Steps(detail, errors, int(fields["exact_levels"]), previews)
+
+
+def fallback_preview(steps: Steps, size: int) -> Preview | None:
+    """The preview that is the fallback image: the finest one of a texture whose `.ptm` lacks that
+    level, unless it exceeds ``size`` (0: none does)."""
+    if not steps.previews:
+        return None
+    finest = steps.previews[-1]
+    fits = not size or max(finest.width, finest.height) <= size
+    return finest if steps.finest_is_image and fits else None
 
 
 def without_finest(options: TextureOptions, count: int, width: int, height: int) -> TextureOptions:
@@ -225,21 +310,3 @@ def fallback_level(header: PtmHeader, size: int) -> int:
     sides = [max(level.width, level.height) for level in header.levels]
     fitting = [n for n, side in enumerate(sides) if side <= size or not size]
     return fitting[-1] if fitting else 0
-
-
-def bare_png(data: bytes) -> bytes:
-    """An intact PNG without the chunks that do not change its texels: gamma, profile, text, date.
-
-    Deflating a megatexel again takes half a second, three times as long as encoding it, and gives
-    other bytes with another zlib.
-    """
-    kept, at = [data[: len(PNG_MAGIC)]], len(PNG_MAGIC)
-    while at < len(data):
-        end = at + 12 + int.from_bytes(data[at : at + 4], "big")
-        kind = data[at + 4 : at + 8]
-        if kind in (b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"):
-            kept.append(data[at:end])
-        if kind == b"IEND":
-            break
-        at = end
-    return b"".join(kept)

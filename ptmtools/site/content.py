@@ -33,6 +33,7 @@ from ptmtools.pipeline.stages.emit import EMIT
 from ptmtools.progress import Progress, silent
 from ptmtools.store.folder import DatabaseFolder, damaged, unreadable
 from ptmtools.store.layout import SERVED, sha256
+from ptmtools.texture.previews import FORMATS
 
 FORMAT = "ptmtools site"
 INDEX, DATA = "index.html", "data"
@@ -53,7 +54,8 @@ GLB, PTM = "model/gltf-binary", "application/octet-stream"
 PROFILES, KIND, VERSION = ("fast", "raw"), "uint8", 2
 #: Fields of a database's index that a site's index lacks.
 _LEFT_OUT = ("record", "geometry", "textureSets", "statistics", "firstLook", "octrees")
-_VRML_MEDIA = {".wrl": "model/vrml", ".png": "image/png"}
+_IMAGE_MEDIA = {format.suffix: format.media for format in FORMATS.values()}
+_VRML_MEDIA = {".wrl": "model/vrml", ".png": "image/png"} | _IMAGE_MEDIA
 #: First bytes of pictures: pattern, media type, suffix.
 _MAGIC = (
     (rb"\xff\xd8\xff", JPEG, ".jpg"),
@@ -233,7 +235,18 @@ class _Builder:
                 self._notes.append(texture.note)
             source = file if texture.data is None else texture.data
             name = self._add(file.stem, ".ptm", PTM, source, digest=digest)
-            yield {**texture.row, "file": name, "fallback": None, "fallbackLevel": None}
+            changed: dict[str, Any] = {"file": name, "fallback": None, "fallbackLevel": None}
+            if "previews" in row:
+                changed["previews"] = [self._preview(preview) for preview in row["previews"]]
+            yield {**texture.row, **changed}
+
+    def _preview(self, row: Mapping[str, Any]) -> Mapping[str, Any]:
+        """A preview's row, with the file's name in the site."""
+        file, digest = self._place(row["file"])
+        if not file.is_file() or file.stat().st_size != row["bytes"]:
+            raise damaged(file, "is not the preview that the index has")
+        media = _IMAGE_MEDIA[file.suffix]
+        return {**row, "file": self._add(file.stem, file.suffix, media, file, digest=digest)}
 
     def _pictures(self) -> tuple[list[dict[str, Any]], str | None]:
         """The viewpoints, and the URL of the poster."""

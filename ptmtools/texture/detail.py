@@ -73,6 +73,23 @@ def float_lengths(level: NDArray[Any], below: NDArray[Any], colours: int) -> flo
     return total
 
 
+@kernel
+def integer_squares(level: NDArray[Any], below: NDArray[Any], colours: int) -> float:
+    """As `integer_lengths`, the sum of the squares."""
+    height, width = below.shape[:2]
+    total = 0.0
+    for y in range(level.shape[0]):
+        row = min(y >> 1, height - 1)
+        of_row = np.int64(0)
+        for x in range(level.shape[1]):
+            column = min(x >> 1, width - 1)
+            for c in range(colours):
+                difference = np.int64(level[y, x, c]) - np.int64(below[row, column, c])
+                of_row += difference * difference
+        total += of_row
+    return total
+
+
 Samples = NDArray[Any]
 
 #: Significant digits of the differences.
@@ -109,6 +126,13 @@ def difference_between(level: Samples, below: Samples) -> float:
     lengths = integer_lengths if level.dtype.kind == "u" else float_lengths
     colours = colours_of(level.shape[2])
     return lengths(level, below, colours) / math.sqrt(colours)
+
+
+def squares_between(level: Samples, below: Samples) -> float:
+    """As `difference_between`, of uint8 texels: the sum over the texels of the mean square over the
+    components without alpha."""
+    colours = colours_of(level.shape[2])
+    return integer_squares(level, below, colours) / colours
 
 
 def detail_of(coarsest: Samples, above: Iterable[tuple[float, int]]) -> Detail:

@@ -32,7 +32,7 @@ from ptmtools.output.options import EmitOptions
 from ptmtools.output.validation.files import ServedDatabase, check_gzip, check_names, served_files
 from ptmtools.output.validation.findings import CODES
 from ptmtools.output.validation.hints import gather
-from ptmtools.output.validation.textures import read_png, read_ptm
+from ptmtools.output.validation.textures import IMAGES, read_picture, read_ptm
 from ptmtools.progress import Progress, silent
 from ptmtools.quantities import count
 from ptmtools.store.layout import MANIFEST, SERVED
@@ -262,8 +262,8 @@ class _Check:
         emitter = owner_of(path)
         if suffix == GZIP:
             check_gzip(data, self._neighbour(stem), at)
-        elif suffix == ".png" and emitter is None:
-            return read_png(data, self._limits, at)
+        elif suffix in IMAGES and emitter is None:
+            return read_picture(data, IMAGES[suffix], self._limits, at)
         elif suffix == ".ptm":
             return read_ptm(data, self._limits, at)
         elif emitter and emitter.reader:

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import unquote_to_bytes
 
 from ptmtools.diagnostics import Findings, Issue, Place
@@ -28,8 +28,14 @@ _LIMITS = Limits()
 
 #: An object of the hints that matches its schema and whose indices are in range.
 Row = Mapping[str, Any]
-#: The files of a texture in the served folder, the fallback image first; None for a missing one.
-Images = tuple[str | None, ...]
+
+
+class Images(NamedTuple):
+    """The files of a texture in the served folder; None for a missing one."""
+
+    file: str | None
+    fallback: str | None
+    previews: tuple[str | None, ...]
 
 
 def served_files(folder: Path, findings: Findings) -> list[str]:
@@ -152,7 +158,7 @@ class ServedDatabase:
     files: all paths.
     limits: of the check.
     contents: for each file that could be read its header if it is a `.ptm`, (width, height) of a
-        fallback image, and the result of the form's reader of other files.
+        served image, and the result of the form's reader of other files.
     hints: None without a readable index.
     named: the files that some URL names.
     """

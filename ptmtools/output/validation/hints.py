@@ -17,7 +17,7 @@ from ptmtools.output.model import FileError, shaped
 from ptmtools.output.names import BUNDLE, HINTS, HINTS_FOLDER, STATISTICS
 from ptmtools.output.validation.files import Images, ReadHints, Row, ServedDatabase
 from ptmtools.output.validation.space import check_space
-from ptmtools.output.validation.textures import check_octrees, check_record
+from ptmtools.output.validation.textures import Pictures, check_octrees, check_record, sizes_of
 from ptmtools.tolerance import PARALLEL_COSINE
 
 #: Slack of the sum of the ach values.
@@ -75,8 +75,9 @@ def gather(database: ServedDatabase) -> ReadHints | None:
     images: list[Images] = []
     files = database.resolve_each(HINTS, "textures", [row["file"] for row in textures])
     for row, file in zip(textures, files, strict=True):
-        fallback = row["fallback"]
-        images.append((file,) if fallback is None else (database.resolve(HINTS, fallback), file))
+        fallback = row["fallback"] and database.resolve(HINTS, row["fallback"])
+        previews = [database.resolve(HINTS, each["file"]) for each in row.get("previews", ())]
+        images.append(Images(file, fallback, tuple(previews)))
     paths_or_urls = [path or url for path, url in zip(paths, urls, strict=True)]
     return ReadHints(index, paths_or_urls, records, images)
 
@@ -88,7 +89,7 @@ def check_files(database: ServedDatabase) -> None:
         return
     index, at = hints.index, database.at(HINTS)
     places = [database.at(path) for path in hints.paths]
-    levels = [len(row["ends"]) for row in index["textures"]]
+    levels = [len(sizes_of(row)) for row in index["textures"]]
     for i, record in hints.known():
         _check_record(record, i, levels, places[i])
         points = np.array([point for leaf in record["leaves"] for point in leaf["points"]])
@@ -183,15 +184,15 @@ def _ascends(entries: Sequence[int]) -> bool:
 def _check_textures(hints: ReadHints, database: ServedDatabase) -> None:
     used = {t for _, record in hints.known() for row in record["textures"][:1] for t in row}
     complete = all(record is not None for record in hints.records)
-    for i, (row, (*image, file)) in enumerate(
-        zip(hints.index["textures"], hints.images, strict=True)
-    ):
+    for i, (row, images) in enumerate(zip(hints.index["textures"], hints.images, strict=True)):
         at = database.at(HINTS, f"textures[{i}]")
         if complete and i not in used:
             at.add("PTM-D708", f"no cell uses {row['file']}")
-        if header := database.contents.get(file or ""):
-            shown = database.contents.get(image[0] or "") if image else None
-            check_record(row, header, shown, at)
+        if header := database.contents.get(images.file or ""):
+            fallback, *previews = (
+                database.contents.get(file or "") for file in (images.fallback, *images.previews)
+            )
+            check_record(row, header, Pictures(fallback, previews), at)
 
 
 def _check_first_looks(hints: ReadHints, database: ServedDatabase) -> None:

@@ -3,9 +3,10 @@ hints."""
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+import io
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,9 +19,8 @@ from ptmtools.texture.model import gpu_texel_bytes
 if TYPE_CHECKING:
     from ptmtools.texture import Limits, PtmHeader
 
-_PNG = b"\x89PNG\r\n\x1a\n"
-#: Of the first chunk of a PNG: its length and kind, width and height.
-_IHDR = struct.Struct(">I4sII")
+#: Formats of the served images, as Pillow names them, by suffix.
+IMAGES = {".png": "PNG", ".webp": "WEBP", ".avif": "AVIF", ".jpg": "JPEG"}
 #: Texels of an octree take less than this many bytes, however they are deflated: the texels are
 #: fewer than the addresses.
 _MOST_BYTES = 1 << 27
@@ -45,30 +45,57 @@ def read_ptm(data: bytes, limits: Limits, at: Place) -> PtmHeader | None:
         return None
 
 
-def read_png(data: bytes, limits: Limits, at: Place) -> tuple[int, int] | None:
-    """Decodes a PNG; its width and height, None with PTM-D710 if it is none."""
-    from ptmtools.texture import load_image
+class ReadPicture(NamedTuple):
+    """A served image: its width and height, and its bytes."""
 
-    if not data.startswith(_PNG) or len(data) < len(_PNG) + _IHDR.size:
-        at.add("PTM-D710", "is not a PNG")
-        return None
-    length, kind, width, height = _IHDR.unpack_from(data, len(_PNG))
-    if (length, kind) != (13, b"IHDR"):
-        at.add("PTM-D710", "is not a PNG")
-        return None
+    size: tuple[int, int]
+    bytes: int
+
+
+def read_picture(data: bytes, format: str, limits: Limits, at: Place) -> ReadPicture | None:
+    """Decodes an image of a format that Pillow names so; None with PTM-D710 if it is none."""
+    from ptmtools.texture import load_image
+    from ptmtools.texture.images.opening import opened
+
     try:
-        load_image(data, limits)
+        image = opened(io.BytesIO(data), limits)
+        if image.format == format:
+            load_image(data, limits)
+            return ReadPicture(image.size, len(data))
+        at.add("PTM-D710", f"is not a {format}")
     except PtmError as fault:
         code = "PTM-D713" if isinstance(fault, LimitError) else "PTM-D710"
         at.add(code, f"cannot be read ({fault.message})")
-    return width, height
+    except Exception:  # a damaged file can make Pillow's parsers raise nearly anything
+        at.add("PTM-D710", f"is not a {format}")
+    return None
+
+
+class Pictures(NamedTuple):
+    """The images of a texture that could be read: its fallback, and its previews in the order of
+    their rows."""
+
+    fallback: ReadPicture | None
+    previews: Sequence[ReadPicture | None]
+
+
+def sizes_of(record: Mapping[str, Any]) -> list[tuple[int, int]]:
+    """(width, height) of all levels of a row of `textures`, coarsest first, those that exist as
+    previews only included."""
+    width, height, count = record["width"], record["height"], len(record["ends"])
+    previews = record.get("previews", ())
+    if previews and previews[-1]["level"] >= count:
+        finest = previews[-1]
+        width, height, count = finest["width"], finest["height"], finest["level"] + 1
+    shifts = range(count - 1, -1, -1)
+    return [(max(1, width >> shift), max(1, height >> shift)) for shift in shifts]
 
 
 def check_record(
-    record: Mapping[str, Any], header: PtmHeader, image: tuple[int, int] | None, at: Place
+    record: Mapping[str, Any], header: PtmHeader, pictures: Pictures, at: Place
 ) -> None:
-    """Compares a row of `textures` in `hints.json` with its `.ptm` and with the width and height of
-    its fallback image."""
+    """Compares a row of `textures` in `hints.json` with its `.ptm`, its fallback image and its
+    previews."""
     finest = header.levels[-1]
     actual = {
         "components": header.components,
@@ -81,15 +108,49 @@ def check_record(
     for name, value in actual.items():
         if record.get(name, value) != value:
             at.add("PTM-D704", f"{name} does not match the file, which has {value}")
-    if "differences" in record and len(record["differences"]) != len(header.levels):
-        at.add("PTM-D704", "differences do not match the levels in the file")
+    sizes = sizes_of(record)
+    if "differences" in record and len(record["differences"]) != len(sizes):
+        at.add("PTM-D704", "differences do not match the levels")
+    _check_previews(record, sizes, pictures.previews, at)
+    _check_fallback(record, sizes, pictures.fallback, at)
+
+
+def _check_previews(
+    record: Mapping[str, Any],
+    sizes: Sequence[tuple[int, int]],
+    pictures: Sequence[ReadPicture | None],
+    at: Place,
+) -> None:
+    rows = record.get("previews", ())
+    levels = [row["level"] for row in rows]
+    if any(one >= other for one, other in pairwise(levels)):
+        at.add("PTM-D704", "previews are not in ascending order of their levels")
+        return
+    if sizes[len(record["ends"]) - 1] != (record["width"], record["height"]):
+        at.add("PTM-D704", "the finest preview and the .ptm are not of one pyramid")
+    for row, picture in zip(rows, pictures, strict=True):
+        size, place = (row["width"], row["height"]), f"preview of level {row['level']}"
+        if size != sizes[row["level"]]:
+            at.add("PTM-D704", f"the {place} is {size[0]} x {size[1]}, its level is not")
+        if row.get("exact") and row["difference"]:
+            at.add("PTM-D704", f"the {place} is exact and differs by {row['difference']:g}")
+        if picture and picture != (size, row["bytes"]):
+            at.add("PTM-D704", f"the {place} does not match its file")
+
+
+def _check_fallback(
+    record: Mapping[str, Any],
+    sizes: Sequence[tuple[int, int]],
+    picture: ReadPicture | None,
+    at: Place,
+) -> None:
     if (record["fallback"] is None) != (record["fallbackLevel"] is None):
         at.add("PTM-D704", "only one of fallback and fallbackLevel is null")
-    elif image is not None:
-        sizes = [(level.width, level.height) for level in header.levels]
-        level = sizes.index(image) if image in sizes else None
+    elif picture is not None:
+        size = picture.size
+        level = sizes.index(size) if size in sizes else None
         if level is None:
-            message = f"is {image[0]} x {image[1]}, which is not the size of any level"
+            message = f"is {size[0]} x {size[1]}, which is not the size of any level"
             at.add("PTM-D710", f"{record['fallback']} {message}")
         elif level != record["fallbackLevel"]:
             message = f"the fallback image is level {level}, not {record['fallbackLevel']}"

@@ -7,14 +7,21 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from ptmtools.output.options import EmitOptions
-from ptmtools.pipeline.encoding import fallback_level, read_detail
+from ptmtools.pipeline.encoding import (
+    fallback_level,
+    fallback_preview,
+    preview_file,
+    read_steps,
+    stem_of,
+    steps_file,
+)
 from ptmtools.pipeline.stage import Artifacts, Job, Stage, described
 from ptmtools.pipeline.stages.ach import ACH
 from ptmtools.pipeline.stages.apo import APO, octree_records
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.pvs import PVS
 from ptmtools.pipeline.stages.scene import image_digests
-from ptmtools.pipeline.stages.textures import TEXTURES, detail_file, header_of, texture_files
+from ptmtools.pipeline.stages.textures import TEXTURES, header_of, texture_files
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import SERVED
 
@@ -23,7 +30,6 @@ if TYPE_CHECKING:
     from ptmtools.output.model import TextureRecord
     from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
-    from ptmtools.texture.detail import Detail
 
 
 class EmissionJob(Job):
@@ -71,42 +77,48 @@ class EmissionJob(Job):
         from ptmtools.coverage.required_levels import TextureSize, compute_need
 
         run = self.run
-        sizes = {t.image: TextureSize(t.width, t.height, len(t.levels)) for t in textures}
+        sizes = {t.image: TextureSize(*t.finest, t.level_count) for t in textures}
         return compute_need(run[APO], run[CELLS], run[PVS], sizes, self.options.need, run.progress)
 
 
 def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
     """The textures of a database, for the served files."""
     from ptmtools.output import TextureRecord
-
-    def detail(name: str) -> Detail:
-        file = detail_file(name)
-        return run.cached(file, lambda: read_detail(run.db.read_output(TEXTURES.name, file)))
+    from ptmtools.output.model import PreviewRecord
 
     record = run.record(TEXTURES)
     options, served = run.recorded(TEXTURES), run.db.path / SERVED
-    records = []
-    for i, name in enumerate(texture_files(image_digests(run))):
-        png = f"{name.removesuffix('ptm')}png"
-        fallback = png if f"{SERVED}/{png}" in record.outputs else None
+
+    def one(image: int, name: str) -> TextureRecord:
+        stem = stem_of(name)
+        file = steps_file(stem)
+        steps = run.cached(file, lambda: read_steps(run.db.read_output(TEXTURES.name, file)))
         header = header_of(served / name)
-        records.append(
-            TextureRecord(
-                image=i,
-                file=name,
-                fallback=fallback,
-                width=header.levels[-1].width,
-                height=header.levels[-1].height,
-                components=header.components,
-                levels=header.levels,
-                sha256=run.db.output(TEXTURES.name, f"{SERVED}/{name}"),
-                fallback_level=fallback_level(header, options.fallback_size) if fallback else None,
-                fallback_bytes=(served / fallback).stat().st_size if fallback else 0,
-                detail=detail(name),
-                stored=served / name,
-            )
+        png, fallback, level = f"{name.removesuffix('ptm')}png", None, None
+        if f"{SERVED}/{png}" in record.outputs:
+            fallback, level = png, fallback_level(header, options.fallback_size)
+        elif options.fallback and (preview := fallback_preview(steps, options.fallback_size)):
+            fallback, level = preview_file(stem, preview), preview.level
+        return TextureRecord(
+            image=image,
+            file=name,
+            fallback=fallback,
+            width=header.levels[-1].width,
+            height=header.levels[-1].height,
+            components=header.components,
+            levels=header.levels,
+            sha256=run.db.output(TEXTURES.name, f"{SERVED}/{name}"),
+            fallback_level=level,
+            fallback_bytes=(served / fallback).stat().st_size if fallback else 0,
+            detail=steps.detail,
+            stored=served / name,
+            errors=steps.errors,
+            previews=tuple(
+                PreviewRecord(preview_file(stem, preview), preview) for preview in steps.previews
+            ),
         )
-    return tuple(records)
+
+    return tuple(one(i, name) for i, name in enumerate(texture_files(image_digests(run))))
 
 
 def _summary(n: Mapping[str, Any]) -> str:
@@ -127,11 +139,11 @@ def _summary(n: Mapping[str, Any]) -> str:
 EMIT: Stage[None] = Stage(
     name="emit",
     about="Write the served files: cells and hints.",
-    recipe=9,
-    changed="the hints hold the effect of each texture level, mean colours, GPU sizes of texels, "
-    "and the resolution needed in each cell; --first-look writes a bundle of coarse levels for "
-    "each cell; viewpoints face pictures; hulls with slivers and portals with short edges are "
-    "convex in float32 and in float64",
+    recipe=10,
+    changed="the hints hold the previews of textures, the errors and the effect of each texture "
+    "level, mean colours, GPU sizes of texels, and the resolution needed in each cell; "
+    "--first-look writes a bundle of coarse levels for each cell; viewpoints face pictures; hulls "
+    "with slivers and portals with short edges are convex in float32 and in float64",
     options=EmitOptions,
     reads=(APO, CELLS, PVS, ACH, TEXTURES),
     files=(APO,),

@@ -16,18 +16,23 @@ import json
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ptmtools.errors import naming
 from ptmtools.pipeline.encoding import (
+    ImageFile,
     ImageTask,
     TextureOptions,
     encoded_image,
     encoded_on_disk,
+    ptm_file,
+    read_steps,
     shared_disk,
+    stem_of,
+    steps_file,
 )
 from ptmtools.pipeline.stage import Artifacts, Job, Run, Stage
 from ptmtools.pipeline.stages.apo import APO
@@ -35,7 +40,7 @@ from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.pvs import PVS
 from ptmtools.pipeline.stages.scene import SCENE, image_digests, image_rows, images_of
 from ptmtools.quantities import count, size
-from ptmtools.store.layout import IMAGES, SERVED, STAGES_FOLDER, sha256
+from ptmtools.store.layout import IMAGES, SERVED, sha256
 
 if TYPE_CHECKING:
     from threading import Event
@@ -45,20 +50,15 @@ if TYPE_CHECKING:
     from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
     from ptmtools.texture.model import PtmHeader
+    from ptmtools.texture.previews import Steps
 
-FOLDER = "textures"
 #: Largest number of images in one message to a worker; a message costs a few ms.
 IMAGES_PER_MESSAGE = 4
 
 
 def texture_files(images: Iterable[str]) -> list[str]:
     """The `.ptm` of each image, named by its stem, relative to the served folder."""
-    return [f"{FOLDER}/{image.rpartition('.')[0]}.ptm" for image in images]
-
-
-def detail_file(texture: str) -> str:
-    """The file of the `Detail` of a `.ptm`, relative to the database."""
-    return f"{STAGES_FOLDER}/{texture.removesuffix('ptm')}json"
+    return [ptm_file(image.rpartition(".")[0]) for image in images]
 
 
 def _inputs(artifacts: Artifacts, options: TextureOptions) -> dict[str, str]:
@@ -122,36 +122,79 @@ def _sizes(artifacts: Artifacts, options: TextureOptions) -> list[tuple[int, int
     return sizes
 
 
-def _left_out(header: PtmHeader, options: TextureOptions) -> list[tuple[int, int]]:
-    """(width, height) of the levels that only ``--trim`` has left out, coarsest first."""
-    from ptmtools.texture.encoder import kept_levels
-    from ptmtools.texture.pyramid import level_sizes
+@dataclass(frozen=True)
+class Stored:
+    """A texture as stored.
 
-    sizes = level_sizes(header.width, header.height)
-    return sizes[len(sizes) - header.trimmed : kept_levels(*sizes[-1], options)[-1] + 1]
+    Attributes
+    ----------
+    name: of its `.ptm`. header, steps: see their classes.
+    """
+
+    name: str
+    header: PtmHeader
+    steps: Steps
+
+    @property
+    def finest(self) -> tuple[int, int, int]:
+        """Width, height and bytes of the finest level, which may exist as an image only."""
+        if self.steps.finest_is_image:
+            preview = self.steps.previews[-1]
+            return preview.width, preview.height, preview.bytes
+        level = self.header.levels[-1]
+        return level.width, level.height, level.length
+
+    def estimated_bytes(self, width: int, height: int) -> int:
+        """Of another level, by the bytes for a texel of the finest one."""
+        finest_width, finest_height, length = self.finest
+        return length * width * height // (finest_width * finest_height)
+
+    def finer(self) -> list[tuple[int, int]]:
+        """(width, height) of the levels of the image that are finer than the finest one stored,
+        coarsest first."""
+        from ptmtools.texture.pyramid import level_sizes
+
+        sizes = level_sizes(self.header.width, self.header.height)
+        return sizes[sizes.index(self.finest[:2]) + 1 :]
 
 
 def _trimmed(
-    names: Iterable[str], headers: Iterable[PtmHeader], options: TextureOptions
+    textures: Iterable[Stored], options: TextureOptions
 ) -> tuple[dict[str, int], list[str]]:
     """The counts of ``--trim``: the textures with levels left out, and the decoded bytes by which
-    their finest levels are smaller. And a note on each, with the bytes saved, estimated from the
-    bytes for a texel of the finest level kept. Nothing without ``--trim``."""
+    their finest levels are smaller. And a note on each, with the bytes saved as estimated. Nothing
+    without ``--trim``."""
     if not options.trim:
         return {}, []
+    from ptmtools.texture.encoder import kept_levels
+    from ptmtools.texture.pyramid import level_sizes
+
     counts, notes = {"unresolved": 0, "unresolved_bytes": 0}, []
-    for name, header in zip(names, headers, strict=True):
-        if sizes := _left_out(header, options):
-            (width, height), finest = sizes[-1], header.levels[-1]
-            kept = finest.width * finest.height
+    for texture in textures:
+        header, (kept_width, kept_height, _) = texture.header, texture.finest
+        all_sizes = level_sizes(header.width, header.height)
+        last = kept_levels(header.width, header.height, options)[-1]
+        sizes = [size for size in texture.finer() if all_sizes.index(size) <= last]
+        if sizes:
+            width, height = sizes[-1]
             counts["unresolved"] += 1
-            counts["unresolved_bytes"] += (width * height - kept) * header.texel_bytes
-            saved = finest.length * sum(w * h for w, h in sizes) // kept
+            counts["unresolved_bytes"] += (
+                width * height - kept_width * kept_height
+            ) * header.texel_bytes
+            saved = sum(texture.estimated_bytes(*size) for size in sizes)
             notes.append(
-                f"--trim leaves out {count(len(sizes), 'level')} of {name}: {finest.width} x "
-                f"{finest.height} of {width} x {height}, about {size(saved)} less"
+                f"--trim leaves out {count(len(sizes), 'level')} of {texture.name}: {kept_width} x "
+                f"{kept_height} of {width} x {height}, about {size(saved)} less"
             )
     return counts, notes
+
+
+def _files_by_stem(record: StageRecord | None) -> dict[str, dict[str, str]]:
+    """The outputs of a record with their digests, by the stem of their image."""
+    files: dict[str, dict[str, str]] = {}
+    for name, digest in (record.outputs if record else {}).items():
+        files.setdefault(stem_of(name), {})[name] = digest
+    return files
 
 
 class TexturesJob(Job):
@@ -162,12 +205,10 @@ class TexturesJob(Job):
         """The textures to encode, those with lost files included, see `Job.tasks`."""
         before = artifacts.before(TEXTURES)
         stale = set(stale_textures(before, work))
-        outputs = before.outputs if before else {}
+        files = _files_by_stem(before)
 
         def is_lost(name: str) -> bool:
-            stem = Path(name).stem
-            files = {file: digest for file, digest in outputs.items() if Path(file).stem == stem}
-            return artifacts.db.damaged(files) is not None
+            return artifacts.db.damaged(files.get(stem_of(name), {})) is not None
 
         return [name for name in work.inputs if name in stale or is_lost(name)]
 
@@ -215,10 +256,10 @@ class TexturesJob(Job):
         if self.left:
             self.encode(self.run.workers.executor)
         if transaction := self._transaction:
-            headers = list(self._headers(transaction))
-            counts, notes = _trimmed(self._names, headers, self.options)
-            notes = [*notes_on_size(self._names, headers, self.options.max_side), *notes]
-            record = replace(self._work, counts={**counts_of(headers), **counts}, notes=notes)
+            textures = list(self._stored(transaction))
+            counts, notes = _trimmed(textures, self.options)
+            notes = [*notes_on_size(textures, self.options.max_side), *notes]
+            record = replace(self._work, counts={**counts_of(textures), **counts}, notes=notes)
             self.run.settle(self.stage, transaction, record)
         self.run.end(self.stage, self._why, self._seconds, self._tasks)
 
@@ -238,10 +279,10 @@ class TexturesJob(Job):
         kept, resumed = 0, 0
         before = self.run.before(self.stage)
         stale = set(stale_textures(before, self._work))
-        outputs = before.outputs if before else {}
+        files = _files_by_stem(before)
         for i, name in enumerate(self._names):
-            files = {file: outputs.get(file, "") for file in self._files(name)}
-            if name not in stale and transaction.keep(files):
+            own = files.get(stem_of(name))
+            if own and name not in stale and transaction.keep(own):
                 kept += 1
             elif transaction.resume(self._task(i)):
                 resumed += 1
@@ -259,9 +300,9 @@ class TexturesJob(Job):
         total, images, fewer = len(self._names), images_of(self.run), self._fewer
         wanted = takewhile(lambda _: stop is None or not stop.is_set(), tuple(self._left))
         with shared_disk(transaction, self.run.db.path, self.options, executor) as disk:
-            results: Iterator[Sequence[bytes | tuple[str, str]]]
+            results: Iterator[Sequence[tuple[str, bytes] | tuple[str, str, str]]]
             if disk is None:
-                sources = ((images[i].name, images[i].load(), fewer[i]) for i in wanted)
+                sources = (ImageFile(images[i].name, images[i].load(), fewer[i]) for i in wanted)
                 results = executor.each(encoded_image, self.options, sources, releases_lock=True)
             else:
                 chunk = max(1, min(IMAGES_PER_MESSAGE, len(self._left) // (8 * executor.workers)))
@@ -272,21 +313,16 @@ class TexturesJob(Job):
                     encoded_on_disk, disk, tasks, releases_lock=True, chunk=chunk
                 )
             for result in results:
-                files = self._files(self._names[self._left[0]])
-                for name, output in zip(files, result, strict=True):
-                    if isinstance(output, bytes):
-                        transaction.put(name, output)
+                for output in result:
+                    if len(output) == 2:
+                        transaction.put(*output)
                     else:
-                        transaction.take(name, Path(output[0]), output[1])
+                        transaction.take(output[0], Path(output[1]), output[2])
                 self.run.progress(total - len(self._left), total, "textures")
-                transaction.finish(self._task(self._left.popleft()), files)
+                names = [output[0] for output in result]
+                transaction.finish(self._task(self._left.popleft()), names)
         self.run.progress(total - len(self._left), total, "textures")
         self._seconds += time.perf_counter() - start
-
-    def _files(self, name: str) -> list[str]:
-        """The outputs of a texture, in the order of `encoded_image`."""
-        fallback = [f"{SERVED}/{name.removesuffix('ptm')}png"] if self.options.fallback else []
-        return [f"{SERVED}/{name}", detail_file(name), *fallback]
 
     def _task(self, i: int) -> str:
         """A digest of everything that the files of a texture depend on, their names included."""
@@ -294,40 +330,45 @@ class TexturesJob(Job):
         depends = [self._work.recipe, _coding(self._work), name, self._work.inputs[name]]
         return sha256(json.dumps(depends, sort_keys=True).encode())
 
-    def _headers(self, transaction: Transaction) -> Iterator[PtmHeader]:
-        """The headers of all textures, staged or committed."""
-        for ptm, *_ in map(self._files, self._names):
-            staged = transaction.folder / ptm
-            yield header_of(staged if staged.is_file() else self.run.db.path / ptm)
+    def _stored(self, transaction: Transaction) -> Iterator[Stored]:
+        """All textures, staged or committed."""
+
+        def place(name: str) -> Path:
+            staged = transaction.folder / name
+            return staged if staged.is_file() else self.run.db.path / name
+
+        for name in self._names:
+            steps = read_steps(place(steps_file(stem_of(name))).read_bytes())
+            yield Stored(name, header_of(place(f"{SERVED}/{name}")), steps)
 
 
-def counts_of(headers: Iterable[PtmHeader]) -> dict[str, int]:
+def counts_of(textures: Iterable[Stored]) -> dict[str, int]:
     """The counts of the stage."""
-    counts = {"textures": 0, "raw_bytes": 0, "ptm_bytes": 0}
-    for header in headers:
-        finest = header.levels[-1]
+    counts = {"textures": 0, "raw_bytes": 0, "ptm_bytes": 0, "preview_bytes": 0, "kept_sources": 0}
+    for texture in textures:
+        width, height, _ = texture.finest
         counts["textures"] += 1
-        counts["raw_bytes"] += finest.width * finest.height * header.texel_bytes
-        counts["ptm_bytes"] += header.file_size
+        counts["raw_bytes"] += width * height * texture.header.texel_bytes
+        counts["ptm_bytes"] += texture.header.file_size
+        counts["preview_bytes"] += sum(preview.bytes for preview in texture.steps.previews)
+        counts["kept_sources"] += any(preview.exact for preview in texture.steps.previews)
     return counts
 
 
-def notes_on_size(names: Iterable[str], headers: Iterable[PtmHeader], most: int) -> Iterator[str]:
+def notes_on_size(textures: Iterable[Stored], most: int) -> Iterator[str]:
     """The texture farthest below ``--max-side``, where no level has that size: levels halve."""
-    from ptmtools.texture.encoder import level_above
-
     below = []
-    for name, header in zip(names, headers, strict=True):
-        finest, above = header.levels[-1], level_above(header)
-        side = max(finest.width, finest.height)
-        if above and side < most:
-            below.append((side, name, finest, above))
+    for texture in textures:
+        width, height, _ = texture.finest
+        if (finer := texture.finer()) and max(width, height) < most:
+            below.append((max(width, height), texture.name, texture, finer[0]))
     if below:
-        _, name, finest, (width, height, more) = min(below, key=lambda each: each[:2])
+        _, name, texture, above = min(below, key=lambda each: each[:2])
+        width, height, _ = texture.finest
         yield (
             f"--max-side {most} keeps less than that of {count(len(below), 'texture')}, because "
-            f"sides halve from level to level: {name} has {finest.width} x {finest.height}; "
-            f"{width} x {height} would add about {size(more)}"
+            f"sides halve from level to level: {name} has {width} x {height}; "
+            f"{above[0]} x {above[1]} would add about {size(texture.estimated_bytes(*above))}"
         )
 
 
@@ -343,17 +384,22 @@ def header_of(file: Path) -> PtmHeader:
 def _summary(n: Mapping[str, Any]) -> str:
     raw, stored = n["raw_bytes"], n["ptm_bytes"]
     share = f" ({stored / raw:.1%})" if raw else ""
-    trim = ""
+    more = ""
+    if previews := n.get("preview_bytes"):  # absent from databases of earlier releases
+        more = f"; previews {size(previews)}"
+        if kept := n["kept_sources"]:
+            more += f", of which {count(kept, 'lossy image')} of the model"
     if unresolved := n.get("unresolved"):
-        trim = f"; {size(n['unresolved_bytes'])} of {count(unresolved, 'texture')} omitted"
-    return f"{count(n['textures'], 'texture')}, {size(raw)} → {size(stored)}{share}{trim}"
+        more += f"; {size(n['unresolved_bytes'])} of {count(unresolved, 'texture')} omitted"
+    return f"{count(n['textures'], 'texture')}, {size(raw)} → {size(stored)}{share}{more}"
 
 
 TEXTURES: Stage[None] = Stage(
     name="textures",
     about="Encode the model's images as progressive textures.",
-    recipe=4,
-    changed="the effect of each level and the mean colour of each texture are recorded",
+    recipe=5,
+    changed="previews of the levels are written, lossy images are kept as they are, and the error "
+    "of each level is recorded",
     options=TextureOptions,
     reads=lambda options: (SCENE, APO, CELLS, PVS) if options.trim else (SCENE,),
     inputs=_inputs,

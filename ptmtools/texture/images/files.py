@@ -27,7 +27,7 @@ from ptmtools.texture.sources import open_file
 
 #: Suffixes of the files that count as images when a folder is given.
 SUFFIXES = (
-    *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".tga", ".bmp", ".gif", ".webp", ".pcx"),
+    *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".tga", ".bmp", ".gif", ".webp", ".avif", ".pcx"),
     *(".ppm", ".pgm", ".pbm", ".pnm", ".hdr", ".exr", ".npy"),
 )
 _LIMITS = Limits()
@@ -37,8 +37,8 @@ _PPM = (b"P2", b"P3", b"P5", b"P6")
 def load_image(source: str | os.PathLike[str] | bytes, limits: Limits = _LIMITS) -> Picture:
     """Loads an image file to encode: texels exactly as stored, and their description.
 
-    8 bits: PNG, JPEG (as it decodes), TIFF, TGA, BMP, GIF, WebP, PPM, PCX. 16 bits: PNG, TIFF,
-    PPM and PGM, .npy. Floats: TIFF, Radiance .hdr (float32), OpenEXR, .npy. TIFFs of several
+    8 bits: PNG, JPEG (as it decodes), TIFF, TGA, BMP, GIF, WebP, AVIF, PPM, PCX. 16 bits: PNG,
+    TIFF, PPM and PGM, .npy. Floats: TIFF, Radiance .hdr (float32), OpenEXR, .npy. TIFFs of several
     components deeper than 8 bits need imagecodecs, OpenEXR files need OpenEXR.
 
     1 component for grey (1-bit images become 0 and 255), 2 with alpha; 3 for RGB and palettes, 4
@@ -77,7 +77,7 @@ def read_image(
     """
     picture = load_image(source, limits)
     with naming(None if isinstance(source, bytes) else source):
-        _check_depth(picture)
+        check_depth(picture)
         return picture.array()
 
 
@@ -87,10 +87,11 @@ def check_image(source: bytes, limits: Limits = _LIMITS) -> None:
     file = cast("BinaryIO", io.BytesIO(source))
     opened = _opened(file, None, limits)
     if isinstance(opened, Picture):
-        _check_depth(opened)
+        check_depth(opened)
 
 
-def _check_depth(picture: Picture) -> None:
+def check_depth(picture: Picture) -> None:
+    """Raises InputError PTM-I126 for samples of more than 8 bits."""
     if picture.texels.dtype.name != "uint8":
         raise InputError(
             "PTM-I126",

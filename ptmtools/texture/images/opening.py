@@ -56,9 +56,11 @@ _PLUGINS: dict[str, bytes | tuple[bytes, ...]] = {
     # A Targa file begins with anything; its own checks decide.
     "Tga": b"",
 }
+#: What the first bytes of an AVIF have behind a length: a box and its brand.
+_AVIF = (b"ftypavif", b"ftypavis")
 #: Formats whose first bytes are too short to call a failing file damaged.
 _VAGUE = ("Ppm", "Pcx", "Tga")
-READABLE = "PNG, JPEG, TIFF, TGA, BMP, GIF, WebP, PPM, PCX, Radiance, OpenEXR or .npy"
+READABLE = "PNG, JPEG, TIFF, TGA, BMP, GIF, WebP, AVIF, PPM, PCX, Radiance, OpenEXR or .npy"
 #: The tag of EXIF and TIFF.
 ORIENTATION = 0x0112
 #: Tags of TIFF.
@@ -77,6 +79,8 @@ def opened(file: BinaryIO, limits: Limits) -> ImageFile:
     file.seek(0)
     first = file.read(30)
     name = next(name for name, magic in _PLUGINS.items() if first.startswith(magic))
+    if first[4:12] in _AVIF:
+        name = "Avif"
     if name == "WebP":
         check_webp(first, limits)
     elif name == "Jpeg":
@@ -109,7 +113,7 @@ def lossy_format(file: BinaryIO, image: ImageFile) -> str | None:
         while len(head := file.read(8)) == 8 and head[:4] not in (b"VP8 ", b"VP8L"):
             file.seek(int.from_bytes(head[4:], "little") + 1 & ~1, 1)
         return "WebP" if head[:4] == b"VP8 " else None
-    return "JPEG" if image.format in ("JPEG", "MPO") else None
+    return {"JPEG": "JPEG", "MPO": "JPEG", "AVIF": "AVIF"}.get(image.format or "")
 
 
 def load(image: ImageFile) -> None:
