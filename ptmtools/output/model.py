@@ -6,11 +6,11 @@ Positions are world metres, Y up (design, "Space"); angles are radians unless a 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ptmtools import schemas
 from ptmtools.errors import InputError
@@ -86,6 +86,18 @@ class TextureRecord:
             return self.width, self.height
         preview = self.previews[-1].preview
         return preview.width, preview.height
+
+
+def sizes_of(row: Mapping[str, Any]) -> list[tuple[int, int]]:
+    """(width, height) of all levels of a row of `textures`, coarsest first, those that exist as
+    previews only included."""
+    width, height, count = row["width"], row["height"], len(row["ends"])
+    previews = row.get("previews", ())
+    if previews and previews[-1]["level"] >= count:
+        finest = previews[-1]
+        width, height, count = finest["width"], finest["height"], finest["level"] + 1
+    shifts = range(count - 1, -1, -1)
+    return [(max(1, width >> shift), max(1, height >> shift)) for shift in shifts]
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from ptmtools.errors import DatabaseError, Rebuild
 from ptmtools.files import open_regular
 from ptmtools.output.gltf import WRAPS
 from ptmtools.output.gltf_reader import ReadGlb, ReadPrimitive, read_glb
-from ptmtools.output.model import FileError
+from ptmtools.output.model import FileError, sizes_of
 from ptmtools.output.names import HINTS, texture_name
 from ptmtools.scene.colors import to_srgb
 from ptmtools.store.layout import SERVED
@@ -339,7 +339,7 @@ def _check_record(
     fault = ""
     if len(rows) > 1 or max(others, default=0) >= cells or max(used, default=-1) >= len(textures):
         fault = "an index is out of range"
-    elif any(first + len(levels) > len(textures[t]["ends"]) for t, first, *levels in need):
+    elif any(first + len(levels) > len(sizes_of(textures[t])) for t, first, *levels in need):
         fault = "needs levels that do not exist"
     elif record["cell"] != cell or record["visible"][:1] != [cell]:
         fault = "belongs to another cell"

@@ -13,11 +13,11 @@ import numpy as np
 from ptmtools import schemas
 from ptmtools.diagnostics import Place
 from ptmtools.output.hints import RECORD_FORMAT as FORMAT, SCHEMA
-from ptmtools.output.model import FileError, shaped
+from ptmtools.output.model import FileError, shaped, sizes_of
 from ptmtools.output.names import BUNDLE, HINTS, HINTS_FOLDER, STATISTICS
 from ptmtools.output.validation.files import Images, ReadHints, Row, ServedDatabase
 from ptmtools.output.validation.space import check_space
-from ptmtools.output.validation.textures import Pictures, check_octrees, check_record, sizes_of
+from ptmtools.output.validation.textures import Pictures, check_octrees, check_record
 from ptmtools.tolerance import PARALLEL_COSINE
 
 #: Slack of the sum of the ach values.

@@ -12,6 +12,7 @@ import numpy as np
 
 from ptmtools.diagnostics import Place
 from ptmtools.errors import InputError, LimitError, PtmError
+from ptmtools.output.model import sizes_of
 from ptmtools.output.names import HINTS
 from ptmtools.output.validation.files import ReadHints, ServedDatabase
 from ptmtools.texture.model import gpu_texel_bytes
@@ -77,18 +78,6 @@ class Pictures(NamedTuple):
 
     fallback: ReadPicture | None
     previews: Sequence[ReadPicture | None]
-
-
-def sizes_of(record: Mapping[str, Any]) -> list[tuple[int, int]]:
-    """(width, height) of all levels of a row of `textures`, coarsest first, those that exist as
-    previews only included."""
-    width, height, count = record["width"], record["height"], len(record["ends"])
-    previews = record.get("previews", ())
-    if previews and previews[-1]["level"] >= count:
-        finest = previews[-1]
-        width, height, count = finest["width"], finest["height"], finest["level"] + 1
-    shifts = range(count - 1, -1, -1)
-    return [(max(1, width >> shift), max(1, height >> shift)) for shift in shifts]
 
 
 def check_record(
