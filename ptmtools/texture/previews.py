@@ -69,7 +69,9 @@ class PreviewFormat:
 WEBP, AVIF, JPEG = "webp", "avif", "jpeg"
 #: Formats by name. Images with alpha are WebP where the chosen format has none.
 FORMATS: Mapping[str, PreviewFormat] = {
-    WEBP: PreviewFormat("read by all browsers since 2020", ".webp", "image/webp", 16383, True, {}),
+    WEBP: PreviewFormat(
+        "read by all browsers since 2020", ".webp", "image/webp", 16383, True, {"exact": True}
+    ),
     AVIF: PreviewFormat(
         "read by browsers since 2022 to 2024; slow to write",
         ".avif",
@@ -159,7 +161,7 @@ class Steps:
     ----------
     detail: of all levels, those that exist as images only included.
     errors: root mean square of each level from the finest, 0 to 255, computed from the differences
-        of successive levels, which are orthogonal but for rounding.
+        of successive levels, which are orthogonal but for rounding and odd sides.
     exact_levels: number of levels of the `.ptm`.
     previews: by ascending level.
     """

@@ -94,7 +94,7 @@ def test_an_image_is_found_before_and_after_its_commit(tmp_path, transaction) ->
         for folder in (".ptm-new/scene/stages/images", "stages/images"):
             (database / folder).mkdir(parents=True)
             (database / folder / task.sha256).write_bytes(image)
-            made.append([digest for _, digest in encoded_on_disk(disk, task)])
+            made.append([digest for _, _, digest in encoded_on_disk(disk, task)])
             (database / folder / task.sha256).write_bytes(image[:-1])
         assert made[0] == made[1]
         with pytest.raises(WorkerError, match="PTM-W005"):  # damaged, both of them

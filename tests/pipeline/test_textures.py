@@ -15,12 +15,13 @@ from ptmtools import parallel
 from ptmtools.executor import Executor
 from ptmtools.parallel import Workers
 from ptmtools.pipeline.build import build_scene, run_stage
-from ptmtools.pipeline.encoding import TextureOptions, bare_png
+from ptmtools.pipeline.encoding import TextureOptions
 from ptmtools.pipeline.stage import Run
 from ptmtools.pipeline.stages import CELLS, TEXTURES
 from ptmtools.pipeline.stages.textures import TexturesJob
 from ptmtools.store.writer import DatabaseWriter
 from ptmtools.texture import read_image
+from ptmtools.texture.images.bare import bare
 
 TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data/two_rooms/two_rooms.obj"
 
@@ -38,11 +39,11 @@ def test_a_bare_png_has_the_same_texels_and_nothing_else(mode: str, transparent:
     image.save(
         out, "PNG", pnginfo=info, dpi=(72, 72), **({} if key is None else {"transparency": key})
     )
-    bare = bare_png(out.getvalue())
-    assert np.array_equal(read_image(bare), read_image(out.getvalue()))
-    assert len(bare) < len(out.getvalue())
-    assert not any(kind in bare for kind in (b"tEXt", b"gAMA", b"pHYs"))
-    assert bare_png(bare + b"behind the end") == bare
+    stripped = bare(out.getvalue(), "PNG")
+    assert np.array_equal(read_image(stripped), read_image(out.getvalue()))
+    assert len(stripped) < len(out.getvalue())
+    assert not any(kind in stripped for kind in (b"tEXt", b"gAMA", b"pHYs"))
+    assert bare(stripped + b"behind the end", "PNG") == stripped
 
 
 def test_what_is_left_when_it_is_stopped_is_done_later(tmp_path: Path) -> None:

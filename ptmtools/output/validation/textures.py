@@ -97,7 +97,8 @@ def check_record(
     for name, value in actual.items():
         if record.get(name, value) != value:
             at.add("PTM-D704", f"{name} does not match the file, which has {value}")
-    sizes = sizes_of(record)
+    sizes = [(level.width, level.height) for level in header.levels]
+    sizes += sizes_of(record)[len(sizes) :]
     if "differences" in record and len(record["differences"]) != len(sizes):
         at.add("PTM-D704", "differences do not match the levels")
     _check_previews(record, sizes, pictures.previews, at)
@@ -115,11 +116,13 @@ def _check_previews(
     if any(one >= other for one, other in pairwise(levels)):
         at.add("PTM-D704", "previews are not in ascending order of their levels")
         return
-    if sizes[len(record["ends"]) - 1] != (record["width"], record["height"]):
+    if sizes_of(record)[len(record["ends"]) - 1] != (record["width"], record["height"]):
         at.add("PTM-D704", "the finest preview and the .ptm are not of one pyramid")
     for row, picture in zip(rows, pictures, strict=True):
         size, place = (row["width"], row["height"]), f"preview of level {row['level']}"
-        if size != sizes[row["level"]]:
+        if row["level"] >= len(sizes):
+            at.add("PTM-D704", f"the {place} has no level")
+        elif size != sizes[row["level"]]:
             at.add("PTM-D704", f"the {place} is {size[0]} x {size[1]}, its level is not")
         if row.get("exact") and row["difference"]:
             at.add("PTM-D704", f"the {place} is exact and differs by {row['difference']:g}")

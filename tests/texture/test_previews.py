@@ -1,0 +1,193 @@
+"""Previews: their place between exact levels, their measured errors, sources kept as they are."""
+
+from __future__ import annotations
+
+import io
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+from numpy.typing import NDArray
+from PIL import Image
+
+from ptmtools.errors import InputError
+from ptmtools.texture import EncodeOptions, build_pyramid, decode_levels, load_image, read_header
+from ptmtools.texture.images import Picture
+from ptmtools.texture.images.bare import bare
+from ptmtools.texture.previews import (
+    BESIDE,
+    FIRST_SIDE,
+    WORTH,
+    PreviewOptions,
+    Pyramid,
+    decoded_preview,
+)
+from ptmtools.texture.steps import EncodedSteps, encode_steps
+
+Texels = NDArray[np.uint8]
+
+
+def photograph(width: int, height: int, components: int = 3) -> Texels:
+    """Texels with detail at every scale; alpha is a disc."""
+    random = np.random.default_rng(1)
+    image = np.zeros((height, width, components))
+    side = 1
+    while side <= max(width, height):
+        noise = random.normal(0, 18, (side + 1, side + 1, components))
+        y, x = np.arange(height) * side // height, np.arange(width) * side // width
+        image += noise[y][:, x]
+        side *= 2
+    texels = np.clip(image + 128, 0, 255).astype(np.uint8)
+    if components in (2, 4):
+        y, x = np.mgrid[-1 : 1 : height * 1j, -1 : 1 : width * 1j]
+        texels[..., -1] = np.where(x * x + y * y < 0.8, 255, 0)
+    return texels
+
+
+def saved(texels: Texels, format: str, **parameters: object) -> bytes:
+    shown = texels[..., 0] if texels.shape[2] == 1 else texels
+    buffer = io.BytesIO()
+    Image.fromarray(shown).save(buffer, format, **parameters)  # type: ignore[arg-type]
+    return buffer.getvalue()
+
+
+def steps_of(source: bytes, levels: EncodeOptions | None = None, **options: object) -> EncodedSteps:
+    previews = PreviewOptions(**options)  # type: ignore[arg-type]
+    return encode_steps(load_image(source), source, levels or EncodeOptions(), previews)
+
+
+@pytest.mark.parametrize(("width", "height"), [(256, 256), (300, 131), (64, 1000)])
+@pytest.mark.parametrize("components", [1, 2, 3, 4])
+def test_every_preview_is_of_its_level(width: int, height: int, components: int) -> None:
+    texels = photograph(width, height, components)
+    encoded = steps_of(saved(texels, "PNG"))
+    exact = [*decode_levels(encoded.ptm)]
+    assert np.array_equal(exact[-1], texels)
+    assert encoded.steps.previews
+    for preview, data in zip(encoded.steps.previews, encoded.previews, strict=True):
+        level = exact[preview.level]
+        image = decoded_preview(data, components)
+        assert image.shape == level.shape == (preview.height, preview.width, components)
+        assert len(data) == preview.bytes
+        colours = components - (components in (2, 4))
+        apart = image[..., :colours].astype(float) - level[..., :colours]
+        own = np.sqrt(np.square(apart).mean(axis=2)).mean()
+        assert preview.difference == pytest.approx(own, rel=0.006)
+        assert preview.difference < 40
+        assert max(preview.width, preview.height) >= FIRST_SIDE
+        assert len(data) <= WORTH * read_header(encoded.ptm).levels[preview.level].end
+
+
+@given(
+    width=st.integers(64, 200), height=st.integers(64, 200), components=st.sampled_from([1, 3, 4])
+)
+@settings(max_examples=15, deadline=None)
+def test_errors_are_those_of_the_enlarged_levels(width: int, height: int, components: int) -> None:
+    pyramid = Pyramid(build_pyramid(photograph(width, height, components)))
+    finest = pyramid.levels[-1].astype(float)
+    colours = components - (components in (2, 4))
+    count = len(pyramid.levels)
+    for level, (texels, error) in enumerate(zip(pyramid.levels, pyramid.errors, strict=True)):
+        up = texels
+        for finer in pyramid.levels[level + 1 :]:
+            rows = np.minimum(np.arange(finer.shape[0]) >> 1, up.shape[0] - 1)
+            columns = np.minimum(np.arange(finer.shape[1]) >> 1, up.shape[1] - 1)
+            up = up[rows][:, columns]
+        real = math.sqrt(np.square(up[..., :colours] - finest[..., :colours]).mean())
+        # Means are rounded down, and edge texels of odd sides belong to no block.
+        assert error == pytest.approx(real, rel=0.1, abs=0.5)
+    assert pyramid.errors[-1] == 0
+    assert list(pyramid.errors) == sorted(pyramid.errors)[::-1]
+    coarse, fine = (pyramid.preview(level, 75, "webp")[0] for level in (count - 3, count - 1))
+    assert coarse.error > fine.error > 0
+    assert coarse.error >= pyramid.errors[count - 3]
+
+
+@pytest.mark.parametrize(
+    ("format", "name", "parameters"),
+    [
+        ("JPEG", "jpeg", {"quality": 85}),
+        ("WEBP", "webp", {"quality": 75}),
+        ("AVIF", "avif", {"quality": 70, "speed": 10}),
+    ],
+)
+def test_a_lossy_source_is_its_own_exact_form(
+    format: str, name: str, parameters: dict[str, object]
+) -> None:
+    source = saved(photograph(512, 512), format, **parameters)
+    encoded = steps_of(source)
+    *between, finest = encoded.steps.previews
+    assert (finest.exact, finest.format, finest.level) == (True, name, 9)
+    assert (finest.width, finest.height, finest.difference, finest.error) == (512, 512, 0, 0)
+    texels = load_image(source).array()
+    assert np.array_equal(decoded_preview(encoded.previews[-1], 3), texels)
+    beside = len(encoded.ptm) + sum(preview.bytes for preview in between)
+    assert beside <= BESIDE * len(source)
+    assert {preview.exact for preview in between} == {False}
+    levels = [*decode_levels(encoded.ptm)]
+    assert len(levels) == encoded.steps.exact_levels < len(encoded.steps.errors) == 10
+    for level, expected in zip(levels, build_pyramid(texels), strict=False):
+        assert np.array_equal(level, expected)
+
+
+@pytest.mark.parametrize("options", [{"exact": "always"}, {"exact": "always", "preview": 0}])
+def test_a_lossless_copy_of_a_lossy_source_on_request(options: dict[str, object]) -> None:
+    source = saved(photograph(128, 128), "JPEG")
+    encoded = steps_of(source, **options)
+    assert np.array_equal([*decode_levels(encoded.ptm)][-1], load_image(source).array())
+    assert not any(preview.exact for preview in encoded.steps.previews)
+    assert bool(encoded.steps.previews) == ("preview" not in options)
+
+
+def test_trimmed_lossy_sources_are_not_kept() -> None:
+    source = saved(photograph(256, 256), "JPEG")
+    encoded = steps_of(source, EncodeOptions(max_side=128))
+    assert not any(preview.exact for preview in encoded.steps.previews)
+    assert [*decode_levels(encoded.ptm)][-1].shape == (128, 128, 3)
+
+
+@pytest.mark.parametrize("format", ["webp", "avif", "jpeg"])
+def test_without_exact_levels_the_finest_preview_remains(format: str) -> None:
+    encoded = steps_of(saved(photograph(256, 200, 4), "PNG"), exact="never", preview_format=format)
+    header, finest = read_header(encoded.ptm), encoded.steps.previews[-1]
+    assert max(header.levels[-1].width, header.levels[-1].height) < FIRST_SIDE
+    assert (finest.width, finest.height, finest.exact) == (256, 200, False)
+    # JPEG has no alpha.
+    assert finest.format == ("webp" if format == "jpeg" else format)
+    levels = [preview.level for preview in encoded.steps.previews]
+    assert levels == [*range(len(header.levels), len(encoded.steps.errors))]
+
+
+def test_previews_of_deep_images_show_the_upper_bits() -> None:
+    texels = photograph(128, 128, 3).astype(np.uint16) << 8 | 77
+    encoded = encode_steps(Picture(texels), b"", EncodeOptions(), PreviewOptions())
+    assert np.array_equal([*decode_levels(encoded.ptm)][-1], texels)
+    shown = decoded_preview(encoded.previews[-1], 3).astype(float)
+    assert np.abs(shown - (texels >> 8)).mean() < 20
+
+
+@pytest.mark.parametrize(
+    "options", [{"preview": 101}, {"preview": -1}, {"preview": 0, "exact": "never"}]
+)
+def test_impossible_options_are_refused(options: dict[str, object]) -> None:
+    with pytest.raises(InputError, match="PTM-I111"):
+        PreviewOptions(**options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("format", "name"), [("JPEG", "JPEG"), ("WEBP", "WebP")])
+def test_a_bare_lossy_image_keeps_its_texels_and_loses_its_orientation(
+    format: str, name: str
+) -> None:
+    texels = photograph(40, 24)
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    profile = b"not a profile" * 50
+    source = saved(texels, format, exif=exif, icc_profile=profile)
+    stripped = bare(source, name)
+    assert profile in source
+    assert profile not in stripped
+    with Image.open(io.BytesIO(stripped)) as image, Image.open(io.BytesIO(source)) as original:
+        assert image.getexif().get(0x0112, 1) == 1
+        assert np.array_equal(np.asarray(image), np.asarray(original))
+    assert bare(stripped, name) == stripped
