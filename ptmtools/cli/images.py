@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -38,12 +38,33 @@ from ptmtools.cli.parameters import (
 )
 from ptmtools.errors import InputError, OutputError, naming
 from ptmtools.neighbours.interlace.model import InterlaceOptions
+from ptmtools.options import option as option_field
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Description, EncodeOptions, Limits
+from ptmtools.texture.previews import Exact, PreviewOptions
 from ptmtools.texture.profiles import PROFILES
 
 if TYPE_CHECKING:
     from ptmtools.texture.comparison import Measured
+    from ptmtools.texture.steps import EncodedSteps
+
+
+@dataclass(frozen=True)
+class FilePreviews(PreviewOptions):
+    """Options of the previews beside a `.ptm`."""
+
+    preview: int = option_field(
+        0,
+        "Also write previews of this quality, 1 to 100: lossy images of single levels, "
+        "NAME-SIDE.webp. 0 writes none.",
+        metavar="QUALITY",
+    )
+    exact: Exact = option_field(
+        "always",
+        "Levels in the .ptm: always all of them; lossless-sources only the coarsest of a JPEG, "
+        "lossy WebP or AVIF, whose own bytes become the finest preview; never more than the "
+        "coarsest, and the finest preview is the finest level.",
+    )
 
 
 @click.command("encode", cls=Command)
@@ -52,7 +73,7 @@ if TYPE_CHECKING:
     "File to write, or - for stdout; a folder if there are several images or the path ends with "
     "/. Default: beside each image."
 )
-@options_of(EncodeOptions)
+@options_of(EncodeOptions, FilePreviews)
 @option(
     "--orient / --no-orient",
     help="Rotate the texels according to the EXIF orientation of the image instead of storing the "
@@ -70,9 +91,15 @@ def encode(
     from ptmtools.texture.container import HEAD_MAX, read_header
     from ptmtools.texture.encoder import check_options, encode_to, level_above
     from ptmtools.texture.images import SUFFIXES, load_image
+    from ptmtools.texture.steps import encode_steps
 
-    options = take(EncodeOptions, values)
+    options, previews = take(EncodeOptions, values), take(FilePreviews, values)
     check_options(options)
+    stepped = bool(previews.preview) or previews.exact != "always"
+    if stepped and output == STANDARD:
+        raise InputError(
+            "PTM-I111", "previews are files beside the .ptm", remedy="use -o FILE instead of -o -"
+        )
     jobs = jobs_for(images, SUFFIXES, output, ".ptm", (".ptm", *SUFFIXES))
     if output and any(job.target and not job.folder for job in jobs):
         _refuse_image_suffix(output)
@@ -88,9 +115,12 @@ def encode(
             return report
 
         def write(file: IO[bytes]) -> None:
-            encode_to(
-                file, picture.texels, options, description=picture.description, threads=threads
-            )
+            if encoded:
+                file.write(encoded.ptm)
+            else:
+                encode_to(
+                    file, picture.texels, options, description=picture.description, threads=threads
+                )
             report["ptm_bytes"] = file.tell()
             file.seek(0)
             header = read_header(file.read(HEAD_MAX))
@@ -108,9 +138,15 @@ def encode(
             picture = load_image(data, batch.limits)
             report["image_bytes"] = len(data) if isinstance(data, bytes) else os.path.getsize(data)
             report["lossy"] = picture.lossy
-            if orient:
-                picture = picture.upright()
+            if orient and picture.description.orientation != 1:
+                picture = replace(picture.upright(), lossy=None)
+            encoded = None
+            if stepped:
+                read = data if isinstance(data, bytes) else Path(data).read_bytes()
+                encoded = encode_steps(picture, read, options, previews, threads)
             job.put(write, batch.force)
+            if encoded and target:
+                report["previews"] = list(_put_previews(target, encoded, batch.force))
         return report
 
     def lines(report: Report) -> Iterator[str]:
@@ -124,13 +160,30 @@ def encode(
             f"{report['file']}: {count(report['levels'], 'level')}, {size(stored)}: "
             f"{_share(stored, raw)} the uncompressed size ({size(raw)}){compared}"
         )
-        if note := _note_on_sides(report, options.max_side):
+        if made := report.get("previews"):
+            yield (
+                f"  {count(len(made), 'preview')}, {size(sum(each['bytes'] for each in made))}: "
+                f"{', '.join(os.path.basename(each['file']) for each in made)}"
+            )
+        elif note := _note_on_sides(report, options.max_side):
             yield f"  {note}"
 
     status, reports = batch.each(jobs, work, lines)
     if not batch.console.as_json and (hint := _hint_on_lossy(reports, options)):
         batch.console.print(hint)
     return status
+
+
+def _put_previews(target: Path, encoded: EncodedSteps, force: bool) -> Iterator[dict[str, object]]:
+    """Writes the previews beside a `.ptm`; the properties of each."""
+    from ptmtools.files import write_bytes
+    from ptmtools.texture.previews import FORMATS
+
+    for preview, data in zip(encoded.steps.previews, encoded.previews, strict=True):
+        side = max(preview.width, preview.height)
+        file = target.with_name(f"{target.stem}-{side}{FORMATS[preview.format].suffix}")
+        write_bytes(file, data, force=force)
+        yield {"file": os.fspath(file), **asdict(preview)}
 
 
 def _note_on_sides(report: Report, max_side: int) -> str | None:
@@ -163,9 +216,9 @@ def _hint_on_lossy(reports: list[Report], options: EncodeOptions) -> str | None:
     kinds = " and ".join(sorted({report["lossy"] for report in grown}))
     return (
         f"hint: {kinds} files discard detail; a lossless .ptm keeps every decoded texel, noise "
-        "included. For pictures, --max-error 4 about halves the .ptm: errors of up to 4 per "
-        "sample (range 0 to 255) are hard to see. Keep 0 where texels are data, such as normals, "
-        "masks or heights."
+        "included. --exact lossless-sources keeps the image itself as the finest level. Or "
+        "--max-error 4 about halves the .ptm: errors of up to 4 per sample (range 0 to 255) are "
+        "hard to see. Keep 0 where texels are data, such as normals, masks or heights."
     )
 
 

@@ -27,6 +27,7 @@ from ptmtools.errors import DatabaseError, InputError, LimitError, Rebuild, nami
 from ptmtools.files import open_regular
 from ptmtools.options import option
 from ptmtools.output.emission import compressed
+from ptmtools.output.model import sizes_of
 from ptmtools.output.served import FORM, Served, read_served
 from ptmtools.pipeline.command import naming_command, open_database
 from ptmtools.pipeline.stages.emit import EMIT
@@ -113,6 +114,14 @@ class SiteOptions:
         metavar="FILE",
     )
     pictures: bool = option(True, "Render a poster and images of the viewpoints.")
+    exact: Literal["built", "never"] = option(
+        "built",
+        "Levels of the textures: as built, or never the exact ones where a preview has the finest "
+        "level, for a site of a few megabytes.",
+    )
+    preview: bool = option(
+        True, "Include the previews; without them, only levels that exist as images have one."
+    )
     clients: Literal["page", "vrml"] = option(
         "page",
         "Clients that the site supports: page (only its own page) or vrml (also VRML browsers, "
@@ -233,12 +242,23 @@ class _Builder:
             texture = web_texture(file, row)
             if texture.note:
                 self._notes.append(texture.note)
+            if self._options.exact == "never":
+                texture = without_exact(file, texture)
             source = file if texture.data is None else texture.data
-            name = self._add(file.stem, ".ptm", PTM, source, digest=digest)
-            changed: dict[str, Any] = {"file": name, "fallback": None, "fallbackLevel": None}
-            if "previews" in row:
-                changed["previews"] = [self._preview(preview) for preview in row["previews"]]
-            yield {**texture.row, **changed}
+            changed = dict(texture.row)
+            changed |= {
+                "file": self._add(file.stem, ".ptm", PTM, source, digest=digest),
+                "fallback": None,
+                "fallbackLevel": None,
+            }
+            kept = [
+                preview
+                for preview in changed.pop("previews", ())
+                if self._options.preview or preview["level"] >= len(changed["ends"])
+            ]
+            if kept:
+                changed["previews"] = [self._preview(preview) for preview in kept]
+            yield changed
 
     def _preview(self, row: Mapping[str, Any]) -> Mapping[str, Any]:
         """A preview's row, with the file's name in the site."""
@@ -432,6 +452,32 @@ def web_texture(file: Path, row: Mapping[str, Any]) -> Texture:
     if header.profile in PROFILES and header.kind == KIND and header.version == VERSION:
         return Texture(row)
     return _encoded_again(file, row)
+
+
+def without_exact(file: Path, texture: Texture) -> Texture:
+    """A texture of a site without the exact levels that finer previews replace, if a preview has
+    the finest level; raises DatabaseError as `web_texture`."""
+    from ptmtools.texture.container import cut, read_header
+    from ptmtools.texture.previews import coarse_levels
+
+    row, sizes = texture.row, sizes_of(texture.row)
+    levels = coarse_levels([max(size) for size in sizes])
+    previews = row.get("previews", ())
+    if not previews or previews[-1]["level"] < len(sizes) - 1 or levels >= len(row["ends"]):
+        return texture
+    data = texture.data
+    if data is None:
+        try:
+            data = file.read_bytes()
+        except OSError as fault:
+            raise unreadable(file, fault) from None
+    data = cut(data, levels)
+    changed = {
+        "width": sizes[levels - 1][0],
+        "height": sizes[levels - 1][1],
+        "ends": [level.end for level in read_header(data).levels],
+    }
+    return Texture({**row, **changed}, data, texture.note)
 
 
 def _encoded_again(file: Path, row: Mapping[str, Any]) -> Texture:

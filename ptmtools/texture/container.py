@@ -84,6 +84,22 @@ def pack_head(
     return bytes(packed + _CRC.pack(zlib.crc32(packed)))
 
 
+def cut(data: bytes, levels: int) -> bytes:
+    """A file of version 2 with its first ``levels`` levels, the finer ones left out on purpose.
+
+    Raises as `read_header`.
+    """
+    header = read_header(data)
+    options = EncodeOptions(header.profile, header.max_error, header.tile)
+    kept, (offset, length, _) = header.levels[:levels], header.description
+    shape = (header.height, header.width, header.components)
+    trimmed = header.trimmed + len(header.levels) - len(kept)
+    described = data[offset : offset + length]
+    groups = [(level.length, level.crc32) for level in kept]
+    head = pack_head(shape, header.kind, options, trimmed, described, groups)
+    return head + described + data[kept[0].offset : kept[-1].end]
+
+
 def read_header(data: bytes) -> PtmHeader:
     """The header and group table of a file, from its first `HEAD_MAX` bytes or more.
 

@@ -27,16 +27,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.options import option
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from ptmtools.texture.detail import Detail
 
-Samples = NDArray[Any]
+    Samples = NDArray[Any]
+
 #: Longer side of the coarsest level with a preview, texels; coarser levels are exact only.
 FIRST_SIDE = 64
 #: By how much the quality of previews below the finest is lower, and the lowest quality.
@@ -193,6 +194,8 @@ class Pyramid:
     """
 
     def __init__(self, levels: Sequence[Samples]) -> None:
+        import numpy as np
+
         from ptmtools.texture.detail import detail_of, difference_between, squares_between
 
         self.levels = levels
@@ -227,6 +230,8 @@ class Pyramid:
 
     def measured(self, level: int, data: bytes, name: str) -> Preview:
         """The preview that a file is of a level."""
+        import numpy as np
+
         from ptmtools.texture.detail import colours_of
 
         texels = self.levels[level]
@@ -278,9 +283,16 @@ class Pyramid:
         return kept
 
 
+def coarse_levels(sides: Sequence[int]) -> int:
+    """The number of levels that are exact in any case, given the longer side of each, coarsest
+    first: those below `FIRST_SIDE` texels, and the coarsest."""
+    return max(1, sum(side < FIRST_SIDE for side in sides))
+
+
 def image_bytes(texels: Samples, name: str, quality: int) -> bytes:
     """(h, w, c) uint8 texels as an image of a format in `FORMATS`; grey becomes RGB in WebP and
     AVIF. Raises MissingComponentError PTM-M100 if Pillow lacks the format."""
+    import numpy as np
     from PIL import Image, features
 
     if name == AVIF and not features.check("avif"):
@@ -301,6 +313,7 @@ def image_bytes(texels: Samples, name: str, quality: int) -> bytes:
 
 def decoded_preview(data: bytes, components: int) -> NDArray[np.uint8]:
     """(h, w, components) the texels of a preview's file. Raises what Pillow raises."""
+    import numpy as np
     from PIL import Image
 
     with Image.open(io.BytesIO(data)) as image:

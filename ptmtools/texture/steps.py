@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING
 from ptmtools.texture.previews import (
     BESIDE,
     COARSE_PART,
-    FIRST_SIDE,
     SOURCES,
     WORTH,
     Preview,
     PreviewOptions,
     Pyramid,
     Steps,
+    coarse_levels,
 )
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ class _Encoding:
         self._pyramid = Pyramid(levels[: len(kept)])
         #: Numbers in the complete pyramid of the kept levels, and of those that are always exact.
         self._kept = kept
-        self._coarse = [n for n in kept if max(sizes[n]) < FIRST_SIDE] or kept[:1]
+        self._coarse = kept[: coarse_levels([max(sizes[n]) for n in kept])]
         format = SOURCES.get(picture.lossy or "")
         own = previews.exact != "always" and kept[-1] == len(sizes) - 1
         own &= len(self._coarse) < len(kept)

@@ -106,12 +106,44 @@ def test_the_index(site: Site, two_rooms: Path) -> None:
         assert texture.read() == (two_rooms / "www" / was["file"]).read_bytes()
         assert not texture.compressed
         assert (row["fallback"], row["fallbackLevel"]) == (None, None)
-        same = was.keys() - {"file", "fallback", "fallbackLevel"}
+        same = was.keys() - {"file", "fallback", "fallbackLevel", "previews"}
         assert {name: row[name] for name in same} == {name: was[name] for name in same}
+        assert ("previews" in row) == ("previews" in was)
+        for preview, before in zip(row.get("previews", ()), was.get("previews", ()), strict=True):
+            image = site.entries[f"data/{preview['file']}"]
+            assert image.read() == (two_rooms / "www" / before["file"]).read_bytes()
+            assert image.media == "image/webp"
+            assert {**preview, "file": before["file"]} == before
     for row in index["viewpoints"]:
         row.pop("thumbnail")
     hints["format"] = index["format"]
     assert {name: index[name] for name in hints} == hints
+
+
+def test_without_exact_levels(two_rooms: Path, site: Site) -> None:
+    """Textures whose finest level a preview has keep only the coarsest levels in their `.ptm`."""
+    never = site_of(two_rooms, SiteOptions(pictures=False, exact="never"))
+    assert weight_of(never).whole < weight_of(site).whole
+    cut = 0
+    for row, whole in zip(never.index["textures"], site.index["textures"], strict=True):
+        data = never.entries[f"data/{row['file']}"].read()
+        levels = [*decode_levels(data)]
+        before = [*decode_levels(site.entries[f"data/{whole['file']}"].read())]
+        for level, expected in zip(levels, before, strict=False):
+            assert np.array_equal(level, expected)
+        assert row["ends"] == [level.end for level in read_header(data).levels]
+        assert (row["height"], row["width"]) == levels[-1].shape[:2]
+        finest = row["previews"][-1] if "previews" in row else None
+        assert len(levels) == len(before) or (finest and finest["level"] == len(before) - 1)
+        cut += len(levels) < len(before)
+    assert cut
+    schemas.read(never.entries[told(never)["index"]].read(), schemas.SITE)
+
+
+def test_without_previews(two_rooms: Path) -> None:
+    plain = site_of(two_rooms, SiteOptions(pictures=False, preview=False))
+    assert not any("previews" in row for row in plain.index["textures"])
+    assert not any(name.endswith(".webp") for name in plain.entries)
 
 
 def test_the_page(site: Site, two_rooms: Path) -> None:

@@ -79,10 +79,13 @@ def test_every_preview_is_of_its_level(width: int, height: int, components: int)
         assert len(data) <= WORTH * read_header(encoded.ptm).levels[preview.level].end
 
 
+# Sides that halve evenly: edge texels of odd sides belong to no block and add to the error.
 @given(
-    width=st.integers(64, 200), height=st.integers(64, 200), components=st.sampled_from([1, 3, 4])
+    width=st.sampled_from([64, 128, 192]),
+    height=st.sampled_from([64, 128, 192]),
+    components=st.sampled_from([1, 3, 4]),
 )
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_errors_are_those_of_the_enlarged_levels(width: int, height: int, components: int) -> None:
     pyramid = Pyramid(build_pyramid(photograph(width, height, components)))
     finest = pyramid.levels[-1].astype(float)
@@ -95,8 +98,8 @@ def test_errors_are_those_of_the_enlarged_levels(width: int, height: int, compon
             columns = np.minimum(np.arange(finer.shape[1]) >> 1, up.shape[1] - 1)
             up = up[rows][:, columns]
         real = math.sqrt(np.square(up[..., :colours] - finest[..., :colours]).mean())
-        # Means are rounded down, and edge texels of odd sides belong to no block.
-        assert error == pytest.approx(real, rel=0.1, abs=0.5)
+        # Means are rounded down.
+        assert error == pytest.approx(real, rel=0.02, abs=0.5)
     assert pyramid.errors[-1] == 0
     assert list(pyramid.errors) == sorted(pyramid.errors)[::-1]
     coarse, fine = (pyramid.preview(level, 75, "webp")[0] for level in (count - 3, count - 1))
