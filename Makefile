@@ -8,6 +8,7 @@
 # make bench-ach     coverage hints: what accuracy costs (a quarter of an hour)
 # make bench-walk    what clients show to a walker: all policies, links and scenes (an hour)
 # make bench-web     how soon a view is there, by the walk page and by what people do otherwise
+#                    (a day; it continues where it was stopped)
 # make fuzz    100,000 damaged and hostile files for every reader (half an hour)
 # make page    bundle the page of web/page into the package, with esbuild
 # make sample  only the sample museum
@@ -121,11 +122,10 @@ bench-walk: build/museum/.made $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/walk_table.py
 
 bench-web: build/museum/.made $(VENV)/.installed-dev
-	$(BIN)/python benchmarks/scenes.py museum rooms
-	@for scene in museum rooms; do set -x; \
-	  $(BIN)/python -m benchmarks.web_rivals "build/bench/walks/$$scene.db"; \
-	  $(BIN)/python -m benchmarks.web_rivals "build/bench/walks/$$scene.db" --memory; \
-	  { set +x; } 2>/dev/null; done
+	$(BIN)/python benchmarks/scenes.py museum rooms hospital office web_gallery atrium
+	$(BIN)/python -m benchmarks.web_rivals.bytes
+	$(BIN)/python -m benchmarks.web_rivals
+	$(BIN)/python -m benchmarks.web_rivals --memory --scene museum,rooms
 
 bench: $(VENV)/.installed-dev
 	@mkdir -p build/bench

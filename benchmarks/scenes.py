@@ -1,6 +1,6 @@
 """Test models, databases and walks of the simulator's benchmarks.
 
-    python benchmarks/scenes.py [museum rooms mixed hospital]
+    python benchmarks/scenes.py [museum rooms mixed hospital office web_gallery atrium]
 
 builds missing databases in ``build/bench/walks``, each with three walks of 150 seconds:
 
@@ -8,6 +8,9 @@ museum        the sample museum (`make sample`): 12 rooms, 31 textures of 1024 Ã
 rooms         a museum of 40 rooms and 120 textures of 1024 Ã— 1024 texels
 mixed         the same with random texture sides of 256, 512, 1024 and 2048 texels
 hospital      of the shared data: 9 small textures, and much furniture
+office        of the shared data: a floor of offices with one texture
+web_gallery   40 JPEG paintings, geometry in Draco (`sample_data/make_web_gallery.py`)
+atrium        one hall of 250,000 triangles, 25 textures (`sample_data/make_atrium.py`)
 
 Two processes build scenes in parallel. The museums of 40 rooms take longest; painting their
 pictures comes first.
@@ -38,6 +41,11 @@ MODELS = {
 }
 
 FOLDER = ROOT / "build/bench/walks"
+#: Models that a script of `sample_data` writes: script and file.
+SAMPLES = {
+    "web_gallery": ("make_web_gallery.py", "web_gallery.glb"),
+    "atrium": ("make_atrium.py", "atrium.obj"),
+}
 #: Sides of the textures of the museums that are made here.
 SIDES = {"rooms": (1024,), "mixed": (256, 512, 1024, 2048)}
 ROOMS, TEXTURES = 40, 120
@@ -58,6 +66,15 @@ def database_of(scene: str) -> Path:
     return FOLDER / f"{scene}.db"
 
 
+def model_of(scene: str) -> Path:
+    """The model of a scene; any other name is a file's."""
+    if scene in SIDES:
+        return FOLDER / f"{scene}/museum.obj"
+    if scene in SAMPLES:
+        return FOLDER / scene / SAMPLES[scene][1]
+    return model_file(scene)
+
+
 def walk_file(scene: str, seed: int, seconds: int = SECONDS) -> Path:
     """A walk through a scene; it is made if it is missing or older than the database."""
     database = database_of(scene)
@@ -71,9 +88,12 @@ def walk_file(scene: str, seed: int, seconds: int = SECONDS) -> Path:
 def make_scene(scene: str) -> None:
     """Makes the model, the database and the walks of a scene, or brings them up to date."""
     FOLDER.mkdir(parents=True, exist_ok=True)
-    model = FOLDER / f"{scene}/museum.obj" if scene in SIDES else MODELS[scene]
+    model = model_of(scene)
     if scene in SIDES and not model.is_file():
         make_mixed(model.parent, SIDES[scene])
+    if scene in SAMPLES and not model.is_file():
+        script = ROOT / "sample_data" / SAMPLES[scene][0]
+        subprocess.run([sys.executable, script, "-o", model.parent], check=True)
     ptm("build-scene", model, "-o", database_of(scene), *BUILD)
     for seed in WALKS:
         walk_file(scene, seed)

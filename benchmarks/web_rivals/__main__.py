@@ -1,29 +1,32 @@
 """Time until a view is complete, for the walk page and for usual alternatives.
 
-    python -m benchmarks.web_rivals [DB] [--bandwidth 4M,16M] [--latency 100ms] [--only ptm,glb-png]
-    python -m benchmarks.web_rivals [DB] --memory
+    python -m benchmarks.web_rivals [--scene museum,atrium] [--link 512k,4M] [--http 1.1,2]
+                                    [--entrant ptm,glb-png]
+    python -m benchmarks.web_rivals --memory [--scene museum]
+    python -m benchmarks.web_rivals.bytes
 
-Of each page (``entrants.py``), opened at the first viewpoint of a database over a link of so much
-bandwidth and latency, with an empty cache: seconds and bytes until (a) FLIP is at most 0.05 for
-good, (b) at most 0.01, (c) the page has all that it asks for. FLIP is against the page's own full
-picture, which is kind to lossy ones; *lossy* is how far that is from the picture of ``glb-png``,
-which ``ptm`` is not compared with. In parentheses: how many times as long as the walk page, or else
-as the best.
+Of each page (``entrants.py``), opened at the first viewpoint of a scene (``benchmarks/scenes.py``,
+or the path of a database) over a link (``link.py``) from nginx (``nginx.py``), with an empty cache:
+seconds and bytes until (a) FLIP is at most 0.05 for good, (b) at most 0.01, (c) the page has all
+that it asks for; FLIP at the end; requests. FLIP is against the full picture with all texels exact,
+as the page's own renderer draws it. In parentheses: how many times as long as the walk page, or
+else as the best. Medians of ``--repeats`` runs.
 
 A page is looked at for ``--patience`` seconds. What takes longer is computed from the run over the
 next faster link, for pages that ask for the same in the same order whatever the link is: its bytes
-take as much longer, and nothing else changes. Where both is known, both is printed.
+take as much longer, and nothing else changes.
 
-``--memory`` prints the second table instead (``memory.py``): FLIP in so much texture memory.
+Runs are kept (``results.py``): stopped and started again, the benchmark continues. Tables are
+printed scene by scene. ``--memory`` prints FLIP in so much texture memory instead (``memory.py``).
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,51 +34,160 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "benchmarks")]
 
 from render import load  # noqa: E402
-from scenes import database_of  # noqa: E402
+from scenes import database_of, model_of  # noqa: E402
 
 from benchmarks.web_rivals import memory  # noqa: E402
-from benchmarks.web_rivals.entrants import RIVALS, WALK, Entrant, require, rival, walk_page  # noqa: E402
+from benchmarks.web_rivals.entrants import (  # noqa: E402
+    LOSSLESS,
+    RIVALS,
+    SOURCE,
+    WALK,
+    Entrant,
+    Subject,
+    require,
+    rival,
+    walk_page,
+)
+from benchmarks.web_rivals.nginx import HTTP, Certificate, certificate  # noqa: E402
+from benchmarks.web_rivals.results import Conditions, kept  # noqa: E402
 from benchmarks.web_rivals.tables import memory_table, times_table  # noqa: E402
-from benchmarks.web_rivals.timeline import Timeline, chromium, watch  # noqa: E402
+from benchmarks.web_rivals.timeline import (  # noqa: E402
+    Picture,
+    Timeline,
+    chromium,
+    difference,
+    watch,
+)
 from ptmtools.output.served import read_served  # noqa: E402
 from ptmtools.quantities import parse_bandwidth, parse_duration  # noqa: E402
 from ptmtools.site.throttle import Throttle  # noqa: E402
 
+SCENES = ("museum", "rooms", "hospital", "office", "web_gallery", "atrium")
+LINKS = ("512k", "4M", "16M")
 #: Of the second table, bytes; the last holds everything.
 BUDGETS = tuple(kib << 10 for kib in (256, 512, 1024, 2048, 4096, 8192, 16384, 1 << 30))
+#: Over which full pictures are drawn.
+FAST = Throttle(None, 0.0)
+
+
+@dataclass(frozen=True)
+class Desk:
+    """What runs share: the browser, the certificate that it accepts, and the numbers given."""
+
+    browser: Any
+    own: Certificate
+    repeats: int
+    patience: float
+
+    def run(self, entrant: Entrant, conditions: Conditions, seconds: float) -> Timeline:
+        """A timeline, kept or new."""
+
+        def measure() -> Timeline:
+            print(f"{entrant.name}, {conditions}", file=sys.stderr, flush=True)
+            http = conditions.http
+            return watch(
+                self.browser, entrant, conditions.link, self.own, http=http, seconds=seconds
+            )
+
+        actual = kept(entrant, conditions, measure)
+        for message in actual.messages:
+            print(f"{entrant.name}: {message}", file=sys.stderr)
+        return actual
+
+    def full_picture(self, entrant: Entrant) -> Picture:
+        """The last picture of a page that has all texels."""
+        return self.run(entrant, Conditions(FAST, HTTP[0], 0, 600), 600).full
 
 
 def main() -> None:
     """Prints the tables."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.web_rivals")
-    parser.add_argument("database", nargs="?", type=Path, default=database_of("museum"))
-    parser.add_argument("--bandwidth", default="512k,4M,16M")
-    parser.add_argument("--latency", default="100ms")
-    parser.add_argument("--patience", type=float, default=100, help="seconds")
-    parser.add_argument("--only", default=",".join((WALK, *RIVALS)), help="of these pages")
+    parser.add_argument("--scene", default=",".join(SCENES), help="names, or paths of databases")
+    parser.add_argument("--link", default=",".join(LINKS), help="bit/s")
+    parser.add_argument("--http", default=",".join(HTTP))
+    parser.add_argument("--entrant", default=",".join((WALK, *RIVALS)))
+    parser.add_argument("--rtt", default="100ms", help="of a round trip")
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--patience", type=float, default=60, help="seconds")
+    parser.add_argument("--reference", type=Path, help="a database with all exact levels")
     parser.add_argument("--memory", action="store_true", help="the table of texture memory")
     given = parser.parse_args()
-    scene = load(given.database)
-    viewpoint = json.loads((given.database / "www/hints.json").read_text())["viewpoints"][0]
-    if given.memory:
-        rows = memory.measured(read_served(given.database), scene, viewpoint, BUDGETS)
-        print(memory_table(rows))
-        return
-    require(given.only.split(","))
-    entrants = [
-        walk_page(given.database) if name == WALK else rival(name, scene, viewpoint)
-        for name in given.only.split(",")
-    ]
-    bandwidths = sorted((speed(text) for text in given.bandwidth.split(",")), reverse=True)
-    latency = parse_duration(given.latency)
-    runs: dict[str, list[Timeline]] = {}
-    with chromium() as browser:
+    names = given.entrant.split(",")
+    require(names)
+    links = sorted((speed(text) for text in given.link.split(",")), reverse=True)
+    throttles = [Throttle(bandwidth, parse_duration(given.rtt)) for bandwidth in links]
+    for scene in given.scene.split(","):
+        database = database_in(scene)
+        if given.memory:
+            served = read_served(database)
+            view = served.index["viewpoints"][0]
+            rows = memory.measured(served, load(database), view, BUDGETS)
+            print(f"\n{database.stem}\n\n{memory_table(rows)}", flush=True)
+            continue
+        with certificate() as own, chromium(own) as browser:
+            desk = Desk(browser, own, given.repeats, given.patience)
+            print_scene(desk, database, names, throttles, given.http.split(","), given.reference)
+
+
+def database_in(scene: str) -> Path:
+    """The database of a name or path; raises SystemExit with the remedy."""
+    database = Path(scene) if Path(scene).is_dir() else database_of(scene)
+    if not database.is_dir():
+        raise SystemExit(f"{database} is missing; python benchmarks/scenes.py {scene}")
+    return database
+
+
+def subject_of(database: Path) -> Subject:
+    """What a database shows."""
+    model = model_of(database.stem)
+    source = model if model.suffix == ".glb" and model.is_file() else None
+    return Subject(load(database), read_served(database).index, source)
+
+
+def print_scene(
+    desk: Desk,
+    database: Path,
+    names: Sequence[str],
+    links: Sequence[Throttle],
+    protocols: Sequence[str],
+    reference: Path | None,
+) -> None:
+    """The tables of one scene, a link and a protocol each."""
+    subject = subject_of(database)
+    names = [name for name in names if name != SOURCE or subject.source]
+    entrants = [walk_page(database) if name == WALK else rival(name, subject) for name in names]
+    full = full_pictures(desk, entrants, subject, reference or database)
+    for http in protocols:
+        runs: dict[str, list[list[Timeline]]] = {}
         for entrant in entrants:
-            links = [Throttle(bandwidth, latency) for bandwidth in bandwidths]
-            runs[entrant.name] = list(timelines(browser, entrant, links, given.patience))
-    for k, bandwidth in enumerate(bandwidths):
-        title = f"{given.database.stem}, {bandwidth / 1e6:g} Mbit/s, {1000 * latency:.0f} ms"
-        print(f"\n{title}\n\n{times_table({name: rows[k] for name, rows in runs.items()})}")
+            repetitions = [
+                list(timelines(desk, entrant, links, http, k)) for k in range(desk.repeats)
+            ]
+            runs[entrant.name] = [list(rows) for rows in zip(*repetitions, strict=True)]
+        for k, link in enumerate(links):
+            title = f"{database.stem}, {(link.bandwidth or 0) / 1e6:g} Mbit/s, "
+            title += f"{1000 * link.latency:.0f} ms, HTTP/{http}, {desk.repeats} runs"
+            table = times_table({name: rows[k] for name, rows in runs.items()}, full)
+            print(f"\n{title}\n\n{table}", flush=True)
+    if WALK in full and len(full) > 1:
+        other = next(picture for name, picture in full.items() if name != WALK)
+        print(f"\nThe two renderers' full pictures differ by {difference(other, full[WALK]):.4f}.")
+
+
+def full_pictures(
+    desk: Desk, entrants: Sequence[Entrant], subject: Subject, exact: Path
+) -> Mapping[str, Picture]:
+    """The full picture of each page, as its renderer draws it."""
+    lossless: Picture | None = None
+    actual = {}
+    for entrant in entrants:
+        if entrant.name == WALK:
+            actual[WALK] = desk.full_picture(walk_page(exact))
+            continue
+        if lossless is None:
+            lossless = desk.full_picture(rival(LOSSLESS, subject))
+        actual[entrant.name] = lossless
+    return actual
 
 
 def speed(text: str) -> float:
@@ -87,27 +199,22 @@ def speed(text: str) -> float:
 
 
 def timelines(
-    browser: Any, entrant: Entrant, links: list[Throttle], patience: float
+    desk: Desk, entrant: Entrant, links: Sequence[Throttle], http: str, repetition: int
 ) -> Iterator[Timeline]:
     """Over each link, the fastest first."""
     before: tuple[Throttle, Timeline] | None = None
     for link in links:
+        conditions = Conditions(link, http, repetition, desk.patience)
         computed = before[1].over(before[0], link) if before and entrant.steady else None
         if computed is None:
-            actual = watch(browser, entrant, link)
-        elif computed.begins > patience:
+            whole = replace(conditions, patience=600)
+            actual = desk.run(entrant, whole, 600)
+        elif computed.begins > desk.patience:
             actual = computed
         else:
-            actual = watch(browser, entrant, link, seconds=patience)
+            actual = desk.run(entrant, conditions, desk.patience)
             if actual.done == math.inf:
                 actual = actual.continued(computed)
-            else:
-                print(
-                    f"{entrant.name}, {(link.bandwidth or 0) / 1e6:g} Mbit/s: all in "
-                    f"{actual.done:.2f} s, computed {computed.done:.2f}"
-                )
-        for message in actual.messages:
-            print(f"{entrant.name}: {message}", file=sys.stderr)
         before = link, actual
         yield actual
 

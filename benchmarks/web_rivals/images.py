@@ -1,6 +1,7 @@
 """The textures of a scene in the forms that the rivals send, kept by content below ``build``.
 
-``png`` and ``webp`` are lossless; ``webp-90`` is lossy; ``jpeg-256`` has at most 256 texels a side;
+``png`` and ``webp`` are lossless; ``webp-90`` is lossy, and ``webp-128`` to ``webp-1024`` are the
+same with at most as many texels a side; ``jpeg-256`` has at most 256 texels a side;
 ``etc1s`` and ``uastc`` are KTX2 with all levels, by npm's ktx2-encoder (WebAssembly, seconds each).
 """
 
@@ -24,12 +25,14 @@ MEDIA = {
     "png": "image/png",
     "webp": "image/webp",
     "webp-90": "image/webp",
+    "webp-128": "image/webp",
+    "webp-256": "image/webp",
+    "webp-512": "image/webp",
+    "webp-1024": "image/webp",
     "jpeg-256": "image/jpeg",
     "etc1s": "image/ktx2",
     "uastc": "image/ktx2",
 }
-#: Texels a side of what is shown first.
-_SMALL = 256
 #: To be raised when the same name stands for other bytes.
 _EDITION = 1
 
@@ -40,7 +43,7 @@ def in_form(images: Sequence[SourceImage], form: str) -> list[bytes]:
     lacking = [(i, f) for i, f in zip(images, files, strict=True) if not f.is_file()]
     KEPT.mkdir(parents=True, exist_ok=True)
     for image, file in lacking:
-        _keep(file, _ENCODERS[form](_opened(image)))
+        keep(file, _ENCODERS[form](_opened(image)))
     return [file.read_bytes() for file in files]
 
 
@@ -55,7 +58,15 @@ def _opened(image: SourceImage) -> Image.Image:
         return opened.convert("RGB" if opaque else "RGBA")
 
 
-def _keep(file: Path, data: bytes) -> None:
+def size_of(image: bytes) -> tuple[int, int]:
+    """Width and height of an encoded image."""
+    with Image.open(io.BytesIO(image)) as opened:
+        return opened.size
+
+
+def keep(file: Path, data: bytes) -> None:
+    """Writes a file below `KEPT`, whole or not at all."""
+    file.parent.mkdir(parents=True, exist_ok=True)
     part = file.with_name(f"{file.name}.part")
     part.write_bytes(data)
     part.replace(file)
@@ -70,10 +81,18 @@ def _by_pillow(name: str, **options: object) -> Callable[[Image.Image], bytes]:
     return encoded
 
 
-def _small(image: Image.Image) -> bytes:
+def _small(image: Image.Image, side: int) -> Image.Image:
     small = image.copy()
-    small.thumbnail((_SMALL, _SMALL), Image.Resampling.BOX)
-    return _by_pillow("JPEG", quality=85, optimize=True)(small.convert("RGB"))
+    small.thumbnail((side, side), Image.Resampling.BOX)
+    return small
+
+
+def _small_jpeg(image: Image.Image) -> bytes:
+    return _by_pillow("JPEG", quality=85, optimize=True)(_small(image, 256).convert("RGB"))
+
+
+def _small_webp(image: Image.Image, side: int) -> bytes:
+    return _ENCODERS["webp-90"](_small(image, side))
 
 
 def _ktx2(image: Image.Image, form: str) -> bytes:
@@ -93,7 +112,8 @@ _ENCODERS: dict[str, Callable[[Image.Image], bytes]] = {
     "png": _by_pillow("PNG", optimize=True),
     "webp": _by_pillow("WEBP", lossless=True, quality=80, method=4, exact=True),
     "webp-90": _by_pillow("WEBP", quality=90, method=4),
-    "jpeg-256": _small,
+    **{f"webp-{side}": partial(_small_webp, side=side) for side in (128, 256, 512, 1024)},
+    "jpeg-256": _small_jpeg,
     "etc1s": partial(_ktx2, form="etc1s"),
     "uastc": partial(_ktx2, form="uastc"),
 }

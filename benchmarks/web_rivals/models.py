@@ -54,11 +54,10 @@ def whole_glb(scene: Scene, images: Sequence[bytes] = (), media: str = "") -> by
         document["images"] = []
         parts = [binary]
         at = len(binary)
-        for image in images:
+        for number, image in enumerate(images):
             view = {"buffer": 0, "byteOffset": at, "byteLength": len(image)}
-            document["images"].append(
-                {"bufferView": len(members["bufferViews"]), "mimeType": media}
-            )
+            row = {"name": str(number), "bufferView": len(members["bufferViews"])}
+            document["images"].append({**row, "mimeType": media})
             members["bufferViews"].append(view)
             parts.append(image + bytes(-len(image) % 4))
             at += len(parts[-1])

@@ -20,12 +20,18 @@ class Package:
     @property
     def folder(self) -> Path:
         """Where it is once it is installed."""
-        return ROOT / "build/browsers" / self.prefix / "node_modules" / self.name
+        return self.modules / self.name
+
+    @property
+    def modules(self) -> Path:
+        """The folder of this package and of those that it needs."""
+        return ROOT / "build/browsers" / self.prefix / "node_modules"
 
     @property
     def command(self) -> str:
         """What installs it, in the checkout."""
         options = "--no-save --no-package-lock --ignore-scripts --no-audit --no-fund"
+        options += " --legacy-peer-deps"  # one three.js for all
         prefix = f"--prefix build/browsers/{self.prefix}"
         return f"npm install {options} {prefix} {self.name}@{self.version}"
 
@@ -45,7 +51,10 @@ class Package:
 
 THREE = Package("three", "0.187.0", "three")
 KTX2 = Package("ktx2-encoder", "0.6.0", "ktx2")
+GLTF_TRANSFORM = Package("@gltf-transform/cli", "4.5.1", "gltf-transform")
+NEEDLE = Package("@needle-tools/gltf-progressive", "3.3.5", "needle")
 #: Joins and shortens the modules of a page, as those who use three.js do.
 ESBUILD = Package("esbuild", "0.28.2", "esbuild")
-#: The one that tests need and others do not install.
+#: Those that tests need and others do not install.
 INSTALL = ESBUILD.command
+INSTALL_GLTF_TRANSFORM, INSTALL_NEEDLE = GLTF_TRANSFORM.command, NEEDLE.command

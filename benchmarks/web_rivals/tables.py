@@ -2,46 +2,55 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from statistics import median
 
 from benchmarks.web_rivals.entrants import WALK
 from benchmarks.web_rivals.memory import Held
-from benchmarks.web_rivals.timeline import Timeline, difference
+from benchmarks.web_rivals.timeline import Picture, Timeline, difference
 
 GOALS = {"(a) FLIP ≤ 0.05": 0.05, "(b) ≤ 0.01": 0.01}
 EVERYTHING = "(c) all"
-LOSSLESS = "glb-png"
 
 #: Seconds and bytes, or None for what is not reached.
 Reached = tuple[float, float] | None
 
 
-def times_table(runs: Mapping[str, Timeline]) -> str:
-    """A line for each page, of runs over one link."""
-    reached = {name: goals_of(run) for name, run in runs.items()}
+def times_table(runs: Mapping[str, Sequence[Timeline]], full: Mapping[str, Picture]) -> str:
+    """A line for each page, of its runs over one link: medians. ``full``: the full picture of each
+    page, as its renderer draws it."""
+    reached = {name: goals_of(rows, full[name]) for name, rows in runs.items()}
     columns = [*GOALS, EVERYTHING]
     beside = [_beside([(name, by[column]) for name, by in reached.items()]) for column in columns]
-    lines = [f"| | {' | '.join(columns)} | lossy | requests |"]
-    lines.append("|---" + "|--:" * (len(columns) + 2) + "|")
-    for name, run in runs.items():
+    lines = [f"| | {' | '.join(columns)} | FLIP at the end | requests | connections |"]
+    lines.append("|---" + "|--:" * (len(columns) + 3) + "|")
+    for name, rows in runs.items():
         cells = [_cell(reached[name][c], b) for c, b in zip(columns, beside, strict=True)]
-        lossy = ""
-        if LOSSLESS in runs and name != WALK:
-            lossy = f"{difference(runs[LOSSLESS].full, run.full):.3f}"
-        lines.append(f"| {name} | {' | '.join(cells)} | {lossy} | {run.requests} |")
+        lossy = median(difference(full[name], run.full) for run in rows)
+        counts = [median(run.requests for run in rows), median(run.connections for run in rows)]
+        cells += [f"{lossy:.3f}", *(f"{count:.0f}" for count in counts)]
+        lines.append(f"| {name} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
-def goals_of(run: Timeline) -> dict[str, Reached]:
-    """When a run reached each of the goals."""
-    actual: dict[str, Reached] = {c: run.until(most, run.full) for c, most in GOALS.items()}
-    return actual | {EVERYTHING: (run.done, run.everything)}
+def goals_of(rows: Sequence[Timeline], full: Picture) -> dict[str, Reached]:
+    """When the runs reached each of the goals; medians of seconds and of bytes."""
+    actual = {c: _middle([run.until(most, full) for run in rows]) for c, most in GOALS.items()}
+    return actual | {EVERYTHING: _middle([(run.done, run.everything) for run in rows])}
+
+
+def _middle(rows: Sequence[Reached]) -> Reached:
+    """None if half of them or more reached nothing."""
+    seconds, sent = zip(*(row or (math.inf, math.inf) for row in rows), strict=True)
+    middle = median(seconds), median(sent)
+    return None if middle[0] == math.inf else middle
 
 
 def _beside(rows: Sequence[tuple[str, Reached]]) -> float:
-    """Seconds of the walk page, or else of the best."""
+    """Seconds of the walk page, or else of the best; NaN if there are none."""
     seconds = {name: actual[0] for name, actual in rows if actual}
-    return seconds.get(WALK, min(seconds.values()))
+    return seconds.get(WALK, min(seconds.values(), default=math.nan))
 
 
 def _cell(found: Reached, beside: float) -> str:

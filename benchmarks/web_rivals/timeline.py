@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import math
 import sys
-import threading
 import time
 import zlib
 from collections.abc import Iterator
@@ -18,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.web_rivals.entrants import Entrant
+from benchmarks.web_rivals.link import Traffic, shaped
+from benchmarks.web_rivals.nginx import Certificate, nginx
 from benchmarks.web_rivals.packages import ROOT
 from ptmtools.lab.measures import flip
-from ptmtools.site.serving import serving
-from ptmtools.site.throttle import Throttle, Visits
+from ptmtools.site.throttle import Throttle
 
 sys.path[:0] = [str(ROOT / "tests" / "e2e")]
 from browsers import web  # noqa: E402
@@ -32,8 +32,6 @@ WIDTH, HEIGHT = 320, 240
 SETTLED = 1.0
 #: What Chromium remarks of the recorder itself.
 RECORDING = "GPU stall due to ReadPixels"
-#: s between two looks at what has been sent.
-_METER = 0.01
 
 Floats = NDArray[np.float64]
 Picture = NDArray[np.uint8]
@@ -45,11 +43,11 @@ class Timeline:
     Attributes
     ----------
     time: (n,) s since the navigation began, of pictures that differ from those before them.
-    sent: (n,) bytes of responses by then, heads included.
+    sent: (n,) bytes that had arrived by then, heads and TLS included.
     pictures: n of (height, width, 3).
     done, everything: s and bytes until the page was complete, or, with infinite s, until it was
         given up.
-    requests: how many.
+    requests, connections: how many.
     messages: what the console complained about.
     """
 
@@ -59,6 +57,7 @@ class Timeline:
     done: float
     everything: float
     requests: int
+    connections: int
     messages: tuple[str, ...]
 
     @property
@@ -112,35 +111,43 @@ def difference(full: Picture, shown: Picture) -> float:
 
 
 @contextmanager
-def chromium() -> Iterator[Any]:
-    """A headless browser."""
+def chromium(own: Certificate) -> Iterator[Any]:
+    """A headless browser that accepts a certificate of our own."""
     from playwright.sync_api import sync_playwright
 
+    flags = [*web.FLAGS[1:], "--hide-scrollbars", own.flag]
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=web.chromium(), args=[*web.FLAGS[1:], "--hide-scrollbars"]
-        )
+        browser = playwright.chromium.launch(executable_path=web.chromium(), args=flags)
         try:
             yield browser
         finally:
             browser.close()
 
 
-def watch(browser: Any, entrant: Entrant, link: Throttle, *, seconds: float = 600) -> Timeline:
+def watch(
+    browser: Any,
+    entrant: Entrant,
+    link: Throttle,
+    own: Certificate,
+    *,
+    http: str = "1.1",
+    seconds: float = 600,
+) -> Timeline:
     """Opens the page of an entrant, waits until it is complete, or so long, and takes what it has
-    shown."""
+    shown. ``link.latency``: s of a round trip."""
     from playwright.sync_api import TimeoutError as TooLong
 
-    visits = Visits()
+    traffic = Traffic()
     script = Path(__file__).with_name("recorder.js").read_text()
-    with serving(entrant.files, throttle=link, visits=visits) as url, _metered(visits) as meter:
+    scheme = "https" if http == "2" else "http"
+    with nginx(entrant.files, http, own) as server, shaped(server.port, link, traffic) as port:
         context = browser.new_context(viewport={"width": WIDTH, "height": HEIGHT})
         try:
             context.add_init_script(script.replace("COMPLETE", entrant.complete))
             page, messages = context.new_page(), []
             page.on("console", lambda message: messages.append(f"{message.type}: {message.text}"))
             page.on("pageerror", lambda error: messages.append(f"error: {error}"))
-            page.goto(url, wait_until="commit")
+            page.goto(f"{scheme}://127.0.0.1:{port}/", wait_until="commit")
             with suppress(TooLong):
                 page.wait_for_function(
                     "window.recorder?.done !== undefined", timeout=1000 * seconds, polling=100
@@ -150,18 +157,21 @@ def watch(browser: Any, entrant: Entrant, link: Throttle, *, seconds: float = 60
                 "[performance.timeOrigin, performance.now(), recorder.done ?? null, recorder.count]"
             )
             taken = [page.evaluate("(k) => recorder.packed(k)", k) for k in range(count)]
+            requests = server.requests()
         finally:
             context.close()
     stamps = np.array([1e-3 * one["time"] for one in taken])
-    clock = 1e-3 * origin - meter.offset
+    clock = 1e-3 * origin - (time.time() - time.monotonic())
+    # What was complete may be seen a moment later.
+    last = np.array([1e-3 * (done or now), *stamps]).max()
     return Timeline(
         time=stamps,
-        sent=meter.at(clock + stamps),
+        sent=traffic.at(clock + stamps),
         pictures=tuple(_unpacked(one) for one in taken),
         done=math.inf if done is None else 1e-3 * done,
-        # What was complete may be seen a moment later, and bytes between two looks are guessed.
-        everything=float(meter.at(clock + max(1e-3 * (done or now), *stamps))),
-        requests=len(visits),
+        everything=float(traffic.at(np.array([clock + last]))[0]),
+        requests=len(requests),
+        connections=traffic.connections,
         messages=tuple(text for text in messages if RECORDING not in text),
     )
 
@@ -170,37 +180,3 @@ def _unpacked(packed: dict[str, Any]) -> Picture:
     data = zlib.decompress(base64.b64decode(packed["data"]))
     shape = (packed["height"], packed["width"], 4)
     return np.ascontiguousarray(np.frombuffer(data, np.uint8).reshape(shape)[::-1, :, :3])
-
-
-class _Meter:
-    """What has been sent when, read off a server's visits; ``offset`` from its clock to the time
-    of day."""
-
-    def __init__(self) -> None:
-        self.offset = time.time() - time.monotonic()
-        self._rows: list[tuple[float, float]] = [(time.monotonic(), 0.0)]
-
-    def read(self, visits: Visits) -> None:
-        self._rows.append((time.monotonic(), float(visits.bytes)))
-
-    def at(self, moment: Floats) -> Floats:
-        """(n,) bytes at moments of the server's clock."""
-        when, sent = np.array(self._rows).T
-        return np.interp(moment, when, sent)
-
-
-@contextmanager
-def _metered(visits: Visits) -> Iterator[_Meter]:
-    meter, over = _Meter(), threading.Event()
-
-    def run() -> None:
-        while not over.wait(_METER):
-            meter.read(visits)
-
-    thread = threading.Thread(target=run, daemon=True)
-    thread.start()
-    try:
-        yield meter
-    finally:
-        over.set()
-        thread.join()

@@ -1,6 +1,7 @@
 // What the rivals' pages have in common: a canvas as large as the window, a camera at the first
 // viewpoint, and `window.rival.complete`, which says that nothing more will come. Colours go to the
-// screen as textures hold them, and levels are averages of what they hold, as in the walk page.
+// screen as textures hold them, and levels are averages of what they hold, as in the walk page. The
+// origin of the walk page's world is subtracted from a model that keeps its own.
 
 import {
   LinearSRGBColorSpace, MathUtils, NoColorSpace, PerspectiveCamera, Scene, Vector3, WebGLRenderer,
@@ -27,6 +28,7 @@ export function add(model) {
     material.color.convertLinearToSRGB();
     if (material.map) material.map.colorSpace = NoColorSpace;
   });
+  if (files.origin) model.position.sub(new Vector3(...files.origin));
   scene.add(model);
 }
 
