@@ -5,8 +5,9 @@ For each set of images: by size of a level, all images together,
 - the bytes of the exact levels up to it, and its root mean square error from the finest level,
 - the bytes of a lossy image of it by format and quality, and that image's error;
 
-then the whole ladder of previews that `ptm textures` writes, with other `LADDER`s. Sets: the images given, or the sample museum's (`make
-sample`), the shared textures and the shared scenes.
+then the whole ladder of previews that `ptm textures` writes, with other `LADDER`s.
+
+Sets: the images given, or the sample museum's (`make sample`), the shared textures and scenes.
 """
 
 from __future__ import annotations
