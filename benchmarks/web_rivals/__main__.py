@@ -2,6 +2,7 @@
 
     python -m benchmarks.web_rivals [--scene museum,atrium] [--link 512k,4M] [--http 1.1,2]
                                     [--entrant ptm,glb-png]
+    python -m benchmarks.web_rivals --round-trips [--scene museum]
     python -m benchmarks.web_rivals --memory [--scene museum]
     python -m benchmarks.web_rivals.bytes
 
@@ -12,18 +13,21 @@ that it asks for; FLIP at the end; requests. FLIP is against the full picture wi
 as the page's own renderer draws it. In parentheses: how many times as long as the walk page, or
 else as the best. Medians of ``--repeats`` runs.
 
-A page is looked at for ``--patience`` seconds. What takes longer is computed from the run over the
-next faster link, for pages that ask for the same in the same order whatever the link is: its bytes
-take as much longer, and nothing else changes.
+A page is looked at for ``--patience`` seconds, the walk page for three times as long. What takes
+longer is computed from the run over the next faster link, for pages that ask for the same in the
+same order whatever the link is: its bytes take as much longer, and nothing else changes.
 
 Runs are kept (``results.py``): stopped and started again, the benchmark continues. Tables are
-printed scene by scene. ``--memory`` prints FLIP in so much texture memory instead (``memory.py``).
+printed scene by scene. ``--round-trips`` prints instead by how many round trips a longer way of
+`WAYS` delays each goal, over the fastest link; ``--memory``, FLIP in so much texture memory
+(``memory.py``).
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+import signal
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -42,6 +46,7 @@ from benchmarks.web_rivals.entrants import (  # noqa: E402
     RIVALS,
     SOURCE,
     WALK,
+    WALKS,
     Entrant,
     Subject,
     require,
@@ -50,7 +55,7 @@ from benchmarks.web_rivals.entrants import (  # noqa: E402
 )
 from benchmarks.web_rivals.nginx import HTTP, Certificate, certificate  # noqa: E402
 from benchmarks.web_rivals.results import Conditions, kept  # noqa: E402
-from benchmarks.web_rivals.tables import memory_table, times_table  # noqa: E402
+from benchmarks.web_rivals.tables import memory_table, round_trips_table, times_table  # noqa: E402
 from benchmarks.web_rivals.timeline import (  # noqa: E402
     Picture,
     Timeline,
@@ -66,6 +71,12 @@ SCENES = ("museum", "rooms", "hospital", "office", "web_gallery", "atrium")
 LINKS = ("512k", "4M", "16M")
 #: Of the second table, bytes; the last holds everything.
 BUDGETS = tuple(kib << 10 for kib in (256, 512, 1024, 2048, 4096, 8192, 16384, 1 << 30))
+#: How many times as long the walk page is looked at, since nothing of it is computed.
+WALK_PATIENCE = 3
+#: s at most over the fastest link.
+WHOLE = 600.0
+#: s of a round trip, near and far.
+WAYS = (0.05, 0.35)
 #: Over which full pictures are drawn.
 FAST = Throttle(None, 0.0)
 
@@ -96,7 +107,7 @@ class Desk:
 
     def full_picture(self, entrant: Entrant) -> Picture:
         """The last picture of a page that has all texels."""
-        return self.run(entrant, Conditions(FAST, HTTP[0], 0, 600), 600).full
+        return self.run(entrant, Conditions(FAST, HTTP[0], 0, WHOLE), WHOLE).full
 
 
 def main() -> None:
@@ -110,12 +121,17 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--patience", type=float, default=60, help="seconds")
     parser.add_argument("--reference", type=Path, help="a database with all exact levels")
+    parser.add_argument("--round-trips", action="store_true", help="the table of round trips")
     parser.add_argument("--memory", action="store_true", help="the table of texture memory")
     given = parser.parse_args()
+    # Whatever ends the run also ends nginx and Chromium.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     names = given.entrant.split(",")
     require(names)
     links = sorted((speed(text) for text in given.link.split(",")), reverse=True)
     throttles = [Throttle(bandwidth, parse_duration(given.rtt)) for bandwidth in links]
+    if given.round_trips:
+        throttles = [Throttle(links[0], way) for way in WAYS]
     for scene in given.scene.split(","):
         database = database_in(scene)
         if given.memory:
@@ -155,7 +171,9 @@ def print_scene(
     """The tables of one scene, a link and a protocol each."""
     subject = subject_of(database)
     names = [name for name in names if name != SOURCE or subject.source]
-    entrants = [walk_page(database) if name == WALK else rival(name, subject) for name in names]
+    entrants = [
+        walk_page(database, name) if name in WALKS else rival(name, subject) for name in names
+    ]
     full = full_pictures(desk, entrants, subject, reference or database)
     for http in protocols:
         runs: dict[str, list[list[Timeline]]] = {}
@@ -164,30 +182,30 @@ def print_scene(
                 list(timelines(desk, entrant, links, http, k)) for k in range(desk.repeats)
             ]
             runs[entrant.name] = [list(rows) for rows in zip(*repetitions, strict=True)]
+        if links[0].bandwidth == links[-1].bandwidth and len(links) > 1:
+            title = f"{database.stem}, {(links[0].bandwidth or 0) / 1e6:g} Mbit/s, HTTP/{http}"
+            print(f"\n{title}\n\n{round_trips_table(runs, full, WAYS)}", flush=True)
+            continue
         for k, link in enumerate(links):
             title = f"{database.stem}, {(link.bandwidth or 0) / 1e6:g} Mbit/s, "
             title += f"{1000 * link.latency:.0f} ms, HTTP/{http}, {desk.repeats} runs"
             table = times_table({name: rows[k] for name, rows in runs.items()}, full)
             print(f"\n{title}\n\n{table}", flush=True)
-    if WALK in full and len(full) > 1:
-        other = next(picture for name, picture in full.items() if name != WALK)
-        print(f"\nThe two renderers' full pictures differ by {difference(other, full[WALK]):.4f}.")
+    two = {name in WALKS: picture for name, picture in full.items()}
+    if len(two) == 2:
+        print(f"\nThe two renderers' full pictures differ by {difference(*two.values()):.4f}.")
 
 
 def full_pictures(
     desk: Desk, entrants: Sequence[Entrant], subject: Subject, exact: Path
 ) -> Mapping[str, Picture]:
     """The full picture of each page, as its renderer draws it."""
-    lossless: Picture | None = None
-    actual = {}
-    for entrant in entrants:
-        if entrant.name == WALK:
-            actual[WALK] = desk.full_picture(walk_page(exact))
-            continue
-        if lossless is None:
-            lossless = desk.full_picture(rival(LOSSLESS, subject))
-        actual[entrant.name] = lossless
-    return actual
+    kinds = {entrant.name in WALKS for entrant in entrants}
+    drawn = {
+        ours: desk.full_picture(walk_page(exact) if ours else rival(LOSSLESS, subject))
+        for ours in kinds
+    }
+    return {entrant.name: drawn[entrant.name in WALKS] for entrant in entrants}
 
 
 def speed(text: str) -> float:
@@ -205,10 +223,15 @@ def timelines(
     before: tuple[Throttle, Timeline] | None = None
     for link in links:
         conditions = Conditions(link, http, repetition, desk.patience)
-        computed = before[1].over(before[0], link) if before and entrant.steady else None
-        if computed is None:
-            whole = replace(conditions, patience=600)
-            actual = desk.run(entrant, whole, 600)
+        computed = None
+        if before and entrant.steady and before[0].latency == link.latency:
+            computed = before[1].over(before[0], link)
+        if not entrant.steady:
+            longer = replace(conditions, patience=WALK_PATIENCE * desk.patience)
+            actual = desk.run(entrant, longer, longer.patience)
+        elif computed is None:
+            whole = replace(conditions, patience=WHOLE)
+            actual = desk.run(entrant, whole, WHOLE)
         elif computed.begins > desk.patience:
             actual = computed
         else:

@@ -14,7 +14,8 @@ source          the model's own file, for scenes whose model is a GLB with Draco
 ==============  =================================================================================
 
 A GLB is shown once it is there with all its images: GLTFLoader does not begin before. The walk page
-enters as ``ptm``.
+enters as ``ptm``; ``ptm-never`` is its site without exact levels, ``ptm-no-preview`` that without
+previews.
 
 Every page is measured against the *full picture*: the same view with all texels of all textures,
 exact. Each renderer draws its own, once and over a fast link: three.js from ``glb-png``, the walk
@@ -51,6 +52,12 @@ _COMPRESSED = 16 << 20
 _BASIS = "examples/jsm/libs/basis/basis_transcoder"
 _DRACO = "examples/jsm/libs/draco/gltf"
 WALK, SOURCE, LOSSLESS = "ptm", "source", "glb-png"
+#: Sites of the walk page, by the options of `ptm publish`.
+WALKS: dict[str, dict[str, Any]] = {
+    WALK: {},
+    "ptm-never": {"exact": "never"},
+    "ptm-no-preview": {"preview": False},
+}
 RIVALS = (
     LOSSLESS,
     "glb-webp",
@@ -109,7 +116,7 @@ class Subject:
 
 def require(names: Iterable[str]) -> None:
     """Raises SystemExit with the remedy for what is not installed, before anything is made."""
-    forms = {name.removeprefix("glb-") for name in names if name != WALK}
+    forms = {name.removeprefix("glb-") for name in names if name not in WALKS}
     if forms:
         THREE.require()
         ESBUILD.require()
@@ -144,11 +151,12 @@ def rival(name: str, subject: Subject) -> Entrant:
     return _page(name, script, files, entries, subject)
 
 
-def walk_page(database: Path) -> Entrant:
-    """The page that `ptm publish` makes of a database. What it asks for depends on the link."""
-    from ptmtools.site.content import site_of
+def walk_page(database: Path, name: str = WALK) -> Entrant:
+    """One of `WALKS` of a database. What it asks for depends on the link."""
+    from ptmtools.site.content import SiteOptions, site_of
 
-    return Entrant(WALK, site_of(database).entries, "window.ptm?.state().complete", steady=False)
+    files = site_of(database, SiteOptions(**WALKS[name])).entries
+    return Entrant(name, files, "window.ptm?.state().complete", steady=False)
 
 
 def _coarse_first(subject: Subject) -> Entrant:

@@ -34,6 +34,28 @@ def times_table(runs: Mapping[str, Sequence[Timeline]], full: Mapping[str, Pictu
     return "\n".join(lines)
 
 
+def round_trips_table(
+    runs: Mapping[str, Sequence[Sequence[Timeline]]],
+    full: Mapping[str, Picture],
+    ways: tuple[float, float],
+) -> str:
+    """A line for each page: by how many round trips each goal comes later over the longer way.
+    ``runs``: over the shorter way, and over the longer; ``ways``: s of a round trip."""
+    lines = [f"| round trips | {' | '.join((*GOALS, EVERYTHING))} |"]
+    lines.append("|---" + "|--:" * (len(GOALS) + 1) + "|")
+    for name, both in runs.items():
+        near, far = (goals_of(rows, full[name]) for rows in both)
+        cells = []
+        for goal, short in near.items():
+            long = far[goal]
+            trips = math.nan
+            if short is not None and long is not None and long[0] < math.inf:
+                trips = (long[0] - short[0]) / (ways[1] - ways[0])
+            cells.append("–" if math.isnan(trips) else f"{trips:.1f}")
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
 def goals_of(rows: Sequence[Timeline], full: Picture) -> dict[str, Reached]:
     """When the runs reached each of the goals; medians of seconds and of bytes."""
     actual = {c: _middle([run.until(most, full) for run in rows]) for c, most in GOALS.items()}

@@ -57,7 +57,11 @@ from benchmarks.web_rivals.packages import (  # noqa: E402
 )
 from benchmarks.web_rivals.progressive import progressive  # noqa: E402
 from benchmarks.web_rivals.results import Conditions, kept  # noqa: E402
-from benchmarks.web_rivals.tables import memory_table, times_table  # noqa: E402
+from benchmarks.web_rivals.tables import (  # noqa: E402
+    memory_table,
+    round_trips_table,
+    times_table,
+)
 from benchmarks.web_rivals.timeline import (  # noqa: E402
     HEIGHT,
     WIDTH,
@@ -201,10 +205,10 @@ def test_the_link_takes_round_trips_and_shares_its_bandwidth() -> None:
     assert took >= 0.4 + 1.0 - LATE
     assert traffic.connections == 2
     assert traffic.rows[-1][1] == 2 * len(body)
-    # At no moment more than the bandwidth allows, from the first byte on.
+    # At no moment more than the bandwidth allows since the first byte was possible.
     moments = np.array([when for when, _ in traffic.rows[1:]])
     sent = np.array([count for _, count in traffic.rows[1:]])
-    assert (sent - sent[0] <= 100_000 * (moments - moments[0] + LATE) + 2000).all()
+    assert (sent <= 100_000 * (moments - begun - 0.4 + LATE) + 2000).all()
 
 
 def test_the_window_opens_slowly() -> None:
@@ -230,7 +234,9 @@ def test_the_window_opens_slowly() -> None:
     sent = [float(traffic.at(np.array([begun + 0.6 + 0.3 * k - 0.01]))[0]) for k in range(1, 4)]
     for k, count in enumerate(sent):
         assert count <= (2 << k) * WINDOW - WINDOW, "late on a busy machine, never early"
-    assert traffic.rows[-1] == (pytest.approx(begun + 1.5, abs=0.25), len(body))
+    when, count = traffic.rows[-1]
+    assert when >= begun + 1.49
+    assert count == len(body)
 
 
 def test_what_comes_and_goes_is_not_there_yet() -> None:
@@ -255,6 +261,16 @@ def test_the_table_shows_medians_against_the_full_picture() -> None:
     lines = table.splitlines()
     assert lines[-1].startswith("| needle | – | – | 3.0 s"), "its full picture is black"
     assert lines[-2].endswith("| 0.000 | 5 | 2 |")
+
+
+def test_round_trips_are_those_that_a_longer_way_takes() -> None:
+    white = np.full((48, 64, 3), 255, np.uint8)
+    near = Timeline(np.array([1.0]), np.ones(1), (white,), 2.0, 30.0, 5, 2, ())
+    far = replace(near, time=near.time + 0.9, done=2.0 + 1.5)
+    table = round_trips_table({"ptm": [[near], [far]]}, {"ptm": white}, (0.05, 0.35))
+    assert table.splitlines()[-1] == "| ptm | 3.0 | 3.0 | 5.0 |"
+    table = round_trips_table({"ptm": [[near], [far]]}, {"ptm": 255 - white}, (0.05, 0.35))
+    assert table.splitlines()[-1] == "| ptm | – | – | 5.0 |"
 
 
 def test_runs_are_found_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
