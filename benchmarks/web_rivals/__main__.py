@@ -18,9 +18,9 @@ longer is computed from the run over the next faster link, for pages that ask fo
 same order whatever the link is: its bytes take as much longer, and nothing else changes.
 
 Runs are kept (``results.py``): stopped and started again, the benchmark continues. Tables are
-printed scene by scene. ``--round-trips`` prints instead by how many round trips a longer way of
-`WAYS` delays each goal, over the fastest link; ``--memory``, FLIP in so much texture memory
-(``memory.py``).
+printed scene by scene. ``--common`` measures the walk page, too, from three.js's full picture.
+``--round-trips`` prints instead by how many round trips a longer way of `WAYS` delays each goal,
+over the fastest link; ``--memory``, FLIP in so much texture memory (``memory.py``).
 """
 
 from __future__ import annotations
@@ -121,6 +121,7 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--patience", type=float, default=60, help="seconds")
     parser.add_argument("--reference", type=Path, help="a database with all exact levels")
+    parser.add_argument("--common", action="store_true", help="three.js's full picture for all")
     parser.add_argument("--round-trips", action="store_true", help="the table of round trips")
     parser.add_argument("--memory", action="store_true", help="the table of texture memory")
     given = parser.parse_args()
@@ -142,7 +143,8 @@ def main() -> None:
             continue
         with certificate() as own, chromium(own) as browser:
             desk = Desk(browser, own, given.repeats, given.patience)
-            print_scene(desk, database, names, throttles, given.http.split(","), given.reference)
+            exact = None if given.common else given.reference or database
+            print_scene(desk, database, names, throttles, given.http.split(","), exact)
 
 
 def database_in(scene: str) -> Path:
@@ -166,15 +168,15 @@ def print_scene(
     names: Sequence[str],
     links: Sequence[Throttle],
     protocols: Sequence[str],
-    reference: Path | None,
+    exact: Path | None,
 ) -> None:
-    """The tables of one scene, a link and a protocol each."""
+    """The tables of one scene, a link and a protocol each; ``exact``: see `full_pictures`."""
     subject = subject_of(database)
     names = [name for name in names if name != SOURCE or subject.source]
     entrants = [
         walk_page(database, name) if name in WALKS else rival(name, subject) for name in names
     ]
-    full = full_pictures(desk, entrants, subject, reference or database)
+    full = full_pictures(desk, entrants, subject, exact)
     for http in protocols:
         runs: dict[str, list[list[Timeline]]] = {}
         for entrant in entrants:
@@ -191,18 +193,22 @@ def print_scene(
             title += f"{1000 * link.latency:.0f} ms, HTTP/{http}, {desk.repeats} runs"
             table = times_table({name: rows[k] for name, rows in runs.items()}, full)
             print(f"\n{title}\n\n{table}", flush=True)
+    if exact is None:
+        print("\nAll from three.js's full picture.")
+        return
     two = {name in WALKS: picture for name, picture in full.items()}
     if len(two) == 2:
         print(f"\nThe two renderers' full pictures differ by {difference(*two.values()):.4f}.")
 
 
 def full_pictures(
-    desk: Desk, entrants: Sequence[Entrant], subject: Subject, exact: Path
+    desk: Desk, entrants: Sequence[Entrant], subject: Subject, exact: Path | None
 ) -> Mapping[str, Picture]:
-    """The full picture of each page, as its renderer draws it."""
+    """The full picture of each page, as its renderer draws it; the walk page's of a database with
+    all ``exact`` levels, or without one as three.js draws it."""
     kinds = {entrant.name in WALKS for entrant in entrants}
     drawn = {
-        ours: desk.full_picture(walk_page(exact) if ours else rival(LOSSLESS, subject))
+        ours: desk.full_picture(walk_page(exact) if ours and exact else rival(LOSSLESS, subject))
         for ours in kinds
     }
     return {entrant.name: drawn[entrant.name in WALKS] for entrant in entrants}
