@@ -14,6 +14,7 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.jit import inlined_kernel, kernel, plain_kernel
+from ptmtools.rendering.lossy import Lossy
 from ptmtools.rendering.records import Pyramids, Shows, Sight, Triangles
 
 #: Colour of pixels without data, 0 to 255.
@@ -26,9 +27,10 @@ class Sums(NamedTuple):
     Attributes
     ----------
     pair: (m,) pair of each triangle.
-    error, square: (P, L + 2) root mean squares over R, G and B, and their squares. Columns: nothing
-        loaded, the mean colour, then level 0, level 1, … as the finest loaded level, or the columns
-        of `Shows` instead of levels.
+    error, square: (P, S + 1) root mean squares over R, G and B, and their squares. Columns: nothing
+        loaded, the mean colour, then the states of `ptmtools.rendering.lossy` from 1 on, the
+        first of which are level 0, level 1, … as the finest loaded level; or the columns of `Shows`
+        instead of states.
     need, sight: (P, L) demand for each level, 0 to 1 per pixel, over all pixels and over the pixels
         of a client's item buffer; column 0 counts surfaces without texture.
     """
@@ -177,6 +179,7 @@ def add_frame(
     seen: Bools,
     triangles: Triangles,
     textures: Pyramids,
+    lossy: Lossy,
     full: Pyramids,
     same: bool,
     sums: Sums,
@@ -188,7 +191,7 @@ def add_frame(
     ----------
     seen: (n,) whether the pixel belongs to the client's item buffer.
     full: reference textures; ``same`` if they are ``textures``.
-    scratch: (L + 7, 3), overwritten.
+    scratch: (S + 6, 3), overwritten.
     """
     exact, coarse, work, shown = scratch[0], scratch[1], scratch[2:5], scratch[5:]
     shown[0] = GREY
@@ -236,6 +239,24 @@ def add_frame(
             sums.need[p, n] += wanted
             if seen[i]:
                 sums.sight[p, n] += wanted
+        for q in range(lossy.first[t], lossy.first[t + 1]):
+            at, levels = lossy.state[q] + 2, lossy.pyramids.levels[q]
+            drawn = min(sharp + 1, levels)
+            for n in range(drawn):
+                sample(lossy.pyramids, q, n, u, v, clamped, shown[at + n])
+            if sharp < levels:
+                for k in range(3):
+                    step = shown[at + below, k] - shown[at + sharp, k]
+                    shown[at + sharp, k] += (detail - int(detail)) * step
+            for n in range(drawn):
+                for k in range(3):
+                    shown[at + n, k] *= color[k]
+                square = distance(shown[at + n], exact)
+                # Finer levels that are not sampled do not change the picture.
+                times = levels - n if n == drawn - 1 else 1
+                for m in range(n, n + times):
+                    sums.error[p, at + m] += np.sqrt(square)
+                    sums.square[p, at + m] += square
 
 
 @plain_kernel

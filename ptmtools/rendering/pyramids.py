@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats
 from ptmtools.errors import DatabaseError, InputError, LimitError
+from ptmtools.output.model import sizes_of
 from ptmtools.output.served import BUILD, Served
 from ptmtools.progress import Progress, silent
+from ptmtools.rendering.previews import read_preview
 from ptmtools.rendering.records import Pyramids, Sight, Triangles, own_levels
 from ptmtools.texture import reader
 from ptmtools.texture.detail import difference_between
@@ -27,6 +29,7 @@ def read_pyramids(
     served: Served, progress: Progress = silent, only: Collection[int] | None = None
 ) -> Pyramids:
     """Decodes all textures, or only those whose number is in ``only``; the others get no levels.
+    Levels that are finer than those of the `.ptm` come from the finest preview.
 
     Raises
     ------
@@ -63,6 +66,8 @@ def _pyramids(served: Served, progress: Progress, only: Collection[int] | None =
                     "PTM-D006", "is not the texture that the index has", file=file, remedy=BUILD
                 )
             chains[t] = [rgb(samples) for samples in ptm.levels()]
+        if (count := len(sizes_of(rows[t]))) > len(held):
+            chains[t] += read_preview(served, t, -1)[len(held) : count]
         mean[t] = chains[t][0].reshape(-1, 3).mean(axis=0)
         for below, level in pairwise(chains[t]):
             texels = level.shape[0] * level.shape[1]

@@ -19,8 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
+from ptmtools.output.model import sizes_of
 from ptmtools.output.served import Served
 from ptmtools.parallel import ordered
+from ptmtools.rendering.previews import read_preview
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.rendering.records import Sight, Triangles, triangles_of
 from ptmtools.texture.model import Limits
@@ -108,13 +110,17 @@ def _look(caster: Caster, size: tuple[int, int], viewpoint: Mapping[str, Any]) -
 
 
 def _levels(served: Served, texture: int) -> Levels:
-    """The levels of a texture up to `FINEST`, always with the coarsest."""
+    """The levels of a texture up to `FINEST`, always with the coarsest: those of the `.ptm`, or, of
+    one that has too few, of a preview."""
     from ptmtools.texture import open as open_ptm
 
+    row = served.index["textures"][texture]
+    count = max(1, sum(max(size) <= FINEST for size in sizes_of(row)))
+    if count > len(row["ends"]):
+        fine = (n for n, preview in enumerate(row["previews"]) if preview["level"] >= count - 1)
+        return read_preview(served, texture, next(fine))[:count]
     colors: list[NDArray[np.uint8]] = []
     with open_ptm(served.texture_file(texture), limits=_LIMITS) as ptm:
-        sides = [max(level.width, level.height) for level in ptm.header.levels]
-        count = max(1, sum(side <= FINEST for side in sides))
         for samples in islice(ptm.levels(), count):
             shown = in_eight_bits(samples)
             colors.append(shown[:, :, :3] if shown.shape[2] >= 3 else shown[:, :, [0, 0, 0]])

@@ -1,0 +1,102 @@
+"""Pictures of lossy previews, and the states of textures that have some.
+
+*States* number the pictures that a texture can have. State 0 is nothing; states 1 to M are the
+columns of the exact levels, M of them; then come the columns of each lossy preview, 1 to its level
++ 1. A preview that is the exact form of its texture has the states of the exact levels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ptmtools.arrays import Ints
+from ptmtools.output.served import Served
+from ptmtools.progress import Progress, silent
+from ptmtools.rendering.previews import Texels, read_preview
+from ptmtools.rendering.pyramids import packed
+from ptmtools.rendering.records import Pyramids, Shows, own_levels
+
+
+class Lossy(NamedTuple):
+    """Pictures of the lossy previews of textures.
+
+    Attributes
+    ----------
+    pyramids: a pyramid for each of Q previews, texture by texture, by ascending level; their levels
+        are those of the texture, from the coarsest to that of the preview.
+    first: (T + 1,) where the previews of each texture begin.
+    state: (Q,) the state before the first one of each preview.
+    """
+
+    pyramids: Pyramids
+    first: Ints
+    state: Ints
+
+    @property
+    def states(self) -> int:
+        """The greatest number of a state of lossy previews, 0 without any."""
+        return int((self.state + self.pyramids.levels).max(initial=0))
+
+
+def no_previews(textures: int) -> Lossy:
+    """The pictures of ``textures`` without previews."""
+    return Lossy(packed([]), np.zeros(textures + 1, np.int64), np.zeros(0, np.int64))
+
+
+def states_of(texture: Mapping[str, Any]) -> list[int]:
+    """The state before the first one of each preview of a row of the index."""
+    previews = texture.get("previews", ())
+    finest = previews[-1]["level"] + 1 if previews else 0
+    result, following = [], max(len(texture["ends"]), finest)
+    for preview in previews:
+        lossy = not preview.get("exact", False)
+        result.append(following if lossy else 0)
+        following += (preview["level"] + 1) * lossy
+    return result
+
+
+def read_lossy(served: Served, progress: Progress = silent) -> Lossy:
+    """The pictures of all lossy previews. Raises as `read_preview`."""
+    rows = served.index["textures"]
+    chains: list[list[Texels]] = []
+    first, state = [0], []
+    for t, row in enumerate(rows):
+        progress(t, len(rows), "decoding previews")
+        for number, before in enumerate(states_of(row)):
+            if before:
+                chains.append(read_preview(served, t, number))
+                state.append(before)
+        first.append(len(chains))
+    return Lossy(packed(chains), np.array(first), np.array(state, dtype=np.int64))
+
+
+def pictures(pyramids: Pyramids, lossy: Lossy) -> Shows:
+    """The pictures of all states of textures; with previews, a copy of all texels."""
+    if not len(lossy.state):
+        return own_levels(pyramids)
+    textures, columns = pyramids.start.shape
+    of = np.repeat(np.arange(textures), np.diff(lossy.first))
+    # All levels have their place, so that the level of detail is that of the whole texture.
+    start = np.zeros((len(of), columns), np.int64)
+    start[:, : lossy.pyramids.start.shape[1]] = lossy.pyramids.start + len(pyramids.texel)
+    every = np.concatenate([np.arange(textures), of])
+    joined = Pyramids(
+        np.concatenate([pyramids.texel, lossy.pyramids.texel]),
+        np.concatenate([pyramids.start, start]),
+        pyramids.size[every],
+        pyramids.levels[every],
+        pyramids.mean[every],
+        pyramids.differences[every],
+    )
+    states = max(lossy.states, int(pyramids.levels.max(initial=0))) + 1
+    row = np.repeat(np.arange(textures)[:, None], states, axis=1)
+    held, last = np.minimum(np.arange(states), pyramids.levels[:, None]), pyramids.levels.copy()
+    for q, t in enumerate(of.tolist()):
+        levels, before = int(lossy.pyramids.levels[q]), int(lossy.state[q])
+        own = slice(before + 1, before + levels + 1)
+        row[t, own], held[t, own] = textures + q, np.arange(1, levels + 1)
+        last[t] = before + levels
+    return Shows(joined, row, held, last, pyramids.mean)

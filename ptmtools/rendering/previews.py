@@ -1,0 +1,51 @@
+"""Decodes previews: ordinary lossy images of single levels of textures.
+
+A preview of level n shows that level and, halved by means of 2 × 2 texels, all coarser ones. Its
+image is as Pillow decodes it; browsers decode JPEG with other chroma filters, which moves single
+texels by a few steps of 255.
+"""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.errors import DatabaseError
+from ptmtools.output.model import sizes_of
+from ptmtools.output.served import BUILD, Served
+from ptmtools.texture.pyramid import build_pyramid
+
+Texels = NDArray[np.uint8]
+
+
+def read_preview(served: Served, texture: int, number: int) -> list[Texels]:
+    """The levels of a preview, the coarsest first, as (h, w, 3) RGB.
+
+    Raises DatabaseError: PTM-D005, D006 it is missing, damaged or does not match the index.
+    """
+    row = served.index["textures"][texture]
+    preview = row["previews"][number]
+    file = served.file(preview["file"])
+    sizes = sizes_of(row)[: preview["level"] + 1]
+    levels = build_pyramid(_decoded(file, served.read(preview["file"])))[-len(sizes) :]
+    if [level.shape[1::-1] for level in levels] != sizes:
+        raise _damaged(file, "does not match the index")
+    return [np.ascontiguousarray(level) for level in levels]
+
+
+def _decoded(file: Path, data: bytes) -> Texels:
+    """(h, w, 3) the texels of an image."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(io.BytesIO(data)) as image:
+            return np.asarray(image.convert("RGB"))
+    except (OSError, ValueError, SyntaxError, UnidentifiedImageError) as fault:
+        raise _damaged(file, f"cannot be decoded ({fault})") from None
+
+
+def _damaged(file: Path, problem: str) -> DatabaseError:
+    return DatabaseError("PTM-D006", problem, file=file, remedy=BUILD)
