@@ -37,6 +37,7 @@ from ptmtools.output.served import Served, Surfaces, read_served
 from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.warm_up import warm_building
 from ptmtools.progress import Progress, silent
+from ptmtools.rendering.lossy import read_lossy
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.records import Pyramids
 from ptmtools.walk import Walk
@@ -246,14 +247,17 @@ def compared(served: Served, walk: Walk, original: World) -> World:
     """The world of a walk through a database, with the textures of ``original`` as the reference, a
     world of the same model and walk.
 
-    If only the finest levels of its textures are missing, the tables of the original hold the
-    errors without them; with the same geometry no rays are cast again.
+    If only the finest levels of its textures, or previews, are missing, the tables of the original
+    hold the errors without them; with the same geometry no rays are cast again.
     """
-    own, full = read_pyramids(served), original.pyramids
-    if not begins_with(full, own):
-        return prepare(served, walk, own, full=full)
+    own, lossy, full = read_pyramids(served), read_lossy(served), original.pyramids
+    coarse = begins_with(full, own)
+    if not coarse or len(lossy.state):
+        own = full if coarse and (own.levels == full.levels).all() else own
+        return prepare(served, walk, own, full=full, lossy=lossy)
     same = _same(served.surfaces, original.served.surfaces)
-    world = prepare(served, walk, full, views=original.views if same else None)
+    views = original.views if same else None
+    world = prepare(served, walk, full, views=views, lossy=lossy)
     return replace(
         world,
         pyramids=own,
@@ -291,7 +295,8 @@ def _longest(served: Served) -> int:
 def served_bytes(stock: Catalogue) -> int:
     """Bytes that clients of the hints can fetch."""
     documents = stock.index_bytes + stock.statistics_bytes + int(stock.record_bytes.sum())
-    return documents + int(stock.geometry_bytes.sum()) + int(stock.ends[:, -1].sum())
+    textures = int(stock.ends[:, -1].sum() + stock.previews.bytes.sum())
+    return documents + int(stock.geometry_bytes.sum()) + textures
 
 
 def minutes(seconds: float) -> str:

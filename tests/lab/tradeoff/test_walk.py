@@ -176,7 +176,7 @@ def test_settings_are_other_than_the_databases_own_and_coarser_where_pictures_ch
 def test_what_lacks_levels_is_predicted_by_the_tables_of_the_original(db, walk, original) -> None:
     """Looking again, with the coarse textures on the walls, gives the same."""
     with copied(db) as copy:
-        coarse = built(copy, max_side=16)
+        coarse = built(copy, max_side=16, preview=0)
         world = compared(coarse, walk, original)
         own = read_pyramids(coarse)
     assert begins_with(original.pyramids, own)
@@ -219,6 +219,25 @@ def test_the_same_database_shows_the_same(db, walk, original) -> None:
     world = compared(read_served(db), walk, original)
     np.testing.assert_array_equal(world.views.error, original.views.error)
     np.testing.assert_array_equal(world.views.sight, original.views.sight)
+
+
+def test_other_previews_have_other_errors_and_the_same_reference(db, walk, original) -> None:
+    assert len(original.lossy.state) > 0
+    with copied(db) as copy:
+        worse = compared(built(copy, preview=10), walk, original)
+    with copied(db) as copy:
+        lossy = compared(built(copy, exact="never"), walk, original)
+    known = original.pyramids.levels[original.views.texture] + 2
+    exact = (np.arange(original.views.error.shape[1]) < known[:, None]) & (
+        original.views.texture >= 0
+    )[:, None]
+    assert (worse.views.error[exact] == original.views.error[exact]).all()
+    states = ~exact & (original.views.error > 0)
+    assert worse.views.error[states].sum() > 1.01 * original.views.error[states].sum()
+    # Without exact levels all that is there is off by the finest preview.
+    few = np.flatnonzero(lossy.catalogue.stored < lossy.catalogue.levels)
+    rows = np.flatnonzero(np.isin(lossy.views.texture, few) & (lossy.views.need[:, -1] > 0))
+    assert lossy.views.error[rows, lossy.pyramids.levels[lossy.views.texture[rows]] + 1].min() > 0
 
 
 def test_a_stage_runs_again_where_it_is_current(db) -> None:
