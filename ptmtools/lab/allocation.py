@@ -1,9 +1,12 @@
-"""Compiled choice of texture levels by their worth per byte.
+"""Compiled choice of texture levels, and of their sources, by worth per byte.
 
 The worth of each level is given. A coarse level of no worth may lead to a fine one of some worth,
 so a step comprises any number of levels, and the best step has the greatest worth per byte. Taking
 the steps of all textures in that order, as long as they fit, is the greedy solution of a knapsack
 whose items are chains.
+
+Tables by source (R, K) have the worth that each column adds in each source
+(`ptmtools.lab.catalogue`); the value of a column is the sum up to it.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.jit import kernel, plain_kernel
+from ptmtools.lab.previews import Previews
 
 #: Most exchanges of steps in one choice.
 _EXCHANGES = 8
@@ -122,30 +126,108 @@ def _least(worth: Floats, cost: Ints, column: Ints, kept: int) -> tuple[int, int
     return texture, to, lost
 
 
-@plain_kernel
-def next_fetch(
-    worth: Floats, ends: Ints, requested: Ints, last: Ints, overhead: int
-) -> tuple[float, int, int]:
-    """The texture whose next bytes are worth most: worth per byte, texture, and the column they
-    lead to; (0, -1, 0) if there is none.
+@kernel
+def offered(
+    worth: Floats, have: Ints, previews: Previews, present: Bools,
+    step: Floats, source: Ints, last: Ints,
+) -> None:  # fmt: skip
+    """Chooses the source of each column of each texture among those present: the exact one, else
+    the preview of the greatest value, of equal ones the finer.
 
     Parameters
     ----------
-    worth, ends: (T, K). requested: (T,) bytes requested already. last: (T,) wanted columns.
+    worth: (R, K). have: (T,) columns whose ranges are present. present: (P,) whether a preview is.
+    step: (T, K) becomes the worth that each column adds, from its best source, to the column
+        before. source: (T, K) becomes that source. last: (T,) becomes the last column with one.
+    """
+    count, total = len(have), np.zeros(len(present))
+    for t in range(count):
+        begin, end = previews.first[t], previews.first[t + 1]
+        value, last[t] = 0.0, have[t]
+        for p in range(begin, end):
+            if present[p]:
+                last[t] = max(last[t], previews.column[p])
+        for k in range(1, last[t] + 1):
+            best, of = -np.inf, t
+            for p in range(begin, end):
+                total[p] += worth[count + p, k]
+                if present[p] and k <= previews.column[p]:
+                    if previews.exact[p]:
+                        best, of = np.inf, count + p
+                    elif total[p] >= best:
+                        best, of = total[p], count + p
+            if k <= have[t] or best == np.inf:
+                step[t, k] = worth[t, k]
+                source[t, k] = t if k <= have[t] else of
+                value += worth[t, k]
+            else:
+                step[t, k] = best - value
+                source[t, k], value = of, best
+
+
+@plain_kernel
+def next_fetch(
+    worth: Floats, ends: Ints, stored: Ints, requested: Ints, busy: Bools, last: Ints,
+    previews: Previews, pending: Bools, overhead: int,
+) -> tuple[float, int, int]:  # fmt: skip
+    """The next bytes of greatest worth: worth per byte, source, and the column that they lead to;
+    (0, -1, 0) if there are none.
+
+    The worth is what they add to the greatest value of the requested sources at a wanted column;
+    that of ranges, at one which the file has, so that its levels follow a preview of finer ones.
+
+    Parameters
+    ----------
+    worth: (R, K). ends: (T, K) bytes up to each column, the finest of them ``stored`` (T,).
+    requested: (T,) bytes requested already. busy: (T,) whether no more ranges may be requested.
+    last: (T,) wanted columns.
+    pending: (P,) whether a preview was requested.
     overhead: further bytes of a request.
     """
-    best, texture, column = 0.0, -1, 0
+    best, source, column = 0.0, -1, 0
     for t in range(len(requested)):
-        requested_bytes = requested[t]
-        if requested_bytes >= ends[t, last[t]]:
-            continue
-        here = 0
-        while here < last[t] and ends[t, here + 1] <= requested_bytes:
+        until, exact, most, here = min(last[t], stored[t]), 0.0, 0.0, 0
+        while here < until and ends[t, here + 1] <= requested[t]:
             here += 1
-        density, to = best_step(worth[t], ends[t], here, requested_bytes - overhead, last[t])
-        if density > best:
-            best, texture, column = density, t, to
-    return best, texture, column
+            exact += worth[t, here]
+            most = max(most, exact)
+        coarse = most
+        for p in range(previews.first[t], previews.first[t + 1]):
+            if pending[p]:
+                row, finest = len(requested) + p, previews.column[p]
+                most = max(most, greatest(worth[row], min(finest, last[t]))[0])
+                coarse = max(coarse, greatest(worth[row], min(finest, until))[0])
+        own, of, to = 0.0, -1, 0
+        if not busy[t]:
+            total = exact - coarse
+            for k in range(here + 1, until + 1):
+                total += worth[t, k]
+                density = total / max(ends[t, k] - requested[t] + overhead, 1)
+                if total > 0.0 and density >= own:
+                    own, of, to = density, t, k
+        for p in range(previews.first[t], previews.first[t + 1]):
+            if pending[p]:
+                continue
+            row = len(requested) + p
+            value, k = greatest(worth[row], min(previews.column[p], last[t]))
+            density = (value - most) / max(previews.bytes[p] + overhead, 1)
+            if value > most and density >= own:
+                own, of, to = density, row, k
+        if own > best:
+            best, source, column = own, of, to
+    return best, source, column
+
+
+@plain_kernel
+def greatest(worth: Floats, last: int) -> tuple[float, int]:
+    """The greatest value of the columns of a source (K,) up to ``last``, at least 0, and the finest
+    column that has it."""
+    best, column, total = 0.0, 0, 0.0
+    for k in range(1, last + 1):
+        total += worth[k]
+        if total >= best:
+            best, column = total, k
+    return best, column
 
 
 @plain_kernel
@@ -201,8 +283,8 @@ def holes(
 @plain_kernel
 def picture(
     start: int, end: int, cell: Numbers, texture: Numbers, error: Singles,
-    square: Singles, need: Singles, loaded: Bools, column: Ints, colored: bool,
-    shown: Bools, drawn: Bools,
+    square: Singles, need: Singles, loaded: Bools, column: Ints, source: Ints, state: Ints,
+    colored: bool, shown: Bools, drawn: Bools,
 ) -> tuple[float, float, float]:  # fmt: skip
     """Sums up the rows of a frame: mean error, mean squared error, and the share of wanted levels
     that is missing. Marks what is displayed.
@@ -210,9 +292,9 @@ def picture(
     Parameters
     ----------
     cell, texture, error, square, need: see `Views`. loaded: (C,) whether the geometry is loaded.
-        column: (T,) resident.
+        column, source, state: (T,) resident column, its source, and its state (`Lossy`).
     colored: whether mean colours are known.
-    shown: (T, K) becomes true for columns that were wanted and resident. drawn: (C,) the same for
+    shown: (R, K) becomes true for columns that were wanted and resident. drawn: (C,) the same for
         geometry.
     """
     mean, squared, missing, wanted = 0.0, 0.0, 0.0, 0.0
@@ -230,7 +312,7 @@ def picture(
         if t < 0:
             continue
         held = column[t]
-        at = held + 1 if held > 0 else (1 if colored else 0)
+        at = state[t] + 1 if held > 0 else (1 if colored else 0)
         mean += error[r, at]
         squared += square[r, at]
         for k in range(need.shape[1]):
@@ -238,5 +320,5 @@ def picture(
             if k >= held:
                 missing += need[r, k]
             elif need[r, k] > 0.0:
-                shown[t, k + 1] = True
+                shown[source[t], k + 1] = True
     return mean, squared, missing / wanted if wanted > 0.0 else 0.0

@@ -5,6 +5,9 @@ The client decides which part it may use, by what has arrived.
 
 A texture with resident column k holds levels 0 to k − 1: column 0 is nothing. GPUs have no texels
 of three bytes, so RGB counts four; the paper counts three.
+
+A column has several *sources*: the `.ptm`, and previews (`ptmtools.lab.previews`). Tables by source
+have a row for each texture, which stands for its exact levels, and then one for each preview.
 """
 
 from __future__ import annotations
@@ -17,6 +20,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints, normals
+from ptmtools.lab.previews import LEAST, Previews, no_previews, previews_of
+from ptmtools.output.model import sizes_of
 from ptmtools.output.served import Document, Served
 from ptmtools.scene.colors import gradients
 from ptmtools.texture.model import gpu_texel_bytes
@@ -30,11 +35,13 @@ class Columns(NamedTuple):
     Attributes
     ----------
     levels: (T,) columns of each texture, without the first, which is nothing.
+    stored: (T,) those of them that files of ranges hold; finer ones exist as previews only.
     ends: (T, K) bytes of each column and those before it. memory: (T, K) bytes of texture memory.
     size: (T, K, 2) width and height of the finest image that each column shows.
     """
 
     levels: Ints
+    stored: Ints
     ends: Ints
     memory: Ints
     size: Ints
@@ -49,15 +56,15 @@ def texel_bytes(texture: Any, *, paper: bool = False) -> int:
 
 
 def columns_of(textures: Sequence[Any], *, paper: bool = False) -> Columns:
-    """Columns of `.ptm`s for entries of the index: bytes in the file, and texture memory of all
-    levels of a column."""
+    """Columns of `.ptm`s and previews for entries of the index: bytes in the `.ptm`, and texture
+    memory of all levels of a column."""
     rows = []
     for texture in textures:
-        shift = len(texture["ends"]) - 1 - np.arange(len(texture["ends"]))
-        sides = [np.maximum(1, texture[side] >> shift) for side in ("width", "height")]
-        each = np.cumsum(sides[0] * sides[1]) * texel_bytes(texture, paper=paper)
-        rows.append((texture["ends"], each, np.stack(sides, axis=1)))
-    return aligned(rows)
+        size, ends = np.array(sizes_of(texture)), texture["ends"]
+        each = np.cumsum(size.prod(axis=1)) * texel_bytes(texture, paper=paper)
+        rows.append(([*ends, *ends[-1:] * (len(size) - len(ends))], each, size))
+    stored = np.array([len(texture["ends"]) for texture in textures], dtype=np.int64)
+    return aligned(rows)._replace(stored=stored)
 
 
 def joined(first: Columns, second: Columns) -> Columns:
@@ -69,9 +76,9 @@ def joined(first: Columns, second: Columns) -> Columns:
         parts = (np.pad(a, [(0, 0), (0, wide - a.shape[1]), *rest], "edge") for a in (one, other))
         return np.concatenate(list(parts))
 
-    tables = zip(first[1:], second[1:], strict=True)
-    levels = np.concatenate([first.levels, second.levels])
-    return Columns(levels, *(both(*pair) for pair in tables))
+    tables = zip(first[2:], second[2:], strict=True)
+    counts = (np.concatenate(pair) for pair in zip(first[:2], second[:2], strict=True))
+    return Columns(*counts, *(both(*pair) for pair in tables))
 
 
 def aligned(rows: Sequence[tuple[Any, Any, Any]]) -> Columns:
@@ -85,12 +92,7 @@ def aligned(rows: Sequence[tuple[Any, Any, Any]]) -> Columns:
         for table, values in zip((ends, memory, size), row, strict=True):
             table[t, 1 : n + 1] = values
             table[t, n + 1 :] = table[t, n]
-    return Columns(last, ends, memory, size)
-
-
-#: Least difference of a level, 0 to 255: a level that only repeats the texels of the one below
-#: still sharpens the filtering between them.
-LEAST = 0.5
+    return Columns(last, last, ends, memory, size)
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,7 @@ class Catalogue:
 
     Attributes
     ----------
-    levels: (T,) columns of each texture, without the first.
+    levels, stored: (T,) columns of each texture, without the first; see `Columns`.
     ends: (T, K) bytes of the file up to each column; of several files, their sum.
     memory: (T, K) bytes of texture memory. size: (T, K, 2) width and height of the finest
         image that a column shows.
@@ -140,9 +142,11 @@ class Catalogue:
         leaves only of cells whose record has arrived.
     records, statistics: of each cell.
     shapes: see `Shapes`.
+    previews: see `Previews`.
     """
 
     levels: Ints
+    stored: Ints
     ends: Ints
     memory: Ints
     size: Ints
@@ -157,6 +161,7 @@ class Catalogue:
     records: tuple[Document, ...]
     statistics: Sequence[Document]
     shapes: Shapes
+    previews: Previews
 
     @property
     def texture_count(self) -> int:
@@ -172,6 +177,35 @@ class Catalogue:
     def whole(self) -> int:
         """Bytes of texture memory of all textures with all levels."""
         return int(self.memory[:, -1].sum())
+
+    @cached_property
+    def gains(self) -> Floats:
+        """(R, K) mean difference that each column of each source removes on pixels that want it, 0
+        to 255, less than 0 if its texels are worse than the column before."""
+        own = self.differences[self.previews.texture] - self.previews.losses(self.ends.shape[1])
+        own[np.arange(own.shape[1]) > self.previews.column[:, None]] = 0.0
+        return np.concatenate([self.differences, own])
+
+    def by_source(self, shares: Floats) -> Floats:
+        """(R, K) the (T, K) shares of the textures of all sources."""
+        return np.concatenate([shares, shares[self.previews.texture]])
+
+    @cached_property
+    def without_previews(self) -> Catalogue:
+        """The same catalogue for clients that know no previews."""
+        if not len(self.previews.texture):
+            return self
+        column, last = np.arange(self.ends.shape[1]), self.stored[:, None]
+        exists, each = column <= last, np.arange(self.texture_count)[:, None]
+        kept = each, np.minimum(column, last)
+        return replace(
+            self,
+            levels=self.stored,
+            memory=self.memory[kept],
+            size=self.size[kept],
+            differences=np.where(exists, self.differences, 0.0),
+            previews=no_previews(self.texture_count),
+        )
 
     @cached_property
     def first_shape(self) -> Ints:
@@ -211,9 +245,10 @@ class Catalogue:
         )
 
     def in_columns(self, columns: Columns) -> Catalogue:
-        """The same textures with other columns, all of the least difference."""
-        differences = np.where(_stored(columns), LEAST, 0.0)
-        return replace(self, **columns._asdict(), differences=differences)
+        """The same textures with other columns, all of the least difference, and no previews."""
+        differences = np.where(_existing(columns), LEAST, 0.0)
+        previews = no_previews(self.texture_count)
+        return replace(self, **columns._asdict(), differences=differences, previews=previews)
 
     def with_memory(self, memory: Ints) -> Catalogue:
         """The same catalogue with other texture memory (t, k) of the first textures."""
@@ -228,15 +263,17 @@ class Catalogue:
     ) -> Catalogue:
         """The same catalogue with further textures and shapes after its own; ``differences`` (T',
         K')."""
-        own = joined(Columns(self.levels, self.ends, self.memory, self.size), more)
+        each = (getattr(self, name) for name in Columns._fields)
+        own = joined(Columns(*each), more)
         wide = own.ends.shape[1]
-        each = [
+        wider = [
             np.pad(d, ((0, 0), (0, wide - d.shape[1]))) for d in (self.differences, differences)
         ]
         return replace(
             self,
             **own._asdict(),
-            differences=np.concatenate(each),
+            differences=np.concatenate(wider),
+            previews=self.previews.among(len(own.levels)),
             colors=np.concatenate([self.colors, np.zeros((len(more.levels), 3))]),
             shapes=self.shapes if shapes is None else self.shapes.joined_with(shapes),
         )
@@ -249,15 +286,15 @@ def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalog
     columns = columns_of(textures)
     differences_: Floats = np.zeros(columns.ends.shape)
     differences_[:, 1:] = differences[:, : differences_.shape[1] - 1]
-    if all(len(row.get("differences", ())) == len(row["ends"]) for row in textures):
+    if all(len(row.get("differences", ())) == len(sizes_of(row)) for row in textures):
         for into, row in zip(differences_, textures, strict=True):
-            into[1 : len(row["ends"]) + 1] = row["differences"]
+            into[1 : len(sizes_of(row)) + 1] = row["differences"]
     if textures and all("color" in row for row in textures):
         colors = np.array([row["color"] for row in textures], dtype=np.float64)
     boxes = np.array([cell["box"] for cell in served.index["cells"]], dtype=np.float64)
     low, high = boxes.reshape(-1, 2, 3).transpose(1, 0, 2).copy()
-    stored = _stored(columns)
-    differences_[stored] = np.maximum(differences_[stored], LEAST)
+    existing = _existing(columns)
+    differences_[existing] = np.maximum(differences_[existing], LEAST)
     return Catalogue(
         **columns._asdict(),
         differences=differences_,
@@ -271,10 +308,11 @@ def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalog
         records=served.records,
         statistics=served.statistics["cells"],
         shapes=_shapes(served),
+        previews=previews_of(textures),
     )
 
 
-def _stored(columns: Columns) -> Bools:
+def _existing(columns: Columns) -> Bools:
     """(T, K) which columns exist, without the first."""
     column = np.arange(columns.ends.shape[1])
     result: Bools = (column > 0) & (column <= columns.levels[:, None])

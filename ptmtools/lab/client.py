@@ -1,8 +1,8 @@
 """The base of all clients: requests of files, storage of arrivals, and an estimate of the link.
 
 A client has the index once it has arrived, then the record of its cell and the geometry of the
-visible cells; it requests ranges of a `.ptm` from its beginning on. Downloaded bytes stay in main
-memory; texture memory is limited.
+visible cells; it requests ranges of a `.ptm` from its beginning on, and whole previews. Downloaded
+bytes stay in main memory; texture memory is limited.
 
 `Estimate` is the client's estimate of its link, from recent downloads (§6.2: "network bandwidth and
 latency analysis performed for some recent downloadings"). Bandwidth is bytes over the time during
@@ -96,6 +96,7 @@ class Kind(IntEnum):
     GEOMETRY = 2
     TEXTURE = 3
     STATISTICS = 4
+    PREVIEW = 5
 
 
 #: Kinds that are neither textures nor geometry.
@@ -159,8 +160,9 @@ class Client(ABC):
     ----------
     world, link, budget: the walk, the link, and the limit of texture memory, bytes.
     frame: current frame.
-    index: whether it has the index. records, geometry, textures: see `Files`.
-    column: (T,) resident column of each texture.
+    index: whether it has the index. records, geometry, textures, previews: see `Files`.
+    column: (T,) resident column of each texture. source: (T,) its source, a row of tables by source
+        (`ptmtools.lab.catalogue`).
     estimate: estimate of the link.
     ticks: number of calls of `tick` between two frames, plus one.
     """
@@ -177,10 +179,12 @@ class Client(ABC):
             Kind.GEOMETRY: Files(Kind.GEOMETRY, stock.geometry_bytes.copy()),
             Kind.TEXTURE: Files(Kind.TEXTURE, stock.ends[:, -1]),
             Kind.STATISTICS: Files(Kind.STATISTICS, np.array([stock.statistics_bytes])),
+            Kind.PREVIEW: Files(Kind.PREVIEW, stock.previews.bytes),
         }
         self.records, self.geometry = self.files[Kind.RECORD], self.files[Kind.GEOMETRY]
-        self.textures = self.files[Kind.TEXTURE]
+        self.textures, self.previews = self.files[Kind.TEXTURE], self.files[Kind.PREVIEW]
         self.column = np.zeros(stock.texture_count, np.int64)
+        self.source = np.arange(stock.texture_count)
         self.estimate = Estimate(link, *PRIOR)
         self.waiting: list[Request] = []
         #: The cell whose record is in use: the current one, once its record has arrived.
@@ -193,10 +197,18 @@ class Client(ABC):
 
     @property
     def have(self) -> Ints:
-        """(T,) columns that are completely downloaded."""
+        """(T,) columns whose ranges are completely downloaded."""
         stock = self.world.catalogue
         held = (stock.ends <= self.textures.loaded[:, None]).sum(axis=1) - 1
-        columns: Ints = np.minimum(held, stock.levels)
+        columns: Ints = np.minimum(held, stock.stored)
+        return columns
+
+    @property
+    def exact(self) -> Ints:
+        """(T,) columns with an exact source."""
+        previews, columns = self.world.catalogue.previews, self.have
+        whole = previews.exact & self.previews.whole
+        np.maximum.at(columns, previews.texture[whole], previews.column[whole])
         return columns
 
     def look(self, frame: int) -> None:

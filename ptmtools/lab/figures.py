@@ -99,12 +99,12 @@ _STRIP_LINES, _LABEL, _GAP = 360, 26, 6
 
 def frames(world: World, run: Run, every: float) -> Iterator[tuple[str, bytes]]:
     """PNGs of the frames of a run, one each ``every`` seconds, named by their time."""
-    world = world.in_form(POLICIES[run.policy].form)
+    world = POLICIES[run.policy].in_world(world)
     renderer = Renderer(world, LINES)
     step = max(1, round(every * world.rate))
     for f in range(0, world.frames, step):
         sight = renderer.look(world.eye[f], world.direction[f])
-        colors = renderer.colors(sight, run.loaded[f], run.column[f])
+        colors = renderer.colors(sight, run.loaded[f], run.state[f])
         yield f"{world.time[f]:07.1f}.png", png(as_bytes(colors))
 
 
@@ -113,7 +113,7 @@ def strip(world: World, played: RunResult, paper: PaperOptions | None = None) ->
     without moving, and the full picture."""
     finished = played.run
     policy = POLICIES[finished.policy].configured(paper or PaperOptions())
-    world = world.in_form(policy.form)
+    world = policy.in_world(world)
     standing = world.standing(INSTANTS[-1])
     run = simulate(standing, policy, finished.conditions, finished.budget)
     renderer = Renderer(world, _STRIP_LINES, samples=3)
@@ -121,7 +121,7 @@ def strip(world: World, played: RunResult, paper: PaperOptions | None = None) ->
     frames = []
     for instant in INSTANTS:
         f = int(np.searchsorted(standing.time, instant - 0.5 / standing.rate))
-        colors = renderer.colors(sight, run.loaded[f], run.column[f])
+        colors = renderer.colors(sight, run.loaded[f], run.state[f])
         label = f"{instant:g} s, {run.fetched[f] / 1e6:.2f} MB, e {run.error[f]:.2f}"
         frames.append((label, as_bytes(colors)))
     frames.append(("full", as_bytes(renderer.full(sight))))

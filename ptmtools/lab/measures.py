@@ -163,13 +163,13 @@ class Flip:
         """(n,) the mean FLIP of each of the frames."""
         return np.array(
             [
-                self._of(k, run.loaded[f], run.column[f])
+                self._of(k, run.loaded[f], run.state[f])
                 for k, f in enumerate(self.frame.tolist())
             ]
         )  # fmt: skip
 
-    def _of(self, k: int, loaded: Bools, column: Ints) -> float:
-        return flip(self._full[k], self._renderer.colors(self._sights[k], loaded, column))
+    def _of(self, k: int, loaded: Bools, state: Ints) -> float:
+        return flip(self._full[k], self._renderer.colors(self._sights[k], loaded, state))
 
 
 def flip(reference: Floats, test: Floats) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.rendering.light import lamps
+from ptmtools.rendering.lossy import pictures
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.rendering.records import Shows, Sight, own_levels, triangles_of
 
@@ -28,7 +29,7 @@ class Renderer:
         self.height, self.samples = height, samples
         self.width = max(1, round(height * world.camera.aspect))
         self._world, self._full = world, own_levels(world.pyramids)
-        self._shows = self._full if world.shows is None else world.shows
+        self._shows = pictures(world.pyramids, world.lossy) if world.shows is None else world.shows
         camera = world.camera
         self._camera = Camera(
             self.width * samples,
@@ -45,10 +46,10 @@ class Renderer:
         """The surfaces seen from an eye (3,) in a direction (3,)."""
         return self._caster.look(self._camera, eye, direction)
 
-    def colors(self, sight: Sight, loaded: Bools, column: Ints) -> Floats:
-        """(height, width, 3) 0 to 255, with the loaded geometry of cells (C,) and a column (T,) of
+    def colors(self, sight: Sight, loaded: Bools, state: Ints) -> Floats:
+        """(height, width, 3) 0 to 255, with the loaded geometry of cells (C,) and a state (T,) of
         each texture."""
-        return self._drawn(sight, self._shows, loaded, column)
+        return self._drawn(sight, self._shows, loaded, state)
 
     def full(self, sight: Sight) -> Floats:
         """The full picture, whatever the form of the textures: all levels of the pyramids and of

@@ -28,7 +28,8 @@ class RowSums:
     Parameters
     ----------
     keys: (k, 2) pairs of cell and texture, each any number of times.
-    columns: number of columns with an error, besides those of nothing and of the mean colour.
+    levels: number of levels that pixels may want. states: number of states with an error, besides
+        those of nothing and of the mean colour.
     seen: (n,) which pixels belong to the item buffer of a client.
 
     Attributes
@@ -37,12 +38,14 @@ class RowSums:
     sums: tables for the kernels, by pair; ``pair`` is that of the keys.
     """
 
-    def __init__(self, keys: Ints | NDArray[np.int32], columns: int, seen: Bools) -> None:
+    def __init__(
+        self, keys: Ints | NDArray[np.int32], levels: int, states: int, seen: Bools
+    ) -> None:
         from ptmtools.rendering.kernels import Sums
 
         self._pairs, pair = np.unique(keys, axis=0, return_inverse=True)
         self.pair: Ints = pair.reshape(-1).astype(np.int64)
-        wide = (columns + 2, columns + 2, columns, columns)
+        wide = (states + 2, states + 2, levels, levels)
         self.sums = Sums(self.pair, *(np.zeros((len(self._pairs), n)) for n in wide))
         self._pixels = (len(seen), len(seen), len(seen), max(int(seen.sum()), 1))
         #: Pairs, and rows of each table: first of no frame, then of each.

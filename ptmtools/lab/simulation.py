@@ -38,7 +38,8 @@ class Run:
     quality: (F,) the paper's: levels downloaded over levels existing, of the textures of the
         visible set.
     memory: (F,) bytes of texture memory in use. fetched: (F,) bytes of bodies received so far.
-    column: (F, T) resident column of each texture. loaded: (F, C) whether the geometry is loaded.
+    column, state: (F, T) resident column of each texture, and its state
+        (`ptmtools.rendering.lossy`). loaded: (F, C) whether the geometry is loaded.
     body, overhead: bytes received of bodies and headers.
     documents: bytes of other bodies than textures and geometry.
     useful: bytes of textures and geometry that were displayed.
@@ -59,6 +60,7 @@ class Run:
     memory: Ints
     fetched: Floats
     column: Ints
+    state: Ints
     loaded: Bools
     body: float
     overhead: float
@@ -77,15 +79,16 @@ def simulate(world: World, policy: PolicyEntry, conditions: Conditions, budget: 
 
     Raises InputError PTM-I701 if the world was not prepared for that form.
     """
-    world = world.in_form(policy.form)
+    world = policy.in_world(world)
     link = Link(conditions)
     client = policy.client(world, link, budget)
     frames, stock, views = world.frames, world.catalogue, world.views
     error, square, missing, quality, fetched = (np.zeros(frames) for _ in range(5))
     memory = np.zeros(frames, np.int64)
-    column = np.zeros((frames, stock.texture_count), np.int64)
+    column, state = (np.zeros((frames, stock.texture_count), np.int64) for _ in range(2))
     loaded = np.zeros((frames, stock.cell_count), dtype=bool)
-    shown = np.zeros(stock.ends.shape, dtype=bool)
+    shown = np.zeros(stock.gains.shape, dtype=bool)
+    before_first = np.concatenate([np.zeros(stock.texture_count, np.int64), stock.previews.state])
     drawn = np.zeros(stock.cell_count, dtype=bool)
     each = np.arange(stock.texture_count)
     clock = _Clock(client, link)
@@ -96,20 +99,23 @@ def simulate(world: World, policy: PolicyEntry, conditions: Conditions, budget: 
             client.tick()
         clock.frame(f)
         column[f], loaded[f] = client.column, client.geometry.whole
+        state[f] = np.where(client.column > 0, before_first[client.source] + client.column, 0)
         memory[f] = stock.memory[each, client.column].sum()
         rows = views.rows(int(world.view[f]))
         error[f], square[f], missing[f] = picture(
             rows.start, rows.stop, views.cell, views.texture, views.error, views.square, views.need,
-            loaded[f], client.column, world.colored, shown, drawn,
+            loaded[f], client.column, client.source, state[f], world.colored, shown, drawn,
         )  # fmt: skip
         quality[f] = _quality(client)
         arriving = sum(request.received for request in client.waiting)
         fetched[f] = link.bytes - clock.page_bytes + arriving
         client.fetch()
-    steps = np.diff(column, axis=0, prepend=0)
-    before = column - steps
-    held = [stock.memory[each, columns] for columns in (column, before)]
-    textures = int((np.diff(stock.ends, axis=1) * shown[:, 1:]).sum())
+    held, offset = stock.memory[each, column], state - column
+    grown = np.maximum(np.diff(held, axis=0, prepend=0), 0)
+    replaced = (np.diff(offset, axis=0, prepend=offset[:1]) != 0) & (column > 0)
+    exact, previews = np.split(shown[:, 1:], [stock.texture_count])
+    textures = int((np.diff(stock.ends, axis=1) * exact).sum())
+    textures += int(stock.previews.bytes[previews.any(axis=1)].sum())
     return Run(
         policy=policy.name,
         conditions=conditions,
@@ -123,13 +129,14 @@ def simulate(world: World, policy: PolicyEntry, conditions: Conditions, budget: 
         memory=memory,
         fetched=fetched,
         column=column,
+        state=state,
         loaded=loaded,
         body=float(fetched[-1]),
         overhead=link.overhead_bytes,
         documents=sum(int(client.files[kind].loaded.sum()) for kind in DOCUMENTS),
         useful=textures + float(stock.geometry_bytes[drawn].sum()),
-        uploads=int(np.maximum(held[0] - held[1], 0).sum()),
-        switches=int(np.count_nonzero(steps)),
+        uploads=int(np.where(replaced, held, grown).sum()),
+        switches=int(np.count_nonzero(np.diff(state, axis=0, prepend=0))),
         requests=link.requests - clock.page,
         stalls=int((~loaded[np.arange(frames), world.cell]).sum()),
         overruns=int((memory > policy.limits(world, budget)).sum()),

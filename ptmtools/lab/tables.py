@@ -8,7 +8,8 @@ each at the client's level. Surfaces without texture have no error once their ce
 missing cells are grey.
 
 The same rays serve textures in several forms (`ptmtools.lab.forms`). A pixel samples each level of
-one pyramid once; a form whose steps are pyramids of their own (`Shows`) costs a sample of each.
+one pyramid once; a form whose steps are pyramids of their own (`Shows`) costs a sample of each, and
+so does each level of a lossy preview (`ptmtools.rendering.lossy`).
 
 The level of detail is that of a screen of 1080 lines, whatever the size of the item buffer: a
 coarser buffer samples fewer pixels of the same picture.
@@ -28,6 +29,7 @@ from ptmtools.lab.relief.tables import Relief, Tally as ReliefTally
 from ptmtools.lab.rows import Rows, RowSums
 from ptmtools.output.served import Surfaces
 from ptmtools.progress import Progress, silent
+from ptmtools.rendering.lossy import Lossy, no_previews
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.rendering.records import Pyramids, Shows, Sight, Triangles, triangles_of
 
@@ -41,9 +43,9 @@ class Views:
     start: (F + 1,) first row of each frame.
     cell, texture: (R,) int32 of each row; the texture is -1 for surfaces without. Octrees come
         after the textures, see `ptmtools.lab.relief`.
-    error, square: (R, L + 2) part of the frame's mean error, and mean squared error, with these as
-        the finest data: nothing, the mean colour, level 0, level 1, …; in other forms their columns
-        in place of levels.
+    error, square: (R, S + 1) part of the frame's mean error, and mean squared error, with these as
+        the finest data: nothing, the mean colour, then the states from 1 on (`Lossy`), which begin
+        with level 0, level 1, …; in other forms their columns in place of states.
     need: (R, L) share of the pixels that want a level, besides the coarser ones; for surfaces
         without texture the first is the share that they cover.
     sight: (R, L) the same in the item buffer that a client draws, with half as many pixels each
@@ -83,14 +85,16 @@ def look(
     forms: Sequence[Shows] = (),
     full: Pyramids | None = None,
     relief: Relief | None = None,
+    lossy: Lossy | None = None,
 ) -> list[Views]:
-    """The tables of (F, 3) eyes and unit directions of view: of ``pyramids``, and of the same
-    textures in other ``forms``; with octrees and other relief, if any. The reference is ``full``,
-    which holds the same textures in other quality, or ``pyramids``."""
+    """The tables of (F, 3) eyes and unit directions of view: of ``pyramids`` and their ``lossy``
+    previews, and of the same textures in other ``forms``; with octrees and other relief, if any.
+    The reference is ``full``, which holds the same textures in other quality, or ``pyramids``."""
     triangles, caster, seen = triangles_of(surfaces), Caster(surfaces), camera.sparse
     full = pyramids if full is None else full
+    lossy = no_previews(len(pyramids.levels)) if lossy is None else lossy
     shown: list[Pyramids | Shows] = [pyramids, *forms]
-    tallies = [_Tally(triangles, textures, full, seen) for textures in shown]
+    tallies = [_Tally(triangles, textures, lossy, full, seen) for textures in shown]
     relief_tally = ReliefTally(relief, surfaces, triangles, pyramids, seen) if relief else None
     owner = np.empty((len(eye), int(seen.sum())), np.int32)
     depth = np.empty(owner.shape, np.float32)
@@ -110,20 +114,27 @@ class _Tally:
     """Sums up errors of frames."""
 
     def __init__(
-        self, triangles: Triangles, textures: Pyramids | Shows, full: Pyramids, seen: Bools
+        self,
+        triangles: Triangles,
+        textures: Pyramids | Shows,
+        lossy: Lossy,
+        full: Pyramids,
+        seen: Bools,
     ) -> None:
         from ptmtools.rendering.kernels import add_columns, add_frame
 
         self._add: Callable[..., None]
         if isinstance(textures, Shows):
-            self._add, deepest = add_columns, textures.row.shape[1] - 1
+            self._add, levels = add_columns, textures.row.shape[1] - 1
             self._what: tuple[Any, ...] = seen, triangles, textures, full
+            states = levels
         else:
-            self._add, deepest = add_frame, textures.start.shape[1]
-            self._what = seen, triangles, textures, full, textures is full
+            self._add, levels = add_frame, textures.start.shape[1]
+            self._what = seen, triangles, textures, lossy, full, textures is full
+            states = max(levels, lossy.states)
         keys = np.stack([triangles.cell, triangles.texture], axis=1)
-        self._sums = RowSums(keys, deepest, seen)
-        self._room = np.zeros((deepest + 7, 3))
+        self._sums = RowSums(keys, levels, states, seen)
+        self._room = np.zeros((states + 7, 3))
         self.rows = self._sums.rows
 
     def add(self, sight: Sight) -> None:
@@ -166,8 +177,8 @@ def _views(parts: Sequence[Rows], owner: NDArray[np.int32], depth: Singles) -> V
 
 
 def limited(views: Views, count: Ints) -> Views:
-    """The views with textures that lack their finest levels; ``count`` (T,) is the number of levels
-    of each. Missing levels stay an error."""
+    """The views with textures that lack their finest levels and have no previews; ``count`` (T,) is
+    the number of levels of each. Missing levels stay an error."""
     deepest = int(count.max(initial=1))
     # One more, for surfaces without texture: the last.
     has = np.arange(deepest) < np.append(count, deepest)[views.texture, None]

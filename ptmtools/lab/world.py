@@ -20,6 +20,7 @@ from ptmtools.lab.relief.tables import Relief
 from ptmtools.lab.tables import Views, look
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress, silent
+from ptmtools.rendering.lossy import Lossy, read_lossy
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.rays import Camera, Frustum
 from ptmtools.rendering.records import Pyramids, Shows
@@ -48,7 +49,7 @@ class World:
 
     Attributes
     ----------
-    served, pyramids: the served files, and all levels of the `.ptm`s.
+    served: the served files. pyramids: all levels of the textures. lossy: see `Lossy`.
     catalogue: the catalogue of clients.
     views, view: the tables of the screen, and (F,) the view of each frame.
     camera: the camera of the item buffer.
@@ -64,13 +65,14 @@ class World:
     colored: whether clients know the mean colour of each texture; else it is grey until its first
         level arrives.
     form: form of the textures, a name in `ptmtools.lab.forms.FORMS`.
-    shows: images of the columns, None for the levels of the pyramids.
+    shows: images of the columns, None for the levels of the pyramids and previews.
     relief: octrees, which come after the textures, and the reference of pictures; None: neither.
     other_forms: the same world in other forms, by name.
     """
 
     served: Served
     pyramids: Pyramids
+    lossy: Lossy
     catalogue: Catalogue
     views: Views
     view: Ints
@@ -164,6 +166,7 @@ def prepare(
     views: Views | None = None,
     forms: Mapping[str, Shows] | None = None,
     relief: Relief | None = None,
+    lossy: Lossy | None = None,
 ) -> World:
     """The world of a walk.
 
@@ -175,12 +178,13 @@ def prepare(
     views: those of this walk, if already made.
     forms: other forms of textures, as read by `read_forms`.
     relief: octrees and another reference database (`relief_of`).
+    lossy: previews of this database, if already read.
 
     Raises
     ------
     InputError: PTM-I700 the walk does not lead through this database.
     LimitError: PTM-L400 it is too long.
-    DatabaseError, LimitError: those of `read_pyramids`.
+    DatabaseError, LimitError: those of `read_pyramids` and `read_lossy`.
     """
     time, browser = frame_times(walk, rate), walk.browser
     if browser:
@@ -202,6 +206,7 @@ def prepare(
     known = np.maximum.accumulate(np.where(astray, -1, np.arange(len(cell))))
     cell = cell[np.where(known < 0, int(np.argmax(~astray)), known)]
     textures = read_pyramids(served, progress) if pyramids is None else pyramids
+    lossy = read_lossy(served, progress) if lossy is None else lossy
     if full is None and relief and relief.reference:
         full = relief.reference.pyramids
     camera = Camera(*pixels, walk.field_of_view, walk.aspect)
@@ -216,13 +221,14 @@ def prepare(
         shows = [*(forms or {}).values()]
         views, *others = look(
             served.surfaces, textures, camera, eyes, looks, progress, forms=shows, full=full,
-            relief=relief,
+            relief=relief, lossy=lossy,
         )  # fmt: skip
     catalogue = catalogue_of(served, textures.differences, textures.mean)
     catalogue = catalogue.with_browser_sizes(browser) if browser else catalogue
     world = World(
         served=served,
         pyramids=textures,
+        lossy=lossy,
         catalogue=catalogue,
         views=views,
         view=view.reshape(-1).astype(np.int64),

@@ -10,6 +10,7 @@ from hypothesis import given, settings, strategies as st
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.lab.allocation import allocate, holes, next_fetch, picture
+from ptmtools.lab.previews import no_previews
 from tests.lab.worlds import SEEDS, any_world
 
 Case = tuple[Floats, Ints, Ints, int]
@@ -95,7 +96,11 @@ def test_the_next_bytes(case: Case, seed: int, overhead: int) -> None:
             gain = float(worth[t, whole + 1 : k + 1].sum())
             if gain > 0:
                 options[t, k] = gain / float(ends[t, k] - asked[t] + overhead)
-    density, texture, column = next_fetch(worth, ends, asked, last, overhead)
+    free, none = np.zeros(len(last), np.bool_), np.zeros(0, np.bool_)
+    stored = np.full(len(last), ends.shape[1] - 1)
+    density, texture, column = next_fetch(
+        worth, ends, stored, asked, free, last, no_previews(len(last)), none, overhead
+    )
     if not options:
         assert (density, texture, column) == (0.0, -1, 0)
     else:
@@ -159,7 +164,7 @@ def test_the_picture_of_a_frame(seed: int, colored: bool) -> None:
         shown, drawn = np.zeros(stock.ends.shape, np.bool_), np.zeros(stock.cell_count, np.bool_)
         actual = picture(
             rows.start, rows.stop, views.cell, views.texture, views.error, views.square,
-            views.need, there, column, colored, shown, drawn,
+            views.need, there, column, np.arange(len(column)), column, colored, shown, drawn,
         )  # fmt: skip
         sums, levels, seen = np.zeros(2), np.zeros(2), np.zeros_like(shown)
         for r in range(rows.start, rows.stop):

@@ -30,6 +30,7 @@ def run_of(error: list[float], still: list[bool]) -> Run:
         memory=np.zeros(count, np.int64),
         fetched=np.zeros(count),
         column=np.zeros((count, 1), np.int64),
+        state=np.zeros((count, 1), np.int64),
         loaded=np.ones((count, 1), dtype=bool),
         body=1000.0,
         overhead=30.0,

@@ -18,6 +18,7 @@ from ptmtools.lab.figures import frames, strip
 from ptmtools.lab.renderer import Renderer
 from ptmtools.lab.world import World
 from ptmtools.output.served import Surfaces
+from ptmtools.rendering.lossy import no_previews
 from ptmtools.rendering.rays import Camera
 from ptmtools.rendering.records import Pyramids
 
@@ -59,6 +60,7 @@ def card() -> Any:
         served=SimpleNamespace(surfaces=surfaces),
         relief=None,
         pyramids=textures,
+        lossy=no_previews(1),
         camera=Camera(2, 1, np.pi / 2, 2.0),
         catalogue=SimpleNamespace(cell_count=1, levels=np.array([2])),
         shows=None,

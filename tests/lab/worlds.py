@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.lab.catalogue import Catalogue, Shapes
 from ptmtools.lab.policies import POLICIES
+from ptmtools.lab.previews import AVERAGING, LEAST, previews_of
 from ptmtools.lab.tables import Views
 from ptmtools.lab.world import STILL_SECONDS, World
 from ptmtools.rendering.rays import Camera, Frustum
@@ -31,10 +32,28 @@ _FACES = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], 
 
 @dataclass(frozen=True)
 class Texture:
-    """Bytes of each level in the file and in texture memory, the coarsest first."""
+    """Bytes of each level in the file and in texture memory, the coarsest first; memory of more
+    levels than the file has, if the finest exist as previews only.
+
+    Attributes
+    ----------
+    previews: level, bytes and difference of each, by ascending level.
+    exact: whether the last preview is the exact form.
+    """
 
     groups: tuple[int, ...]
     memory: tuple[int, ...]
+    previews: tuple[tuple[int, int, float], ...] = ()
+    exact: bool = False
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """Its previews in a row of the index."""
+        fields = ("level", "bytes", "difference")
+        rows: list[Any] = [dict(zip(fields, each, strict=True)) for each in self.previews]
+        if self.exact:
+            rows[-1]["exact"] = True
+        return {"ends": self.groups, "previews": rows}
 
 
 def leaf(low: Floats, high: Floats) -> dict[str, Any]:
@@ -60,13 +79,15 @@ def catalogue(
 ) -> Catalogue:
     """What is served: ``shapes`` are cells and textures, ascending by cell. Without ``random`` each
     shape is the whole of its room, and a cell covers the more the nearer it is."""
-    count = np.array([len(t.groups) for t in textures], dtype=np.int64)
+    count = np.array([len(t.memory) for t in textures], dtype=np.int64)
     wide = int(count.max(initial=0)) + 1
     ends, memory = (np.zeros((len(textures), wide), np.int64) for _ in range(2))
     differences = np.zeros((len(textures), wide))
     for t, texture in enumerate(textures):
         for table, each in ((ends, texture.groups), (memory, texture.memory)):
-            table[t, 1:] = np.cumsum([*each, *[0] * (wide - 1 - count[t])])
+            table[t, 1:] = np.cumsum([*each, *[0] * (wide - 1 - len(each))])
+        if any(texture.previews for texture in textures):
+            differences[t, 1] = LEAST
         each = 8.0 if random is None else random.uniform(1, 20, count[t] - 1)
         differences[t, 2 : count[t] + 1] = each
     cell, texture_of = np.array(shapes, dtype=np.int64).reshape(-1, 2).T
@@ -80,6 +101,7 @@ def catalogue(
     records = tuple(_record(c, cells, textures, shapes, random) for c in range(cells))
     return Catalogue(
         levels=count,
+        stored=np.array([len(t.groups) for t in textures], dtype=np.int64),
         ends=ends,
         memory=memory,
         size=np.repeat(memory[:, :, None], 2, axis=2),
@@ -94,6 +116,7 @@ def catalogue(
         records=records,
         statistics=[{"views": np.tile(r["ach"], (6, 1)).tolist()} for r in records],
         shapes=own,
+        previews=previews_of([texture.row for texture in textures]),
     )
 
 
@@ -121,7 +144,7 @@ def _record(
         "leaves": [leaf(low, low + ROOM)],
         "textures": rows,
         "textureShares": [[[None, 1.0], *([t, 1.0] for t in row)] for row in rows],
-        "need": [[t, 0, *[0.5 / len(textures)] * len(x.groups)] for t, x in enumerate(textures)],
+        "need": [[t, 0, *[0.5 / len(textures)] * len(x.memory)] for t, x in enumerate(textures)],
         "portals": [
             {"neighbour": c, "polygon": _door(low[0] + (ROOM[0] if c > cell else 0))} for c in doors
         ],
@@ -146,6 +169,7 @@ def world(
     return World(
         served=None,  # type: ignore[arg-type] # no client reads files
         pyramids=None,  # type: ignore[arg-type]
+        lossy=None,  # type: ignore[arg-type]
         catalogue=stock,
         views=_views(stock, eye, direction, cell, random),
         view=np.arange(frames),
@@ -168,8 +192,9 @@ def _still(pose: Floats) -> Bools:
 def _views(
     stock: Catalogue, eye: Floats, direction: Floats, cell: Ints, random: np.random.Generator | None
 ) -> Views:
-    shapes, deepest = stock.shapes, stock.ends.shape[1] - 1
-    wide = (deepest + 2, deepest + 2, deepest, deepest)
+    shapes, deepest, previews = stock.shapes, stock.ends.shape[1] - 1, stock.previews
+    states = max(deepest, int((previews.state + previews.column).max(initial=0)))
+    wide = (states + 2, states + 2, deepest, deepest)
     start, pairs = [0], []
     tables: list[list[Floats]] = [[] for _ in wide]
     for f in range(len(eye)):
@@ -183,8 +208,10 @@ def _views(
         for c, t in shown.tolist():
             pairs.append((c, t))
             share = 1 / len(shown) if random is None else random.uniform(0.1, 1) / len(shown)
-            for table, row in zip(tables, _row(stock, t, share, random), strict=True):
-                table.append(row)
+            for table, row, columns in zip(
+                tables, _row(stock, t, share, random), wide, strict=True
+            ):
+                table.append(np.pad(row, (0, columns - len(row))))
         start.append(len(pairs))
     rows = [
         np.array(table).reshape(-1, columns).astype(np.float32)
@@ -217,7 +244,23 @@ def _row(
             : wanted + 1
         ]
         need[:wanted] = share * np.linspace(1, 0.5, wanted)
+        wrong = _with_previews(stock, texture, wanted, wrong)
     return wrong * share, wrong**2 * share, need, need.copy()
+
+
+def _with_previews(stock: Catalogue, texture: int, wanted: int, wrong: Floats) -> Floats:
+    """The errors of all states of a texture: those of lossy previews on top of missing levels."""
+    previews, states = stock.previews, [*wrong]
+    for p in range(previews.first[texture], previews.first[texture + 1]):
+        if previews.exact[p]:
+            continue
+        column = int(previews.column[p])
+        assert len(states) >= previews.state[p] + 2
+        del states[previews.state[p] + 2 :]
+        for k in range(1, column + 1):
+            own = previews.difference[p] * AVERAGING ** (column - min(k, wanted))
+            states.append(float(np.hypot(wrong[k + 1], own)))
+    return np.array(states)
 
 
 def for_policy(world: World, policy: str) -> World:
@@ -242,7 +285,7 @@ def strolling(stock: Catalogue, seconds: float) -> World:
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-def any_world(seed: int, frames: int = 25) -> World:
+def any_world(seed: int, frames: int = 25, *, previews: bool = False) -> World:
     """A few rooms and textures, and a walk that turns, stops and comes back."""
     random = np.random.default_rng(seed)
     cells, count = int(random.integers(1, 6)), int(random.integers(1, 7))
@@ -252,6 +295,8 @@ def any_world(seed: int, frames: int = 25) -> World:
         groups = np.maximum(random.integers(3, 12) * 3 ** np.arange(levels), 1)
         memory = random.integers(1, 5) * 4 ** np.arange(levels)
         textures.append(Texture(tuple(groups.tolist()), tuple(memory.tolist())))
+        if previews:
+            textures[-1] = _any_previews(random, textures[-1])
     shapes = sorted(
         (int(random.integers(cells)), int(random.integers(-1, count)))
         for _ in range(int(random.integers(1, 12)))
@@ -266,3 +311,19 @@ def any_world(seed: int, frames: int = 25) -> World:
     eye = np.stack([x, np.full(frames, 1.6), np.full(frames, 2.0)], axis=1)
     direction = np.stack([np.cos(yaw), np.zeros(frames), np.sin(yaw)], axis=1)
     return world(stock, eye, direction, random)
+
+
+def _any_previews(random: np.random.Generator, texture: Texture) -> Texture:
+    """The texture with previews of some levels; some have their finest levels as previews only."""
+    levels = len(texture.memory)
+    chosen = np.flatnonzero(random.random(levels) < 0.6).tolist()
+    stored = int(random.integers(1, levels + 1)) if random.random() < 0.5 else levels
+    if stored < levels and levels - 1 not in chosen:
+        chosen.append(levels - 1)
+    size = sum(texture.groups) // 8 * random.random(len(chosen)) + 1
+    previews = [
+        (level, int(size[n] * 4.0 ** (level - levels)) + 1, float(random.uniform(0, 9)))
+        for n, level in enumerate(chosen)
+    ]
+    exact = bool(chosen) and chosen[-1] == levels - 1 and bool(random.random() < 0.5)
+    return Texture(texture.groups[:stored], texture.memory, tuple(previews), exact)

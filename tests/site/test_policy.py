@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from ptmtools.lab.catalogue import catalogue_of
 from ptmtools.lab.client import PRIOR, Estimate
 from ptmtools.lab.network import Link, Request
 from ptmtools.lab.policies.paper_kernels import refresh, share_out
+from ptmtools.lab.previews import no_previews
 from ptmtools.lab.world import World
 from ptmtools.link import Conditions
 from tests.lab.conftest import two_rooms, walk_file, world
@@ -67,8 +69,9 @@ def test_what_is_fetched_next(tmp_path: Path) -> None:
         random = np.random.default_rng(seed)
         worth, ends, last = tall(random)
         asked, busy = random.integers(0, ends[:, -1] + 1), random.random(len(last)) < 0.3
-        free = np.where(busy, ends[:, -1], asked)
-        expected.append(list(next_fetch(worth, ends, free, last, 5)))
+        none, stored = no_previews(len(last)), np.full(len(last), ends.shape[1] - 1)
+        pending = np.zeros(0, np.bool_)
+        expected.append(list(next_fetch(worth, ends, stored, asked, busy, last, none, pending, 5)))
         reported = {"worth": worth, "ends": ends, "asked": asked, "last": last, "busy": busy}
         calls.append(("next", {k: v.tolist() for k, v in reported.items()} | {"overhead": 5}))
     assert called(tmp_path, calls) == expected
@@ -194,7 +197,8 @@ def test_walks(tmp_path_factory: pytest.TempPathFactory, policy: str, seed: int)
 def test_a_walk_through_a_database(
     tmp_path: Path, world: World, policy: str, bandwidth: float
 ) -> None:
-    witness = Witness(world, policy, world.catalogue.whole // 4)
+    bare = replace(world, catalogue=world.catalogue.without_previews)
+    witness = Witness(bare, policy, bare.catalogue.whole // 4)
     witness.walk(Conditions(bandwidth))
     answers = witness.in_javascript(tmp_path)
     assert same(answers, witness.answers)

@@ -137,7 +137,7 @@ def _missing(client: Client) -> int | None:
     seen |= (known == here) | (client.placeholders(1)[known] > 0)
     count += int((seen & ~client.geometry.whole[known]).sum())
     hold, kept, best = client._worth.hold, client._kept, np.zeros(len(stock.levels), np.int64)
-    worth = hold + HELD_ON * kept + HELD_ON**2 * stock.differences
+    worth = hold + HELD_ON * kept + HELD_ON**2 * stock.gains
     allocate(worth, stock.memory, stock.levels, client.budget, best, False)
     column = np.arange(stock.ends.shape[1])
     absent = (column > client.have[:, None]) & (column <= best[:, None])

@@ -292,6 +292,7 @@ def _run(
         memory=run.memory,
         fetched=run.fetched,
         column=np.zeros((frames, 0), np.int64),
+        state=np.zeros((frames, 0), np.int64),
         loaded=np.zeros((frames, 0), np.bool_),
         body=run.body,
         overhead=run.overhead,

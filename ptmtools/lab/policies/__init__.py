@@ -36,6 +36,7 @@ class PolicyEntry:
     options: its own options, if any; see `configured`.
     needs: a field that the records of cells must have, and how to get it; None: no optional field.
     form: form of its textures, a name in `ptmtools.lab.forms.FORMS`.
+    previews: whether its clients show previews; those of others have the `.ptm`s only.
     """
 
     name: str
@@ -43,6 +44,7 @@ class PolicyEntry:
     client: Callable[..., Client]
     needs: tuple[str, str] | None = None
     form: str = PTM
+    previews: bool = False
     options: PaperOptions | None = None
 
     def configured(self, options: PaperOptions) -> PolicyEntry:
@@ -50,6 +52,14 @@ class PolicyEntry:
         if self.options is None:
             return self
         return replace(self, options=options, client=partial(self.client, options=options))
+
+    def in_world(self, world: World) -> World:
+        """The world as its clients know it: textures in their form. Raises InputError PTM-I701 if
+        the world was not prepared for that form."""
+        world = world.in_form(self.form)
+        if self.previews:
+            return world
+        return replace(world, catalogue=world.catalogue.without_previews)
 
     def limits(self, world: World, budget: int) -> Ints:
         """(F,) bytes of texture memory that a client with a budget may use in each frame."""
@@ -108,8 +118,12 @@ _LIST = (
         needs=("need", "measure it with `ptm emit DB --need 16`"),
     ),
     PolicyEntry(
-        "best", "policy of the viewer: screen area, needed resolution and distance", _engine(BEST)
+        "best",
+        "policy of the viewer: screen area, needed resolution and distance, also for previews",
+        _engine(BEST),
+        previews=True,
     ),
+    PolicyEntry("best-exact", "best without previews", _engine(BEST)),
     PolicyEntry(
         "apo",
         "client of Lacoste et al., §4.2: octree textures level by level; other textures as in best",
@@ -117,11 +131,12 @@ _LIST = (
         form="octree",
     ),
     PolicyEntry("best+apo", "best, also for octree textures", _engine(BEST), form="octree"),
-    PolicyEntry("oracle", "greedy, with knowledge of the whole walk", _oracle),
+    PolicyEntry("oracle", "greedy, with knowledge of the whole walk", _oracle, previews=True),
     PolicyEntry(
         "oracle-exchange",
         "as oracle, but also exchanges levels in memory",
         partial(_oracle, exchanging=True),
+        previews=True,
     ),
 )
 #: Policies by name.

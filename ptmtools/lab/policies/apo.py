@@ -121,7 +121,7 @@ class ApoClient(EngineClient):
         return min(coarse)[2] if coarse else None
 
     def _levels_asked(self, octree: int) -> int:
-        asked = self._asked()[octree]
+        asked = self.textures.asked[octree]
         return int((self.world.catalogue.ends[octree] <= asked).sum()) - 1
 
     def _asked_bytes(self) -> int:

@@ -3,8 +3,10 @@
 A policy computes the current worth of each level of each texture, and of the geometry of each cell.
 The engine chooses the levels for texture memory, to the last that fits, and requests the missing
 ones by worth per byte, in ranges of a fraction of a second, so that few bytes are under way that
-may become unwanted. When nothing is missing it continues with the most valuable levels beyond the
-budget, which stay in main memory.
+may become unwanted, or as previews, which are requested as a whole. A preview counts as the worth
+that it adds to the best source that was requested, so a step may leap over levels, and the exact
+ones follow when their worth per byte is the greatest. When nothing is missing the engine continues
+with the most valuable levels beyond the budget, which stay in main memory.
 
 Records and geometry compete with textures by the same measure: a cell without geometry is grey, and
 its worth is the error of that. Both are requested as a whole, since browsers get no ranges of
@@ -26,7 +28,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.lab.allocation import allocate, gather, holes, next_fetch
+from ptmtools.lab.allocation import allocate, gather, holes, next_fetch, offered
 from ptmtools.lab.client import Client, Kind
 from ptmtools.lab.network import Link, Request
 from ptmtools.lab.world import World
@@ -118,10 +120,11 @@ class Worth:
 
     Attributes
     ----------
-    hold: (T, K) that each column adds on the screen now to those before it.
-    fetch: (T, K) that it adds now and soon.
+    hold: (R, K) that each column of each source adds on the screen now to those before it.
+    fetch: (R, K) that it adds now and soon.
     geometry: (C,) that the geometry of a cell adds.
-    ahead: (T, K) of fetching beyond the budget; None: no such fetching.
+    ahead: (R, K) of fetching beyond the budget; None: no such fetching.
+    sight: (T, K) share of the view that wants each column; None: unknown.
     exact: see `allocate`.
     """
 
@@ -129,6 +132,7 @@ class Worth:
     fetch: Floats
     geometry: Floats
     ahead: Floats | None = None
+    sight: Floats | None = None
     exact: bool = False
 
 
@@ -149,7 +153,7 @@ class EngineClient(Client):
         self._policy, self._statistics = policy, statistics
         stock = world.catalogue
         self._target: Ints = np.zeros(stock.texture_count, np.int64)
-        self._kept = np.zeros(stock.ends.shape)
+        self._kept = np.zeros(stock.gains.shape)
         self._worth: Worth | None = None
         self._items, self._looked = ItemBuffers(self), -math.inf
         #: Budget including the second copy of a growing texture.
@@ -222,22 +226,39 @@ class EngineClient(Client):
         now = float(self.world.time[self.frame])
         fading = 0.5 ** ((now - self._looked) / HELD_SECONDS)
         self._looked = now
-        self._kept = np.maximum(self._kept * fading, hold)
+        # The greatest share of late, whatever the sign of what it counts for.
+        kept = self._kept * fading
+        self._kept = np.where(np.abs(hold) > np.abs(kept), hold, kept)
         stock = self.world.catalogue
-        worth = hold + HELD_ON * self._kept + HELD_ON**2 * stock.differences
-        allocate(worth, stock.memory, self.have, self.budget, self.column, exact)
+        worth = hold + HELD_ON * self._kept + HELD_ON**2 * stock.gains
+        step, source = np.zeros(stock.ends.shape), np.zeros(stock.ends.shape, np.int64)
+        last = np.zeros(stock.texture_count, np.int64)
+        offered(worth, self.have, stock.previews, self.previews.whole, step, source, last)
+        last = np.where(self._suffices(), self.exact, last)
+        allocate(step, stock.memory, last, self.budget, self.column, exact)
         while self.world.browser and self._grow():
             self.budget = self._all - self._reserve
-            allocate(worth, stock.memory, self.have, self.budget, self.column, exact)
+            allocate(step, stock.memory, last, self.budget, self.column, exact)
+        self.source = source[np.arange(len(last)), self.column]
 
     def arrived(self, request: Request) -> None:
         """See `Client.arrived`."""
         super().arrived(request)
-        if request.tag.kind != Kind.TEXTURE:  # type: ignore[attr-defined]
+        if request.tag.kind not in (Kind.TEXTURE, Kind.PREVIEW):  # type: ignore[attr-defined]
             if self.cell < 0 and self.records.whole[self.world.cell[self.frame]]:
                 self.cell = int(self.world.cell[self.frame])
             self._items.note()
             self._weigh()
+
+    def _suffices(self) -> Bools:
+        """(T,) the textures in view whose exact columns are all that the view wants: no finer
+        preview takes their place."""
+        stock = self.world.catalogue
+        if self._worth is None or self._worth.sight is None:
+            return np.zeros(stock.texture_count, dtype=bool)
+        sight, beyond = self._worth.sight, np.arange(stock.ends.shape[1]) > self.exact[:, None]
+        result: Bools = (sight[:, 1] > 0) & ~(beyond & (sight > 0)).any(axis=1)
+        return result
 
     def _grow(self) -> bool:
         """Reserves memory for the second copy of a texture while it grows: the largest texture
@@ -254,7 +275,7 @@ class EngineClient(Client):
         if self.cell >= 0 and (self.files[Kind.STATISTICS].whole[0] or not self._statistics):
             stock = self.world.catalogue
             self._worth = self._policy(self)
-            fetch, exact = self._worth.fetch, self._worth.exact
+            fetch, exact = self._worth.fetch[: stock.texture_count], self._worth.exact
             allocate(fetch, stock.memory, stock.levels, self.budget, self._target, exact)
 
     def fetch(self) -> None:
@@ -284,8 +305,9 @@ class EngineClient(Client):
         if self._worth is None:
             return False
         stock, worth = self.world.catalogue, self._worth
-        asked, overhead = self._asked(), self._overhead()
-        best, texture, column = next_fetch(worth.fetch, stock.ends, asked, self._target, overhead)
+        # With little memory a preview may show more columns than are wanted of the exact levels.
+        last = np.maximum(self._target, np.where(self.column > self.exact, self.column, 0))
+        best, source, column = self._next_fetch(worth.fetch, last)
         size = np.maximum(self.geometry.size, 1)
         density = np.where(self.geometry.asked == 0, worth.geometry / size, 0.0)
         cell = int(density.argmax())
@@ -297,22 +319,23 @@ class EngineClient(Client):
                 return self.whole(Kind.RECORD, least, record)
         if density[cell] > best:
             return self.whole(Kind.GEOMETRY, cell, float(density[cell]))
-        if texture < 0 and worth.ahead is not None:
-            best, texture, column = next_fetch(
-                worth.ahead, stock.ends, asked, stock.levels, overhead
-            )
-        if texture < 0:
+        if source < 0 and worth.ahead is not None:
+            best, source, column = self._next_fetch(worth.ahead, stock.levels)
+        if source < 0:
             return False
-        return self._range(texture, int(stock.ends[texture, column]), best)
+        if source >= stock.texture_count:
+            return self.whole(Kind.PREVIEW, source - stock.texture_count, best)
+        return self._range(source, int(stock.ends[source, column]), best)
 
-    def _asked(self) -> Ints:
-        """(T,) bytes from the beginning of each texture that are not to be requested: with one
-        range a file at a time, the whole file while one is pending."""
-        asked = self.textures.asked
-        if not self.world.one_range:
-            return asked
-        under_way = asked > self.textures.loaded
-        return np.where(under_way, self.textures.size, asked)
+    def _next_fetch(self, worth: Floats, last: Ints) -> tuple[float, int, int]:
+        """See `next_fetch`; with one range a file at a time, no more while one is pending."""
+        stock, asked = self.world.catalogue, self.textures.asked
+        busy = (asked > self.textures.loaded) & self.world.one_range
+        step: tuple[float, int, int] = next_fetch(
+            worth, stock.ends, stock.stored, asked, busy, last, stock.previews,
+            self.previews.asked > 0, self._overhead(),
+        )  # fmt: skip
+        return step
 
     def _overhead(self) -> int:
         """Overhead of a request, bytes: headers, and the bytes that its connection could bring

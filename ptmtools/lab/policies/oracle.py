@@ -44,17 +44,22 @@ class Oracle:
 
 
 def _drops(world: World) -> tuple[Singles, Singles]:
-    """(F, T, K) the reduction of each frame's error by each column, and (F, C) the error without
-    each cell's geometry."""
+    """(F, R, K) the reduction of each frame's error by each column of each source, and (F, C) the
+    error without each cell's geometry."""
     stock, views = world.catalogue, world.views
-    count = views.frames
-    columns = np.zeros((count, stock.texture_count, stock.ends.shape[1]), np.float32)
+    count, textures, previews = views.frames, stock.texture_count, stock.previews
+    columns = np.zeros((count, *stock.gains.shape), np.float32)
     cells = np.zeros((count, stock.cell_count), np.float32)
     frame = np.repeat(np.arange(count), np.diff(views.start))
     np.add.at(cells, (frame, views.cell), views.error[:, 0])
-    rows = np.flatnonzero(views.texture >= 0)
-    drop = views.error[rows, 1:-1] - views.error[rows, 2:]
-    np.add.at(columns[:, :, 1:], (frame[rows], views.texture[rows]), drop)
+    of = np.concatenate([np.arange(textures), previews.texture])
+    first = np.concatenate([np.zeros(textures, np.int64), previews.state])
+    last = np.concatenate([stock.levels, previews.column])
+    for row, (t, before, until) in enumerate(zip(of, first, last, strict=True)):
+        shown = np.flatnonzero(views.texture == t)
+        error = views.error[shown, before + 1 : before + until + 2]
+        error[:, 0] = views.error[shown, 1]
+        np.add.at(columns[:, row, 1 : until + 1], frame[shown], error[:, :-1] - error[:, 1:])
     return columns[world.view], cells[world.view]
 
 

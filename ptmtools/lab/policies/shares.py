@@ -216,17 +216,17 @@ class Screen:
 
     def __call__(self, client: EngineClient) -> Worth:
         """See `Policy`."""
-        weight = client.world.catalogue.differences
-        sight = client.sight(self.age)
+        stock, sight = client.world.catalogue, client.sight(self.age)
         if self.around is None:
-            worth = sight * weight
-            return Worth(worth, worth, geometry_by_placeholders(client, self.age))
+            worth = stock.by_source(sight) * stock.gains
+            return Worth(worth, worth, geometry_by_placeholders(client, self.age), sight=sight)
         around = self.around(client)
         return Worth(
-            hold=(sight + HELD * self.share * around) * weight,
-            fetch=(sight + self.share * around) * weight,
+            hold=stock.by_source(sight + HELD * self.share * around) * stock.gains,
+            fetch=stock.by_source(sight + self.share * around) * stock.gains,
             geometry=geometry_by_placeholders(client, self.age),
-            ahead=around * weight,
+            ahead=stock.by_source(around) * stock.gains,
+            sight=sight,
         )
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ptmtools.arrays import Floats, areas
-from ptmtools.lab.catalogue import LEAST, Catalogue, Columns, Shapes, aligned
+from ptmtools.lab.catalogue import Catalogue, Columns, Shapes, aligned
+from ptmtools.lab.previews import LEAST
 from ptmtools.output.served import Served
 from ptmtools.rendering.octrees import Octrees
 
@@ -51,7 +52,7 @@ def _with_empty(stock: Catalogue, count: int, octrees: Octrees) -> Catalogue:
     """The catalogue with ``count`` more textures without columns."""
     wide = 1 + int(octrees.levels.max(initial=1))
     last, table = np.zeros(count, np.int64), np.zeros((count, wide), np.int64)
-    nothing = Columns(last, table, table, np.zeros((count, wide, 2), np.int64))
+    nothing = Columns(last, last, table, table, np.zeros((count, wide, 2), np.int64))
     return stock.joined_with(nothing, np.zeros((count, wide)))
 
 

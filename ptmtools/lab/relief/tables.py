@@ -92,7 +92,8 @@ class Tally:
         wanted = np.where(octrees.of < 0, octrees.number, octrees.of) + first
         stuck = np.full(len(wanted), first + octrees.number)
         keys = np.stack([np.tile(triangles.cell, 2), np.concatenate([wanted, stuck])], axis=1)
-        self._rows = RowSums(keys, int(octrees.levels.max(initial=1)), seen)
+        levels = int(octrees.levels.max(initial=1))
+        self._rows = RowSums(keys, levels, levels, seen)
         pair, self._stuck = self._rows.pair.reshape(2, -1)
         self._sums = self._rows.sums._replace(pair=pair)
         self.rows = self._rows.rows
