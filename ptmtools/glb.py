@@ -108,7 +108,7 @@ def natural(value: object) -> int:
 FLOAT, SHORT, INT = 5126, 5123, 5125
 _VERTICES, _INDICES = 34962, 34963
 #: Narrow indices end before 65535, which restarts a primitive.
-_NARROW = 65535
+NARROW = 65535
 
 
 class BufferWriter:
@@ -136,7 +136,7 @@ class BufferWriter:
 
     def indices(self, triangle: NDArray[np.integer[Any]], vertices: int) -> int:
         """(m, 3) indices, below the number of ``vertices``."""
-        kind, form = (SHORT, "<u2") if vertices <= _NARROW else (INT, "<u4")
+        kind, form = (SHORT, "<u2") if vertices <= NARROW else (INT, "<u4")
         accessor = {"componentType": kind, "count": triangle.size, "type": "SCALAR"}
         return self._append(accessor, triangle.astype(form).tobytes(), _INDICES)
 

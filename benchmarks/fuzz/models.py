@@ -427,7 +427,7 @@ class Meshopt:
 
     def read(self, case: Case) -> str:
         """Decodes it, as the reader of glTF does."""
-        from ptmtools.scene.gltf.meshopt import decode
+        from ptmtools.meshopt.decoding import decode
 
         try:
             actual = decode(case.data, case.facts)

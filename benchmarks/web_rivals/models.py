@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ptmtools.output.gltf import WRAPS, CellBufferWriter, flipped, linear, pack
+from ptmtools.output.gltf import WRAPS, linear, pack
+from ptmtools.output.gltf_shapes import PlainBuffer, flipped
 from ptmtools.scene.model import Material, Scene
 
 UNLIT = "KHR_materials_unlit"
@@ -23,7 +24,7 @@ _LINEAR, _MIPMAPS = 9729, 9987
 def whole_glb(scene: Scene, images: Sequence[bytes] = (), media: str = "") -> bytes:
     """The GLB of all triangles of a scene, with its images in order, of one media type, or
     without."""
-    buffer = CellBufferWriter()
+    buffer = PlainBuffer()
     shown = np.stack([scene.triangle_material, scene.two_sided], axis=1)
     kinds, kind = np.unique(shown, axis=0, return_inverse=True)
     primitives = [
@@ -67,7 +68,7 @@ def whole_glb(scene: Scene, images: Sequence[bytes] = (), media: str = "") -> by
     return pack(kept, binary)
 
 
-def _primitive(scene: Scene, rows: Any, material: int, buffer: CellBufferWriter) -> dict[str, Any]:
+def _primitive(scene: Scene, rows: Any, material: int, buffer: PlainBuffer) -> dict[str, Any]:
     points = scene.corners[rows].reshape(-1, 3).astype(np.float32)
     uv = flipped(scene.uv[rows].reshape(-1, 2))
     vertices, triangle = np.unique(

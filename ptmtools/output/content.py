@@ -210,6 +210,13 @@ class Content:
         return Geometry(self.scene, self.cells)
 
     @cached_property
+    def position_exponent(self) -> int:
+        """Exponent of the step of positions in compressed cells, a power of two in metres."""
+        from ptmtools.output.grid import position_exponent
+
+        return position_exponent(self.scene)
+
+    @cached_property
     def leaves(self) -> list[list[int]]:
         """The leaves of each cell, ascending."""
         order, count = np.argsort(self.cells.leaf_cell, kind="stable"), self.cells.cell_count

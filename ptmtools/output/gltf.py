@@ -3,15 +3,11 @@
 The shapes are those of the VRML file, in its order. Triangles are indexed; a vertex is a position
 with, where the material has an image, its texture coordinates, whose origin is the upper left in
 glTF, and with its colour where the shape has several. There are no normals: the scene has none, and
-surfaces without are flat (glTF 2.0, section 3.7.2.1). Each shape has positions of its own: with one
-accessor for the whole cell the files of the sample museum are 13 % smaller, those of the hospital
-5 %, but clients take its bounds for the shape's, and some copy all of it for each.
+surfaces without are flat (glTF 2.0, section 3.7.2.1).
 
-One buffer view holds each kind of data: positions, texture coordinates, colours, wide indices,
-narrow ones. Equal arrays share an accessor. Vertices are in the order of their first use, so
-rectangles of all sizes share their six indices, and often their texture coordinates.
-
-docs/formats/gltf.md lists the members of a material by the properties of the scene's.
+The buffer is compressed (`ptmtools.output.gltf_compressed`) or plain
+(`ptmtools.output.gltf_shapes`). docs/formats/gltf.md lists the members of a material by the
+properties of the scene's.
 
 (Tried: the texture as emissiveTexture over black, which shows it texel for texel as VRML does,
 without KHR_materials_unlit. Clients then have no base colour texture to replace with their own, and
@@ -27,90 +23,17 @@ from typing import Any
 from urllib.parse import quote
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ptmtools import schemas
 from ptmtools.errors import LimitError
-from ptmtools.glb import (
-    BINARY,
-    COMPONENTS,
-    FLOAT,
-    INT,
-    ITEMS,
-    JSON,
-    SHORT,
-    BufferWriter,
-    glb,
-    glb_chunks,
-)
-from ptmtools.output.content import Content, Geometry, Shape
+from ptmtools.glb import BINARY, JSON, glb, glb_chunks
+from ptmtools.output.content import Content
+from ptmtools.output.gltf_compressed import CompressedBuffer
+from ptmtools.output.gltf_shapes import PlainBuffer, vertices_of
 from ptmtools.output.model import FileError, TextureRecord, shaped
 from ptmtools.output.names import GLTF_FILES, UP, cell_name, path_of
-from ptmtools.scene.colors import packed, to_linear, unpacked
-from ptmtools.scene.model import Material, Scene, Wrap
-
-#: In the order of the views: component type and type.
-_KINDS = ((FLOAT, "VEC3"), (FLOAT, "VEC2"), (SHORT, "VEC4"), (INT, "SCALAR"), (SHORT, "SCALAR"))
-#: Whole numbers below this are written without the ".0" that Python gives them.
-_WHOLE = 1e15
-
-
-class CellBufferWriter(BufferWriter):
-    """Gathers the arrays of one cell: one view for each kind, one accessor for equal arrays."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._known: dict[tuple[int, bytes], int] = {}
-        self._of_kind: tuple[list[bytes], ...] = tuple([] for _ in _KINDS)
-        self._sizes = [0] * len(_KINDS)
-        self._targets = [0] * len(_KINDS)
-
-    def _append(self, accessor: dict[str, Any], data: bytes, target: int) -> int:
-        kind = _KINDS.index((accessor["componentType"], accessor["type"]))
-        place = self._known.setdefault((kind, data), len(self._accessors))
-        if place == len(self._accessors):
-            begin = {"byteOffset": self._sizes[kind]} if self._sizes[kind] else {}
-            self._accessors.append({"bufferView": kind} | begin | accessor)
-            self._of_kind[kind].append(data)
-            self._sizes[kind] += len(data)
-            self._targets[kind] = target
-        return place
-
-    def _numbers(self, values: NDArray[np.float32]) -> list[float]:
-        shortest = super()._numbers(values)
-        return [int(v) if v.is_integer() and abs(v) < _WHOLE else v for v in shortest]
-
-    def members(self) -> dict[str, Any]:
-        """The members "accessors", "bufferViews" and "buffers" of the document; none without
-        arrays."""
-        views: list[dict[str, Any]] = []
-        place: dict[int, int] = {}
-        at = 0
-        for kind, (component, form) in enumerate(_KINDS):
-            if not self._sizes[kind]:
-                continue
-            place[kind] = len(views)
-            view: dict[str, Any] = {"buffer": 0} | ({"byteOffset": at} if at else {})
-            view["byteLength"] = self._sizes[kind]
-            # Vertex data that several accessors share must have it, indices must not.
-            if form != "SCALAR" and len(self._of_kind[kind]) > 1:
-                view["byteStride"] = ITEMS[form] * np.dtype(COMPONENTS[component]).itemsize
-            views.append(view | {"target": self._targets[kind]})
-            at += self._sizes[kind]
-        return (
-            {}
-            if not views
-            else {
-                "accessors": [a | {"bufferView": place[a["bufferView"]]} for a in self._accessors],
-                "bufferViews": views,
-                "buffers": [{"byteLength": at}],
-            }
-        )
-
-    def bytes(self) -> bytes:
-        """All arrays."""
-        return b"".join(part for parts in self._of_kind for part in parts)
-
+from ptmtools.scene.colors import to_linear
+from ptmtools.scene.model import Material, Wrap
 
 _LARGEST = 2**32 - 1
 #: The most bytes around JSON and buffer: headers and padding.
@@ -250,29 +173,31 @@ def gltf_files(content: Content) -> Iterator[tuple[str, bytes]]:
     content.progress(count, count, "glTF")
 
 
-def flipped(uv: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Texture coordinates with the origin at the upper left instead of the lower, or back."""
-    turned = np.array(uv, dtype=np.float64)
-    turned[..., 1] = 1 - turned[..., 1]
-    return turned.astype(np.float32)
-
-
 def _glb(content: Content, cell: int) -> bytes:
-    scene, geometry, buffer = content.scene, content.geometry, CellBufferWriter()
-    materials = MaterialWriter(scene.materials, content.records, content.options.fallback)
+    scene, options = content.scene, content.options
+    buffer = PlainBuffer() if options.plain_gltf else CompressedBuffer(content.position_exponent)
+    materials = MaterialWriter(scene.materials, content.records, options.fallback)
     nodes: list[dict[str, Any]] = []
-    node: dict[str, Any]
     meshes: list[dict[str, Any]] = []
     last = -1
-    for shape in geometry.shapes(cell):
+    for shape in content.geometry.shapes(cell):
+        image = scene.materials[shape.material].image
+        record = content.records[image][1] if image >= 0 else None
+        vertices = vertices_of(content.geometry, shape, textured=record is not None)
+        material = materials.take(shape.material, shape.two_sided)
+        size = None if record is None else (record.width, record.height)
+        primitive = buffer.take(vertices, material, size)
+        if primitive is None:
+            continue
         if shape.object != last:
             last = shape.object
-            node = {"name": scene.objects[shape.object], "mesh": len(meshes)}
+            node: dict[str, Any] = {"name": scene.objects[shape.object], "mesh": len(meshes)}
             if (octree := content.octree_of.get(shape.object)) is not None:
                 node["extras"] = {"octree": octree}
             nodes.append(node)
             meshes.append({"primitives": []})
-        meshes[-1]["primitives"].append(_primitive(scene, geometry, shape, buffer, materials))
+        meshes[-1]["primitives"].append(primitive)
+    buffer.finish()
     top: dict[str, Any] = {"name": cell_name(cell), "extras": {"cell": cell}}
     if nodes:
         top["nodes"] = list(range(len(nodes)))
@@ -284,45 +209,3 @@ def _glb(content: Content, cell: int) -> bytes:
     if nodes:
         document |= {"nodes": nodes, "meshes": meshes}
     return pack(document | materials.members() | buffer.members(), buffer.bytes())
-
-
-def _primitive(
-    scene: Scene,
-    geometry: Geometry,
-    shape: Shape,
-    buffer: BufferWriter,
-    materials: MaterialWriter,
-) -> dict[str, Any]:
-    textured = scene.materials[shape.material].image >= 0
-    # A vertex for each that differs in position, texture coordinates or colour.
-    width = len(shape.uv) if textured else 1
-    corner = shape.triangle * width + (shape.uv_triangle if textured else 0)
-    vertex, triangle = _by_first_use(corner)
-    color = None
-    if shape.color is not None:
-        both, triangle = _by_first_use(triangle << 24 | packed(shape.color))
-        vertex, color = vertex[both >> 24], unpacked(both & 0xFFFFFF)
-    attributes = {"POSITION": buffer.positions(geometry.point[shape.point[vertex // width]])}
-    if textured:
-        uv = geometry.uv[shape.uv[vertex % width]]
-        attributes["TEXCOORD_0"] = buffer.vectors(flipped(uv))
-    if color is not None:
-        # 8 bits of linear light would be too few in the dark.
-        rgba = np.full((len(color), 4), 65535, "<u2")
-        rgba[:, :3] = np.rint(65535 * to_linear(color / 255))
-        attributes["COLOR_0"] = buffer.shares(rgba)
-    return {
-        "attributes": attributes,
-        "indices": buffer.indices(triangle, len(vertex)),
-        "material": materials.take(shape.material, shape.two_sided),
-    }
-
-
-def _by_first_use(corner: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The distinct values of an (m, 3) array, in the order in which they come, and (m, 3) where
-    each is among them."""
-    distinct, first, place = np.unique(corner.ravel(), return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    return distinct[order], rank[place.ravel()].reshape(-1, 3)

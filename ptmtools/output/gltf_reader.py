@@ -1,4 +1,4 @@
-"""A strict reader of the GLBs that `emit` writes, and of no others.
+"""A strict reader of the GLBs that `emit` writes, plain or compressed, and of no others.
 
 Other features of glTF are refused; `schemas/glb.schema.json` describes the accepted ones. The
 reader stops at the first fault. It compares every count with the available bytes before it
@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 
 from ptmtools import schemas
 from ptmtools.glb import COMPONENTS, ITEMS, elements, meaning
+from ptmtools.meshopt.decoding import decode
 from ptmtools.output.gltf import WHITE, WRAPS, unpack
+from ptmtools.output.gltf_compressed import EXTENSIONS, MESHOPT
 from ptmtools.output.model import FileError
 
 _VERTICES, _INDICES, _FLOAT = 34962, 34963, 5126
@@ -96,12 +98,19 @@ class _Reader:
     def __init__(self, document: dict[str, Any], binary: bytes) -> None:
         self._tree = document
         buffers = document.get("buffers", [])
-        if len(buffers) != (1 if binary else 0):
+        compressed = {name: document[name] for name in EXTENSIONS if name in document}
+        self._compressed = bool(compressed)
+        if compressed not in ({}, EXTENSIONS):
+            _foreign("document", f"has other extensions than {MESHOPT}")
+        fallbacks = [MESHOPT in buffer.get("extensions", {}) for buffer in buffers]
+        expected = [False, True][: 1 + self._compressed] if binary else []
+        if fallbacks != expected:
             _foreign("buffers", f"{len(buffers)} buffers for {len(binary)} bytes")
         length = buffers[0]["byteLength"] if buffers else 0
         if not 0 <= len(binary) - length < 4:
             raise FileError("PTM-D731", "buffers[0]", f"{length} bytes of {len(binary)}")
         self._data = binary[:length]
+        self._views: dict[int, tuple[dict[str, Any], bytes]] = {}
 
     def cell(self) -> ReadGlb:
         scene = self._row("scenes", self._tree["scene"])
@@ -145,6 +154,12 @@ class _Reader:
             message = f"{len(index)} indices up to {index.max()} into {len(point)} vertices"
             raise FileError("PTM-D731", place, message)
         triangle = index.astype(np.int64).reshape(-1, 3)
+        if self._compressed:  # the shapes of a cell share their arrays
+            own = slice(int(index.min()), int(index.max()) + 1)
+            triangle -= own.start
+            point = point[own]
+            uv = None if uv is None else uv[own]
+            color = None if color is None else color[own]
         material = self._material(primitive["material"])
         octree = node.get("extras", {}).get("octree")
         return ReadPrimitive(place, node["name"], octree, point, uv, color, triangle, material)
@@ -172,23 +187,53 @@ class _Reader:
     ) -> NDArray[Any]:
         """(count, items) of an accessor; its elements and its view must be of the given kinds."""
         place, accessor = f"accessors[{index}]", self._row("accessors", index)
-        view = self._row("bufferViews", accessor["bufferView"])
         component = accessor["componentType"]
-        self._row("buffers", view["buffer"])
         if accessor["type"] != form or component not in components:
             _foreign(place, f"{accessor['type']} of component type {component}")
         unit = np.dtype(COMPONENTS[component]).itemsize
         size = ITEMS[form] * unit
-        if view["target"] != target or view.get("byteStride", size) != size:
-            _foreign(place, "its buffer view is for other data")
+        if self._compressed:
+            view, data = self._decoded(accessor["bufferView"], target)
+        else:
+            view, data = self._row("bufferViews", accessor["bufferView"]), self._data
+            self._row("buffers", view["buffer"])
+            if view.get("target") != target or view.get("byteStride", size) != size:
+                _foreign(place, "its buffer view is for other data")
         try:
-            rows = elements(accessor, view, self._data)
+            rows = elements(accessor, view, data)
         except ValueError as fault:
             raise FileError("PTM-D731", place, str(fault)) from None
         begin = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
         if begin % unit:
             raise FileError("PTM-D731", place, f"begins at byte {begin}, not a multiple of {unit}")
         return rows
+
+    def _decoded(self, index: int, target: int) -> tuple[dict[str, Any], bytes]:
+        """A compressed view and its bytes, as a view of those bytes alone."""
+        if index in self._views:
+            return self._views[index]
+        place, view = f"bufferViews[{index}]", self._row("bufferViews", index)
+        coded = view.get("extensions", {}).get(MESHOPT)
+        if coded is None or view["buffer"] != 1 or coded["buffer"] != 0:
+            _foreign(place, "is not compressed, or not of the buffers of compressed views")
+        if (coded["mode"] == "TRIANGLES") != (target == _INDICES):
+            _foreign(place, f"is of mode {coded['mode']}")
+        begin, length = coded.get("byteOffset", 0), coded["byteLength"]
+        count, stride = coded["count"], coded["byteStride"]
+        room = self._tree["buffers"][1]["byteLength"] - view.get("byteOffset", 0)
+        if (
+            begin + length > len(self._data)
+            or count * stride != view["byteLength"]
+            or (not 0 <= view["byteLength"] <= room or view.get("byteStride", stride) != stride)
+        ):
+            raise FileError("PTM-D731", place, "its sizes contradict each other")
+        try:
+            data = decode(self._data[begin : begin + length], coded)
+        except ValueError as fault:
+            raise FileError("PTM-D731", place, str(fault)) from None
+        own = {name: view[name] for name in view if name in ("byteLength", "byteStride")}
+        self._views[index] = own, data
+        return own, data
 
     def _check_bounds(self, index: int, point: NDArray[np.float32]) -> None:
         place, accessor = f"accessors[{index}]", self._tree["accessors"][index]

@@ -189,6 +189,12 @@ class WriterOptions:
     fallback: bool = option(
         True, "Also refer to the PNG of each texture, for clients that cannot read .ptm."
     )
+    plain_gltf: bool = option(
+        False,
+        "Write GLBs without compression, with the exact coordinates, for viewers that cannot read "
+        "EXT_meshopt_compression.",
+        default_before=(11, True),
+    )
     viewpoints: tuple[GivenViewpoint, ...] = option(
         (),
         "Viewpoint inside the building: position in metres, Y up, and yaw in degrees, "

@@ -15,8 +15,10 @@ from typing import Any
 import numpy as np
 
 from ptmtools import schemas
-from ptmtools.output.gltf import WRAPS, flipped, linear
+from ptmtools.output.gltf import WRAPS, linear
 from ptmtools.output.gltf_reader import ReadGlb, ReadMaterial, ReadPrimitive, read_glb
+from ptmtools.output.gltf_shapes import flipped
+from ptmtools.output.grid import COARSEST, MOST
 from ptmtools.output.model import FileError
 from ptmtools.output.vrml_reader import Document, Node, parse
 from ptmtools.scene.colors import to_srgb
@@ -227,19 +229,76 @@ def _shapes(name: str, glb: ReadGlb, shapes: Sequence[Node]) -> Iterator[str]:
         corners = _corners(shape, "coord", "coordIndex")
         if corners is None:
             continue
-        points = primitive.point[primitive.triangle]
-        if not np.array_equal(corners.astype(np.float32), points):
-            yield f"triangles: {name}: {primitive.place}, positions"
-        uv = None if primitive.uv is None else primitive.uv[primitive.triangle]
         mapped = _corners(shape, "texCoord", "texCoordIndex")
-        if mapped is None:
-            same = uv is None or "texCoord" in shape.at("geometry")
-        else:
-            same = uv is not None and np.array_equal(flipped(mapped.astype(np.float32)), uv)
-        if not same:
+        unmapped = "texCoord" not in shape.at("geometry")
+        uv = primitive.uv
+        if mapped is not None and uv is not None:
+            mapped = flipped(mapped.astype(np.float32))
+        elif (mapped is not None or unmapped) and (uv is not None or not unmapped):
             yield f"triangles: {name}: {primitive.place}, texture coordinates"
-        if fault := _other_colors(primitive, shape) or _other_material(primitive.material, shape):
+            continue
+        else:
+            mapped = uv = None
+        pairs = [(corners.astype(np.float32), primitive.point)]
+        kept, triangle = corresponding(primitive.triangle, pairs)
+        if uv is not None and triangle is not None:
+            kept, triangle = corresponding(primitive.triangle, [*pairs, (mapped, uv)])
+            if triangle is None:
+                yield f"triangles: {name}: {primitive.place}, texture coordinates"
+                continue
+        if triangle is None:
+            yield f"triangles: {name}: {primitive.place}, positions"
+            continue
+        fault = _other_colors(primitive, shape, kept, triangle)
+        if fault := fault or _other_material(primitive.material, shape):
             yield f"material: {name}: {primitive.place}, {fault}"
+
+
+def corresponding(
+    triangle: np.ndarray, pairs: Sequence[tuple[np.ndarray, np.ndarray]]
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """Finds the triangles of a shape in a GLB, whose vertices may lie on grids of powers of two,
+    and whose triangles may have another order and begin with another corner.
+
+    ``pairs``: (m, 3, k) the values at the shape's corners, and (n, k) those of the GLB's vertices.
+    Returns which of the shape's triangles have three corners on the grid of the first pair, and
+    (m', 3) the GLB's vertices at their corners; None if they are others.
+    """
+    kept = np.ones(len(pairs[0][0]), np.bool_)
+    columns, own = [], []
+    for k, (exact, given) in enumerate(pairs):
+        step = 2.0 ** np.array([_exponent(column) for column in given.T])
+        steps = np.rint(exact / step)
+        if k == 0:
+            slack = max(2.0**COARSEST / 2, np.abs(exact).max(initial=0.0) / MOST)
+            if np.abs(steps * step - exact).max(initial=0.0) > slack:
+                return kept, None
+            kept = ~(steps == np.roll(steps, 1, axis=1)).all(axis=2).any(axis=1)
+        columns.append(steps.reshape(-1, exact.shape[2]))
+        own.append(given / step)
+    both = np.vstack([np.hstack(columns), np.hstack(own)[triangle.ravel()]])
+    number = np.unique(both, axis=0, return_inverse=True)[1].reshape(-1, 3)
+    wanted, given = number[: len(kept)][kept], number[len(kept) :]
+    turns = [corner.argmin(axis=1)[:, None] for corner in (wanted, given)]
+    turned = [
+        np.take_along_axis(corner, (turn + np.arange(3)) % 3, axis=1)
+        for corner, turn in zip((wanted, given), turns, strict=True)
+    ]
+    orders = [np.lexsort(corner.T) for corner in turned]
+    if not np.array_equal(*(corner[order] for corner, order in zip(turned, orders, strict=True))):
+        return kept, None
+    vertex = np.take_along_axis(triangle, (turns[1] + np.arange(3)) % 3, axis=1)
+    result = np.empty_like(vertex)
+    result[orders[0]] = vertex[orders[1]]
+    return kept, np.take_along_axis(result, (np.arange(3) - turns[0]) % 3, axis=1)
+
+
+def _exponent(values: np.ndarray) -> int:
+    """The largest k, at most 0, for which float32 values are multiples of 2^k."""
+    mantissa, exponent = np.frexp(values[np.isfinite(values) & (values != 0)].astype(np.float64))
+    whole = (mantissa * 2.0**53).astype(np.int64)
+    zeros = np.frexp((whole & -whole).astype(np.float64))[1] - 1
+    return int((exponent - 53 + zeros).min(initial=0))
 
 
 def _other_material(material: ReadMaterial, shape: Node) -> str:
@@ -267,7 +326,9 @@ def _other_material(material: ReadMaterial, shape: Node) -> str:
     return "opaque" if material.factor[3] < 1 and not material.blends else ""
 
 
-def _other_colors(primitive: ReadPrimitive, shape: Node) -> str:
+def _other_colors(
+    primitive: ReadPrimitive, shape: Node, kept: np.ndarray, triangle: np.ndarray
+) -> str:
     geometry = shape.at("geometry")
     painted = "colorIndex" in geometry and geometry.get("colorPerVertex", True)
     if painted != (primitive.color is not None):
@@ -275,7 +336,7 @@ def _other_colors(primitive: ReadPrimitive, shape: Node) -> str:
     colors = _corners(shape, "color", "colorIndex", "color") if painted else None
     if colors is None or primitive.color is None:
         return ""
-    given = to_srgb(primitive.color)[primitive.triangle]
+    given, colors = to_srgb(primitive.color)[triangle], colors[kept]
     same = given.shape == colors.shape and np.abs(given - colors).max(initial=0.0) <= LEVEL_SLACK
     return "" if same else "colours of corners"
 

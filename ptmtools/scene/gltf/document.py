@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ptmtools.errors import InputError, LimitError
 from ptmtools.files import open_regular
 from ptmtools.glb import BINARY, COMPONENTS, ITEMS, MAGIC, elements, glb_chunks, meaning, natural
-from ptmtools.scene.gltf.meshopt import EXTENSIONS, decode as decode_view
+from ptmtools.meshopt.decoding import EXTENSIONS, decode as decode_view
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import FileRange, HeldBytes, decode

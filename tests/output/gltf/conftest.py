@@ -19,7 +19,7 @@ EmitGltf = Callable[..., Path]
 def emit_gltf(
     artifacts: Any, put_textures: Callable[[Path], tuple[TextureRecord, ...]]
 ) -> EmitGltf:
-    """``emit_gltf(www, scene=…, cells=…, records=…, fallback=…)``."""
+    """``emit_gltf(www, scene=…, cells=…, records=…, fallback=…)``; plain unless asked for."""
 
     def write(
         www: Path,
@@ -31,7 +31,7 @@ def emit_gltf(
     ) -> Path:
         records = tuple(map(rename, put_textures(www)))
         a = artifacts
-        given = EmitOptions(**{"format": "vrml,gltf", **options})
+        given = EmitOptions(**{"format": "vrml,gltf", "plain_gltf": True, **options})
         emit(scene or a.scene, cells or a.cells, a.pvs, a.ach, records, www, given)
         return www
 

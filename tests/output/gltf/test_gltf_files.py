@@ -17,7 +17,8 @@ from hypothesis import given, strategies as st
 
 from ptmtools.errors import InputError, LimitError, OutputError
 from ptmtools.output import EmitOptions, validate_database
-from ptmtools.output.gltf import CellBufferWriter, linear, pack, unpack
+from ptmtools.output.gltf import linear, pack, unpack
+from ptmtools.output.gltf_shapes import PlainBuffer
 from ptmtools.output.vrml_reader import Node, parse
 from ptmtools.scene.model import Material
 from tests.output.agreement import disagreements
@@ -260,7 +261,7 @@ def test_vrml_alone(artifacts: Any, tmp_path: Path, emit_gltf: EmitGltf) -> None
 
 
 def test_same_arrays_have_one_accessor() -> None:
-    buffer = CellBufferWriter()
+    buffer = PlainBuffer()
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
     index = np.array([[0, 1, 2], [0, 2, 3]])
     assert [buffer.positions(square), buffer.positions(square * 2)] == [0, 1]
@@ -277,7 +278,7 @@ def test_same_arrays_have_one_accessor() -> None:
 @pytest.mark.parametrize(("vertices", "component", "size"), [(65535, 5123, 2), (65536, 5125, 4)])
 def test_indices_are_wide_where_they_must(vertices: int, component: int, size: int) -> None:
     """65535 restarts a primitive, so it is no index of 16 bits."""
-    buffer = CellBufferWriter()
+    buffer = PlainBuffer()
     buffer.indices(np.array([[0, 1, vertices - 1]]), vertices)
     members, binary = buffer.members(), buffer.bytes()
     assert members["accessors"][0]["componentType"] == component
@@ -286,7 +287,7 @@ def test_indices_are_wide_where_they_must(vertices: int, component: int, size: i
 
 def test_wide_and_narrow_indices_beside_each_other() -> None:
     """Wide ones go first, so that both are aligned whatever their number."""
-    buffer = CellBufferWriter()
+    buffer = PlainBuffer()
     point = np.zeros((1, 3), np.float32)
     places = [
         buffer.positions(point),

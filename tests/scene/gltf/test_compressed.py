@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ptmtools.cells import Cells, subdivide
+from ptmtools.errors import LimitError
 from ptmtools.scene import Scene, ingest
 from tests.scene.buildings import HIGH, WIDE, house
 from tests.scene.conftest import Gltf, Put, noise, png
@@ -137,3 +138,28 @@ def test_on_a_coarser_grid_the_cells_are_the_same(
 def test_a_door_stays_open_on_a_coarse_grid(put: Put) -> None:
     """The openings of the house are wider than any tolerance."""
     assert by_draco(put).tolerance.hairline < min(WIDE, HIGH) / 50
+
+
+def test_what_unpacks_to_more_than_can_be_meant(put: Put, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Equal bytes take a thousandth of what they unpack to."""
+    from ptmtools.scene.gltf import document as module
+
+    doc = Gltf.wall()
+    for count, refused in ((4, False), (400_000, True)):
+        block = min(count, 256)
+        control = bytes([0xAA]) * (3 * -(-count // block))
+        data = bytes([0xA1]) + control + bytes(9) + bytes(15)
+        reported = {"buffer": 0, "byteOffset": 0, "byteLength": len(data), "count": count}
+        reported |= {"byteStride": 12, "mode": "ATTRIBUTES"}
+        extension = {"KHR_meshopt_compression": reported}
+        view = {"buffer": 0, "byteLength": 12 * count, "extensions": extension}
+        tree = doc.tree | {"bufferViews": [view]}
+        made = module.Document(put("a.glb", b""), tree, [module.Buffer(data, None)])
+        monkeypatch.setattr(module, "_DECODED", 1 << 20)
+        made = module.Document(made.path, tree, [module.Buffer(data, None)])
+        if refused:
+            with pytest.raises(LimitError, match=r"4 MiB.*PTM-L204"):
+                made.view(0)
+        else:
+            buffer, start, length = made.view(0)
+            assert (buffer.data, start, length) == (bytes(48), 0, 48)

@@ -53,7 +53,7 @@ def _check(place: int, mode: str) -> None:
 
 def _attributes(stream: NDArray[np.uint8], count: int, stride: int) -> NDArray[np.uint8]:
     """(count, stride)"""
-    from ptmtools.scene.gltf.meshopt_kernels import BLOCK, BLOCK_BYTES, GROUP, decode_attributes
+    from ptmtools.meshopt.decoding_kernels import BLOCK, BLOCK_BYTES, GROUP, decode_attributes
 
     if not len(stream) or (version := int(stream[0]) - _ATTRIBUTES) not in (0, 1):
         raise ValueError("meshopt attributes: not of version 0 or 1")
@@ -70,7 +70,7 @@ def _attributes(stream: NDArray[np.uint8], count: int, stride: int) -> NDArray[n
 
 def _triangles(stream: NDArray[np.uint8], count: int) -> NDArray[np.uint32]:
     """(count,)"""
-    from ptmtools.scene.gltf.meshopt_kernels import decode_triangles
+    from ptmtools.meshopt.decoding_kernels import decode_triangles
 
     if count % 3 or len(stream) < 1 + count // 3 + 16 or stream[0] != _TRIANGLES:
         raise ValueError(f"meshopt triangles: {len(stream)} bytes for {count} indices")
@@ -84,7 +84,7 @@ def _triangles(stream: NDArray[np.uint8], count: int) -> NDArray[np.uint32]:
 
 def _indices(stream: NDArray[np.uint8], count: int) -> NDArray[np.uint32]:
     """(count,)"""
-    from ptmtools.scene.gltf.meshopt_kernels import decode_indices
+    from ptmtools.meshopt.decoding_kernels import decode_indices
 
     if len(stream) < 1 + count + 4 or stream[0] != _INDICES:
         raise ValueError(f"meshopt indices: {len(stream)} bytes for {count} indices")

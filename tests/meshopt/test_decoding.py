@@ -10,9 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from ptmtools.errors import LimitError
-from ptmtools.scene.gltf.meshopt import decode
-from tests.scene.conftest import Gltf, Put
+from ptmtools.meshopt.decoding import decode
 
 SEEDS = st.integers(0, 2**32 - 1)
 #: The example of 4-bit sentinel coding in the specification, and the deltas that it says it holds.
@@ -215,28 +213,3 @@ def test_what_contradicts_itself(how: dict[str, Any], match: str) -> None:
     stream = bytes([{"TRIANGLES": 0xE1, "INDICES": 0xD1}.get(how["mode"], 0xA0)]) + bytes(500)
     with pytest.raises(ValueError, match=match):
         decode(stream, how)
-
-
-def test_what_unpacks_to_more_than_can_be_meant(put: Put, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Equal bytes take a thousandth of what they unpack to."""
-    from ptmtools.scene.gltf import document as module
-
-    doc = Gltf.wall()
-    for count, refused in ((4, False), (400_000, True)):
-        block = min(count, 256)
-        control = bytes([0xAA]) * (3 * -(-count // block))
-        data = bytes([0xA1]) + control + bytes(9) + bytes(15)
-        reported = {"buffer": 0, "byteOffset": 0, "byteLength": len(data), "count": count}
-        reported |= {"byteStride": 12, "mode": "ATTRIBUTES"}
-        extension = {"KHR_meshopt_compression": reported}
-        view = {"buffer": 0, "byteLength": 12 * count, "extensions": extension}
-        tree = doc.tree | {"bufferViews": [view]}
-        made = module.Document(put("a.glb", b""), tree, [module.Buffer(data, None)])
-        monkeypatch.setattr(module, "_DECODED", 1 << 20)
-        made = module.Document(made.path, tree, [module.Buffer(data, None)])
-        if refused:
-            with pytest.raises(LimitError, match=r"4 MiB.*PTM-L204"):
-                made.view(0)
-        else:
-            buffer, start, length = made.view(0)
-            assert (buffer.data, start, length) == (bytes(48), 0, 48)

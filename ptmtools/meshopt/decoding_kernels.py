@@ -1,4 +1,4 @@
-"""Compiled decoders of meshopt's three bit streams (`meshopt`).
+"""Compiled decoders of meshopt's three bit streams (`ptmtools.meshopt.decoding`).
 
 Each returns `DONE`, or the position in the data where these are invalid or truncated. No read or
 write leaves its array for any data.

@@ -1,0 +1,1 @@
+"""Buffer views compressed with meshopt: the codecs of EXT_meshopt_compression."""

@@ -1,0 +1,146 @@
+"""The vertices of a shape in glTF, and the plain buffer of a cell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.glb import COMPONENTS, FLOAT, INT, ITEMS, SHORT, BufferWriter
+from ptmtools.meshopt.encoding import by_first_use
+from ptmtools.output.content import Geometry, Shape
+from ptmtools.scene.colors import packed, to_linear, unpacked
+
+#: Whole numbers below this are written without the ".0" that Python gives them.
+_WHOLE = 1e15
+
+
+@dataclass(frozen=True)
+class Vertices:
+    """A shape as glTF has it; vertices differ in position, texture coordinates or colour.
+
+    Attributes
+    ----------
+    point: (n, 3) float32.
+    uv: (n, 2) float32, origin at the upper left; None without a texture.
+    color: (n, 4) uint16, linear light and an alpha of 1, of 65535; None where all are white.
+    triangle: (m, 3)
+    """
+
+    point: NDArray[np.float32]
+    uv: NDArray[np.float32] | None
+    color: NDArray[np.uint16] | None
+    triangle: NDArray[np.int64]
+
+
+def vertices_of(geometry: Geometry, shape: Shape, *, textured: bool) -> Vertices:
+    """The vertices of a shape in the order of their first use."""
+    # A vertex for each that differs in position, texture coordinates or colour.
+    width = len(shape.uv) if textured else 1
+    corner = shape.triangle * width + (shape.uv_triangle if textured else 0)
+    vertex, triangle = by_first_use(corner)
+    rgba = None
+    if shape.color is not None:
+        both, triangle = by_first_use(triangle << 24 | packed(shape.color))
+        vertex, color = vertex[both >> 24], unpacked(both & 0xFFFFFF)
+        # 8 bits of linear light would be too few in the dark.
+        rgba = np.full((len(color), 4), 65535, np.uint16)
+        rgba[:, :3] = np.rint(65535 * to_linear(color / 255))
+    point = geometry.point[shape.point[vertex // width]]
+    uv = flipped(geometry.uv[shape.uv[vertex % width]]) if textured else None
+    return Vertices(point, uv, rgba, triangle)
+
+
+def flipped(uv: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Texture coordinates with the origin at the upper left instead of the lower, or back."""
+    turned = np.array(uv, dtype=np.float64)
+    turned[..., 1] = 1 - turned[..., 1]
+    return turned.astype(np.float32)
+
+
+def shortest(values: NDArray[np.float32]) -> list[float]:
+    """The shortest numbers in JSON that read back to the same float32."""
+    numbers = [float(str(value)) for value in values]
+    return [int(v) if v.is_integer() and abs(v) < _WHOLE else v for v in numbers]
+
+
+#: In the order of the views: component type and type.
+_KINDS = ((FLOAT, "VEC3"), (FLOAT, "VEC2"), (SHORT, "VEC4"), (INT, "SCALAR"), (SHORT, "SCALAR"))
+
+
+class PlainBuffer(BufferWriter):
+    """Gathers the arrays of one cell, uncompressed: one view for each kind, one accessor for equal
+    arrays.
+
+    Vertices are in the order of their first use, so rectangles of all sizes share their six
+    indices, and often their texture coordinates. Each shape has positions of its own: with one
+    accessor for the whole cell the files of the sample museum are 13 % smaller, those of the
+    hospital 5 %, but clients take its bounds for the shape's, and some copy all of it for each.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._known: dict[tuple[int, bytes], int] = {}
+        self._of_kind: tuple[list[bytes], ...] = tuple([] for _ in _KINDS)
+        self._sizes = [0] * len(_KINDS)
+        self._targets = [0] * len(_KINDS)
+
+    def take(self, vertices: Vertices, material: int, _: tuple[int, int] | None) -> dict[str, Any]:
+        """The primitive of a shape."""
+        attributes = {"POSITION": self.positions(vertices.point)}
+        if vertices.uv is not None:
+            attributes["TEXCOORD_0"] = self.vectors(vertices.uv)
+        if vertices.color is not None:
+            attributes["COLOR_0"] = self.shares(vertices.color)
+        indices = self.indices(vertices.triangle, len(vertices.point))
+        return {"attributes": attributes, "indices": indices, "material": material}
+
+    def finish(self) -> None:
+        """Nothing: primitives are complete."""
+
+    def _append(self, accessor: dict[str, Any], data: bytes, target: int) -> int:
+        kind = _KINDS.index((accessor["componentType"], accessor["type"]))
+        place = self._known.setdefault((kind, data), len(self._accessors))
+        if place == len(self._accessors):
+            begin = {"byteOffset": self._sizes[kind]} if self._sizes[kind] else {}
+            self._accessors.append({"bufferView": kind} | begin | accessor)
+            self._of_kind[kind].append(data)
+            self._sizes[kind] += len(data)
+            self._targets[kind] = target
+        return place
+
+    def _numbers(self, values: NDArray[np.float32]) -> list[float]:
+        return shortest(values)
+
+    def members(self) -> dict[str, Any]:
+        """The members "accessors", "bufferViews" and "buffers" of the document; none without
+        arrays."""
+        views: list[dict[str, Any]] = []
+        place: dict[int, int] = {}
+        at = 0
+        for kind, (component, form) in enumerate(_KINDS):
+            if not self._sizes[kind]:
+                continue
+            place[kind] = len(views)
+            view: dict[str, Any] = {"buffer": 0} | ({"byteOffset": at} if at else {})
+            view["byteLength"] = self._sizes[kind]
+            # Vertex data that several accessors share must have it, indices must not.
+            if form != "SCALAR" and len(self._of_kind[kind]) > 1:
+                view["byteStride"] = ITEMS[form] * np.dtype(COMPONENTS[component]).itemsize
+            views.append(view | {"target": self._targets[kind]})
+            at += self._sizes[kind]
+        return (
+            {}
+            if not views
+            else {
+                "accessors": [a | {"bufferView": place[a["bufferView"]]} for a in self._accessors],
+                "bufferViews": views,
+                "buffers": [{"byteLength": at}],
+            }
+        )
+
+    def bytes(self) -> bytes:
+        """All arrays."""
+        return b"".join(part for parts in self._of_kind for part in parts)
