@@ -4,6 +4,7 @@
 
 import { readFileSync } from "node:fs";
 import { readGlb } from "../../web/page/data/glb.js";
+import { loadViewDecoder } from "../../web/ptm/src/meshopt.js";
 import { Solids } from "../../web/page/walk/solids.js";
 import { Walker } from "../../web/page/walk/walker.js";
 
@@ -12,12 +13,15 @@ const json = (path) => JSON.parse(readFileSync(path, "utf8"));
 const index = json(`${www}/hints.json`);
 const solids = new Solids();
 const begun = performance.now();
-const records = index.cells.map(({ name }, cell) => {
+const wasm = new URL("../../web/ptm/src/decoder.wasm", import.meta.url);
+const decoder = await loadViewDecoder(readFileSync(wasm));
+const records = [];
+for (const [cell, { name }] of index.cells.entries()) {
   const record = json(`${www}/hints/${name}.json`), glb = readFileSync(`${www}/gltf/${name}.glb`);
   const whole = glb.buffer.slice(glb.byteOffset, glb.byteOffset + glb.byteLength);
-  solids.add(cell, readGlb(whole).shapes, record);
-  return record;
-});
+  solids.add(cell, (await readGlb(whole, Infinity, async () => decoder)).shapes, record);
+  records.push(record);
+}
 const loading = performance.now() - begun;
 
 const behind = (points, face, [x, y, z]) => {

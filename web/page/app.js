@@ -21,6 +21,7 @@ const LONGEST = 0.1;
 
 /** @typedef {import("./walk/walker.js").Pose} Pose */
 /** @typedef {import("./ui/all.js").Events} Events */
+/** @typedef {import("./stream.js").Decoders} Decoders */
 
 export class App {
   /** @type {Map<string, ((detail: any) => void)[]>} */
@@ -31,9 +32,9 @@ export class App {
    * @param {WebGL2RenderingContext} gl
    * @param {import("./data/site.js").Site} site
    * @param {import("./data/site.js").SiteConfig} config
-   * @param {import("../ptm/src/workers.js").DecoderWorkers} workers
+   * @param {Decoders} decoders
    */
-  constructor(canvas, gl, site, config, workers) {
+  constructor(canvas, gl, site, config, decoders) {
     const query = new URLSearchParams(location.search);
     const small = matchMedia("(pointer: coarse)").matches;
     const megabytes = Number(query.get("memory"));
@@ -42,7 +43,7 @@ export class App {
     this.config = config;
     this.index = site.index;
     const options = {
-      workers,
+      decoders,
       policy: Object.hasOwn(POLICIES, policy) ? policy : "best",
       budget: megabytes > 0 ? Math.min(megabytes, MOST) * 2 ** 20 : small ? SMALL_BUDGET : BUDGET,
     };

@@ -1,6 +1,6 @@
 // The entry of the page: reads the index, creates the application and runs its frames.
 
-import { DecoderWorkers, hasSimd } from "../ptm/src/index.js";
+import { DecoderWorkers, hasSimd, loadViewDecoder } from "../ptm/src/index.js";
 import { App } from "./app.js";
 import { readConfig, Site } from "./data/site.js";
 import { PageError } from "./net/errors.js";
@@ -17,14 +17,19 @@ async function siteOf(config) {
   );
 }
 
-/** Decoders, which start while the index is on its way. @param {import("./data/site.js").SiteConfig} config */
-function workersOf(config) {
+/**
+ * Decoders of textures and of geometry, which start while the index is on its way.
+ * @param {import("./data/site.js").SiteConfig} config
+ */
+function decodersOf(config) {
   const worker = new URL(config.worker, location.href);
-  const wasm = new URL(config.wasm, location.href).href;
+  const address = new URL(config.wasm, location.href).href;
   const compiled = async () =>
-    WebAssembly.compile(await new Fetcher(() => {}).whole(wasm, (body) => body));
-  const create = () => new Worker(worker, { type: "module" });
-  return new DecoderWorkers({ wasm: compiled(), create });
+    WebAssembly.compile(await new Fetcher(() => {}).whole(address, (body) => body));
+  const create = () => new Worker(worker, { type: "module" }), wasm = compiled();
+  const geometry = wasm.then(loadViewDecoder);
+  geometry.catch(() => {}); // the first cell reports it
+  return { workers: new DecoderWorkers({ wasm, create }), geometry: () => geometry };
 }
 
 /** Smooth edges cost too much without a graphics card. @param {HTMLCanvasElement} canvas */
@@ -42,10 +47,10 @@ async function main() {
     if (!hasSimd()) {
       throw new PageError("PTM-V102", "This browser cannot run WebAssembly with SIMD.");
     }
-    const workers = workersOf(config), site = siteOf(config);
+    const decoders = decodersOf(config), site = siteOf(config);
     const gl = contextOf(canvas);
     if (!gl) throw new PageError("PTM-V101", "This browser cannot draw with WebGL 2.");
-    const app = new App(canvas, gl, await site, config, workers);
+    const app = new App(canvas, gl, await site, config, decoders);
     Object.assign(window, { ptm: app });
     const controls = attachUi(app);
     let before = clock();

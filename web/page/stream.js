@@ -10,6 +10,8 @@ import { TextureFile } from "./net/texture-file.js";
 /** @typedef {import("./policy/downloads.js").Request} Request */
 /** @typedef {import("./data/site.js").CellRecord} CellRecord */
 /** @typedef {import("./data/glb.js").Shape} Shape */
+/** @typedef {import("../ptm/src/meshopt.js").ViewDecoder} ViewDecoder */
+/** @typedef {{workers: import("../ptm/src/workers.js").DecoderWorkers, geometry: () => Promise<ViewDecoder>}} Decoders */
 
 /** Seconds until a failed file is requested again. */
 const REST = 10;
@@ -37,20 +39,21 @@ export class Stream {
    * @param {import("../client/src/locating.js").Locator} parts.locator
    * @param {import("./policy/estimate.js").Estimate} parts.estimate
    * @param {import("./net/fetcher.js").Fetcher} parts.fetcher
-   * @param {import("../ptm/src/workers.js").DecoderWorkers} parts.workers
+   * @param {Decoders} parts.decoders
    * @param {() => boolean} parts.rests whether to make no more requests
    * @param {(error: PageError, kind: string, number: number) => void} parts.report
    */
-  constructor({ site, client, locator, estimate, fetcher, workers, rests, report }) {
+  constructor({ site, client, locator, estimate, fetcher, decoders, rests, report }) {
     this.site = site;
     this.client = client;
     this.locator = locator;
     this.estimate = estimate;
     this.fetcher = fetcher;
-    this.workers = workers;
+    this.workers = decoders.workers;
+    this.geometry = decoders.geometry;
     this.rests = rests;
     this.report = report;
-    this.files = site.index.textures.map((row) => new TextureFile(row, workers));
+    this.files = site.index.textures.map((row) => new TextureFile(row, this.workers));
   }
 
   /** Makes the most urgent requests, as long as the link would run dry. */
@@ -120,7 +123,8 @@ export class Stream {
       client.learnRecord(cell, record);
     } else {
       const textures = this.site.index.textures.length;
-      const read = (/** @type {Uint8Array<ArrayBuffer>} */ body) => readShapes(body, cell, textures);
+      const read = (/** @type {Uint8Array<ArrayBuffer>} */ body) =>
+        readShapes(body, cell, textures, this.geometry);
       const shapes = await this.fetcher.whole(url, read, request);
       this.shapes.set(cell, shapes);
       client.arrived(request);
@@ -186,9 +190,14 @@ export class Stream {
  * @param {Uint8Array<ArrayBuffer>} body
  * @param {number} cell
  * @param {number} textures in the index
+ * @param {Decoders["geometry"]} decoder
  */
-function readShapes(body, cell, textures) {
-  const read = readGlb(body.buffer, textures);
+async function readShapes(body, cell, textures, decoder) {
+  const loaded = () =>
+    decoder().catch((fault) => {
+      throw new PageError("PTM-V106", `The geometry cannot be decoded: ${fault}`);
+    });
+  const read = await readGlb(body.buffer, textures, loaded);
   if (read.cell !== cell) throw new Error("is of another cell");
   return read.shapes;
 }

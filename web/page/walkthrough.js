@@ -68,7 +68,7 @@ export class Walkthrough {
    * @param {WebGL2RenderingContext} gl
    * @param {import("./data/site.js").Site} site
    * @param {object} options
-   * @param {import("../ptm/src/workers.js").DecoderWorkers} options.workers
+   * @param {import("./stream.js").Decoders} options.decoders
    * @param {string} options.policy
    * @param {number} options.budget bytes of texture memory
    * @param {import("./app.js").App["emit"]} emit
@@ -100,7 +100,7 @@ export class Walkthrough {
       locator: this.locator,
       estimate: this.estimate,
       fetcher: this.fetcher,
-      workers: options.workers,
+      decoders: options.decoders,
       rests: () => this.#rests,
       report: (error, kind, number) => this.#report(error, kind, number),
     });

@@ -26,13 +26,109 @@ const ARRAYS = { 5126: Float32Array, 5123: Uint16Array, 5125: Uint32Array };
 /** @type {Record<string, number>} */
 const ITEMS = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
 
+/** @typedef {import("../../ptm/src/meshopt.js").ViewDecoder} ViewDecoder */
+/** @typedef {Float32Array | Uint16Array | Uint32Array} Numbers */
+
+/** The arrays of a GLB, by the numbers of their accessors. */
+class Arrays {
+  /** Of compressed views: their elements, or indices. @type {Map<number, Uint8Array | Uint32Array>} */
+  #decoded = new Map();
+  /** @type {Map<number, Numbers>} */
+  #read = new Map();
+
+  /**
+   * @param {any} tree the JSON of the GLB
+   * @param {Uint8Array<ArrayBuffer>} binary its bytes, from a multiple of 4 on
+   * @param {ViewDecoder | null} decoder of compressed views
+   */
+  constructor(tree, binary, decoder) {
+    this.tree = tree;
+    this.binary = binary;
+    this.decoder = decoder;
+  }
+
+  /** The numbers of an accessor of vertices. @param {number} number @returns {Numbers} */
+  vertices(number) {
+    const known = this.#read.get(number);
+    if (known) return known;
+    const row = this.tree.accessors[number], { bytes, stride } = this.#elements(row.bufferView);
+    const Kind = ARRAYS[row.componentType], items = ITEMS[row.type], from = row.byteOffset ?? 0;
+    let numbers;
+    if (stride === 0 || stride === items * Kind.BYTES_PER_ELEMENT) {
+      numbers = new Kind(bytes.buffer, bytes.byteOffset + from, row.count * items);
+    } else {
+      const all = new Kind(bytes.buffer, bytes.byteOffset + from);
+      const step = stride / Kind.BYTES_PER_ELEMENT;
+      if ((row.count - 1) * step + items > all.length) throw new Error("has a view that is too short");
+      numbers = new Kind(row.count * items);
+      for (let k = 0, at = 0; k < row.count; k++, at += step) {
+        for (let n = 0; n < items; n++) numbers[items * k + n] = all[at + n];
+      }
+    }
+    this.#read.set(number, numbers);
+    return numbers;
+  }
+
+  /**
+   * The indices of an accessor.
+   * @param {number} number
+   * @param {number} vertices that they index
+   * @returns {Uint16Array | Uint32Array}
+   */
+  indices(number, vertices) {
+    const row = this.tree.accessors[number], view = row.bufferView;
+    const coded = this.#coded(view);
+    if (!coded) return /** @type {Uint16Array | Uint32Array} */ (this.vertices(number));
+    let all = /** @type {Uint32Array | undefined} */ (this.#decoded.get(view));
+    if (!all) {
+      all = this.#with().triangles(this.#stream(coded), coded.count, vertices);
+      this.#decoded.set(view, all);
+    }
+    const begin = (row.byteOffset ?? 0) / coded.byteStride;
+    return all.subarray(begin, begin + row.count);
+  }
+
+  /** The bytes of a view, and the distance of its elements, 0 if they are adjacent. @param {number} number */
+  #elements(number) {
+    const view = this.tree.bufferViews[number], coded = this.#coded(number);
+    if (!coded) {
+      const begin = view.byteOffset ?? 0;
+      return { bytes: this.binary.subarray(begin, begin + view.byteLength), stride: 0 };
+    }
+    let bytes = /** @type {Uint8Array<ArrayBuffer> | undefined} */ (this.#decoded.get(number));
+    if (!bytes) {
+      const { count, byteStride, filter } = coded;
+      const exponential = filter === "EXPONENTIAL";
+      bytes = this.#with().attributes(this.#stream(coded), count, byteStride, exponential);
+      this.#decoded.set(number, bytes);
+    }
+    return { bytes, stride: coded.byteStride };
+  }
+
+  /** @param {number} view */
+  #coded(view) {
+    return this.tree.bufferViews[view].extensions?.EXT_meshopt_compression;
+  }
+
+  /** @param {{byteOffset?: number, byteLength: number}} coded */
+  #stream({ byteOffset = 0, byteLength }) {
+    return this.binary.subarray(byteOffset, byteOffset + byteLength);
+  }
+
+  #with() {
+    if (!this.decoder) throw new Error("does not say that it is compressed");
+    return this.decoder;
+  }
+}
+
 /**
- * The cell and the shapes of a GLB. Throws an Error if it is damaged.
+ * The cell and the shapes of a GLB. Rejects with an Error if it is damaged, and as `decoder`.
  * @param {ArrayBuffer} buffer
- * @param {number} [textures] in the index
- * @returns {{cell: number, shapes: Shape[]}}
+ * @param {number} textures in the index
+ * @param {() => Promise<ViewDecoder>} decoder called for a compressed GLB
+ * @returns {Promise<{cell: number, shapes: Shape[]}>}
  */
-export function readGlb(buffer, textures = Infinity) {
+export async function readGlb(buffer, textures, decoder) {
   const view = new DataView(buffer);
   if (buffer.byteLength < 20 || view.getUint32(0, true) !== GLTF) throw new Error("is not a GLB");
   if (view.getUint32(8, true) !== buffer.byteLength) throw new Error("is cut short");
@@ -45,13 +141,8 @@ export function readGlb(buffer, textures = Infinity) {
     if (view.getUint32(next + 4, true) !== BINARY_CHUNK) throw new Error("has no binary chunk");
     binary = next + 8;
   }
-
-  /** @param {number} number */
-  const accessor = (number) => {
-    const row = tree.accessors[number], part = tree.bufferViews[row.bufferView];
-    const offset = binary + (part.byteOffset ?? 0) + (row.byteOffset ?? 0);
-    return new ARRAYS[row.componentType](buffer, offset, row.count * ITEMS[row.type]);
-  };
+  const compressed = tree.extensionsRequired !== undefined;
+  const arrays = new Arrays(tree, new Uint8Array(buffer, binary), compressed ? await decoder() : null);
 
   /** @type {Shape[]} */
   const shapes = [];
@@ -59,13 +150,11 @@ export function readGlb(buffer, textures = Infinity) {
     for (const { attributes, indices, material } of tree.meshes[node.mesh].primitives) {
       const look = tree.materials[material], base = look.pbrMetallicRoughness ?? {};
       const { texture = -1, wrapS, wrapT } = look.extras ?? {};
-      const { min, max } = tree.accessors[attributes.POSITION];
       const textured = texture >= 0 && attributes.TEXCOORD_0 !== undefined;
-      const index = /** @type {Uint16Array | Uint32Array} */ (accessor(indices));
-      const positions = /** @type {Float32Array} */ (accessor(attributes.POSITION));
-      const uvs = textured ? /** @type {Float32Array} */ (accessor(attributes.TEXCOORD_0)) : null;
       const painted = attributes.COLOR_0 !== undefined;
-      const colors = painted ? /** @type {Uint16Array} */ (accessor(attributes.COLOR_0)) : null;
+      const positions = /** @type {Float32Array} */ (arrays.vertices(attributes.POSITION));
+      const uvs = textured ? /** @type {Float32Array} */ (arrays.vertices(attributes.TEXCOORD_0)) : null;
+      const colors = painted ? /** @type {Uint16Array} */ (arrays.vertices(attributes.COLOR_0)) : null;
       if (!Number.isInteger(texture) || texture >= textures) {
         throw new Error("has a texture that is not in the index");
       }
@@ -73,20 +162,13 @@ export function readGlb(buffer, textures = Infinity) {
       if (!Array.isArray(factor) || factor.length !== 4 || !factor.every(Number.isFinite)) {
         throw new Error("has an invalid colour");
       }
-      if (![min, max].every((corner) => corner?.length === 3 && corner.every(Number.isFinite))) {
-        throw new Error("has no bounding box");
-      }
       if (uvs && 3 * uvs.length !== 2 * positions.length) throw new Error("has too few coordinates");
       if (colors && 3 * colors.length !== 4 * positions.length) throw new Error("has too few colours");
-      let greatest = -1;
-      for (let k = 0; k < index.length; k++) if (index[k] > greatest) greatest = index[k];
-      if (3 * greatest >= positions.length) throw new Error("has a wrong index");
+      const own = ownOf(arrays.indices(indices, positions.length / 3), { positions, uvs, colors });
+      const { low, high } = boxOf(own.positions);
       shapes.push({
         name: node.name ?? "",
-        positions,
-        uvs,
-        colors,
-        indices: index,
+        ...own,
         texture: textured ? texture : -1,
         clampU: wrapS === CLAMP,
         clampV: wrapT === CLAMP,
@@ -94,10 +176,44 @@ export function readGlb(buffer, textures = Infinity) {
         blends: look.alphaMode === "BLEND",
         cutoff: look.alphaMode === "MASK" ? Number(look.alphaCutoff) || 0 : 0,
         twoSided: look.doubleSided === true,
-        low: min,
-        high: max,
+        low,
+        high,
       });
     }
   }
   return { cell: tree.scenes[tree.scene ?? 0].extras.cell, shapes };
+}
+
+/**
+ * The vertices of one shape, of an array that it may share with others.
+ * @param {Uint16Array | Uint32Array} index
+ * @param {{positions: Float32Array, uvs: Float32Array | null, colors: Uint16Array | null}} shared
+ */
+function ownOf(index, { positions, uvs, colors }) {
+  let first = Infinity, last = -1;
+  for (let k = 0; k < index.length; k++) {
+    if (index[k] < first) first = index[k];
+    if (index[k] > last) last = index[k];
+  }
+  if (last < 0 || 3 * last >= positions.length) throw new Error("has a wrong index");
+  const end = last + 1;
+  const indices = first ? index.map((n) => n - first) : index;
+  return {
+    positions: positions.subarray(3 * first, 3 * end),
+    uvs: uvs && uvs.subarray(2 * first, 2 * end),
+    colors: colors && colors.subarray(4 * first, 4 * end),
+    indices,
+  };
+}
+
+/** @param {Float32Array} positions */
+function boxOf(positions) {
+  const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+  for (let k = 0; k < positions.length; k++) {
+    const value = positions[k], axis = k % 3;
+    if (value < low[axis]) low[axis] = value;
+    if (value > high[axis]) high[axis] = value;
+  }
+  if (![...low, ...high].every(Number.isFinite)) throw new Error("has a position that is not finite");
+  return { low, high };
 }

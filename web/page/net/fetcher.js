@@ -41,7 +41,7 @@ export class Fetcher {
    * captive portal may have answered.
    * @template T
    * @param {string} url
-   * @param {(body: Uint8Array<ArrayBuffer>) => T} read throws if it is damaged
+   * @param {(body: Uint8Array<ArrayBuffer>) => T | Promise<T>} read throws or rejects if it is damaged
    * @param {{left: number}} [progress] bytes still to come, updated
    * @returns {Promise<T>}
    */
@@ -50,8 +50,9 @@ export class Fetcher {
       const { response, body } = await this.#get(url, { cache }, progress);
       if (response.status !== 200) throw refused(url, response.status);
       try {
-        return read(body);
+        return await read(body);
       } catch (fault) {
+        if (fault instanceof PageError) throw fault;
         const message = /** @type {Error} */ (fault).message;
         if (cache === "default") throw new Passing(message, true);
         throw new PageError("PTM-V105", `${nameOf(url)} is damaged: ${message}`);

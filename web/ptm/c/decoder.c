@@ -1,4 +1,5 @@
-// The exports of the module: room for a tile, then one of three coders.
+// The exports of the module: room for a tile, then one of three coders; room for a buffer view, then one
+// of meshopt's.
 
 #include "memory.h"
 #include "rans.h"
@@ -8,6 +9,9 @@
 int decode_haar(void);
 int decode_repeats(void);
 int decode_texels(i32 error);
+int decode_attributes(const u8 *at, const u8 *end, i32 count, i32 stride, u8 *out);
+void filter_exponential(u32 *number, i32 count);
+int decode_triangles(const u8 *at, const u8 *end, i32 count, u32 vertices, u32 *out);
 
 Tile tile;
 
@@ -56,6 +60,17 @@ EXPORT(reserve) bool reserve(u32 length, i32 width, i32 height, i32 components) 
   return true;
 }
 
+// Allocates the bytes and the elements of a buffer view; false if memory is short. They lie where those
+// of a tile do.
+EXPORT(reserve_view) bool reserve_view(u32 length, u32 size) {
+  used = ((u64)(uintptr_t)&__heap_base + 15) & ~(u64)15;
+  u8 *data = room(length);
+  u32 *elements = room(size);
+  if (!data || !elements) return false;
+  tile = (Tile){.data = data, .end = data + length, .texels = elements};
+  return true;
+}
+
 EXPORT(data) const u8 *data(void) { return tile.data; }
 EXPORT(below) const u32 *below(void) { return tile.below; }
 EXPORT(texels) const u32 *texels(void) { return tile.texels; }
@@ -63,3 +78,12 @@ EXPORT(texels) const u32 *texels(void) { return tile.texels; }
 EXPORT(haar) int haar(void) { return decode_haar(); }
 EXPORT(repeats) int repeats(void) { return decode_repeats(); }
 EXPORT(texel) int texel(i32 error) { return decode_texels(error); }
+
+EXPORT(attributes) int attributes(i32 count, i32 stride, i32 exponential) {
+  int result = decode_attributes(tile.data, tile.end, count, stride, (u8 *)tile.texels);
+  if (result == OK && exponential) filter_exponential(tile.texels, count * (stride / 4));
+  return result;
+}
+EXPORT(triangles) int triangles(i32 count, u32 vertices) {
+  return decode_triangles(tile.data, tile.end, count, vertices, tile.texels);
+}

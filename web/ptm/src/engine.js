@@ -39,9 +39,9 @@ import { geometricTables, tokenTables } from "./families.js";
 /** The module of this package. */
 export const DECODER_URL = /* @__PURE__ */ new URL("./decoder.wasm", import.meta.url);
 /** An error of the coders. */
-const NO_MEMORY = 2;
+export const NO_MEMORY = 2;
 /** Memory never shrinks: an instance that has grown beyond this is given up after the tile. */
-const KEPT = 2 ** 25;
+export const KEPT = 2 ** 25;
 
 /** A module that declares a function type with a vector of 128 bits, and nothing else. */
 const VECTOR_TYPE = /* @__PURE__ */ Uint8Array.of(0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123);
@@ -57,15 +57,22 @@ export function hasSimd() {
  * @param {ModuleSource} [source]
  * @returns {Promise<Engine>}
  */
-export async function loadEngine(source = DECODER_URL) {
+export async function loadEngine(source) {
+  return engineOf(await compileModule(source));
+}
+
+/**
+ * Compiles the module; throws as `loadEngine`.
+ * @param {ModuleSource} [source]
+ * @returns {Promise<WebAssembly.Module>}
+ */
+export async function compileModule(source = DECODER_URL) {
   if (!hasSimd()) throw new PtmError("PTM-M103", "this browser has no SIMD in WebAssembly");
-  if (source instanceof WebAssembly.Module) return engineOf(source);
-  if (typeof source !== "string" && !(source instanceof URL)) {
-    return engineOf(await WebAssembly.compile(source));
-  }
+  if (source instanceof WebAssembly.Module) return source;
+  if (typeof source !== "string" && !(source instanceof URL)) return WebAssembly.compile(source);
   const response = await fetch(source);
   if (!response.ok) throw new Error(`${source}: ${response.status}`);
-  return engineOf(await WebAssembly.compile(await response.arrayBuffer()));
+  return WebAssembly.compile(await response.arrayBuffer());
 }
 
 /**
