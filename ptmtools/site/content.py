@@ -5,9 +5,7 @@ and a site that changes is never half old. The index is that of the hints, with 
 each file instead of templates: a client plans with the sizes of records and geometry.
 The page itself is built by ``web/page/build.py`` and committed in ``page/``.
 
-The geometry stays GLB. (Tried, benchmarks/RESULTS.md: differences of vertices in planes of
-bytes save 22 to 44 % of it, but 0.02 to 0.04 s until the first room at 512 kbit/s; a GLB without
-the names and URIs that the page does not read, 5 %.)
+The geometry stays GLB, without what the page does not read (`ptmtools.site.geometry`).
 """
 
 from __future__ import annotations
@@ -27,11 +25,12 @@ from ptmtools.errors import DatabaseError, InputError, LimitError, Rebuild, nami
 from ptmtools.files import open_regular
 from ptmtools.options import option
 from ptmtools.output.emission import compressed
-from ptmtools.output.model import sizes_of
+from ptmtools.output.model import FileError, sizes_of
 from ptmtools.output.served import FORM, Served, read_served
 from ptmtools.pipeline.command import naming_command, open_database
 from ptmtools.pipeline.stages.emit import EMIT
 from ptmtools.progress import Progress, silent
+from ptmtools.site.geometry import lean_glb
 from ptmtools.store.folder import DatabaseFolder, damaged, unreadable
 from ptmtools.store.layout import SERVED, sha256
 from ptmtools.texture.previews import FORMATS
@@ -221,8 +220,14 @@ class _Builder:
             for kind, template in templates.items():
                 file, digest = self._place(template.replace("{name}", cell["name"]))
                 data = self._folder.read(file.relative_to(self._folder.path).as_posix(), digest)
+                source: Path | bytes = file
+                if kind == "geometry":
+                    try:
+                        source = data = lean_glb(data)
+                    except FileError as fault:
+                        raise damaged(file, str(fault)) from None
                 row[kind] = self._add(
-                    cell["name"], *media[kind], file, digest=digest, compressed=True
+                    cell["name"], *media[kind], source, digest=digest, compressed=True
                 )
                 row[f"{kind}Bytes"] = min(len(data), len(compressed(data)))
             yield row

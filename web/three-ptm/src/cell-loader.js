@@ -4,6 +4,8 @@
 import { ClampToEdgeWrapping, Mesh, MeshBasicMaterial, RepeatWrapping, Texture } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 
+import { loadViewDecoder } from "ptm-decoder";
+
 /** @typedef {import("three").Group} Group */
 /**
  * Returns the texture with a number in the index, with these wrap modes.
@@ -12,11 +14,32 @@ import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 
 const CLAMP = 33071;
 
+/** @type {Promise<import("ptm-decoder").ViewDecoder> | undefined} */
+let decoder;
+
+/** The decoder of compressed cells, in the form that GLTFLoader takes. */
+const meshoptDecoder = {
+  supported: true,
+  /**
+   * @param {number} count
+   * @param {number} stride
+   * @param {Uint8Array} source
+   * @param {string} mode
+   * @param {string} [filter]
+   */
+  async decodeGltfBufferAsync(count, stride, source, mode, filter) {
+    const views = await (decoder ??= loadViewDecoder());
+    if (mode === "ATTRIBUTES") return views.attributes(source, count, stride, filter === "EXPONENTIAL");
+    const indices = views.triangles(source, count, 2 ** 32 - 1);
+    return stride === 2 ? Uint16Array.from(indices) : indices;
+  },
+};
+
 /** Loads cells whose surfaces show the textures of `textureOf`. */
 export class CellLoader {
   #textureOf;
   // Prevents the loader from fetching images.
-  #loader = new GLTFLoader().register(() => {
+  #loader = new GLTFLoader().setMeshoptDecoder(meshoptDecoder).register(() => {
     return { name: "none", loadTexture: async () => new Texture() };
   });
 

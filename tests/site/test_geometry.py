@@ -1,0 +1,83 @@
+"""The GLBs of a site draw what those of the database draw."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ptmtools.cli.main import main
+from ptmtools.glb import COMPONENTS
+from ptmtools.output.gltf import pack, unpack
+from ptmtools.site.geometry import lean_glb
+from tests.e2e.conftest import make_museum
+
+UNREAD = ("name", "metallicFactor", "ptm", "baseColorTexture")
+
+
+@pytest.fixture(scope="module")
+def cells(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[bytes]]:
+    """Of each form all GLBs of a small museum."""
+    folder = tmp_path_factory.mktemp("lean")
+    model = make_museum(folder / "model", rooms=2)
+    result = {}
+    for form, options in {"compressed": [], "plain": ["--plain-gltf"]}.items():
+        db = folder / f"{form}.db"
+        assert main(["-q", "build-scene", str(model), "-o", str(db), "-j", "1", *options]) == 0
+        result[form] = [path.read_bytes() for path in sorted((db / "www/gltf").iterdir())]
+    return result
+
+
+def drawn(data: bytes) -> Counter[tuple[str, str, int, int]]:
+    """The bytes of indices that are drawn, with the look and the vertices of each."""
+    tree, _ = unpack(data)
+    counter: Counter[tuple[str, str, int, int]] = Counter()
+    for mesh in tree["meshes"]:
+        for primitive in mesh["primitives"]:
+            material = bare(tree["materials"][primitive["material"]])
+            attributes = {n: tree["accessors"][a] for n, a in primitive["attributes"].items()}
+            index = tree["accessors"][primitive["indices"]]
+            size = int(COMPONENTS[index["componentType"]][-1])
+            first = index.get("byteOffset", 0)
+            for place in range(first, first + size * index["count"], size):
+                vertices = json.dumps(attributes, sort_keys=True)
+                counter[json.dumps(material), vertices, index["bufferView"], place] += 1
+    return counter
+
+
+def bare(value: Any) -> Any:
+    """Without what the page does not read, nor empty objects."""
+    if not isinstance(value, dict):
+        return value
+    kept = {name: bare(value[name]) for name in sorted(value) if name not in UNREAD}
+    return {name: part for name, part in kept.items() if part != {}}
+
+
+@pytest.mark.parametrize("form", ["compressed", "plain"])
+def test_the_same_triangles_with_the_same_looks(cells: dict[str, list[bytes]], form: str) -> None:
+    fewer = 0
+    for data in cells[form]:
+        lean = lean_glb(data)
+        assert len(lean) < len(data)
+        assert drawn(lean) == drawn(data)
+        (before, binary), (tree, same) = unpack(data), unpack(lean)
+        assert same == binary
+        assert tree["scenes"][0]["extras"] == before["scenes"][0]["extras"]
+        assert b"uri" not in lean
+        count = [sum(len(m["primitives"]) for m in t["meshes"]) for t in (before, tree)]
+        fewer += count[1] < count[0]
+    assert (fewer > 0) == (form == "compressed")
+
+
+def test_an_empty_cell() -> None:
+    tree = {
+        "asset": {"version": "2.0", "generator": "ptmtools"},
+        "scene": 0,
+        "scenes": [{"name": "c0003", "extras": {"cell": 3}}],
+    }
+    lean, binary = unpack(lean_glb(pack(tree, b"")))
+    assert lean == {"asset": {"version": "2.0"}, "scenes": [{"extras": {"cell": 3}}]}
+    assert binary == b""
