@@ -63,7 +63,7 @@ def texture_exponents(uv: NDArray[np.floating], width: int, height: int) -> tupl
 
 def _least(most: float) -> int:
     """The exponent of the least step of which 24 bits hold enough for a number."""
-    return max(_FINEST, math.ceil(math.log2(most / MOST))) if most > 0 else _FINEST
+    return math.ceil(math.log2(max(most / MOST, 2.0**_FINEST)))
 
 
 def least_thickness(corners: NDArray[np.float64], tolerance: Tolerance) -> float:

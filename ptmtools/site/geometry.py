@@ -1,9 +1,8 @@
 """The GLB of a cell as its own page needs it.
 
-The page reads no names and no URIs, and draws shapes of one look together. The document loses these,
-objects become one node, and shapes of one look that lie side by side one primitive; the arrays stay
-byte for byte. In bytes with gzip that is 15 % less in the sample museum and 9 % less in the
-hospital.
+The page reads no names and no URIs, and draws shapes of one look together. The document loses
+these, objects become one node, and shapes of one look that lie side by side one primitive; the
+arrays stay byte for byte. With gzip that saves 15 % in the sample museum and 11 % in the hospital.
 """
 
 from __future__ import annotations

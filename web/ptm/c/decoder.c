@@ -17,7 +17,7 @@ Tile tile;
 
 extern u8 __heap_base;
 // Rows are read and written sixteen texels at a time: so much further at most.
-enum { PAGE = 1 << 16, WORD_BYTES = 2, ROOM_BEHIND = 256 };
+enum { PAGE = 1 << 16, WORD_BYTES = 2, ROOM_BEHIND = 256, VIEW_BEHIND = 15 * 256 };
 static u64 used;
 
 // Grows the memory to a number of bytes.
@@ -65,7 +65,7 @@ EXPORT(reserve) bool reserve(u32 length, i32 width, i32 height, i32 components) 
 EXPORT(reserve_view) bool reserve_view(u32 length, u32 size) {
   used = ((u64)(uintptr_t)&__heap_base + 15) & ~(u64)15;
   u8 *data = room(length);
-  u32 *elements = room(size);
+  u32 *elements = room((u64)size + VIEW_BEHIND);
   if (!data || !elements) return false;
   tile = (Tile){.data = data, .end = data + length, .texels = elements};
   return true;

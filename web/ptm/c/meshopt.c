@@ -1,6 +1,8 @@
 // The codecs of EXT_meshopt_compression that cells use (docs/formats/gltf.md): attributes of version 0,
 // with the filter EXPONENTIAL or none, and triangles of version 1.
 
+#include <wasm_simd128.h>
+
 #include "memory.h"
 
 enum { BLOCK = 256, GROUP = 16, BLOCK_BYTES = 8192, TAIL = 32, TABLE = 16, RECENT = 16 };
@@ -14,7 +16,7 @@ static const u8 *deltas(const u8 *at, const u8 *end, i32 groups, u8 *delta) {
     i32 mode = modes[group / 4] >> (2 * (group % 4)) & 3, bits = mode ? 1 << mode : 0;
     if (2 * bits > end - at) return NULL;
     if (bits == 0 || bits == 8) {
-      for (i32 i = 0; i < GROUP; i++) delta[i] = bits ? at[i] : 0;
+      wasm_v128_store(delta, bits ? wasm_v128_load(at) : wasm_i32x4_const_splat(0));
       at += 2 * bits;
       continue;
     }
@@ -33,22 +35,59 @@ static const u8 *deltas(const u8 *at, const u8 *end, i32 groups, u8 *delta) {
   return at;
 }
 
-// Decodes elements of a stride that is a multiple of 4, at most 256.
+// Sixteen deltas of a byte of elements: even ones go up, odd ones down.
+static v128_t steps(const u8 *at) {
+  v128_t delta = wasm_v128_load(at), odd = wasm_v128_and(delta, wasm_i8x16_const_splat(1));
+  return wasm_v128_xor(wasm_u8x16_shr(delta, 1), wasm_i8x16_neg(odd));
+}
+
+// Adds the deltas of four bytes of 4 elements to `last`, the element before in each lane of 32 bits.
+static v128_t add_up(v128_t sum, v128_t last, i32 stride, u8 *out) {
+  v128_t zero = wasm_i32x4_const_splat(0);
+  sum = wasm_i8x16_add(sum, wasm_i32x4_shuffle(zero, sum, 0, 4, 5, 6));
+  sum = wasm_i8x16_add(sum, wasm_i32x4_shuffle(zero, sum, 0, 1, 4, 5));
+  sum = wasm_i8x16_add(sum, last);
+  wasm_v128_store32_lane(out, sum, 0);
+  wasm_v128_store32_lane(out + stride, sum, 1);
+  wasm_v128_store32_lane(out + 2 * stride, sum, 2);
+  wasm_v128_store32_lane(out + 3 * stride, sum, 3);
+  return wasm_i32x4_shuffle(sum, sum, 3, 3, 3, 3);
+}
+
+// The same of 16 elements, whose bytes come one after the other.
+static v128_t add_group(const u8 *delta, v128_t last, i32 stride, u8 *out) {
+  v128_t a = steps(delta), b = steps(delta + BLOCK);
+  v128_t c = steps(delta + 2 * BLOCK), d = steps(delta + 3 * BLOCK);
+  v128_t ab = wasm_i8x16_shuffle(a, b, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+  v128_t cd = wasm_i8x16_shuffle(c, d, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+  last = add_up(wasm_i16x8_shuffle(ab, cd, 0, 8, 1, 9, 2, 10, 3, 11), last, stride, out);
+  out += 4 * stride;
+  last = add_up(wasm_i16x8_shuffle(ab, cd, 4, 12, 5, 13, 6, 14, 7, 15), last, stride, out);
+  out += 4 * stride;
+  ab = wasm_i8x16_shuffle(a, b, 8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
+  cd = wasm_i8x16_shuffle(c, d, 8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
+  last = add_up(wasm_i16x8_shuffle(ab, cd, 0, 8, 1, 9, 2, 10, 3, 11), last, stride, out);
+  out += 4 * stride;
+  return add_up(wasm_i16x8_shuffle(ab, cd, 4, 12, 5, 13, 6, 14, 7, 15), last, stride, out);
+}
+
+// Decodes elements of a stride that is a multiple of 4, at most 256. Behind them is room for 15 more.
 int decode_attributes(const u8 *at, const u8 *end, i32 count, i32 stride, u8 *out) {
   i32 tail = at_least(TAIL, stride), block = at_most(BLOCK_BYTES / stride & ~(GROUP - 1), BLOCK);
   if (end - at < 1 + tail || *at++ != 0xa0) return DAMAGED;
   const u8 *before = end - stride;
   end -= tail;
-  u8 delta[BLOCK];
+  u8 delta[4 * BLOCK];
   for (i32 first = 0; first < count; first += block) {
-    i32 n = at_most(block, count - first);
-    for (i32 byte = 0; byte < stride; byte++) {
-      at = deltas(at, end, (n + GROUP - 1) / GROUP, delta);
-      if (!at) return DAMAGED;
-      u8 value = before[byte], *to = out + byte;
-      for (i32 i = 0; i < n; i++, to += stride) {
-        value = (u8)(value + ((delta[i] >> 1) ^ -(delta[i] & 1)));
-        *to = value;
+    i32 n = at_most(block, count - first), groups = (n + GROUP - 1) / GROUP;
+    for (i32 channel = 0; channel < stride; channel += 4) {
+      for (i32 byte = 0; byte < 4; byte++) {
+        at = deltas(at, end, groups, delta + byte * BLOCK);
+        if (!at) return DAMAGED;
+      }
+      v128_t last = wasm_v128_load32_splat(before + channel);
+      for (i32 from = 0; from < n; from += GROUP) {
+        last = add_group(delta + from, last, stride, out + channel + from * stride);
       }
     }
     out += n * stride;
