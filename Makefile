@@ -138,6 +138,7 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/ach.py sample_data/two_rooms/two_rooms.obj --only presets speed
 	$(BIN)/python benchmarks/emission.py
 	$(BIN)/python benchmarks/formats.py
+	$(BIN)/python benchmarks/geometry.py
 	$(BIN)/python benchmarks/simplification.py --faces 100000
 	$(BIN)/python benchmarks/apo.py --triangles 50000
 	$(BIN)/python benchmarks/interlace.py --quick

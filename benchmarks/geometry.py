@@ -2,8 +2,8 @@
 
     python benchmarks/geometry.py [MODEL…]
 
-The first table gives bytes of the geometry of each model, with `gzip -9` of each file, which is how a
-site sends it, and for each triangle. *Cells* are those of a database: plain (`--plain-gltf`),
+The first table gives bytes of the geometry of each model, with `gzip -9` of each file, which is how
+a site sends it, and for each triangle. *Cells* are those of a database: plain (`--plain-gltf`),
 compressed, and as `ptm publish` serves them; they have more triangles than the model, since cells
 cut them. *Model* is the model in one GLB, written by trimesh, then compressed by gltfpack and by
 glTF-Transform (meshopt and Draco, at their defaults); images are left out of all. The last columns
@@ -99,7 +99,7 @@ def rivals(glb: bytes, folder: Path) -> list[tuple[str, bytes]]:
     source.write_bytes(glb)
     pack = ["node", GLTFPACK.folder / "cli.js", "-i", source, "-o", out]
     transform = ["node", TRANSFORM.folder / "bin/cli.js"]
-    commands = {
+    commands: dict[str, list[Any]] = {
         "gltfpack -c": [*pack, "-c"],
         "gltfpack -cc": [*pack, "-cc"],
         "gltf-transform meshopt": [*transform, "meshopt", source, out],
@@ -107,6 +107,8 @@ def rivals(glb: bytes, folder: Path) -> list[tuple[str, bytes]]:
     }
     results = []
     for name, command in commands.items():
+        if (GLTFPACK if command[1] == pack[1] else TRANSFORM).remedy():
+            continue
         subprocess.run(list(map(str, command)), check=True, capture_output=True)
         results.append((f"model, {name}", out.read_bytes()))
     return results
@@ -179,9 +181,12 @@ def main() -> None:
     parser.add_argument("models", nargs="*", type=model_file, default=usual, help="names or files")
     models = [model for model in parser.parse_args().models if model.is_file()]
     for package in (GLTFPACK, TRANSFORM, MESHOPTIMIZER):
-        package.require()
+        if remedy := package.remedy():
+            print(f"without {package.name}; {remedy}")
     with tempfile.TemporaryDirectory(prefix="geometry-") as folder:
         cells = {model.stem: sizes(model, Path(folder)) for model in models}
+        if MESHOPTIMIZER.remedy():
+            return
         print("\n| cells of | kB decoded | encoded, MB/s | decoded, MB/s | meshoptimizer |")
         print("|---|--:|--:|--:|--:|")
         for name, files in cells.items():

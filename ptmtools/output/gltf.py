@@ -185,7 +185,7 @@ def _glb(content: Content, cell: int) -> bytes:
         record = content.records[image][1] if image >= 0 else None
         vertices = vertices_of(content.geometry, shape, textured=record is not None)
         material = materials.take(shape.material, shape.two_sided)
-        size = None if record is None else (record.width, record.height)
+        size = None if record is None else record.finest
         primitive = buffer.take(vertices, material, size)
         if primitive is None:
             continue
