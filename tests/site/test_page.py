@@ -39,7 +39,11 @@ def record_of(site: Site, cell: int) -> dict[str, Any]:
 
 
 def geometry_of(site: Site, cell: int) -> ReadGlb:
-    return read_glb(read(site, site.index["cells"][cell]["geometry"]))
+    """The GLB of the database; that of the site has no names."""
+    row = site.index["cells"][cell]
+    record = site.entries[f"data/{row['record']}"].source
+    assert isinstance(record, Path)
+    return read_glb((record.parents[1] / f"gltf/{row['name']}.glb").read_bytes())
 
 
 def tall(viewpoint: dict[str, Any], width: int, height: int) -> float:

@@ -21,6 +21,8 @@
 
 const GLTF = 0x46546c67, JSON_CHUNK = 0x4e4f534a, BINARY_CHUNK = 0x004e4942;
 const CLAMP = 33071;
+/** Milliseconds of reading without a pause. */
+const AT_ONCE = 6;
 /** @type {Record<number, typeof Float32Array | typeof Uint16Array | typeof Uint32Array>} */
 const ARRAYS = { 5126: Float32Array, 5123: Uint16Array, 5125: Uint32Array };
 /** @type {Record<string, number>} */
@@ -144,6 +146,14 @@ export async function readGlb(buffer, textures, decoder) {
   const compressed = tree.extensionsRequired !== undefined;
   const arrays = new Arrays(tree, new Uint8Array(buffer, binary), compressed ? await decoder() : null);
 
+  let begun = performance.now();
+  // A quarter of a million triangles take several frames.
+  const pause = async () => {
+    if (performance.now() - begun < AT_ONCE) return;
+    await new Promise((resolve) => setTimeout(resolve));
+    begun = performance.now();
+  };
+
   /** @type {Shape[]} */
   const shapes = [];
   for (const node of tree.nodes ?? []) {
@@ -153,6 +163,7 @@ export async function readGlb(buffer, textures, decoder) {
       const textured = texture >= 0 && attributes.TEXCOORD_0 !== undefined;
       const painted = attributes.COLOR_0 !== undefined;
       const positions = /** @type {Float32Array} */ (arrays.vertices(attributes.POSITION));
+      await pause();
       const uvs = textured ? /** @type {Float32Array} */ (arrays.vertices(attributes.TEXCOORD_0)) : null;
       const colors = painted ? /** @type {Uint16Array} */ (arrays.vertices(attributes.COLOR_0)) : null;
       if (!Number.isInteger(texture) || texture >= textures) {
@@ -164,7 +175,10 @@ export async function readGlb(buffer, textures, decoder) {
       }
       if (uvs && 3 * uvs.length !== 2 * positions.length) throw new Error("has too few coordinates");
       if (colors && 3 * colors.length !== 4 * positions.length) throw new Error("has too few colours");
-      const own = ownOf(arrays.indices(indices, positions.length / 3), { positions, uvs, colors });
+      await pause();
+      const index = arrays.indices(indices, positions.length / 3);
+      await pause();
+      const own = ownOf(index, { positions, uvs, colors });
       const { low, high } = boxOf(own.positions);
       shapes.push({
         name: node.name ?? "",
