@@ -18,7 +18,11 @@ HERE = Path(__file__).resolve().parent
 MODULE = HERE / "src" / "decoder.wasm"
 #: The compiler, a wheel on PyPI; the extra `dev` pins it too.
 ZIG = "0.15.2"
-SOURCES = ("decoder.c", "rans.c", "haar.c", "haar_planes.c", "repeats.c", "texel.c", "meshopt.c")
+SOURCES = (
+    *("decoder.c", "crc32.c"),
+    *("rans.c", "haar.c", "haar_planes.c", "repeats.c", "texel.c"),
+    "meshopt.c",
+)
 FLAGS = (
     *("-target", "wasm32-freestanding", "-mcpu=mvp+simd128+bulk_memory+sign_ext"),
     *("-std=c17", "-Os", "-ffreestanding", "-nostdlib", "-fno-exceptions", "-g0"),

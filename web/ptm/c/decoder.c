@@ -1,5 +1,5 @@
-// The exports of the module: room for a tile, then one of three coders; room for a buffer view, then one
-// of meshopt's.
+// The exports of the module: a checksum; room for a tile, then one of three coders; room for a buffer
+// view, then one of meshopt's.
 
 #include "memory.h"
 #include "rans.h"
@@ -12,6 +12,7 @@ int decode_texels(i32 error);
 int decode_attributes(const u8 *at, const u8 *end, i32 count, i32 stride, u8 *out);
 void filter_exponential(u32 *number, i32 count);
 int decode_triangles(const u8 *at, const u8 *end, i32 count, u32 vertices, u32 *out);
+u32 crc32(const u8 *at, u32 length);
 
 Tile tile;
 
@@ -45,6 +46,13 @@ void *take(u32 size) {
 // Where the host writes the built-in tables: 34 of Haar and repeats, 78 of the texel coder.
 EXPORT(geometric_tables) u16 *geometric_tables(void) { return geometric[0]; }
 EXPORT(token_tables) u16 *token_tables(void) { return tokens[0]; }
+
+// Allocates bytes in the place of all others; NULL if memory is short.
+EXPORT(reserve_bytes) const u8 *reserve_bytes(u32 length) {
+  used = ((u64)(uintptr_t)&__heap_base + 15) & ~(u64)15;
+  return room(length);
+}
+EXPORT(checksum) u32 checksum(const u8 *bytes, u32 length) { return crc32(bytes, length); }
 
 // Allocates the bytes and texels of a tile; false if memory is short.
 EXPORT(reserve) bool reserve(u32 length, i32 width, i32 height, i32 components) {

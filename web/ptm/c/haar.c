@@ -21,10 +21,10 @@ static const i16 activity_weights[3][3][7] = {
     {{9, 98, 36, 0, 0, 0, 0}, {3, 99, 51, 0, 60, 0, 0}, {1, 27, 57, 0, 17, 50, 49}},
     {{8, 74, 31, 128, 0, 0, 0}, {3, 88, 23, 131, 38, 0, 0}, {1, 24, 20, 61, 25, 39, 55}},
 };
+// By activity, where the table of its class begins.
+static u16 offsets[ACTIVITY_TOP + 1];
+_Static_assert(CLASSES * sizeof(RowTable) < 1 << 16, "offsets have 16 bits");
 static const i16 class_bounds[CLASSES - 1] = {1, 3, 7, 12, 20, 32, 50, 76, 115, 170, 250, 370, 560};
-// Three times the class of an activity: the offset of its table, KB.
-static u8 kilobytes[ACTIVITY_TOP + 1];
-_Static_assert(sizeof(Table) == 3 << 10, "three KB");
 
 static v128_t stray;
 
@@ -61,7 +61,7 @@ static inline __attribute__((always_inline)) void predict(Plane *plane, i32 y, c
   const i16 *r2 = plane->references > 1 ? planes[1].residual[k][side] : zeros;
   const i16 *w = plane->weights[k], *c = activity_weights[plane->references][k];
   i16 *const predicted = prediction;
-  u16 *const lively = activity;
+  u16 *const lively = symbols;
   const i32 bw = tile.bw;
   for (i32 x = 0; x < bw; x += BLOCKS) {
     v128_t e1 = load(r1 + x), e2 = load(r2 + x);
@@ -108,35 +108,49 @@ static inline __attribute__((always_inline)) void predict(Plane *plane, i32 y, c
   }
 }
 
-static inline const Table *table_of(const Table *first, u32 a) {
-  return (const Table *)((const u8 *)first + ((u32)kilobytes[a] << 10));
+// The next state; the symbol comes in the place of its activity, so that a row has one address.
+static inline u32 step(u32 x, const u8 *first, u16 *at, const u8 **word) {
+  const u8 *table = first + offsets[*at];
+  u32 slot = x & (SUM - 1), z = table[offsetof(RowTable, slots) + slot];
+  *at = (u16)z;
+  const u16 *interval = (const u16 *)table + 2 * z;
+  return renewed(interval[1] * (x >> 11) + slot - interval[0], word);
 }
 
-// The symbols of a row, whose tables are known: the four states work side by side.
-static void decode_row(const Table *first) {
-  const i32 n = tile.bw;
-  const u16 *const lively = activity;
-  u16 *const out = symbols;
+// The symbols of a row in place of their activities: the four states work side by side.
+static void decode_row(const RowTable *first) {
+  const u8 *const from = (const u8 *)first;
+  u16 *at = symbols, *const end = at + tile.bw;
   const u32 lane = stream.count;
   u32 a = stream.state[lane & 3], b = stream.state[(lane + 1) & 3];
   u32 c = stream.state[(lane + 2) & 3], d = stream.state[(lane + 3) & 3];
   const u8 *word = stream.word;
-  i32 x = 0;
-  for (; x + 4 <= n; x += 4) {
-    out[x] = (u16)step(&a, table_of(first, lively[x]), &word);
-    out[x + 1] = (u16)step(&b, table_of(first, lively[x + 1]), &word);
-    out[x + 2] = (u16)step(&c, table_of(first, lively[x + 2]), &word);
-    out[x + 3] = (u16)step(&d, table_of(first, lively[x + 3]), &word);
+  for (; at + 8 <= end; at += 8) {
+    a = step(a, from, at, &word);
+    b = step(b, from, at + 1, &word);
+    c = step(c, from, at + 2, &word);
+    d = step(d, from, at + 3, &word);
+    a = step(a, from, at + 4, &word);
+    b = step(b, from, at + 5, &word);
+    c = step(c, from, at + 6, &word);
+    d = step(d, from, at + 7, &word);
+  }
+  if (at + 4 <= end) {
+    a = step(a, from, at, &word);
+    b = step(b, from, at + 1, &word);
+    c = step(c, from, at + 2, &word);
+    d = step(d, from, at + 3, &word);
+    at += 4;
   }
   stream.state[lane & 3] = a;
   stream.state[(lane + 1) & 3] = b;
   stream.state[(lane + 2) & 3] = c;
   stream.state[(lane + 3) & 3] = d;
   stream.word = word;
-  stream.count += (u32)x;
-  for (; x < n; x++) out[x] = (u16)plain_symbol(table_of(first, lively[x]));
+  stream.count += (u32)(at - symbols);
+  for (; at < end; at++) *at = (u16)row_symbol((const RowTable *)(from + offsets[*at]));
   // Behind the row are no residuals.
-  wasm_v128_store(out + n, wasm_i16x8_splat(0));
+  wasm_v128_store(end, wasm_i16x8_splat(0));
 }
 
 // From symbols to residuals and differences.
@@ -269,7 +283,7 @@ static void decode_edge(void) {
     u32 texel = opaque();
     for (u32 at = 0; at < 8 * (u32)tile.components; at += 8) {
       i32 guess = median(a.w >> at & 255, a.n >> at & 255, a.nw >> at & 255);
-      texel |= ((u32)(guess + signed_of(plain_symbol(&tables[EDGE_TABLE]))) & 255) << at;
+      texel |= ((u32)(guess + signed_of(row_symbol(&row_tables[EDGE_TABLE]))) & 255) << at;
     }
     tile.texels[place] = texel;
   }
@@ -296,7 +310,7 @@ static bool decode_plane(Plane *plane, i32 y) {
     } else {
       predict(plane, row, G);
     }
-    decode_row(tables + (k == G ? CLASSES : 0));
+    decode_row(row_tables + (k == G ? CLASSES : 0));
     if (stream.word > stream.end) return false;
     absorb(plane->residual[k][row & 1], plane->value[k][row & 1]);
   }
@@ -310,12 +324,14 @@ static bool decode_plane(Plane *plane, i32 y) {
 }
 
 int decode_haar(void) {
-  for (i32 a = 0; a <= ACTIVITY_TOP && !kilobytes[ACTIVITY_TOP]; a++) {
-    for (u32 i = 0; i < CLASSES - 1; i++) kilobytes[a] += class_bounds[i] <= a ? 3 : 0;
+  for (i32 a = 0; a <= ACTIVITY_TOP && !offsets[ACTIVITY_TOP]; a++) {
+    for (u32 i = 0; i < CLASSES - 1; i++) {
+      offsets[a] += class_bounds[i] <= a ? (u16)sizeof(RowTable) : 0;
+    }
   }
   const u8 *data = tile.data;
   if (!take_rows()) return NO_MEMORY;
-  if (!read_planes(&data) || !read_tables(&data, TABLES, geometric, 34)) return DAMAGED;
+  if (!read_planes(&data) || !read_tables(&data, TABLES, geometric, 34, true)) return DAMAGED;
   if (!begin_stream(data)) return DAMAGED;
   stray = wasm_i16x8_splat(0);
   const u16 *upper[MOST_PLANES], *lower[MOST_PLANES];

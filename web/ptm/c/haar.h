@@ -25,7 +25,7 @@ typedef struct {
 
 extern Plane planes[MOST_PLANES];
 extern i16 *zeros, *prediction;
-extern u16 *activity, *symbols, *rest;  // rest: the bits above the components
+extern u16 *symbols, *rest;  // rest: the bits above the components
 
 // Room for all rows; false if memory is short.
 bool take_rows(void);

@@ -11,7 +11,7 @@ static const i16 built_in[3][3][7] = {
 
 Plane planes[MOST_PLANES];
 i16 *zeros, *prediction;
-u16 *activity, *symbols, *rest;
+u16 *symbols, *rest;
 
 static void read_ranks(Plane *plane, const u8 *bitmap) {
   i32 many = 0;
@@ -32,7 +32,7 @@ static i16 *take_row(void) {
 
 bool take_rows(void) {
   bool all = (zeros = take_row()) && (rest = (u16 *)take_row()) && (prediction = take_row());
-  all = all && (activity = (u16 *)take_row()) && (symbols = (u16 *)take_row());
+  all = all && (symbols = (u16 *)take_row());
   for (i32 c = 0; c < tile.components; c++) {
     Plane *plane = &planes[c];
     for (i32 i = 0; i < 8; i++) all = all && (plane->rows[i] = take_row());

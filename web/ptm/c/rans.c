@@ -1,6 +1,9 @@
+#include <wasm_simd128.h>
+
 #include "rans.h"
 
-Table tables[MOST_TABLES];
+RowTable row_tables[MOST_ROW_TABLES];
+static SingleTable single_tables[MOST_TABLES];
 Stream stream;
 u16 geometric[34][256], tokens[78][256];
 
@@ -36,16 +39,38 @@ static bool read_sent(Nibbles *from, u16 *f) {
   return !from->broken && sum == SUM;
 }
 
-static void fill(Table *table, const u16 *f) {
+// A table without frequencies is not used; of a damaged stream it makes zeros.
+static void fill_row(RowTable *table, const u16 *f) {
   u32 at = 0;
-  for (u32 z = 0; z < 256; z++) {
-    table->intervals[z] = (u32)f[z] << 12 | at;
-    if (f[z]) __builtin_memset(table->slots + at, (int)z, f[z]);
+  if (!f) __builtin_memset(table, 0, sizeof *table);
+  for (u32 z = 0; f && z < 256; z++) {
+    table->intervals[z][0] = (u16)at;
+    table->intervals[z][1] = f[z];
+    // Sixteen at a time, further than needed.
+    const v128_t many = wasm_i8x16_splat((signed char)z);
+    for (u32 end = at + f[z], i = at; i < end; i += 16) wasm_v128_store(table->slots + i, many);
     at += f[z];
   }
 }
 
-bool read_tables(const u8 **data, u32 count, const u16 (*family)[256], u32 kinds) {
+static void fill_single(SingleTable *table, const u16 *f) {
+  u32 at = 0, many = 0, bucket = 0;
+  if (!f) {
+    __builtin_memset(table, 0, sizeof *table);
+    many = 1;
+  }
+  for (u32 z = 0; f && z < 256; z++) {
+    if (!f[z]) continue;
+    table->entries[many] = z << 24 | (u32)f[z] << 12 | at;
+    at += f[z];
+    while (bucket << BUCKET_BITS < at) table->first[bucket++] = (u8)many;
+    many++;
+  }
+  table->entries[many] = SUM;
+}
+
+bool read_tables(const u8 **data, u32 count, const u16 (*family)[256], u32 kinds,
+                 bool rows) {
   u8 kind[MOST_TABLES];
   u16 sent[256];
   if (tile.end - *data < 2) return false;
@@ -70,24 +95,33 @@ bool read_tables(const u8 **data, u32 count, const u16 (*family)[256], u32 kinds
     kind[t++] = n == 1 ? SENT : (u8)now;
   }
   for (u32 t = 0; t < count; t++) {
-    if (kind[t] == 0) {
-      __builtin_memset(&tables[t], 0, sizeof(Table));
-    } else if (kind[t] == SENT) {
-      if (!read_sent(&from, sent)) return false;
-      fill(&tables[t], sent);
+    if (kind[t] == SENT && !read_sent(&from, sent)) return false;
+    const u16 *f = kind[t] == 0 ? NULL : kind[t] == SENT ? sent : family[kind[t] - 1];
+    if (rows) {
+      fill_row(&row_tables[t], f);
     } else {
-      fill(&tables[t], family[kind[t] - 1]);
+      fill_single(&single_tables[t], f);
     }
   }
   return !from.broken;
 }
 
-__attribute__((noinline)) u32 plain_symbol(const Table *table) {
-  return step(&stream.state[stream.count++ & 3], table, &stream.word);
+u32 row_symbol(const RowTable *table) {
+  u32 *state = &stream.state[stream.count++ & 3];
+  u32 slot = *state & (SUM - 1), z = table->slots[slot];
+  const u16 *interval = table->intervals[z];
+  *state = renewed(interval[1] * (*state >> 11) + slot - interval[0], &stream.word);
+  return z;
 }
 
-__attribute__((noinline)) u32 symbol(u32 table) {
-  u32 z = step(&stream.state[stream.count++ & 3], &tables[table], &stream.word);
+__attribute__((noinline)) u32 symbol(u32 number) {
+  const SingleTable *table = &single_tables[number];
+  u32 *state = &stream.state[stream.count++ & 3];
+  u32 x = *state, slot = x & (SUM - 1);
+  const u32 *entry = table->entries + table->first[slot >> BUCKET_BITS];
+  while ((entry[1] & 4095) <= slot) entry++;
+  u32 e = *entry, z = e >> 24;
+  *state = renewed((e >> 12 & 4095) * (x >> 11) + slot - (e & 4095), &stream.word);
   return __builtin_expect(z == ESCAPE, 0) ? next_escape() : z;
 }
 

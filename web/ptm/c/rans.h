@@ -5,15 +5,26 @@
 
 #include "memory.h"
 
-enum { SUM = 2048, ESCAPE = 255, STATE_LOW = 1 << 15, MOST_TABLES = 236 };
+enum { SUM = 2048, ESCAPE = 255, STATE_LOW = 1 << 15, MOST_TABLES = 236, MOST_ROW_TABLES = 29,
+       BUCKET_BITS = 3 };
 
-// Three KB stay in a core's own cache; eight, with all data at each slot, do not.
+// For rows of symbols whose tables are known (Haar). The padding makes a table an odd number of cache
+// lines, so that the first intervals of all tables do not compete for the same lines.
 typedef struct {
-  u8 slots[SUM];       // the symbol of each
-  u32 intervals[256];  // of each symbol: frequency << 12 | where its slots begin
-} Table;
+  u16 intervals[256][2];  // of each symbol: where its slots begin, frequency
+  u8 slots[SUM];          // the symbol of each
+  u8 apart[64];
+} RowTable;
 
-extern Table tables[MOST_TABLES];
+// For single symbols by any of many tables (repeats, texels): a tenth of the cache lines, and a
+// search that seldom takes a step.
+typedef struct {
+  u8 first[SUM >> BUCKET_BITS];  // the entry of the first slot of each bucket
+  u32 entries[257];  // of the symbols in use: symbol << 24 | frequency << 12 | where its slots begin
+  u8 apart[60];
+} SingleTable;
+
+extern RowTable row_tables[MOST_ROW_TABLES];
 
 // The stream of a group.
 typedef struct {
@@ -30,8 +41,9 @@ extern Stream stream;
 // the texel coder.
 extern u16 geometric[34][256], tokens[78][256];
 
-// Reads a number of tables from *data on, which is moved behind them; false if they are damaged.
-bool read_tables(const u8 **data, u32 count, const u16 (*family)[256], u32 kinds);
+// Reads a number of tables from *data on, which is moved behind them, as row tables or single ones;
+// false if they are damaged.
+bool read_tables(const u8 **data, u32 count, const u16 (*family)[256], u32 kinds, bool rows);
 
 // Begins the stream that is from `data` to the end of the tile. Words behind its end may be read,
 // but no further than the host has left room for.
@@ -50,22 +62,19 @@ static inline u32 next_escape(void) {
   return word16(stream.escape - 2);
 }
 
-// A symbol from one state: renewed without a branch, which would be guessed wrong half of the time.
-static inline u32 step(u32 *state, const Table *table, const u8 **word) {
-  u32 x = *state, slot = x & (SUM - 1);
-  u32 z = table->slots[slot], interval = table->intervals[z];
-  x = (interval >> 12) * (x >> 11) + slot - (interval & 4095);
-  u32 renewed = x << 16 | word16(*word);
+// A state below its range renewed by the next word: without a branch, which would be guessed wrong half
+// of the time.
+static inline u32 renewed(u32 x, const u8 **word) {
+  u32 longer = x << 16 | word16(*word);
   bool low = x < STATE_LOW;
-  *state = low ? renewed : x;
   *word += low ? 2 : 0;
-  return z;
+  return low ? longer : x;
 }
 
-// The next symbol, 255 as it is.
-u32 plain_symbol(const Table *table);
+// The next symbol by a row table, 255 as it is.
+u32 row_symbol(const RowTable *table);
 
-// The next symbol. One copy of it in the module costs no time that can be measured.
+// The next symbol by a single table. One copy of it in the module costs no time that can be measured.
 u32 symbol(u32 table);
 
 static inline i32 signed_of(u32 z) { return (i32)(z >> 1) ^ -(i32)(z & 1); }

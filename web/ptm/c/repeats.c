@@ -309,7 +309,7 @@ int decode_repeats(void) {
   u8 *missed = take((u32)tile.bw + 1);
   if (!missed) return NO_MEMORY;
   const u8 *data = tile.data;
-  if (!read_tables(&data, TABLES, geometric, 34) || !begin_stream(data)) return DAMAGED;
+  if (!read_tables(&data, TABLES, geometric, 34, false) || !begin_stream(data)) return DAMAGED;
   u32 blocks = (u32)(tile.bw * tile.bh);
   u32 bits = blocks ? 32 - (u32)__builtin_clz(blocks) : 0;
   bits = (u32)at_most(at_least((i32)bits, 6), MOST_BITS);

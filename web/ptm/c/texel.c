@@ -111,7 +111,7 @@ int decode_texels(i32 error) {
     __builtin_memcpy(planes[c].weights, built_in[references_of(c)], sizeof built_in[0]);
   }
   if (form == CODED_WITH_WEIGHTS && !read_weights(&data, planes)) return DAMAGED;
-  if (!read_tables(&data, TABLES, tokens, 78) || tile.end - data < 4) return DAMAGED;
+  if (!read_tables(&data, TABLES, tokens, 78, false) || tile.end - data < 4) return DAMAGED;
   u32 length = word16(data) | word16(data + 2) << 16;
   data += 4;
   if (length > (u32)(tile.end - data)) return DAMAGED;

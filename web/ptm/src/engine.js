@@ -15,6 +15,7 @@ import { geometricTables, tokenTables } from "./families.js";
  * Decodes one tile of `fast` from its bytes (behind those that name its coder) and the same part of the
  * level below. The next call may overwrite the texels that it returns.
  * @typedef {object} Engine
+ * @property {(bytes: Uint8Array) => number} crc32 of PNG and zip, unsigned
  * @property {(data: Uint8Array, below: Uint32Array, shape: Shape) => Uint32Array} haar
  * @property {(data: Uint8Array, below: Uint32Array, shape: Shape) => Uint32Array} repeats
  * @property {(data: Uint8Array, below: Uint32Array, shape: Shape, error: number) => Uint32Array} texel
@@ -26,6 +27,8 @@ import { geometricTables, tokenTables } from "./families.js";
  * @property {WebAssembly.Memory} memory
  * @property {() => number} geometric_tables
  * @property {() => number} token_tables
+ * @property {(length: number) => number} reserve_bytes 0 if memory does not suffice
+ * @property {(bytes: number, length: number) => number} checksum
  * @property {(length: number, width: number, height: number, components: number) => number} reserve
  *   whether memory suffices
  * @property {() => number} data
@@ -90,6 +93,15 @@ function engineOf(module) {
     return coders;
   }
 
+  /** @param {Uint8Array} bytes */
+  function crc32(bytes) {
+    const { memory, reserve_bytes: reserve, checksum } = (instance ??= instantiate());
+    const at = reserve(bytes.length);
+    if (!at) throw noMemory();
+    new Uint8Array(memory.buffer).set(bytes, at);
+    return checksum(at, bytes.length) >>> 0;
+  }
+
   /**
    * @param {(exports: Exports) => number} coder
    * @param {Uint8Array} data
@@ -113,6 +125,7 @@ function engineOf(module) {
   }
 
   return {
+    crc32,
     haar: (data, below, shape) => decode((coders) => coders.haar(), data, below, shape),
     repeats: (data, below, shape) => decode((coders) => coders.repeats(), data, below, shape),
     texel: (data, below, shape, error) =>

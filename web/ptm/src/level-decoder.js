@@ -1,7 +1,6 @@
 // Decodes groups to levels, each refining the one before it; tile by tile, checksums first.
 
 import { FAST, RAW, pyramidSizes } from "./container.js";
-import { crc32 } from "./crc32.js";
 import { PtmError, damaged } from "./errors.js";
 import { Reader } from "./reader.js";
 import { rawTexels, storedTexels, toNative, toRgba, unknownCoder } from "./texels.js";
@@ -108,7 +107,7 @@ export class LevelDecoder {
     const tiled = level.across * level.down > 1;
     const texels = tiled
       ? this.#tiles(group, number)
-      : this.#tile(checked(group, level.crc32, `level ${number}`), this.#texels, shape, !number);
+      : this.#tile(this.#checked(group, level.crc32, `level ${number}`), this.#texels, shape, !number);
     const channels = this.format === "rgba" ? 4 : components;
     const out = channels === 4 ? toRgba(texels, components) : toNative(texels, components);
     // Nothing refines the finest level. An engine may overwrite its result.
@@ -128,7 +127,7 @@ export class LevelDecoder {
     const below = this.#texels;
     const size = 8 * across * down;
     if (size > group.length) throw wrongIndex(number);
-    const index = new Reader(checked(group.subarray(0, size), crc, `level ${number}`));
+    const index = new Reader(this.#checked(group.subarray(0, size), crc, `level ${number}`));
     const reader = new Reader(group.subarray(size));
     const out = new Uint32Array(width * height);
     for (let row = 0; row < down; row++) {
@@ -138,7 +137,7 @@ export class LevelDecoder {
         const length = index.number(4);
         if (length > group.length - size - reader.at) throw wrongIndex(number);
         const place = `level ${number}, tile ${row * across + column}`;
-        const data = checked(reader.take(length), index.number(4), place);
+        const data = this.#checked(reader.take(length), index.number(4), place);
         const under = new Uint32Array((w >> 1) * (h >> 1));
         copyRows(below, (y >> 1) * (width >> 1) + (x >> 1), width >> 1, under, 0, w >> 1, w >> 1);
         const shape = { width: w, height: h, components };
@@ -147,6 +146,18 @@ export class LevelDecoder {
     }
     if (reader.at < reader.bytes.length) throw wrongIndex(number);
     return out;
+  }
+
+  /**
+   * @param {Uint8Array} data
+   * @param {number} crc
+   * @param {string} place
+   */
+  #checked(data, crc, place) {
+    if (this.engine.crc32(data) !== crc) {
+      throw new PtmError("PTM-I108", `${place}: the checksum is wrong`);
+    }
+    return data;
   }
 
   /**
@@ -204,16 +215,6 @@ export class LevelDecoder {
     reader.end();
     return texels;
   }
-}
-
-/**
- * @param {Uint8Array} data
- * @param {number} crc
- * @param {string} place
- */
-function checked(data, crc, place) {
-  if (crc32(data) !== crc) throw new PtmError("PTM-I108", `${place}: the checksum is wrong`);
-  return data;
 }
 
 /** @param {number} number */
