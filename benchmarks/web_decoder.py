@@ -1,10 +1,11 @@
 """Speed of the browser's decoder and of Python's: `python benchmarks/web_decoder.py [NAME…]`
 
 Names are those of the sets of `benchmarks/codec/images.py`. Python with numba, and WebAssembly in
-node, decode all levels of every image on one thread, in turn and several times; the minimum time
-counts. MB are those of the finest level. ``--browser`` does the same in a worker of headless
-Chromium, beside `createImageBitmap` of the same images as PNG (which may decode on a separate
-thread). The last table gives the download sizes of a page.
+node, decode all levels of every image on one thread, in turn and several times; the minimum
+processor time counts. MB are those of the finest level. ``--against COMMIT`` also times the decoder
+of that commit, in turn with this one, and prints the ratio. ``--browser`` measures elapsed time in a
+worker of headless Chromium, all levels as one order, beside `createImageBitmap` of the same images
+as PNG (which may decode on a separate thread). The last table gives the download sizes of a page.
 """
 
 from __future__ import annotations
@@ -73,29 +74,42 @@ def encoded(name: str, sources: list[Path], folder: Path) -> Timed:
 
 def by_python(data: bytes) -> float:
     """Seconds."""
-    begin = time.perf_counter()
+    begin = time.process_time()
     for _ in decode_levels(data):
         pass
-    return time.perf_counter() - begin
+    return time.process_time() - begin
 
 
-def by_node(files: list[Path], rounds: int) -> list[float]:
-    """Seconds of each file, the least of several rounds in one process."""
+def package_of(commit: str, folder: Path) -> Path:
+    """The decoder of a commit, as files in a folder."""
+    packed = subprocess.run(
+        ["git", "archive", commit, "web/ptm"], cwd=ROOT, stdout=subprocess.PIPE, check=True
+    )
+    subprocess.run(["tar", "x", "-C", str(folder)], input=packed.stdout, check=True)
+    return folder / "web" / "ptm"
+
+
+def by_node(packages: dict[str, Path], timed: Timed) -> None:
+    """Notes the least times of several rounds in one process."""
     script = ROOT / "benchmarks" / "web_decoder.mjs"
-    command = ["node", str(script), str(rounds), *map(str, files)]
+    folders = ",".join(map(str, packages.values()))
+    command = ["node", str(script), str(ROUNDS), folders, *map(str, timed.files)]
     done = subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True)
-    return [milliseconds / 1000 for milliseconds in json.loads(done.stdout)["least"]]
+    for name, least in zip(packages, json.loads(done.stdout), strict=True):
+        timed.note(name, [milliseconds / 1000 for milliseconds in least])
 
 
-def in_browser(timed: list[Timed], folder: Path, rounds: int) -> None:
-    """Notes the times of the decoder and of `createImageBitmap` in one page."""
+def in_browser(packages: dict[str, Path], timed: list[Timed], folder: Path, rounds: int) -> None:
+    """Notes the times of the decoders and of `createImageBitmap` in one page."""
     from browsers import web
 
     files = [file.name for one in timed for file in one.files]
     code = (ROOT / "benchmarks" / "web_decoder_page.js").read_text()
-    given = f"const files = {json.dumps(files)}, rounds = {rounds};"
+    urls = {name: f"/package{i}" for i, name in enumerate(packages)}
+    given = f"const files = {json.dumps(files)}, rounds = {rounds}, packages = {json.dumps(urls)};"
     page = f'{web.REPORTING}<script type="module">{given}\n{code}</script>'
-    visit = web.visit(page, {"ptm": PACKAGE, "files": folder}, seconds=900)
+    mounted = {f"package{i}": path for i, path in enumerate(packages.values())}
+    visit = web.visit(page, {**mounted, "files": folder}, seconds=900)
     if visit.messages:
         sys.exit("; ".join(visit.messages))
     for decoder, milliseconds in json.loads(visit.body).items():
@@ -128,16 +142,20 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3, help="each of several within a process")
     parser.add_argument("--images", type=int, default=6, help="of each set at most")
     parser.add_argument("--browser", action="store_true")
+    parser.add_argument("--against", metavar="COMMIT", help="also time the decoder of that commit")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="web-decoder-") as name:
         folder = Path(name)
+        packages = {"wasm": PACKAGE}
+        if given.against:
+            packages[f"wasm of {given.against}"] = package_of(given.against, folder)
         timed = [encoded(one, actual[one][: given.images], folder) for one in given.names]
         for _ in range(given.rounds):
             for one in timed:
                 one.note("Python", [by_python(file.read_bytes()) for file in one.files])
-                one.note("wasm", by_node(one.files, ROUNDS))
+                by_node(packages, one)
         if given.browser:
-            in_browser(timed, folder, ROUNDS * given.rounds)
+            in_browser(packages, timed, folder, ROUNDS * given.rounds)
     decoders = list(timed[0].least)
     print(f"| MB/s (share of Python's) | {' | '.join(decoders)} |")
     print("|---" * (1 + len(decoders)) + "|")
@@ -145,6 +163,10 @@ def main() -> None:
         speeds = [one.speed(decoder) for decoder in decoders]
         cells = (f"{speed:.0f} ({speed / speeds[0]:.2f})" for speed in speeds)
         print(f"| {len(one.files)} {one.name} | {' | '.join(cells)} |")
+    for one in timed if given.against else []:
+        for decoder in decoders:
+            if (old := f"{decoder} of {given.against}") in decoders:
+                print(f"{one.name}, {decoder} / old: {one.speed(decoder) / one.speed(old):.2f}")
     print_sizes()
 
 

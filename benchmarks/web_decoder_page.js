@@ -1,25 +1,20 @@
-// The page of `web_decoder.py --browser`: `files` and `rounds` stand before it. Posts, for each
-// decoder, the least milliseconds of each file.
-
-import { DecoderWorkers, readHeader } from "/ptm/src/index.js";
+// The page of `web_decoder.py --browser`: `files`, `rounds` and `packages` (name and URL) stand before
+// it. Posts, for each decoder, the least milliseconds of each file.
 
 const bytes = async (name) => new Uint8Array(await (await fetch(`/files/${name}`)).arrayBuffer());
 const ptm = await Promise.all(files.map(bytes));
 const png = await Promise.all(files.map((name) => bytes(name.replace(".ptm", ".png"))));
 
-async function throughWorker(workers, file) {
+// All levels as one order, as a page decodes the levels that have come.
+async function throughWorker({ readHeader, workers }, file) {
   const header = readHeader(file);
+  const ends = header.levels.map(({ offset, length }) => offset + length);
   const begin = performance.now();
-  const decoder = workers.decoder(header);
-  for (const { offset, length } of header.levels) {
-    await decoder.refine(file.subarray(offset, offset + length));
-  }
-  const taken = performance.now() - begin;
-  decoder.close();
-  return taken;
+  await workers.decodeFirst(file, { ends, levels: ends.length });
+  return performance.now() - begin;
 }
 
-async function asBitmap(file) {
+async function asBitmap(_, file) {
   const blob = new Blob([file], { type: "image/png" });
   const begin = performance.now();
   const bitmap = await createImageBitmap(blob, { premultiplyAlpha: "none", colorSpaceConversion: "none" });
@@ -28,13 +23,18 @@ async function asBitmap(file) {
   return taken;
 }
 
-const wasm = new DecoderWorkers({ count: 1 });
-const least = { wasm: [], PNG: [] };
-for (let i = 0; i < files.length; i++) for (const times of Object.values(least)) times.push(Infinity);
+const decoders = { PNG: { decode: asBitmap, files: png } };
+for (const [name, url] of Object.entries(packages)) {
+  const { DecoderWorkers, readHeader } = await import(`${url}/src/index.js`);
+  const workers = new DecoderWorkers({ count: 1 });
+  decoders[name] = { decode: throughWorker, files: ptm, readHeader, workers };
+}
+const least = Object.fromEntries(Object.keys(decoders).map((name) => [name, files.map(() => Infinity)]));
 for (let round = 0; round < rounds; round++) {
   for (let i = 0; i < files.length; i++) {
-    least.wasm[i] = Math.min(least.wasm[i], await throughWorker(wasm, ptm[i]));
-    least.PNG[i] = Math.min(least.PNG[i], await asBitmap(png[i]));
+    for (const [name, decoder] of Object.entries(decoders)) {
+      least[name][i] = Math.min(least[name][i], await decoder.decode(decoder, decoder.files[i]));
+    }
   }
 }
 post("/done", JSON.stringify(least));

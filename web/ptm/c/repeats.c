@@ -11,9 +11,12 @@ static const u32 K0 = 0x9e3779b1, K1 = 0x85ebca6b, K2 = 0xc2b2ae35;
 static const u32 K3 = 0x27d4eb2f, K4 = 0x165667b1, K5 = 0xa24baed5;
 
 // The last entry of each slot: a block as its place and 1, 0 for none; in FIRST as its place
-// << 2 | trust; the mean of the block in CHANGE; in SEEN a texel.
-enum { FIRST, AROUND, MEAN, CHANGE, CHANGE_MEAN, SEEN, SORTS };
+// << 2 | trust; in SEEN a texel. Of a change the mean of the block, too.
+enum { FIRST, AROUND, MEAN, SEEN, SORTS };
 static u32 slots[SORTS][1 << MOST_BITS];
+static struct {
+  u32 place, mean;
+} changes[1 << MOST_BITS];
 static u32 shift_of_slots;
 
 static inline u32 slot_of(u32 key) { return (key ^ key >> 15) * K1 >> shift_of_slots; }
@@ -110,14 +113,10 @@ static u32 new_texel(u32 position, u32 mean, u32 w, u32 n, u32 nw, u32 ne) {
 static inline u32 texel_of(u32 position, u32 table, u32 seen, u32 mean, u32 w, u32 n, u32 nw,
                            u32 ne) {
   table += 12 * position + (w == n) + 2 * ((seen == w) | (seen == n));
-  switch (symbol(table)) {
-    case 0: return seen;
-    case 1: return w;
-    case 2: return n;
-    case 3: return nw;
-    case 4: return ne;
-    default: return new_texel(position, mean, w, n, nw, ne);
-  }
+  // By index: a switch would be guessed wrong for most texels.
+  const u32 known[5] = {seen, w, n, nw, ne};
+  u32 z = symbol(table);
+  return z < 5 ? known[z] : new_texel(position, mean, w, n, nw, ne);
 }
 
 // s of a block by the remainder of the sum.
@@ -244,11 +243,11 @@ static u32 decode_block(i32 y, i32 x, u32 near) {
   u32 mean = slot_of(i * K0);
   u32 change = slot_of(minus(b.n0, i) * K0 + minus(b.n1, i) * K2 + minus(b.w0, i) * K3 +
                        minus(b.w1, i) * K4 + minus(e, i) * K5 + minus(s, i) * K1);
-  u32 places[3] = {slots[AROUND][around], slots[MEAN][mean], slots[CHANGE][change]};
-  u32 by = minus(i, slots[CHANGE_MEAN][change]);
+  u32 places[3] = {slots[AROUND][around], slots[MEAN][mean], changes[change].place};
+  u32 by = minus(i, changes[change].mean);
   u32 guess = symbol(GUESS + 4 * near + (places[0] > 0) + 2 * (places[1] > 0));
-  slots[AROUND][around] = slots[MEAN][mean] = slots[CHANGE][change] = place + 1;
-  slots[CHANGE_MEAN][change] = i;
+  slots[AROUND][around] = slots[MEAN][mean] = changes[change].place = place + 1;
+  changes[change].mean = i;
   if (guess < TEXELS) {
     if (places[guess] == 0) {
       put(here, i, i, i, i);
@@ -317,6 +316,7 @@ int decode_repeats(void) {
   const u32 mask = ~opaque();
   for (u32 i = 0; i < blocks; i++) tile.below[i] &= mask;
   for (u32 i = 0; i < SORTS; i++) __builtin_memset(slots[i], 0, sizeof(u32) << bits);
+  __builtin_memset(changes, 0, sizeof *changes << bits);
   for (i32 y = 0; y < tile.bh; y++) {
     u32 before = 0;
     bool ended = false;

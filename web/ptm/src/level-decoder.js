@@ -109,9 +109,14 @@ export class LevelDecoder {
       ? this.#tiles(group, number)
       : this.#tile(this.#checked(group, level.crc32, `level ${number}`), this.#texels, shape, !number);
     const channels = this.format === "rgba" ? 4 : components;
-    const out = channels === 4 ? toRgba(texels, components) : toNative(texels, components);
-    // Nothing refines the finest level. An engine may overwrite its result.
+    // Nothing refines the finest level. An engine may overwrite its result, tiles are copied out of it.
     const last = number === this.header.levels.length - 1;
+    const ready = last && tiled && channels === 4 && components > 2;
+    const out = ready
+      ? new Uint8Array(texels.buffer)
+      : channels === 4
+        ? toRgba(texels, components)
+        : toNative(texels, components);
     this.#texels = last ? new Uint32Array(0) : tiled ? texels : texels.slice();
     this.level = number;
     return { level: number, width: level.width, height: level.height, channels, data: out };
