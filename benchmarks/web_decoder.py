@@ -2,10 +2,11 @@
 
 Names are those of the sets of `benchmarks/codec/images.py`. Python with numba, and WebAssembly in
 node, decode all levels of every image on one thread, in turn and several times; the minimum
-processor time counts. MB are those of the finest level. ``--against COMMIT`` also times the decoder
-of that commit, in turn with this one, and prints the ratio. ``--browser`` measures elapsed time in a
-worker of headless Chromium, all levels as one order, beside `createImageBitmap` of the same images
-as PNG (which may decode on a separate thread). The last table gives the download sizes of a page.
+processor time counts. MB are those of the finest level. ``--against COMMIT`` also times the
+decoder of that commit, in turn with this one, and prints the ratio. ``--browser`` measures elapsed
+time in a worker of headless Chromium, all levels as one order, beside `createImageBitmap` of the
+same images as PNG (which may decode on a separate thread). The last table gives the download sizes
+of a page.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Bytes against decoding time where two coders suit: `python benchmarks/codec/choice.py [SET…]`
+"""Bytes against decoding time, by coder: `python benchmarks/codec/choice.py [SET…]`
 
-Sets are those of `images.py`, or folders of images. Profile `fast` codes a tile by *repeats* only if
-that is shorter than a share of what *Haar* takes (`fast.WORTH`). For several shares this prints the
-bytes of a set, relative to those of the largest share, and the speed of the decoder of `web/ptm` in
-node: MB of the finest level for each second of processor time, all levels, the least of several
-rounds.
+Sets are those of `images.py`, or folders of images. Profile `fast` codes a tile by *repeats* only
+if that is shorter than a share of what *Haar* takes (`fast.WORTH`). For several shares this prints
+the bytes of a set, relative to those of the largest share, and the speed of the decoder of
+`web/ptm` in node: MB of the finest level for each second of processor time, all levels, the least
+of several rounds.
 """
 
 from __future__ import annotations
@@ -45,7 +45,9 @@ def measured(sources: list[Path], share: float, folder: Path, rounds: int) -> tu
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     known = sets()
-    parser.add_argument("names", nargs="*", default=list(known), help=f"{', '.join(known)}; folders")
+    parser.add_argument(
+        "names", nargs="*", default=list(known), help=f"{', '.join(known)}; folders"
+    )
     parser.add_argument("--rounds", type=int, default=1, help="of ten each")
     given = parser.parse_args()
     print("| set | share | kB | relative | MB/s |")
@@ -57,7 +59,9 @@ def main() -> None:
             with tempfile.TemporaryDirectory(prefix="choice-") as folder:
                 size, speed = measured(sources, share, Path(folder), given.rounds)
             first = first or size
-            print(f"| {Path(name).name} | {share} | {size / 1e3:,.0f} | {size / first:.4f} | {speed:.0f} |")
+            relative = size / first
+            label = Path(name).name
+            print(f"| {label} | {share} | {size / 1e3:,.0f} | {relative:.4f} | {speed:.0f} |")
 
 
 if __name__ == "__main__":

@@ -43,9 +43,9 @@ PROBED_BLOCKS = 16 * 16
 #: Share of new texels up to which repeats is taken, and from which Haar is; between them both are
 #: tried, and with one or two components wherever repeats is not taken at once.
 BOTH_FROM, BOTH_TO = 0.4, 0.55
-#: Haar decodes two to six times as fast: repeats has to be smaller than this share of it. Instead of
-#: 0.97, models' textures have 0.6 % more bytes and decode a fifth faster; 0.7 costs another 0.2 % and
-#: gains a fiftieth (``benchmarks/codec/choice.py``).
+#: Haar decodes faster: repeats has to be smaller than this share of it. Compared with 0.97, models'
+#: textures have 0.6 % more bytes and decode a fifth faster; 0.7 costs another 0.2 % and gains a
+#: fiftieth (``benchmarks/codec/choice.py``).
 WORTH = 0.85
 #: Texels are counted in 30 bits by `coders.repeats`.
 TOO_MANY_BLOCKS = 1 << 27

@@ -3,7 +3,7 @@
 #include "rans.h"
 
 RowTable row_tables[MOST_ROW_TABLES];
-static SingleTable single_tables[MOST_TABLES];
+SingleTable single_tables[MOST_TABLES];
 Stream stream;
 u16 geometric[34][256], tokens[78][256];
 
@@ -114,16 +114,7 @@ u32 row_symbol(const RowTable *table) {
   return z;
 }
 
-__attribute__((noinline)) u32 symbol(u32 number) {
-  const SingleTable *table = &single_tables[number];
-  u32 *state = &stream.state[stream.count++ & 3];
-  u32 x = *state, slot = x & (SUM - 1);
-  const u32 *entry = table->entries + table->first[slot >> BUCKET_BITS];
-  while ((entry[1] & 4095) <= slot) entry++;
-  u32 e = *entry, z = e >> 24;
-  *state = renewed((e >> 12 & 4095) * (x >> 11) + slot - (e & 4095), &stream.word);
-  return __builtin_expect(z == ESCAPE, 0) ? next_escape() : z;
-}
+__attribute__((noinline)) u32 symbol(u32 number) { return symbol_here(number); }
 
 bool begin_stream(const u8 *data) {
   if (tile.end - data < 4) return false;

@@ -74,7 +74,20 @@ static inline u32 renewed(u32 x, const u8 **word) {
 // The next symbol by a row table, 255 as it is.
 u32 row_symbol(const RowTable *table);
 
-// The next symbol by a single table. One copy of it in the module costs no time that can be measured.
+// The next symbol by a single table. Inlined where it is called most often, it saves a thirtieth of the
+// time of repeats; everywhere, another fiftieth, and the module would be 3 kB larger.
+extern SingleTable single_tables[MOST_TABLES];
+static inline __attribute__((always_inline)) u32 symbol_here(u32 number) {
+  const SingleTable *table = &single_tables[number];
+  u32 *state = &stream.state[stream.count++ & 3];
+  u32 x = *state, slot = x & (SUM - 1);
+  const u32 *entry = table->entries + table->first[slot >> BUCKET_BITS];
+  while ((entry[1] & 4095) <= slot) entry++;
+  u32 e = *entry, z = e >> 24;
+  *state = renewed((e >> 12 & 4095) * (x >> 11) + slot - (e & 4095), &stream.word);
+  return __builtin_expect(z == ESCAPE, 0) ? next_escape() : z;
+}
+
 u32 symbol(u32 table);
 
 static inline i32 signed_of(u32 z) { return (i32)(z >> 1) ^ -(i32)(z & 1); }

@@ -115,7 +115,7 @@ static inline u32 texel_of(u32 position, u32 table, u32 seen, u32 mean, u32 w, u
   table += 12 * position + (w == n) + 2 * ((seen == w) | (seen == n));
   // By index: a switch would be guessed wrong for most texels.
   const u32 known[5] = {seen, w, n, nw, ne};
-  u32 z = symbol(table);
+  u32 z = symbol_here(table);
   return z < 5 ? known[z] : new_texel(position, mean, w, n, nw, ne);
 }
 
@@ -223,7 +223,7 @@ static u32 decode_block(i32 y, i32 x, u32 near) {
 
   u32 first = slot_of(i * K0 + b.n0 * K2 + b.n1 * K3 + b.w0 * K4 + b.w1 * K5);
   u32 entry = slots[FIRST][first], trust = entry & 3;
-  if (symbol(3 * trust + near) == 0) {
+  if (symbol_here(3 * trust + near) == 0) {
     if (trust == 0) {
       slots[FIRST][first] = place << 2 | 1;
       put(here, i, i, i, i);
@@ -245,7 +245,7 @@ static u32 decode_block(i32 y, i32 x, u32 near) {
                        minus(b.w1, i) * K4 + minus(e, i) * K5 + minus(s, i) * K1);
   u32 places[3] = {slots[AROUND][around], slots[MEAN][mean], changes[change].place};
   u32 by = minus(i, changes[change].mean);
-  u32 guess = symbol(GUESS + 4 * near + (places[0] > 0) + 2 * (places[1] > 0));
+  u32 guess = symbol_here(GUESS + 4 * near + (places[0] > 0) + 2 * (places[1] > 0));
   slots[AROUND][around] = slots[MEAN][mean] = changes[change].place = place + 1;
   changes[change].mean = i;
   if (guess < TEXELS) {

@@ -3,7 +3,7 @@
 import { FAST, RAW, pyramidSizes } from "./container.js";
 import { PtmError, damaged } from "./errors.js";
 import { Reader } from "./reader.js";
-import { rawTexels, storedTexels, toNative, toRgba, unknownCoder } from "./texels.js";
+import { asBytes, rawTexels, storedTexels, toNative, toRgba, unknownCoder } from "./texels.js";
 import { tileSpan } from "./tiling.js";
 
 /** @typedef {import("./container.js").Header} Header */
@@ -112,11 +112,8 @@ export class LevelDecoder {
     // Nothing refines the finest level. An engine may overwrite its result, tiles are copied out of it.
     const last = number === this.header.levels.length - 1;
     const ready = last && tiled && channels === 4 && components > 2;
-    const out = ready
-      ? new Uint8Array(texels.buffer)
-      : channels === 4
-        ? toRgba(texels, components)
-        : toNative(texels, components);
+    const convert = channels === 4 ? toRgba : toNative;
+    const out = ready ? asBytes(texels) : convert(texels, components);
     this.#texels = last ? new Uint32Array(0) : tiled ? texels : texels.slice();
     this.level = number;
     return { level: number, width: level.width, height: level.height, channels, data: out };

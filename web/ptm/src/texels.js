@@ -82,6 +82,14 @@ export function rawTexels(data, below, { width, height, components }) {
 }
 
 /**
+ * The texels of an array that has a buffer of its own, not copied.
+ * @param {Uint32Array} texels
+ */
+export function asBytes(texels) {
+  return new Uint8Array(/** @type {ArrayBuffer} */ (texels.buffer));
+}
+
+/**
  * Texels ready for upload: red, green, blue, alpha; grey is in all three, missing alpha is 255.
  * @param {Uint32Array} texels
  * @param {number} components
