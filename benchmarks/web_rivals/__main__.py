@@ -94,7 +94,7 @@ class Desk:
         """A timeline, kept or new."""
 
         def measure() -> Timeline:
-            print(f"{entrant.name}, {conditions}", file=sys.stderr, flush=True)
+            print(f"{entrant.name}: {conditions}", file=sys.stderr, flush=True)
             http = conditions.http
             return watch(
                 self.browser, entrant, conditions.link, self.own, http=http, seconds=seconds
@@ -102,7 +102,8 @@ class Desk:
 
         actual = kept(entrant, conditions, measure)
         for message in actual.messages:
-            print(f"{entrant.name}: {message}", file=sys.stderr)
+            if not message.startswith("debug:"):
+                print(f"{entrant.name}: {message}", file=sys.stderr)
         return actual
 
     def full_picture(self, entrant: Entrant) -> Picture:

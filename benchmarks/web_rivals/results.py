@@ -32,6 +32,12 @@ class Conditions:
     repetition: int
     patience: float
 
+    def __str__(self) -> str:
+        bandwidth = self.link.bandwidth
+        speed = "no limit" if bandwidth is None else f"{bandwidth / 1e6:g} Mbit/s"
+        way = f"{1000 * self.link.latency:.0f} ms"
+        return f"{speed}, {way}, HTTP/{self.http}, run {self.repetition + 1}"
+
     def key(self, entrant: Entrant) -> str:
         """The name of its file."""
         facts = [_EDITION, WIDTH, HEIGHT, entrant.name, entrant.digest]
