@@ -31,7 +31,7 @@ import trimesh
 from emission import best
 from PIL import Image
 from scenes import MODELS, MUSEUM, ROOT, model_file
-from web_rivals.packages import Package
+from web_rivals.packages import GLTF_TRANSFORM, Package
 
 from ptmtools.cells import subdivide
 from ptmtools.meshopt.encoding import encode_attributes, encode_triangles
@@ -39,12 +39,12 @@ from ptmtools.output.content import Content
 from ptmtools.output.emission import compressed
 from ptmtools.output.gltf import gltf_files, unpack
 from ptmtools.output.gltf_compressed import MESHOPT
+from ptmtools.output.grid import COARSEST
 from ptmtools.output.model import TextureRecord, WriterOptions
 from ptmtools.scene import Scene, ingest
 from ptmtools.site.geometry import lean_glb
 
 GLTFPACK = Package("gltfpack", "1.3.0", "gltfpack")
-TRANSFORM = Package("@gltf-transform/cli", "4.5.1", "gltf-transform")
 MESHOPTIMIZER = Package("meshoptimizer", "1.3.0", "meshoptimizer")
 
 
@@ -98,7 +98,7 @@ def rivals(glb: bytes, folder: Path) -> list[tuple[str, bytes]]:
     source, out = folder / "in.glb", folder / "out.glb"
     source.write_bytes(glb)
     pack = ["node", GLTFPACK.folder / "cli.js", "-i", source, "-o", out]
-    transform = ["node", TRANSFORM.folder / "bin/cli.js"]
+    transform = ["node", GLTF_TRANSFORM.folder / "bin/cli.js"]
     commands: dict[str, list[Any]] = {
         "gltfpack -c": [*pack, "-c"],
         "gltfpack -cc": [*pack, "-cc"],
@@ -107,7 +107,7 @@ def rivals(glb: bytes, folder: Path) -> list[tuple[str, bytes]]:
     }
     results = []
     for name, command in commands.items():
-        if (GLTFPACK if command[1] == pack[1] else TRANSFORM).remedy():
+        if (GLTFPACK if command[1] == pack[1] else GLTF_TRANSFORM).remedy():
             continue
         subprocess.run(list(map(str, command)), check=True, capture_output=True)
         results.append((f"model, {name}", out.read_bytes()))
@@ -131,6 +131,9 @@ def sizes(model: Path, folder: Path) -> list[bytes]:
     step = f"{1e3 * 2.0**content.position_exponent:.2f}"
     Geometry("cells", count, files).row(triangles, step)
     Geometry("cells, published", count, [lean_glb(d) for d in files]).row(triangles, step)
+    coarse = replace(content, options=WriterOptions(gltf_step=2.0**COARSEST))
+    lean = [lean_glb(data) for _, data in gltf_files(coarse)]
+    Geometry("the same, `--gltf-step 0.001`", count, lean).row(triangles, "0.98")
     for name, data in [("model", source), *rivals(source, folder)]:
         Geometry(name, triangles, [data]).row(triangles)
     return files
@@ -180,7 +183,7 @@ def main() -> None:
     usual = [MODELS[name] for name in (MUSEUM, "hospital", "gallery", "office")]
     parser.add_argument("models", nargs="*", type=model_file, default=usual, help="names or files")
     models = [model for model in parser.parse_args().models if model.is_file()]
-    for package in (GLTFPACK, TRANSFORM, MESHOPTIMIZER):
+    for package in (GLTFPACK, GLTF_TRANSFORM, MESHOPTIMIZER):
         if remedy := package.remedy():
             print(f"without {package.name}; {remedy}")
     with tempfile.TemporaryDirectory(prefix="geometry-") as folder:

@@ -214,7 +214,7 @@ class Content:
         """Exponent of the step of positions in compressed cells, a power of two in metres."""
         from ptmtools.output.grid import position_exponent
 
-        return position_exponent(self.scene)
+        return position_exponent(self.scene, self.options.gltf_step)
 
     @cached_property
     def leaves(self) -> list[list[int]]:

@@ -43,11 +43,12 @@ _FINEST = -126
 MOST = (1 << 23) - 1
 
 
-def position_exponent(scene: Scene) -> int:
-    """k of the step 2^k m of a scene's positions."""
-    thickness = least_thickness(scene.corners, scene.tolerance)
-    step = min(thickness / _IN_THICKNESS, _OF_EXTENT * scene.tolerance.extent)
-    exponent = min(COARSEST, math.floor(math.log2(step)))
+def position_exponent(scene: Scene, step: float | None = None) -> int:
+    """k of the step 2^k m of a scene's positions; ``step`` is the largest one, metres, if given."""
+    if step is None:
+        thickness = least_thickness(scene.corners, scene.tolerance)
+        step = min(thickness / _IN_THICKNESS, _OF_EXTENT * scene.tolerance.extent, 2.0**COARSEST)
+    exponent = math.floor(math.log2(step))
     return max(exponent, _least(float(np.abs(scene.points).max(initial=0.0))))
 
 

@@ -193,7 +193,12 @@ class WriterOptions:
         False,
         "Write GLBs without compression, with the exact coordinates, for viewers that cannot read "
         "EXT_meshopt_compression.",
-        default_before=(11, True),
+    )
+    gltf_step: float | None = option(
+        None,
+        "Largest rounding step of positions in compressed GLBs. Default: 1 mm or a tenth of the "
+        "least thickness, whichever is less.",
+        metavar="METRES",
     )
     viewpoints: tuple[GivenViewpoint, ...] = option(
         (),
@@ -256,6 +261,8 @@ class WriterOptions:
             fault = f"--viewpoint-count {self.viewpoint_count} is below 0"
         elif self.first_look < 0:
             fault = f"--first-look {self.first_look} is below 0"
+        elif self.gltf_step is not None and not 0 < self.gltf_step < math.inf:
+            fault = f"--gltf-step {self.gltf_step:g} m is not above 0"
         elif self.need < 0:
             fault = f"--need {self.need} is below 0"
         if fault:

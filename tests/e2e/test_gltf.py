@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from ptmtools.cli.main import main
+from ptmtools.site.geometry import lean_glb
 from tests.output.agreement import disagreements
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -72,6 +73,16 @@ def test_two_rooms(khronos: Any, database: Path, ptm: Any) -> None:
 def test_museum(khronos: Any, gltf_museum: Path) -> None:
     both = REMARKS | COMPRESSED
     assert clean(khronos, gltf_museum, both) == counts(gltf_museum)["triangles"]
+
+
+def test_published_cells(khronos: Any, gltf_museum: Path, tmp_path: Path) -> None:
+    """Without names and images they are still glTF, for other clients of a site."""
+    for file in (gltf_museum / "www/gltf").iterdir():
+        (tmp_path / file.name).write_bytes(lean_glb(file.read_bytes()))
+    actual = khronos.validate(tmp_path)
+    assert {name: file.complaints for name, file in actual.items() if file.complaints} == {}
+    assert set().union(*(file.remarks for file in actual.values())) <= COMPRESSED
+    assert sum(file.triangles for file in actual.values()) == counts(gltf_museum)["triangles"]
 
 
 def test_hospital(khronos: Any, shared: Path, tmp_path: Path) -> None:

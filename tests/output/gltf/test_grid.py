@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ptmtools.output.grid import COARSEST, MOST, least_thickness, texture_exponents
+from ptmtools.errors import InputError
+from ptmtools.output import EmitOptions
+from ptmtools.output.grid import (
+    COARSEST,
+    MOST,
+    least_thickness,
+    position_exponent,
+    texture_exponents,
+)
 from ptmtools.tolerance import Tolerance
 
 
@@ -49,6 +59,17 @@ def test_thick_parts_and_dust_do_not_count() -> None:
     assert thickness(ROOM) == thickness(ROOM, plate((1, 1, 1), (2, 2, 1.02))) == most
     assert thickness(ROOM, plate((1, 1, 1), (1.01, 1.01, 1.001))) == most
     assert thickness(np.zeros((4, 3, 3))) == most
+
+
+def test_the_step_is_a_power_of_two_or_less_than_the_given_one(artifacts: Any) -> None:
+    scene = artifacts.scene
+    assert position_exponent(scene, 0.001) == -10
+    assert position_exponent(scene, 2.0**-13) == -13
+    assert position_exponent(scene) <= COARSEST
+    assert 2.0 ** position_exponent(scene, 1e-30) * MOST >= np.abs(scene.points).max()
+    for step in (0.0, -1.0, float("inf"), float("nan")):
+        with pytest.raises(InputError, match=r"gltf-step.*PTM-I111"):
+            EmitOptions(gltf_step=step)
 
 
 @given(st.integers(1, 70000), st.integers(1, 70000), st.floats(0, 1e9))
