@@ -443,9 +443,9 @@ def test_bytes_of_a_site_and_of_its_model(gltf_museum: Path) -> None:
     subject = Subject(load(gltf_museum), read_served(gltf_museum).index)
     row = weights.row_of(gltf_museum)
     assert row.site.total == sum(map(link_bytes, walk_page(gltf_museum).files.values()))
-    assert row.site.images == sum(
-        file.stat().st_size for file in (gltf_museum / "www/textures").glob("*.ptm")
-    )
+    served = gltf_museum / "www"
+    files = [*served.glob("textures/*.ptm"), *served.glob("previews/*")]
+    assert row.site.images == sum(file.stat().st_size for file in files)
     assert row.model.images == sum(len(image.load()) for image in subject.scene.images)
     table = weights.bytes_table([replace(row, scene="x", model=row.site)])
     assert table.splitlines()[-1].startswith(f"| x | {row.triangles:,} |")
