@@ -179,7 +179,7 @@ class Client(ABC):
             Kind.GEOMETRY: Files(Kind.GEOMETRY, stock.geometry_bytes.copy()),
             Kind.TEXTURE: Files(Kind.TEXTURE, stock.ends[:, -1]),
             Kind.STATISTICS: Files(Kind.STATISTICS, np.array([stock.statistics_bytes])),
-            Kind.PREVIEW: Files(Kind.PREVIEW, stock.previews.bytes),
+            Kind.PREVIEW: Files(Kind.PREVIEW, stock.previews.bytes.copy()),
         }
         self.records, self.geometry = self.files[Kind.RECORD], self.files[Kind.GEOMETRY]
         self.textures, self.previews = self.files[Kind.TEXTURE], self.files[Kind.PREVIEW]
@@ -223,8 +223,8 @@ class Client(ABC):
         """Passes a frame; with an item buffer the client may get another one."""
 
     def give(self, kind: Kind, number: int, size: int) -> None:
-        """Starts a transfer that the client did not request."""
-        if not self.files[kind].asked[number]:
+        """Starts a transfer that the client did not request; of a preview, if it knows some."""
+        if number < len(self.files[kind].size) and not self.files[kind].asked[number]:
             self.files[kind].size[number] = size
             self.ask(kind, number, size, math.inf)
 

@@ -331,6 +331,14 @@ def read_forms(
 
 
 def _require_fitting(browser: Browser, served: Served) -> None:
+    previews = sum(len(row.get("previews", ())) for row in served.index["textures"])
+    numbers = [file.number for file in browser.files if file.kind == "preview"]
+    if max(numbers, default=-1) >= previews:
+        raise InputError(
+            "PTM-I700",
+            f"was recorded with preview {max(numbers)}, and there are {previews}",
+            remedy="use the database whose site it was recorded on",
+        )
     if len(browser.record_bytes) != served.cell_count:
         raise InputError(
             "PTM-I700",

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -24,6 +24,7 @@ from ptmtools.lab.catalogue import catalogue_of
 from ptmtools.lab.client import Client, Kind
 from ptmtools.lab.network import Link
 from ptmtools.lab.policies import POLICIES
+from ptmtools.lab.policies.oracle import _drops
 from ptmtools.lab.previews import AVERAGING, LEAST, Previews, previews_of
 from ptmtools.lab.renderer import Renderer
 from ptmtools.lab.simulation import Run, simulate
@@ -205,6 +206,7 @@ def test_a_leap_and_the_exact_levels_after_it() -> None:
 def test_at_rest_all_is_exact(policy: str, seed: int) -> None:
     """With time and memory, whatever previews there are; and the budget holds."""
     world = any_world(seed, previews=True)
+    assume(len(world.catalogue.previews.texture))
     world = replace(world.standing(60.0), still=np.ones(301, np.bool_))
     client, run = watched(world, policy, Conditions(1e6, 0.02), 1 << 30)
     stock = client.world.catalogue
@@ -232,6 +234,49 @@ def watched(world: World, policy: str, conditions: Conditions, budget: int) -> t
 
     run = simulate(world, replace(POLICIES[policy], client=client), conditions, budget)
     return clients[0], run
+
+
+@settings(max_examples=20)
+@given(SEEDS)
+def test_the_oracle_knows_the_errors_of_all_states(seed: int) -> None:
+    """What a column of a source removes of a frame, from the mean colour on."""
+    world = any_world(seed, frames=4, previews=True)
+    stock, views = world.catalogue, world.views
+    columns, cells = _drops(world)
+    assert columns.shape == (4, *stock.gains.shape)
+    for f in range(world.frames):
+        for source in range(stock.gains.shape[0]):
+            p = source - stock.texture_count
+            t = int(stock.previews.texture[p]) if p >= 0 else source
+            before = int(stock.previews.state[p]) if p >= 0 else 0
+            last = int(stock.previews.column[p] if p >= 0 else stock.levels[t])
+            rows = [r for r in range(*views.start[f : f + 2].tolist()) if views.texture[r] == t]
+            for k in range(1, last + 1):
+                drop = sum(float(views.error[r, 1] - views.error[r, before + k + 1]) for r in rows)
+                removed = float(columns[f, source, 1 : k + 1].sum())
+                assert removed == pytest.approx(drop, abs=1e-4)
+            assert not columns[f, source, last + 1 :].any()
+        assert cells[f].sum() == pytest.approx(views.error[views.rows(f), 0].sum(), rel=1e-5)
+
+
+@pytest.mark.parametrize("memory", [1.0, 0.3])
+def test_exact_levels_that_suffice_stay(memory: float) -> None:
+    """A finer preview does not take their place; and with little memory the exact levels of what a
+    preview shows are still fetched."""
+    levels = 5
+    groups, sizes = tuple(40 * 4**k for k in range(levels)), tuple(4**k for k in range(levels))
+    texture = Texture(groups, sizes, ((levels - 1, 60, 0.5),))
+    world = standing(catalogue([texture], [(0, 0)]), 60.0)
+    # The view wants three levels.
+    needs = np.where(np.arange(levels) < 3, world.views.need, 0).astype(np.float32)
+    world = replace(world, views=replace(world.views, need=needs, sight=needs))
+    budget = int(memory * world.catalogue.whole)
+    client, run = watched(world, "best", Conditions(64e3, 0.02), budget)
+    assert client.previews.whole.all()
+    assert client.have[0] >= 3
+    assert client.source.tolist() == [0]
+    assert client.column[0] >= 3
+    assert run.overruns == 0
 
 
 @settings(max_examples=20)
