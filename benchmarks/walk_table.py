@@ -11,6 +11,7 @@ e             mean over pixels and frames of the root mean square error over R, 
 p95           95th percentile of e over the frames
 waste         share of the bytes received that never were on the screen
 / oracle      e over that of `oracle` on the same walk under the same conditions, on average
+/ best-exact  e over that of `best-exact` likewise: the gain by previews
 ± walks       standard deviation of that ratio over the walks through a scene, root mean square
 p95 / ach     p95 on average over that of `ach`, which is 0 on some walks
 90 %, s       time until a visitor at the start has 90 % of the picture, at most a minute
@@ -48,6 +49,7 @@ from ptmtools.lab.world import World, prepare
 from ptmtools.link import Conditions
 from ptmtools.output.served import Served, read_served
 from ptmtools.quantities import parse_bandwidth, parse_memory
+from ptmtools.rendering.lossy import Lossy, read_lossy
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.records import Pyramids
 from ptmtools.walk import read_walk
@@ -101,9 +103,11 @@ def tables(rows: Rows) -> list[str]:
     """All tables, as Markdown."""
     rows = [{**row, **row["e"]} for row in rows]
     truth = {_place(row): row["mean"] for row in rows if row["policy"] == "oracle"}
+    bare = {_place(row): row["mean"] for row in rows if row["policy"] == "best-exact"}
     rival = {_place(row): row["p95"] for row in rows if row["policy"] == "ach"}
     for row in rows:
         row["ratio"] = row["mean"] / truth.get(_place(row), nan)
+        row["gain"] = row["mean"] / bare.get(_place(row), nan)
         row["standing"] = STANDS if row["final"][1] is None else row["final"][1]
         row["rival"] = rival.get(_place(row), nan)
     conditions = list(dict.fromkeys((row["bandwidth"], row["memory"]) for row in rows))
@@ -125,9 +129,16 @@ def tables(rows: Rows) -> list[str]:
         for scene in scenes
         for head, name in (("e", "mean"), ("p95", "p95"), ("/ oracle", "ratio"))
     ]
+    gains: list[Column] = [
+        (f"{scene} {link} {memory}", _mean("gain", scene=scene, bandwidth=link, memory=memory))
+        for scene in scenes
+        for link, memory in conditions
+    ]
     actual = [
         _table("e", rows, under("mean") + summary),
         _table("e / oracle", rows, under("ratio")),
+        _table("e / best-exact", rows, under("gain")),
+        _table("e / best-exact", rows, gains),
         _table("by scene", rows, by_scene),
         _preparation(rows),
     ]
@@ -222,8 +233,8 @@ def made(cases: list[Case], file: Path, jobs: int) -> list[Row]:
 
 def prepared(scene: str, walk: Path) -> World:
     """The world of a walk through a scene; textures that are decoded are kept for the next."""
-    served, pyramids = _textures(scene)
-    return prepare(served, read_walk(walk), pyramids)
+    served, pyramids, lossy = _textures(scene)
+    return prepare(served, read_walk(walk), pyramids, lossy=lossy)
 
 
 def _run_all(cases: list[Case], file: Path) -> None:
@@ -265,14 +276,15 @@ def _rows(file: Path) -> Iterator[Row]:
 
 
 @lru_cache(1)
-def _textures(scene: str) -> tuple[Served, Pyramids]:
+def _textures(scene: str) -> tuple[Served, Pyramids, Lossy]:
     served = read_served(database_of(scene))
-    return served, read_pyramids(served)
+    return served, read_pyramids(served), read_lossy(served)
 
 
 @cache
 def _sources() -> str:
-    files = sorted((ROOT / "ptmtools/walkthrough").rglob("*.py"))
+    folders = (ROOT / "ptmtools" / name for name in ("lab", "rendering"))
+    files = sorted(file for folder in folders for file in folder.rglob("*.py"))
     return _digest(b"".join(file.read_bytes() for file in files))
 
 
