@@ -10,6 +10,7 @@ import {
   directionOf, distance, frustumOf, meetsBox, meetsHull,
 } from "../../web/page/space/frustum.js";
 import { Locator } from "../../web/client/src/locating.js";
+import { stockFrom } from "./typed.mjs";
 import { crossing } from "../../web/page/space/portals.js";
 
 const reals = (rows) => Float64Array.from(rows.flat());
@@ -22,8 +23,9 @@ const functions = {
     return [used, [...column]];
   },
   next({ worth, ends, asked, last, overhead, busy }) {
-    const free = (texture) => !busy[texture];
-    const step = nextFetch(reals(worth), reals(ends), reals(asked), whole(last), overhead, free);
+    const stock = stockFrom({ T: last.length, ends, stored: ends.map((row) => row.length - 1) });
+    const free = (_, texture) => !busy[texture], none = () => false;
+    const step = nextFetch(reals(worth), stock, reals(asked), whole(last), overhead, free, none);
     return [step.density, step.texture, step.column];
   },
   share({ memory, levels, have, budget, cells, column, rounds }) {
@@ -47,7 +49,7 @@ const functions = {
     });
   },
   catalogue({ index }) {
-    const { levels, T, C, K, whole: all, ...tables } = catalogueOf(index);
+    const { levels, stored, previews, gains, T, C, K, whole: all, ...tables } = catalogueOf(index);
     const rows = Object.entries(tables).map(([name, table]) => [name, [...table]]);
     return { levels: [...levels], T, C, K, whole: all, ...Object.fromEntries(rows) };
   },

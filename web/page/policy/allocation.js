@@ -5,9 +5,12 @@
 
 /**
  * The best next request, or a step of one texture.
- * @typedef {{density: number, texture: number, column: number}} Step worth per byte, of which
- *   texture (−1: none), and the column that it leads to
+ * @typedef {{density: number, texture: number, column: number, preview: number}} Step worth per byte,
+ *   of which texture (−1: none), the column that it leads to, and the preview (−1: exact levels)
  */
+
+/** @returns {Step} */
+const noStep = () => ({ density: 0, texture: -1, column: 0, preview: -1 });
 
 /**
  * The best step of a texture: written to `step`, its density 0 if none is worth anything.
@@ -18,9 +21,11 @@
  * @param {number} paid bytes already paid, at least those of `column`
  * @param {number} last the furthest column
  * @param {Step} step
+ * @param {number} total worth of the step before its first column: 0, or less where a preview gives
+ *   more than the present column
  */
-export function bestStep(worth, cost, at, column, paid, last, step) {
-  let best = 0, to = column, total = 0;
+export function bestStep(worth, cost, at, column, paid, last, step, total = 0) {
+  let best = 0, to = column;
   for (let k = column + 1; k <= last; k++) {
     total += worth[at + k];
     const density = total / Math.max(cost[at + k] - paid, 1);
@@ -31,6 +36,7 @@ export function bestStep(worth, cost, at, column, paid, last, step) {
   }
   step.density = best;
   step.column = to;
+  step.preview = -1;
 }
 
 /**
@@ -42,10 +48,9 @@ export function bestStep(worth, cost, at, column, paid, last, step) {
  * @param {Int32Array} column
  */
 export function allocate(worth, cost, last, budget, column) {
-  const count = last.length, wide = worth.length / count;
+  const count = last.length, wide = cost.length / count;
   const density = new Float64Array(count), to = new Int32Array(count), limit = last.slice();
-  /** @type {Step} */
-  const step = { density: 0, texture: -1, column: 0 };
+  const step = noStep();
   /** @param {number} t whether it has a step left, which is stored */
   const steps = (t) => {
     const at = t * wide, here = column[t];
@@ -92,32 +97,51 @@ export function allocate(worth, cost, last, budget, column) {
 }
 
 /**
- * The texture whose next bytes are worth most.
- * @param {Float64Array} worth (T × K)
- * @param {Float64Array} ends (T × K)
- * @param {Float64Array} asked (T) bytes requested already
+ * The texture whose next bytes are worth most: exact levels, or a preview.
+ * @param {Float64Array} worth ((T + P) × K) of each column by each source, see `bestStep`
+ * @param {Pick<Catalogue, "ends" | "stored" | "previews">} stock
+ * @param {Float64Array} asked (T) bytes of `.ptm`s requested already
  * @param {Int32Array} last (T) wanted columns
  * @param {number} overhead bytes that a request takes besides
- * @param {(texture: number) => boolean} free whether it may be requested
+ * @param {(kind: Kind, number: number) => boolean} free whether it may be requested
+ * @param {(preview: number) => boolean} requested whether it is on its way or here
  * @returns {Step}
  */
-export function nextFetch(worth, ends, asked, last, overhead, free) {
-  const count = last.length, wide = worth.length / count;
-  /** @type {Step} */
-  const best = { density: 0, texture: -1, column: 0 };
-  /** @type {Step} */
-  const step = { density: 0, texture: -1, column: 0 };
-  for (let t = 0; t < count; t++) {
-    const at = t * wide;
-    if (asked[t] >= ends[at + last[t]] || !free(t)) continue;
-    let here = 0;
-    while (here < last[t] && ends[at + here + 1] <= asked[t]) here++;
-    bestStep(worth, ends, at, here, asked[t] - overhead, last[t], step);
-    if (step.density > best.density) {
-      best.density = step.density;
-      best.texture = t;
-      best.column = step.column;
+export function nextFetch(worth, stock, asked, last, overhead, free, requested) {
+  const { ends, stored, previews: { first, column, bytes } } = stock;
+  const count = last.length, wide = ends.length / count;
+  const best = noStep(), step = noStep();
+  /** The greatest worth of a preview. @param {number} p @param {number} limit */
+  const worthOf = (p, limit) => {
+    let total = 0, most = 0;
+    for (let k = 1, at = (count + p) * wide + 1; k <= Math.min(column[p], limit); k++, at++) {
+      total += worth[at];
+      most = Math.max(most, total);
     }
+    return most;
+  };
+  for (let t = 0; t < count; t++) {
+    const at = t * wide, until = Math.min(last[t], stored[t]);
+    let here = 0, present = 0;
+    while (here < until && ends[at + here + 1] <= asked[t]) present += worth[at + ++here];
+    let most = present;
+    for (let p = first[t]; p < first[t + 1]; p++) {
+      if (requested(p)) most = Math.max(most, worthOf(p, last[t]));
+    }
+    step.density = 0;
+    if (here < until && free("texture", t)) {
+      bestStep(worth, ends, at, here, asked[t] - overhead, until, step, present - most);
+    }
+    for (let p = first[t]; p < first[t + 1]; p++) {
+      if (!free("preview", p)) continue;
+      const density = (worthOf(p, last[t]) - most) / (bytes[p] + overhead);
+      if (density > 0 && density >= step.density) {
+        step.density = density;
+        step.column = Math.min(column[p], last[t]);
+        step.preview = p;
+      }
+    }
+    if (step.density > best.density) Object.assign(best, step, { texture: t });
   }
   return best;
 }

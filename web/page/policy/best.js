@@ -1,11 +1,12 @@
 // The policy of docs/formats/client.md: the greatest worth for its bytes, by the pixels of the view, by
 // distance and by the needs of the cell. Texture memory is allocated to the last level that fits;
 // missing levels are requested in ranges of a fraction of a second, so that few requests under way
-// become useless. After that, it requests the levels that are worth most beyond the budget.
+// become useless. After that, it requests the levels that are worth most beyond the budget. Previews
+// compete with the exact levels, and these replace them as they arrive.
 
 import { allocate, nextFetch } from "./allocation.js";
 import { lookAround, NOTHING, weighGeometry } from "./around.js";
-import { OVERHEAD } from "./downloads.js";
+import { NO_SOURCE, OVERHEAD } from "./downloads.js";
 import { meetsBox } from "../space/frustum.js";
 
 /** @typedef {import("./client.js").Client} Client */
@@ -53,22 +54,27 @@ function overheadOf({ latency, bandwidth }) {
 
 /** @implements {Policy} */
 export class Best {
-  #client; #geometry; #wanted;
-  /** @type {Float64Array} (T × K) gain of each column on the screen now, and soon; beyond the
-   *   budget; and lately */
-  #hold; #fetch; #ahead; #kept;
+  #client; #geometry; #wanted; #last; #worth;
+  /** @type {Float64Array} (T × K) share of the view that wants each column, in texture memory; and
+   *   lately */
+  #hold; #kept;
+  /** @type {Float64Array} ((T + P) × K) gain of each column by each source soon, and beyond the budget */
+  #fetch; #ahead;
   #weighed = false;
   #looked = -Infinity;
 
   /** @param {Client} client */
   constructor(client) {
-    const { T, C, K } = client.catalogue;
+    const { T, C, K, gains } = client.catalogue;
     this.#client = client;
     this.target = new Int32Array(T);
     this.#hold = new Float64Array(T * K);
-    this.#fetch = new Float64Array(T * K);
-    this.#ahead = new Float64Array(T * K);
     this.#kept = new Float64Array(T * K);
+    this.#fetch = new Float64Array(gains.length);
+    this.#ahead = new Float64Array(gains.length);
+    /** What is computed for a single choice. */
+    this.#worth = new Float64Array(gains.length);
+    this.#last = new Int32Array(T);
     /** (C) gain of the geometry of each cell. */
     this.#geometry = new Float64Array(C);
     /** (T) the allocation if everything were downloaded. */
@@ -93,34 +99,81 @@ export class Best {
   }
 
   fit() {
-    const { catalogue, cell, have, budget, column } = this.#client;
-    if (cell >= 0) allocate(this.#holding(), catalogue.memory, have, budget, column);
+    const { catalogue, cell, budget, column } = this.#client;
+    if (cell >= 0) allocate(this.#showing(), catalogue.memory, this.#last, budget, column);
   }
 
-  /** (T × K) worth of each column in texture memory. */
+  /**
+   * ((T + P) × K) worth of each column in texture memory by each source; its first rows are the exact
+   * levels.
+   */
   #holding() {
-    const { differences } = this.#client.catalogue, kept = this.#kept;
-    return this.#hold.map((hold, i) => hold + HELD_ON * kept[i] + HELD_ON ** 2 * differences[i]);
+    const kept = this.#kept;
+    const share = this.#hold.map((hold, i) => hold + HELD_ON * kept[i] + HELD_ON ** 2);
+    return this.#gained(share, this.#worth);
+  }
+
+  /**
+   * Worth of each column, by the best source that is present, beside those before it; `#last` becomes
+   * the last column of each texture. Where exact levels suffice for the view, no preview that is finer
+   * replaces them.
+   */
+  #showing() {
+    const { catalogue: { T, K }, sight, have, downloads } = this.#client;
+    const worth = this.#holding(), last = this.#last;
+    for (let t = 0; t < T; t++) {
+      const at = t * K, reach = downloads.reach(t);
+      let seen = reach.exact;
+      while (seen + 1 < K && !(sight[at + seen + 1] > 0)) seen++;
+      last[t] = sight[at + 1] > 0 && seen + 1 === K ? reach.exact : reach.last;
+      let before = 0;
+      for (let k = 1; k <= have[t]; k++) before += worth[at + k];
+      for (let k = have[t] + 1; k <= last[t]; k++) {
+        const row = (T + downloads.source(t, k)) * K;
+        let value = 0;
+        for (let j = 1; j <= k; j++) value += worth[row + j];
+        worth[at + k] = value - before;
+        before = value;
+      }
+    }
+    return worth;
+  }
+
+  /**
+   * Writes the gains of shares by each source.
+   * @param {Float64Array} share (T × K)
+   * @param {Float64Array} into ((T + P) × K)
+   */
+  #gained(share, into) {
+    const { T, K, gains, previews: { first } } = this.#client.catalogue;
+    for (let i = 0; i < share.length; i++) into[i] = share[i] * gains[i];
+    for (let t = 0; t < T; t++) {
+      for (let p = first[t]; p < first[t + 1]; p++) {
+        for (let k = 1, at = (T + p) * K + 1; k < K; k++, at++) into[at] = share[t * K + k] * gains[at];
+      }
+    }
+    return into;
   }
 
   #weigh() {
     if (this.#weighed || this.#client.cell < 0) return;
     this.#weighed = true;
-    const { catalogue, sight, budget } = this.#client, { memory, levels, differences } = catalogue;
-    const around = this.#ahead;
+    const { catalogue, sight, budget } = this.#client, { T, K, memory, levels } = catalogue;
+    const around = new Float64Array(T * K), share = new Float64Array(T * K);
     lookAround(this.#client, around);
     for (let i = 0; i < around.length; i++) {
-      this.#hold[i] = (sight[i] + HELD * AROUND * around[i]) * differences[i];
-      this.#fetch[i] = (sight[i] + AROUND * around[i]) * differences[i];
-      around[i] *= differences[i];
+      this.#hold[i] = sight[i] + HELD * AROUND * around[i];
+      share[i] = sight[i] + AROUND * around[i];
     }
+    this.#gained(share, this.#fetch);
+    this.#gained(around, this.#ahead);
     weighGeometry(this.#client, this.#geometry);
     allocate(this.#fetch, memory, levels, budget, this.target);
   }
 
   /** @param {(kind: import("./downloads.js").Kind, number: number) => boolean} counts */
   missing(counts) {
-    const { catalogue, sight, cell, here, frustum, have, known, hidden, downloads, budget } =
+    const { catalogue, sight, cell, here, frustum, column, known, hidden, downloads, budget } =
       this.#client;
     const { T, K, memory, levels, low, high } = catalogue;
     let count = 0;
@@ -133,27 +186,52 @@ export class Best {
     }
     allocate(this.#holding(), memory, levels, budget, this.#wanted);
     for (let t = 0; t < T; t++) {
-      let k = have[t] + 1;
-      while (k <= this.#wanted[t] && !(sight[t * K + k] > 0)) k++;
-      if (k <= this.#wanted[t] && counts("texture", t)) count++;
+      const { exact } = downloads.reach(t);
+      let k = Math.max(this.#wanted[t], column[t] > exact ? column[t] : 0);
+      while (k > exact && !(sight[t * K + k] > 0 && this.#lacks(t, k, counts))) k--;
+      if (k > exact) count++;
     }
     return count;
+  }
+
+  /**
+   * Whether a column that is not exact could be: by any source if none is present, else by an exact one.
+   * @param {number} t
+   * @param {number} k
+   * @param {(kind: import("./downloads.js").Kind, number: number) => boolean} counts
+   */
+  #lacks(t, k, counts) {
+    const { catalogue: { stored, previews: { first, column, loss } }, downloads } = this.#client;
+    if (k <= stored[t] && counts("texture", t)) return true;
+    const none = downloads.source(t, k) === NO_SOURCE;
+    for (let p = first[t]; p < first[t + 1]; p++) {
+      if (column[p] >= k && (none || loss[p] === 0) && counts("preview", p)) return true;
+    }
+    return false;
+  }
+
+  /** (T) the columns to fetch: the wanted ones, and those that now show a preview. */
+  #limits() {
+    const { column, downloads } = this.#client;
+    return this.target.map((k, t) =>
+      column[t] > k && column[t] > downloads.reach(t).exact ? column[t] : k);
   }
 
   /** @param {Belief} estimate */
   next(estimate) {
     const { catalogue, known, cell, here, downloads } = this.#client;
-    const { C, recordBytes, geometryBytes, ends, levels } = catalogue;
+    const { C, recordBytes, geometryBytes, levels } = catalogue;
     if (!room(estimate, downloads.waiting)) return null;
     if (downloads.free("record", here)) return downloads.ask("record", here, Infinity);
     if (cell < 0) {
       return downloads.free("geometry", here) ? downloads.ask("geometry", here, Infinity) : null;
     }
     this.#weigh();
-    /** @param {number} t */
-    const free = (t) => downloads.free("texture", t);
     const overhead = overheadOf(estimate);
-    let step = nextFetch(this.#fetch, ends, downloads.bytes, this.target, overhead, free);
+    /** @param {Float64Array} worth @param {Int32Array} last */
+    const next = (worth, last) => nextFetch(
+      worth, catalogue, downloads.asked, last, overhead, downloads.free, downloads.requested);
+    let step = next(this.#fetch, this.#limits());
 
     let nearest = -1, geometry = 0;
     for (let c = 0; c < C; c++) {
@@ -168,9 +246,8 @@ export class Best {
     const record = least < 0 ? 0 : NOTHING * RECORD_SHARE / recordBytes[least];
     if (record > Math.max(step.density, geometry)) return downloads.ask("record", least, record);
     if (geometry > step.density) return downloads.ask("geometry", nearest, geometry);
-    if (step.texture < 0) {
-      step = nextFetch(this.#ahead, ends, downloads.bytes, levels, overhead, free);
-    }
+    if (step.texture < 0) step = next(this.#ahead, levels);
+    if (step.preview >= 0) return downloads.ask("preview", step.preview, step.density);
     return step.texture < 0 ? null : this.#range(step, estimate);
   }
 

@@ -1,6 +1,10 @@
 // Sizes of everything that can be fetched, as arrays from the index. A texture holds column k if it has
 // the levels 0 to k − 1; column 0 is nothing. Tables of T textures and K columns are flat, texture by
-// texture; after a texture's last column they repeat it.
+// texture; after a texture's last column they repeat it. The `.ptm` has exact levels up to a column;
+// each of P previews, an image of one level, gives all columns up to its own with an error. Tables of
+// worth have T + P rows: those of the textures, then those of the previews (docs/formats/client.md).
+
+import { levelSizes } from "../../client/src/levels.js";
 
 /**
  * @typedef {object} Catalogue
@@ -8,10 +12,14 @@
  * @property {number} C cells
  * @property {number} K columns, that of nothing included
  * @property {Int32Array} levels (T) of each texture
- * @property {Float64Array} ends (T × K) bytes of the file that hold each column
+ * @property {Int32Array} stored (T) those of its `.ptm`
+ * @property {Float64Array} ends (T × K) bytes of the `.ptm` that hold each column
  * @property {Float64Array} memory (T × K) bytes of texture memory that each column takes
  * @property {Float64Array} differences (T × K) of each column to the one before it, 0 to 255; of
  *   columns after the last 0
+ * @property {Float64Array} gains ((T + P) × K) of columns by each source: the differences, and for
+ *   a preview the differences less its error
+ * @property {Previews} previews
  * @property {Float64Array} colors (T × 3) mean colour, 0 to 255
  * @property {Float64Array} low (C × 3) corner of the box of each cell, metres
  * @property {Float64Array} high (C × 3)
@@ -21,15 +29,29 @@
  */
 
 /**
+ * The previews of all textures, in the order of the index.
+ * @typedef {object} Previews
+ * @property {Int32Array} first (T + 1) number of the first preview of each texture
+ * @property {Int32Array} column (P) the finest column that each gives
+ * @property {Float64Array} bytes (P)
+ * @property {Float64Array} loss (P) error of each in the empty column, from which that of column k is
+ *   HALVED ** −k times as much: the less, the closer are all of its columns; of exact previews 0
+ */
+
+/**
  * The parts of an index that are read here (docs/formats/hints.md).
  * @typedef {object} Index
  * @property {{width: number, height: number, components: number, texelBytes: number,
- *   gpuTexelBytes?: number, ends: number[], differences?: number[], color?: number[]}[]} textures
+ *   gpuTexelBytes?: number, ends: number[], differences?: number[], color?: number[],
+ *   previews?: {level: number, width: number, height: number, bytes: number, difference: number,
+ *   exact?: boolean}[]}[]} textures
  * @property {{box: number[], recordBytes?: number, geometryBytes?: number}[]} cells
  */
 
 // A level that only repeats the texels of the one below still sharpens interpolated colours.
 const LEAST = 0.5;
+/** Error of a level as a share of that of the level above it: errors of texels cancel in means. */
+export const HALVED = 0.5;
 const RECORD_BYTES = 1000, GEOMETRY_BYTES = 4000;
 const GREY = [128, 128, 128];
 
@@ -39,29 +61,64 @@ const GREY = [128, 128, 128];
  */
 export function catalogueOf({ textures, cells }) {
   const T = textures.length, C = cells.length;
-  const levels = Int32Array.from(textures, (texture) => texture.ends.length);
+  const levels = Int32Array.from(textures, (texture) => levelSizes(texture).length);
+  const stored = Int32Array.from(textures, ({ ends }) => ends.length);
   const K = 1 + levels.reduce((most, count) => Math.max(most, count), 0);
   const [ends, memory, differences] = [0, 0, 0].map(() => new Float64Array(T * K));
   let whole = 0;
   textures.forEach((texture, t) => {
-    const { width, height, components, texelBytes } = texture;
-    const stored = components === 3 ? (texelBytes / 3) * 4 : texelBytes;
+    const { components, texelBytes } = texture, sizes = levelSizes(texture);
+    const texel = texture.gpuTexelBytes ?? (components === 3 ? (texelBytes / 3) * 4 : texelBytes);
     for (let k = 1; k < K; k++) {
-      const at = t * K + k, shift = levels[t] - k;
-      const texels = Math.max(1, width >> shift) * Math.max(1, height >> shift);
-      const exists = k <= levels[t];
-      ends[at] = exists ? texture.ends[k - 1] : ends[at - 1];
-      memory[at] = memory[at - 1] + (exists ? texels * (texture.gpuTexelBytes ?? stored) : 0);
-      differences[at] = exists ? Math.max(texture.differences?.[k - 1] ?? 0, LEAST) : 0;
+      const at = t * K + k, size = sizes[k - 1];
+      ends[at] = texture.ends[k - 1] ?? ends[at - 1];
+      memory[at] = memory[at - 1] + (size ? size.width * size.height * texel : 0);
+      differences[at] = size ? Math.max(texture.differences?.[k - 1] ?? 0, LEAST) : 0;
     }
     whole += memory[t * K + K - 1];
   });
+  const previews = previewsOf(textures);
   return {
-    T, C, K, levels, ends, memory, differences, whole,
+    T, C, K, levels, stored, ends, memory, differences, whole, previews,
+    gains: gainsOf(differences, K, previews),
     colors: Float64Array.from(textures.flatMap((texture) => texture.color ?? GREY)),
     low: Float64Array.from(cells.flatMap((cell) => cell.box.slice(0, 3))),
     high: Float64Array.from(cells.flatMap((cell) => cell.box.slice(3))),
     recordBytes: Float64Array.from(cells, (cell) => cell.recordBytes ?? RECORD_BYTES),
     geometryBytes: Float64Array.from(cells, (cell) => cell.geometryBytes ?? GEOMETRY_BYTES),
   };
+}
+
+/** @param {Index["textures"]} textures @returns {Previews} */
+function previewsOf(textures) {
+  const first = new Int32Array(textures.length + 1);
+  textures.forEach(({ previews }, t) => (first[t + 1] = first[t] + (previews?.length ?? 0)));
+  const all = textures.flatMap(({ previews }) => previews ?? []);
+  return {
+    first,
+    column: Int32Array.from(all, ({ level }) => level + 1),
+    bytes: Float64Array.from(all, ({ bytes }) => bytes),
+    loss: Float64Array.from(all, ({ level, difference, exact }) =>
+      exact ? 0 : Math.max(difference, LEAST) * HALVED ** (level + 1)),
+  };
+}
+
+/**
+ * @param {Float64Array} differences (T × K)
+ * @param {number} K
+ * @param {Previews} previews
+ */
+export function gainsOf(differences, K, { first, column, loss }) {
+  const T = first.length - 1, gains = new Float64Array(differences.length + column.length * K);
+  gains.set(differences);
+  for (let t = 0; t < T; t++) {
+    for (let p = first[t]; p < first[t + 1]; p++) {
+      for (let k = 1; k <= column[p]; k++) {
+        // The error of the column less that of the one before it, which it replaces.
+        const own = loss[p] * HALVED ** -k * (k > 1 ? 1 - HALVED : 1);
+        gains[(T + p) * K + k] = differences[t * K + k] - own;
+      }
+    }
+  }
+  return gains;
 }

@@ -81,7 +81,7 @@ export class Client {
     this.#policy = policy(this);
   }
 
-  /** (T) columns that are downloaded whole. */
+  /** (T) columns of `.ptm`s that are downloaded whole. */
   get have() {
     return this.downloads.have;
   }
@@ -186,6 +186,15 @@ export class Client {
    */
   failed(request, until = 0) {
     this.downloads.failed(request, until);
+  }
+
+  /**
+   * Forgets a preview that cannot be shown; it may be requested from `until` on, s.
+   * @param {number} preview
+   * @param {number} until
+   */
+  losePreview(preview, until = 0) {
+    this.downloads.drop(preview, until);
   }
 
   /**

@@ -1,15 +1,15 @@
-// Requested and downloaded bytes. Records and geometry are requested whole; of a texture one range at
-// a time, each where the last one ended: caches of browsers request ranges again while they still
-// receive the file.
+// Requested and downloaded bytes. Records, geometry and previews are requested whole; of a texture's
+// `.ptm` one range at a time, each where the last one ended: caches of browsers request ranges again
+// while they still receive the file.
 
 /** @typedef {import("./catalogue.js").Catalogue} Catalogue */
-/** @typedef {"record" | "geometry" | "texture"} Kind */
+/** @typedef {"record" | "geometry" | "texture" | "preview"} Kind */
 
 /**
  * Bytes `begin` to `end` of a file.
  * @typedef {object} Request
  * @property {Kind} kind
- * @property {number} number of the cell or texture
+ * @property {number} number of the cell, texture or preview
  * @property {number} begin
  * @property {number} end an estimate for whole files whose size is not in the index
  * @property {number} priority the greater, the sooner; it may grow
@@ -21,6 +21,8 @@
 /** Bytes of the headers of a request. */
 export const OVERHEAD = 300;
 const ABSENT = 0, ASKED = 1, THERE = 2;
+/** In place of the number of a preview: the exact levels, and no source. */
+export const EXACT = -1, NO_SOURCE = -2;
 
 export class Downloads {
   #stock;
@@ -31,17 +33,21 @@ export class Downloads {
 
   /** @param {Catalogue} stock */
   constructor(stock) {
-    const { T, C } = stock;
+    const { T, C } = stock, P = stock.previews.column.length;
     this.#stock = stock;
     this.#state = {
       record: new Uint8Array(C), geometry: new Uint8Array(C), texture: new Uint8Array(T),
+      preview: new Uint8Array(P),
     };
     this.#rests = {
       record: new Float64Array(C), geometry: new Float64Array(C), texture: new Float64Array(T),
+      preview: new Float64Array(P),
     };
-    /** (T) bytes of each texture, from its beginning. */
+    /** (T) bytes of each texture's `.ptm`, from its beginning. */
     this.bytes = new Float64Array(T);
-    /** (T) complete columns. */
+    /** (T) the same with those that are on the way. */
+    this.asked = new Float64Array(T);
+    /** (T) complete columns of the `.ptm`. */
     this.have = new Int32Array(T);
     /** @type {Set<Request>} on the way */
     this.waiting = new Set();
@@ -50,9 +56,8 @@ export class Downloads {
   }
 
   /** Whether it may be requested. @param {Kind} kind @param {number} number */
-  free(kind, number) {
-    return this.#state[kind][number] === ABSENT && this.#rests[kind][number] <= this.now;
-  }
+  free = (kind, number) =>
+    this.#state[kind][number] === ABSENT && this.#rests[kind][number] <= this.now;
 
   /** Whether a request for it has failed, and it is not to be requested now. @param {Kind} kind @param {number} number */
   rests(kind, number) {
@@ -64,9 +69,46 @@ export class Downloads {
     return this.#rests[kind][number] === Infinity;
   }
 
-  /** Whether a record or geometry is complete. @param {Kind} kind @param {number} number */
+  /** Whether a record, geometry or preview is complete. @param {Kind} kind @param {number} number */
   has(kind, number) {
     return this.#state[kind][number] === THERE;
+  }
+
+  /** Whether a preview is on its way or complete. @param {number} preview */
+  requested = (preview) => this.#state.preview[preview] !== ABSENT;
+
+  /**
+   * The best source present of a texture's column: `EXACT`, a preview, or `NO_SOURCE`.
+   * @param {number} texture
+   * @param {number} column
+   */
+  source(texture, column) {
+    if (column <= this.have[texture]) return EXACT;
+    const { first, column: finest, loss } = this.#stock.previews;
+    let best = NO_SOURCE;
+    for (let p = first[texture]; p < first[texture + 1]; p++) {
+      if (finest[p] < column || !this.has("preview", p)) continue;
+      if (best < 0 || loss[p] <= loss[best]) best = p;
+    }
+    return best;
+  }
+
+  /** The loss of that source: 0 if it is exact, Infinity without. @param {number} texture @param {number} column */
+  loss(texture, column) {
+    const source = this.source(texture, column);
+    return source === EXACT ? 0 : source < 0 ? Infinity : this.#stock.previews.loss[source];
+  }
+
+  /** The finest column that is present, and the finest exact one. @param {number} texture */
+  reach(texture) {
+    const { first, column, loss } = this.#stock.previews;
+    let last = this.have[texture], exact = last;
+    for (let p = first[texture]; p < first[texture + 1]; p++) {
+      if (!this.has("preview", p)) continue;
+      last = Math.max(last, column[p]);
+      if (loss[p] === 0) exact = Math.max(exact, column[p]);
+    }
+    return { last, exact };
   }
 
   /** @param {Kind} kind @param {number} number */
@@ -87,11 +129,13 @@ export class Downloads {
    * @returns {Request}
    */
   ask(kind, number, priority, end) {
-    const { recordBytes, geometryBytes } = this.#stock;
-    end ??= (kind === "record" ? recordBytes : geometryBytes)[number];
+    const { recordBytes, geometryBytes, previews } = this.#stock;
+    const whole = { record: recordBytes, geometry: geometryBytes, preview: previews.bytes };
+    end ??= kind === "texture" ? 0 : whole[kind][number];
     const begin = kind === "texture" ? this.bytes[number] : 0;
     const request = { kind, number, begin, end, priority, left: OVERHEAD + end - begin };
     this.#state[kind][number] = ASKED;
+    if (kind === "texture") this.asked[number] = Math.max(begin, end);
     this.waiting.add(request);
     return request;
   }
@@ -102,12 +146,13 @@ export class Downloads {
    * @param {number} end
    */
   over(request, end) {
-    const { kind, number } = request, { K, ends, levels } = this.#stock;
+    const { kind, number } = request, { K, ends, stored } = this.#stock;
     this.waiting.delete(request);
+    if (kind === "preview") this.came(kind, number);
     if (kind !== "texture") return;
     this.lost(kind, number);
-    this.bytes[number] = Math.max(this.bytes[number], end);
-    while (this.have[number] < levels[number]
+    this.bytes[number] = this.asked[number] = Math.max(this.bytes[number], end);
+    while (this.have[number] < stored[number]
         && ends[number * K + this.have[number] + 1] <= this.bytes[number]) this.have[number]++;
   }
 
@@ -123,7 +168,18 @@ export class Downloads {
     while (this.have[texture] > 0 && ends[texture * K + this.have[texture]] > bytes) {
       this.have[texture]--;
     }
+    if (this.#state.texture[texture] !== ASKED) this.asked[texture] = this.bytes[texture];
     this.#rests.texture[texture] = until;
+  }
+
+  /**
+   * Forgets a preview that is damaged; it is not requested before `until`.
+   * @param {number} preview
+   * @param {number} until
+   */
+  drop(preview, until) {
+    this.lost("preview", preview);
+    this.#rests.preview[preview] = until;
   }
 
   /**
@@ -135,6 +191,7 @@ export class Downloads {
     const { kind, number } = request;
     this.waiting.delete(request);
     if (this.#state[kind][number] === ASKED) this.lost(kind, number);
+    if (kind === "texture") this.asked[number] = this.bytes[number];
     this.#rests[kind][number] = Math.max(this.#rests[kind][number], until);
   }
 }

@@ -1,7 +1,8 @@
 // The client of Marvie & Bouatouch, §6.1 and §6.2, as `ptm simulate --policy paper` reads them:
 // memory is divided among the cells in the frustum by their average coverage, and equally among the
 // shapes of each; a texture adds, removes or requests one level at each look, if it can arrive
-// within the patience of the visitor. Requests are made at once.
+// within the patience of the visitor. Requests are made at once. The paper has no previews: they serve
+// only for levels finer than those of the `.ptm`, the coarsest first.
 
 import { duration } from "./estimate.js";
 import { refresh, shareOut } from "./sharing.js";
@@ -40,7 +41,7 @@ export class Paper {
   learned() {}
 
   look() {
-    const { catalogue, cell, column, have, budget, downloads, frustum, known } = this.#client;
+    const { catalogue, cell, column, budget, downloads, frustum, known } = this.#client;
     const here = known[cell];
     if (!frustum) return;
     this.#way.push({ now: downloads.now, eye: frustum.eye });
@@ -54,6 +55,8 @@ export class Paper {
     }
     const share = new Float64Array(catalogue.T);
     shareOut(catalogue, this.#shown(), column, budget, share);
+    const { stored } = catalogue;
+    const have = this.#client.have.map((k, t) => (k < stored[t] ? k : downloads.reach(t).last));
     this.#asks = refresh(catalogue, share, have, budget, column).filter((t) => this.#used.has(t));
     this.#due = [...this.#asks];
   }
@@ -88,7 +91,20 @@ export class Paper {
       const seen = c === cell || this.#boxed(c);
       if (seen && !downloads.has("geometry", c) && counts("geometry", c)) count++;
     }
-    return count + this.#asks.filter((t) => counts("texture", t)).length;
+    return count + this.#asks.filter((t) => counts(...this.#nextOf(t))).length;
+  }
+
+  /**
+   * The file that has the next level of a texture.
+   * @param {number} t
+   * @returns {[Kind, number]}
+   */
+  #nextOf(t) {
+    const { catalogue: { stored, previews: { first, column } }, have, downloads } = this.#client;
+    if (have[t] < stored[t]) return ["texture", t];
+    let p = first[t];
+    while (column[p] <= downloads.reach(t).last && p < first[t + 1] - 1) p++;
+    return ["preview", p];
   }
 
   /** @param {Belief} estimate */
@@ -127,9 +143,13 @@ export class Paper {
     const { catalogue, downloads, have, patience, still } = this.#client;
     const most = still ? patience.still : patience.moving;
     while (this.#due.length > 0) {
-      const t = this.#due.splice(0, 1)[0], end = catalogue.ends[t * catalogue.K + have[t] + 1];
-      const soon = duration(estimate, end - downloads.bytes[t]) <= most;
-      if (soon && downloads.free("texture", t)) return downloads.ask("texture", t, LEVEL, end);
+      const t = this.#due.splice(0, 1)[0], [kind, number] = this.#nextOf(t);
+      const end = kind === "preview" ? catalogue.previews.bytes[number]
+        : catalogue.ends[t * catalogue.K + have[t] + 1];
+      const left = kind === "preview" ? end : end - downloads.bytes[t];
+      if (duration(estimate, left) <= most && downloads.free(kind, number)) {
+        return downloads.ask(kind, number, LEVEL, end);
+      }
     }
     return null;
   }
