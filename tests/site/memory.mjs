@@ -8,8 +8,10 @@ const gl = new Proxy({}, { get: (_, name) => (name === "createTexture" ? () => (
 const sizes = [];
 for (let size = 1; size <= side; size *= 2) sizes.push({ width: size, height: size });
 const rows = Array.from({ length: count }, () => ({ sizes, channels: 4 }));
-const decode = async (_, levels) =>
-  sizes.slice(0, levels).map(({ width, height }) => ({ width, height, data: new Uint8Array(0) }));
+const decode = async (_, levels) => ({
+  images: sizes.slice(0, levels).map(({ width, height }) => ({ width, height, data: new Uint8Array(0) })),
+  loss: 0,
+});
 const memory = new TextureMemory(gl, rows, decode);
 memory.fades = false;
 
@@ -31,7 +33,7 @@ for (const { budget, want } of stages) {
   memory.peak = 0;
   const wanted = Int32Array.from(rows, (_, t) => want(t));
   for (let look = 0; look < 40; look++) {
-    memory.settle(wanted, priority);
+    memory.settle(wanted, priority, new Float64Array(count));
     for (let frame = 0; frame < 10; frame++) {
       await new Promise((done) => setImmediate(done));
       memory.pump(look, () => false);

@@ -18,23 +18,37 @@ export class Comparison {
   /** Requests the visible textures to the finest level that the view resolves; true once all are here. */
   settle() {
     const { walk, memory } = this, { client, catalogue, present, estimate } = walk;
-    const { T, K, levels, ends } = catalogue;
+    const { T, K, levels, stored, ends, previews: { first, column, loss } } = catalogue;
     if (!present) return false;
-    const want = new Int32Array(T), share = new Float64Array(T);
+    const want = new Int32Array(T), share = new Float64Array(T), losses = new Float64Array(T);
     const { downloads } = client, most = Math.max(RANGE_BYTES, RANGE_SECONDS * estimate.bandwidth / 8);
-    /** @type {{texture: number, end: number}[]} */
+    /** @type {{texture: number, end: number, preview: number}[]} */
     const missing = [];
     for (let t = 0; t < T; t++) {
       share[t] = present[t * K + 1];
-      let column = levels[t];
-      while (column > 0 && !(present[t * K + column] > 0)) column--;
-      want[t] = Math.min(column, client.have[t]);
-      if (want[t] < column || memory.held[t] < column) missing.push({ texture: t, end: ends[t * K + column] });
+      let k = levels[t], preview = -1;
+      while (k > 0 && !(present[t * K + k] > 0)) k--;
+      want[t] = Math.min(k, downloads.reach(t).last);
+      losses[t] = downloads.loss(t, want[t]);
+      // Levels that the `.ptm` lacks come from the closest preview.
+      for (let p = first[t]; k > stored[t] && p < first[t + 1]; p++) {
+        if (column[p] >= k && (preview < 0 || loss[p] < loss[preview])) preview = p;
+      }
+      const least = preview < 0 ? 0 : loss[preview];
+      if (memory.held[t] < k || (k > 0 && memory.loss[t] > least)) {
+        missing.push({ texture: t, end: ends[t * K + k], preview });
+      }
     }
-    memory.settle(want, share);
+    memory.settle(want, share, losses);
     missing.sort((a, b) => share[b.texture] - share[a.texture]);
-    for (const { texture, end } of missing) {
+    for (const { texture, end, preview } of missing) {
       if (!room(estimate, downloads.waiting)) break;
+      if (preview >= 0) {
+        if (downloads.free("preview", preview)) {
+          walk.stream.ask(downloads.ask("preview", preview, share[texture]));
+        }
+        continue;
+      }
       const part = Math.min(end, Math.floor(downloads.bytes[texture] + most));
       if (part <= downloads.bytes[texture] || !downloads.free("texture", texture)) continue;
       walk.stream.ask(downloads.ask("texture", texture, share[texture], part));

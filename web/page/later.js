@@ -1,4 +1,6 @@
-// The panels *Map* and *Details*: a script of its own, loaded when one of them is first opened.
+// The panels *Map* and *Details*, and decoding of previews for browsers whose workers cannot: a script
+// of its own, loaded when one of them is first needed.
 
 export { attachMinimap } from "./ui/minimap.js";
 export { attachOverlay } from "./ui/overlay.js";
+export { decodePreview } from "../ptm/src/preview.js";

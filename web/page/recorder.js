@@ -19,10 +19,9 @@ export class Recorder {
   constructor(walk) {
     this.walk = walk;
     performance.setResourceTimingBufferSize(1e5);
-    const { client, site } = walk, arrived = client.arrived.bind(client);
+    const { client, stream } = walk, arrived = client.arrived.bind(client);
     client.arrived = (request, end) => {
-      const { kind, number } = request;
-      const url = kind === "texture" ? site.texture(number) : site.cell(kind, number);
+      const url = stream.url(request.kind, request.number);
       this.#taken.set(url, [...(this.#taken.get(url) ?? []), clock()]);
       arrived(request, end);
     };
@@ -58,11 +57,12 @@ export class Recorder {
 
   /** Files that the client did not request: time, kind, number, bytes. */
   #files() {
-    const { site } = this.walk, asked = new Map([[site.address, ["index", 0]]]);
+    const { site, stream } = this.walk, asked = new Map([[site.address, ["index", 0]]]);
     site.index.cells.forEach((_, cell) => {
-      asked.set(site.cell("record", cell), ["record", cell]);
-      asked.set(site.cell("geometry", cell), ["geometry", cell]);
+      asked.set(stream.url("record", cell), ["record", cell]);
+      asked.set(stream.url("geometry", cell), ["geometry", cell]);
     });
+    stream.previews.forEach((_, p) => asked.set(stream.url("preview", p), ["preview", p]));
     const entries = [...performance.getEntriesByType("navigation"),
       ...performance.getEntriesByType("resource")];
     return /** @type {PerformanceResourceTiming[]} */ (entries)

@@ -18,6 +18,8 @@ export function stateOf(walk) {
     bytes: fetcher.bytes,
     pending: fetcher.pending,
     complete: walk.complete,
+    exact: walk.exact,
+    previews: walk.rows.filter((_, t) => walk.previews(t)).length,
     fps: walk.fps,
     bandwidth: estimate.bandwidth,
     latency: estimate.latency,

@@ -5,7 +5,9 @@ import { readGlb } from "./data/glb.js";
 import { readRecord } from "./data/record.js";
 import { PageError } from "./net/errors.js";
 import { clock } from "./net/fetcher.js";
+import { previewsOf } from "./net/preview-file.js";
 import { TextureFile } from "./net/texture-file.js";
+import { EXACT, NO_SOURCE } from "./policy/downloads.js";
 
 /** @typedef {import("./policy/downloads.js").Request} Request */
 /** @typedef {import("./data/site.js").CellRecord} CellRecord */
@@ -30,11 +32,14 @@ export class Stream {
   #sent = new Set();
   /** The damaged level of a texture. @type {Map<number, number>} */
   #suspect = new Map();
+  /** Previews that could not be decoded. @type {Set<number>} */
+  #spoilt = new Set();
   #cannotDecode = false;
 
   /**
    * @param {object} parts
    * @param {import("./data/site.js").Site} parts.site
+   * @param {import("./data/site.js").Index} parts.index what the GPU can hold of it
    * @param {import("./policy/client.js").Client} parts.client
    * @param {import("../client/src/locating.js").Locator} parts.locator
    * @param {import("./policy/estimate.js").Estimate} parts.estimate
@@ -43,7 +48,7 @@ export class Stream {
    * @param {() => boolean} parts.rests whether to make no more requests
    * @param {(error: PageError, kind: string, number: number) => void} parts.report
    */
-  constructor({ site, client, locator, estimate, fetcher, decoders, rests, report }) {
+  constructor({ site, index, client, locator, estimate, fetcher, decoders, rests, report }) {
     this.site = site;
     this.client = client;
     this.locator = locator;
@@ -54,6 +59,17 @@ export class Stream {
     this.rests = rests;
     this.report = report;
     this.files = site.index.textures.map((row) => new TextureFile(row, this.workers));
+    this.previews = previewsOf(index, this.workers);
+  }
+
+  /**
+   * The URL of a file.
+   * @param {import("./policy/downloads.js").Kind} kind
+   * @param {number} number
+   */
+  url(kind, number) {
+    if (kind === "preview") return this.site.of(this.previews[number].row.file);
+    return kind === "texture" ? this.site.texture(number) : this.site.cell(kind, number);
   }
 
   /** Makes the most urgent requests, as long as the link would run dry. */
@@ -95,6 +111,7 @@ export class Stream {
     const { kind, number } = request, { client } = this;
     try {
       if (kind === "texture") await this.#texture(request);
+      else if (kind === "preview") await this.#preview(request);
       else await this.#cell(kind, request);
       this.news = true;
     } catch (fault) {
@@ -111,7 +128,7 @@ export class Stream {
    * @param {Request} request
    */
   async #cell(kind, request) {
-    const { client } = this, cell = request.number, url = this.site.cell(kind, cell);
+    const { client } = this, cell = request.number, url = this.url(kind, cell);
     if (kind === "record") {
       const { cells, textures } = this.site.index;
       const read = (/** @type {Uint8Array} */ body) =>
@@ -136,23 +153,68 @@ export class Stream {
   async #texture(request) {
     const { number, begin, end } = request, file = this.files[number];
     const size = file.row.ends[file.row.ends.length - 1];
-    const url = this.site.texture(number), cache = this.#suspect.has(number) ? "no-store" : "default";
+    const url = this.url("texture", number), cache = this.#suspect.has(number) ? "no-store" : "default";
     const part = await this.fetcher.range(url, begin, end, size, request, cache);
     // The bytes before it may be damaged.
     if (part.begin <= file.length) file.append(part.begin, part.body);
     this.client.arrived(request, file.length);
   }
 
+  /** @param {Request} request */
+  async #preview(request) {
+    const { number } = request, file = this.previews[number];
+    const read = (/** @type {Uint8Array<ArrayBuffer>} */ body) => body;
+    const cache = this.#spoilt.has(number) ? "no-store" : "default";
+    file.bytes = await this.fetcher.whole(this.url("preview", number), read, request, cache);
+    this.client.arrived(request);
+  }
+
   /**
-   * The first levels of a texture whose bytes have arrived. A damaged level is requested once more; if it
-   * is damaged again, the levels below it remain.
+   * The first levels of a texture by the best source that has arrived, and the loss of that.
    * @param {number} texture
    * @param {number} levels
    */
   async decode(texture, levels) {
+    const source = this.client.downloads.source(texture, levels);
+    // Damaged bytes are on their way again.
+    if (source === NO_SOURCE) throw new Error("not here");
+    const { loss } = this.client.catalogue.previews;
+    return source === EXACT ? { images: await this.#decodeExact(texture, levels), loss: 0 }
+      : { images: await this.#decodePreview(source, levels), loss: loss[source] };
+  }
+
+  /**
+   * By a preview. One that cannot be decoded is requested once more, then left out.
+   * @param {number} number
+   * @param {number} levels
+   */
+  async #decodePreview(number, levels) {
+    const file = this.previews[number], { client } = this;
+    try {
+      return await file.decode(levels);
+    } catch (fault) {
+      // Another call has reported it.
+      if (!(fault instanceof PtmError) || !file.bytes) throw fault;
+      file.bytes = null;
+      const again = this.#spoilt.has(number);
+      client.losePreview(number, again ? Infinity : 0);
+      if (!again) {
+        this.#spoilt.add(number);
+        const message = `${file.row.file} is not shown: ${fault.message}`;
+        this.report(new PageError("PTM-V105", message), "preview", number);
+      }
+      throw fault;
+    }
+  }
+
+  /**
+   * By the `.ptm`. A damaged level is requested once more; if it is damaged again, the levels below it
+   * remain.
+   * @param {number} texture
+   * @param {number} levels
+   */
+  async #decodeExact(texture, levels) {
     const file = this.files[texture];
-    // The damaged bytes are on their way again.
-    if (levels > this.client.have[texture]) throw new Error("not here");
     try {
       const images = await file.decode(levels);
       if (levels > (this.#suspect.get(texture) ?? levels)) this.#suspect.delete(texture);

@@ -96,6 +96,7 @@ export class Walkthrough {
     });
     this.stream = new Stream({
       site,
+      index,
       client: this.client,
       locator: this.locator,
       estimate: this.estimate,
@@ -133,7 +134,7 @@ export class Walkthrough {
    */
   #report(error, kind, number) {
     this.faults.push({ code: error.code, message: error.message });
-    const room = kind !== "texture" && number === this.cell;
+    const room = (kind === "record" || kind === "geometry") && number === this.cell;
     const fatal = !this.begun && (room || kind === "decoder");
     this.emit(fatal ? "error" : "notice", error);
   }
@@ -349,7 +350,13 @@ export class Walkthrough {
     client.look({ now, cell: this.cell, frustum, still });
     while (reserve.grow(client.column) && client.fit(this.budget - reserve.bytes));
     memory.budget = this.budget;
-    memory.settle(client.column, this.#priority());
+    memory.settle(client.column, this.#priority(), this.#losses());
+  }
+
+  /** The loss of the best source that each texture has of its column. */
+  #losses() {
+    const { column, downloads } = this.client;
+    return Float64Array.from(column, (k, t) => downloads.loss(t, k));
   }
 
   /** Share of the view of each texture, for the order of uploads. */
@@ -369,17 +376,32 @@ export class Walkthrough {
     return this.#sightDrawn < 0 ? null : clock() - this.#sightDrawn;
   }
 
-  /** Whether everything that this view could use within the budget is present. */
+  /** Whether everything that this view could use within the budget is present, in the best form. */
   get complete() {
     const { client, memory, present, catalogue: { T, K } } = this;
     if (!present || this.#sightDrawn < this.#changed || this.#looked < this.#changed) return false;
     if (client.cell !== this.cell || client.missing() > 0 || !this.sharpness.full) return false;
     for (let t = 0; t < T; t++) {
       const held = memory.held[t];
+      const better = client.downloads.loss(t, client.column[t]) < memory.loss[t];
+      if (better && held > 0 && present[t * K + 1] > 0) return false;
       for (let column = client.column[t]; column > held; column--) {
         if (present[t * K + column] > 0) return false;
       }
     }
+    return true;
+  }
+
+  /** Whether a texture shows a preview. @param {number} t */
+  previews(t) {
+    return this.memory.held[t] > 0 && this.memory.loss[t] > 0;
+  }
+
+  /** Whether it is complete, with exact texels alone, and no file of it has failed. */
+  get exact() {
+    const { client, present, catalogue: { T, K } } = this;
+    if (!present || !this.complete || client.missing(false, true) > 0) return false;
+    for (let t = 0; t < T; t++) if (present[t * K + 1] > 0 && this.previews(t)) return false;
     return true;
   }
 }

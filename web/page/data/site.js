@@ -10,6 +10,15 @@ import { levelSizes } from "../../client/src/levels.js";
  * @property {string} [poster]
  * @property {string} title
  *
+ * @typedef {object} Preview
+ * @property {string} file
+ * @property {number} level
+ * @property {number} width
+ * @property {number} height
+ * @property {number} bytes
+ * @property {number} difference
+ * @property {boolean} [exact]
+ *
  * @typedef {object} TextureRow
  * @property {string} file
  * @property {number} width
@@ -19,6 +28,7 @@ import { levelSizes } from "../../client/src/levels.js";
  * @property {number} gpuTexelBytes
  * @property {number[]} ends
  * @property {number[]} differences
+ * @property {Preview[]} [previews]
  * @property {number[]} color
  *
  * @typedef {object} CellRow
@@ -104,7 +114,7 @@ export class Site {
 }
 
 /**
- * An index without the levels that a GPU cannot hold.
+ * An index without the levels that a GPU cannot hold, and without those that only their previews reached.
  * @param {Index} index
  * @param {number} side texels at most
  * @returns {Index}
@@ -114,9 +124,11 @@ export function fitting(index, side) {
     let beyond = 0;
     while (Math.max(row.width, row.height) >> beyond > side) beyond++;
     const kept = row.ends.length - beyond;
-    return beyond === 0 ? row : {
-      ...row, width: row.width >> beyond, height: row.height >> beyond,
-      ends: row.ends.slice(0, kept), differences: row.differences.slice(0, kept),
+    const previews = (row.previews ?? []).filter(({ width, height }) => Math.max(width, height) <= side);
+    const levels = Math.max(kept, (previews.at(-1)?.level ?? 0) + 1);
+    return {
+      ...row, width: row.width >> beyond, height: row.height >> beyond, previews,
+      ends: row.ends.slice(0, kept), differences: row.differences.slice(0, levels),
     };
   });
   return { ...index, textures };

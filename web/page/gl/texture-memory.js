@@ -1,6 +1,9 @@
 // The levels of each texture on the GPU: never more bytes than the budget, those of a texture that is
 // being replaced counted twice; uploads in stripes, as long as a frame has time.
 //
+// Levels that come from a better source, as exact ones in place of a preview, go into the storage that
+// is there: it has their size, takes no more memory, and the picture neither fades nor flickers.
+//
 // Levels are decoded again for each replacement, a third more work than the finest alone. (Tried:
 // copying the common levels on the GPU. That needs an open decoder for each texture, with four bytes
 // for each of its texels, and a second way of shrinking.)
@@ -13,17 +16,23 @@ import { Storage } from "./storage.js";
  * @typedef {object} Row
  * @property {{width: number, height: number}[]} sizes of its levels, coarsest first
  * @property {number} channels of a texel on the GPU
- * Decodes the first levels of a texture.
- * @typedef {(texture: number, levels: number) => Promise<Image[]>} Decode
+ *
+ * The first levels of a texture.
+ * @typedef {object} Decoded
+ * @property {Image[]} images
+ * @property {number} loss of their source: 0 if they are exact
+ *
+ * @typedef {(texture: number, levels: number) => Promise<Decoded>} Decode
  */
 
 /** The most textures that are decoded at a time, and that are under way. */
 const DECODING = 3, UNDER_WAY = 6;
 
-/** A replacement of a texture's storage. */
+/** A replacement of a texture's storage, or of the texels in it. */
 class Replacement {
   /** @type {Image[] | null} */
   images = null;
+  loss = 0;
   /** @type {Storage | null} */
   storage = null;
   /** The level that is uploaded, and the next row of it. */
@@ -37,6 +46,8 @@ class Replacement {
   constructor(texture, to) {
     this.texture = texture;
     this.to = to;
+    /** Whether the storage is the present one. */
+    this.inside = false;
   }
 }
 
@@ -49,6 +60,8 @@ export class TextureMemory {
   #want = new Int32Array(0);
   /** @type {Float64Array} */
   #priority = new Float64Array(0);
+  /** The loss of the best source of the wanted columns. @type {Float64Array} */
+  #loss;
   #lost;
 
   /**
@@ -63,6 +76,9 @@ export class TextureMemory {
     this.#storages = rows.map(() => null);
     /** Columns on the GPU: the number of levels of each texture. */
     this.held = new Int32Array(rows.length);
+    /** The loss of their source, see `Decoded`. */
+    this.loss = new Float64Array(rows.length);
+    this.#loss = new Float64Array(rows.length);
     /** Columns lost with the context and not chosen again. */
     this.#lost = new Int32Array(rows.length);
     this.budget = Infinity;
@@ -82,16 +98,18 @@ export class TextureMemory {
    * before growing ones. Textures that are not wanted at all are freed at once.
    * @param {Int32Array} want columns
    * @param {Float64Array} priority
+   * @param {Float64Array} loss of the best source of each
    */
-  settle(want, priority) {
+  settle(want, priority, loss) {
     this.#want = want;
+    this.#loss = loss;
     this.#lost.fill(0);
     this.#priority = priority;
     for (let t = 0; t < want.length; t++) if (want[t] === 0 && this.held[t]) this.#clear(t);
     // There may be no room to shrink in.
     const shrinking = [...want.keys()].filter((t) => this.held[t] > want[t]);
     shrinking.sort((a, b) => priority[a] - priority[b]);
-    const moving = [...this.#underWay.values()].some(({ storage }) => storage);
+    const moving = [...this.#underWay.values()].some(({ storage, inside }) => storage && !inside);
     const least = Math.min(...shrinking.map((t) => this.#size(t, want[t])));
     for (const t of shrinking) {
       if (this.bytes <= this.budget && (moving || this.bytes + least <= this.budget)) break;
@@ -103,6 +121,7 @@ export class TextureMemory {
   /** Keeps the present levels, or those before the context was lost, and adds no others. */
   hold() {
     this.#want = this.held.map((held, t) => Math.max(held, Math.min(this.#want[t] ?? 0, this.#lost[t])));
+    this.#loss = this.loss.slice();
   }
 
   /** Restores the levels that were wanted before the context was lost. */
@@ -123,6 +142,11 @@ export class TextureMemory {
     return best;
   }
 
+  /** Whether the present columns are the wanted ones, and a better source has them. @param {number} t */
+  #improves(t) {
+    return this.held[t] > 0 && this.held[t] === this.#want[t] && this.#loss[t] < this.loss[t];
+  }
+
   /** Decodes the most urgent textures, as long as decoders are free. */
   #next() {
     const { held } = this, want = this.#want, priority = this.#priority;
@@ -132,15 +156,16 @@ export class TextureMemory {
       // Shrinking makes room for the others.
       const all = under.length < UNDER_WAY;
       const next = this.#best(
-        (t) => want[t] > 0 && (want[t] < held[t] || (all && want[t] > held[t])) && !this.#underWay.has(t),
-        (t) => priority[t] + +(want[t] < held[t]),
+        (t) => want[t] > 0 && !this.#underWay.has(t)
+          && (want[t] < held[t] || (all && (want[t] > held[t] || this.#improves(t)))),
+        (t) => priority[t] + (want[t] < held[t] ? 1 : want[t] > held[t] ? 0 : -1),
       );
       if (next < 0) return;
       const replacement = new Replacement(next, want[next]);
       this.#underWay.set(next, replacement);
       this.decode(next, want[next]).then(
-        (images) => {
-          replacement.images = images;
+        ({ images, loss }) => {
+          Object.assign(replacement, { images, loss });
           this.#next();
         },
         () => this.#drop(replacement),
@@ -151,7 +176,7 @@ export class TextureMemory {
   /** @param {Replacement} replacement */
   #drop(replacement) {
     if (this.#underWay.get(replacement.texture) !== replacement) return;
-    if (replacement.storage) this.#remove(replacement.storage);
+    if (replacement.storage && !replacement.inside) this.#remove(replacement.storage);
     this.#underWay.delete(replacement.texture);
   }
 
@@ -184,17 +209,23 @@ export class TextureMemory {
    * @param {number} now
    */
   #step(replacement, now) {
-    const { texture, to, images } = replacement, held = this.held[texture];
+    const { texture, to, images, loss } = replacement, held = this.held[texture];
     if (!images || this.#underWay.get(texture) !== replacement) return false;
-    const want = this.#want[texture];
+    const want = this.#want[texture], better = to === held && loss < this.loss[texture];
     // No longer wanted; more than wanted; or less than present and wanted.
-    if (want === 0 || to > want || (to <= held && want >= held)) {
+    if (want === 0 || to > want || (to <= held && want >= held && !better)) {
       this.#drop(replacement);
       return false;
     }
-    replacement.storage ??= this.#make(texture, to);
+    if (!replacement.storage) {
+      replacement.inside = better;
+      replacement.storage = better ? this.#storages[texture] : this.#make(texture, to);
+    }
     const { storage } = replacement;
-    if (!storage) return false;
+    if (!storage || (replacement.inside && storage !== this.#storages[texture])) {
+      if (storage) this.#drop(replacement);
+      return false;
+    }
     replacement.row = storage.upload(replacement.level, images[replacement.level].data, replacement.row);
     if (replacement.row >= images[replacement.level].height) {
       replacement.row = 0;
@@ -202,6 +233,8 @@ export class TextureMemory {
     }
     if (replacement.level < to) return true;
     this.#underWay.delete(texture);
+    this.loss[texture] = loss;
+    if (replacement.inside) return true;
     this.#clear(texture);
     this.#storages[texture] = storage;
     this.held[texture] = to;

@@ -43,10 +43,11 @@ export class Fetcher {
    * @param {string} url
    * @param {(body: Uint8Array<ArrayBuffer>) => T | Promise<T>} read throws or rejects if it is damaged
    * @param {{left: number}} [progress] bytes still to come, updated
+   * @param {RequestCache} [cache] "no-store" for a file that was damaged
    * @returns {Promise<T>}
    */
-  whole(url, read, progress) {
-    return this.#persist(url, "default", progress, async (cache) => {
+  whole(url, read, progress, cache = "default") {
+    return this.#persist(url, cache, progress, async (cache) => {
       const { response, body } = await this.#get(url, { cache }, progress);
       if (response.status !== 200) throw refused(url, response.status);
       try {

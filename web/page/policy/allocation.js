@@ -1,7 +1,11 @@
 // Chooses the levels that are worth most for their bytes. Each level has a worth of its own, but a
 // coarse level that adds nothing may lead to a fine one that does: so a step is any number of levels,
 // and the best step has the greatest worth per byte. Taking steps of all textures in that order, as
-// long as they fit, solves greedily a knapsack whose items are chains.
+// long as they fit, solves greedily a knapsack whose items are chains. A request may leap,
+// too: a preview competes with the exact levels by its gain over everything requested before.
+
+/** @typedef {import("./catalogue.js").Catalogue} Catalogue */
+/** @typedef {import("./downloads.js").Kind} Kind */
 
 /**
  * The best next request, or a step of one texture.

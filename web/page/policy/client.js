@@ -155,11 +155,12 @@ export class Client {
   /**
    * Number of files and levels that this view could use within the budget and that are missing.
    * @param {boolean} [free] whether to omit those that are requested already or cannot be now
+   * @param {boolean} [gone] whether to count those that are unavailable
    */
-  missing(free = false) {
+  missing(free = false, gone = false) {
     const { downloads } = this;
     return this.#policy.missing((kind, number) =>
-      free ? downloads.free(kind, number) : !downloads.gone(kind, number));
+      free ? downloads.free(kind, number) : gone || !downloads.gone(kind, number));
   }
 
   /**

@@ -6,5 +6,6 @@ export { PtmError } from "./errors.js";
 export { loadViewDecoder, ViewDecoder } from "./meshopt.js";
 export { DEFAULT_MEMORY, LevelDecoder, memoryNeeded } from "./level-decoder.js";
 export { Ptm, openPtm } from "./open.js";
+export { decodePreview } from "./preview.js";
 export { serve } from "./serve.js";
 export { DecoderWorkers } from "./workers.js";

@@ -4,13 +4,15 @@ import { readHeader } from "./container.js";
 import { loadEngine } from "./engine.js";
 import { PtmError } from "./errors.js";
 import { LevelDecoder } from "./level-decoder.js";
+import { decodePreview } from "./preview.js";
 
 /**
- * A message to a worker: first the source of the module; then a file whose first levels are wanted; or the
- * begin, a refinement or the end of a decoder.
+ * A message to a worker: first the source of the module; then a file or an image whose first levels are
+ * wanted; or the begin, a refinement or the end of a decoder.
  * @typedef {{wasm?: import("./engine.js").ModuleSource}
  *   | {bytes: Uint8Array, ends: number[], levels: number,
  *      options: import("./level-decoder.js").DecoderOptions}
+ *   | {bytes: Uint8Array<ArrayBuffer>, preview: import("./preview.js").PreviewOptions}
  *   | {decoder: number, header: import("./container.js").Header,
  *      options: import("./level-decoder.js").DecoderOptions}
  *   | {decoder: number, bytes: Uint8Array}
@@ -49,6 +51,11 @@ export function serve(port) {
     if ("wasm" in order) {
       loading = loadEngine(order.wasm);
       loading.catch(() => {}); // the next order reports it
+      return;
+    }
+    if ("preview" in order) {
+      const images = await decodePreview(order.bytes, order.preview);
+      port.postMessage({ images, fault: null }, images.map(({ data }) => data.buffer));
       return;
     }
     const engine = await (loading ??= loadEngine()).catch((error) => {

@@ -6,6 +6,7 @@ import { PtmError } from "./errors.js";
 /** @typedef {import("./level-decoder.js").Image} Image */
 /** @typedef {import("./level-decoder.js").DecoderOptions} DecoderOptions */
 /** @typedef {import("./engine.js").ModuleSource} ModuleSource */
+/** @typedef {import("./preview.js").PreviewOptions} PreviewOptions */
 
 /**
  * @typedef {object} WorkersOptions
@@ -18,7 +19,7 @@ import { PtmError } from "./errors.js";
 /** Bytes on their way through a worker. */
 class Task {
   /** @param {{bytes: Uint8Array, decoder: number} | {bytes: Uint8Array, ends: number[], levels: number,
-   *   options: DecoderOptions}} order */
+   *   options: DecoderOptions} | {bytes: Uint8Array, preview: PreviewOptions}} order */
   constructor(order) {
     this.order = order;
     /** @type {(images: Image[]) => void} */
@@ -211,8 +212,22 @@ export class DecoderWorkers {
    * @param {{ends: number[], levels: number} & DecoderOptions} options where each level ends in the
    *   file, and how many are wanted
    */
-  async decodeFirst(bytes, { ends, levels, ...options }) {
-    const lane = this.#lane(), task = new Task({ bytes, ends, levels, options });
+  decodeFirst(bytes, { ends, levels, ...options }) {
+    return this.#carryOut(new Task({ bytes, ends, levels, options }));
+  }
+
+  /**
+   * The first levels of an image, as `decodePreview`, in browsers with OffscreenCanvas.
+   * @param {Uint8Array} bytes
+   * @param {PreviewOptions} preview
+   */
+  decodePreview(bytes, preview) {
+    return this.#carryOut(new Task({ bytes, preview }));
+  }
+
+  /** @param {Task} task */
+  async #carryOut(task) {
+    const lane = this.#lane();
     lane.decoders++;
     lane.add(task);
     return task.images.finally(() => lane.decoders--);

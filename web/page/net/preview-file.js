@@ -1,0 +1,55 @@
+// A downloaded preview, and the levels that a worker decodes from it.
+
+import { levelSizes } from "../../client/src/levels.js";
+import { loadLater } from "../load-later.js";
+
+/** @typedef {import("../../ptm/src/level-decoder.js").Image} Image */
+/** @typedef {import("../../ptm/src/workers.js").DecoderWorkers} DecoderWorkers */
+
+export class PreviewFile {
+  /** All bytes, once they have arrived. @type {Uint8Array<ArrayBuffer> | null} */
+  bytes = null;
+
+  /**
+   * @param {import("../data/site.js").Preview} row
+   * @param {number} texture
+   * @param {import("../data/site.js").TextureRow} all the row of that texture
+   * @param {DecoderWorkers} workers
+   */
+  constructor(row, texture, all, workers) {
+    this.row = row;
+    this.texture = texture;
+    this.all = all;
+    this.workers = workers;
+  }
+
+  /** The media type, by the suffix. */
+  get type() {
+    const suffix = this.row.file.split(".").pop()?.toLowerCase() ?? "";
+    return `image/${suffix === "jpg" ? "jpeg" : suffix}`;
+  }
+
+  /**
+   * The first levels. Throws PtmError PTM-I105 if it is damaged or another.
+   * @param {number} levels
+   * @returns {Promise<Image[]>}
+   */
+  async decode(levels) {
+    const { bytes, all, row, type, workers } = this;
+    if (!bytes) throw new Error("not here");
+    const sizes = levelSizes(all).slice(0, row.level + 1);
+    const options = { sizes, levels, components: all.components, type };
+    if (typeof OffscreenCanvas === "function") return workers.decodePreview(bytes, options);
+    return (await loadLater()).decodePreview(bytes, options);
+  }
+}
+
+/**
+ * The previews of an index, in its order.
+ * @param {import("../data/site.js").Index} index
+ * @param {DecoderWorkers} workers
+ */
+export function previewsOf({ textures }, workers) {
+  return textures.flatMap((all, texture) =>
+    (all.previews ?? []).map((row) => new PreviewFile(row, texture, all, workers)));
+}
