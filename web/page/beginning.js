@@ -2,22 +2,30 @@
 
 /** Levels of a texture that make a first picture. */
 const FIRST_LEVELS = 5;
+/** Share of the pixels that need them; what few others show may come much later. */
+const ENOUGH = 0.95;
+/** Steps of the progress that textures make; the room makes two. */
+const STEPS = 10;
 
 /** @param {import("./walkthrough.js").Walkthrough} walk */
 export function beginningOf(walk) {
   const { catalogue: { T, K, levels }, client, memory, present, stream } = walk;
   const parts = +stream.records.has(walk.cell) + +stream.shapes.has(walk.cell);
-  let loaded = parts, total = 2;
+  let share = 0, total = 0;
   for (let t = 0; t < T; t++) {
-    const seen = present && present[t * K + 1] > 0 && !client.downloads.rests("texture", t);
-    const wanted = seen ? Math.min(FIRST_LEVELS, levels[t]) : 0;
-    total += wanted;
-    loaded += Math.min(memory.held[t], wanted);
+    if (!present || client.downloads.rests("texture", t)) continue;
+    const seen = present[t * K + 1], wanted = Math.min(FIRST_LEVELS, levels[t]);
+    total += seen;
+    share += seen * Math.min(memory.held[t] / wanted, 1);
   }
-  const room = parts < 2 || total === 2;
+  const room = parts < 2 || total === 0;
   return {
-    progress: { stage: room ? "Loading the room" : "Loading textures", loaded, total: room ? 12 : total },
+    progress: {
+      stage: room ? "Loading the room" : "Loading textures",
+      loaded: parts + (room ? 0 : STEPS * share / total),
+      total: 2 + STEPS,
+    },
     // Without the room there is no picture.
-    over: parts === 2 && ((!room && loaded >= total) || walk.complete),
+    over: parts === 2 && ((!room && share >= ENOUGH * total) || walk.complete),
   };
 }
