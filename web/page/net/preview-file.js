@@ -23,22 +23,16 @@ export class PreviewFile {
     this.workers = workers;
   }
 
-  /** The media type, by the suffix. */
-  get type() {
-    const suffix = this.row.file.split(".").pop()?.toLowerCase() ?? "";
-    return `image/${suffix === "jpg" ? "jpeg" : suffix}`;
-  }
-
   /**
    * The first levels. Throws PtmError PTM-I105 if it is damaged or another.
    * @param {number} levels
    * @returns {Promise<Image[]>}
    */
   async decode(levels) {
-    const { bytes, all, row, type, workers } = this;
+    const { bytes, all, row, workers } = this;
     if (!bytes) throw new Error("not here");
     const sizes = levelSizes(all).slice(0, row.level + 1);
-    const options = { sizes, levels, components: all.components, type };
+    const options = { sizes, levels, components: all.components };
     if (typeof OffscreenCanvas === "function") return workers.decodePreview(bytes, options);
     return (await loadLater()).decodePreview(bytes, options);
   }

@@ -15,9 +15,10 @@ import { PtmError } from "./errors.js";
  *   first
  * @property {number} levels that are wanted, coarsest first
  * @property {number} components of the texture: 1 or 2, which come out as they are, 3 or 4 as "rgba"
- * @property {string} type the media type
  */
 
+/** Media types by the first byte of RIFF and of JPEG. @type {Record<number, string>} */
+const TYPES = { 0x52: "image/webp", 0xff: "image/jpeg" };
 /** The context in which images with alpha are read. @type {WebGL2RenderingContext | null | undefined} */
 let reader;
 
@@ -28,8 +29,8 @@ let reader;
  * @param {PreviewOptions} options
  * @returns {Promise<Image[]>}
  */
-export async function decodePreview(bytes, { sizes, levels, components, type }) {
-  const { width, height } = sizes[sizes.length - 1];
+export async function decodePreview(bytes, { sizes, levels, components }) {
+  const { width, height } = sizes[sizes.length - 1], type = TYPES[bytes[0]] ?? "image/avif";
   const bitmap = await createImageBitmap(new Blob([bytes], { type }), {
     premultiplyAlpha: "none", colorSpaceConversion: "none",
   }).catch(() => {
