@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ptmtools.texture import EncodeOptions, decode_levels, encode
+from ptmtools.texture import EncodeOptions, decode_levels, encode, read_header
+from tests.site.previews import Preview, decoded, halved, levels_of, saved
 from tests.texture.coding import textured
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -253,3 +254,61 @@ def test_files_at_fault(three: Any, files: Path, tmp_path: Path) -> None:
     assert len(visit.messages) == 2
     assert "flipped.ptm: PtmError: PTM-I108" in visit.messages[0]
     assert visit.messages[1] == "error: 404 /files/none.ptm"
+
+
+PREVIEWS = """
+const told = [];
+const at = (file) => new URL(`/files/${file}`, document.baseURI);
+for (const { file, level, ...options } of settings.textures) {
+  const previews = options.previews.map((one) => ({ ...one, file: at(one.file) }));
+  const texture = new PtmTexture(renderer, at(file), { ...options, previews });
+  const states = [];
+  for (const exact of [false, true]) {
+    await texture.refine(level, { exact });
+    states.push(await levelsOf(renderer, texture));
+  }
+  await texture.refine(3);
+  states.push(await levelsOf(renderer, texture), texture.gpuBytes, gpu.bytes);
+  texture.dispose();
+  told.push(states);
+}
+return told;
+"""
+
+
+def test_previews_before_exact_levels(three: Any, tmp_path: Path) -> None:
+    """A preview is shown first and gives way; a damaged one is left out; one alone stays."""
+    texels = textured(211, 99, 4)
+    levels, preview = levels_of(texels), Preview(6, options={"quality": 80, "exact": True})
+    image = saved(levels[6], preview)
+    shown = [decoded(image, 4)]
+    while len(shown) < 7:
+        shown.insert(0, halved(shown[0]))
+    (tmp_path / "whole.ptm").write_bytes(encode(texels, EncodeOptions()))
+    (tmp_path / "some.ptm").write_bytes(encode(levels[4], EncodeOptions()))
+    (tmp_path / "good.webp").write_bytes(image)
+    (tmp_path / "bad.webp").write_bytes(image[:100])
+    sizes = [{"width": level.shape[1], "height": level.shape[0]} for level in levels]
+    textures = []
+    for ptm, name in [("whole", "good"), ("whole", "bad"), ("some", "good"), ("some", "bad")]:
+        ends = [level.end for level in read_header((tmp_path / f"{ptm}.ptm").read_bytes()).levels]
+        # Not worth its bytes otherwise.
+        row = {"file": f"{name}.webp", "level": 6, "bytes": 1}
+        more = {"ends": ends, "sizes": sizes, "components": 4}
+        textures.append({"file": f"{ptm}.ptm", "level": 6, "previews": [row], **more})
+    actual, visit = three.run(PREVIEWS, {"files": tmp_path}, textures=textures)
+
+    def digests(of: Any) -> list[str]:
+        return [hashlib.sha256(rgba(level).tobytes()).hexdigest() for level in of]
+
+    exact, by_image = digests(levels), digests(shown)
+    assert exact != by_image
+    assert [states[:2] for states in actual] == [
+        [by_image, exact],
+        [exact, exact],
+        [by_image, by_image],
+        [exact[:5], exact[:5]],
+    ]
+    assert all(states[2] == exact[:4] for states in actual)
+    assert all(told == counted for *_, told, counted in actual)
+    assert len([m for m in visit.messages if "bad.webp" in m]) == 2

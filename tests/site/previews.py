@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -87,7 +88,7 @@ def decoded(data: bytes, components: int) -> Texels:
 
 
 def with_previews(site: Site, textures: Mapping[int, Texture]) -> Site:
-    """The same site with other textures of these numbers; it still needs `rewritten`'s index."""
+    """The same site with other textures of these numbers."""
     entries, index = dict(site.entries), {**site.index}
     rows: list[dict[str, Any]] = [dict(row) for row in site.index["textures"]]
     for number, texture in textures.items():
@@ -96,10 +97,14 @@ def with_previews(site: Site, textures: Mapping[int, Texture]) -> Site:
     return with_index(Site(entries, index), index)
 
 
+def without_previews(site: Site) -> Site:
+    """The same site without those that it has."""
+    rows = [{k: v for k, v in row.items() if k != "previews"} for row in site.index["textures"]]
+    return with_index(site, {**site.index, "textures": rows})
+
+
 def with_index(site: Site, index: Mapping[str, Any]) -> Site:
     """The same site with another index, under the same name."""
-    import json
-
     name = next(n for n in site.entries if n.startswith("data/index-"))
     text = json.dumps(index).encode()
     entry = replace(site.entries[name], source=text, state=None)

@@ -15,6 +15,8 @@ import pytest
 from ptmtools.site.content import Site
 from ptmtools.site.throttle import Throttle
 
+from .previews import without_previews
+
 DOCS = Path(__file__).parents[2] / "docs/guide/publish.md"
 TEXTURES = re.compile(r"\.ptm$")
 
@@ -123,7 +125,8 @@ def test_a_missing_file(visit: Callable[..., Any], museum: Site) -> None:
 
 def test_no_textures_at_all(visit: Callable[..., Any], museum: Site) -> None:
     """There is a walk all the same, and a tab that is hidden, or a data saver, can rest."""
-    entries = {name: e for name, e in museum.entries.items() if not name.endswith(".ptm")}
+    textures = (".ptm", ".webp")
+    entries = {name: e for name, e in museum.entries.items() if not name.endswith(textures)}
     with visit(Site(entries, museum.index)) as visitor:
         visitor.page.evaluate("window.ptm.setDataSaver(true)")
         visitor.until("window.ptm.walk.begun && s.complete")
@@ -238,9 +241,20 @@ def test_no_simd(visit: Callable[..., Any], museum: Site) -> None:
 
 def test_a_missing_decoder(visit: Callable[..., Any], museum: Site) -> None:
     entries = {name: e for name, e in museum.entries.items() if not name.endswith(".wasm")}
-    with visit(Site(entries, museum.index)) as visitor:
+    with visit(without_previews(Site(entries, museum.index))) as visitor:
         visitor.page.locator("#error").wait_for()
         assert visitor.page.locator("#error-code").inner_text() == "PTM-V106"
+
+
+def test_previews_without_a_decoder(visit: Callable[..., Any], museum: Site) -> None:
+    """They are shown, and it is said that nothing else is."""
+    entries = {name: e for name, e in museum.entries.items() if not name.endswith(".wasm")}
+    with visit(Site(entries, museum.index)) as visitor:
+        state = visitor.until("window.ptm?.walk.begun && s.complete && ptm.errors.length > 0")
+        assert visitor.page.evaluate("ptm.errors.map(({ code }) => code)") == ["PTM-V106"]
+        assert not visitor.page.locator("#error").is_visible()
+    assert state["previews"] > 5
+    assert not state["exact"]
 
 
 def test_a_worker_that_does_not_start(visit: Callable[..., Any], museum: Site) -> None:

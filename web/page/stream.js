@@ -157,7 +157,7 @@ export class Stream {
     const part = await this.fetcher.range(url, begin, end, size, request, cache);
     // The bytes before it may be damaged.
     if (part.begin <= file.length) file.append(part.begin, part.body);
-    this.client.arrived(request, file.length);
+    this.client.arrived(request, this.#cannotDecode ? 0 : file.length);
   }
 
   /** @param {Request} request */
@@ -193,6 +193,7 @@ export class Stream {
     try {
       return await file.decode(levels);
     } catch (fault) {
+      if (!(fault instanceof PtmError)) this.#reportDecoder(fault);
       // Another call has reported it.
       if (!(fault instanceof PtmError) || !file.bytes) throw fault;
       file.bytes = null;
@@ -205,6 +206,14 @@ export class Stream {
       }
       throw fault;
     }
+  }
+
+  /** Without a decoder of files previews may still be shown. @param {unknown} fault */
+  #reportDecoder(fault) {
+    if (this.#cannotDecode || !this.workers.failed) return;
+    this.#cannotDecode = true;
+    this.report(new PageError("PTM-V106", `Textures cannot be decoded: ${fault}`), "decoder", 0);
+    this.files.forEach((_, t) => this.client.lose(t, 0, Infinity));
   }
 
   /**
@@ -222,10 +231,7 @@ export class Stream {
     } catch (fault) {
       // A worker without a decoder has no access to the file.
       if (!(fault instanceof PtmError) || fault.code === "PTM-M103") {
-        if (!this.#cannotDecode && this.workers.failed) {
-          this.report(new PageError("PTM-V106", `Textures cannot be decoded: ${fault}`), "decoder", 0);
-        }
-        this.#cannotDecode ||= this.workers.failed;
+        this.#reportDecoder(fault);
         throw fault;
       }
       // Another call has reported it.

@@ -135,7 +135,9 @@ export class Walkthrough {
   #report(error, kind, number) {
     this.faults.push({ code: error.code, message: error.message });
     const room = (kind === "record" || kind === "geometry") && number === this.cell;
-    const fatal = !this.begun && (room || kind === "decoder");
+    const { previews, workers } = this.stream;
+    const decoder = kind === "decoder" && (previews.length === 0 || workers.ended);
+    const fatal = !this.begun && (room || decoder);
     this.emit(fatal ? "error" : "notice", error);
   }
 

@@ -128,13 +128,16 @@ export function nextFetch(worth, stock, asked, last, overhead, free, requested) 
     const at = t * wide, until = Math.min(last[t], stored[t]);
     let here = 0, present = 0;
     while (here < until && ends[at + here + 1] <= asked[t]) present += worth[at + ++here];
-    let most = present;
+    // Beside a preview's finer columns the last exact ones would be worth nothing.
+    let most = present, below = present;
     for (let p = first[t]; p < first[t + 1]; p++) {
-      if (requested(p)) most = Math.max(most, worthOf(p, last[t]));
+      if (!requested(p)) continue;
+      most = Math.max(most, worthOf(p, last[t]));
+      below = Math.max(below, worthOf(p, until));
     }
     step.density = 0;
     if (here < until && free("texture", t)) {
-      bestStep(worth, ends, at, here, asked[t] - overhead, until, step, present - most);
+      bestStep(worth, ends, at, here, asked[t] - overhead, until, step, present - below);
     }
     for (let p = first[t]; p < first[t + 1]; p++) {
       if (!free("preview", p)) continue;

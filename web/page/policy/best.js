@@ -185,13 +185,12 @@ export class Best {
       if (seen && !downloads.has("geometry", c) && counts("geometry", c)) count++;
     }
     allocate(this.#holding(), memory, levels, budget, this.#wanted);
-    const limits = this.#limits();
     for (let t = 0; t < T; t++) {
       const { exact } = downloads.reach(t);
       for (let k = Math.max(this.#wanted[t], column[t]); k > exact; k--) {
         if (!(sight[t * K + k] > 0)) continue;
         const none = downloads.source(t, k) === NO_SOURCE;
-        const missing = this.#lacks(t, k, none, limits[t], counts);
+        const missing = this.#lacks(t, k, none, counts);
         if (missing) count++;
         if (missing || !none) break;
       }
@@ -200,17 +199,15 @@ export class Best {
   }
 
   /**
-   * Whether a column that is not exact could be: by any source if none is present, else by an exact one
-   * that would be fetched.
+   * Whether a column that is not exact could be: by any source if none is present, else by an exact one.
    * @param {number} t
    * @param {number} k
    * @param {boolean} none
-   * @param {number} limit
    * @param {(kind: import("./downloads.js").Kind, number: number) => boolean} counts
    */
-  #lacks(t, k, none, limit, counts) {
+  #lacks(t, k, none, counts) {
     const { stored, previews: { first, column, loss } } = this.#client.catalogue;
-    if (k <= stored[t] && (none || limit <= stored[t]) && counts("texture", t)) return true;
+    if (k <= stored[t] && counts("texture", t)) return true;
     for (let p = first[t]; p < first[t + 1]; p++) {
       if (column[p] >= k && (none || loss[p] === 0) && counts("preview", p)) return true;
     }

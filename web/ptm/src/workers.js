@@ -57,6 +57,8 @@ class Lane {
     this.decoders = 0;
     /** @type {Error | undefined} */
     this.failure = undefined;
+    /** Why it cannot decode files; images it can. @type {Error | undefined} */
+    this.useless = undefined;
     port.onmessage = ({ data }) => this.#answered(data);
     port.onerror = (event) => this.fail(new Error(`a worker failed: ${event.message ?? event}`));
   }
@@ -72,7 +74,8 @@ class Lane {
 
   /** @param {Task} task */
   add(task) {
-    if (this.failure) return task.reject(this.failure);
+    const reason = this.failure ?? ("preview" in task.order ? undefined : this.useless);
+    if (reason) return task.reject(reason);
     this.#waiting.push(task);
     this.#next();
   }
@@ -111,7 +114,10 @@ class Lane {
       const { code, message } = fault;
       const error = code ? new PtmError(code, message.slice(code.length + 2)) : new Error(message);
       task?.reject(Object.assign(error, { decoded: images.length }));
-      if (useless) this.fail(error);
+      if (useless) {
+        this.useless = error;
+        for (const waiting of this.#waiting.splice(0)) this.add(waiting);
+      }
     } else {
       task?.resolve(images);
     }
@@ -186,9 +192,14 @@ export class DecoderWorkers {
     this.lanes = Array.from({ length: count }, () => new Lane(make(), wasm));
   }
 
-  /** Whether all workers have failed. */
-  get failed() {
+  /** Whether all workers have ended, or never started. */
+  get ended() {
     return this.lanes.every(({ failure }) => failure);
+  }
+
+  /** Whether no worker can decode files. */
+  get failed() {
+    return this.lanes.every(({ failure, useless }) => failure ?? useless);
   }
 
   /**
@@ -235,7 +246,7 @@ export class DecoderWorkers {
 
   /** The worker that has the fewest decoders, of those that have not failed. */
   #lane() {
-    const able = this.lanes.filter(({ failure }) => !failure);
+    const able = this.lanes.filter(({ failure, useless }) => !failure && !useless);
     return (able.length ? able : this.lanes).reduce(
       (one, other) => (other.decoders < one.decoders ? other : one),
     );

@@ -6,6 +6,9 @@
 // the old storage freed. Until then both count. Textures of a renderer take turns, so that at most one is
 // present twice.
 //
+// A preview, an image of one level, may be shown first: it fills the storage of its level, which the exact
+// levels then exchange.
+//
 // Materials keep referring to the same object: three.js finds the new storage behind it, as textures
 // with equal settings share that of their source.
 //
@@ -20,7 +23,7 @@ import {
   SRGBColorSpace,
   Vector2,
 } from "three";
-import { DecoderWorkers, HEAD_MAX, openPtm } from "ptm-decoder";
+import { DecoderWorkers, HEAD_MAX, decodePreview, openPtm } from "ptm-decoder";
 import { TEXEL_BYTES, pyramidBytes } from "./budget.js";
 import { RangeFile } from "./range-file.js";
 
@@ -28,9 +31,22 @@ import { RangeFile } from "./range-file.js";
 /** @typedef {Awaited<ReturnType<import("ptm-decoder").Ptm["image"]>>} Image */
 
 /**
+ * An image of one level (docs/formats/hints.md).
+ * @typedef {object} Preview
+ * @property {string | URL} file
+ * @property {number} level
+ * @property {number} bytes
+ * @property {boolean} [exact]
+ */
+
+/**
  * @typedef {object} TextureOptions
  * @property {DecoderWorkers} [workers] that decode; all textures without share some
  * @property {number[]} [ends] of the levels, from the index: saves the request that determines them
+ * @property {Preview[]} [previews] from the index, ascending by level: with `ends`, `sizes` and
+ *   `components`
+ * @property {{width: number, height: number}[]} [sizes] of all levels, coarsest first
+ * @property {number} [components] of the texture: 2 and 4 have alpha
  * @property {number[]} [color] red, green, blue, 0 to 255: shown before the first level
  * @property {number} [wrapS] `RepeatWrapping` by default
  * @property {number} [wrapT]
@@ -51,6 +67,11 @@ let shared;
  * @type {WeakMap<WebGLRenderer, Promise<unknown>>}
  */
 const turns = new WeakMap();
+/**
+ * The downloaded previews of files by address; null for those that cannot be shown.
+ * @type {WeakMap<RangeFile, Map<string, Uint8Array<ArrayBuffer> | null>>}
+ */
+const images = new WeakMap();
 
 /** See `refine`. Its rows begin at the top, as glTF has it. */
 export class PtmTexture extends DataTexture {
@@ -59,6 +80,9 @@ export class PtmTexture extends DataTexture {
   /** @type {import("ptm-decoder").Ptm | undefined} */
   #ptm;
   #wanted = -1;
+  #exactly = true;
+  /** The finest level up to which all present ones are exact. */
+  #sure = -1;
   /** The current call of `refine`. @type {symbol | undefined} */
   #call;
   /** @type {Promise<boolean>} */
@@ -98,19 +122,22 @@ export class PtmTexture extends DataTexture {
   /**
    * Fetches, decodes and shows the levels up to this one, coarsest first, and gives finer ones
    * back; -1 leaves nothing but the colour. Levels larger than the GPU's limit are left out.
-   * Cancels earlier requests. After a loss of the context the levels are restored from the
+   * Where a preview takes fewer bytes it is shown first, and the exact levels replace it. Cancels earlier
+   * requests. After a loss of the context the levels are restored from the
    * downloaded bytes.
    *
    * Rejects as `openPtm` and decoding do, and with an Error that names the file if it
    * does not come; levels that were shown before stay.
    *
    * @param {number} level
+   * @param {{exact?: boolean}} [options] whether to go on after a preview of the level; true by default
    * @returns {Promise<boolean>} true when the levels are shown, false if the call was cancelled
    */
-  refine(level) {
-    if (this.#call && level === this.#wanted) return this.#answer;
+  refine(level, { exact = true } = {}) {
+    if (this.#call && level === this.#wanted && exact === this.#exactly) return this.#answer;
     this.#control.abort();
     this.#wanted = level;
+    this.#exactly = exact;
     this.#call = Symbol();
     return (this.#answer = this.#reach(level, this.#call));
   }
@@ -140,13 +167,13 @@ export class PtmTexture extends DataTexture {
   };
 
   #restored = () => {
-    if (!this.#call && this.#wanted >= 0) this.refine(this.#wanted);
+    if (!this.#call && this.#wanted >= 0) this.refine(this.#wanted, { exact: this.#exactly });
   };
 
   #free() {
     super.dispose();
     this.#storages.delete(this);
-    this.level = -1;
+    this.level = this.#sure = -1;
   }
 
   /** Shows only the colour. */
@@ -169,7 +196,8 @@ export class PtmTexture extends DataTexture {
         try {
           await contextOf(this.#renderer);
           signal.throwIfAborted();
-          await (level > this.level ? this.#rise(level, signal) : this.#hold(level, [], signal));
+          if (level < this.level) await this.#hold(level, [], signal);
+          await this.#rise(level, signal);
           return true;
         } catch (error) {
           if (!signal.aborted) throw error;
@@ -182,18 +210,89 @@ export class PtmTexture extends DataTexture {
   }
 
   /**
-   * Decodes the downloaded bytes and the range after them; requests bytes with a wrong checksum again.
+   * By a preview first, if one is better than the bytes that the exact levels lack.
    * @param {number} level
    * @param {AbortSignal} signal
    */
   async #rise(level, signal) {
+    const { ends = [], previews = [], sizes } = this.#options;
+    if (sizes) level = Math.min(level, sizes.length - 1);
+    while (level > this.level) {
+      const preview = this.#previewOf(level);
+      if (!preview || preview.level <= this.level) break;
+      if (level < ends.length && ends[level] - this.file.held <= preview.bytes) break;
+      if (await this.#preview(preview, Math.min(level, preview.level), signal)) break;
+    }
+    if (!this.#exactly && this.level >= level) return;
+    const last = previews.length ? Math.min(level, ends.length - 1) : level;
+    // Levels that only previews have are not replaced by fewer.
+    if (last > this.#sure && last >= this.level) await this.#riseExactly(last, signal);
+  }
+
+  /**
+   * The coarsest preview that shows a level, or the finest.
+   * @param {number} level
+   */
+  #previewOf(level) {
+    const { previews = [], sizes = [] } = this.#options, known = images.get(this.file);
+    const most = this.#renderer.capabilities.maxTextureSize;
+    const usable = previews.filter((preview) => {
+      const { width, height } = sizes[preview.level];
+      return Math.max(width, height) <= most && known?.get(String(preview.file)) !== null;
+    });
+    return usable.find((preview) => preview.level >= level) ?? usable.at(-1);
+  }
+
+  /**
+   * Shows a preview; returns whether it could.
+   * @param {Preview} preview
+   * @param {number} level
+   * @param {AbortSignal} signal
+   */
+  async #preview({ file, level: finest, exact }, level, signal) {
+    const { components = 3, sizes = [] } = this.#options, url = String(file);
+    const known = images.get(this.file) ?? new Map();
+    images.set(this.file, known);
+    try {
+      if (!known.has(url)) {
+        const response = await fetch(url, { signal });
+        if (!response.ok) throw new Error(`${response.status} ${response.statusText}`);
+        known.set(url, new Uint8Array(await response.arrayBuffer()));
+      }
+      const options = {
+        sizes: sizes.slice(0, finest + 1), levels: level + 1, components: components % 2 ? 3 : 4,
+      };
+      const bytes = known.get(url);
+      const levels = typeof OffscreenCanvas === "function"
+        ? await this.#workers.decodePreview(bytes, options) : await decodePreview(bytes, options);
+      signal.throwIfAborted();
+      await this.#hold(level, levels, signal, exact ? level : -1);
+      return true;
+    } catch (error) {
+      if (signal.aborted) throw error;
+      known.set(url, null);
+      console.warn(`three-ptm: ${url}: ${error}; left out`);
+      return false;
+    }
+  }
+
+  get #workers() {
+    return this.#options.workers ?? (shared ??= new DecoderWorkers());
+  }
+
+  /**
+   * Decodes the downloaded bytes and the range after them; requests bytes with a wrong checksum again.
+   * @param {number} level
+   * @param {AbortSignal} signal
+   */
+  async #riseExactly(level, signal) {
     try {
       await this.#decode(level, signal);
     } catch (error) {
       const { code } = /** @type {{code?: string}} */ (error);
       if (signal.aborted || (code !== "PTM-I105" && code !== "PTM-I108")) throw error;
       console.warn(`three-ptm: ${this.file.url}: ${error}; asked for once more`);
-      this.file.forget(this.#ptm?.levels[this.level + 1]?.offset ?? 0);
+      this.file.forget(this.#ptm?.levels[this.#sure + 1]?.offset ?? 0);
       this.#ptm = undefined;
       await this.#decode(level, signal);
     } finally {
@@ -206,7 +305,7 @@ export class PtmTexture extends DataTexture {
    * @param {AbortSignal} signal
    */
   async #decode(level, signal) {
-    const workers = this.#options.workers ?? (shared ??= new DecoderWorkers());
+    const workers = this.#workers;
     this.file.until = this.#options.ends?.[level] ?? FIRST;
     const read = this.file.read.bind(this.file);
     this.#ptm ??= await openPtm(read, { signal, first: HEAD_MAX });
@@ -214,14 +313,15 @@ export class PtmTexture extends DataTexture {
     const most = this.#renderer.capabilities.maxTextureSize;
     const fit = levels.findLastIndex(({ width, height }) => Math.max(width, height) <= most);
     const to = Math.min(level, fit);
-    if (to <= this.level) return;
+    if (to <= this.#sure) return;
     this.file.until = levels[to].offset + levels[to].length;
     /** @type {Image[]} */
     let images = [];
     for await (const image of this.#ptm.decode({ to, workers, signal })) {
-      if (image.level <= this.level) continue;
+      if (image.level <= this.#sure) continue;
       images.push(image);
-      if (image.level < to && image.width * image.height < LEAST) continue;
+      const small = image.level < this.level || image.width * image.height < LEAST;
+      if (image.level < to && small) continue;
       await this.#hold(image.level, images, signal);
       images = [];
     }
@@ -230,13 +330,14 @@ export class PtmTexture extends DataTexture {
   /**
    * Storage of the levels up to this one, filled with present levels and images.
    * @param {number} level
-   * @param {Image[]} images
+   * @param {Image[]} images levels that follow each other, up to this one
    * @param {AbortSignal} signal
+   * @param {number} sure up to which level the images are exact
    */
-  #hold(level, images, signal) {
+  #hold(level, images, signal, sure = level) {
     return inTurn(this.#renderer, async () => {
       signal.throwIfAborted();
-      if (level === this.level) return;
+      if (level === this.level && !images.length) return;
       if (level < 0) {
         this.#free();
         this.#blank();
@@ -245,17 +346,20 @@ export class PtmTexture extends DataTexture {
       const next = this.#storage(level);
       try {
         for (const image of images) await this.#upload(image, next, level - image.level, signal);
-        for (let kept = Math.min(this.level, level); kept >= 0; kept--) {
+        const first = images[0]?.level ?? level + 1;
+        for (let kept = Math.min(this.level, first - 1); kept >= 0; kept--) {
           const [from, to] = [this.level - kept, level - kept];
           this.#renderer.copyTextureToTexture(this, next, null, null, from, to);
         }
         const bytes = /** @type {number} */ (this.#storages.get(next));
+        const exact = images.length ? sure : Math.min(this.#sure, level);
         this.#free();
         this.source = next.source;
         this.mipmaps = next.mipmaps;
         this.#renderer.initTexture(this);
         this.#storages.set(this, bytes);
         this.level = level;
+        this.#sure = exact;
       } finally {
         next.dispose();
         this.#storages.delete(next);
@@ -265,7 +369,7 @@ export class PtmTexture extends DataTexture {
 
   /** @param {number} level */
   #storage(level) {
-    const { levels } = /** @type {import("ptm-decoder").Ptm} */ (this.#ptm);
+    const levels = this.#options.sizes ?? /** @type {import("ptm-decoder").Ptm} */ (this.#ptm).levels;
     const sizes = levels.slice(0, level + 1).reverse();
     const [{ width, height }] = sizes;
     const next = new DataTexture(null, width, height);

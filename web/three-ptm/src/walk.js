@@ -18,8 +18,9 @@ import { RangeFile } from "./range-file.js";
  * @property {{gltf?: string}} [geometry]
  * @property {{position: number[], direction: number[], fieldOfView: number, cell: number,
  *   description: string}[]} viewpoints
- * @property {{file: string, width: number, height: number, ends: number[], color?: number[]}[]}
- *   textures
+ * @property {{file: string, width: number, height: number, ends: number[], color?: number[],
+ *   components?: number, previews?: {file: string, level: number, width: number, height: number,
+ *   bytes: number, exact?: boolean}[]}[]} textures
  * @property {{name: string, box: number[], record?: string, geometry?: string}[]} cells
  */
 
@@ -227,16 +228,17 @@ export class Walk {
    * @param {number} wrapT
    */
   #texture(number, wrapS, wrapT) {
-    const { file, ends, color } = this.index.textures[number];
+    const row = this.index.textures[number], { file, ends, color, components } = row;
     const slot = this.#textures.get(number) ?? {
       file: new RangeFile(new URL(file, this.#url)),
       copies: new Map(),
     };
     this.#textures.set(number, slot);
     const workers = this.#options.workers ?? this.#ownWorkers;
+    const previews = row.previews?.map((one) => ({ ...one, file: new URL(one.file, this.#url) }));
+    const options = { workers, ends, color, components, previews, sizes: levelSizes(row), wrapS, wrapT };
     const texture =
-      slot.copies.get(`${wrapS} ${wrapT}`) ??
-      new PtmTexture(this.#renderer, slot.file, { workers, ends, color, wrapS, wrapT });
+      slot.copies.get(`${wrapS} ${wrapT}`) ?? new PtmTexture(this.#renderer, slot.file, options);
     slot.copies.set(`${wrapS} ${wrapT}`, texture);
     return texture;
   }
@@ -259,8 +261,8 @@ export class Walk {
   }
 
   /**
-   * Textures with too many levels shrink before any grows; then all get coarse levels; then the rest,
-   * beginning with the greatest coverage.
+   * Textures with too many levels shrink before any grows; then all get coarse levels; then the rest by
+   * previews; then exactly. The greatest coverage begins.
    * @param {Map<number, number>} shares
    * @param {AbortSignal} signal
    */
@@ -272,22 +274,23 @@ export class Walk {
     });
     const levels = shareOut(wants, this.budget);
     const order = [...wants.keys()].sort((a, b) => wants[b].share - wants[a].share);
-    /** @param {(n: number, now: number) => number} target */
-    const pass = (target) =>
+    /** @param {(n: number, now: number) => number} target @param {boolean} exact */
+    const pass = (target, exact) =>
       this.#all(
         order.map((n) => async () => {
           // One after the other: the second uses the bytes of the first.
-          for (const texture of wants[n].all) await texture.refine(target(n, texture.level));
+          for (const texture of wants[n].all) await texture.refine(target(n, texture.level), { exact });
         }),
         signal,
       );
-    await pass((n, now) => Math.min(levels[n], now));
+    await pass((n, now) => Math.min(levels[n], now), false);
     await pass((n, now) => {
       const sides = wants[n].sizes.map(({ width, height }) => Math.max(width, height));
       const first = sides.findLastIndex((side) => side <= FIRST_LOOK);
       return Math.min(levels[n], Math.max(first, now, 0));
-    });
-    await pass((n) => levels[n]);
+    }, false);
+    await pass((n) => levels[n], false);
+    await pass((n) => levels[n], true);
   }
 
   /**
