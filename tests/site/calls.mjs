@@ -22,11 +22,13 @@ const functions = {
     const used = allocate(reals(worth), reals(cost), whole(last), budget, column);
     return [used, [...column]];
   },
-  next({ worth, ends, asked, last, overhead, busy }) {
-    const stock = stockFrom({ T: last.length, ends, stored: ends.map((row) => row.length - 1) });
-    const free = (_, texture) => !busy[texture], none = () => false;
-    const step = nextFetch(reals(worth), stock, reals(asked), whole(last), overhead, free, none);
-    return [step.density, step.texture, step.column];
+  next({ worth, ends, stored, asked, last, overhead, busy, previews, pending }) {
+    const stock = stockFrom({ ends, stored, previews }), T = last.length;
+    const requested = (preview) => pending[preview];
+    const free = (kind, number) => (kind === "preview" ? !pending[number] : !busy[number]);
+    const { density, texture, column, preview } =
+      nextFetch(reals(worth), stock, reals(asked), whole(last), overhead, free, requested);
+    return [density, ...(preview < 0 ? [texture, column] : [T + preview, 0])];
   },
   share({ memory, levels, have, budget, cells, column, rounds }) {
     const stock = {
@@ -49,9 +51,10 @@ const functions = {
     });
   },
   catalogue({ index }) {
-    const { levels, stored, previews, gains, T, C, K, whole: all, ...tables } = catalogueOf(index);
-    const rows = Object.entries(tables).map(([name, table]) => [name, [...table]]);
-    return { levels: [...levels], T, C, K, whole: all, ...Object.fromEntries(rows) };
+    const { levels, T, C, K, whole: all, previews, ...tables } = catalogueOf(index);
+    const lists = (some) => Object.entries(some).map(([name, table]) => [name, [...table]]);
+    const rest = Object.fromEntries(lists(tables)), some = Object.fromEntries(lists(previews));
+    return { levels: [...levels], T, C, K, whole: all, previews: some, ...rest };
   },
   frustum({ pose, angle, aspect, low, high, hulls }) {
     const frustum = frustumOf(pose, angle, aspect), far = pose.eye;

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +17,21 @@ from ptmtools.lab.catalogue import catalogue_of
 from ptmtools.lab.client import PRIOR, Estimate
 from ptmtools.lab.network import Link, Request
 from ptmtools.lab.policies.paper_kernels import refresh, share_out
-from ptmtools.lab.previews import no_previews
+from ptmtools.lab.previews import Previews, previews_of
 from ptmtools.lab.world import World
 from ptmtools.link import Conditions
 from tests.lab.conftest import two_rooms, walk_file, world
 from tests.lab.worlds import SEEDS, any_world, catalogue, raw, standing
-from tests.site.watching import HERE, Witness, called, documents, same, tables, write
+from tests.site.watching import (
+    HERE,
+    Witness,
+    called,
+    documents,
+    preview_tables,
+    same,
+    tables,
+    write,
+)
 from tests.web.node import missing, run
 
 __all__ = ["two_rooms", "walk_file", "world"]
@@ -64,18 +72,41 @@ def test_what_is_chosen(tmp_path: Path) -> None:
 
 
 def test_what_is_fetched_next(tmp_path: Path) -> None:
+    """Of exact levels and previews, some of them requested, some files busy."""
     calls, expected = [], []
     for seed in range(CASES):
         random = np.random.default_rng(seed)
         worth, ends, last = tall(random)
-        asked, busy = random.integers(0, ends[:, -1] + 1), random.random(len(last)) < 0.3
-        none, stored = no_previews(len(last)), np.full(len(last), ends.shape[1] - 1)
-        pending = np.zeros(0, np.bool_)
-        expected.append(list(next_fetch(worth, ends, stored, asked, busy, last, none, pending, 5)))
-        reported = {"worth": worth, "ends": ends, "asked": asked, "last": last, "busy": busy}
-        calls.append(("next", {k: v.tolist() for k, v in reported.items()} | {"overhead": 5}))
+        count, wide = worth.shape
+        stored = random.integers(1, wide, count)
+        ends = np.minimum(ends, np.take_along_axis(ends, stored[:, None], axis=1))
+        asked, busy = random.integers(0, ends[:, -1] + 1), random.random(count) < 0.3
+        previews = any_previews(random, count, wide)
+        pending = random.random(len(previews.texture)) < 0.3
+        rows = worth[previews.texture] - random.integers(0, 3, (len(pending), wide))
+        every = np.concatenate([worth, rows])
+        density, source, column = next_fetch(
+            every, ends, stored, asked, busy, last, previews, pending, 5
+        )
+        expected.append([density, source, column if source < count else 0])
+        reported = {"worth": every, "ends": ends, "stored": stored, "asked": asked, "last": last}
+        reported |= {"busy": busy, "pending": pending}
+        more = {"overhead": 5, "previews": preview_tables(previews)}
+        calls.append(("next", {k: v.tolist() for k, v in reported.items()} | more))
     assert called(tmp_path, calls) == expected
-    assert {texture for _, texture, _ in expected} >= {-1, 0, 1, 2}
+    assert {source for _, source, _ in expected} >= {-1, 0, 1, 2, 9}
+
+
+def any_previews(random: np.random.Generator, count: int, wide: int) -> Previews:
+    """Up to three previews of each texture."""
+    rows = [
+        [
+            {"level": int(level), "bytes": int(random.integers(1, 30)), "difference": 1.0}
+            for level in np.flatnonzero(random.random(wide - 1) < 0.3)
+        ]
+        for _ in range(count)
+    ]
+    return previews_of([{"ends": [0] * (wide - 1), "previews": some} for some in rows])
 
 
 def test_how_the_paper_shares_out(tmp_path: Path) -> None:
@@ -182,11 +213,15 @@ def test_the_catalogue_of_an_index(tmp_path: Path, world: World) -> None:
 
 @EACH
 @settings(max_examples=25)
-@given(SEEDS)
-def test_walks(tmp_path_factory: pytest.TempPathFactory, policy: str, seed: int) -> None:
+@given(SEEDS, st.booleans())
+def test_walks(
+    tmp_path_factory: pytest.TempPathFactory, policy: str, seed: int, previews: bool
+) -> None:
     """What it holds, has, lacks and asks for, at each look and each arrival."""
     random = np.random.default_rng(seed)
-    witness = Witness(any_world(seed, 40), policy, int(random.integers(0, 3000)))
+    # The paper's client knows none; the page's fetches those that the `.ptm` lacks.
+    previews &= policy == "best"
+    witness = Witness(any_world(seed, 40, previews=previews), policy, int(random.integers(0, 3000)))
     bandwidth = float(random.choice([2e3, 2e4, 2e5, 1e7]))
     witness.walk(Conditions(bandwidth, float(random.choice([0.0, 0.05, 0.3]))))
     assert same(witness.in_javascript(tmp_path_factory.mktemp("walk")), witness.answers)
@@ -197,8 +232,7 @@ def test_walks(tmp_path_factory: pytest.TempPathFactory, policy: str, seed: int)
 def test_a_walk_through_a_database(
     tmp_path: Path, world: World, policy: str, bandwidth: float
 ) -> None:
-    bare = replace(world, catalogue=world.catalogue.without_previews)
-    witness = Witness(bare, policy, bare.catalogue.whole // 4)
+    witness = Witness(world, policy, world.catalogue.whole // 4)
     witness.walk(Conditions(bandwidth))
     answers = witness.in_javascript(tmp_path)
     assert same(answers, witness.answers)

@@ -17,6 +17,7 @@ from ptmtools.lab.client import Client, Kind
 from ptmtools.lab.network import Link, Request
 from ptmtools.lab.policies import POLICIES
 from ptmtools.lab.policies.engine import HELD_ON, EngineClient
+from ptmtools.lab.previews import AVERAGING, Previews
 from ptmtools.lab.simulation import simulate
 from ptmtools.lab.world import World
 from ptmtools.link import Conditions
@@ -81,7 +82,7 @@ class Witness:
             arrived(request)
             if request in number:
                 part: Any = request.tag
-                seen = {} if part.kind == Kind.TEXTURE else _seen(client)
+                seen = {} if part.kind in (Kind.TEXTURE, Kind.PREVIEW) else _seen(client)
                 self._note("arrived", client.have.tolist(), number=number[request], **seen)
 
         vars(client).update(look=looked, fetch=fetched, arrived=came)
@@ -136,12 +137,29 @@ def _missing(client: Client) -> int | None:
     seen = client.frustum.meets_boxes(stock.low[known], stock.high[known])
     seen |= (known == here) | (client.placeholders(1)[known] > 0)
     count += int((seen & ~client.geometry.whole[known]).sum())
-    hold, kept, best = client._worth.hold, client._kept, np.zeros(len(stock.levels), np.int64)
+    hold, kept, wanted = client._worth.hold, client._kept, np.zeros(len(stock.levels), np.int64)
     worth = hold + HELD_ON * kept + HELD_ON**2 * stock.gains
-    allocate(worth, stock.memory, stock.levels, client.budget, best, False)
-    column = np.arange(stock.ends.shape[1])
-    absent = (column > client.have[:, None]) & (column <= best[:, None])
-    return count + int((absent & (client.sight(1) > 0)).any(axis=1).sum())
+    allocate(worth[: len(wanted)], stock.memory, stock.levels, client.budget, wanted, False)
+    last = np.maximum(wanted, client.column)
+    return count + sum(_lacks(client, t, int(last[t])) for t in range(len(last)))
+
+
+def _lacks(client: Client, texture: int, last: int) -> bool:
+    """Whether a texture could be shown better, in the finest column up to ``last`` that the view
+    wants and that some source has or could have: exactly, or at all."""
+    stock = client.world.catalogue
+    sight, previews = client.sight(1)[texture], stock.previews  # type: ignore[attr-defined]
+    own = previews.texture == texture
+    for column in range(last, int(client.exact[texture]), -1):
+        if not sight[column] > 0:
+            continue
+        shows = own & (previews.column >= column)
+        none = not (shows & client.previews.whole).any()
+        if column <= stock.stored[texture] or (shows & (none | previews.exact)).any():
+            return True
+        if not none:
+            return False
+    return False
 
 
 def _row(request: Request) -> list[Any]:
@@ -155,9 +173,11 @@ def tables(stock: Catalogue) -> dict[str, Any]:
     count, wide = stock.ends.shape
     arrays = {
         "levels": stock.levels,
+        "stored": stock.stored,
         "ends": stock.ends,
         "memory": stock.memory,
         "differences": stock.differences,
+        "gains": stock.gains,
         "colors": stock.colors,
         "low": stock.low,
         "high": stock.high,
@@ -165,7 +185,18 @@ def tables(stock: Catalogue) -> dict[str, Any]:
         "geometryBytes": stock.geometry_bytes,
     }
     sizes = {"T": count, "C": stock.cell_count, "K": wide, "whole": stock.whole}
-    return {**sizes, **{name: np.asarray(array).tolist() for name, array in arrays.items()}}
+    flat = {name: np.asarray(array).tolist() for name, array in arrays.items()}
+    return {**sizes, **flat, "previews": preview_tables(stock.previews)}
+
+
+def preview_tables(previews: Previews) -> dict[str, Any]:
+    """Previews as the viewer has them."""
+    return {
+        "first": previews.first.tolist(),
+        "column": previews.column.tolist(),
+        "bytes": previews.bytes.tolist(),
+        "loss": (previews.difference * AVERAGING**previews.column).tolist(),
+    }
 
 
 def documents(world: World) -> dict[str, Any]:

@@ -10,7 +10,7 @@
 /**
  * The best next request, or a step of one texture.
  * @typedef {{density: number, texture: number, column: number, preview: number}} Step worth per byte,
- *   of which texture (−1: none), the column that it leads to, and the preview (−1: exact levels)
+ *   of which texture (−1: none), and the column that it leads to, or the preview (−1: exact levels)
  */
 
 /** @returns {Step} */
@@ -144,7 +144,6 @@ export function nextFetch(worth, stock, asked, last, overhead, free, requested) 
       const density = (worthOf(p, last[t]) - most) / (bytes[p] + overhead);
       if (density > 0 && density >= step.density) {
         step.density = density;
-        step.column = Math.min(column[p], last[t]);
         step.preview = p;
       }
     }

@@ -6,8 +6,8 @@
 // the old storage freed. Until then both count. Textures of a renderer take turns, so that at most one is
 // present twice.
 //
-// A preview, an image of one level, may be shown first: it fills the storage of its level, which the exact
-// levels then exchange.
+// A preview, an image of one level, may be shown first: it fills the storage of its level, and the exact
+// levels overwrite it there.
 //
 // Materials keep referring to the same object: three.js finds the new storage behind it, as textures
 // with equal settings share that of their source.
@@ -337,7 +337,11 @@ export class PtmTexture extends DataTexture {
   #hold(level, images, signal, sure = level) {
     return inTurn(this.#renderer, async () => {
       signal.throwIfAborted();
-      if (level === this.level && !images.length) return;
+      if (level === this.level) {
+        for (const image of images) await this.#upload(image, this, level - image.level, signal);
+        if (images.length) this.#sure = sure;
+        return;
+      }
       if (level < 0) {
         this.#free();
         this.#blank();
