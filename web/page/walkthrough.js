@@ -380,8 +380,9 @@ export class Walkthrough {
 
   /** Whether everything that this view could use within the budget is present, in the best form. */
   get complete() {
-    const { client, memory, present, catalogue: { T, K } } = this;
+    const { client, memory, present, renderer, stream, catalogue: { T, K } } = this;
     if (!present || this.#sightDrawn < this.#changed || this.#looked < this.#changed) return false;
+    if (this.visible.some((c) => stream.shapes.has(c) && !renderer?.cells.has(c))) return false;
     if (client.cell !== this.cell || client.missing() > 0 || !this.sharpness.full) return false;
     for (let t = 0; t < T; t++) {
       const held = memory.held[t];
