@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from ptmtools.cli.main import main
-from ptmtools.glb import JSON, glb_chunks
 from ptmtools.neighbours.apo.files import inflated
 from ptmtools.neighbours.apo.model import Octree
 from ptmtools.neighbours.apo.octree import fault_of
 from ptmtools.neighbours.apo.traversal import look_up
+from ptmtools.output.gltf_reader import read_glb
 from tests.e2e.conftest import Ptm, make_museum
 from tests.neighbours.apo.statues import STATUES, write_rooms
 from tests.output.agreement import disagreements
@@ -118,24 +118,8 @@ def test_statues_can_be_lit_by_what_is_served(tmp_path: Path, ptm: Ptm) -> None:
 
 def shapes(file: Path) -> list[tuple[str, np.ndarray]]:
     """The name of each node of a GLB, and its (m, 3, 3) triangles."""
-    chunks = {kind: body for kind, _, body in glb_chunks(file.read_bytes())}
-    tree = json.loads(chunks[JSON])
-    (binary,) = (bytes(body) for kind, body in chunks.items() if kind != JSON)
-    types = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-
-    def values(number: int, width: int) -> np.ndarray:
-        accessor = tree["accessors"][number]
-        view = tree["bufferViews"][accessor["bufferView"]]
-        begin = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
-        kind = types[accessor["componentType"]]
-        return np.frombuffer(binary, kind, accessor["count"] * width, begin).reshape(-1, width)
-
-    actual = []
-    for node in tree.get("nodes", []):
-        for primitive in tree["meshes"][node["mesh"]]["primitives"]:
-            points = values(primitive["attributes"]["POSITION"], 3).astype(np.float64)
-            actual.append((node["name"], points[values(primitive["indices"], 1).reshape(-1, 3)]))
-    return actual
+    primitives = read_glb(file.read_bytes()).primitives
+    return [(p.object, p.point[p.triangle].astype(np.float64)) for p in primitives]
 
 
 def test_killed_builds_end_as_undisturbed_ones(tmp_path: Path) -> None:
