@@ -259,24 +259,19 @@ def test_the_oracle_knows_the_errors_of_all_states(seed: int) -> None:
         assert cells[f].sum() == pytest.approx(views.error[views.rows(f), 0].sum(), rel=1e-5)
 
 
-@pytest.mark.parametrize("memory", [1.0, 0.3])
-def test_exact_levels_that_suffice_stay(memory: float) -> None:
-    """A finer preview does not take their place; and with little memory the exact levels of what a
-    preview shows are still fetched."""
+def test_exact_levels_that_suffice_stay() -> None:
+    """A preview of levels that the view does not want does not take their place."""
     levels = 5
     groups, sizes = tuple(40 * 4**k for k in range(levels)), tuple(4**k for k in range(levels))
-    texture = Texture(groups, sizes, ((levels - 1, 60, 0.5),))
+    texture = Texture(groups[:3], sizes, ((levels - 1, 60, 0.5),))
     world = standing(catalogue([texture], [(0, 0)]), 60.0)
-    # The view wants three levels.
-    needs = np.where(np.arange(levels) < 3, world.views.need, 0).astype(np.float32)
-    world = replace(world, views=replace(world.views, need=needs, sight=needs))
-    budget = int(memory * world.catalogue.whole)
-    client, run = watched(world, "best", Conditions(64e3, 0.02), budget)
+    few = np.where(np.arange(levels) < 3, world.views.need, 0).astype(np.float32)
+    views = replace(world.views, need=few, sight=few)
+    client, _ = watched(replace(world, views=views), "best", Conditions(64e3, 0.02), 1 << 30)
     assert client.previews.whole.all()
-    assert client.have[0] >= 3
-    assert client.source.tolist() == [0]
-    assert client.column[0] >= 3
-    assert run.overruns == 0
+    assert (client.source[0], client.column[0]) == (0, 3)
+    client, _ = watched(world, "best", Conditions(64e3, 0.02), 1 << 30)
+    assert (client.source[0], client.column[0]) == (1, 5)
 
 
 @settings(max_examples=20)

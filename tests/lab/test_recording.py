@@ -19,6 +19,7 @@ from ptmtools.lab.simulation import simulate
 from ptmtools.lab.world import World, prepare
 from ptmtools.link import Conditions
 from ptmtools.walk import Waits, Walk, parse_walk
+from tests.lab.test_previews import watched
 from tests.lab.worlds import SEEDS, any_world
 
 #: Seconds from navigation to the first frame.
@@ -98,6 +99,25 @@ def test_a_walk_is_walked_at_its_own_pace(world: World) -> None:
     np.testing.assert_array_equal(run.column, again.column)
     for policy in ("paper", "lru", "ach", "oracle"):
         assert simulate(replayed, POLICIES[policy], Conditions(512e3), 1 << 20).requests > 5
+
+
+def test_previews_that_a_page_preloads(world: World) -> None:
+    """They are there without a request of the client; their numbers are those of the index."""
+    files = [[0.01, "page", 0, 3000], [0.3, "index", 0, 2000], [0.3, "preview", 0, 700]]
+    count = len(world.catalogue.previews.texture)
+    assert count
+    walk = parsed(document(world, world.catalogue.cell_count, files=files))
+    replayed = prepare(world.served, walk, world.pyramids)
+    for policy in ("best", "best-exact"):
+        client, _ = watched(replayed, policy, Conditions(5e4), 1 << 20)
+        whole, size = client.previews.whole, client.previews.size
+        assert whole[:1].tolist() == size[:1].astype(bool).tolist() == [True] * (policy == "best")
+        assert size[:1].tolist() == [700] * (policy == "best")
+    assert replayed.catalogue.previews.bytes[0] != 700
+    files[2][2] = count
+    walk = parsed(document(world, world.catalogue.cell_count, files=files))
+    with pytest.raises(InputError, match="PTM-I700"):
+        prepare(world.served, walk, world.pyramids)
 
 
 def test_another_database_is_refused(world: World) -> None:
