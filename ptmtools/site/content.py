@@ -15,7 +15,7 @@ import io
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal
@@ -50,6 +50,7 @@ PROGRAM = {
 }
 JSON, JPEG = "application/json", "image/jpeg"
 GLB, PTM = "model/gltf-binary", "application/octet-stream"
+OPENING = "application/octet-stream"
 #: Textures that the page decodes.
 PROFILES, KIND, VERSION = ("fast", "raw"), "uint8", 2
 #: Fields of a database's index that a site's index lacks.
@@ -190,24 +191,57 @@ class _Builder:
         index["viewpoints"], poster = self._pictures()
         if self._options.clients == "vrml":
             self._vrml()
+        opening = self._opening(index)
         text = json.dumps(index, ensure_ascii=False, separators=(",", ":")).encode()
         name = self._add("index", ".json", JSON, text, compressed=True)
-        self._page(index, f"{DATA}/{name}", poster)
+        self._page(index, f"{DATA}/{name}", poster, opening)
         return Site(self._entries, index, tuple(self._notes))
 
-    def _page(self, index: Mapping[str, Any], url: str, poster: str | None) -> None:
+    def _opening(self, index: Mapping[str, Any]) -> str | None:
+        """The URL of the opening of the first viewpoint; None where Embree is missing."""
+        from ptmtools.site.opening import needs_of, ordered_steps, packed_opening
+
+        viewpoint, cells = index["viewpoints"][0], index["cells"]
+        try:
+            needs = needs_of(self._served, viewpoint)
+        except ImportError:
+            return None
+        previews = [p["file"] for row in index["textures"] for p in row.get("previews", ())]
+        urls: dict[str, Callable[[int], str]] = {
+            "record": lambda number: cells[number]["record"],
+            "geometry": lambda number: cells[number]["geometry"],
+            "texture": lambda number: index["textures"][number]["file"],
+            "preview": previews.__getitem__,
+        }
+        sizes = {
+            (kind, number): int(row[f"{kind}Bytes"])
+            for number, row in enumerate(cells)
+            for kind in ("record", "geometry")
+        }
+
+        def read(kind: str, number: int) -> bytes:
+            return self._entries[f"{DATA}/{urls[kind](number)}"].read()
+
+        data = packed_opening(ordered_steps(index, needs, viewpoint["cell"], sizes), read)
+        return f"{DATA}/{self._add('opening', '.bin', OPENING, data)}"
+
+    def _page(
+        self, index: Mapping[str, Any], url: str, poster: str | None, opening: str | None
+    ) -> None:
         program = program_files()
         self._entries |= {entry.name: entry for entry in program.values()}
-        first = index["cells"][index["viewpoints"][0]["cell"]]
         settings = {
             "index": url,
+            "opening": opening,
             "worker": program["worker.js"].name,
             "wasm": program["decoder.wasm"].name,
             "poster": poster,
             "title": self._options.title or title_of(self._folder.path),
         }
-        preload = [url, *(f"{DATA}/{first[kind]}" for kind in ("record", "geometry"))]
-        preload.append(program["decoder.wasm"].name)
+        preload = [url, program["decoder.wasm"].name]
+        if not opening:
+            first = index["cells"][index["viewpoints"][0]["cell"]]
+            preload += [f"{DATA}/{first[kind]}" for kind in ("record", "geometry")]
         self._entries[INDEX] = page(settings, program["viewer.js"].name, preload)
 
     def _cells(self) -> Iterator[dict[str, Any]]:

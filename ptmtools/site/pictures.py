@@ -22,6 +22,7 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.output.model import sizes_of
 from ptmtools.output.served import Served
 from ptmtools.parallel import ordered
+from ptmtools.rendering.footprints import detail_of_pixels, footprints
 from ptmtools.rendering.previews import read_preview
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.rendering.records import Sight, Triangles, triangles_of
@@ -139,36 +140,22 @@ def _colors(sight: Sight, triangles: Triangles, textures: Mapping[int, Levels]) 
     light = _AMBIENT + (1 - _AMBIENT) * np.abs(facing) / np.maximum(length, 1e-300)
     lit = np.repeat(255.0 * light[:, None], 3, axis=1)
     texture = triangles.texture[triangle]
-    facing = np.where(facing == 0, 1e-300, facing)
     for number, levels in textures.items():
         rows = np.flatnonzero(texture == number)
         if len(rows):
-            of = hit[rows]
-            lit[rows] = _sampled(sight, of, facing[rows], triangles, levels)
+            lit[rows] = _sampled(sight, hit[rows], triangles, levels)
     shown[hit] = lit * triangles.color[triangle]
     return shown
 
 
-def _sampled(
-    sight: Sight, pixel: Ints, facing: Floats, triangles: Triangles, levels: Levels
-) -> Floats:
-    """(n, 3) colours that some pixels show of a texture; ``facing`` is the normal along the ray."""
-    triangle, ray = sight.triangle[pixel], sight.ray[pixel]
-    normal, gradient = triangles.normal[triangle], triangles.gradient[triangle]
-    offset = triangles.corner[triangle, 0] - sight.eye
-    depth = np.einsum("ij,ij->i", normal, offset) / facing
-    at = ray * depth[:, None] - offset
-    uv = triangles.uv[triangle, 0] + np.einsum("ikj,ij->ik", gradient, at)
-    # By how many texels of the finest level the texture moves from a pixel to the next, across the
-    # screen and up it; the larger of the two counts, as in OpenGL.
+def _sampled(sight: Sight, pixel: Ints, triangles: Triangles, levels: Levels) -> Floats:
+    """(n, 3) colours that some pixels show of a texture."""
+    uv, moves = footprints(sight, pixel, triangles)
     height, width = levels[-1].shape[:2]
-    slope = np.einsum("ij,kj->ik", normal, sight.axes) / facing[:, None]
-    move = sight.axes[None] - slope[:, :, None] * ray[:, None]
-    texels = np.einsum("icj,ikj->ikc", gradient, move) * [width, height]
-    covered = np.linalg.norm(texels, axis=2).max(axis=1) * np.abs(depth) * sight.pixel
     finest = len(levels) - 1
-    coarser = np.clip(np.rint(np.log2(np.maximum(covered, 1.0))), 0, finest).astype(np.int64)
-    clamped = triangles.clamped[triangle]
+    detail = np.rint(detail_of_pixels(moves, width, height))
+    coarser = np.clip(detail, 0, finest).astype(np.int64)
+    clamped = triangles.clamped[sight.triangle[pixel]]
     colors = np.empty((len(pixel), 3))
     for step in np.unique(coarser):
         rows = np.flatnonzero(coarser == step)

@@ -1,0 +1,201 @@
+r"""The opening of a site: one file with everything small that the first view needs, by worth.
+
+At 4 Mbit/s and more, round trips and requests rule the first second: a view takes a record, the
+geometry of some cells and the coarse levels of some textures, each a request of a few kilobytes.
+The page fetches the opening with its program, so that both are there after two round trips. Larger
+previews stay files of their own, which the page requests in the order of the opening's list: their
+bytes are not published twice, and a request costs little beside them.
+
+The opening is of a *view*, the first viewpoint on a screen of 16:9. (Bundles by cell, which hold
+the coarse levels of all that may be seen from it, bring nothing to the client:
+docs/formats/hints.md, First look.) The order is that of the client (docs/formats/client.md): the
+worth of a step by the pixels that need it, per byte.
+
+=======  ============================================================
+offset   little-endian
+=======  ============================================================
+0        length of the JSON, uint32
+4        JSON: ``parts``, a list of [kind, number, bytes]; ``next``,
+         numbers of previews
+then     the parts, one after the other
+=======  ============================================================
+
+Kinds: ``record`` and ``geometry`` of a cell, as gzip packs the file; ``texture``, the next bytes
+of a `.ptm`; ``preview``, a file. Textures are numbered as in the index, previews in its order, over
+all textures.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import accumulate
+from typing import Any
+
+import numpy as np
+
+from ptmtools.arrays import Floats
+from ptmtools.output.emission import compressed
+from ptmtools.output.model import sizes_of
+from ptmtools.output.served import Served
+from ptmtools.rendering.footprints import detail_of_pixels, footprints
+from ptmtools.rendering.rays import Camera, Caster
+from ptmtools.rendering.records import triangles_of
+from ptmtools.texture.previews import coarse_levels
+
+#: Pixels of the view, and its aspect.
+WIDTH, HEIGHT = 160, 90
+#: Error of a pixel without geometry, 0 to 255; least difference of a level; by how much less a
+#: preview is off in the next coarser level: as for the client (docs/formats/client.md).
+NOTHING, LEAST, HALVED = 64.0, 0.5, 0.5
+#: Bytes of a request beside its own.
+OVERHEAD = 300
+#: Largest preview that is a part, bytes.
+SMALL = 4096
+#: Share of a texture's pixels that may need a finer level than those of the opening.
+FEW = 0.02
+_LENGTH = struct.Struct("<I")
+
+
+@dataclass(frozen=True)
+class Needs:
+    """The pixels of a view.
+
+    Attributes
+    ----------
+    cells: for each cell in view the share of the pixels that show it.
+    textures: for each texture in view (M,) the share of the pixels that require each level, the
+        coarsest first.
+    """
+
+    cells: Mapping[int, float]
+    textures: Mapping[int, Floats]
+
+
+def needs_of(served: Served, viewpoint: Mapping[str, Any]) -> Needs:
+    """The needs of a viewpoint on the screen of `Camera`. Raises ImportError without Embree."""
+    triangles = triangles_of(served.surfaces)
+    camera = Camera(WIDTH, HEIGHT, viewpoint["fieldOfView"], WIDTH / HEIGHT)
+    eye, direction = (np.array(viewpoint[name]) for name in ("position", "direction"))
+    sight = Caster(served.surfaces).look(camera, eye, direction)
+    hit = np.flatnonzero(sight.triangle >= 0)
+    triangle, each = sight.triangle[hit], 1 / len(sight.triangle)
+    cells, counts = np.unique(triangles.cell[triangle], return_counts=True)
+    textures = {}
+    for texture in np.unique(triangles.texture[triangle]).tolist():
+        if texture < 0:
+            continue
+        own = hit[triangles.texture[triangle] == texture]
+        sizes = sizes_of(served.index["textures"][texture])
+        detail = detail_of_pixels(footprints(sight, own, triangles)[1], *sizes[-1])
+        # A pixel requires level n by max(0, min(1, N - n - λ)).
+        level = np.arange(len(sizes))
+        required = len(sizes) - level - np.minimum(detail, len(sizes) - 1)[:, None]
+        textures[texture] = each * np.clip(required, 0, 1).sum(axis=0)
+    return Needs(dict(zip(cells.tolist(), (each * counts).tolist(), strict=True)), textures)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A part of an opening, or a preview that follows it.
+
+    Attributes
+    ----------
+    kind, number: see the module. end: bytes of the file up to its end.
+    bytes: of the part. density: worth per byte.
+    """
+
+    kind: str
+    number: int
+    end: int
+    bytes: int
+    density: float = field(compare=False)
+
+
+def texture_steps(number: int, row: Mapping[str, Any], share: Floats, first: int) -> list[Step]:
+    """The steps of a texture, in their order, up to one that shows what the view needs; ``first``
+    is the number of its first preview."""
+    sizes, ends, previews = sizes_of(row), row["ends"], row.get("previews", ())
+    gain = np.append(0, np.cumsum(share * np.maximum(row["differences"], LEAST)))
+    needed = 1 + int(np.flatnonzero(share > FEW * share[0])[-1])
+    exact = min(len(ends), coarse_levels([max(size) for size in sizes]) if previews else needed)
+    # What each source shows: (worth, bytes of its file, kind, number, column).
+    sources: list[tuple[float, int, str, int, int]] = [
+        (float(gain[k]), ends[k - 1], "texture", number, k) for k in range(1, exact + 1)
+    ]
+    fades = np.maximum(share - np.append(share[1:], 0), 0)
+    for place, preview in enumerate(previews):
+        column = preview["level"] + 1
+        error = 0.0 if preview.get("exact") else max(preview["difference"], LEAST)
+        halved = HALVED ** (column - np.arange(1, column + 1))
+        lost = float((np.append(fades[: column - 1], share[column - 1]) * error * halved).sum())
+        worth = float(gain[column]) - lost
+        sources.append((worth, preview["bytes"], "preview", first + place, column))
+        if column >= needed:
+            break
+    steps: list[Step] = []
+    shown, held = 0.0, 0
+    while True:
+        best: tuple[float, int, tuple[float, int, str, int, int]] | None = None
+        for source in sources:
+            worth, end, kind, _, _ = source
+            length = end - held if kind == "texture" else end
+            density = (worth - shown) / (length + OVERHEAD)
+            if worth > shown and length > 0 and (best is None or density >= best[0]):
+                best = density, length, source
+        if best is None:
+            return steps
+        density, length, (worth, end, kind, place, column) = best
+        steps.append(Step(kind, place, end, length, density))
+        shown, held = worth, end if kind == "texture" else held
+        if column >= needed:
+            return steps
+
+
+def ordered_steps(
+    index: Mapping[str, Any], needs: Needs, cell: int, sizes: Mapping[tuple[str, int], int]
+) -> list[Step]:
+    """The steps of a view, the record and the geometry of its ``cell`` first, then by worth per
+    byte; ``sizes``: bytes of records and geometry by (kind, cell)."""
+    textures = index["textures"]
+    first = [0, *accumulate(len(row.get("previews", ())) for row in textures)]
+
+    def whole(kind: str, number: int, worth: float) -> Step:
+        length = sizes[kind, number]
+        return Step(kind, number, length, length, worth / length)
+
+    steps = [
+        whole("geometry", number, NOTHING * share)
+        for number, share in needs.cells.items()
+        if number != cell
+    ]
+    for number, share in needs.textures.items():
+        # A texture's steps keep their order, which is that of their worth per byte but for leaps.
+        density = np.inf
+        for step in texture_steps(number, textures[number], share, first[number]):
+            density = min(density, step.density)
+            steps.append(Step(step.kind, step.number, step.end, step.bytes, density))
+    steps.sort(key=lambda step: -step.density)
+    return [whole("record", cell, np.inf), whole("geometry", cell, np.inf), *steps]
+
+
+def packed_opening(steps: Sequence[Step], read: Callable[[str, int], bytes]) -> bytes:
+    """The file; ``read`` returns the bytes of the file of a kind and number."""
+    parts, later, data = [], [], []
+    held: dict[int, int] = {}
+    for step in steps:
+        if step.kind == "preview" and step.bytes > SMALL:
+            later.append(step.number)
+            continue
+        body = read(step.kind, step.number)
+        if step.kind in ("record", "geometry"):
+            body = compressed(body)
+        elif step.kind == "texture":
+            body = body[held.get(step.number, 0) : step.end]
+            held[step.number] = step.end
+        parts.append([step.kind, step.number, len(body)])
+        data.append(body)
+    text = json.dumps({"parts": parts, "next": later}, separators=(",", ":")).encode()
+    return b"".join([_LENGTH.pack(len(text)), text, *data])

@@ -1,0 +1,166 @@
+"""The opening holds the first view: whole files and beginnings, the worthiest first."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import struct
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ptmtools.output.served import Served, read_served
+from ptmtools.site.content import DATA, Site, SiteOptions, site_of
+from ptmtools.site.opening import (
+    FEW,
+    SMALL,
+    Needs,
+    needs_of,
+    ordered_steps,
+    packed_opening,
+    texture_steps,
+)
+
+
+@pytest.fixture(scope="module")
+def served(two_rooms: Path) -> Served:
+    return read_served(two_rooms)
+
+
+@pytest.fixture(scope="module")
+def site(two_rooms: Path) -> Site:
+    return site_of(two_rooms, SiteOptions(pictures=False))
+
+
+def parts_of(data: bytes) -> Iterator[tuple[str, int, bytes]]:
+    (length,) = struct.unpack_from("<I", data)
+    at = 4 + length
+    for kind, number, size in json.loads(data[4:at])["parts"]:
+        yield kind, number, data[at : at + size]
+        at += size
+    assert at == len(data)
+
+
+def opening_of(site: Site) -> bytes:
+    (name,) = (name for name in site.entries if name.startswith(f"{DATA}/opening-"))
+    return site.entries[name].read()
+
+
+def read(site: Site, kind: str, number: int) -> bytes:
+    index = site.index
+    if kind == "preview":
+        names = [p["file"] for row in index["textures"] for p in row.get("previews", ())]
+        name = names[number]
+    elif kind == "texture":
+        name = index["textures"][number]["file"]
+    else:
+        name = index["cells"][number][kind]
+    return site.entries[f"{DATA}/{name}"].read()
+
+
+def test_parts_are_the_files_or_their_beginnings(site: Site) -> None:
+    held: dict[int, bytes] = {}
+    parts = [*parts_of(opening_of(site))]
+    cell = site.index["viewpoints"][0]["cell"]
+    assert [part[:2] for part in parts[:2]] == [("record", cell), ("geometry", cell)]
+    assert len({part[:2] for part in parts if part[0] != "texture"}) == sum(
+        part[0] != "texture" for part in parts
+    )
+    for kind, number, data in parts:
+        whole = read(site, kind, number)
+        if kind == "texture":
+            held[number] = held.get(number, b"") + data
+            assert whole.startswith(held[number])
+        elif kind == "preview":
+            assert data == whole
+            assert len(data) <= SMALL
+        else:
+            assert gzip.decompress(data) == whole
+
+
+def test_the_page_names_it(site: Site) -> None:
+    page = site.entries["index.html"].read().decode()
+    (name,) = (name for name in site.entries if name.startswith(f"{DATA}/opening-"))
+    assert name in page
+
+
+def test_needs_are_those_of_the_pixels(served: Served) -> None:
+    viewpoint = served.index["viewpoints"][0]
+    needs = needs_of(served, viewpoint)
+    assert 0 < sum(needs.cells.values()) <= 1 + 1e-9
+    assert viewpoint["cell"] in needs.cells
+    total = sum(share[0] for share in needs.textures.values())
+    assert total <= sum(needs.cells.values()) + 1e-9
+    for share in needs.textures.values():
+        assert (np.diff(share) <= 1e-12).all()  # a pixel requires all coarser levels, too
+
+
+def texture(levels: int, previews: list[tuple[int, int, float]], stored: int = 0) -> dict[str, Any]:
+    side, stored = 1 << levels - 1, stored or levels
+    return {
+        "width": side >> levels - stored,
+        "height": side >> levels - stored,
+        "ends": [100 + 4**n for n in range(stored)],
+        "differences": [0.0, *np.linspace(12, 6, levels - 1)],
+        "previews": [
+            {
+                "level": level,
+                "bytes": size,
+                "difference": difference,
+                "width": 1 << level,
+                "height": 1 << level,
+            }
+            for level, size, difference in previews
+        ],
+    }
+
+
+def test_a_texture_ends_with_what_the_view_needs() -> None:
+    ladder = [(level, 30 * 3 ** (level - 6), 4.0) for level in range(6, 11)]
+    row = texture(11, ladder)
+    for needed in range(11):
+        share = np.where(np.arange(11) <= needed, 0.3, FEW * 0.1)
+        steps = texture_steps(7, row, share, first=100)
+        previews = [step.number - 100 for step in steps if step.kind == "preview"]
+        exact = [step for step in steps if step.kind == "texture"]
+        assert all(step.number == 7 for step in exact)
+        assert sum(step.bytes for step in exact) == max((s.end for s in exact), default=0)
+        reached = max(
+            [row["ends"].index(step.end) for step in exact] + [ladder[p][0] for p in previews]
+        )
+        assert reached >= needed
+        if previews and previews[-1] > 0:
+            assert ladder[previews[-1] - 1][0] < needed  # no finer one than that
+
+
+def test_without_previews_the_exact_levels_that_it_needs() -> None:
+    share = np.where(np.arange(8) <= 5, 0.3, 0.0)
+    row = texture(8, [])
+    steps = texture_steps(0, row, share, first=0)
+    assert {step.kind for step in steps} == {"texture"}
+    assert steps[-1].end == row["ends"][5]
+
+
+def test_steps_come_by_worth_per_byte() -> None:
+    row = texture(9, [(6, 300, 5.0), (7, 900, 4.0), (8, 5000, 3.0)])
+    index = {"textures": [row, row], "cells": [{}, {}, {}]}
+    share = np.full(9, 0.4)
+    needs = Needs({0: 0.7, 2: 0.01}, {0: share, 1: share / 10})
+    sizes: Mapping[tuple[str, int], int] = {
+        (kind, number): 1000 for kind in ("record", "geometry") for number in range(3)
+    }
+    steps = ordered_steps(index, needs, 0, sizes)
+    assert [(step.kind, step.number) for step in steps[:2]] == [("record", 0), ("geometry", 0)]
+    densities = [step.density for step in steps]
+    assert all(one >= other for one, other in pairwise(densities))
+    finest = {step.number for step in steps if step.kind == "preview"}
+    assert {2, 5} <= finest  # that of the first texture, and of the second
+    data = packed_opening(steps, lambda kind, number: bytes(20_000))
+    parts = [*parts_of(data)]
+    (length,) = struct.unpack_from("<I", data)
+    assert json.loads(data[4 : 4 + length])["next"] == [2, 5]
+    assert not {("preview", 2), ("preview", 5)} & {part[:2] for part in parts}
