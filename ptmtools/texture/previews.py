@@ -242,7 +242,7 @@ class Pyramid:
         for y in range(0, height, 256):
             strip = slice(y, y + 256)
             apart = decoded[strip, :, :colours].astype(np.float32) - texels[strip, :, :colours]
-            squares = np.square(apart).mean(axis=2, dtype=np.float64)
+            squares = np.einsum("ijk,ijk->ij", apart, apart, dtype=np.float64) / colours
             length += float(np.sqrt(squares).sum())
             square += float(squares.sum())
         texel_count = height * width
