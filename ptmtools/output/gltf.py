@@ -19,6 +19,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
+from pathlib import PurePath
 from typing import Any
 from urllib.parse import quote
 
@@ -75,6 +76,8 @@ def unpack(data: bytes) -> tuple[Any, bytes]:
 #: A sampler's number for each behaviour outside [0, 1]; the first is the default.
 WRAPS: dict[Wrap, int] = {"repeat": 10497, "clamp": 33071}
 WHITE = [1.0, 1.0, 1.0, 1.0]
+#: The extension that names an image, by suffix; glTF itself has PNG and JPEG.
+IMAGE_EXTENSIONS = {".avif": "EXT_texture_avif", ".webp": "EXT_texture_webp"}
 
 
 @lru_cache(maxsize=4096)
@@ -111,9 +114,13 @@ class MaterialWriter:
 
     def members(self) -> dict[str, Any]:
         """The document's "materials", "textures", "images" and "samplers"."""
+        uris = list(self._images)
         textures: list[dict[str, Any]] = []
         for image, sampler in self._textures:
-            textures.append({"source": image} | ({} if sampler < 0 else {"sampler": sampler}))
+            source: dict[str, Any] = {"source": image}
+            if extension := IMAGE_EXTENSIONS.get(PurePath(uris[image]).suffix):
+                source = {"extensions": {extension: source}}
+            textures.append(source | ({} if sampler < 0 else {"sampler": sampler}))
         lists = {
             "materials": self._materials,
             "textures": textures,
@@ -121,6 +128,12 @@ class MaterialWriter:
             "samplers": [_wrap(*wraps) for wraps in self._samplers],
         }
         return {name: rows for name, rows in lists.items() if rows}
+
+    @property
+    def extensions(self) -> list[str]:
+        """The extensions that the images use."""
+        used = {IMAGE_EXTENSIONS.get(PurePath(uri).suffix, "") for uri in self._images}
+        return sorted(used - {""})
 
     def _material(self, material: Material, two_sided: bool) -> dict[str, Any]:
         alpha = min(max(material.opacity, 0.0), 1.0)
@@ -208,4 +221,8 @@ def _glb(content: Content, cell: int) -> bytes:
     }
     if nodes:
         document |= {"nodes": nodes, "meshes": meshes}
-    return pack(document | materials.members() | buffer.members(), buffer.bytes())
+    document |= materials.members() | buffer.members()
+    if materials.extensions:
+        # Not required: a viewer without them shows the cell untextured.
+        document["extensionsUsed"] = document.get("extensionsUsed", []) + materials.extensions
+    return pack(document, buffer.bytes())

@@ -98,10 +98,13 @@ class _Reader:
     def __init__(self, document: dict[str, Any], binary: bytes) -> None:
         self._tree = document
         buffers = document.get("buffers", [])
-        compressed = {name: document[name] for name in EXTENSIONS if name in document}
-        self._compressed = bool(compressed)
-        if compressed not in ({}, EXTENSIONS):
-            _foreign("document", f"has other extensions than {MESHOPT}")
+        images = sorted(
+            {name for row in document.get("textures", ()) for name in row.get("extensions", ())}
+        )
+        required = document.get("extensionsRequired", [])
+        self._compressed = required == EXTENSIONS["extensionsRequired"]
+        if document.get("extensionsUsed", []) != required + images:
+            _foreign("document", "lists other extensions than it uses")
         fallbacks = [MESHOPT in buffer.get("extensions", {}) for buffer in buffers]
         expected = [False, True][: 1 + self._compressed] if binary else []
         if fallbacks != expected:
@@ -255,7 +258,10 @@ class _Reader:
         wrap, image = _wrap(extras), None
         if "baseColorTexture" in surface:
             texture = self._row("textures", surface["baseColorTexture"]["index"])
-            image = self._row("images", texture["source"])["uri"]
+            sources = list(texture.get("extensions", {"": texture}).values())
+            if len(sources) != 1 or "source" not in sources[0]:
+                _foreign(f"materials[{index}]", "its texture has not one source")
+            image = self._row("images", sources[0]["source"])["uri"]
             sampler = self._row("samplers", texture["sampler"]) if "sampler" in texture else {}
             if _wrap(sampler) != wrap:
                 _foreign(f"materials[{index}]", "its sampler and its extras wrap differently")

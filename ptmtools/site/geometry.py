@@ -35,14 +35,17 @@ def lean_glb(data: bytes) -> bytes:
     ]
     accessors: list[dict[str, Any]] = document.get("accessors", [])
     # Equal arrays of plain cells share an accessor.
-    merged = _merged(primitives, accessors) if "extensionsUsed" in document else primitives
+    merged = _merged(primitives, accessors) if "extensionsRequired" in document else primitives
     used = sorted({a for p in merged for a in (*p["attributes"].values(), p["indices"])})
     place = {accessor: n for n, accessor in enumerate(used)}
     for primitive in merged:
         attributes = primitive["attributes"].items()
         primitive["attributes"] = {name: place[number] for name, number in attributes}
         primitive["indices"] = place[primitive["indices"]]
-    lean = {name: document[name] for name in document if name.startswith("extensions")}
+    # Those of images go with the images.
+    names = ("extensionsUsed", "extensionsRequired")
+    required = document.get("extensionsRequired")
+    lean = dict.fromkeys(names, required) if required else {}
     top = {"extras": document["scenes"][0]["extras"]}
     lean = {"asset": {"version": "2.0"}} | lean | {"scenes": [top]}
     if merged:

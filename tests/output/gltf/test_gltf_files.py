@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -14,14 +15,18 @@ import numpy as np
 import pytest
 import trimesh
 from hypothesis import given, strategies as st
+from PIL import Image
 
 from ptmtools.errors import InputError, LimitError, OutputError
 from ptmtools.output import EmitOptions, validate_database
 from ptmtools.output.gltf import linear, pack, unpack
 from ptmtools.output.gltf_shapes import PlainBuffer
 from ptmtools.output.vrml_reader import Node, parse
+from ptmtools.pipeline.build import build_scene
 from ptmtools.scene.model import Material
 from tests.output.agreement import disagreements
+
+TWO_ROOMS = Path(__file__).parents[3] / "sample_data" / "two_rooms"
 
 EmitGltf = Callable[..., Path]
 
@@ -317,3 +322,35 @@ def test_a_cell_beyond_the_format_is_refused(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr("ptmtools.output.gltf._LARGEST", 100)
     with pytest.raises(LimitError, match="PTM-L400"):
         pack({"asset": {}}, bytes(100))
+
+
+@pytest.mark.parametrize(
+    ("name", "extension"), [("WEBP", "EXT_texture_webp"), ("AVIF", "EXT_texture_avif")]
+)
+def test_lossy_images_of_the_model_are_named_by_extensions(
+    tmp_path: Path, name: str, extension: str
+) -> None:
+    model = shutil.copytree(TWO_ROOMS, tmp_path / "model")
+    noise = np.random.default_rng(0).integers(0, 256, (8, 8, 3), np.uint8)
+    image = Image.fromarray(noise).resize((128, 128))
+    image.save(model / "floor.png", name, quality=60)
+    build_scene(model / "two_rooms.obj", tmp_path / "db")
+    www = tmp_path / "db/www"
+    (texture,) = (
+        row
+        for row in json.loads((www / "hints.json").read_text())["textures"]
+        if "floor" in row["file"]
+    )
+    assert texture["fallback"] == f"textures/floor.{name.lower()}"
+    used = 0
+    for file in sorted((www / "gltf").iterdir()):
+        tree, _ = unpack(file.read_bytes())
+        rows = [row for row in tree.get("textures", ()) if "extensions" in row]
+        assert tree["extensionsRequired"] == ["EXT_meshopt_compression"]
+        assert (extension in tree["extensionsUsed"]) == bool(rows)
+        for row in rows:
+            (source,) = row["extensions"].values()
+            assert tree["images"][source["source"]]["uri"] == f"../{texture['fallback']}"
+            used += 1
+    assert used
+    assert not validate_database(tmp_path / "db").issues
