@@ -20,8 +20,8 @@ offset   little-endian
 then     the parts, one after the other
 =======  ============================================================
 
-Kinds: ``record`` and ``geometry`` of a cell, as gzip packs the file; ``texture``, the next bytes
-of a `.ptm`; ``preview``, a file. Textures are numbered as in the index, previews in its order, over
+Kinds: ``record`` and ``geometry`` of a cell, as gzip packs the file; ``texture``, the beginning of
+a `.ptm`; ``preview``, a file. Textures are numbered as in the index, previews in its order, over
 all textures.
 """
 
@@ -183,19 +183,22 @@ def ordered_steps(
 
 def packed_opening(steps: Sequence[Step], read: Callable[[str, int], bytes]) -> bytes:
     """The file; ``read`` returns the bytes of the file of a kind and number."""
+    ends = {step.number: step.end for step in steps if step.kind == "texture"}
     parts, later, data = [], [], []
-    held: dict[int, int] = {}
     for step in steps:
-        if step.kind == "preview" and step.bytes > SMALL:
+        body = b""
+        if step.kind == "texture":
+            # The coarsest levels together, where the first of them has its place.
+            end = ends.pop(step.number, 0)
+            body = read(step.kind, step.number)[:end]
+        elif step.kind == "preview" and step.bytes > SMALL:
             later.append(step.number)
-            continue
-        body = read(step.kind, step.number)
-        if step.kind in ("record", "geometry"):
-            body = compressed(body)
-        elif step.kind == "texture":
-            body = body[held.get(step.number, 0) : step.end]
-            held[step.number] = step.end
-        parts.append([step.kind, step.number, len(body)])
-        data.append(body)
+        elif step.kind == "preview":
+            body = read(step.kind, step.number)
+        else:
+            body = compressed(read(step.kind, step.number))
+        if body:
+            parts.append([step.kind, step.number, len(body)])
+            data.append(body)
     text = json.dumps({"parts": parts, "next": later}, separators=(",", ":")).encode()
     return b"".join([_LENGTH.pack(len(text)), text, *data])

@@ -1,0 +1,90 @@
+// The opening of a site: small files of the first view, and beginnings of textures, which come with the
+// page in one file (docs/formats/hints.md). Each is a file of its own, too, so an opening that fails
+// costs nothing but time.
+
+/** @typedef {Uint8Array<ArrayBuffer>} Bytes */
+/** @typedef {import("../policy/downloads.js").Kind} Kind */
+
+/** Kinds that are compressed in it. */
+const PACKED = ["record", "geometry"];
+
+/** The bytes of a response as they arrive. */
+class Arriving {
+  #bytes = new Uint8Array(0);
+  #reader;
+
+  /** @param {ReadableStream<Bytes>} body */
+  constructor(body) {
+    this.#reader = body.getReader();
+  }
+
+  /** The next bytes; throws if the response ends before. @param {number} count @returns {Promise<Bytes>} */
+  async take(count) {
+    while (this.#bytes.length < count) {
+      const { done, value } = await this.#reader.read();
+      if (done) throw new Error("is cut short");
+      const longer = new Uint8Array(this.#bytes.length + value.length);
+      longer.set(this.#bytes);
+      longer.set(value, this.#bytes.length);
+      this.#bytes = longer;
+    }
+    const taken = this.#bytes.slice(0, count);
+    this.#bytes = this.#bytes.subarray(count);
+    return taken;
+  }
+}
+
+export class Opening {
+  /** By kind and number. @type {Map<string, (part: Bytes | null) => void>} */
+  #waiting = new Map();
+  /** @type {Map<string, Promise<Bytes | null>>} */
+  #parts = new Map();
+  #contents;
+
+  /** @param {string} url */
+  constructor(url) {
+    const arriving = this.#open(url);
+    this.#contents = arriving.catch(() => {});
+    /** The previews that the view needs next, once all parts are here. @type {Promise<number[]>} */
+    this.next = arriving
+      .then(async ({ bytes, parts, next }) => {
+        for (const [kind, number, size] of parts) {
+          const part = await bytes.take(size);
+          this.#waiting.get(kind + number)?.(PACKED.includes(kind) ? await unpacked(part) : part);
+        }
+        return next;
+      })
+      .catch(() => [])
+      .finally(() => this.#waiting.forEach((come) => come(null)));
+  }
+
+  /** @param {string} url @returns {Promise<{bytes: Arriving, parts: [Kind, number, number][], next: number[]}>} */
+  async #open(url) {
+    const { ok, body } = await fetch(url);
+    if (!ok || !body) throw new Error("cannot be downloaded");
+    const bytes = new Arriving(/** @type {ReadableStream<Bytes>} */ (body));
+    const length = new DataView((await bytes.take(4)).buffer).getUint32(0, true);
+    const contents = JSON.parse(new TextDecoder().decode(await bytes.take(length)));
+    for (const [kind, number] of contents.parts) {
+      const key = kind + number;
+      this.#parts.set(key, new Promise((come) => this.#waiting.set(key, come)));
+    }
+    return { bytes, ...contents };
+  }
+
+  /**
+   * The bytes of a part, once they are here; null if it has no such part.
+   * @param {Kind} kind
+   * @param {number} number
+   */
+  async take(kind, number) {
+    await this.#contents;
+    return (await this.#parts.get(kind + number)) ?? null;
+  }
+}
+
+/** @param {Bytes} part @returns {Promise<Bytes>} */
+async function unpacked(part) {
+  const stream = new Blob([part]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
