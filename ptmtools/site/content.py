@@ -122,6 +122,11 @@ class SiteOptions:
     preview: bool = option(
         True, "Include the previews; without them, only levels that exist as images have one."
     )
+    opening: bool = option(
+        True,
+        "Write an opening: one file with everything small that the first view needs, which the "
+        "page fetches together with its program.",
+    )
     clients: Literal["page", "vrml"] = option(
         "page",
         "Clients that the site supports: page (only its own page) or vrml (also VRML browsers, "
@@ -191,7 +196,7 @@ class _Builder:
         index["viewpoints"], poster = self._pictures()
         if self._options.clients == "vrml":
             self._vrml()
-        opening = self._opening(index)
+        opening = self._opening(index) if self._options.opening else None
         text = json.dumps(index, ensure_ascii=False, separators=(",", ":")).encode()
         name = self._add("index", ".json", JSON, text, compressed=True)
         self._page(index, f"{DATA}/{name}", poster, opening)
@@ -436,6 +441,9 @@ def page(settings: Mapping[str, Any], script: str, preload: Sequence[str]) -> En
     # Workers take the module out of the cache.
     links = [f'<link rel="modulepreload" href="{settings["worker"]}">']
     links += [f'<link rel="preload" as="fetch" href="{url}" crossorigin>' for url in preload]
+    if opening := settings.get("opening"):
+        # The page makes it a preload, unless a link leads to another view.
+        links.append(f'<link id="opening" rel="next" as="fetch" href="{opening}" crossorigin>')
     text = json.dumps(settings, ensure_ascii=False, separators=(",", ":"))
     fields = {
         "title": html.escape(settings["title"]),

@@ -33,8 +33,9 @@ export class App {
    * @param {import("./data/site.js").Site} site
    * @param {import("./data/site.js").SiteConfig} config
    * @param {Decoders} decoders
+   * @param {import("./net/opening.js").Opening | null} [opening] of the first viewpoint
    */
-  constructor(canvas, gl, site, config, decoders) {
+  constructor(canvas, gl, site, config, decoders, opening = null) {
     const query = new URLSearchParams(location.search);
     const small = matchMedia("(pointer: coarse)").matches;
     const megabytes = Number(query.get("memory"));
@@ -44,6 +45,7 @@ export class App {
     this.index = site.index;
     const options = {
       decoders,
+      opening,
       policy: Object.hasOwn(POLICIES, policy) ? policy : "best",
       budget: megabytes > 0 ? Math.min(megabytes, MOST) * 2 ** 20 : small ? SMALL_BUDGET : BUDGET,
     };

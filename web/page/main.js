@@ -5,6 +5,7 @@ import { App } from "./app.js";
 import { readConfig, Site } from "./data/site.js";
 import { PageError } from "./net/errors.js";
 import { clock, Fetcher } from "./net/fetcher.js";
+import { Opening } from "./net/opening.js";
 import { attachUi } from "./ui/all.js";
 import { showError } from "./ui/errors.js";
 
@@ -48,9 +49,11 @@ async function main() {
       throw new PageError("PTM-V102", "This browser cannot run WebAssembly with SIMD.");
     }
     const decoders = decodersOf(config), site = siteOf(config);
+    // A link leads to another view.
+    const opening = config.opening && !location.hash ? new Opening(config.opening) : null;
     const gl = contextOf(canvas);
     if (!gl) throw new PageError("PTM-V101", "This browser cannot draw with WebGL 2.");
-    const app = new App(canvas, gl, await site, config, decoders);
+    const app = new App(canvas, gl, await site, config, decoders, opening);
     Object.assign(window, { ptm: app });
     const controls = attachUi(app);
     let before = clock();

@@ -57,7 +57,7 @@ export class Recorder {
 
   /** Files that the client did not request: time, kind, number, bytes. */
   #files() {
-    const { site, stream } = this.walk, asked = new Map([[site.address, ["index", 0]]]);
+    const { site, stream } = this.walk, { opening } = stream, asked = new Map([[site.address, ["index", 0]]]);
     site.index.cells.forEach((_, cell) => {
       asked.set(stream.url("record", cell), ["record", cell]);
       asked.set(stream.url("geometry", cell), ["geometry", cell]);
@@ -65,11 +65,17 @@ export class Recorder {
     stream.previews.forEach((_, p) => asked.set(stream.url("preview", p), ["preview", p]));
     const entries = [...performance.getEntriesByType("navigation"),
       ...performance.getEntriesByType("resource")];
+    const address = opening && new URL(opening.url, location.href).href;
     return /** @type {PerformanceResourceTiming[]} */ (entries)
       .filter(({ name, requestStart, transferSize }) => transferSize > 0
         && (asked.has(name) ? requestStart < 1000 * this.#begun : !name.endsWith(".ptm")))
-      .map(({ name, requestStart, encodedBodySize }) =>
-        [short(requestStart / 1000), ...(asked.get(name) ?? ["page", 0]), encodedBodySize]);
+      .flatMap(({ name, requestStart, encodedBodySize }) => {
+        const at = short(requestStart / 1000);
+        if (name !== address) return [[at, ...(asked.get(name) ?? ["page", 0]), encodedBodySize]];
+        // The first levels of textures count as the page's: a file is whole, or is not there.
+        return stream.opening?.parts.map(([kind, number, bytes]) => [at,
+          ...(kind === "texture" ? ["page", 0] : [kind, number]), bytes]) ?? [];
+      });
   }
 
   /** Times between which requests waited for the browser, and answers for the page. */

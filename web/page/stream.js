@@ -44,22 +44,36 @@ export class Stream {
    * @param {import("../client/src/locating.js").Locator} parts.locator
    * @param {import("./policy/estimate.js").Estimate} parts.estimate
    * @param {import("./net/fetcher.js").Fetcher} parts.fetcher
+   * @param {import("./net/opening.js").Opening | null} parts.opening
    * @param {Decoders} parts.decoders
    * @param {() => boolean} parts.rests whether to make no more requests
    * @param {(error: PageError, kind: string, number: number) => void} parts.report
    */
-  constructor({ site, index, client, locator, estimate, fetcher, decoders, rests, report }) {
+  constructor({ site, index, client, locator, estimate, fetcher, opening, decoders, rests, report }) {
     this.site = site;
     this.client = client;
     this.locator = locator;
     this.estimate = estimate;
     this.fetcher = fetcher;
+    this.opening = opening;
     this.workers = decoders.workers;
     this.geometry = decoders.geometry;
     this.rests = rests;
     this.report = report;
     this.files = site.index.textures.map((row) => new TextureFile(row, this.workers));
-    this.previews = previewsOf(index, this.workers);
+    this.previews = previewsOf(index, site.index, this.workers);
+    this.#follow();
+  }
+
+  /** Requests the previews that the view of the opening needs next. */
+  async #follow() {
+    const { downloads } = this.client, next = (await this.opening?.next) ?? [];
+    next.map((number) => this.previews.findIndex(({ place }) => place === number))
+      .forEach((number, order) => {
+        if (number >= 0 && !this.rests() && downloads.free("preview", number)) {
+          this.ask(downloads.ask("preview", number, -order));
+        }
+      });
   }
 
   /**
@@ -128,12 +142,12 @@ export class Stream {
    * @param {Request} request
    */
   async #cell(kind, request) {
-    const { client } = this, cell = request.number, url = this.url(kind, cell);
+    const { client } = this, cell = request.number;
     if (kind === "record") {
       const { cells, textures } = this.site.index;
       const read = (/** @type {Uint8Array} */ body) =>
         readRecord(body, cell, cells.length, textures.length);
-      const record = await this.fetcher.whole(url, read, request);
+      const record = await this.#whole(request, read);
       this.locator.learn(cell, record);
       this.records.set(cell, record);
       client.arrived(request);
@@ -142,11 +156,30 @@ export class Stream {
       const textures = this.site.index.textures.length;
       const read = (/** @type {Uint8Array<ArrayBuffer>} */ body) =>
         readShapes(body, cell, textures, this.geometry);
-      const shapes = await this.fetcher.whole(url, read, request);
+      const shapes = await this.#whole(request, read);
       this.shapes.set(cell, shapes);
       client.arrived(request);
       client.learnGeometry(cell, shapes);
     }
+  }
+
+  /**
+   * A whole file, parsed: from the opening, or else from the host.
+   * @template R
+   * @param {Request} request
+   * @param {(body: Uint8Array<ArrayBuffer>) => R | Promise<R>} read throws or rejects if it is damaged
+   * @param {RequestCache} [cache]
+   */
+  async #whole(request, read, cache = "default") {
+    const { kind, number } = request;
+    const place = kind === "preview" ? this.previews[number].place : number;
+    const part = cache === "default" ? await this.opening?.take(kind, place) : null;
+    try {
+      if (part) return await read(part);
+    } catch {
+      // The file itself may be intact.
+    }
+    return this.fetcher.whole(this.url(kind, number), read, request, cache);
   }
 
   /** @param {Request} request */
@@ -154,7 +187,9 @@ export class Stream {
     const { number, begin, end } = request, file = this.files[number];
     const size = file.row.ends[file.row.ends.length - 1];
     const url = this.url("texture", number), cache = this.#suspect.has(number) ? "no-store" : "default";
-    const part = await this.fetcher.range(url, begin, end, size, request, cache);
+    const first = begin === 0 && cache === "default" ? await this.opening?.take("texture", number) : null;
+    const part = first ? { begin, body: first }
+      : await this.fetcher.range(url, begin, end, size, request, cache);
     // The bytes before it may be damaged.
     if (part.begin <= file.length) file.append(part.begin, part.body);
     this.client.arrived(request, this.#cannotDecode ? 0 : file.length);
@@ -165,7 +200,7 @@ export class Stream {
     const { number } = request, file = this.previews[number];
     const read = (/** @type {Uint8Array<ArrayBuffer>} */ body) => body;
     const cache = this.#spoilt.has(number) ? "no-store" : "default";
-    file.bytes = await this.fetcher.whole(this.url("preview", number), read, request, cache);
+    file.bytes = await this.#whole(request, read, cache);
     this.client.arrived(request);
   }
 

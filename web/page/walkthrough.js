@@ -69,6 +69,7 @@ export class Walkthrough {
    * @param {import("./data/site.js").Site} site
    * @param {object} options
    * @param {import("./stream.js").Decoders} options.decoders
+   * @param {import("./net/opening.js").Opening | null} options.opening
    * @param {string} options.policy
    * @param {number} options.budget bytes of texture memory
    * @param {import("./app.js").App["emit"]} emit
@@ -102,6 +103,7 @@ export class Walkthrough {
       estimate: this.estimate,
       fetcher: this.fetcher,
       decoders: options.decoders,
+      opening: options.opening,
       rests: () => this.#rests,
       report: (error, kind, number) => this.#report(error, kind, number),
     });

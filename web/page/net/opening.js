@@ -35,20 +35,23 @@ class Arriving {
 }
 
 export class Opening {
+  /** Kind, number and bytes of each part, once known. @type {[Kind, number, number][]} */
+  parts = [];
   /** By kind and number. @type {Map<string, (part: Bytes | null) => void>} */
   #waiting = new Map();
   /** @type {Map<string, Promise<Bytes | null>>} */
-  #parts = new Map();
+  #coming = new Map();
   #contents;
 
   /** @param {string} url */
   constructor(url) {
+    this.url = url;
     const arriving = this.#open(url);
     this.#contents = arriving.catch(() => {});
     /** The previews that the view needs next, once all parts are here. @type {Promise<number[]>} */
     this.next = arriving
-      .then(async ({ bytes, parts, next }) => {
-        for (const [kind, number, size] of parts) {
+      .then(async ({ bytes, next }) => {
+        for (const [kind, number, size] of this.parts) {
           const part = await bytes.take(size);
           this.#waiting.get(kind + number)?.(PACKED.includes(kind) ? await unpacked(part) : part);
         }
@@ -58,18 +61,19 @@ export class Opening {
       .finally(() => this.#waiting.forEach((come) => come(null)));
   }
 
-  /** @param {string} url @returns {Promise<{bytes: Arriving, parts: [Kind, number, number][], next: number[]}>} */
+  /** @param {string} url @returns {Promise<{bytes: Arriving, next: number[]}>} */
   async #open(url) {
     const { ok, body } = await fetch(url);
     if (!ok || !body) throw new Error("cannot be downloaded");
     const bytes = new Arriving(/** @type {ReadableStream<Bytes>} */ (body));
     const length = new DataView((await bytes.take(4)).buffer).getUint32(0, true);
-    const contents = JSON.parse(new TextDecoder().decode(await bytes.take(length)));
-    for (const [kind, number] of contents.parts) {
+    const { parts, next } = JSON.parse(new TextDecoder().decode(await bytes.take(length)));
+    this.parts = parts;
+    for (const [kind, number] of this.parts) {
       const key = kind + number;
-      this.#parts.set(key, new Promise((come) => this.#waiting.set(key, come)));
+      this.#coming.set(key, new Promise((come) => this.#waiting.set(key, come)));
     }
-    return { bytes, ...contents };
+    return { bytes, next };
   }
 
   /**
@@ -79,7 +83,7 @@ export class Opening {
    */
   async take(kind, number) {
     await this.#contents;
-    return (await this.#parts.get(kind + number)) ?? null;
+    return (await this.#coming.get(kind + number)) ?? null;
   }
 }
 

@@ -14,10 +14,12 @@ export class PreviewFile {
    * @param {import("../data/site.js").Preview} row
    * @param {number} texture
    * @param {import("../data/site.js").TextureRow} all the row of that texture
+   * @param {number} place among the previews of the site
    * @param {DecoderWorkers} workers
    */
-  constructor(row, texture, all, workers) {
+  constructor(row, texture, all, place, workers) {
     this.row = row;
+    this.place = place;
     this.texture = texture;
     this.all = all;
     this.workers = workers;
@@ -40,10 +42,12 @@ export class PreviewFile {
 
 /**
  * The previews of an index, in its order.
- * @param {import("../data/site.js").Index} index
+ * @param {import("../data/site.js").Index} index what the GPU can hold of `site`
+ * @param {import("../data/site.js").Index} site
  * @param {DecoderWorkers} workers
  */
-export function previewsOf({ textures }, workers) {
-  return textures.flatMap((all, texture) =>
-    (all.previews ?? []).map((row) => new PreviewFile(row, texture, all, workers)));
+export function previewsOf({ textures }, site, workers) {
+  const files = site.textures.flatMap(({ previews = [] }) => previews.map(({ file }) => file));
+  return textures.flatMap((all, texture) => (all.previews ?? []).map(
+    (row) => new PreviewFile(row, texture, all, files.indexOf(row.file), workers)));
 }
