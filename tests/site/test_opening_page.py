@@ -1,0 +1,88 @@
+"""The page takes the first view from the opening, and does without one that is damaged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from ptmtools.site.content import Site, SiteOptions, site_of
+
+from .browser import Visitor
+
+Visiting = Callable[..., AbstractContextManager[Visitor]]
+
+
+@pytest.fixture(scope="module")
+def site(two_rooms: Path) -> Site:
+    return site_of(two_rooms, SiteOptions(pictures=False))
+
+
+@pytest.fixture(scope="module")
+def without(two_rooms: Path) -> Site:
+    return site_of(two_rooms, SiteOptions(pictures=False, opening=False))
+
+
+def opening_name(site: Site) -> str:
+    (name,) = (name for name in site.entries if name.startswith("data/opening-"))
+    return name
+
+
+def asked(visitor: Visitor) -> list[str]:
+    return [visit.path.lstrip("/") for visit in visitor.visits]
+
+
+def test_the_first_view_comes_with_the_opening(visit: Visiting, site: Site, without: Site) -> None:
+    with visit(site) as visitor:
+        state = visitor.complete()
+        files = asked(visitor)
+        assert state["exact"]
+        assert visitor.messages == []
+    with visit(without) as visitor:
+        same = visitor.complete()
+        more = asked(visitor)
+    cell = site.index["cells"][state["cell"]]
+    assert files.count(opening_name(site)) == 1
+    assert not {f"data/{cell['record']}", f"data/{cell['geometry']}"} & set(files)
+    assert len(files) < len(more)
+    assert (state["cell"], state["held"]) == (same["cell"], same["held"])
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda data: b"",
+        lambda data: data[: len(data) // 2],
+        lambda data: b"\xff" * len(data),
+        lambda data: data[:4] + bytes(len(data) - 4),
+        lambda data: data[:-200] + bytes(200),
+        lambda data: data + bytes(1000),
+        lambda data: data.replace(b"\x1f\x8b", b"\x00\x00"),
+    ],
+)
+def test_a_damaged_opening_costs_only_time(
+    visit: Visiting, site: Site, damage: Callable[[bytes], bytes]
+) -> None:
+    name = opening_name(site)
+    entry = site.entries[name]
+    entries = {**site.entries, name: replace(entry, source=damage(entry.read()))}
+    with visit(replace(site, entries=entries)) as visitor:
+        state = visitor.complete()
+        assert state["exact"]
+        assert not [message for message in visitor.messages if "Error" in message]
+
+
+def test_a_missing_opening_costs_only_time(visit: Visiting, site: Site) -> None:
+    entries = {n: entry for n, entry in site.entries.items() if n != opening_name(site)}
+    with visit(replace(site, entries=entries)) as visitor:
+        assert visitor.complete()["exact"]
+
+
+def test_a_link_elsewhere_needs_no_opening(visit: Visiting, site: Site) -> None:
+    x, y, z = site.index["viewpoints"][-1]["position"]
+    with visit(site, query=f"#{x},{y},{z},90") as visitor:
+        visitor.complete()
+        assert opening_name(site) not in asked(visitor)
