@@ -23,6 +23,8 @@ from tests.lab.conftest import Ptm, ptm, two_rooms  # noqa: E402
 
 __all__ = ["Ptm", "ptm", "two_rooms"]
 
+#: Each file by itself, to be damaged, left out and counted; `test_opening_page.py` has openings.
+PLAIN = SiteOptions(pictures=False, opening=False)
 Visiting = Callable[..., AbstractContextManager[Visitor]]
 
 
@@ -64,10 +66,10 @@ def hospital_db(tmp_path_factory: pytest.TempPathFactory, shared: Path) -> Path:
 @pytest.fixture(scope="session")
 def museum(museum_db: Path) -> Site:
     """The site of the museum."""
-    return site_of(museum_db, SiteOptions(pictures=False))
+    return site_of(museum_db, PLAIN)
 
 
 @pytest.fixture(scope="session")
 def hospital(hospital_db: Path) -> Site:
     """The site of the hospital."""
-    return site_of(hospital_db, SiteOptions(pictures=False))
+    return site_of(hospital_db, PLAIN)

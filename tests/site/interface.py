@@ -57,7 +57,7 @@ def _answer(route: Any) -> None:
     elif path.endswith(".png"):
         route.fulfill(body=PNG, content_type="image/png")
     else:
-        web = path.startswith(("/page/", "/client/"))
+        web = path.startswith(("/page/", "/client/", "/ptm/"))
         file = PAGE.parent / path[1:] if web else HERE / path[1:]
         route.fulfill(body=file.read_text(), content_type="text/javascript")
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ptmtools.site.content import Site, SiteOptions, site_of
+from ptmtools.site.content import Site, site_of
 from tests.scene.conftest import Gltf, noise, png
 
-from .conftest import build
+from .conftest import PLAIN, build
 from .previews import Preview, Texels, Texture, decoded, halved, levels_of, saved, with_previews
 from .test_page import LEVELS, as_held
 
@@ -48,7 +48,7 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> Site:
     doc.tree["scenes"] = [{"nodes": [0, 1]}]
     folder = tmp_path_factory.mktemp("previews")
     (folder / "room.glb").write_bytes(doc.glb())
-    site = site_of(build(folder / "room.glb", folder / "room.db"), SiteOptions(pictures=False))
+    site = site_of(build(folder / "room.glb", folder / "room.db"), PLAIN)
     assert len(site.index["textures"]) == COUNT
     return site
 

@@ -67,7 +67,11 @@ export class Stream {
 
   /** Requests the previews that the view of the opening needs next. */
   async #follow() {
-    const { downloads } = this.client, next = (await this.opening?.next) ?? [];
+    const { client: { downloads }, fetcher, opening } = this;
+    if (!opening) return;
+    fetcher.requests++;
+    const next = await opening.next;
+    fetcher.bytes += opening.bytes;
     next.map((number) => this.previews.findIndex(({ place }) => place === number))
       .forEach((number, order) => {
         if (number >= 0 && !this.rests() && downloads.free("preview", number)) {
@@ -188,7 +192,7 @@ export class Stream {
     const size = file.row.ends[file.row.ends.length - 1];
     const url = this.url("texture", number), cache = this.#suspect.has(number) ? "no-store" : "default";
     const first = begin === 0 && cache === "default" ? await this.opening?.take("texture", number) : null;
-    const part = first ? { begin, body: first }
+    const part = first && first.length <= size ? { begin, body: first }
       : await this.fetcher.range(url, begin, end, size, request, cache);
     // The bytes before it may be damaged.
     if (part.begin <= file.length) file.append(part.begin, part.body);

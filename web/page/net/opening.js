@@ -10,6 +10,8 @@ const PACKED = ["record", "geometry"];
 
 /** The bytes of a response as they arrive. */
 class Arriving {
+  /** All that have come. */
+  count = 0;
   #bytes = new Uint8Array(0);
   #reader;
 
@@ -23,6 +25,7 @@ class Arriving {
     while (this.#bytes.length < count) {
       const { done, value } = await this.#reader.read();
       if (done) throw new Error("is cut short");
+      this.count += value.length;
       const longer = new Uint8Array(this.#bytes.length + value.length);
       longer.set(this.#bytes);
       longer.set(value, this.#bytes.length);
@@ -37,6 +40,8 @@ class Arriving {
 export class Opening {
   /** Kind, number and bytes of each part, once known. @type {[Kind, number, number][]} */
   parts = [];
+  /** Bytes received. */
+  bytes = 0;
   /** By kind and number. @type {Map<string, (part: Bytes | null) => void>} */
   #waiting = new Map();
   /** @type {Map<string, Promise<Bytes | null>>} */
@@ -53,6 +58,7 @@ export class Opening {
       .then(async ({ bytes, next }) => {
         for (const [kind, number, size] of this.parts) {
           const part = await bytes.take(size);
+          this.bytes = bytes.count;
           this.#waiting.get(kind + number)?.(PACKED.includes(kind) ? await unpacked(part) : part);
         }
         return next;
