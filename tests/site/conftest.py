@@ -38,9 +38,9 @@ def visit(chromium: Any) -> Visiting:
     return of
 
 
-def build(model: Path, database: Path) -> Path:
-    """A database with cells as glTF alone."""
-    options = ["--format", "gltf", "--no-fallback", "-j", "1"]
+def build(model: Path, database: Path, *more: str) -> Path:
+    """A database with cells as glTF alone; ``more`` options."""
+    options = ["--format", "gltf", "--no-fallback", "-j", "1", *more]
     assert main(["-q", "build-scene", str(model), "-o", str(database), *options]) == 0
     return database
 

@@ -97,12 +97,6 @@ def with_previews(site: Site, textures: Mapping[int, Texture]) -> Site:
     return with_index(Site(entries, index), index)
 
 
-def without_previews(site: Site) -> Site:
-    """The same site without those that it has."""
-    rows = [{k: v for k, v in row.items() if k != "previews"} for row in site.index["textures"]]
-    return with_index(site, {**site.index, "textures": rows})
-
-
 def with_index(site: Site, index: Mapping[str, Any]) -> Site:
     """The same site with another index, under the same name."""
     name = next(n for n in site.entries if n.startswith("data/index-"))

@@ -15,8 +15,6 @@ import pytest
 from ptmtools.site.content import Site
 from ptmtools.site.throttle import Throttle
 
-from .previews import without_previews
-
 DOCS = Path(__file__).parents[2] / "docs/guide/publish.md"
 TEXTURES = re.compile(r"\.ptm$")
 
@@ -240,13 +238,6 @@ def test_no_simd(visit: Callable[..., Any], museum: Site) -> None:
 
 
 def test_a_missing_decoder(visit: Callable[..., Any], museum: Site) -> None:
-    entries = {name: e for name, e in museum.entries.items() if not name.endswith(".wasm")}
-    with visit(without_previews(Site(entries, museum.index))) as visitor:
-        visitor.page.locator("#error").wait_for()
-        assert visitor.page.locator("#error-code").inner_text() == "PTM-V106"
-
-
-def test_without_a_decoder(visit: Callable[..., Any], museum: Site) -> None:
     """Cells are compressed, too: there is no walk, and that is said."""
     entries = {name: e for name, e in museum.entries.items() if not name.endswith(".wasm")}
     with visit(Site(entries, museum.index)) as visitor:

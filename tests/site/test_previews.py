@@ -48,7 +48,9 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> Site:
     doc.tree["scenes"] = [{"nodes": [0, 1]}]
     folder = tmp_path_factory.mktemp("previews")
     (folder / "room.glb").write_bytes(doc.glb())
-    site = site_of(build(folder / "room.glb", folder / "room.db"), PLAIN)
+    # Cells that need no decoder.
+    database = build(folder / "room.glb", folder / "room.db", "--plain-gltf")
+    site = site_of(database, PLAIN)
     assert len(site.index["textures"]) == COUNT
     return site
 
@@ -156,6 +158,18 @@ def test_without_a_canvas_for_workers(visit: Callable[..., Any], kinds: Site) ->
         visitor.until(whole(kinds))
         check_kinds(visitor)
     assert visitor.messages == []
+
+
+def test_without_a_decoder_of_files(visit: Callable[..., Any], room: Site) -> None:
+    """Previews are shown, and it is said that nothing else is."""
+    site = refined(room, corners_of(128, 128), [WEBP])
+    entries = {name: e for name, e in site.entries.items() if not name.endswith(".wasm")}
+    with visit(Site(entries, site.index)) as visitor:
+        state = visitor.until("window.ptm?.walk.begun && s.complete && ptm.errors.length > 0")
+        assert visitor.page.evaluate("ptm.errors.map(({ code }) => code)") == ["PTM-V106"]
+        assert not visitor.page.locator("#error").is_visible()
+    assert state["previews"] > 3
+    assert not state["exact"]
 
 
 def refined(room: Site, texels: Texels, previews: Sequence[Preview], **more: Any) -> Site:
