@@ -99,7 +99,8 @@ def _worth(world: World) -> NDArray[np.float64]:
     error = np.zeros(world.catalogue.memory.shape)
     # The first of a row is the error of nothing at all, grey.
     which = world.views.texture[rows][textured]
-    np.add.at(error, which, world.views.error[rows][textured][:, 1:])
+    # The states of levels come before those of previews.
+    np.add.at(error, which, world.views.error[rows][textured][:, 1 : 1 + error.shape[1]])
     worth = np.zeros_like(error)
     worth[:, 1:] = error[:, :-1] - error[:, 1:]
     return worth

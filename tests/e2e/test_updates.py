@@ -87,7 +87,7 @@ def test_one_texture_painted_over_is_one_texture_encoded(
         p.name for p, stamp in stamps.items() if p.exists() and p.stat().st_mtime_ns != stamp
     }
     always = {"manifest.json", "images.json", "floor.ptm", "floor.png", "floor.json"}
-    always |= {"hints.json", "statistics.json"}
+    always |= {"floor-64.webp", "hints.json", "statistics.json"}
     assert touched == always
     built(ptm, model, tmp_path / "fresh.db")
     assert listing(db) == listing(tmp_path / "fresh.db")

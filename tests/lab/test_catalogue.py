@@ -68,12 +68,12 @@ def test_the_only_level_of_a_texture_is_worth_something(database: Path) -> None:
 
 def test_how_large_an_image_is_on_a_shape(database: Path) -> None:
     """Of the walls of the two rooms: 4 m wide and 3 m high, floors once a metre; in the doorway
-    once a metre both ways, across its sides and floor alike."""
+    once a metre both ways, across its sides and floor alike. Cells lie on a grid."""
     served = read_served(database)
     pyramids = read_pyramids(served)
     stock = catalogue_of(served, pyramids.differences, pyramids.mean)
     painted = stock.shapes.texture >= 0
-    actual = {tuple(np.round(side, 3).tolist()) for side in stock.shapes.side[painted]}
+    actual = {tuple(np.round(side, 1).tolist()) for side in stock.shapes.side[painted]}
     assert actual == {(4, 3), (1, 1)}
     assert (stock.size[:, -1] == 64).all()
     assert (stock.size[:, 1] == 1).all()
