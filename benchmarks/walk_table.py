@@ -137,8 +137,7 @@ def tables(rows: Rows) -> list[str]:
     actual = [
         _table("e", rows, under("mean") + summary),
         _table("e / oracle", rows, under("ratio")),
-        _table("e / best-exact", rows, under("gain")),
-        _table("e / best-exact", rows, gains),
+        *(_table("e / best-exact", rows, columns) for columns in (under("gain"), gains) if bare),
         _table("by scene", rows, by_scene),
         _preparation(rows),
     ]
@@ -172,9 +171,12 @@ def _preparation(rows: Rows) -> str:
 
 def _mean(name: str, **alike: str) -> Callable[[Rows], float]:
     """The mean of a figure of the rows that have those values."""
-    return lambda rows: fmean(
-        row[name] for row in rows if all(row[key] == value for key, value in alike.items())
-    )
+
+    def mean(rows: Rows) -> float:
+        some = [row[name] for row in rows if alike.items() <= row.items()]
+        return fmean(some) if some else nan
+
+    return mean
 
 
 def _spread(rows: Rows) -> float:

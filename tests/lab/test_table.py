@@ -53,6 +53,13 @@ def test_means_ratios_and_their_spread_over_walks() -> None:
     assert count == "4 runs; frames above the budget: 0"
 
 
+def test_previews_beside_none() -> None:
+    rows = [row("best-exact", 1, 4.0), row("best", 1, 3.0), row("best", 1, 9.0, scene="office")]
+    _, _, gains, by_scene, *_ = tables(rows)
+    assert cells(gains, "best")["4M 10%"] == "nan"  # the office has nothing beside it
+    assert cells(by_scene, "best")["museum 4M 10%"] == "0.75"
+
+
 def test_scenes_and_conditions_are_apart() -> None:
     rows = [
         row("oracle", 1, 1.0),
