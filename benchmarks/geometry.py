@@ -75,8 +75,8 @@ def records(scene: Scene) -> tuple[TextureRecord, ...]:
     rows = []
     for i, image in enumerate(scene.images):
         width, height = Image.open(io.BytesIO(image.load())).size
-        names = [f"textures/{image.name}.{suffix}" for suffix in ("ptm", "png")]
-        rows.append(TextureRecord(i, *names, width, height, 3, (), "0" * 64))
+        ptm, png = (f"textures/{image.name}.{suffix}" for suffix in ("ptm", "png"))
+        rows.append(TextureRecord(i, ptm, png, width, height, 3, (), "0" * 64))
     return tuple(rows)
 
 

@@ -6,7 +6,7 @@ which browsers decode by themselves; the exact levels. A preview stands alone: i
 bytes. A texture whose source is lossy already keeps the bytes of that image as its finest step and
 has no lossless copy.
 
-`benchmarks/previews.py` prints the bytes and errors behind these choices:
+`benchmarks/codec/previews.py` prints the bytes and errors behind these choices:
 
 - *Files beside the `.ptm`*, not groups in it: a lossy source has to be a file of its own in any
   case, plain hosts and caches serve whole files better than ranges, and a `.ptm` stays a sequence

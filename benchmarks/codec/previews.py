@@ -1,4 +1,4 @@
-"""The bytes and errors of previews, and the settings of their ladder: python benchmarks/previews.py
+"""The bytes and errors of previews: python benchmarks/codec/previews.py [IMAGE…]
 
 For each set of images: by size of a level, all images together,
 
@@ -20,8 +20,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
+from images import ROOT, image_files, sets
 
-from benchmarks.codec.images import ROOT, image_files, sets
 from ptmtools.parallel import ordered
 from ptmtools.texture import build_pyramid, encode, load_image, previews as settings, read_header
 from ptmtools.texture.previews import PreviewOptions, Pyramid
