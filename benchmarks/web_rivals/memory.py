@@ -27,7 +27,6 @@ from PIL import Image
 
 from benchmarks.web_rivals.images import in_form
 from benchmarks.web_rivals.packages import KTX2
-from ptmtools.arrays import Floats
 from ptmtools.lab.allocation import allocate
 from ptmtools.lab.measures import flip
 from ptmtools.lab.renderer import Renderer
@@ -101,8 +100,8 @@ def _worth(world: World) -> NDArray[np.float64]:
     # The first of a row is the error of nothing at all, grey.
     which = world.views.texture[rows][textured]
     # The states of levels come before those of previews.
-    states: Floats = world.views.error[rows][textured].astype(np.float64)
-    np.add.at(error, which, states[:, 1 : 1 + error.shape[1]])
+    states = np.arange(1, error.shape[1] + 1)
+    np.add.at(error, which, world.views.error[rows][textured][:, states])
     worth = np.zeros_like(error)
     worth[:, 1:] = error[:, :-1] - error[:, 1:]
     return worth
