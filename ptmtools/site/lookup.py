@@ -36,6 +36,7 @@ _MEDIA = {
     ".png": ("image/png", False),
     ".jpg": ("image/jpeg", False),
     ".webp": ("image/webp", False),
+    ".avif": ("image/avif", False),
 }
 _OTHER = ("application/octet-stream", False)
 #: The hash that `ptm publish` puts into names that change with the content.

@@ -81,6 +81,14 @@ def test_a_missing_opening_costs_only_time(visit: Visiting, site: Site) -> None:
         assert visitor.complete()["exact"]
 
 
+def test_an_opening_that_never_arrives_costs_only_time(visit: Visiting, site: Site) -> None:
+    def prepare(page: Any) -> None:
+        page.route("**/opening-*", lambda route: None)
+
+    with visit(site, prepare=prepare) as visitor:
+        assert visitor.complete()["exact"]
+
+
 def test_a_link_elsewhere_needs_no_opening(visit: Visiting, site: Site) -> None:
     x, y, z = site.index["viewpoints"][-1]["position"]
     with visit(site, query=f"#{x},{y},{z},90") as visitor:

@@ -6,7 +6,7 @@ import { PageError } from "./errors.js";
 /** Tries, and the pause before the second one, s; each pause is twice the one before. */
 const TRIES = 6, FIRST_WAIT = 0.5;
 /** Seconds without a byte after which a response is abandoned. */
-const PATIENCE = 20;
+export const PATIENCE = 20;
 
 /** An error that another request may correct. */
 class Passing extends Error {

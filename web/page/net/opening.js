@@ -2,11 +2,32 @@
 // page in one file (docs/formats/hints.md). Each is a file of its own, too, so an opening that fails
 // costs nothing but time.
 
+import { PATIENCE } from "./fetcher.js";
+
 /** @typedef {Uint8Array<ArrayBuffer>} Bytes */
 /** @typedef {import("../policy/downloads.js").Kind} Kind */
 
 /** Kinds that are compressed in it. */
 const PACKED = ["record", "geometry"];
+
+/**
+ * A result; throws if it takes too long.
+ * @template R
+ * @param {Promise<R>} result
+ * @returns {Promise<R>}
+ */
+async function patiently(result) {
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  let timer;
+  const late = new Promise((_, fail) => {
+    timer = setTimeout(() => fail(new Error("nothing came")), 1000 * PATIENCE);
+  });
+  try {
+    return /** @type {R} */ (await Promise.race([result, late]));
+  } finally {
+    clearTimeout(timer);
+  }
+}
 
 /** The bytes of a response as they arrive. */
 class Arriving {
@@ -23,7 +44,7 @@ class Arriving {
   /** The next bytes; throws if the response ends before. @param {number} count @returns {Promise<Bytes>} */
   async take(count) {
     while (this.#bytes.length < count) {
-      const { done, value } = await this.#reader.read();
+      const { done, value } = await patiently(this.#reader.read());
       if (done) throw new Error("is cut short");
       this.count += value.length;
       const longer = new Uint8Array(this.#bytes.length + value.length);
@@ -69,7 +90,7 @@ export class Opening {
 
   /** @param {string} url @returns {Promise<{bytes: Arriving, next: number[]}>} */
   async #open(url) {
-    const { ok, body } = await fetch(url);
+    const { ok, body } = await patiently(fetch(url));
     if (!ok || !body) throw new Error("cannot be downloaded");
     const bytes = new Arriving(/** @type {ReadableStream<Bytes>} */ (body));
     const length = new DataView((await bytes.take(4)).buffer).getUint32(0, true);
