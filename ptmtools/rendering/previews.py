@@ -7,7 +7,6 @@ texels by a few steps of 255.
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from ptmtools.errors import DatabaseError
 from ptmtools.output.model import sizes_of
 from ptmtools.output.served import BUILD, Served
+from ptmtools.texture.previews import decoded_preview
 from ptmtools.texture.pyramid import build_pyramid
 
 Texels = NDArray[np.uint8]
@@ -38,12 +38,9 @@ def read_preview(served: Served, texture: int, number: int) -> list[Texels]:
 
 def _decoded(file: Path, data: bytes) -> Texels:
     """(h, w, 3) the texels of an image."""
-    from PIL import Image, UnidentifiedImageError
-
     try:
-        with Image.open(io.BytesIO(data)) as image:
-            return np.asarray(image.convert("RGB"))
-    except (OSError, ValueError, SyntaxError, UnidentifiedImageError) as fault:
+        return decoded_preview(data, 3)
+    except (OSError, ValueError, SyntaxError) as fault:
         raise _damaged(file, f"cannot be decoded ({fault})") from None
 
 

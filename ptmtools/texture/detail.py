@@ -112,6 +112,11 @@ class Detail:
     color: tuple[int, int, int]
 
 
+def rounded(value: float) -> float:
+    """A difference with `DIGITS`."""
+    return float(f"{value:.{DIGITS}g}")
+
+
 def colours_of(components: int) -> int:
     """Number of components that are colours; the last of 2 and of 4 is alpha."""
     return components - (components in (2, 4))
@@ -151,4 +156,4 @@ def detail_of(coarsest: Samples, above: Iterable[tuple[float, int]]) -> Detail:
     mean = coarsest[..., :colours].reshape(-1, colours).mean(axis=0, dtype=np.float64)
     shown = np.clip(np.nan_to_num(mean * scale), 0, _WHITE)
     red, green, blue = np.floor(np.broadcast_to(shown, 3) + 0.5).astype(int).tolist()
-    return Detail((0.0, *(float(f"{v:.{DIGITS}g}") for v in means)), (red, green, blue))
+    return Detail((0.0, *map(rounded, means)), (red, green, blue))

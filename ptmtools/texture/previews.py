@@ -178,13 +178,6 @@ class Steps:
         return self.exact_levels < len(self.errors)
 
 
-def digits(value: float) -> float:
-    """A difference or an error with the digits of the hints."""
-    from ptmtools.texture.detail import DIGITS
-
-    return float(f"{value:.{DIGITS}g}")
-
-
 class Pyramid:
     """The levels of a texture, against which its previews are measured.
 
@@ -210,7 +203,9 @@ class Pyramid:
     @property
     def errors(self) -> tuple[float, ...]:
         """See `Steps`."""
-        return tuple(digits(math.sqrt(square)) for square in self.squares)
+        from ptmtools.texture.detail import rounded
+
+        return tuple(rounded(math.sqrt(square)) for square in self.squares)
 
     def preview(self, level: int, quality: int, wanted: str) -> tuple[Preview, bytes]:
         """The preview of a level, and its file; in another format where the one wanted holds no
@@ -232,7 +227,7 @@ class Pyramid:
         """The preview that a file is of a level."""
         import numpy as np
 
-        from ptmtools.texture.detail import colours_of
+        from ptmtools.texture.detail import colours_of, rounded
 
         texels = self.levels[level]
         height, width, components = texels.shape
@@ -248,7 +243,7 @@ class Pyramid:
         texel_count = height * width
         error = math.sqrt(self.squares[level] + square / texel_count)
         return Preview(
-            level, width, height, len(data), name, digits(length / texel_count), digits(error)
+            level, width, height, len(data), name, rounded(length / texel_count), rounded(error)
         )
 
     def source(self, data: bytes, name: str) -> Preview:

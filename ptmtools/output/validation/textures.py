@@ -56,10 +56,11 @@ class ReadPicture(NamedTuple):
 def read_picture(data: bytes, format: str, limits: Limits, at: Place) -> ReadPicture | None:
     """Decodes an image of a format that Pillow names so; None with PTM-D710 if it is none."""
     from ptmtools.texture import load_image
-    from ptmtools.texture.images.opening import opened
+    from ptmtools.texture.images.opening import opened, pillow_faults
 
     try:
-        image = opened(io.BytesIO(data), limits)
+        with pillow_faults():
+            image = opened(io.BytesIO(data), limits)
         if image.format == format:
             load_image(data, limits)
             return ReadPicture(image.size, len(data))
@@ -67,8 +68,6 @@ def read_picture(data: bytes, format: str, limits: Limits, at: Place) -> ReadPic
     except PtmError as fault:
         code = "PTM-D713" if isinstance(fault, LimitError) else "PTM-D710"
         at.add(code, f"cannot be read ({fault.message})")
-    except Exception:  # a damaged file can make Pillow's parsers raise nearly anything
-        at.add("PTM-D710", f"is not a {format}")
     return None
 
 
