@@ -62,7 +62,7 @@ http {{
 
 @dataclass(frozen=True)
 class Certificate:
-    """A certificate for 127.0.0.1: files, and what Chromium has to be told to accept it."""
+    """A certificate for 127.0.0.1: its files, and the fingerprint by which Chromium accepts it."""
 
     file: Path
     key: Path

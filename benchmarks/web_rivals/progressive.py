@@ -49,7 +49,7 @@ def _levels(number: int, images: Sequence[bytes], files: dict[str, bytes]) -> It
 
 
 def _level_glb(number: int, image: bytes) -> bytes:
-    """A GLB of a single texture, which is found by its guid."""
+    """A GLB of a single texture, which its guid names."""
     document = {
         "asset": {"version": "2.0"},
         "extensionsUsed": [EXTENSIONS[WEBP], PROGRESSIVE],

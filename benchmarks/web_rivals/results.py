@@ -1,7 +1,7 @@
 """Timelines kept below ``build/bench/rivals``, so that a long run can be stopped and continued.
 
-A timeline is found again by everything that it depends on: the files that the page sends, the link,
-the protocol, and the number of its repetition. A changed page is measured anew.
+The key of a kept timeline is everything that it depends on: the files that the page sends, the
+link, the protocol, and the number of its repetition. A changed page is measured anew.
 """
 
 from __future__ import annotations

@@ -60,9 +60,9 @@ GROUPS: dict[str, dict[str, Entry]] = {
         "decode": Entry("Decode .ptm files to images.", "images:decode"),
         "compare": Entry("Compare .ptm with other image formats.", "images:compare"),
         "interlace": Entry(
-            "Split an image into files that add detail step by step.", "images:interlace"
+            "Split an image into files that add detail step by step.", "interlaced:interlace"
         ),
-        "deinterlace": Entry("Join the files of an interlaced image.", "images:deinterlace"),
+        "deinterlace": Entry("Join the files of an interlaced image.", "interlaced:deinterlace"),
     },
     "Other representations": {
         "apo": Entry(

@@ -59,7 +59,7 @@ def pyramid_bytes(file: Path) -> list[int]:
 
 
 EVERY_LEVEL = """
-const told = [];
+const listed = [];
 const { levels, name } = settings;
 const texture = new PtmTexture(renderer, `/files/${name}.ptm`);
 for (const level of settings.order) {
@@ -257,7 +257,7 @@ def test_files_at_fault(three: Any, files: Path, tmp_path: Path) -> None:
 
 
 PREVIEWS = """
-const told = [];
+const listed = [];
 const at = (file) => new URL(`/files/${file}`, document.baseURI);
 for (const { file, level, ...options } of settings.textures) {
   const previews = options.previews.map((one) => ({ ...one, file: at(one.file) }));
@@ -270,9 +270,9 @@ for (const { file, level, ...options } of settings.textures) {
   await texture.refine(3);
   states.push(await levelsOf(renderer, texture), texture.gpuBytes, gpu.bytes);
   texture.dispose();
-  told.push(states);
+  listed.push(states);
 }
-return told;
+return listed;
 """
 
 
@@ -310,5 +310,5 @@ def test_previews_before_exact_levels(three: Any, tmp_path: Path) -> None:
         [exact[:5], exact[:5]],
     ]
     assert all(states[2] == exact[:4] for states in actual)
-    assert all(told == counted for *_, told, counted in actual)
+    assert all(listed == counted for *_, listed, counted in actual)
     assert len([m for m in visit.messages if "bad.webp" in m]) == 2

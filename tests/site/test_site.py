@@ -28,10 +28,10 @@ from ptmtools.site.content import (
     link_bytes,
     site_of,
     title_of,
-    web_texture,
 )
 from ptmtools.site.geometry import lean_glb
 from ptmtools.site.publishing import weight_of
+from ptmtools.site.textures import web_texture
 from ptmtools.texture import EncodeOptions, decode, decode_levels, encode, read_header
 
 PLAIN = SiteOptions(pictures=False)

@@ -76,7 +76,7 @@ def test_the_step_is_a_power_of_two_or_less_than_the_given_one(artifacts: Any) -
 def test_texture_coordinates_are_within_a_tenth_of_a_texel(
     width: int, height: int, most: float
 ) -> None:
-    """Unless 24 bits do not hold so many steps; then all 24 are used."""
+    """In a range of more steps than 24 bits hold, all 24 are used."""
     exponents = texture_exponents(np.array([[most, -most]]), width, height)
     for exponent, side in zip(exponents, (width, height), strict=True):
         assert most <= MOST * 2.0**exponent
