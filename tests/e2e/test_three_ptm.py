@@ -59,20 +59,20 @@ def pyramid_bytes(file: Path) -> list[int]:
 
 
 EVERY_LEVEL = """
-const listed = [];
+const stated = [];
 const { levels, name } = settings;
 const texture = new PtmTexture(renderer, `/files/${name}.ptm`);
 for (const level of settings.order) {
   gpu.most = gpu.bytes;
   const uploaded = gpu.uploads;
   if (!(await texture.refine(level)) || texture.level !== level) throw new Error(`not ${level}`);
-  told.push({
+  stated.push({
     levels: await levelsOf(renderer, texture),
-    told: texture.gpuBytes, counted: gpu.bytes, most: gpu.most, uploaded: gpu.uploads - uploaded,
+    stated: texture.gpuBytes, counted: gpu.bytes, most: gpu.most, uploaded: gpu.uploads - uploaded,
   });
 }
 texture.dispose();
-return { told, largest: gpu.largest, left: gpu.bytes, textures: renderer.info.memory.textures };
+return { stated, largest: gpu.largest, left: gpu.bytes, textures: renderer.info.memory.textures };
 """
 
 
@@ -86,9 +86,9 @@ def test_levels_are_pythons(three: Any, files: Path, name: str) -> None:
     actual, visit = three.run(EVERY_LEVEL, {"files": files}, name=name, order=order)
     assert visit.messages == []
     before = -1
-    for level, reported in zip(order, actual["told"], strict=True):
+    for level, reported in zip(order, actual["stated"], strict=True):
         assert reported["levels"] == wanted[: level + 1]
-        assert reported["told"] == reported["counted"] == memory[level]
+        assert reported["stated"] == reported["counted"] == memory[level]
         had = memory[before] if before >= 0 else 0
         if level == before + 1 or level < before:
             assert reported["most"] == (had + memory[level] if before >= 0 else memory[level])
@@ -138,7 +138,7 @@ while (second.level < whole) await new Promise((resolve) => setTimeout(resolve, 
 return {
   before, shown, levels, done, after: middle(),
   found: [await levelsOf(renderer, first), await levelsOf(renderer, second)],
-  told: first.gpuBytes + second.gpuBytes, counted: gpu.bytes,
+  stated: first.gpuBytes + second.gpuBytes, counted: gpu.bytes,
 };
 """
 
@@ -152,7 +152,7 @@ def test_a_lost_context_comes_back(three: Any, files: Path) -> None:
     assert actual["done"] is True
     assert actual["found"] == [expected(files / f"{name}.ptm") for name in ("odd", "tiled")]
     assert actual["after"] == actual["shown"] != actual["before"]
-    assert actual["told"] == actual["counted"]
+    assert actual["stated"] == actual["counted"]
     whole = [end - begin for path, begin, end in visit.ranges if "tiled" in path]
     assert sum(whole) == (files / "tiled.ptm").stat().st_size
 
@@ -171,7 +171,7 @@ const disposed = texture.refine(99);
 texture.dispose();
 const third = await disposed;
 await new Promise((resolve) => setTimeout(resolve, 200));
-return { first, second, third, levels, left: gpu.bytes, told: texture.gpuBytes };
+return { first, second, third, levels, left: gpu.bytes, stated: texture.gpuBytes };
 """
 
 
@@ -184,7 +184,7 @@ def test_refining_is_called_off(three: Any, files: Path) -> None:
         "third": False,
         "levels": [2, -1],
         "left": 0,
-        "told": 0,
+        "stated": 0,
     }
 
 
@@ -201,7 +201,7 @@ const wraps = [one, other].map((texture) => {
 });
 renderer.resetState();
 return {
-  wraps, told: [one.gpuBytes, other.gpuBytes], counted: gpu.bytes,
+  wraps, stated: [one.gpuBytes, other.gpuBytes], counted: gpu.bytes,
   found: [await levelsOf(renderer, one), await levelsOf(renderer, other)],
 };
 """
@@ -215,7 +215,7 @@ def test_two_ways_to_wrap_are_two_textures(three: Any, files: Path) -> None:
     assert visit.messages == []
     assert actual["wraps"] == [33071, 10497]
     assert actual["found"] == [wanted, wanted[:5]]
-    assert actual["told"] == [memory[-1], memory[4]]
+    assert actual["stated"] == [memory[-1], memory[4]]
     assert actual["counted"] == memory[-1] + memory[4]
     assert sum(end - begin for _, begin, end in visit.ranges) == file.stat().st_size
 
@@ -233,7 +233,7 @@ return { say, left: gpu.bytes };
 
 
 def test_files_at_fault(three: Any, files: Path, tmp_path: Path) -> None:
-    """Levels before the fault stay. A wrong checksum is asked for once more, then told."""
+    """Levels before the fault stay. A wrong checksum is asked for once more, then stated."""
     file = (files / "odd.ptm").read_bytes()
     flipped = bytearray(file)
     flipped[-1] ^= 1
@@ -257,7 +257,7 @@ def test_files_at_fault(three: Any, files: Path, tmp_path: Path) -> None:
 
 
 PREVIEWS = """
-const listed = [];
+const stated = [];
 const at = (file) => new URL(`/files/${file}`, document.baseURI);
 for (const { file, level, ...options } of settings.textures) {
   const previews = options.previews.map((one) => ({ ...one, file: at(one.file) }));
@@ -270,9 +270,9 @@ for (const { file, level, ...options } of settings.textures) {
   await texture.refine(3);
   states.push(await levelsOf(renderer, texture), texture.gpuBytes, gpu.bytes);
   texture.dispose();
-  listed.push(states);
+  stated.push(states);
 }
-return listed;
+return stated;
 """
 
 
@@ -310,5 +310,5 @@ def test_previews_before_exact_levels(three: Any, tmp_path: Path) -> None:
         [exact[:5], exact[:5]],
     ]
     assert all(states[2] == exact[:4] for states in actual)
-    assert all(listed == counted for *_, listed, counted in actual)
+    assert all(stated == counted for *_, stated, counted in actual)
     assert len([m for m in visit.messages if "bad.webp" in m]) == 2

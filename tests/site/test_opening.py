@@ -161,3 +161,28 @@ def test_steps_come_by_worth_per_byte() -> None:
     (length,) = struct.unpack_from("<I", data)
     assert json.loads(data[4 : 4 + length])["next"] == [2, 5]
     assert not {("preview", 2), ("preview", 5)} & {part[:2] for part in parts}
+
+
+def test_it_weighs_as_the_client(two_rooms: Path) -> None:
+    """The product does not import the simulator, so its constants are compared here; the needs are
+    those of the simulator's own screen."""
+    from ptmtools.lab.policies import engine
+    from ptmtools.lab.previews import AVERAGING, LEAST as LEAST_DIFFERENCE
+    from ptmtools.lab.tables import look
+    from ptmtools.rendering.pyramids import read_pyramids
+    from ptmtools.rendering.rays import Camera
+    from ptmtools.site.opening import HALVED, HEIGHT, LEAST, NOTHING, OVERHEAD, WIDTH
+
+    assert (NOTHING, LEAST, HALVED) == (engine.NOTHING, LEAST_DIFFERENCE, AVERAGING)
+    assert OVERHEAD == engine.OVERHEAD
+    served = read_served(two_rooms)
+    for viewpoint in served.index["viewpoints"]:
+        eye, direction = (np.array([viewpoint[name]]) for name in ("position", "direction"))
+        camera = Camera(WIDTH, HEIGHT, viewpoint["fieldOfView"], WIDTH / HEIGHT)
+        (views,) = look(served.surfaces, read_pyramids(served), camera, eye, direction)
+        needs = needs_of(served, viewpoint)
+        for texture, share in needs.textures.items():
+            expected = views.need[views.texture == texture].sum(axis=0)[: len(share)]
+            assert share == pytest.approx(expected, abs=2e-4)
+        for cell, share_of_cell in needs.cells.items():
+            assert share_of_cell == pytest.approx(views.need[views.cell == cell, 0].sum(), abs=2e-4)
