@@ -68,7 +68,7 @@ class Cluster(Executor):
         self._counted, self._threads = 0.0, 0
         announce(f"waiting for the scheduler at {address}")
         try:
-            self._client = Client(address, timeout=PATIENCE, set_as_default=False, name="ptmtools")
+            self._client = _connect(Client, address)
         except (OSError, ValueError) as fault:
             raise WorkerError(
                 "PTM-W001",
@@ -192,6 +192,22 @@ class Cluster(Executor):
                 answer = f"the worker cannot use ptmtools ({type(answer).__name__}: {answer})"
             if answer:
                 raise _other_software(worker, answer)
+
+
+def _connect(kind: Any, address: str) -> Any:
+    """A Dask client of ``address``. One that fails is closed here with its loop: if the garbage
+    collector closed it in the thread of the next client's loop, it would wait for the lock that
+    the start of that loop holds, and the next client would fail by an assertion after 10 s."""
+    client = kind.__new__(kind)
+    try:
+        client.__init__(address, timeout=PATIENCE, set_as_default=False, name="ptmtools")
+    except BaseException:
+        with suppress(Exception):
+            client.close(timeout=2)
+        with suppress(Exception):
+            client._loop_runner.stop()
+        raise
+    return client
 
 
 async def _fetch(remote: Any) -> Any:

@@ -6,6 +6,7 @@ import logging
 import os
 import signal
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -27,9 +28,15 @@ def test_without_dask(monkeypatch):
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "tcp://", "ftp://x:1", ""])
 def test_without_a_scheduler(address, monkeypatch):
+    before = _loops()
     monkeypatch.setattr(module, "PATIENCE", 0.1)
     with pytest.raises(WorkerError, match=r"no scheduler answers.*PTM-W001"):
         open_executor(scheduler=address)
+    assert _loops() <= before  # a client that the collector closes can stop the next one
+
+
+def _loops() -> set[threading.Thread]:
+    return {thread for thread in threading.enumerate() if thread.name == "IO loop"}
 
 
 def test_limits(scheduler):
