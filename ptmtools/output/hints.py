@@ -122,6 +122,8 @@ def _texture(record: TextureRecord, fallback: bool) -> Mapping[str, Any]:
     if record.detail:
         row["differences"] = [whole(value) for value in record.detail.differences]
         row["color"] = list(record.detail.color)
+        if any(record.detail.offsets):
+            row["offsets"] = list(record.detail.offsets)
     if record.previews:
         row["previews"] = [_preview(each) for each in record.previews]
     return row

@@ -100,6 +100,11 @@ def sizes_of(row: Mapping[str, Any]) -> list[tuple[int, int]]:
     return [(max(1, width >> shift), max(1, height >> shift)) for shift in shifts]
 
 
+def offsets_of(row: Mapping[str, Any]) -> list[int]:
+    """What clients add to the colours of each level of a row of `textures`, coarsest first."""
+    return list(row.get("offsets") or [0] * len(sizes_of(row)))
+
+
 @dataclass(frozen=True)
 class OctreeRecord:
     """The octree texture of an object, for the emitted files (docs/formats/apo.md).

@@ -274,7 +274,8 @@ def read_steps(data: bytes) -> Steps:
 
     fields = json.loads(data)
     red, green, blue = map(int, fields["color"])
-    detail = Detail(tuple(map(float, fields["differences"])), (red, green, blue))
+    offsets = tuple(map(int, fields["offsets"]))
+    detail = Detail(tuple(map(float, fields["differences"])), (red, green, blue), offsets)
     errors = tuple(map(float, fields["errors"]))
     previews = tuple(Preview(**row) for row in fields["previews"])
     if any(preview.format not in FORMATS for preview in previews):

@@ -13,11 +13,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ptmtools.arrays import Ints
+from ptmtools.output.model import offsets_of
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress, silent
 from ptmtools.rendering.previews import Texels, read_preview
 from ptmtools.rendering.pyramids import packed
 from ptmtools.rendering.records import Pyramids, Shows, own_levels
+from ptmtools.texture.detail import with_offset
 
 
 class Lossy(NamedTuple):
@@ -67,7 +69,8 @@ def read_lossy(served: Served, progress: Progress = silent) -> Lossy:
         progress(t, len(rows), "decoding previews")
         for number, before in enumerate(states_of(row)):
             if before:
-                chains.append(read_preview(served, t, number))
+                levels = zip(read_preview(served, t, number), offsets_of(row), strict=False)
+                chains.append([with_offset(*each) for each in levels])
                 state.append(before)
         first.append(len(chains))
     return Lossy(packed(chains), np.array(first), np.array(state, dtype=np.int64))

@@ -22,7 +22,7 @@ Texels = NDArray[np.uint8]
 
 
 def read_preview(served: Served, texture: int, number: int) -> list[Texels]:
-    """The levels of a preview, the coarsest first, as (h, w, 3) RGB.
+    """The levels of a preview, the coarsest first, as (h, w, 3) RGB, without offsets.
 
     Raises DatabaseError: PTM-D005, D006 it is missing, damaged or does not match the index.
     """

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats
 from ptmtools.errors import DatabaseError, InputError, LimitError
-from ptmtools.output.model import sizes_of
+from ptmtools.output.model import offsets_of, sizes_of
 from ptmtools.output.served import BUILD, Served
 from ptmtools.progress import Progress, silent
 from ptmtools.rendering.previews import read_preview
 from ptmtools.rendering.records import Pyramids, Sight, Triangles, own_levels
 from ptmtools.texture import reader
-from ptmtools.texture.detail import difference_between
+from ptmtools.texture.detail import difference_between, with_offset
 from ptmtools.texture.model import Limits
 from ptmtools.texture.samples import in_eight_bits
 
@@ -68,10 +68,12 @@ def _pyramids(served: Served, progress: Progress, only: Collection[int] | None =
             chains[t] = [rgb(samples) for samples in ptm.levels()]
         if (count := len(sizes_of(rows[t]))) > len(held):
             chains[t] += read_preview(served, t, -1)[len(held) : count]
-        mean[t] = chains[t][0].reshape(-1, 3).mean(axis=0)
         for below, level in pairwise(chains[t]):
             texels = level.shape[0] * level.shape[1]
             differences[t].append(difference_between(level, below) / texels)
+        each = zip(chains[t], offsets_of(rows[t]), strict=True)
+        chains[t] = [with_offset(level, offset) for level, offset in each]
+        mean[t] = chains[t][0].reshape(-1, 3).mean(axis=0)
     result = packed(chains)
     for row, values in zip(result.differences, differences, strict=True):
         row[: len(values)] = values

@@ -19,13 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.output.model import sizes_of
+from ptmtools.output.model import offsets_of, sizes_of
 from ptmtools.output.served import Served
 from ptmtools.parallel import ordered
 from ptmtools.rendering.footprints import detail_of_pixels, footprints
 from ptmtools.rendering.previews import read_preview
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.rendering.records import Sight, Triangles, triangles_of
+from ptmtools.texture.detail import with_offset
 from ptmtools.texture.model import Limits
 from ptmtools.texture.samples import in_eight_bits
 
@@ -119,13 +120,17 @@ def _levels(served: Served, texture: int) -> Levels:
     count = max(1, sum(max(size) <= FINEST for size in sizes_of(row)))
     if count > len(row["ends"]):
         fine = (n for n, preview in enumerate(row["previews"]) if preview["level"] >= count - 1)
-        return read_preview(served, texture, next(fine))[:count]
+        return _shown(row, read_preview(served, texture, next(fine))[:count])
     colors: list[NDArray[np.uint8]] = []
     with open_ptm(served.texture_file(texture), limits=_LIMITS) as ptm:
         for samples in islice(ptm.levels(), count):
-            shown = in_eight_bits(samples)
-            colors.append(shown[:, :, :3] if shown.shape[2] >= 3 else shown[:, :, [0, 0, 0]])
-    return colors
+            texels = in_eight_bits(samples)
+            colors.append(texels[:, :, :3] if texels.shape[2] >= 3 else texels[:, :, [0, 0, 0]])
+    return _shown(row, colors)
+
+
+def _shown(row: Mapping[str, Any], levels: Levels) -> Levels:
+    return [with_offset(*each) for each in zip(levels, offsets_of(row), strict=False)]
 
 
 def _colors(sight: Sight, triangles: Triangles, textures: Mapping[int, Levels]) -> Floats:

@@ -109,6 +109,7 @@ def _encoded_again(file: Path, row: Mapping[str, Any]) -> Texture:
         "ends": [level.end for level in read_header(data).levels],
         "differences": list(detail.differences),
         "color": list(detail.color),
+        "offsets": list(detail.offsets),
     }
     note = f"{file.name} was {before}, which browsers do not read: encoded again as fast, 8 bits"
     return Texture({**row, **changed}, data, note)

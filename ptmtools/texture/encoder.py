@@ -32,7 +32,7 @@ from ptmtools.texture.container import (
     pack_description,
     pack_head,
 )
-from ptmtools.texture.detail import Detail, detail_of, difference_between
+from ptmtools.texture.detail import Between, Detail, between, detail_of, mean_surplus
 from ptmtools.texture.model import TILE_SIDES, Description, EncodeOptions, PtmHeader
 from ptmtools.texture.profiles import PROFILES
 from ptmtools.texture.pyramid import (
@@ -192,14 +192,13 @@ def encode_to(
     start = file.tell()
     file.write(bytes(head_size(len(kept))))
     file.write(described)
-    single, tiled = _levels(rows, kept, options.tile)
+    single, tiled, finer = _levels(rows, kept, options.tile)
+    beyond = mean_surplus(finer)
+    del finer
     tiles = encoding.single([_whole(level) for level in single], more=bool(tiled))
     del single
     coarsest, below, memory = tiles[0].texels, tiles[-1].texels, tiles[-1].memory
-    above = [
-        (difference_between(tile.texels, under.texels), _texels_of(tile.texels))
-        for under, tile in pairwise(tiles)
-    ]
+    above = [between(tile.texels, under.texels) for under, tile in pairwise(tiles)]
     groups: list[tuple[int, int]] = []
     for tile in tiles:
         file.write(tile.data)
@@ -208,15 +207,15 @@ def encode_to(
     while tiled:
         # The finest of them may be the image itself, of which nothing is kept.
         level = tiled.pop(0)
-        group, below, difference = encoding.tiled(file, level, below, memory, finest=not tiled)
+        group, below, pair = encoding.tiled(file, level, below, memory, finest=not tiled)
         groups.append(group)
-        above.append((difference, _texels_of(level)))
+        above.append(pair)
     end = file.tell()
     trimmed = len(level_sizes(rows.width, rows.height)) - 1 - kept[-1]
     file.seek(start)
     file.write(pack_head(rows.shape, rows.dtype.name, options, trimmed, described, groups))
     file.seek(end)
-    return detail_of(coarsest, above)
+    return detail_of(coarsest, above, beyond)
 
 
 @dataclass(frozen=True)
@@ -250,10 +249,10 @@ class _Encoding:
 
     def tiled(
         self, file: IO[bytes], level: Samples | ImageRows, below: Samples, memory: Any, finest: bool
-    ) -> tuple[tuple[int, int], Samples, float]:
+    ) -> tuple[tuple[int, int], Samples, Between]:
         """Writes index and tiles of a level of several. Length of the group, CRC-32 of the index;
-        the texels as a decoder has them, none of the finest level; and the `difference_between`
-        them and those below."""
+        the texels as a decoder has them, none of the finest level; and what is `between` them and
+        those below."""
         side, coding = self.options.tile, Coding(self.options.max_error, memory)
         height, width = level.shape[:2]
         across, down = tile_counts(width, height, side)
@@ -269,27 +268,27 @@ class _Encoding:
                     strip = level[box.y0 : box.y1]
                 yield box, strip
 
-        def coded(job: tuple[Box, Samples]) -> tuple[Box, Tile, float]:
+        def coded(job: tuple[Box, Samples]) -> tuple[Box, Tile, Between]:
             box, strip = job
             piece = np.ascontiguousarray(strip[:, box.x0 : box.x1])
             under = np.ascontiguousarray(below[box.below.slices])
             tile = self._tile(piece, under, coding, 1.0 if finest else EXACT_FACTOR)
-            return box, tile, difference_between(tile.texels, under)
+            return box, tile, between(tile.texels, under)
 
         start = file.tell()
         file.write(bytes(across * down * TILE_ENTRY.size))
-        index, difference = bytearray(), 0.0
+        index, pair = bytearray(), Between(0.0, 0.0, 0, 0)
         for box, tile, more in ordered(coded, boxes(), self.threads):
             file.write(tile.data)
             index += TILE_ENTRY.pack(len(tile.data), zlib.crc32(tile.data))
-            difference += more
+            pair += more
             if self.options.max_error and not finest:
                 texels[box.slices] = tile.texels
         end = file.tell()
         file.seek(start)
         file.write(index)
         file.seek(end)
-        return (end - start, zlib.crc32(index)), texels, difference
+        return (end - start, zlib.crc32(index)), texels, pair
 
     def _tile(self, level: Samples, below: Samples, coding: Coding, factor: float) -> Tile:
         """One tile; with an allowed error, exactly if that takes at most ``factor`` times the
@@ -312,21 +311,16 @@ class _Encoding:
 
 def _levels(
     image: ImageRows, kept: list[int], tile: int
-) -> tuple[list[Samples | ImageRows], list[Samples | ImageRows]]:
+) -> tuple[list[Samples | ImageRows], list[Samples | ImageRows], list[Samples | ImageRows]]:
     """The levels to store, coarsest first: those of one tile, the coarsest always among them, and
-    those of several. The image itself is not read into memory for it."""
+    those of several; then the finest to store and all finer ones. The image itself is not read
+    into memory for it."""
     sizes = level_sizes(image.width, image.height)
     pyramid = build_pyramid(image, min(sizes[kept[0]]))
     levels: list[Samples | ImageRows] = [pyramid[n - len(sizes)] for n in kept]
     tiled = [tile_counts(*sizes[n], tile) != (1, 1) for n in kept[1:]]
     single = len(kept) - sum(tiled)
-    return levels[:single], levels[single:]
-
-
-def _texels_of(level: Samples | ImageRows) -> int:
-    """How many texels there are, without a look at them."""
-    height, width = level.shape[:2]
-    return int(height * width)
+    return levels[:single], levels[single:], [*pyramid[kept[-1] - len(sizes) :]]
 
 
 def _whole(level: Samples | ImageRows) -> Samples:

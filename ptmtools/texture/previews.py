@@ -184,18 +184,19 @@ class Pyramid:
     Parameters
     ----------
     levels: (h, w, c) uint8, coarsest first; the coarsest is level 0.
+    finer: those of the image that follow, which the texture lacks.
     """
 
-    def __init__(self, levels: Sequence[Samples]) -> None:
+    def __init__(self, levels: Sequence[Samples], finer: Sequence[Samples] = ()) -> None:
         import numpy as np
 
-        from ptmtools.texture.detail import detail_of, difference_between, squares_between
+        from ptmtools.texture.detail import between, detail_of, mean_surplus, squares_between
 
         self.levels = levels
         pairs = list(zip(levels[1:], levels[:-1], strict=True))
         sizes = [level.shape[0] * level.shape[1] for level in levels]
-        between = ((difference_between(*pair), n) for pair, n in zip(pairs, sizes[1:], strict=True))
-        self.detail = detail_of(levels[0], between)
+        beyond = mean_surplus([levels[-1], *finer])
+        self.detail = detail_of(levels[0], (between(*pair) for pair in pairs), beyond)
         squares = [squares_between(*pair) / n for pair, n in zip(pairs, sizes[1:], strict=True)]
         #: Mean squares from the finest level.
         self.squares = [*np.cumsum(squares[::-1])[::-1].tolist(), 0.0]

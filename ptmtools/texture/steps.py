@@ -87,7 +87,7 @@ class _Encoding:
         height, width = self._texels.shape[:2]
         sizes, kept = level_sizes(width, height), kept_levels(width, height, options)
         levels = build_pyramid(in_eight_bits(self._texels), min(sizes[kept[0]]))
-        self._pyramid = Pyramid(levels[: len(kept)])
+        self._pyramid = Pyramid(levels[: len(kept)], levels[len(kept) :])
         #: Numbers in the complete pyramid of the kept levels, and of those that are always exact.
         self._kept = kept
         self._coarse = kept[: coarse_levels([max(sizes[n]) for n in kept])]

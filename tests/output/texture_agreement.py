@@ -19,8 +19,9 @@ from ptmtools.neighbours.apo.traversal import look_up
 from ptmtools.neighbours.interlace import deinterlace, read_manifest
 from ptmtools.neighbours.interlace.steps import scaled
 from ptmtools.output.gltf_reader import ReadGlb, ReadMaterial, ReadPrimitive
+from ptmtools.output.model import offsets_of
 from ptmtools.texture import load_image, read_header
-from ptmtools.texture.detail import Detail, detail_of, difference_between
+from ptmtools.texture.detail import Detail, between, detail_of
 from ptmtools.texture.reader import decode_levels
 from ptmtools.texture.samples import KINDS, in_eight_bits
 
@@ -39,7 +40,7 @@ def detail_of_levels(levels: Iterable[Any]) -> tuple[Detail, Any]:
     coarsest = finest = next(following)
     above = []
     for level in following:
-        above.append((difference_between(level, finest), level.shape[0] * level.shape[1]))
+        above.append(between(level, finest))
         finest = level
     return detail_of(coarsest, above), finest
 
@@ -72,6 +73,8 @@ def _texture(row: Mapping[str, Any], levels: Sequence[Any], www: Path) -> Iterat
         yield "differences"
     if row.get("color", list(detail.color)) != list(detail.color):
         yield "color"
+    if offsets_of(row) != list(detail.offsets):
+        yield "offsets"
     if row["fallback"] is not None:
         with suppress(OSError, PtmError, TypeError):
             image = load_image((www / unquote(row["fallback"])).read_bytes()).array()

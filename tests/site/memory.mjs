@@ -7,7 +7,8 @@ const [side, count] = process.argv.slice(2).map(Number);
 const gl = new Proxy({}, { get: (_, name) => (name === "createTexture" ? () => ({}) : () => {}) });
 const sizes = [];
 for (let size = 1; size <= side; size *= 2) sizes.push({ width: size, height: size });
-const rows = Array.from({ length: count }, () => ({ sizes, channels: 4 }));
+const offsets = sizes.map(() => 0);
+const rows = Array.from({ length: count }, () => ({ sizes, offsets, channels: 4 }));
 const decode = async (_, levels) => ({
   images: sizes.slice(0, levels).map(({ width, height }) => ({ width, height, data: new Uint8Array(0) })),
   loss: 0,

@@ -6,6 +6,7 @@ import io
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -69,6 +70,21 @@ def levels_of(texels: Texels) -> list[Texels]:
     return levels
 
 
+def brightened(texels: Texels, levels: Sequence[Texels]) -> list[Texels]:
+    """Levels of an image, the coarsest first, as bright as the image (docs/formats/hints.md)."""
+    colours = slice(texels.shape[2] - (texels.shape[2] in (2, 4)))
+    missing = [0.0]
+    for level, below in pairwise(levels_of(texels)[::-1]):
+        blocks = level[: 2 * below.shape[0], : 2 * below.shape[1], colours]
+        missing.insert(0, missing[0] + blocks.mean() - below[..., colours].mean())
+    result = []
+    for level, offset in zip(levels, missing, strict=False):
+        bright = level.astype(int)
+        bright[..., colours] += int(np.floor(offset + 0.5))
+        result.append(np.clip(bright, 0, 255).astype(np.uint8))
+    return result
+
+
 def saved(texels: Texels, preview: Preview) -> bytes:
     """The file of an image."""
     stream = io.BytesIO()
@@ -125,6 +141,7 @@ def _row(entries: dict[str, Entry], stem: str, texture: Texture) -> dict[str, An
         "ends": ends,
         "differences": list(detail.differences),
         "color": list(detail.color),
+        "offsets": list(detail.offsets),
         "previews": [],
     }
     for preview in texture.previews:

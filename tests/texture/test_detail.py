@@ -11,7 +11,7 @@ from hypothesis import given, strategies as st
 from numpy.typing import NDArray
 
 from ptmtools.texture import EncodeOptions, decode_levels, encode_to, read_header
-from ptmtools.texture.detail import Detail, difference_between
+from ptmtools.texture.detail import Detail, difference_between, with_offset
 from tests.output.texture_agreement import detail_of_levels
 
 TYPES = (np.uint8, np.uint16, np.float16, np.float32)
@@ -77,7 +77,14 @@ def test_tiles_errors_and_levels_left_out(options: dict[str, int], dtype: type) 
     detail, data = encoded(noise(83, 101, 3, dtype), **options)
     assert len(detail.differences) == len(read_header(data).levels)
     assert detail.differences == pytest.approx(by_definition(data), rel=5.1e-3)
-    assert detail_of_levels(decode_levels(data))[0] == detail
+    of_levels = detail_of_levels(decode_levels(data))[0]
+    assert of_levels.differences == detail.differences
+    if "tile" in options:
+        assert of_levels == detail
+        return
+    # What is left out counts.
+    whole, count = encoded(noise(83, 101, 3, dtype))[0].offsets, len(detail.offsets)
+    assert detail.offsets == (whole[-count:] if "min_side" in options else whole[:count])
 
 
 def test_alpha_is_no_colour() -> None:
@@ -89,12 +96,48 @@ def test_alpha_is_no_colour() -> None:
     assert encoded(image[..., :2])[0] == encoded(image[..., :1])[0]
 
 
+@given(st.integers(0, 5), st.integers(0, 5), st.integers(1, 4), st.integers(0))
+def test_with_its_offset_a_level_is_as_bright_as_the_finest(
+    high: int, wide: int, components: int, seed: int
+) -> None:
+    """Where each level has whole blocks of the next."""
+    detail, data = encoded(noise(1 << high, 1 << wide, components, np.uint8, seed) // 2)
+    colours = slice(components - (components in (2, 4)))
+    levels = list(decode_levels(data))
+    for level, offset in zip(levels, detail.offsets, strict=True):
+        seen = with_offset(level, offset)
+        missing = levels[-1][..., colours].mean() - seen[..., colours].mean()
+        assert abs(missing) <= 0.5 + 1e-9
+        assert (seen[..., components:] == level[..., components:]).all()
+
+
+def test_offsets_of_flat_deep_and_odd_images() -> None:
+    """A flat image loses nothing, 16 bits next to nothing; what odd sides leave out is no loss."""
+    assert encoded(np.full((64, 64, 3), 200, np.uint8))[0].offsets == (0,) * 7
+    assert not any(encoded(noise(64, 64, 3, np.uint16))[0].offsets)
+    assert not any(encoded(noise(64, 64, 3, np.float32))[0].offsets)
+    image = noise(65, 65, 3, np.uint8) // 2
+    image[64:], image[:, 64:] = 255, 255
+    assert encoded(image)[0].offsets == encoded(image[:64, :64])[0].offsets != (0,) * 7
+    alone = encoded(noise(64, 64, 1, np.uint8), tile=16)[0].offsets
+    assert alone == encoded(noise(64, 64, 1, np.uint8))[0].offsets
+
+
+def test_offsets_stay_within_a_byte_and_off_alpha() -> None:
+    level = np.array([[[250, 3, 254]]], np.uint8)
+    assert with_offset(level, 0) is level
+    assert with_offset(level, 3).tolist() == [[[253, 6, 255]]]
+    assert with_offset(level, -4).tolist() == [[[246, 0, 250]]]
+    assert with_offset(level[..., :2], 3).tolist() == [[[253, 3]]]
+
+
 def test_the_colour_is_that_of_the_coarsest_level() -> None:
     image = noise(64, 32, 3, np.uint8)
     detail, data = encoded(image)
     (first, *_) = decode_levels(data)
     assert first.shape == (2, 1, 3)
-    assert detail.color == tuple(np.floor(first.mean(axis=(0, 1)) + 0.5).astype(int))
+    exact = image.astype(float).mean(axis=(0, 1)).mean() - first.mean()
+    assert detail.color == tuple(np.floor(first.mean(axis=(0, 1)) + exact + 0.5).astype(int))
     assert encoded(np.full((4, 4, 1), 0x8080, np.uint16))[0].color == (128, 128, 128)
     assert encoded(np.full((4, 4, 3), (0, 0.5, 7), np.float32))[0].color == (0, 128, 255)
 

@@ -1,5 +1,5 @@
 // Exports of the package; see README.md.
 
-export { levelSizes } from "./levels.js";
+export { levelSizes, raised } from "./levels.js";
 export { Locator } from "./locating.js";
 export { cross, dot, facing, minus } from "./vectors.js";

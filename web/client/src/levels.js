@@ -15,3 +15,20 @@ export function levelSizes({ width, height, ends, previews }) {
     };
   });
 }
+
+/**
+ * The texels of a level as they are shown, with its offset added to the colours (docs/formats/hints.md):
+ * the same array where that is 0.
+ * @param {Uint8Array} texels
+ * @param {number} channels 1, 2 or 4; the second and the fourth are alpha
+ * @param {number} offset
+ * @returns {Uint8Array}
+ */
+export function raised(texels, channels, offset) {
+  if (!offset) return texels;
+  const result = new Uint8ClampedArray(texels), colours = channels - +(channels > 1);
+  for (let texel = 0; texel < result.length; texel += channels) {
+    for (let k = texel; k < texel + colours; k++) result[k] += offset;
+  }
+  return new Uint8Array(result.buffer);
+}

@@ -29,6 +29,7 @@ import { levelSizes } from "../../client/src/levels.js";
  * @property {number} gpuTexelBytes
  * @property {number[]} ends
  * @property {number[]} differences
+ * @property {number[]} [offsets]
  * @property {Preview[]} [previews]
  * @property {number[]} color
  *
@@ -130,15 +131,17 @@ export function fitting(index, side) {
     return {
       ...row, width: row.width >> beyond, height: row.height >> beyond, previews,
       ends: row.ends.slice(0, kept), differences: row.differences.slice(0, levels),
+      offsets: row.offsets?.slice(0, levels),
     };
   });
   return { ...index, textures };
 }
 
 /**
- * The sizes of a texture's levels, coarsest first, and the bytes of a texel on the GPU.
+ * The sizes and offsets of a texture's levels, coarsest first, and the bytes of a texel on the GPU.
  * @param {TextureRow} row
  */
 export function levelsOf(row) {
-  return { sizes: levelSizes(row), channels: row.gpuTexelBytes };
+  const sizes = levelSizes(row);
+  return { sizes, offsets: row.offsets ?? sizes.map(() => 0), channels: row.gpuTexelBytes };
 }

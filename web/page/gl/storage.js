@@ -2,6 +2,8 @@
 // whole pyramid would take all of its memory at once, and no level of it can be freed. So growing and
 // shrinking mean another storage.
 
+import { raised } from "../../client/src/levels.js";
+
 /** Bytes of one upload: a stripe of this size blocks for 7 ms at most, a whole level of 2048² for 137. */
 export const STRIPE = 256 << 10;
 /** Seconds in which a new level fades in. */
@@ -51,16 +53,17 @@ export class Storage {
    * @param {number} level
    * @param {Uint8Array} data all of the level
    * @param {number} row
+   * @param {number} offset of the level
    */
-  upload(level, data, row) {
+  upload(level, data, row, offset) {
     const { gl, channels } = this, { width, height } = this.sizes[level];
     const rows = Math.min(height - row, Math.max(1, Math.floor(STRIPE / (width * channels))));
+    const stripe = data.subarray(row * width * channels, (row + rows) * width * channels);
     gl.bindTexture(gl.TEXTURE_2D, this.texture);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     gl.texSubImage2D(
       gl.TEXTURE_2D, this.levels - 1 - level, 0, row, width, rows,
-      formats(gl, channels).outside, gl.UNSIGNED_BYTE,
-      data.subarray(row * width * channels, (row + rows) * width * channels),
+      formats(gl, channels).outside, gl.UNSIGNED_BYTE, raised(stripe, channels, offset),
     );
     return row + rows;
   }

@@ -16,6 +16,7 @@ import { Storage } from "./storage.js";
  * @typedef {object} Row
  * @property {{width: number, height: number}[]} sizes of its levels, coarsest first
  * @property {number} channels of a texel on the GPU
+ * @property {number[]} offsets of its levels
  *
  * The first levels of a texture.
  * @typedef {object} Decoded
@@ -210,6 +211,7 @@ export class TextureMemory {
    */
   #step(replacement, now) {
     const { texture, to, images, loss } = replacement, held = this.held[texture];
+    const { offsets } = this.rows[texture];
     if (!images || this.#underWay.get(texture) !== replacement) return false;
     const want = this.#want[texture], better = to === held && loss < this.loss[texture];
     // No longer wanted; more than wanted; or less than present and wanted.
@@ -226,8 +228,9 @@ export class TextureMemory {
       if (storage) this.#drop(replacement);
       return false;
     }
-    replacement.row = storage.upload(replacement.level, images[replacement.level].data, replacement.row);
-    if (replacement.row >= images[replacement.level].height) {
+    const { level, row } = replacement, { data, height } = images[level];
+    replacement.row = storage.upload(level, data, row, offsets[level]);
+    if (replacement.row >= height) {
       replacement.row = 0;
       replacement.level++;
     }

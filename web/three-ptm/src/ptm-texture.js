@@ -24,6 +24,7 @@ import {
   Vector2,
 } from "three";
 import { DecoderWorkers, HEAD_MAX, decodePreview, openPtm } from "ptm-decoder";
+import { raised } from "ptm-client";
 import { TEXEL_BYTES, pyramidBytes } from "./budget.js";
 import { RangeFile } from "./range-file.js";
 
@@ -46,6 +47,7 @@ import { RangeFile } from "./range-file.js";
  * @property {Preview[]} [previews] from the index, ascending by level: with `ends`, `sizes` and
  *   `components`
  * @property {{width: number, height: number}[]} [sizes] of all levels, coarsest first
+ * @property {number[]} [offsets] of the levels, from the index: what is added to their colours
  * @property {number} [components] of the texture: 2 and 4 have alpha
  * @property {number[]} [color] red, green, blue, 0 to 255: shown before the first level
  * @property {number} [wrapS] `RepeatWrapping` by default
@@ -393,8 +395,9 @@ export class PtmTexture extends DataTexture {
    * @param {number} mip
    * @param {AbortSignal} signal
    */
-  async #upload({ width, height, data }, next, mip, signal) {
-    const source = new DataTexture(data, width, height);
+  async #upload({ level, width, height, data }, next, mip, signal) {
+    const texels = raised(data, TEXEL_BYTES, this.#options.offsets?.[level] ?? 0);
+    const source = new DataTexture(texels, width, height);
     const rows = Math.max(Math.floor(STRIPE / (TEXEL_BYTES * width)), 1);
     let began = performance.now();
     for (let y = 0; y < height; y += rows) {

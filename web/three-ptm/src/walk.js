@@ -19,7 +19,7 @@ import { RangeFile } from "./range-file.js";
  * @property {{position: number[], direction: number[], fieldOfView: number, cell: number,
  *   description: string}[]} viewpoints
  * @property {{file: string, width: number, height: number, ends: number[], color?: number[],
- *   components?: number, previews?: {file: string, level: number, width: number, height: number,
+ *   components?: number, offsets?: number[], previews?: {file: string, level: number, width: number, height: number,
  *   bytes: number, exact?: boolean}[]}[]} textures
  * @property {{name: string, box: number[], record?: string, geometry?: string}[]} cells
  */
@@ -228,7 +228,7 @@ export class Walk {
    * @param {number} wrapT
    */
   #texture(number, wrapS, wrapT) {
-    const row = this.index.textures[number], { file, ends, color, components } = row;
+    const row = this.index.textures[number], { file, ends, color, components, offsets } = row;
     const slot = this.#textures.get(number) ?? {
       file: new RangeFile(new URL(file, this.#url)),
       copies: new Map(),
@@ -236,7 +236,8 @@ export class Walk {
     this.#textures.set(number, slot);
     const workers = this.#options.workers ?? this.#ownWorkers;
     const previews = row.previews?.map((one) => ({ ...one, file: new URL(one.file, this.#url) }));
-    const options = { workers, ends, color, components, previews, sizes: levelSizes(row), wrapS, wrapT };
+    const sizes = levelSizes(row);
+    const options = { workers, ends, color, components, offsets, previews, sizes, wrapS, wrapT };
     const texture =
       slot.copies.get(`${wrapS} ${wrapT}`) ?? new PtmTexture(this.#renderer, slot.file, options);
     slot.copies.set(`${wrapS} ${wrapT}`, texture);
