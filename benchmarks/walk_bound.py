@@ -3,7 +3,8 @@
 No client can show less error than the optimum. The program knows the walk, whose beginning it looks
 at once a second, and may load and show fractions: of every exact level, never more than of the
 level below; of every preview; of the geometry of every cell; never less than before, and no more
-bytes than the link has brought since two latencies after the start. The index, the records and the
+bytes than the link has brought since two latencies after the start, or since one if the walk begins
+with the opening of the site. The index, the records and the
 headers of requests are free. In every frame the shares of the states that a texture shows sum to 1
 at most, each within the share that is loaded, and take their share of texture memory. The error of
 a pair of cell and texture falls by the shares of the states that are shown on loaded geometry. The
@@ -37,8 +38,9 @@ from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.stage import Artifacts
 from ptmtools.quantities import parse_bandwidth, parse_memory
 
-#: Latencies before the first byte of geometry or textures: those of the index and of itself.
-ROUND_TRIPS = 2
+#: Latencies before the first byte of geometry or textures: those of the index and of itself; and
+#: with an opening.
+ROUND_TRIPS, WITH_OPENING = 2, 1
 CLIENTS = ("oracle", "best", "best-exact", "ach", "paper")
 
 
@@ -101,7 +103,8 @@ def bound(world: World, frames: Ints, link: Conditions, budget: int) -> float:
             if part in before:
                 program.below([before[part]], loaded[part])
         before = loaded
-        seconds = max(0.0, float(world.time[frame]) - ROUND_TRIPS * link.latency)
+        trips = WITH_OPENING if world.opening else ROUND_TRIPS
+        seconds = max(0.0, float(world.time[frame]) - trips * link.latency)
         arrived = link.bandwidth / 8 * seconds
         program.at_most([(loaded[part], size[part]) for part in size], arrived)
         shown = {t: _states(world, program, t, loaded) for t in textures}

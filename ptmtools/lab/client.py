@@ -232,8 +232,16 @@ class Client(ABC):
         """Requests a file up to a byte."""
         part, now = self.files[kind].ask(number, end), self.link.now
         browser = self.world.browser
-        late = {"late": browser.sent.until(now) - now} if browser else {}
-        self.waiting.append(self.link.request(part.end - part.begin, priority, part, **late))
+        late = browser.sent.until(now) - now if browser else 0.0
+        self.waiting.append(self.link.request(part.end - part.begin, priority, part, late))
+
+    def open(self) -> None:
+        """Requests the index and the opening, if there is one, at once."""
+        self.whole(Kind.INDEX, 0, math.inf)
+        parts = [self.files[Kind[kind.upper()]].ask(n, end) for kind, n, end in self.world.opening]
+        if parts:
+            (size, part), *rest = [(part.end, part) for part in parts]
+            self.waiting.append(self.link.request(size, math.inf, part, rest=tuple(rest)))
 
     def whole(self, kind: Kind, number: int, priority: float) -> bool:
         """Requests a file as a whole; returns False if it was requested before."""
@@ -258,6 +266,8 @@ class Client(ABC):
         """Handles a finished request."""
         assert isinstance(request.tag, Range)
         self.waiting.remove(request)
+        if request.following:
+            self.waiting.append(request.following)
         self.files[request.tag.kind].arrived(request.tag)
 
     def tick(self) -> None:  # noqa: B027 - most clients do nothing

@@ -48,6 +48,8 @@ class Request:
     ended: time of its end, s; None before.
     left: bytes still to arrive, headers included.
     starts: earliest arrival of its response, s.
+    rest: size and tag of each part of the response that follows this one.
+    following: the next part, once this one has ended.
     """
 
     size: int
@@ -62,6 +64,8 @@ class Request:
     ended: float | None = None
     left: float = math.nan
     starts: float = math.inf
+    rest: tuple[tuple[int, object], ...] = ()
+    following: Request | None = None
 
     def __post_init__(self) -> None:
         self.left = float(self.overhead + self.size)
@@ -70,6 +74,11 @@ class Request:
     def arrived(self) -> float:
         """Bytes that have arrived, headers included."""
         return self.overhead + self.size - self.left
+
+    @property
+    def outstanding(self) -> float:
+        """Bytes still to arrive, with those of all parts that follow."""
+        return self.left + sum(size for size, _ in self.rest)
 
     @property
     def received(self) -> float:
@@ -123,14 +132,21 @@ class Link:
         """Bytes so far of arriving requests: headers and bodies."""
         return sum(r.arrived for r in self._arriving)
 
-    def request(self, size: int, priority: float, tag: object = None, late: float = 0.0) -> Request:
+    def request(
+        self,
+        size: int,
+        priority: float,
+        tag: object = None,
+        late: float = 0.0,
+        rest: tuple[tuple[int, object], ...] = (),
+    ) -> Request:
         """Requests ``size`` bytes now, on a connection that it occupies ``late`` seconds before
-        sending; ValueError for a negative size."""
+        sending; ValueError for a negative size. ``rest``: sizes and tags of the further parts of
+        the response, each of which arrives, and ends, as a request of its own."""
         if size < 0:
             raise ValueError(f"a request of {size} bytes")
-        request = Request(
-            size, self.conditions.overhead, priority, tag, self.requests, self.now, late
-        )
+        overhead = self.conditions.overhead
+        request = Request(size, overhead, priority, tag, self.requests, self.now, late, rest=rest)
         self.requests += 1
         if self._shared:
             insort(self._queue, request, key=_rank)
@@ -208,7 +224,13 @@ class Link:
             request.first_byte = self.now
         self.bytes += request.size
         self.overhead_bytes += request.overhead
-        if self._shared:
+        if request.rest:
+            (size, tag), *rest = request.rest
+            more = Request(size, 0, request.priority, tag, request.number, request.issued)
+            more.rest = tuple(rest)
+            request.following = more
+            insort(self._arriving, more, key=_rank)
+        elif self._shared:
             self._free += 1
             self._connect()
         return request

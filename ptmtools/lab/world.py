@@ -16,6 +16,7 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.errors import InputError, LimitError
 from ptmtools.lab.catalogue import Catalogue, catalogue_of
 from ptmtools.lab.forms import FORMS, PTM
+from ptmtools.lab.opening import Parts, opening_of
 from ptmtools.lab.relief.tables import Relief
 from ptmtools.lab.tables import Views, look
 from ptmtools.output.served import Served
@@ -58,6 +59,8 @@ class World:
     still: (F,) whether the viewpoint has not moved for a second.
     rate: frames a second.
     one_range: whether a client requests one range of a file at a time, as browsers must.
+    opening: kind, number and end of each part of the opening of a site, if the walk begins where
+        that is made for (`ptmtools.lab.opening`).
     browser: conditions of a recording in a browser, or None. Times are then since navigation, and a
         frame has the view of the available item buffer.
     drawn: (F,) the frame in which that item buffer was drawn, -1 without one; None unless in a
@@ -85,6 +88,7 @@ class World:
     rate: float = RATE
     colored: bool = True
     one_range: bool = False
+    opening: Parts = ()
     browser: Browser | None = None
     drawn: Ints | None = None
     form: str = PTM
@@ -225,6 +229,7 @@ def prepare(
         )  # fmt: skip
     catalogue = catalogue_of(served, textures.differences, textures.mean)
     catalogue = catalogue.with_browser_sizes(browser) if browser else catalogue
+    opening = () if browser else opening_of(served, catalogue, eye[0], direction[0])
     world = World(
         served=served,
         pyramids=textures,
@@ -240,6 +245,7 @@ def prepare(
         still=_still(time, eye, direction),
         rate=rate,
         one_range=browser is not None,
+        opening=opening,
         browser=browser,
         drawn=drawn,
         relief=relief,

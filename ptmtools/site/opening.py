@@ -30,7 +30,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import accumulate
 from typing import Any
 
@@ -181,24 +181,32 @@ def ordered_steps(
     return [whole("record", cell, np.inf), whole("geometry", cell, np.inf), *steps]
 
 
+def contents_of(steps: Sequence[Step]) -> tuple[list[Step], list[int]]:
+    """The parts of the file, and the numbers of the previews that follow it."""
+    ends = {step.number: step.end for step in steps if step.kind == "texture"}
+    parts, later = [], []
+    for step in steps:
+        if step.kind == "preview" and step.bytes > SMALL:
+            later.append(step.number)
+        elif step.kind != "texture":
+            parts.append(step)
+        elif end := ends.pop(step.number, 0):
+            # The coarsest levels together, where the first of them has its place.
+            parts.append(replace(step, end=end, bytes=end))
+    return parts, later
+
+
 def packed_opening(steps: Sequence[Step], read: Callable[[str, int], bytes]) -> bytes:
     """The file; ``read`` returns the bytes of the file of a kind and number."""
-    ends = {step.number: step.end for step in steps if step.kind == "texture"}
-    parts, later, data = [], [], []
-    for step in steps:
-        body = b""
+    contents, later = contents_of(steps)
+    parts, data = [], []
+    for step in contents:
+        body = read(step.kind, step.number)
         if step.kind == "texture":
-            # The coarsest levels together, where the first of them has its place.
-            end = ends.pop(step.number, 0)
-            body = read(step.kind, step.number)[:end]
-        elif step.kind == "preview" and step.bytes > SMALL:
-            later.append(step.number)
-        elif step.kind == "preview":
-            body = read(step.kind, step.number)
-        else:
-            body = compressed(read(step.kind, step.number))
-        if body:
-            parts.append([step.kind, step.number, len(body)])
-            data.append(body)
+            body = body[: step.end]
+        elif step.kind != "preview":
+            body = compressed(body)
+        parts.append([step.kind, step.number, len(body)])
+        data.append(body)
     text = json.dumps({"parts": parts, "next": later}, separators=(",", ":")).encode()
     return b"".join([_LENGTH.pack(len(text)), text, *data])

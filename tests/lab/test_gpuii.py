@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -51,11 +52,10 @@ def walked(stock: Catalogue, budget: int = 1 << 30, seconds: float = 20) -> tupl
     def make(world: World, link: Link, budget: int) -> Client:
         ask = link.request
 
-        def request(size: int, priority: float, tag: object = None) -> Request:
-            assert isinstance(tag, Range)
+        def request(size: int, priority: float, tag: Any, *more: Any) -> Request:
             if tag.kind == Kind.TEXTURE:
                 asked.append(tag)
-            return ask(size, priority, tag)
+            return ask(size, priority, tag, *more)
 
         link.request = request  # type: ignore[method-assign]
         return GpuiiClient(world, link, budget)

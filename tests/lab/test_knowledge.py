@@ -37,8 +37,8 @@ def played(
     def make(world: World, link: Link, budget: int) -> Client:
         ask = link.request
 
-        def request(size: int, priority: float, tag: object = None) -> Request:
-            asked.append(ask(size, priority, tag))
+        def request(*given: Any, **more: Any) -> Request:
+            asked.append(ask(*given, **more))
             return asked[-1]
 
         link.request = request  # type: ignore[method-assign]

@@ -185,6 +185,27 @@ def test_the_seventh_waits_for_a_connection() -> None:
     assert low.sent == link.now
 
 
+@pytest.mark.parametrize("protocol", ["h1", "h2"])
+def test_a_response_of_several_parts_is_one_request(protocol: str) -> None:
+    """Its parts end one after the other, as if each were alone; headers and latency come once."""
+    link = Link(Conditions(MEGABIT, 0.1, 300, protocol, connections=1))
+    first = link.request(700, 1, "a", rest=((1000, "b"), (2000, "c")))
+    other = link.request(1000, 0, "d")
+    assert first.outstanding == 4000
+    part, ends = first, list[tuple[object, float]]()
+    while part:
+        finished = link.advance(10)
+        assert finished is part
+        ends.append((finished.tag, finished.ended))
+        part = part.following
+    assert [tag for tag, _ in ends] == ["a", "b", "c"]
+    assert [end for _, end in ends] == pytest.approx([0.108, 0.116, 0.132])
+    # Its connection is free only then.
+    assert link.advance(10) is other
+    assert other.ended == pytest.approx(0.132 + (0.1 if protocol == "h1" else 0) + 0.0104)
+    assert (link.requests, link.bytes, link.overhead_bytes) == (2, 4700, 600)
+
+
 def test_h2_serves_the_highest_priority() -> None:
     link = Link(Conditions(MEGABIT, 0.1, 0, "h2"))
     low, high = link.request(12_500, 1.0), link.request(12_500, 2.0)

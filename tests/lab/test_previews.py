@@ -279,7 +279,7 @@ def test_exact_levels_that_suffice_stay() -> None:
 def test_a_client_that_knows_no_previews(seed: int) -> None:
     """Sees a world without them: the same run as where there are none."""
     world = any_world(seed, previews=True)
-    bare = replace(world, catalogue=world.catalogue.without_previews)
+    bare = replace(world, catalogue=world.catalogue.without_previews, opening=())
     conditions, budget = Conditions(2e4, 0.05), int(world.catalogue.whole // 2)
     for ours, theirs in (("best-exact", "best"), ("ach", "ach"), ("paper", "paper")):
         one = simulate(world, POLICIES[ours], conditions, budget)

@@ -14,6 +14,7 @@ from hypothesis import Phase, given, settings, strategies as st
 from ptmtools.arrays import Floats, Ints
 from ptmtools.lab.client import Client, Kind, Range
 from ptmtools.lab.network import Link, Request
+from ptmtools.lab.opening import opening_of
 from ptmtools.lab.policies import POLICIES
 from ptmtools.lab.policies.whole_files import LruClient
 from ptmtools.lab.simulation import Run, simulate
@@ -37,7 +38,7 @@ class Witness:
 
     def __init__(self, world: World, policy: str, conditions: Conditions, budget: int) -> None:
         world = for_policy(world, policy)
-        self.world, self.asked, self.frames = world, list[Request](), 0
+        self.world, self.requests, self.frames = world, list[Request](), 0
         self.run = simulate(
             world, replace(POLICIES[policy], client=self._watched(policy)), conditions, budget
         )
@@ -47,9 +48,9 @@ class Witness:
             self.client, self.link = POLICIES[policy].client(world, link, budget), link
             ask, look = link.request, self.client.look
 
-            def request(size: int, priority: float, tag: object = None) -> Request:
-                self.asked.append(ask(size, priority, tag))
-                return self.asked[-1]
+            def request(*given: Any, **more: Any) -> Request:
+                self.requests.append(ask(*given, **more))
+                return self.requests[-1]
 
             def watched(frame: int) -> None:
                 look(frame)
@@ -60,6 +61,17 @@ class Witness:
             return self.client
 
         return make
+
+    @property
+    def asked(self) -> list[Request]:
+        """The requests, and the parts of their responses that have begun since."""
+        parts = []
+        for request in self.requests:
+            part: Request | None = request
+            while part:
+                parts.append(part)
+                part = part.following
+        return parts
 
     def _check(self, frame: int) -> None:
         stock, client = self.world.catalogue, self.client
@@ -104,7 +116,7 @@ def test_what_no_client_may_do(policy: str, seed: int, conditions: Conditions, b
     known = run.body - arriving + run.overhead
     assert math.isclose(link.carried, known + link.partial, abs_tol=1e-6)
     assert math.isclose(run.body, sum(r.received for r in seen.asked))
-    assert run.requests == len(seen.asked)
+    assert run.requests == len(seen.requests)
     assert (np.diff(run.fetched) >= 0).all()
     assert run.fetched[-1] == run.body
     assert run.useful <= run.body + 1e-6
@@ -183,12 +195,14 @@ def test_all_come_to_the_same_without_limits(seed: int, protocol: str) -> None:
 @settings(max_examples=5, phases=PHASES)
 @given(SEEDS)
 def test_nothing_comes_before_it_can(policy: str, seed: int) -> None:
-    """The index takes a latency, the record and the geometry one more, textures a third."""
+    """The index takes a latency, the record and the geometry one more, textures a third; those of
+    an opening come with the index."""
     world = for_policy(any_world(seed), policy)
     run = simulate(world, POLICIES[policy], Conditions(None, latency=0.5), 1 << 40)
-    early = run.time < 1.0
+    opened = bool(POLICIES[policy].previews and world.opening)
+    early = run.time < (0.5 if opened else 1.0)
     assert run.error[early] == pytest.approx(of_nothing(world)[early])
-    assert not run.column[run.time < 1.5].any()
+    assert not run.column[run.time < (0.5 if opened else 1.5)].any()
     assert run.stalls >= early.sum()
 
 
@@ -253,3 +267,49 @@ def test_who_stands_sees_no_worse(seed: int) -> None:
 def of_nothing(world: World) -> Floats:
     """(F,) the error of each frame with nothing there."""
     return np.array([world.views.error[world.views.rows(int(v)), 0].sum() for v in world.view])
+
+
+def test_an_opening_brings_the_first_view_after_one_latency() -> None:
+    """What it has is not requested again, and what it lacks follows."""
+    textures = [raw(8), raw(16)]
+    stock = catalogue(textures, [(0, 0), (0, 1)])
+    ends = stock.ends
+    opening = (
+        ("record", 0, int(stock.record_bytes[0])),
+        ("geometry", 0, int(stock.geometry_bytes[0])),
+        ("texture", 0, int(ends[0, -1])),
+        ("texture", 1, int(ends[1, 2])),
+    )
+    link = Conditions(None, 0.5)
+    bare = replace(for_policy(standing(stock, 5), "best"), opening=())
+    without = simulate(bare, POLICIES["best"], link, 1 << 40)
+    run = simulate(replace(bare, opening=opening), POLICIES["best"], link, 1 << 40)
+    assert run.body == without.body
+    assert run.overhead == 300 * run.requests
+    # The index, the opening, and the rest of a texture.
+    assert run.requests == 3 < without.requests
+    first = int(run.column.any(axis=1).argmax())
+    assert run.time[first] == pytest.approx(0.6)
+    assert run.column[first].tolist() == [4, 2]
+    assert not without.column[without.time < 1.4].any()
+    assert run.column[-1].tolist() == without.column[-1].tolist() == [4, 5]
+
+
+def test_only_a_walk_from_the_viewpoint_has_the_opening(world: World) -> None:
+    served, stock = world.served, world.catalogue
+    view = served.index["viewpoints"][0]
+    eye, direction = (np.array(view[name]) for name in ("position", "direction"))
+    parts = opening_of(served, stock, eye + 0.2, direction)
+    kinds = [kind for kind, _, _ in parts]
+    assert kinds[:2] == ["record", "geometry"]
+    assert {"texture", "preview"} & {*kinds}
+    assert [number for _, number, _ in parts[:2]] == [view["cell"]] * 2
+    for kind, number, end in parts:
+        size = {
+            "record": stock.record_bytes, "geometry": stock.geometry_bytes,
+            "texture": stock.ends[:, -1], "preview": stock.previews.bytes,
+        }[kind][number]  # fmt: skip
+        assert 0 < end <= size
+        assert kind == "texture" or end == size
+    assert opening_of(served, stock, eye + 2, direction) == ()
+    assert opening_of(served, stock, eye, -direction) == ()

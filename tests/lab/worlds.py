@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.lab.catalogue import Catalogue, Shapes
+from ptmtools.lab.opening import Parts
 from ptmtools.lab.policies import POLICIES
 from ptmtools.lab.previews import AVERAGING, LEAST, previews_of
 from ptmtools.lab.tables import Views
@@ -310,7 +311,22 @@ def any_world(seed: int, frames: int = 25, *, previews: bool = False) -> World:
     yaw = np.cumsum(np.where(moves, random.normal(0, 0.5, frames), 0))
     eye = np.stack([x, np.full(frames, 1.6), np.full(frames, 2.0)], axis=1)
     direction = np.stack([np.cos(yaw), np.zeros(frames), np.sin(yaw)], axis=1)
-    return world(stock, eye, direction, random)
+    walked = world(stock, eye, direction, random)
+    return replace(walked, opening=_any_opening(random, stock, int(walked.cell[0])))
+
+
+def _any_opening(random: np.random.Generator, stock: Catalogue, cell: int) -> Parts:
+    """An opening of a cell, in half of the worlds."""
+    if random.random() < 0.5:
+        return ()
+    others = [c for c in range(stock.cell_count) if c != cell and random.random() < 0.5]
+    parts: list[tuple[str, int, int]] = [("record", cell, int(stock.record_bytes[cell]))]
+    parts += [("geometry", c, int(stock.geometry_bytes[c])) for c in (cell, *others)]
+    for t in np.flatnonzero(random.random(stock.texture_count) < 0.5).tolist():
+        parts.append(("texture", t, int(stock.ends[t, random.integers(1, stock.stored[t] + 1)])))
+    for p in np.flatnonzero(random.random(len(stock.previews.bytes)) < 0.5).tolist():
+        parts.append(("preview", p, int(stock.previews.bytes[p])))
+    return tuple(parts)
 
 
 def _any_previews(random: np.random.Generator, texture: Texture) -> Texture:

@@ -36,7 +36,8 @@ class PolicyEntry:
     options: its own options, if any; see `configured`.
     needs: a field that the records of cells must have, and how to get it; None: no optional field.
     form: form of its textures, a name in `ptmtools.lab.forms.FORMS`.
-    previews: whether its clients show previews; those of others have the `.ptm`s only.
+    previews: whether its clients show previews, and begin with the opening of the site; those of
+        others have the `.ptm`s only.
     """
 
     name: str
@@ -59,7 +60,7 @@ class PolicyEntry:
         world = world.in_form(self.form)
         if self.previews:
             return world
-        return replace(world, catalogue=world.catalogue.without_previews)
+        return replace(world, catalogue=world.catalogue.without_previews, opening=())
 
     def limits(self, world: World, budget: int) -> Ints:
         """(F,) bytes of texture memory that a client with a budget may use in each frame."""

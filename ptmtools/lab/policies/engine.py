@@ -287,14 +287,16 @@ class EngineClient(Client):
         """Whether the link would run dry before a later request could be answered."""
         if len(self.waiting) >= CONNECTIONS:
             return False
-        left = sum(request.left for request in self.waiting)
+        left = sum(request.outstanding for request in self.waiting)
         ahead = self.estimate.latency + RANGE_SECONDS / 2
         return left == 0 or 8 * left < ahead * self.estimate.bandwidth
 
     def _fetch_one(self) -> bool:
         """Requests the range of the greatest worth; False if there is none."""
+        if not self.files[Kind.INDEX].asked[0]:
+            self.open()
         if not self.index:
-            return self.whole(Kind.INDEX, 0, math.inf)
+            return False
         if self._statistics and self.whole(Kind.STATISTICS, 0, math.inf):
             return True
         here = int(self.world.cell[self.frame])
