@@ -397,9 +397,9 @@ def _summary(n: Mapping[str, Any]) -> str:
 TEXTURES: Stage[None] = Stage(
     name="textures",
     about="Encode the model's images as progressive textures.",
-    recipe=5,
+    recipe=6,
     changed="previews of the levels are written, lossy images are kept as they are, and the error "
-    "of each level is recorded",
+    "and the offset of each level are recorded",
     options=TextureOptions,
     reads=lambda options: (SCENE, APO, CELLS, PVS) if options.trim else (SCENE,),
     inputs=_inputs,
