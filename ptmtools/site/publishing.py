@@ -33,7 +33,7 @@ from ptmtools.files import (
 from ptmtools.options import option
 from ptmtools.output.emission import compressed
 from ptmtools.progress import Progress, silent
-from ptmtools.site.content import DATA, DIGITS, INDEX, Entry, Site, link_bytes
+from ptmtools.site.content import DATA, INDEX, Entry, Site, link_bytes
 from ptmtools.store.folder import damaged, unreadable
 from ptmtools.store.layout import sha256
 
@@ -180,12 +180,12 @@ def _headers(entries: Iterable[Entry]) -> bytes:
 
 
 def _digest(entry: Entry) -> str:
-    """The SHA-256 of an entry, whose name must contain it."""
+    """The SHA-256 of an entry, which must be the recorded one, if there is one."""
     if isinstance(entry.source, bytes):
         return sha256(entry.source)
     with _reading(entry.source):
         digest = _file_digest(entry.source)
-    if entry.forever and f"-{digest[:DIGITS]}." not in entry.name:
+    if entry.digest and digest != entry.digest:
         raise damaged(entry.source, "its SHA-256 is not the recorded one")
     return digest
 

@@ -93,9 +93,10 @@ class Witness:
         self.answers.append(answer)
 
     def walk(self, conditions: Conditions) -> None:
-        """Walks through the world, as a browser has to ask for ranges."""
+        """Walks through the world, as a browser has to ask for ranges; without an opening, of which
+        the viewer's client knows nothing: its `Stream` receives it."""
         simulate(
-            replace(self.world, one_range=True),
+            replace(self.world, one_range=True, opening=()),
             replace(POLICIES[self.policy], client=self.client),
             conditions,
             self.budget,
