@@ -18,7 +18,8 @@ longer is computed from the run over the next faster link, for pages that ask fo
 same order whatever the link is: its bytes take as much longer, and nothing else changes.
 
 Runs are kept (``results.py``): stopped and started again, the benchmark continues. Tables are
-printed scene by scene. ``--common`` measures the walk page, too, from three.js's full picture.
+printed scene by scene, and at the end one with the walk page beside the best of the rivals, by
+scene and link. ``--common`` measures the walk page, too, from three.js's full picture.
 ``--round-trips`` prints instead by how many round trips a longer way of `WAYS` delays each goal,
 over the fastest link; ``--memory``, FLIP in so much texture memory (``memory.py``).
 """
@@ -55,7 +56,14 @@ from benchmarks.web_rivals.entrants import (  # noqa: E402
 )
 from benchmarks.web_rivals.nginx import HTTP, Certificate, certificate  # noqa: E402
 from benchmarks.web_rivals.results import Conditions, kept  # noqa: E402
-from benchmarks.web_rivals.tables import memory_table, round_trips_table, times_table  # noqa: E402
+from benchmarks.web_rivals.tables import (  # noqa: E402
+    Reached,
+    goals_of,
+    memory_table,
+    round_trips_table,
+    summary_table,
+    times_table,
+)
 from benchmarks.web_rivals.timeline import (  # noqa: E402
     Picture,
     Timeline,
@@ -134,6 +142,7 @@ def main() -> None:
     throttles = [Throttle(bandwidth, parse_duration(given.rtt)) for bandwidth in links]
     if given.round_trips:
         throttles = [Throttle(links[0], way) for way in WAYS]
+    summary: dict[str, Mapping[str, Mapping[str, Reached]]] = {}
     for scene in given.scene.split(","):
         database = database_in(scene)
         if given.memory:
@@ -145,7 +154,10 @@ def main() -> None:
         with certificate() as own, chromium(own) as browser:
             desk = Desk(browser, own, given.repeats, given.patience)
             exact = None if given.common else given.reference or database
-            print_scene(desk, database, names, throttles, given.http.split(","), exact)
+            protocols = given.http.split(",")
+            summary |= print_scene(desk, database, names, throttles, protocols, exact)
+    if summary and WALK in names and not {*names} <= {*WALKS}:
+        print(f"\n{summary_table(summary)}")
 
 
 def database_in(scene: str) -> Path:
@@ -170,8 +182,10 @@ def print_scene(
     links: Sequence[Throttle],
     protocols: Sequence[str],
     exact: Path | None,
-) -> None:
-    """The tables of one scene, a link and a protocol each; ``exact``: see `full_pictures`."""
+) -> dict[str, Mapping[str, Mapping[str, Reached]]]:
+    """Prints the tables of one scene, a link and a protocol each; ``exact``: see `full_pictures`.
+    Returns what each page reached, by link and protocol."""
+    summary: dict[str, Mapping[str, Mapping[str, Reached]]] = {}
     subject = subject_of(database)
     names = [name for name in names if name != SOURCE or subject.source]
     entrants = [
@@ -192,14 +206,17 @@ def print_scene(
         for k, link in enumerate(links):
             title = f"{database.stem}, {(link.bandwidth or 0) / 1e6:g} Mbit/s, "
             title += f"{1000 * link.latency:.0f} ms, HTTP/{http}, {desk.repeats} runs"
-            table = times_table({name: rows[k] for name, rows in runs.items()}, full)
-            print(f"\n{title}\n\n{table}", flush=True)
+            of_link = {name: rows[k] for name, rows in runs.items()}
+            print(f"\n{title}\n\n{times_table(of_link, full)}", flush=True)
+            short = f"{database.stem}, {(link.bandwidth or 0) / 1e6:g} Mbit/s, HTTP/{http}"
+            summary[short] = {name: goals_of(rows, full[name]) for name, rows in of_link.items()}
     if exact is None:
         print("\nAll from three.js's full picture.")
-        return
+        return summary
     two = {name in WALKS: picture for name, picture in full.items()}
     if len(two) == 2:
         print(f"\nThe two renderers' full pictures differ by {difference(*two.values()):.4f}.")
+    return summary
 
 
 def full_pictures(

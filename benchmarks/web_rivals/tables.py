@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from statistics import median
 
-from benchmarks.web_rivals.entrants import WALK
+from benchmarks.web_rivals.entrants import WALK, WALKS
 from benchmarks.web_rivals.memory import Held
 from benchmarks.web_rivals.timeline import Picture, Timeline, difference
 
@@ -53,6 +53,31 @@ def round_trips_table(
                 trips = (long[0] - short[0]) / (ways[1] - ways[0])
             cells.append("–" if math.isnan(trips) else f"{trips:.1f}")
         lines.append(f"| {name} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def summary_table(runs: Mapping[str, Mapping[str, Mapping[str, Reached]]]) -> str:
+    """A line for each scene and link: when the walk page reaches each goal, and the best of the
+    rivals. ``runs``: by scene and link, and by page, see `goals_of`."""
+    heads = [head for goal in GOALS for head in (f"{WALK} {goal}", "best rival")]
+    lines = [f"| | {' | '.join(heads)} |", "|---" + "|--:" * len(heads) + "|"]
+    for title, pages in runs.items():
+        cells = []
+        for goal in GOALS:
+            ours = pages[WALK][goal]
+            cells.append("–" if ours is None else f"{ours[0]:.1f} s, {ours[1] / 1e6:.2f} MB")
+            rivals = [
+                (reached[goal] or (math.inf, 0.0), name)
+                for name, reached in pages.items()
+                if name not in WALKS
+            ]
+            (seconds, sent), name = min(rivals)
+            if seconds == math.inf:
+                cells.append("–")
+                continue
+            times = f" ({seconds / ours[0]:.1f} ×)" if ours else ""
+            cells.append(f"{name} {seconds:.1f} s, {sent / 1e6:.2f} MB{times}")
+        lines.append(f"| {title} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
