@@ -47,9 +47,13 @@ export class Stream {
    * @param {import("./net/opening.js").Opening | null} parts.opening
    * @param {Decoders} parts.decoders
    * @param {() => boolean} parts.rests whether to make no more requests
+   * @param {(present: Float64Array) => void} parts.expect receives the columns of textures that the first view
+   *   probably wants
    * @param {(error: PageError, kind: string, number: number) => void} parts.report
    */
-  constructor({ site, index, client, locator, estimate, fetcher, opening, decoders, rests, report }) {
+  constructor({
+    site, index, client, locator, estimate, fetcher, opening, decoders, rests, expect, report,
+  }) {
     this.site = site;
     this.client = client;
     this.locator = locator;
@@ -59,25 +63,38 @@ export class Stream {
     this.workers = decoders.workers;
     this.geometry = decoders.geometry;
     this.rests = rests;
+    this.expect = expect;
     this.report = report;
     this.files = site.index.textures.map((row) => new TextureFile(row, this.workers));
     this.previews = previewsOf(index, site.index, this.workers);
     this.#follow();
   }
 
-  /** Requests the previews that the view of the opening needs next. */
+  /**
+   * Requests all parts of the opening, in their order, and the previews that its view needs next. Until the
+   * view itself tells, their textures are expected in it, those of the first parts the most.
+   */
   async #follow() {
-    const { client: { downloads }, fetcher, opening } = this;
+    const { client: { catalogue: { T, K }, downloads }, fetcher, opening } = this;
     if (!opening) return;
     fetcher.requests++;
-    const next = await opening.next;
-    fetcher.bytes += opening.bytes;
-    next.map((number) => this.previews.findIndex(({ place }) => place === number))
-      .forEach((number, order) => {
-        if (number >= 0 && !this.rests() && downloads.free("preview", number)) {
-          this.ask(downloads.ask("preview", number, -order));
-        }
-      });
+    opening.over.then(() => (fetcher.bytes += opening.bytes));
+    const next = await opening.next, present = new Float64Array(T * K);
+    /** @type {[import("./policy/downloads.js").Kind, number, number | undefined][]} */
+    const steps = opening.parts.map(([kind, number, size]) =>
+      [kind, number, kind === "texture" ? size : undefined]);
+    next.forEach((number) => steps.push(["preview", number, undefined]));
+    steps.forEach(([kind, place, end], order) => {
+      const preview = kind === "preview";
+      const number = preview ? this.previews.findIndex((file) => file.place === place) : place;
+      if (number < 0 || this.rests() || !downloads.free(kind, number)) return;
+      this.ask(downloads.ask(kind, number, steps.length - order, end));
+      if (!preview) return;
+      const { texture, row: { level } } = this.previews[number];
+      const first = texture * K + 1, share = present[first] || 1 / (2 + order);
+      present.fill(share, first, first + level + 1);
+    });
+    this.expect(present);
   }
 
   /**

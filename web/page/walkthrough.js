@@ -26,8 +26,11 @@ import { Stillness } from "./walk/stillness.js";
 const ITEM_EVERY = 0.1, LOOK_EVERY = 0.2;
 /** Seconds between pictures while the visitor stands, and of rest until then. */
 const PAINT_EVERY = 0.05, RESTING = 0.4;
-/** Seconds of a frame for uploads, and for geometry that comes into view. */
-const UPLOAD_TIME = 0.004, GEOMETRY_TIME = 0.004;
+/**
+ * Seconds of a frame for uploads, and as much for geometry that comes into view: on a slow machine a share
+ * of the last frame, which takes as long again, up to a limit.
+ */
+const BRINGING = 0.004, BRINGING_SHARE = 0.25, BRINGING_MOST = 0.03;
 /** Largest vertical field of view on a narrow screen, radians. */
 const TALLEST = 1.4;
 /** @typedef {import("./gl/camera.js").Pose} Pose */
@@ -105,6 +108,9 @@ export class Walkthrough {
       decoders: options.decoders,
       opening: options.opening,
       rests: () => this.#rests,
+      expect: (present) => {
+        if (this.#sightDrawn < 0) this.#see({ present, hidden: new Float64Array(this.catalogue.C) });
+      },
       report: (error, kind, number) => this.#report(error, kind, number),
     });
     this.rows = index.textures.map(levelsOf);
@@ -195,20 +201,23 @@ export class Walkthrough {
   frame(pose) {
     const now = clock(), { gl } = this;
     if (gl.isContextLost()) return;
+    // Before anything is uploaded: reading waits for what was begun before it.
+    this.#read();
     this.locate(pose);
     const { stillness } = this;
     if (stillness.takes(pose, now)) this.touch();
     if (this.sharpness.settle(now - this.#before, now - stillness.moved < RESTING)) this.touch();
+    const time = Math.max(BRINGING, Math.min(BRINGING_SHARE * (now - this.#before), BRINGING_MOST));
     this.#before = now;
     const frustum = frustumOf(pose, this.tall, this.aspect);
-    this.#bring(now + GEOMETRY_TIME);
+    this.#bring(now + time);
     this.#cull(frustum);
-    const until = clock() + UPLOAD_TIME, late = () => clock() > until;
+    const until = clock() + time, late = () => clock() > until;
     if (this.memory.pump(now, late) || this.comparison?.memory.pump(now, late)) this.touch();
-    this.#read();
     if (this.stream.news || now - this.#looked >= LOOK_EVERY) this.#look(now, frustum, stillness.lasts(now));
     const camera = cameraOf(pose, this.tall, this.aspect, this.far);
-    const waits = stillness.moved < this.#painted && now - this.#painted < PAINT_EVERY;
+    const waits = stillness.moved < this.#painted
+      && (now - this.#painted < PAINT_EVERY || this.items?.busy);
     if (this.#changed > this.#painted && !waits) this.#paint(camera, now);
     if (this.#changed > this.#itemDrawn && now - this.#itemDrawn >= ITEM_EVERY) {
       this.#drawItems(camera, now);
@@ -332,9 +341,14 @@ export class Walkthrough {
   #read() {
     const reading = this.items?.poll();
     if (!reading) return;
-    this.#sight = sightOf(reading, this.catalogue);
     this.#sightDrawn = reading.drawn;
-    this.client.sees(this.#sight.present, this.#sight.hidden);
+    this.#see(sightOf(reading, this.catalogue));
+  }
+
+  /** @param {import("./policy/sight.js").Sight} sight */
+  #see(sight) {
+    this.#sight = sight;
+    this.client.sees(sight.present, sight.hidden);
   }
 
   /**

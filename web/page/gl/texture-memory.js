@@ -148,6 +148,15 @@ export class TextureMemory {
     return this.held[t] > 0 && this.held[t] === this.#want[t] && this.#loss[t] < this.loss[t];
   }
 
+  /**
+   * Shrinking makes room, anything is better than a colour alone, more levels are better than better ones.
+   * @param {number} t
+   */
+  #urgency(t) {
+    const held = this.held[t], want = this.#want[t];
+    return want < held ? 2 : held === 0 ? 1 : want > held ? 0 : -1;
+  }
+
   /** Decodes the most urgent textures, as long as decoders are free. */
   #next() {
     const { held } = this, want = this.#want, priority = this.#priority;
@@ -159,7 +168,7 @@ export class TextureMemory {
       const next = this.#best(
         (t) => want[t] > 0 && !this.#underWay.has(t)
           && (want[t] < held[t] || (all && (want[t] > held[t] || this.#improves(t)))),
-        (t) => priority[t] + (want[t] < held[t] ? 1 : want[t] > held[t] ? 0 : -1),
+        (t) => priority[t] + this.#urgency(t),
       );
       if (next < 0) return;
       const replacement = new Replacement(next, want[next]);
@@ -196,7 +205,9 @@ export class TextureMemory {
    */
   pump(now, late) {
     let done = false;
-    for (const replacement of [...this.#underWay.values()]) {
+    const urgent = [...this.#underWay.values()];
+    urgent.sort((a, b) => this.#urgency(b.texture) - this.#urgency(a.texture));
+    for (const replacement of urgent) {
       while (!late() && this.#step(replacement, now)) done = true;
       if (late()) break;
     }

@@ -67,24 +67,23 @@ export class Opening {
   #waiting = new Map();
   /** @type {Map<string, Promise<Bytes | null>>} */
   #coming = new Map();
-  #contents;
 
   /** @param {string} url */
   constructor(url) {
     this.url = url;
     const arriving = this.#open(url);
-    this.#contents = arriving.catch(() => {});
-    /** The previews that the view needs next, once all parts are here. @type {Promise<number[]>} */
-    this.next = arriving
-      .then(async ({ bytes, next }) => {
+    /** The previews that the view needs next, once all parts are known. @type {Promise<number[]>} */
+    this.next = arriving.then(({ next }) => next, () => []);
+    /** Resolved when all parts are here, or no more will come. @type {Promise<void>} */
+    this.over = arriving
+      .then(async ({ bytes }) => {
         for (const [kind, number, size] of this.parts) {
           const part = await bytes.take(size);
           this.bytes = bytes.count;
           this.#waiting.get(kind + number)?.(PACKED.includes(kind) ? await unpacked(part) : part);
         }
-        return next;
       })
-      .catch(() => [])
+      .catch(() => {})
       .finally(() => this.#waiting.forEach((come) => come(null)));
   }
 
@@ -109,7 +108,7 @@ export class Opening {
    * @param {number} number
    */
   async take(kind, number) {
-    await this.#contents;
+    await this.next;
     return (await this.#coming.get(kind + number)) ?? null;
   }
 }
