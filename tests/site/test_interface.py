@@ -320,9 +320,8 @@ def test_loading(chromium: Any) -> None:
         page.evaluate("fake.emit('progress', {stage: 'The first room', loaded: 30, total: 120})")
         assert page.get_by_role("progressbar", name="The first room").evaluate("e => e.value") == 30
         page.evaluate("fake.emit('first-picture')")
-        page.wait_for_timeout(600)
-        assert not page.locator("#poster").is_visible()
-        assert not page.locator("#progress").is_visible()
+        page.locator("#poster").wait_for(state="hidden")
+        page.locator("#progress").wait_for(state="hidden")
 
 
 def test_errors_and_notices(desk: Any) -> None:

@@ -25,7 +25,7 @@ export function beginningOf(walk) {
       loaded: parts + (room ? 0 : STEPS * share / total),
       total: 2 + STEPS,
     },
-    // Without the room there is no picture.
-    over: parts === 2 && ((!room && share >= ENOUGH * total) || walk.complete),
+    // Without the room there is no picture; an item buffer says that it has been drawn.
+    over: parts === 2 && walk.bufferAge !== null && ((!room && share >= ENOUGH * total) || walk.complete),
   };
 }

@@ -17,7 +17,6 @@ import { EXACT, NO_SOURCE } from "./policy/downloads.js";
 
 /** Seconds until a failed file is requested again. */
 const REST = 10;
-const CONNECTIONS = 6;
 
 export class Stream {
   /** @type {Map<number, CellRecord>} */
@@ -117,7 +116,7 @@ export class Stream {
   }
 
   /**
-   * As many requests are on the way as browsers have connections to a host, the most urgent ones.
+   * As many requests are on the way as the protocol takes at a time, the most urgent ones.
    * @param {Request} request
    */
   ask(request) {
@@ -128,7 +127,7 @@ export class Stream {
   #send() {
     // Requests that pause before another try take no connection.
     const busy = () => [...this.#sent].filter(({ waits }) => !waits).length;
-    while (busy() < CONNECTIONS && this.#queue.length) {
+    while (busy() < this.estimate.lanes && this.#queue.length) {
       const { priority } = this.#queue.reduce((a, b) => (b.priority > a.priority ? b : a));
       const first = this.#queue.findIndex((request) => request.priority === priority);
       const [request] = this.#queue.splice(first, 1);

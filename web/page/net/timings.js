@@ -28,6 +28,7 @@ export function watchLink(estimate, fetcher) {
       // Skips cached files, and those of other origins, which may hide their sizes.
       if (!entry.transferSize || !entry.responseStart) continue;
       const { requestStart, responseStart, responseEnd, encodedBodySize } = entry;
+      if (entry.nextHopProtocol) estimate.protocol = entry.nextHopProtocol;
       take(requestStart / 1000, responseStart / 1000, responseEnd / 1000, encodedBodySize);
     }
   };

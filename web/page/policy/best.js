@@ -16,7 +16,6 @@ import { meetsBox } from "../space/frustum.js";
 // Seconds of the link that a range takes, and its least bytes.
 export const RANGE_SECONDS = 0.2;
 export const RANGE_BYTES = 8000;
-const CONNECTIONS = 6;
 // The most bytes that waiting counts for, on links without a limit.
 const LONGEST_WAIT = 2 ** 20;
 // Worth of the record of a neighbouring cell, as a share of the screen.
@@ -39,7 +38,7 @@ export function room(estimate, waiting) {
     count += +!request.waits;
   }
   const ahead = estimate.latency + RANGE_SECONDS / 2;
-  return count < CONNECTIONS && (left === 0 || 8 * left < ahead * estimate.bandwidth);
+  return count < estimate.lanes && (left === 0 || 8 * left < ahead * estimate.bandwidth);
 }
 
 /**
@@ -47,8 +46,8 @@ export function room(estimate, waiting) {
  * brought while it waits. So a fast link requests more levels at once.
  * @param {Belief} estimate
  */
-function overheadOf({ latency, bandwidth }) {
-  const waiting = latency > 0 ? latency * bandwidth / 8 / CONNECTIONS : 0;
+function overheadOf({ latency, bandwidth, lanes }) {
+  const waiting = latency > 0 ? latency * bandwidth / 8 / lanes : 0;
   return OVERHEAD + Math.floor(Math.min(waiting, LONGEST_WAIT));
 }
 

@@ -8,7 +8,11 @@
  * @typedef {object} Belief
  * @property {number} bandwidth bit/s
  * @property {number} latency s from a request to its first byte
+ * @property {number} lanes requests at a time
  */
+
+/** Requests at a time: connections of a browser to a host; one connection of HTTP/2 or 3 takes more. */
+const CONNECTIONS = 6, STREAMS = 24;
 
 // Half-life of bytes, in seconds during which bytes arrive.
 const HALF_LIFE = 1;
@@ -31,9 +35,15 @@ export class Estimate {
   #seen = 0;
   #ended = -Infinity;
 
-  /** @param {Belief} prior */
+  /** @param {{bandwidth: number, latency: number}} prior */
   constructor(prior = { bandwidth: 1e6, latency: 0.1 }) {
     this.#prior = prior;
+    this.lanes = CONNECTIONS;
+  }
+
+  /** @param {string} name of the protocol, as browsers report it */
+  set protocol(name) {
+    this.lanes = /^h[23]/.test(name) ? STREAMS : CONNECTIONS;
   }
 
   /** A request goes out. @param {unknown} id @param {number} now s */
@@ -86,7 +96,7 @@ export class Estimate {
 
 /**
  * Seconds that a request of `size` bytes takes if it has the link for itself.
- * @param {Belief} estimate
+ * @param {{bandwidth: number, latency: number}} estimate
  * @param {number} size
  */
 export function duration({ bandwidth, latency }, size) {
