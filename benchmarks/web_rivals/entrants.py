@@ -22,8 +22,8 @@ exact. Each renderer draws its own, once and over a fast link: three.js from ``g
 page from the site of a database with all exact levels. So a page is charged for texels and geometry
 that differ, not for the filters, the order of blending or the edges in which two renderers differ;
 a common renderer would charge all others for those. By how much the two full pictures differ is
-printed with each table (0.048 in the museum, most of it because levels of a `.ptm` are means that
-are rounded down), and ``--common`` measures all from the picture of three.js.
+printed with each table (0.017 in the museum), and ``--common`` measures all from the picture of
+three.js.
 """
 
 from __future__ import annotations
