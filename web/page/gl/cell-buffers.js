@@ -25,6 +25,8 @@
 
 /** Vertices and indices that are packed without a pause. */
 const AT_ONCE = 1 << 14;
+/** The most indices of a batch: what lies outside of the view is not drawn, in one large hall, too. */
+const MOST = 3 << 11;
 
 /**
  * Packs shapes by their looks, step by step: a million triangles take longer than a frame.
@@ -69,17 +71,32 @@ export function* pack(shapes) {
         data[width * vertex + 4] = uvs[2 * k + 1];
       }
     }
-    const factor = group[0].factor;
-    batches.push({
-      look: group[0],
-      first: first * index.BYTES_PER_ELEMENT,
-      count: at - first,
-      color: [...factor.slice(0, 3).map(encoded), factor[3]],
-      low: [0, 1, 2].map((k) => Math.min(...group.map(({ low }) => low[k]))),
-      high: [0, 1, 2].map((k) => Math.max(...group.map(({ high }) => high[k]))),
-    });
+    const [look] = group, color = [...look.factor.slice(0, 3).map(encoded), look.factor[3]];
+    for (let from = first; from < at; from += MOST) {
+      const part = index.subarray(from, Math.min(from + MOST, at));
+      const box = boxOf(part, data, width);
+      batches.push({ look, first: from * index.BYTES_PER_ELEMENT, count: part.length, color, ...box });
+      yield;
+    }
   }
   return { data, painted, index, batches };
+}
+
+/**
+ * The corners of the box of some vertices.
+ * @param {Uint16Array | Uint32Array} index
+ * @param {Float32Array} data
+ * @param {number} width numbers of a vertex
+ */
+function boxOf(index, data, width) {
+  const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+  for (let k = 0; k < index.length; k++) {
+    for (let n = 0, at = width * index[k]; n < 3; n++, at++) {
+      if (data[at] < low[n]) low[n] = data[at];
+      if (data[at] > high[n]) high[n] = data[at];
+    }
+  }
+  return { low, high };
 }
 
 export class CellBuffers {
