@@ -28,7 +28,8 @@ def opening_of(served: Served, catalogue: Catalogue, eye: Floats, direction: Flo
     eye, direction: (3,)
     """
     views = served.index["viewpoints"]
-    if not views:
+    # Databases of earlier releases have no site.
+    if not views or any("differences" not in row for row in served.index["textures"]):
         return ()
     view = views[0]
     away = np.linalg.norm(eye - np.array(view["position"]))

@@ -101,8 +101,10 @@ def sizes_of(row: Mapping[str, Any]) -> list[tuple[int, int]]:
 
 
 def offsets_of(row: Mapping[str, Any]) -> list[int]:
-    """What clients add to the colours of each level of a row of `textures`, coarsest first."""
-    return list(row.get("offsets") or [0] * len(sizes_of(row)))
+    """What clients add to the colours of each level of a row of `textures`, coarsest first; 0 for
+    levels without."""
+    offsets, count = row.get("offsets", ()), len(sizes_of(row))
+    return [*offsets[:count], *([0] * (count - len(offsets)))]
 
 
 @dataclass(frozen=True)

@@ -387,7 +387,9 @@ class _Builder:
         """Adds a file of the data; returns its URL relative to the index. ``digest``: of a file;
         ``mark``: what its name has of that instead."""
         digest = sha256(source) if isinstance(source, bytes) else digest
-        name = f"{_STRANGE.sub('_', stem)[:64]}-{(mark or digest)[:DIGITS]}{suffix}"
+        # Names with a mark differ in their ends.
+        own = _STRANGE.sub("_", stem)[: None if mark else 64]
+        name = f"{own}-{(mark or digest)[:DIGITS]}{suffix}"
         state = state_of(source.stat()) if isinstance(source, Path) else None
         entry = Entry(f"{DATA}/{name}", source, media, True, compressed, state, digest)
         self._entries[entry.name] = entry

@@ -11,7 +11,7 @@ from typing import Any
 
 from ptmtools.errors import InputError, naming
 from ptmtools.files import open_regular
-from ptmtools.output.model import sizes_of
+from ptmtools.output.model import offsets_of, sizes_of
 from ptmtools.store.folder import damaged, unreadable
 
 #: Textures that the page decodes.
@@ -103,13 +103,16 @@ def _encoded_again(file: Path, row: Mapping[str, Any]) -> Texture:
     detail = encode_to(buffer, texels, options)
     data = buffer.getvalue()
     components = int(row["components"])
+    # Of the levels that are not stored, the row knows more.
+    kept = len(row["ends"])
+    beyond = offsets_of(row)[kept - 1]
     changed = {
         "texelBytes": components,
         "gpuTexelBytes": gpu_texel_bytes(components, components),
         "ends": [level.end for level in read_header(data).levels],
-        "differences": list(detail.differences),
-        "color": list(detail.color),
-        "offsets": list(detail.offsets),
+        "differences": [*detail.differences, *row["differences"][kept:]],
+        "color": [min(255, max(0, value + beyond)) for value in detail.color],
+        "offsets": [*(n + beyond for n in detail.offsets), *offsets_of(row)[kept:]],
     }
     note = f"{file.name} was {before}, which browsers do not read: encoded again as fast, 8 bits"
     return Texture({**row, **changed}, data, note)

@@ -312,4 +312,10 @@ def test_only_a_walk_from_the_viewpoint_has_the_opening(world: World) -> None:
         assert 0 < end <= size
         assert kind == "texture" or end == size
     assert opening_of(served, stock, eye + 2, direction) == ()
+    # A database of an earlier release has no site.
+    rows = [
+        {k: v for k, v in row.items() if k != "differences"} for row in served.index["textures"]
+    ]
+    old = replace(served, index={**served.index, "textures": rows})
+    assert opening_of(old, stock, eye, direction) == ()
     assert opening_of(served, stock, eye, -direction) == ()

@@ -50,6 +50,13 @@ const functions = {
       return [estimate.bandwidth, estimate.latency, duration(estimate, size)];
     });
   },
+  lanes({ protocols }) {
+    return protocols.map((protocol) => {
+      const estimate = new Estimate();
+      estimate.protocol = protocol;
+      return estimate.lanes;
+    });
+  },
   catalogue({ index }) {
     const { levels, T, C, K, whole: all, previews, ...tables } = catalogueOf(index);
     const lists = (some) => Object.entries(some).map(([name, table]) => [name, [...table]]);

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -361,3 +362,29 @@ def test_the_papers_client(visit: Callable[..., Any], kinds: Site) -> None:
         asked = {v.path for v in visitor.visits}
     assert not any(path.startswith("/data/t0-") for path in asked)
     assert any(path.startswith("/data/t1-") for path in asked)
+
+
+def test_long_names_of_previews_differ(tmp_path: Path) -> None:
+    """All previews of a texture have one hash, so their names must differ in their ends."""
+    # Grey shades, of which even small previews are worth while.
+    shades = np.add.outer(np.arange(256), np.arange(256)) // 2
+    image = np.repeat(shades[..., None], 3, axis=2).astype(np.uint8) + noise(3, 256) // 16
+    name = "painting" * 8
+    doc = Gltf()
+    doc.tree["images"] = [
+        {"bufferView": doc.view(png(image)), "mimeType": "image/png", "name": name}
+    ]
+    doc.tree["textures"] = [{"source": 0}]
+    doc.tree["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]
+    corners = np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)]) * SIZE
+    doc.place(*(_primitive(doc, corners[quad], 0) for quad in QUADS))
+    doc.tree["scenes"] = [{"nodes": [0]}]
+    (tmp_path / "room.glb").write_bytes(doc.glb())
+    database = build(tmp_path / "room.glb", tmp_path / "room.db", "--preview", "60")
+    site = site_of(database, PLAIN)
+    rows = site.index["textures"][0]["previews"]
+    files = [row["file"] for row in rows]
+    assert len({*files}) == len(files) > 1
+    assert [len(site.entries[f"data/{file}"].read()) for file in files] == [
+        row["bytes"] for row in rows
+    ]

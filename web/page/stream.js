@@ -66,12 +66,12 @@ export class Stream {
     this.report = report;
     this.files = site.index.textures.map((row) => new TextureFile(row, this.workers));
     this.previews = previewsOf(index, site.index, this.workers);
-    this.#follow();
+    this.#follow().catch(() => {});
   }
 
   /**
    * Requests all parts of the opening, in their order, and the previews that its view needs next. Until the
-   * view itself tells, their textures are expected in it, those of the first parts the most.
+   * view itself tells, the textures of its previews are expected in it, those of the first the most.
    */
   async #follow() {
     const { client: { catalogue: { T, K }, downloads }, fetcher, opening } = this;
@@ -86,7 +86,8 @@ export class Stream {
     steps.forEach(([kind, place, end], order) => {
       const preview = kind === "preview";
       const number = preview ? this.previews.findIndex((file) => file.place === place) : place;
-      if (number < 0 || this.rests() || !downloads.free(kind, number)) return;
+      const later = order >= opening.parts.length;
+      if (number < 0 || (later && this.rests()) || !downloads.free(kind, number)) return;
       this.ask(downloads.ask(kind, number, steps.length - order, end));
       if (!preview) return;
       const { texture, row: { level } } = this.previews[number];

@@ -63,6 +63,11 @@ export class Walkthrough {
   /** @type {import("./policy/sight.js").Sight | null} */
   #sight = null;
   #sightDrawn = -1;
+  /** Whether the last item buffer has geometry, and whether one did that has been read. */
+  #drew = false;
+  #shown = false;
+  /** The columns that the opening's view wants, until then. @type {Float64Array | null} */
+  #expected = null;
   /** @type {number[]} */
   #frames = [];
 
@@ -109,7 +114,9 @@ export class Walkthrough {
       opening: options.opening,
       rests: () => this.#rests,
       expect: (present) => {
-        if (this.#sightDrawn < 0) this.#see({ present, hidden: new Float64Array(this.catalogue.C) });
+        if (this.#shown) return;
+        this.#expected = present;
+        this.#see(this.#sight ?? { present, hidden: new Float64Array(this.catalogue.C) });
       },
       report: (error, kind, number) => this.#report(error, kind, number),
     });
@@ -324,6 +331,7 @@ export class Walkthrough {
   #drawItems(camera, now) {
     if (!this.items || this.items.busy) return;
     this.#itemDrawn = now;
+    this.#drew = this.drawn.length > 0;
     const { cells, textures } = this.index;
     this.items.draw({
       camera,
@@ -342,13 +350,20 @@ export class Walkthrough {
     const reading = this.items?.poll();
     if (!reading) return;
     this.#sightDrawn = reading.drawn;
+    this.#shown ||= this.#drew;
+    if (this.#shown) this.#expected = null;
     this.#see(sightOf(reading, this.catalogue));
   }
 
   /** @param {import("./policy/sight.js").Sight} sight */
-  #see(sight) {
-    this.#sight = sight;
-    this.client.sees(sight.present, sight.hidden);
+  #see({ present, hidden }) {
+    this.#sight = { present: this.#expected ?? present, hidden };
+    this.client.sees(this.#sight.present, hidden);
+  }
+
+  /** Whether the view is only expected: no item buffer has shown geometry. */
+  get expects() {
+    return this.#expected !== null;
   }
 
   /**

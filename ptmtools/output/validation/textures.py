@@ -98,8 +98,9 @@ def check_record(
             at.add("PTM-D704", f"{name} does not match the file, which has {value}")
     sizes = [(level.width, level.height) for level in header.levels]
     sizes += sizes_of(record)[len(sizes) :]
-    if "differences" in record and len(record["differences"]) != len(sizes):
-        at.add("PTM-D704", "differences do not match the levels")
+    for name in ("differences", "offsets"):
+        if name in record and len(record[name]) != len(sizes):
+            at.add("PTM-D704", f"{name} do not match the levels")
     _check_previews(record, sizes, pictures.previews, at)
     _check_fallback(record, sizes, pictures.fallback, at)
 

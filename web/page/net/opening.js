@@ -94,11 +94,11 @@ export class Opening {
     const bytes = new Arriving(/** @type {ReadableStream<Bytes>} */ (body));
     const length = new DataView((await bytes.take(4)).buffer).getUint32(0, true);
     const { parts, next } = JSON.parse(new TextDecoder().decode(await bytes.take(length)));
-    this.parts = parts;
-    for (const [kind, number] of this.parts) {
+    for (const [kind, number] of parts) {
       const key = kind + number;
       this.#coming.set(key, new Promise((come) => this.#waiting.set(key, come)));
     }
+    this.parts = parts;
     return { bytes, next };
   }
 
