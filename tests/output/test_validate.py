@@ -452,6 +452,8 @@ FAULTS: list[tuple[str, Damage]] = [
     ("D704", hinted(lambda d: d["textures"][0].update(gpuTexelBytes=3))),
     ("D704 texture", hinted(lambda d: d["textures"][0]["differences"].pop())),
     ("texture", hinted(lambda d: d["textures"][0]["differences"].sort(reverse=True))),
+    ("D704 texture", hinted(lambda d: d["textures"][0].update(offsets=[1]))),
+    ("D700", hinted(lambda d: d["textures"][0].update(offsets=[256]))),
     ("texture", hinted(lambda d: d["textures"][1]["color"].reverse())),
     ("D700", hinted(lambda d: d["textures"][1]["color"].__setitem__(0, 256))),
     ("D700", hinted(lambda d: d["textures"][1]["differences"].__setitem__(1, -1))),

@@ -19,7 +19,6 @@ from ptmtools.neighbours.apo.traversal import look_up
 from ptmtools.neighbours.interlace import deinterlace, read_manifest
 from ptmtools.neighbours.interlace.steps import scaled
 from ptmtools.output.gltf_reader import ReadGlb, ReadMaterial, ReadPrimitive
-from ptmtools.output.model import offsets_of
 from ptmtools.texture import load_image, read_header
 from ptmtools.texture.detail import Detail, between, detail_of
 from ptmtools.texture.reader import decode_levels
@@ -73,7 +72,7 @@ def _texture(row: Mapping[str, Any], levels: Sequence[Any], www: Path) -> Iterat
         yield "differences"
     if row.get("color", list(detail.color)) != list(detail.color):
         yield "color"
-    if offsets_of(row) != list(detail.offsets):
+    if row.get("offsets", [0] * len(levels)) != list(detail.offsets):
         yield "offsets"
     if row["fallback"] is not None:
         with suppress(OSError, PtmError, TypeError):
