@@ -50,11 +50,11 @@ const functions = {
       return [estimate.bandwidth, estimate.latency, duration(estimate, size)];
     });
   },
-  lanes({ protocols }) {
+  concurrency({ protocols }) {
     return protocols.map((protocol) => {
       const estimate = new Estimate();
       estimate.protocol = protocol;
-      return estimate.lanes;
+      return estimate.concurrency;
     });
   },
   catalogue({ index }) {

@@ -13,7 +13,7 @@ const { catalogue, records, shapes, policy, seed, view } =
 const stock = catalogueFrom(catalogue), { T, C, K } = stock;
 const client = new Client(stock, { budget: stock.whole, policy: POLICIES[policy] });
 const frustum = frustumOf({ eye: [1, 1.6, 2], yaw: -Math.PI / 2, pitch: 0 }, ...view);
-const estimate = { bandwidth: 1e5, latency: 0.1, lanes: 6 };
+const estimate = { bandwidth: 1e5, latency: 0.1, concurrency: 6 };
 let state = 1e6 * seed;
 const random = () => (state = (state * 48271) % 2147483647) / 2147483647;
 

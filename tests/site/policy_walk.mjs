@@ -32,7 +32,7 @@ const acts = {
   fetch({ bandwidth, latency, left }) {
     for (const [number, bytes] of left) if (asked[number]) asked[number].left = bytes;
     const found = [];
-    for (let request; (request = client.next({ bandwidth, latency, lanes: 6 })); asked.push(request)) {
+    for (let request; (request = client.next({ bandwidth, latency, concurrency: 6 })); asked.push(request)) {
       const { kind, number, begin, end, priority } = request;
       found.push([kind, number, begin, end, priority]);
     }

@@ -16,7 +16,7 @@ from ptmtools.lab.allocation import allocate, next_fetch
 from ptmtools.lab.catalogue import catalogue_of
 from ptmtools.lab.client import PRIOR, Estimate
 from ptmtools.lab.network import Link, Request
-from ptmtools.lab.policies.engine import LANES
+from ptmtools.lab.policies.engine import CONCURRENCY
 from ptmtools.lab.policies.paper_kernels import refresh, share_out
 from ptmtools.lab.previews import Previews, previews_of
 from ptmtools.lab.world import World
@@ -215,8 +215,8 @@ def test_the_catalogue_of_an_index(tmp_path: Path, world: World) -> None:
 def test_requests_at_a_time(tmp_path: Path) -> None:
     """As many as the protocol takes; one that browsers do not name is the old one."""
     protocols = ["", "http/1.1", "h2", "h3"]
-    assert called(tmp_path, [("lanes", {"protocols": protocols})])[0] == [6, 6, 24, 24]
-    assert LANES == {"h1": 6, "h2": 24}
+    assert called(tmp_path, [("concurrency", {"protocols": protocols})])[0] == [6, 6, 24, 24]
+    assert CONCURRENCY == {"h1": 6, "h2": 24}
 
 
 @EACH

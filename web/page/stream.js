@@ -128,7 +128,7 @@ export class Stream {
   #send() {
     // Requests that pause before another try take no connection.
     const busy = () => [...this.#sent].filter(({ waits }) => !waits).length;
-    while (busy() < this.estimate.lanes && this.#queue.length) {
+    while (busy() < this.estimate.concurrency && this.#queue.length) {
       const { priority } = this.#queue.reduce((a, b) => (b.priority > a.priority ? b : a));
       const first = this.#queue.findIndex((request) => request.priority === priority);
       const [request] = this.#queue.splice(first, 1);

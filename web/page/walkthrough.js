@@ -30,7 +30,7 @@ const PAINT_EVERY = 0.05, RESTING = 0.4;
  * Seconds of a frame for uploads, and as much for geometry that comes into view: on a slow machine a share
  * of the last frame, which takes as long again, up to a limit.
  */
-const BRINGING = 0.004, BRINGING_SHARE = 0.25, BRINGING_MOST = 0.03;
+const UPLOAD_TIME = 0.004, UPLOAD_SHARE = 0.25, UPLOAD_MOST = 0.03;
 /** Largest vertical field of view on a narrow screen, radians. */
 const TALLEST = 1.4;
 /** @typedef {import("./gl/camera.js").Pose} Pose */
@@ -63,7 +63,7 @@ export class Walkthrough {
   /** @type {import("./policy/sight.js").Sight | null} */
   #sight = null;
   #sightDrawn = -1;
-  /** Whether the last item buffer has geometry, and whether one did that has been read. */
+  /** Whether the last item buffer has the room, and whether one that has it was read. */
   #drew = false;
   #shown = false;
   /** The columns that the opening's view wants, until then. @type {Float64Array | null} */
@@ -214,7 +214,7 @@ export class Walkthrough {
     const { stillness } = this;
     if (stillness.takes(pose, now)) this.touch();
     if (this.sharpness.settle(now - this.#before, now - stillness.moved < RESTING)) this.touch();
-    const time = Math.max(BRINGING, Math.min(BRINGING_SHARE * (now - this.#before), BRINGING_MOST));
+    const time = Math.max(UPLOAD_TIME, Math.min(UPLOAD_SHARE * (now - this.#before), UPLOAD_MOST));
     this.#before = now;
     const frustum = frustumOf(pose, this.tall, this.aspect);
     this.#bring(now + time);
@@ -331,7 +331,7 @@ export class Walkthrough {
   #drawItems(camera, now) {
     if (!this.items || this.items.busy) return;
     this.#itemDrawn = now;
-    this.#drew = this.drawn.length > 0;
+    this.#drew = this.cell < 0 || this.renderer?.cells.has(this.cell) === true;
     const { cells, textures } = this.index;
     this.items.draw({
       camera,
@@ -361,7 +361,7 @@ export class Walkthrough {
     this.client.sees(this.#sight.present, hidden);
   }
 
-  /** Whether the view is only expected: no item buffer has shown geometry. */
+  /** Whether the view is only expected: no item buffer has had the room. */
   get expects() {
     return this.#expected !== null;
   }

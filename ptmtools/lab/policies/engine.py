@@ -103,7 +103,7 @@ class ItemBuffers:
 RANGE_SECONDS, RANGE_BYTES = 0.2, 8000
 #: Requests at a time: connections of a browser to a host; one connection of HTTP/2 takes more.
 CONNECTIONS = 6
-LANES = {"h1": CONNECTIONS, "h2": 24}
+CONCURRENCY = {"h1": CONNECTIONS, "h2": 24}
 #: Bytes of the headers of a request, and the greatest cost of waiting, bytes, on links without a
 #: limit.
 OVERHEAD, LONGEST_WAIT = 300, 1 << 20
@@ -152,7 +152,7 @@ class EngineClient(Client):
     ) -> None:
         super().__init__(world, link, budget)
         self._policy, self._statistics = policy, statistics
-        self._lanes = LANES[link.conditions.protocol]
+        self._concurrency = CONCURRENCY[link.conditions.protocol]
         stock = world.catalogue
         self._target: Ints = np.zeros(stock.texture_count, np.int64)
         self._kept = np.zeros(stock.gains.shape)
@@ -287,7 +287,7 @@ class EngineClient(Client):
 
     def _room(self) -> bool:
         """Whether the link would run dry before a later request could be answered."""
-        if len(self.waiting) >= self._lanes:
+        if len(self.waiting) >= self._concurrency:
             return False
         left = sum(request.outstanding for request in self.waiting)
         ahead = self.estimate.latency + RANGE_SECONDS / 2
@@ -345,7 +345,7 @@ class EngineClient(Client):
         """Overhead of a request, bytes: headers, and the bytes that its connection could bring
         while it waits. On a fast link a request thus covers more levels."""
         latency, bandwidth = self.estimate.latency, self.estimate.bandwidth
-        waiting = latency * bandwidth / 8 / self._lanes if latency else 0.0
+        waiting = latency * bandwidth / 8 / self._concurrency if latency else 0.0
         return OVERHEAD + int(min(waiting, LONGEST_WAIT))
 
     def _range(self, texture: int, end: int, priority: float) -> bool:

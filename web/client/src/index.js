@@ -1,5 +1,5 @@
 // Exports of the package; see README.md.
 
-export { levelSizes, raised } from "./levels.js";
+export { levelSizes, withOffset } from "./levels.js";
 export { Locator } from "./locating.js";
 export { cross, dot, facing, minus } from "./vectors.js";

@@ -24,7 +24,7 @@ export function levelSizes({ width, height, ends, previews }) {
  * @param {number} offset
  * @returns {Uint8Array}
  */
-export function raised(texels, channels, offset) {
+export function withOffset(texels, channels, offset) {
   if (!offset) return texels;
   const result = new Uint8ClampedArray(texels), colours = channels - +(channels > 1);
   for (let texel = 0; texel < result.length; texel += channels) {

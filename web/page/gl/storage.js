@@ -2,7 +2,7 @@
 // whole pyramid would take all of its memory at once, and no level of it can be freed. So growing and
 // shrinking mean another storage.
 
-import { raised } from "../../client/src/levels.js";
+import { withOffset } from "../../client/src/levels.js";
 
 /** Bytes of one upload: a stripe of this size blocks for 7 ms at most, a whole level of 2048² for 137. */
 export const STRIPE = 256 << 10;
@@ -63,7 +63,7 @@ export class Storage {
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     gl.texSubImage2D(
       gl.TEXTURE_2D, this.levels - 1 - level, 0, row, width, rows,
-      formats(gl, channels).outside, gl.UNSIGNED_BYTE, raised(stripe, channels, offset),
+      formats(gl, channels).outside, gl.UNSIGNED_BYTE, withOffset(stripe, channels, offset),
     );
     return row + rows;
   }

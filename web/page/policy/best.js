@@ -38,7 +38,7 @@ export function room(estimate, waiting) {
     count += +!request.waits;
   }
   const ahead = estimate.latency + RANGE_SECONDS / 2;
-  return count < estimate.lanes && (left === 0 || 8 * left < ahead * estimate.bandwidth);
+  return count < estimate.concurrency && (left === 0 || 8 * left < ahead * estimate.bandwidth);
 }
 
 /**
@@ -46,8 +46,8 @@ export function room(estimate, waiting) {
  * brought while it waits. So a fast link requests more levels at once.
  * @param {Belief} estimate
  */
-function overheadOf({ latency, bandwidth, lanes }) {
-  const waiting = latency > 0 ? latency * bandwidth / 8 / lanes : 0;
+function overheadOf({ latency, bandwidth, concurrency }) {
+  const waiting = latency > 0 ? latency * bandwidth / 8 / concurrency : 0;
   return OVERHEAD + Math.floor(Math.min(waiting, LONGEST_WAIT));
 }
 

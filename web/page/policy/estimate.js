@@ -8,7 +8,7 @@
  * @typedef {object} Belief
  * @property {number} bandwidth bit/s
  * @property {number} latency s from a request to its first byte
- * @property {number} lanes requests at a time
+ * @property {number} concurrency requests at a time
  */
 
 /** Requests at a time: connections of a browser to a host; one connection of HTTP/2 or 3 takes more. */
@@ -38,12 +38,12 @@ export class Estimate {
   /** @param {{bandwidth: number, latency: number}} prior */
   constructor(prior = { bandwidth: 1e6, latency: 0.1 }) {
     this.#prior = prior;
-    this.lanes = CONNECTIONS;
+    this.concurrency = CONNECTIONS;
   }
 
   /** @param {string} name of the protocol, as browsers report it */
   set protocol(name) {
-    this.lanes = /^h[23]/.test(name) ? STREAMS : CONNECTIONS;
+    this.concurrency = /^h[23]/.test(name) ? STREAMS : CONNECTIONS;
   }
 
   /** A request goes out. @param {unknown} id @param {number} now s */

@@ -24,7 +24,7 @@ import {
   Vector2,
 } from "three";
 import { DecoderWorkers, HEAD_MAX, decodePreview, openPtm } from "ptm-decoder";
-import { raised } from "ptm-client";
+import { withOffset } from "ptm-client";
 import { TEXEL_BYTES, pyramidBytes } from "./budget.js";
 import { RangeFile } from "./range-file.js";
 
@@ -396,7 +396,7 @@ export class PtmTexture extends DataTexture {
    * @param {AbortSignal} signal
    */
   async #upload({ level, width, height, data }, next, mip, signal) {
-    const texels = raised(data, TEXEL_BYTES, this.#options.offsets?.[level] ?? 0);
+    const texels = withOffset(data, TEXEL_BYTES, this.#options.offsets?.[level] ?? 0);
     const source = new DataTexture(texels, width, height);
     const rows = Math.max(Math.floor(STRIPE / (TEXEL_BYTES * width)), 1);
     let began = performance.now();

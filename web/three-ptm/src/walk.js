@@ -19,8 +19,8 @@ import { RangeFile } from "./range-file.js";
  * @property {{position: number[], direction: number[], fieldOfView: number, cell: number,
  *   description: string}[]} viewpoints
  * @property {{file: string, width: number, height: number, ends: number[], color?: number[],
- *   components?: number, offsets?: number[], previews?: {file: string, level: number, width: number, height: number,
- *   bytes: number, exact?: boolean}[]}[]} textures
+ *   components?: number, offsets?: number[], previews?: {file: string, level: number, width: number,
+ *   height: number, bytes: number, exact?: boolean}[]}[]} textures
  * @property {{name: string, box: number[], record?: string, geometry?: string}[]} cells
  */
 
