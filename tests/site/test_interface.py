@@ -42,6 +42,8 @@ def held(page: Any, *keys: str, milliseconds: int = 300) -> tuple[Pose, Pose]:
     for key in keys:
         page.keyboard.down(key)
     page.wait_for_timeout(milliseconds)
+    # Of a busy machine, too, a few frames have seen them.
+    page.evaluate("async () => { for (let k = 5; k--;) await new Promise(requestAnimationFrame); }")
     for key in reversed(keys):
         page.keyboard.up(key)
     page.wait_for_timeout(150)

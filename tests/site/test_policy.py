@@ -199,6 +199,37 @@ def test_what_is_believed_of_a_link(
         assert actual == pytest.approx(wanted)
 
 
+def test_a_queue_is_no_latency(tmp_path: Path) -> None:
+    """Responses that come one after the other, as over HTTP/2, in packets of 30 ms: the link was
+    busy between them, and only the first one tells how long the way is."""
+    calls: list[list[Any]] = []
+    ways = [(k, 0.0, 0.2 + 0.03 * k) for k in range(40)]
+    ways += [(k, 0.2 + 0.03 * (k - 40), 0.2 + 0.03 * k) for k in range(40, 400)]
+    for k, sent, came in ways:
+        calls += [["sent", k, sent], ["firstByte", k, came], ["bytes", came, 2000]]
+        calls.append(["finished", k, came])
+    believed = called(tmp_path, [("estimate", {"calls": calls, "size": 0})])[0]
+    for k in (150, 250, 399):
+        bandwidth, latency, _ = believed[4 * k + 3]
+        assert latency == pytest.approx(0.2)
+        assert bandwidth == pytest.approx(8 * 2000 / 0.03, rel=0.05)
+
+
+@pytest.mark.parametrize(("behind", "expected"), [(0.1, 0.3), (0.6, 0.5)])
+def test_only_a_shorter_wait_behind_another_counts(
+    tmp_path: Path, behind: float, expected: float
+) -> None:
+    calls: list[list[Any]] = []
+    for k in range(12):
+        alone, other = 2 * k, 2 * k + 1
+        calls += [["sent", alone, 2.0 * k], ["firstByte", alone, 2 * k + 0.5]]
+        calls += [["sent", other, 2 * k + 0.7], ["finished", alone, 2 * k + 0.75]]
+        begins = 2 * k + 0.7 + behind
+        calls += [["firstByte", other, begins], ["finished", other, begins]]
+    *_, (_, latency, _) = called(tmp_path, [("estimate", {"calls": calls, "size": 0})])[0]
+    assert latency == pytest.approx(expected)
+
+
 def test_the_catalogue_of_an_index(tmp_path: Path, world: World) -> None:
     served = world.served
     expected = tables(catalogue_of(served, world.pyramids.differences, world.pyramids.mean))

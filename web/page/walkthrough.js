@@ -6,6 +6,7 @@ import { beginningOf } from "./beginning.js";
 import { Comparison } from "./compare.js";
 import { fitting, levelsOf } from "./data/site.js";
 import { cameraOf } from "./gl/camera.js";
+import { Fence } from "./gl/fence.js";
 import { ItemBuffer } from "./gl/item-buffer.js";
 import { Renderer } from "./gl/renderer.js";
 import { Reserve } from "./gl/reserve.js";
@@ -26,6 +27,8 @@ import { Stillness } from "./walk/stillness.js";
 const ITEM_EVERY = 0.1, LOOK_EVERY = 0.2;
 /** Seconds between pictures while the visitor stands, and of rest until then. */
 const PAINT_EVERY = 0.05, RESTING = 0.4;
+/** Times as long as the last one took, on a machine that draws slowly: it also has to decode. */
+const PAUSE = 2;
 /**
  * Seconds of a frame for uploads, and as much for geometry that comes into view: on a slow machine a share
  * of the last frame, which takes as long again, up to a limit.
@@ -54,11 +57,15 @@ export class Walkthrough {
   comparison = null;
   /** @type {import("./recorder.js").Recorder | null} */
   recorder = null;
-  /** Times of the last change of the scene, and of the last picture, s. */
+  /** Times of the last change of the picture, of that of the view or its geometry, and of the last picture, s. */
   #changed = 0;
+  #turned = 0;
   #painted = -1;
   #looked = -1;
   #before = 0;
+  /** Visible cells in view without geometry. @type {{cell: number, box: number[]}[]} */
+  #missing = [];
+  #scene = "";
   #itemDrawn = -1;
   /** @type {import("./policy/sight.js").Sight | null} */
   #sight = null;
@@ -159,12 +166,19 @@ export class Walkthrough {
   #make() {
     this.renderer = new Renderer(this.gl, this.memory, this.means);
     this.items = new ItemBuffer(this.gl);
-    this.touch();
+    this.fence = new Fence(this.gl);
+    this.#turn();
   }
 
-  /** The scene has changed. */
+  /** The picture has changed. */
   touch() {
     this.#changed = clock();
+  }
+
+  /** The view has changed, or its geometry: the item buffer, too. */
+  #turn() {
+    this.touch();
+    this.#turned = this.#changed;
   }
 
   /** Cells visible from the visitor's cell, itself first. */
@@ -208,12 +222,13 @@ export class Walkthrough {
   frame(pose) {
     const now = clock(), { gl } = this;
     if (gl.isContextLost()) return;
+    this.fence?.reached(now);
     // Before anything is uploaded: reading waits for what was begun before it.
-    this.#read();
+    this.#read(now);
     this.locate(pose);
     const { stillness } = this;
-    if (stillness.takes(pose, now)) this.touch();
-    if (this.sharpness.settle(now - this.#before, now - stillness.moved < RESTING)) this.touch();
+    if (stillness.takes(pose, now)) this.#turn();
+    if (this.sharpness.settle(now - this.#before, now - stillness.moved < RESTING)) this.#turn();
     const time = Math.max(UPLOAD_TIME, Math.min(UPLOAD_SHARE * (now - this.#before), UPLOAD_MOST));
     this.#before = now;
     const frustum = frustumOf(pose, this.tall, this.aspect);
@@ -223,10 +238,14 @@ export class Walkthrough {
     if (this.memory.pump(now, late) || this.comparison?.memory.pump(now, late)) this.touch();
     if (this.stream.news || now - this.#looked >= LOOK_EVERY) this.#look(now, frustum, stillness.lasts(now));
     const camera = cameraOf(pose, this.tall, this.aspect, this.far);
-    const waits = stillness.moved < this.#painted
-      && (now - this.#painted < PAINT_EVERY || this.items?.busy);
-    if (this.#changed > this.#painted && !waits) this.#paint(camera, now);
-    if (this.#changed > this.#itemDrawn && now - this.#itemDrawn >= ITEM_EVERY) {
+    const stands = stillness.moved < this.#painted;
+    const soon = (/** @type {number} */ every, /** @type {Fence | undefined} */ fence) =>
+      Math.max(every, stands && fence ? PAUSE * fence.took : 0);
+    if (this.#changed > this.#painted) {
+      const waits = this.fence?.busy || this.items?.busy || now - this.#painted < soon(PAINT_EVERY, this.fence);
+      if (!stands || !waits) this.#paint(camera, now);
+    }
+    if (this.#turned > this.#itemDrawn && now - this.#itemDrawn >= soon(ITEM_EVERY, this.items?.fence)) {
       this.#drawItems(camera, now);
     }
     if (!this.begun) {
@@ -262,6 +281,7 @@ export class Walkthrough {
       comparison.renderer.draw(camera, this.drawn, now);
       gl.disable(gl.SCISSOR_TEST);
     }
+    this.fence?.mark(now);
     this.#frames = [...this.#frames.filter((at) => at > now - 1), now];
   }
 
@@ -305,12 +325,14 @@ export class Walkthrough {
       const shapes = this.stream.shapes.get(cell);
       if (!shapes || renderer.cells.has(cell)) continue;
       if (!renderer.add(cell, shapes, late)) break;
-      this.touch();
       if (late()) break;
     }
   }
 
-  /** @param {import("./space/frustum.js").Frustum} frustum */
+  /**
+   * Chooses what is drawn, and which cells are missing.
+   * @param {import("./space/frustum.js").Frustum} frustum
+   */
   #cull(frustum) {
     this.drawn = [];
     for (const [cell, buffers] of this.renderer?.cells ?? []) {
@@ -318,10 +340,16 @@ export class Walkthrough {
       if (batches.length) this.drawn.push({ cell, buffers, batches });
     }
     const { low, high } = this.catalogue;
+    this.#missing = this.visible
+      .filter((cell) => !this.stream.shapes.has(cell) && meetsBox(frustum, low, high, 3 * cell))
+      .map((cell) => ({ cell, box: this.index.cells[cell].box }));
     const far = new Map(
       this.drawn.map(({ cell }) => [cell, distance(frustum.eye, low, high, 3 * cell)]),
     );
     this.drawn.sort((a, b) => (far.get(a.cell) ?? 0) - (far.get(b.cell) ?? 0));
+    const scene = [this.drawn, this.#missing].map((cells) => cells.map(({ cell }) => cell)).join(";");
+    if (scene !== this.#scene) this.#turn();
+    this.#scene = scene;
   }
 
   /**
@@ -332,22 +360,21 @@ export class Walkthrough {
     if (!this.items || this.items.busy) return;
     this.#itemDrawn = now;
     this.#drew = this.cell < 0 || this.renderer?.cells.has(this.cell) === true;
-    const { cells, textures } = this.index;
+    const { textures } = this.index;
     this.items.draw({
       camera,
       aspect: this.aspect,
       lines: this.sharpness.lines,
       now,
       drawn: this.drawn,
-      missing: this.visible
-        .filter((cell) => !this.stream.shapes.has(cell))
-        .map((cell) => ({ cell, box: cells[cell].box })),
+      missing: this.#missing,
       sizeOf: (t) => [textures[t].width, textures[t].height],
     });
   }
 
-  #read() {
-    const reading = this.items?.poll();
+  /** @param {number} now */
+  #read(now) {
+    const reading = this.items?.poll(now);
     if (!reading) return;
     this.#sightDrawn = reading.drawn;
     this.#shown ||= this.#drew;
@@ -412,7 +439,7 @@ export class Walkthrough {
   /** Whether everything that this view could use within the budget is present, in the best form. */
   get complete() {
     const { client, memory, present, renderer, stream, catalogue: { T, K } } = this;
-    if (!present || this.#sightDrawn < this.#changed || this.#looked < this.#changed) return false;
+    if (!present || this.#sightDrawn < this.#turned || this.#looked < this.#changed) return false;
     if (this.visible.some((c) => stream.shapes.has(c) && !renderer?.cells.has(c))) return false;
     if (client.cell !== this.cell || client.missing() > 0 || !this.sharpness.full) return false;
     for (let t = 0; t < T; t++) {

@@ -1,6 +1,7 @@
 // The item buffer: a small picture of the visible textures and their levels of detail, read back
 // without waiting, and a second one of placeholders for missing cells.
 
+import { Fence } from "./fence.js";
 import { aim, programOf } from "./program.js";
 
 /** Number of pixels for screens of any shape: 80 × 45 on most. */
@@ -17,12 +18,14 @@ const PIXELS = 3600;
  */
 
 export class ItemBuffer {
-  /** @type {{sync: WebGLSync, second: boolean, drawn: number} | null} */
-  #waiting = null;
+  /** Whether placeholders were drawn, and when it was drawn, s. */
+  #second = false;
+  #drawn = 0;
 
   /** @param {WebGL2RenderingContext} gl */
   constructor(gl) {
     this.gl = gl;
+    this.fence = new Fence(gl);
     this.item = programOf(gl, "item");
     this.placeholder = programOf(gl, "placeholder");
     this.frame = gl.createFramebuffer();
@@ -41,7 +44,7 @@ export class ItemBuffer {
 
   /** Whether an item buffer was drawn and not read yet. */
   get busy() {
-    return this.#waiting !== null;
+    return this.fence.busy;
   }
 
   /** @param {number} aspect */
@@ -109,9 +112,9 @@ export class ItemBuffer {
     if (missing.length) this.#read(1);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.bindVertexArray(null);
-    const sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
-    if (sync) this.#waiting = { sync, second: missing.length > 0, drawn: now };
-    gl.flush();
+    this.#second = missing.length > 0;
+    this.#drawn = now;
+    this.fence.mark(now);
   }
 
   /**
@@ -148,22 +151,21 @@ export class ItemBuffer {
 
   /**
    * The item buffer drawn last, once it can be read without waiting.
+   * @param {number} now s
    * @returns {Reading | null}
    */
-  poll() {
-    const { gl } = this, waiting = this.#waiting;
-    if (!waiting || gl.getSyncParameter(waiting.sync, gl.SYNC_STATUS) !== gl.SIGNALED) return null;
-    gl.deleteSync(waiting.sync);
-    this.#waiting = null;
+  poll(now) {
+    if (!this.fence.reached(now)) return null;
+    const { gl } = this;
     const pixels = this.width * this.height;
-    const read = [0, 1].slice(0, waiting.second ? 2 : 1).map((k) => {
+    const read = [0, 1].slice(0, this.#second ? 2 : 1).map((k) => {
       const numbers = new Uint16Array(2 * pixels);
       gl.bindBuffer(gl.PIXEL_PACK_BUFFER, this.packs[k]);
       gl.getBufferSubData(gl.PIXEL_PACK_BUFFER, 0, numbers);
       return numbers;
     });
     gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
-    return { pixels, items: read[0], placeholders: read[1] ?? null, drawn: waiting.drawn };
+    return { pixels, items: read[0], placeholders: read[1] ?? null, drawn: this.#drawn };
   }
 }
 

@@ -1,8 +1,9 @@
-// Estimates the link from recent downloads. Bandwidth is bytes over the time during which any arrived,
-// both forgotten with a half-life of such time: a pause neither lowers the estimate nor ages it, and
-// parallel requests do not count against each other. Bytes between two looks fade as if they arrived
+// Estimates the link from recent downloads. Bandwidth is bytes over the time during which any arrived or
+// were due, both forgotten with a half-life of such time: a pause neither lowers the estimate nor ages it,
+// and parallel requests do not count against each other. Bytes between two looks fade as if they arrived
 // evenly, so that the frequency of looks does not matter. Latency is the mean of the last few requests
-// whose response did not wait for another.
+// during whose wait no other response came. Any other has a queue before it, a belief in which would
+// lengthen the queue; it counts only if it waited less than that mean.
 
 /**
  * @typedef {object} Belief
@@ -19,7 +20,7 @@ const HALF_LIFE = 1;
 // With fewer bytes and less time than these the prior is used.
 const ENOUGH_BYTES = 16384, ENOUGH_SECONDS = 0.25;
 const LATENCIES = 8;
-// A response that begins within this time of the end of another had to wait for it, s.
+// Ends of responses within this time of a request came before it, s.
 const AT_ONCE = 1e-3;
 
 /** @implements {Belief} */
@@ -53,11 +54,14 @@ export class Estimate {
 
   /** Its response begins. @param {unknown} id @param {number} now */
   firstByte(id, now) {
-    if (!this.#arriving) this.#seen = Math.max(this.#seen, now);
     const request = this.#requests.get(id);
     if (!request || request.waited >= 0) return;
-    const behind = this.#ended > request.sent && Math.abs(now - this.#ended) < AT_ONCE;
-    request.waited = behind ? NaN : now - request.sent;
+    const { latency } = this, waited = now - request.sent;
+    // Without a queue it had begun by then.
+    const due = this.#latencies.length ? Math.min(now, request.sent + latency) : now;
+    if (!this.#arriving) this.#seen = Math.max(this.#seen, due);
+    const behind = this.#ended > request.sent + AT_ONCE;
+    request.waited = behind && waited >= latency ? NaN : waited;
     this.#arriving++;
   }
 

@@ -1,0 +1,38 @@
+// Measures how long the graphics card takes for a picture.
+
+export class Fence {
+  /** Seconds from the last mark that was reached until it was noticed. */
+  took = 0;
+  /** @type {WebGLSync | null} */
+  #sync = null;
+  #marked = 0;
+
+  /** @param {WebGL2RenderingContext} gl */
+  constructor(gl) {
+    this.gl = gl;
+  }
+
+  /** Whether what was drawn before the mark is not complete. */
+  get busy() {
+    return this.#sync !== null;
+  }
+
+  /** Marks the end of a picture. @param {number} now s */
+  mark(now) {
+    const { gl } = this;
+    gl.deleteSync(this.#sync);
+    this.#sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    this.#marked = now;
+    gl.flush();
+  }
+
+  /** Whether the mark is reached just now. @param {number} now s */
+  reached(now) {
+    const { gl } = this, sync = this.#sync;
+    if (!sync || gl.getSyncParameter(sync, gl.SYNC_STATUS) !== gl.SIGNALED) return false;
+    gl.deleteSync(sync);
+    this.#sync = null;
+    this.took = now - this.#marked;
+    return true;
+  }
+}
