@@ -1,7 +1,7 @@
 """The opening of a site, as the simulated client receives it (`ptmtools.site.opening`).
 
-A site has the opening of its first viewpoint. A walk that begins there gets it: its parts arrive
-one after the other in one response, which is requested together with the index.
+A walk that begins at the first viewpoint gets its opening: the parts arrive one after the other in
+one response, which is requested together with the index.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 from ptmtools.arrays import Floats
 from ptmtools.lab.catalogue import Catalogue
 from ptmtools.output.served import Served
-from ptmtools.site.opening import contents_of, needs_of, ordered_steps
+from ptmtools.site.opening import Views, contents_of, ordered_steps
 
 #: Kind, number and end of each part, in order.
 Parts = tuple[tuple[str, int, int], ...]
@@ -37,7 +37,7 @@ def opening_of(served: Served, catalogue: Catalogue, eye: Floats, direction: Flo
     if away > NEAR or aside < ALIKE:
         return ()
     try:
-        needs = needs_of(served, view)
+        needs = Views(served).needs(view)
     except ImportError:
         return ()
     sizes = {

@@ -12,9 +12,10 @@ from __future__ import annotations
 
 import html
 import json
+import math
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal
@@ -124,8 +125,9 @@ class SiteOptions:
     )
     opening: bool = option(
         True,
-        "Write an opening: one file with everything small that the first view needs, which the "
-        "page fetches together with its program.",
+        "Write openings: each is one file with everything small that a viewpoint needs, which the "
+        "page fetches together with its program. The first viewpoint has one, others while they "
+        "add little to the site.",
     )
     clients: Literal["page", "vrml"] = option(
         "page",
@@ -196,58 +198,57 @@ class _Builder:
         index["viewpoints"], poster = self._pictures()
         if self._options.clients == "vrml":
             self._vrml()
-        opening = self._opening(index) if self._options.opening else None
+        openings = self._openings(index) if self._options.opening else ()
         text = json.dumps(index, ensure_ascii=False, separators=(",", ":")).encode()
         name = self._add("index", ".json", JSON, text, compressed=True)
-        self._page(index, f"{DATA}/{name}", poster, opening)
+        self._page(index, f"{DATA}/{name}", poster, openings)
         return Site(self._entries, index, tuple(self._notes))
 
-    def _opening(self, index: Mapping[str, Any]) -> str | None:
-        """The URL of the opening of the first viewpoint; None where Embree is missing."""
-        from ptmtools.site.opening import needs_of, ordered_steps, packed_opening
+    def _openings(self, index: Mapping[str, Any]) -> tuple[str, ...]:
+        """The URLs of the openings of the first viewpoints; none where Embree is missing."""
+        from ptmtools.site.opening import openings_of
 
-        viewpoint, cells = index["viewpoints"][0], index["cells"]
-        try:
-            needs = needs_of(self._served, viewpoint)
-        except ImportError:
-            return None
         previews = [p["file"] for row in index["textures"] for p in row.get("previews", ())]
-        urls: dict[str, Callable[[int], str]] = {
-            "record": lambda number: cells[number]["record"],
-            "geometry": lambda number: cells[number]["geometry"],
-            "texture": lambda number: index["textures"][number]["file"],
-            "preview": previews.__getitem__,
-        }
-        sizes = {
-            (kind, number): int(row[f"{kind}Bytes"])
-            for number, row in enumerate(cells)
-            for kind in ("record", "geometry")
-        }
 
         def read(kind: str, number: int) -> bytes:
-            return self._entries[f"{DATA}/{urls[kind](number)}"].read()
+            if kind == "preview":
+                url = previews[number]
+            elif kind == "texture":
+                url = index["textures"][number]["file"]
+            else:
+                url = index["cells"][number][kind]
+            return self._entries[f"{DATA}/{url}"].read()
 
-        data = packed_opening(ordered_steps(index, needs, viewpoint["cell"], sizes), read)
-        return f"{DATA}/{self._add('opening', '.bin', OPENING, data)}"
+        entries = self._entries.values()
+        size = sum(e.state[2] if e.state else len(e.read()) for e in entries)
+        try:
+            data = list(openings_of(self._served, index, read, size))
+        except ImportError:
+            return ()
+        mark = sha256("".join(map(sha256, data)).encode())
+        return tuple(
+            f"{DATA}/{self._add('opening', f'-{number}.bin', OPENING, one, mark=mark)}"
+            for number, one in enumerate(data)
+        )
 
     def _page(
-        self, index: Mapping[str, Any], url: str, poster: str | None, opening: str | None
+        self, index: Mapping[str, Any], url: str, poster: str | None, openings: Sequence[str]
     ) -> None:
         program = program_files()
         self._entries |= {entry.name: entry for entry in program.values()}
         settings = {
             "index": url,
-            "opening": opening,
             "worker": program["worker.js"].name,
             "wasm": program["decoder.wasm"].name,
             "poster": poster,
             "title": self._options.title or title_of(self._folder.path),
         }
         preload = [url, program["decoder.wasm"].name]
-        if not opening:
+        if not openings:
             first = index["cells"][index["viewpoints"][0]["cell"]]
             preload += [f"{DATA}/{first[kind]}" for kind in ("record", "geometry")]
-        self._entries[INDEX] = page(settings, program["viewer.js"].name, preload)
+        views = dict(zip(openings, map(address_of, index["viewpoints"]), strict=False))
+        self._entries[INDEX] = page(settings, program["viewer.js"].name, preload, views)
 
     def _cells(self) -> Iterator[dict[str, Any]]:
         index = self._served.index
@@ -436,22 +437,40 @@ def _built(name: str) -> bytes:
         ) from None
 
 
-def page(settings: Mapping[str, Any], script: str, preload: Sequence[str]) -> Entry:
+def address_of(viewpoint: Mapping[str, Any]) -> list[float]:
+    """What the page's address has of a view: x, y, z in metres, yaw and pitch in degrees."""
+    x, y, z = viewpoint["direction"]
+    yaw, pitch = math.atan2(-x, -z) % math.tau, math.asin(max(-1.0, min(1.0, y)))
+    turned = [round(math.degrees(angle), 1) for angle in (yaw, pitch)]
+    return [*(round(float(part), 2) for part in viewpoint["position"]), *turned]
+
+
+def page(
+    settings: Mapping[str, Any],
+    script: str,
+    preload: Sequence[str],
+    openings: Mapping[str, Sequence[float]],
+) -> Entry:
     """The page, filled in.
 
     Parameters
     ----------
     settings: the JSON that its script reads (docs/guide/publish.md).
     script: URL of its script. preload: URLs of the files that it fetches first.
+    openings: URLs, which differ in their last number, and the addresses of their views.
 
     Raises InputError: PTM-I122 the template is missing.
     """
     # Workers take the module out of the cache.
     links = [f'<link rel="modulepreload" href="{settings["worker"]}">']
     links += [f'<link rel="preload" as="fetch" href="{url}" crossorigin>' for url in preload]
-    if opening := settings.get("opening"):
-        # The page makes it a preload, unless a link leads to another view.
-        links.append(f'<link id="opening" rel="next" as="fetch" href="{opening}" crossorigin>')
+    if openings:
+        # The page makes it a preload, with the number of the view that its address leads to.
+        views = json.dumps([*openings.values()], separators=(",", ":"))
+        links.append(
+            f'<link id="opening" rel="next" as="fetch" href="{next(iter(openings))}" '
+            f'data-views="{views}" crossorigin>'
+        )
     text = json.dumps(settings, ensure_ascii=False, separators=(",", ":"))
     fields = {
         "title": html.escape(settings["title"]),

@@ -1,4 +1,4 @@
-r"""The opening of a site: one file with everything small that the first view needs, by worth.
+r"""The openings of a site: each is one file with everything small that a view needs, by worth.
 
 At 4 Mbit/s and more, round trips and requests rule the first second: a view takes a record, the
 geometry of some cells and the coarse levels of some textures, each a request of a few kilobytes.
@@ -6,9 +6,10 @@ The page fetches the opening with its program, so that both are there after two 
 previews stay files of their own, which the page requests in the order of the opening's list: their
 bytes are not published twice, and a request costs little beside them.
 
-The opening is of a *view*, the first viewpoint on a screen of 16:9. (Bundles by cell, which hold
-the coarse levels of all that may be seen from it, bring nothing to the client:
-docs/formats/hints.md, First look.) The order is that of the client (docs/formats/client.md): the
+An opening is of a *view*, a viewpoint on a screen of 16:9. (Bundles by cell, which hold the coarse
+levels of all that may be seen from it, bring nothing to the client: docs/formats/hints.md, First
+look.) The first viewpoint has one, and those after it as long as the openings repeat little of the
+site: links lead to these. The order is that of the client (docs/formats/client.md): the
 worth of a step by the pixels that need it, per byte.
 
 =======  ============================================================
@@ -29,8 +30,9 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from itertools import accumulate
 from typing import Any
 
@@ -56,6 +58,8 @@ OVERHEAD = 300
 SMALL = 4096
 #: Share of a texture's pixels that may need a finer level than those of the opening.
 FEW = 0.02
+#: Largest share of a site that openings after the first repeat, and how many: the page lists them.
+REPEATED, MOST = 1 / 50, 64
 _LENGTH = struct.Struct("<I")
 
 
@@ -74,27 +78,35 @@ class Needs:
     textures: Mapping[int, Floats]
 
 
-def needs_of(served: Served, viewpoint: Mapping[str, Any]) -> Needs:
-    """The needs of a viewpoint on the screen of `Camera`. Raises ImportError without Embree."""
-    triangles = triangles_of(served.surfaces)
-    camera = Camera(WIDTH, HEIGHT, viewpoint["fieldOfView"], WIDTH / HEIGHT)
-    eye, direction = (np.array(viewpoint[name]) for name in ("position", "direction"))
-    sight = Caster(served.surfaces).look(camera, eye, direction)
-    hit = np.flatnonzero(sight.triangle >= 0)
-    triangle, each = sight.triangle[hit], 1 / len(sight.triangle)
-    cells, counts = np.unique(triangles.cell[triangle], return_counts=True)
-    textures = {}
-    for texture in np.unique(triangles.texture[triangle]).tolist():
-        if texture < 0:
-            continue
-        own = hit[triangles.texture[triangle] == texture]
-        sizes = sizes_of(served.index["textures"][texture])
-        detail = detail_of_pixels(footprints(sight, own, triangles)[1], *sizes[-1])
-        # A pixel requires level n by max(0, min(1, N - n - λ)).
-        level = np.arange(len(sizes))
-        required = len(sizes) - level - np.minimum(detail, len(sizes) - 1)[:, None]
-        textures[texture] = each * np.clip(required, 0, 1).sum(axis=0)
-    return Needs(dict(zip(cells.tolist(), (each * counts).tolist(), strict=True)), textures)
+class Views:
+    """Computes the needs of viewpoints. Raises ImportError without Embree."""
+
+    def __init__(self, served: Served) -> None:
+        self._textures = served.index["textures"]
+        self._triangles = triangles_of(served.surfaces)
+        self._caster = Caster(served.surfaces)
+
+    def needs(self, viewpoint: Mapping[str, Any]) -> Needs:
+        """Those on the screen of `Camera`."""
+        triangles = self._triangles
+        camera = Camera(WIDTH, HEIGHT, viewpoint["fieldOfView"], WIDTH / HEIGHT)
+        eye, direction = (np.array(viewpoint[name]) for name in ("position", "direction"))
+        sight = self._caster.look(camera, eye, direction)
+        hit = np.flatnonzero(sight.triangle >= 0)
+        triangle, each = sight.triangle[hit], 1 / len(sight.triangle)
+        cells, counts = np.unique(triangles.cell[triangle], return_counts=True)
+        textures = {}
+        for texture in np.unique(triangles.texture[triangle]).tolist():
+            if texture < 0:
+                continue
+            own = hit[triangles.texture[triangle] == texture]
+            sizes = sizes_of(self._textures[texture])
+            detail = detail_of_pixels(footprints(sight, own, triangles)[1], *sizes[-1])
+            # A pixel requires level n by max(0, min(1, N - n - λ)).
+            level = np.arange(len(sizes))
+            required = len(sizes) - level - np.minimum(detail, len(sizes) - 1)[:, None]
+            textures[texture] = each * np.clip(required, 0, 1).sum(axis=0)
+        return Needs(dict(zip(cells.tolist(), (each * counts).tolist(), strict=True)), textures)
 
 
 @dataclass(frozen=True)
@@ -197,16 +209,53 @@ def contents_of(steps: Sequence[Step]) -> tuple[list[Step], list[int]]:
 
 
 def packed_opening(steps: Sequence[Step], read: Callable[[str, int], bytes]) -> bytes:
-    """The file; ``read`` returns the bytes of the file of a kind and number."""
+    """The file; ``read`` returns the bytes of the file of a kind and number, as gzip packs those of
+    cells."""
     contents, later = contents_of(steps)
     parts, data = [], []
     for step in contents:
         body = read(step.kind, step.number)
         if step.kind == "texture":
             body = body[: step.end]
-        elif step.kind != "preview":
-            body = compressed(body)
         parts.append([step.kind, step.number, len(body)])
         data.append(body)
     text = json.dumps({"parts": parts, "next": later}, separators=(",", ":")).encode()
     return b"".join([_LENGTH.pack(len(text)), text, *data])
+
+
+def openings_of(
+    served: Served,
+    index: Mapping[str, Any],
+    read: Callable[[str, int], bytes],
+    size: int,
+) -> Iterator[bytes]:
+    """The openings of the first viewpoints of a site.
+
+    Parameters
+    ----------
+    index: of the site. read: returns the bytes of the file of a kind and number.
+    size: bytes of the site.
+
+    Raises ImportError without Embree.
+    """
+    views, cells = Views(served), index["cells"]
+    sizes = {
+        (kind, number): int(row[f"{kind}Bytes"])
+        for number, row in enumerate(cells)
+        for kind in ("record", "geometry")
+    }
+
+    @cache
+    def packed(kind: str, number: int) -> bytes:
+        data = read(kind, number)
+        return compressed(data) if kind in ("record", "geometry") else data
+
+    left = size * REPEATED
+    for number, viewpoint in enumerate(index["viewpoints"][:MOST]):
+        steps = ordered_steps(index, views.needs(viewpoint), viewpoint["cell"], sizes)
+        data = packed_opening(steps, packed)
+        if number:
+            left -= len(data)
+            if left < 0:
+                return
+        yield data

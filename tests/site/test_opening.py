@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import re
 import struct
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
@@ -14,12 +15,13 @@ import numpy as np
 import pytest
 
 from ptmtools.output.served import Served, read_served
-from ptmtools.site.content import DATA, Site, SiteOptions, site_of
+from ptmtools.site import opening
+from ptmtools.site.content import DATA, Site, SiteOptions, address_of, site_of
 from ptmtools.site.opening import (
     FEW,
     SMALL,
     Needs,
-    needs_of,
+    Views,
     ordered_steps,
     packed_opening,
     texture_steps,
@@ -45,9 +47,12 @@ def parts_of(data: bytes) -> Iterator[tuple[str, int, bytes]]:
     assert at == len(data)
 
 
+def names_of(site: Site) -> list[str]:
+    return [name for name in site.entries if name.startswith(f"{DATA}/opening-")]
+
+
 def opening_of(site: Site) -> bytes:
-    (name,) = (name for name in site.entries if name.startswith(f"{DATA}/opening-"))
-    return site.entries[name].read()
+    return site.entries[names_of(site)[0]].read()
 
 
 def read(site: Site, kind: str, number: int) -> bytes:
@@ -81,13 +86,55 @@ def test_parts_are_the_files_or_their_beginnings(site: Site) -> None:
 
 def test_the_page_names_it(site: Site) -> None:
     page = site.entries["index.html"].read().decode()
-    (name,) = (name for name in site.entries if name.startswith(f"{DATA}/opening-"))
-    assert name in page
+    assert names_of(site)[0] in page
+
+
+def test_the_first_views_have_one_each_while_they_repeat_little(
+    two_rooms: Path, site: Site, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They are numbered, and the page has their addresses."""
+    monkeypatch.setattr(opening, "REPEATED", 1.0)
+    every = site_of(two_rooms, SiteOptions(pictures=False))
+    views = every.index["viewpoints"]
+    assert len(views) > 1
+    names = names_of(every)
+    assert [name.rpartition("-")[2] for name in names] == [f"{n}.bin" for n in range(len(views))]
+    assert every.entries[names[0]].read() == opening_of(site)
+    for name, view in zip(names, views, strict=True):
+        parts = [*parts_of(every.entries[name].read())]
+        assert [part[:2] for part in parts[:2]] == [
+            ("record", view["cell"]),
+            ("geometry", view["cell"]),
+        ]
+    (listed,) = re.findall(r'data-views="([^"]+)"', every.entries["index.html"].read().decode())
+    assert json.loads(listed) == [address_of(view) for view in views]
+    second = len(every.entries[names[1]].read())
+    other = [name for name in every.entries if name.startswith(f"{DATA}/") and name not in names]
+    size = sum(len(every.entries[name].read()) for name in other if "/index-" not in name)
+    monkeypatch.setattr(opening, "REPEATED", 1.01 * second / size)
+    assert len(names_of(site_of(two_rooms, SiteOptions(pictures=False)))) == 2
+    monkeypatch.setattr(opening, "REPEATED", 0.0)
+    (alone,) = names_of(site_of(two_rooms, SiteOptions(pictures=False)))
+    assert alone.endswith("-0.bin")
+
+
+@pytest.mark.parametrize(
+    ("direction", "expected"),
+    [
+        ((0, 0, -1), [0, 0]),
+        ((-1, 0, 0), [90, 0]),
+        ((1, 0, 0), [270, 0]),
+        ((0, 0.5, -(0.75**0.5)), [0, 30]),
+    ],
+)
+def test_addresses(direction: tuple[float, ...], expected: list[float]) -> None:
+    view = {"position": [1.234, 5.678, -9], "direction": direction}
+    assert address_of(view) == [1.23, 5.68, -9, *expected]
 
 
 def test_needs_are_those_of_the_pixels(served: Served) -> None:
     viewpoint = served.index["viewpoints"][0]
-    needs = needs_of(served, viewpoint)
+    needs = Views(served).needs(viewpoint)
     assert 0 < sum(needs.cells.values()) <= 1 + 1e-9
     assert viewpoint["cell"] in needs.cells
     total = sum(share[0] for share in needs.textures.values())
@@ -180,7 +227,7 @@ def test_it_weighs_as_the_client(two_rooms: Path) -> None:
         eye, direction = (np.array([viewpoint[name]]) for name in ("position", "direction"))
         camera = Camera(WIDTH, HEIGHT, viewpoint["fieldOfView"], WIDTH / HEIGHT)
         (views,) = look(served.surfaces, read_pyramids(served), camera, eye, direction)
-        needs = needs_of(served, viewpoint)
+        needs = Views(served).needs(viewpoint)
         for texture, share in needs.textures.items():
             expected = views.need[views.texture == texture].sum(axis=0)[: len(share)]
             assert share == pytest.approx(expected, abs=2e-4)

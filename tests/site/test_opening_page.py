@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from ptmtools.site.content import Site, SiteOptions, site_of
+from ptmtools.site import opening
+from ptmtools.site.content import Site, SiteOptions, address_of, site_of
 
 from .browser import Visitor
 
@@ -28,8 +29,7 @@ def without(two_rooms: Path) -> Site:
 
 
 def opening_name(site: Site) -> str:
-    (name,) = (name for name in site.entries if name.startswith("data/opening-"))
-    return name
+    return next(name for name in site.entries if name.startswith("data/opening-"))
 
 
 def asked(visitor: Visitor) -> list[str]:
@@ -92,6 +92,23 @@ def test_an_opening_that_never_arrives_costs_only_time(visit: Visiting, site: Si
 
 def test_a_link_elsewhere_needs_no_opening(visit: Visiting, site: Site) -> None:
     x, y, z = site.index["viewpoints"][-1]["position"]
-    with visit(site, query=f"#{x},{y},{z},90") as visitor:
+    with visit(site, query=f"#{x},{y},{z},33") as visitor:
         visitor.complete()
-        assert opening_name(site) not in asked(visitor)
+        assert not [name for name in asked(visitor) if "opening-" in name]
+
+
+def test_a_link_to_a_viewpoint_brings_its_opening(
+    visit: Visiting, two_rooms: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(opening, "REPEATED", 1.0)
+    site = site_of(two_rooms, SiteOptions(pictures=False))
+    view = site.index["viewpoints"][1]
+    x, y, z, yaw, pitch = address_of(view)
+    with visit(site, query=f"#{x + 0.1},{y},{z},{yaw + 2},{pitch}") as visitor:
+        state = visitor.complete()
+        assert state["exact"]
+        assert state["cell"] == view["cell"]
+        (name,) = {name for name in asked(visitor) if "opening-" in name}
+        assert name.endswith("-1.bin")
+        assert f"data/{site.index['cells'][view['cell']]['record']}" not in asked(visitor)
+        assert visitor.messages == []

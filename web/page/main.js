@@ -49,8 +49,9 @@ async function main() {
       throw new PageError("PTM-V102", "This browser cannot run WebAssembly with SIMD.");
     }
     const decoders = decodersOf(config), site = siteOf(config);
-    // A link leads to another view.
-    const opening = config.opening && !location.hash ? new Opening(config.opening) : null;
+    // The page knows whether there is one of the view that its address leads to.
+    const preload = /** @type {HTMLLinkElement | null} */ (document.querySelector("#opening[rel=preload]"));
+    const opening = preload ? new Opening(preload.href) : null;
     const gl = contextOf(canvas);
     if (!gl) throw new PageError("PTM-V101", "This browser cannot draw with WebGL 2.");
     const app = new App(canvas, gl, await site, config, decoders, opening);

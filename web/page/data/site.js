@@ -8,7 +8,6 @@ import { levelSizes } from "../../client/src/levels.js";
  * @property {string} worker
  * @property {string} wasm
  * @property {string} [poster]
- * @property {string} [opening]
  * @property {string} title
  *
  * @typedef {object} Preview
