@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gzip
+import json
+import struct
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import replace
@@ -12,8 +15,11 @@ import pytest
 
 from ptmtools.site import opening
 from ptmtools.site.content import Site, SiteOptions, address_of, site_of
+from tests.web import node
 
 from .browser import Visitor
+
+HERE = Path(__file__).parent
 
 Visiting = Callable[..., AbstractContextManager[Visitor]]
 
@@ -112,3 +118,21 @@ def test_a_link_to_a_viewpoint_brings_its_opening(
         assert name.endswith("-1.bin")
         assert f"data/{site.index['cells'][view['cell']]['record']}" not in asked(visitor)
         assert visitor.messages == []
+
+
+@pytest.mark.parametrize("there", [3, 2, 1, 0])
+def test_a_silent_connection_gives_up_the_rest(there: int) -> None:
+    """What came before is used."""
+    parts = [
+        ("record", 3, gzip.compress(b"room")),
+        ("texture", 0, b"levels"),
+        ("preview", 5, b"image"),
+    ]
+    listed = [[kind, number, len(data)] for kind, number, data in parts]
+    text = json.dumps({"parts": listed, "next": []}).encode()
+    data = struct.pack("<I", len(text)) + text + b"".join(data for *_, data in parts)
+    end = len(data) - sum(len(part[2]) for part in parts[there:]) + (there < 3)
+    actual = json.loads(node.run(HERE / "stalled.mjs", json.dumps([*data]), end))
+    expected = ["room", "levels", "image"][:there]
+    assert actual["taken"] == expected + [None] * (4 - there)
+    assert actual["waited"] == 20_000
