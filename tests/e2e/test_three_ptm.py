@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from ptmtools.texture import EncodeOptions, decode_levels, encode, read_header
+from ptmtools.texture.detail import with_offset
 from tests.site.previews import Preview, decoded, halved, levels_of, saved
 from tests.texture.coding import textured
 
@@ -101,6 +102,27 @@ def test_levels_are_pythons(three: Any, files: Path, name: str) -> None:
     assert begins == [0, *ends[:-1]], "each range begins where the last one ended"
     assert ends[-1] == (files / f"{name}.ptm").stat().st_size
     assert len(visit.ranges) <= last + 2
+
+
+BRIGHT = """
+const { name, offsets } = settings;
+const texture = new PtmTexture(renderer, `/files/${name}.ptm`, { offsets });
+await texture.refine(99);
+return await levelsOf(renderer, texture);
+"""
+
+
+@pytest.mark.parametrize("name", ["odd", "rgba", "grey-alpha"])
+def test_levels_are_as_bright_as_the_image(three: Any, files: Path, name: str) -> None:
+    """By the offsets of the index, which leave alpha as it is and end at 0 and 255."""
+    levels = [*decode_levels((files / f"{name}.ptm").read_bytes())]
+    offsets = [200, *(-k for k in range(len(levels) - 1))]
+    bright = [with_offset(*pair) for pair in zip(levels, offsets, strict=True)]
+    wanted = [hashlib.sha256(rgba(level).tobytes()).hexdigest() for level in bright]
+    actual, visit = three.run(BRIGHT, {"files": files}, name=name, offsets=offsets)
+    assert actual == wanted
+    assert len({*wanted} & {*expected(files / f"{name}.ptm")}) == 1
+    assert visit.messages == []
 
 
 LOST = """
