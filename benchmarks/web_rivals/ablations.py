@@ -12,20 +12,26 @@ from __future__ import annotations
 
 import argparse
 import shutil
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
-from benchmarks.scenes import BUILD, FOLDER, database_of, model_of, ptm
-from benchmarks.web_rivals.__main__ import Desk, speed
-from benchmarks.web_rivals.entrants import WALK, Entrant
-from benchmarks.web_rivals.nginx import certificate
-from benchmarks.web_rivals.results import Conditions
-from benchmarks.web_rivals.tables import GOALS, goals_of
-from benchmarks.web_rivals.timeline import chromium
-from ptmtools.quantities import parse_duration
-from ptmtools.site.content import SiteOptions, site_of
-from ptmtools.site.throttle import Throttle
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "benchmarks")]
+
+from scenes import BUILD, FOLDER, database_of, model_of, ptm  # noqa: E402
+
+from benchmarks.web_rivals.__main__ import Desk, speed  # noqa: E402
+from benchmarks.web_rivals.entrants import WALK, Entrant  # noqa: E402
+from benchmarks.web_rivals.nginx import certificate  # noqa: E402
+from benchmarks.web_rivals.results import Conditions  # noqa: E402
+from benchmarks.web_rivals.tables import GOALS, goals_of  # noqa: E402
+from benchmarks.web_rivals.timeline import chromium  # noqa: E402
+from ptmtools.quantities import parse_duration  # noqa: E402
+from ptmtools.site.content import SiteOptions, site_of  # noqa: E402
+from ptmtools.site.throttle import Throttle  # noqa: E402
 
 HTTP = "2"
 
