@@ -438,11 +438,10 @@ def _built(name: str) -> bytes:
 
 
 def address_of(viewpoint: Mapping[str, Any]) -> list[float]:
-    """What the page's address has of a view: x, y, z in metres, yaw and pitch in degrees."""
-    x, y, z = viewpoint["direction"]
-    yaw, pitch = math.atan2(-x, -z) % math.tau, math.asin(max(-1.0, min(1.0, y)))
-    turned = [round(math.degrees(angle), 1) for angle in (yaw, pitch)]
-    return [*(round(float(part), 2) for part in viewpoint["position"]), *turned]
+    """What the page's address has of a view: x, y, z in metres and the yaw in degrees."""
+    x, _, z = viewpoint["direction"]
+    yaw = math.degrees(math.atan2(-x, -z) % math.tau)
+    return [*(round(float(part), 2) for part in viewpoint["position"]), round(yaw, 1)]
 
 
 def page(

@@ -16,19 +16,20 @@ worth of a step by the pixels that need it, per byte.
 offset   little-endian
 =======  ============================================================
 0        length of the JSON, uint32
-4        JSON: ``parts``, a list of [kind, number, bytes]; ``next``,
-         numbers of previews
+4        JSON: ``parts``, a list of [kind, number, bytes]; ``next``, a
+         list of [number, lines] of previews
 then     the parts, one after the other
 =======  ============================================================
 
 Kinds: ``record`` and ``geometry`` of a cell, as gzip packs the file; ``texture``, the beginning of
 a `.ptm`; ``preview``, a file. Textures are numbered as in the index, previews in its order, over
-all textures.
+all textures. A screen of no more than so many lines does not need a preview.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -52,6 +53,8 @@ WIDTH, HEIGHT = 160, 90
 #: Error of a pixel without geometry, 0 to 255; least difference of a level; by how much less a
 #: preview is off in the next coarser level: as for the client (docs/formats/client.md).
 NOTHING, LEAST, HALVED = 64.0, 0.5, 0.5
+#: Lines of the screen, and by how many powers of two finer a texture may be needed than it is.
+LINES, FINER = 1080, 4
 #: Bytes of a request beside its own.
 OVERHEAD = 300
 #: Largest preview that is a part, bytes.
@@ -72,10 +75,13 @@ class Needs:
     cells: for each cell in view the share of the pixels that show it.
     textures: for each texture in view (M,) the share of the pixels that require each level, the
         coarsest first.
+    detail: for each the level of detail λ that all but `FEW` of its pixels have or exceed, below 0
+        where the finest level is not fine enough.
     """
 
     cells: Mapping[int, float]
     textures: Mapping[int, Floats]
+    detail: Mapping[int, float]
 
 
 class Views:
@@ -95,18 +101,22 @@ class Views:
         hit = np.flatnonzero(sight.triangle >= 0)
         triangle, each = sight.triangle[hit], 1 / len(sight.triangle)
         cells, counts = np.unique(triangles.cell[triangle], return_counts=True)
-        textures = {}
+        textures, finest = {}, {}
         for texture in np.unique(triangles.texture[triangle]).tolist():
             if texture < 0:
                 continue
             own = hit[triangles.texture[triangle] == texture]
             sizes = sizes_of(self._textures[texture])
-            detail = detail_of_pixels(footprints(sight, own, triangles)[1], *sizes[-1])
+            width, height = (side << FINER for side in sizes[-1])
+            moves = footprints(sight, own, triangles)[1]
+            detail = detail_of_pixels(moves, width, height) - FINER
+            finest[texture] = float(np.quantile(detail, FEW))
             # A pixel requires level n by max(0, min(1, N - n - λ)).
             level = np.arange(len(sizes))
-            required = len(sizes) - level - np.minimum(detail, len(sizes) - 1)[:, None]
+            required = len(sizes) - level - np.clip(detail, 0, len(sizes) - 1)[:, None]
             textures[texture] = each * np.clip(required, 0, 1).sum(axis=0)
-        return Needs(dict(zip(cells.tolist(), (each * counts).tolist(), strict=True)), textures)
+        shares = dict(zip(cells.tolist(), (each * counts).tolist(), strict=True))
+        return Needs(shares, textures, finest)
 
 
 @dataclass(frozen=True)
@@ -117,6 +127,7 @@ class Step:
     ----------
     kind, number: see the module. end: bytes of the file up to its end.
     bytes: of the part. density: worth per byte.
+    lines: of the largest screen that does not need it.
     """
 
     kind: str
@@ -124,11 +135,14 @@ class Step:
     end: int
     bytes: int
     density: float = field(compare=False)
+    lines: int = 0
 
 
-def texture_steps(number: int, row: Mapping[str, Any], share: Floats, first: int) -> list[Step]:
+def texture_steps(
+    number: int, row: Mapping[str, Any], share: Floats, first: int, detail: float = 0.0
+) -> list[Step]:
     """The steps of a texture, in their order, up to one that shows what the view needs; ``first``
-    is the number of its first preview."""
+    is the number of its first preview, ``detail``: see `Needs`."""
     sizes, ends, previews = sizes_of(row), row["ends"], row.get("previews", ())
     gain = np.append(0, np.cumsum(share * np.maximum(row["differences"], LEAST)))
     needed = 1 + int(np.flatnonzero(share > FEW * share[0])[-1])
@@ -148,7 +162,7 @@ def texture_steps(number: int, row: Mapping[str, Any], share: Floats, first: int
         if column >= needed:
             break
     steps: list[Step] = []
-    shown, held = 0.0, 0
+    shown, held, present = 0.0, 0, 0
     while True:
         best: tuple[float, int, tuple[float, int, str, int, int]] | None = None
         for source in sources:
@@ -160,8 +174,10 @@ def texture_steps(number: int, row: Mapping[str, Any], share: Floats, first: int
         if best is None:
             return steps
         density, length, (worth, end, kind, place, column) = best
-        steps.append(Step(kind, place, end, length, density))
-        shown, held = worth, end if kind == "texture" else held
+        # Half as many lines need one level less.
+        lines = math.floor(LINES * 2.0 ** (detail - (len(sizes) - present))) if present else 0
+        steps.append(Step(kind, place, end, length, density, lines))
+        shown, held, present = worth, end if kind == "texture" else held, max(present, column)
         if column >= needed:
             return steps
 
@@ -186,20 +202,21 @@ def ordered_steps(
     for number, share in needs.textures.items():
         # A texture's steps keep their order, which is that of their worth per byte but for leaps.
         density = np.inf
-        for step in texture_steps(number, textures[number], share, first[number]):
+        row, detail = textures[number], needs.detail.get(number, 0.0)
+        for step in texture_steps(number, row, share, first[number], detail):
             density = min(density, step.density)
-            steps.append(Step(step.kind, step.number, step.end, step.bytes, density))
+            steps.append(replace(step, density=density))
     steps.sort(key=lambda step: -step.density)
     return [whole("record", cell, np.inf), whole("geometry", cell, np.inf), *steps]
 
 
-def contents_of(steps: Sequence[Step]) -> tuple[list[Step], list[int]]:
-    """The parts of the file, and the numbers of the previews that follow it."""
+def contents_of(steps: Sequence[Step]) -> tuple[list[Step], list[Step]]:
+    """The parts of the file, and the previews that follow it."""
     ends = {step.number: step.end for step in steps if step.kind == "texture"}
     parts, later = [], []
     for step in steps:
         if step.kind == "preview" and step.bytes > SMALL:
-            later.append(step.number)
+            later.append(step)
         elif step.kind != "texture":
             parts.append(step)
         elif end := ends.pop(step.number, 0):
@@ -219,7 +236,8 @@ def packed_opening(steps: Sequence[Step], read: Callable[[str, int], bytes]) -> 
             body = body[: step.end]
         parts.append([step.kind, step.number, len(body)])
         data.append(body)
-    text = json.dumps({"parts": parts, "next": later}, separators=(",", ":")).encode()
+    after = [[step.number, step.lines] for step in later]
+    text = json.dumps({"parts": parts, "next": after}, separators=(",", ":")).encode()
     return b"".join([_LENGTH.pack(len(text)), text, *data])
 
 

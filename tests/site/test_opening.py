@@ -121,15 +121,15 @@ def test_the_first_views_have_one_each_while_they_repeat_little(
 @pytest.mark.parametrize(
     ("direction", "expected"),
     [
-        ((0, 0, -1), [0, 0]),
-        ((-1, 0, 0), [90, 0]),
-        ((1, 0, 0), [270, 0]),
-        ((0, 0.5, -(0.75**0.5)), [0, 30]),
+        ((0, 0, -1), 0),
+        ((-1, 0, 0), 90),
+        ((1, 0, 0), 270),
+        ((-(0.5**0.5), 0.5, -0.5), 54.7),
     ],
 )
-def test_addresses(direction: tuple[float, ...], expected: list[float]) -> None:
+def test_addresses(direction: tuple[float, ...], expected: float) -> None:
     view = {"position": [1.234, 5.678, -9], "direction": direction}
-    assert address_of(view) == [1.23, 5.68, -9, *expected]
+    assert address_of(view) == [1.23, 5.68, -9, expected]
 
 
 def test_needs_are_those_of_the_pixels(served: Served) -> None:
@@ -181,6 +181,20 @@ def test_a_texture_ends_with_what_the_view_needs() -> None:
             assert ladder[previews[-1] - 1][0] < needed  # no finer one than that
 
 
+def test_small_screens_need_less() -> None:
+    """Half as many lines need one level less, unless not even the finest one is fine enough."""
+    ladder = [(level, 3000 * 3 ** (level - 6), 4.0) for level in range(6, 11)]
+    row, share = texture(11, ladder), np.full(11, 0.3)
+    for detail in (0.0, 0.7, -2.0):
+        steps = texture_steps(7, row, share, first=100, detail=detail)
+        previews = [step for step in steps if step.kind == "preview"]
+        for step, after in pairwise(previews):
+            level = ladder[step.number - 100][0]
+            assert after.lines == int(1080 * 2 ** (detail - (10 - level)))
+            assert step.lines < after.lines
+        assert len(previews) > 1
+
+
 def test_without_previews_the_exact_levels_that_it_needs() -> None:
     share = np.where(np.arange(8) <= 5, 0.3, 0.0)
     row = texture(8, [])
@@ -193,7 +207,7 @@ def test_steps_come_by_worth_per_byte() -> None:
     row = texture(9, [(6, 300, 5.0), (7, 900, 4.0), (8, 5000, 3.0)])
     index = {"textures": [row, row], "cells": [{}, {}, {}]}
     share = np.full(9, 0.4)
-    needs = Needs({0: 0.7, 2: 0.01}, {0: share, 1: share / 10})
+    needs = Needs({0: 0.7, 2: 0.01}, {0: share, 1: share / 10}, {0: 0.5, 1: -1.0})
     sizes: Mapping[tuple[str, int], int] = {
         (kind, number): 1000 for kind in ("record", "geometry") for number in range(3)
     }
@@ -206,7 +220,7 @@ def test_steps_come_by_worth_per_byte() -> None:
     data = packed_opening(steps, lambda kind, number: bytes(20_000))
     parts = [*parts_of(data)]
     (length,) = struct.unpack_from("<I", data)
-    assert json.loads(data[4 : 4 + length])["next"] == [2, 5]
+    assert json.loads(data[4 : 4 + length])["next"] == [[2, 763], [5, 270]]
     assert not {("preview", 2), ("preview", 5)} & {part[:2] for part in parts}
 
 

@@ -45,13 +45,14 @@ export class Stream {
    * @param {import("./net/fetcher.js").Fetcher} parts.fetcher
    * @param {import("./net/opening.js").Opening | null} parts.opening
    * @param {Decoders} parts.decoders
+   * @param {() => number} parts.lines of the screen
    * @param {() => boolean} parts.rests whether to make no more requests
    * @param {(present: Float64Array) => void} parts.expect receives the columns of textures that the first view
    *   probably wants
    * @param {(error: PageError, kind: string, number: number) => void} parts.report
    */
   constructor({
-    site, index, client, locator, estimate, fetcher, opening, decoders, rests, expect, report,
+    site, index, client, locator, estimate, fetcher, opening, decoders, lines, rests, expect, report,
   }) {
     this.site = site;
     this.client = client;
@@ -61,6 +62,7 @@ export class Stream {
     this.opening = opening;
     this.workers = decoders.workers;
     this.geometry = decoders.geometry;
+    this.lines = lines;
     this.rests = rests;
     this.expect = expect;
     this.report = report;
@@ -70,8 +72,9 @@ export class Stream {
   }
 
   /**
-   * Requests all parts of the opening, in their order, and the previews that its view needs next. Until the
-   * view itself tells, the textures of its previews are expected in it, those of the first the most.
+   * Requests all parts of the opening, in their order, and the previews that its view needs next on a screen
+   * of so few lines. Until the view itself tells, the textures of its previews are expected in it, those of the
+   * first the most.
    */
   async #follow() {
     const { client: { catalogue: { T, K }, downloads }, fetcher, opening } = this;
@@ -82,7 +85,8 @@ export class Stream {
     /** @type {[import("./policy/downloads.js").Kind, number, number | undefined][]} */
     const steps = opening.parts.map(([kind, number, size]) =>
       [kind, number, kind === "texture" ? size : undefined]);
-    next.forEach((number) => steps.push(["preview", number, undefined]));
+    const lines = this.lines();
+    for (const [number, few] of next) if (lines > few) steps.push(["preview", number, undefined]);
     steps.forEach(([kind, place, end], order) => {
       const preview = kind === "preview";
       const number = preview ? this.previews.findIndex((file) => file.place === place) : place;

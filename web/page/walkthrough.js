@@ -39,6 +39,9 @@ const TALLEST = 1.4;
 /** @typedef {import("./gl/camera.js").Pose} Pose */
 /** @typedef {import("./gl/renderer.js").Drawn} Drawn */
 
+/** Seconds between pictures of a resting visitor. @param {number} least @param {Fence} [fence] */
+const pause = (least, fence) => Math.max(least, PAUSE * (fence?.took ?? 0));
+
 export class Walkthrough {
   /** @type {Drawn[]} */
   drawn = [];
@@ -119,6 +122,7 @@ export class Walkthrough {
       fetcher: this.fetcher,
       decoders: options.decoders,
       opening: options.opening,
+      lines: () => this.sharpness.lines,
       rests: () => this.#rests,
       expect: (present) => {
         if (this.#shown) return;
@@ -238,22 +242,18 @@ export class Walkthrough {
     if (this.memory.pump(now, late) || this.comparison?.memory.pump(now, late)) this.touch();
     if (this.stream.news || now - this.#looked >= LOOK_EVERY) this.#look(now, frustum, stillness.lasts(now));
     const camera = cameraOf(pose, this.tall, this.aspect, this.far);
-    const stands = stillness.moved < this.#painted;
-    const soon = (/** @type {number} */ every, /** @type {Fence | undefined} */ fence) =>
-      Math.max(every, stands && fence ? PAUSE * fence.took : 0);
-    if (this.#changed > this.#painted) {
-      const waits = this.fence?.busy || this.items?.busy || now - this.#painted < soon(PAINT_EVERY, this.fence);
-      if (!stands || !waits) this.#paint(camera, now);
-    }
-    if (this.#turned > this.#itemDrawn && now - this.#itemDrawn >= soon(ITEM_EVERY, this.items?.fence)) {
-      this.#drawItems(camera, now);
-    }
     if (!this.begun) {
       const { progress, over } = beginningOf(this);
       this.emit("progress", progress);
       this.begun = over;
       if (over) this.emit("first-picture", undefined);
     }
+    const stands = stillness.moved < this.#painted, { fence, items } = this;
+    const waits = stands && (fence?.busy || items?.busy || now - this.#painted < pause(PAINT_EVERY, fence));
+    // Until the walk begins, the poster covers the picture.
+    if (this.begun && this.#changed > this.#painted && !waits) this.#paint(camera, now);
+    const every = stands ? pause(ITEM_EVERY, items?.fence) : ITEM_EVERY;
+    if (this.#turned > this.#itemDrawn && now - this.#itemDrawn >= every) this.#drawItems(camera, now);
     this.recorder?.frame(now, frustum, this.#sightDrawn);
     this.stream.pump();
   }

@@ -72,7 +72,11 @@ export class Opening {
   constructor(url) {
     this.url = url;
     const arriving = this.#open(url);
-    /** The previews that the view needs next, once all parts are known. @type {Promise<number[]>} */
+    /**
+     * The previews that the view needs next, and the lines of a screen that needs them not, once all parts are
+     * known.
+     * @type {Promise<[number, number][]>}
+     */
     this.next = arriving.then(({ next }) => next, () => []);
     /** Resolved when all parts are here, or no more will come. @type {Promise<void>} */
     this.over = arriving
@@ -87,7 +91,7 @@ export class Opening {
       .finally(() => this.#waiting.forEach((come) => come(null)));
   }
 
-  /** @param {string} url @returns {Promise<{bytes: Arriving, next: number[]}>} */
+  /** @param {string} url @returns {Promise<{bytes: Arriving, next: [number, number][]}>} */
   async #open(url) {
     const { ok, body } = await patiently(fetch(url));
     if (!ok || !body) throw new Error("cannot be downloaded");
