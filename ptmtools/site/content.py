@@ -91,9 +91,12 @@ class Entry:
     state: tuple[int, int, int] | None = None
     digest: str = ""
 
-    def read(self) -> bytes:
-        """All bytes."""
-        return self.source if isinstance(self.source, bytes) else self.source.read_bytes()
+    def read(self, end: int | None = None) -> bytes:
+        """All bytes, or those up to an end."""
+        if isinstance(self.source, bytes):
+            return self.source[:end]
+        with self.source.open("rb") as stream:
+            return stream.read(-1 if end is None else end)
 
 
 def state_of(stat: os.stat_result) -> tuple[int, int, int]:
@@ -196,9 +199,9 @@ class _Builder:
         index["cells"] = list(self._cells())
         index["textures"] = list(self._textures())
         index["viewpoints"], poster = self._pictures()
+        openings = self._openings(index) if self._options.opening else ()
         if self._options.clients == "vrml":
             self._vrml()
-        openings = self._openings(index) if self._options.opening else ()
         text = json.dumps(index, ensure_ascii=False, separators=(",", ":")).encode()
         name = self._add("index", ".json", JSON, text, compressed=True)
         self._page(index, f"{DATA}/{name}", poster, openings)
@@ -210,17 +213,17 @@ class _Builder:
 
         previews = [p["file"] for row in index["textures"] for p in row.get("previews", ())]
 
-        def read(kind: str, number: int) -> bytes:
+        def read(kind: str, number: int, end: int | None) -> bytes:
             if kind == "preview":
                 url = previews[number]
             elif kind == "texture":
                 url = index["textures"][number]["file"]
             else:
                 url = index["cells"][number][kind]
-            return self._entries[f"{DATA}/{url}"].read()
+            return self._entries[f"{DATA}/{url}"].read(end)
 
         entries = self._entries.values()
-        size = sum(e.state[2] if e.state else len(e.read()) for e in entries)
+        size = sum(entry.state[2] if entry.state else len(entry.read()) for entry in entries)
         try:
             data = list(openings_of(self._served, index, read, size))
         except ImportError:

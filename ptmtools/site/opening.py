@@ -61,7 +61,8 @@ OVERHEAD = 300
 SMALL = 4096
 #: Share of a texture's pixels that may need a finer level than those of the opening.
 FEW = 0.02
-#: Largest share of a site that openings after the first repeat, and how many: the page lists them.
+#: Largest share of a site that openings after the first repeat; the most openings: the page lists
+#: their views.
 REPEATED, MOST = 1 / 50, 64
 _LENGTH = struct.Struct("<I")
 
@@ -225,15 +226,13 @@ def contents_of(steps: Sequence[Step]) -> tuple[list[Step], list[Step]]:
     return parts, later
 
 
-def packed_opening(steps: Sequence[Step], read: Callable[[str, int], bytes]) -> bytes:
-    """The file; ``read`` returns the bytes of the file of a kind and number, as gzip packs those of
-    cells."""
+def packed_opening(steps: Sequence[Step], read: Callable[[str, int, int], bytes]) -> bytes:
+    """The file; ``read`` returns the bytes of the file of a kind and number up to an end, as gzip
+    packs those of cells."""
     contents, later = contents_of(steps)
     parts, data = [], []
     for step in contents:
-        body = read(step.kind, step.number)
-        if step.kind == "texture":
-            body = body[: step.end]
+        body = read(step.kind, step.number, step.end)
         parts.append([step.kind, step.number, len(body)])
         data.append(body)
     after = [[step.number, step.lines] for step in later]
@@ -244,14 +243,14 @@ def packed_opening(steps: Sequence[Step], read: Callable[[str, int], bytes]) -> 
 def openings_of(
     served: Served,
     index: Mapping[str, Any],
-    read: Callable[[str, int], bytes],
+    read: Callable[[str, int, int | None], bytes],
     size: int,
 ) -> Iterator[bytes]:
     """The openings of the first viewpoints of a site.
 
     Parameters
     ----------
-    index: of the site. read: returns the bytes of the file of a kind and number.
+    index: of the site. read: returns the bytes of the file of a kind and number up to an end.
     size: bytes of the site.
 
     Raises ImportError without Embree.
@@ -264,13 +263,16 @@ def openings_of(
     }
 
     @cache
-    def packed(kind: str, number: int) -> bytes:
-        data = read(kind, number)
-        return compressed(data) if kind in ("record", "geometry") else data
+    def packed(kind: str, number: int, end: int) -> bytes:
+        whole = kind in ("record", "geometry")
+        return compressed(read(kind, number, None)) if whole else read(kind, number, end)
 
     left = size * REPEATED
+    # The page shows all views with the angle of the first.
+    angle = {"fieldOfView": index["viewpoints"][0]["fieldOfView"]}
     for number, viewpoint in enumerate(index["viewpoints"][:MOST]):
-        steps = ordered_steps(index, views.needs(viewpoint), viewpoint["cell"], sizes)
+        needs = views.needs({**viewpoint, **angle})
+        steps = ordered_steps(index, needs, viewpoint["cell"], sizes)
         data = packed_opening(steps, packed)
         if number:
             left -= len(data)

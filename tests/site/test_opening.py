@@ -217,7 +217,7 @@ def test_steps_come_by_worth_per_byte() -> None:
     assert all(one >= other for one, other in pairwise(densities))
     finest = {step.number for step in steps if step.kind == "preview"}
     assert {2, 5} <= finest  # that of the first texture, and of the second
-    data = packed_opening(steps, lambda kind, number: bytes(20_000))
+    data = packed_opening(steps, lambda kind, number, end: bytes(20_000))
     parts = [*parts_of(data)]
     (length,) = struct.unpack_from("<I", data)
     assert json.loads(data[4 : 4 + length])["next"] == [[2, 763], [5, 270]]

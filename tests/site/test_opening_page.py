@@ -96,11 +96,18 @@ def test_an_opening_that_never_arrives_costs_only_time(visit: Visiting, site: Si
         assert visitor.complete()["exact"]
 
 
-def test_a_link_elsewhere_needs_no_opening(visit: Visiting, site: Site) -> None:
-    x, y, z = site.index["viewpoints"][-1]["position"]
-    with visit(site, query=f"#{x},{y},{z},33") as visitor:
+@pytest.mark.parametrize(
+    ("aside", "turned", "expected"),
+    [(0.0, 0.0, True), (0.4, 9.0, True), (0.0, 351.0, True), (0.0, -369.0, True)]
+    + [(0.6, 0.0, False), (0.0, 11.0, False), (0.0, 349.0, False), (0.0, 180.0, False)],
+)
+def test_a_link_close_by_brings_the_opening(
+    visit: Visiting, site: Site, aside: float, turned: float, expected: bool
+) -> None:
+    x, y, z, yaw = address_of(site.index["viewpoints"][0])
+    with visit(site, query=f"#{x + aside},{y},{z},{yaw + turned}") as visitor:
         visitor.complete()
-        assert not [name for name in asked(visitor) if "opening-" in name]
+        assert (opening_name(site) in asked(visitor)) is expected
 
 
 def test_a_link_to_a_viewpoint_brings_its_opening(

@@ -33,7 +33,7 @@ export class App {
    * @param {import("./data/site.js").Site} site
    * @param {import("./data/site.js").SiteConfig} config
    * @param {Decoders} decoders
-   * @param {import("./net/opening.js").Opening | null} [opening] of the first viewpoint
+   * @param {import("./net/opening.js").Opening | null} [opening] of the view that the address leads to
    */
   constructor(canvas, gl, site, config, decoders, opening = null) {
     const query = new URLSearchParams(location.search);
@@ -46,6 +46,7 @@ export class App {
     const options = {
       decoders,
       opening,
+      covered: Boolean(config.poster),
       policy: Object.hasOwn(POLICIES, policy) ? policy : "best",
       budget: megabytes > 0 ? Math.min(megabytes, MOST) * 2 ** 20 : small ? SMALL_BUDGET : BUDGET,
     };

@@ -25,6 +25,9 @@ PTM = ROOT / "web" / "ptm" / "src"
 OUTPUT = ROOT / "ptmtools" / "site" / "page"
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _LINE_END = re.compile(r"\s*\n\s*")
+#: Template strings with shaders, and what esbuild leaves in them.
+_SHADER = re.compile(r"`[^`]*\b(?:uniform|gl_Position)\b[^`]*`")
+_SHADER_REMARK = re.compile(r"\s*//[^\n]*")
 
 
 def minified(source: Path) -> bytes:
@@ -35,6 +38,12 @@ def minified(source: Path) -> bytes:
     return subprocess.run(command, cwd=source.parent, stdout=subprocess.PIPE, check=True).stdout
 
 
+def plain_shader(shader: re.Match[str]) -> str:
+    """A template string without comments, indentation and spaces around operators."""
+    text = _LINE_END.sub("\n", _SHADER_REMARK.sub("", shader[0]))
+    return re.sub(r" ?([-+*/=,?:{}()]) ?", r"\1", text)
+
+
 def build(folder: Path) -> None:
     """Writes the page to a folder. SystemExit without esbuild."""
     ESBUILD.require()
@@ -43,7 +52,7 @@ def build(folder: Path) -> None:
     html = _LINE_END.sub("\n", template).replace("{{style}}", style)
     files = {
         "index.html": html.encode(),
-        "viewer.js": minified(HERE / "main.js"),
+        "viewer.js": _SHADER.sub(plain_shader, minified(HERE / "main.js").decode()).encode(),
         "later.js": minified(HERE / "later.js"),
         "worker.js": minified(PTM / "worker.js"),
         "decoder.wasm": (PTM / "decoder.wasm").read_bytes(),

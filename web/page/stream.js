@@ -72,9 +72,9 @@ export class Stream {
   }
 
   /**
-   * Requests all parts of the opening, in their order, and the previews that its view needs next on a screen
-   * of so few lines. Until the view itself tells, the textures of its previews are expected in it, those of the
-   * first the most.
+   * Requests all parts of the opening, in their order, and the previews that its view needs next on this
+   * screen. Until the view itself tells, the textures of its previews are expected in it, those of the first the
+   * most.
    */
   async #follow() {
     const { client: { catalogue: { T, K }, downloads }, fetcher, opening } = this;

@@ -48,8 +48,9 @@ export class Walkthrough {
   cell = -1;
   /** All errors, in order. @type {{code: string, message: string}[]} */
   faults = [];
-  /** Whether the first picture of the room has been drawn. */
+  /** Whether the first picture of the room has been drawn, and whether it can be. */
   begun = false;
+  #ready = false;
   /** Whether texture memory stays unchanged and nothing is requested. */
   frozen = false;
   /** Whether only visible textures and cells are fetched. */
@@ -90,6 +91,7 @@ export class Walkthrough {
    * @param {import("./net/opening.js").Opening | null} options.opening
    * @param {string} options.policy
    * @param {number} options.budget bytes of texture memory
+   * @param {boolean} options.covered whether a poster covers the picture until the walk begins
    * @param {import("./app.js").App["emit"]} emit
    */
   constructor(canvas, gl, site, options, emit) {
@@ -101,6 +103,7 @@ export class Walkthrough {
     this.emit = emit;
     this.budget = options.budget;
     this.policy = options.policy;
+    this.covered = options.covered;
     this.catalogue = catalogueOf(index);
     this.reserve = new Reserve(this.catalogue);
     this.sharpness = new Sharpness(canvas);
@@ -122,7 +125,8 @@ export class Walkthrough {
       fetcher: this.fetcher,
       decoders: options.decoders,
       opening: options.opening,
-      lines: () => this.sharpness.lines,
+      // Of the field of view of openings.
+      lines: () => this.sharpness.lines * Math.tan(this.angle / 2) / Math.tan(this.tall / 2),
       rests: () => this.#rests,
       expect: (present) => {
         if (this.#shown) return;
@@ -231,8 +235,10 @@ export class Walkthrough {
     this.#read(now);
     this.locate(pose);
     const { stillness } = this;
-    if (stillness.takes(pose, now)) this.#turn();
-    if (this.sharpness.settle(now - this.#before, now - stillness.moved < RESTING)) this.#turn();
+    const turns = stillness.takes(pose, now);
+    // A canvas of another size is empty.
+    const resized = this.sharpness.settle(now - this.#before, now - stillness.moved < RESTING);
+    if (turns || resized) this.#turn();
     const time = Math.max(UPLOAD_TIME, Math.min(UPLOAD_SHARE * (now - this.#before), UPLOAD_MOST));
     this.#before = now;
     const frustum = frustumOf(pose, this.tall, this.aspect);
@@ -242,16 +248,18 @@ export class Walkthrough {
     if (this.memory.pump(now, late) || this.comparison?.memory.pump(now, late)) this.touch();
     if (this.stream.news || now - this.#looked >= LOOK_EVERY) this.#look(now, frustum, stillness.lasts(now));
     const camera = cameraOf(pose, this.tall, this.aspect, this.far);
+    const { fence, items } = this;
     if (!this.begun) {
       const { progress, over } = beginningOf(this);
       this.emit("progress", progress);
-      this.begun = over;
-      if (over) this.emit("first-picture", undefined);
+      this.begun = this.#ready && !fence?.busy;
+      this.#ready ||= over;
+      if (this.begun) this.emit("first-picture", undefined);
     }
-    const stands = stillness.moved < this.#painted, { fence, items } = this;
-    const waits = stands && (fence?.busy || items?.busy || now - this.#painted < pause(PAINT_EVERY, fence));
-    // Until the walk begins, the poster covers the picture.
-    if (this.begun && this.#changed > this.#painted && !waits) this.#paint(camera, now);
+    const stands = !turns && stillness.moved < this.#painted;
+    const waits = stands && !resized
+      && (fence?.busy || items?.busy || now - this.#painted < pause(PAINT_EVERY, fence));
+    if ((this.#ready || !this.covered) && this.#changed > this.#painted && !waits) this.#paint(camera, now);
     const every = stands ? pause(ITEM_EVERY, items?.fence) : ITEM_EVERY;
     if (this.#turned > this.#itemDrawn && now - this.#itemDrawn >= every) this.#drawItems(camera, now);
     this.recorder?.frame(now, frustum, this.#sightDrawn);
@@ -325,6 +333,8 @@ export class Walkthrough {
       const shapes = this.stream.shapes.get(cell);
       if (!shapes || renderer.cells.has(cell)) continue;
       if (!renderer.add(cell, shapes, late)) break;
+      // None of it may be in view, but now the item buffer has the room.
+      if (cell === this.cell) this.#turn();
       if (late()) break;
     }
   }
@@ -440,6 +450,7 @@ export class Walkthrough {
   get complete() {
     const { client, memory, present, renderer, stream, catalogue: { T, K } } = this;
     if (!present || this.#sightDrawn < this.#turned || this.#looked < this.#changed) return false;
+    if (this.#ready && this.#painted < this.#changed) return false;
     if (this.visible.some((c) => stream.shapes.has(c) && !renderer?.cells.has(c))) return false;
     if (client.cell !== this.cell || client.missing() > 0 || !this.sharpness.full) return false;
     for (let t = 0; t < T; t++) {

@@ -1,5 +1,5 @@
-// The opening of a site: small files of the first view, and beginnings of textures, which come with the
-// page in one file (docs/formats/hints.md). Each is a file of its own, too, so an opening that fails
+// An opening of a site: small files of a view, and beginnings of textures, which come with the page in one
+// file (docs/formats/hints.md). Each is a file of its own, too, so an opening that fails
 // costs nothing but time.
 
 import { PATIENCE } from "./fetcher.js";
@@ -73,8 +73,8 @@ export class Opening {
     this.url = url;
     const arriving = this.#open(url);
     /**
-     * The previews that the view needs next, and the lines of a screen that needs them not, once all parts are
-     * known.
+     * The previews that the view needs next, each with the lines of the largest screen that does not need it,
+     * once all parts are known.
      * @type {Promise<[number, number][]>}
      */
     this.next = arriving.then(({ next }) => next, () => []);

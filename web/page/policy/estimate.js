@@ -1,9 +1,11 @@
-// Estimates the link from recent downloads. Bandwidth is bytes over the time during which any arrived or
-// were due, both forgotten with a half-life of such time: a pause neither lowers the estimate nor ages it,
-// and parallel requests do not count against each other. Bytes between two looks fade as if they arrived
-// evenly, so that the frequency of looks does not matter. Latency is the mean of the last few requests
-// during whose wait no other response came. Any other has a queue before it, a belief in which would
-// lengthen the queue; it counts only if it waited less than that mean.
+// Estimates the link from recent downloads. Bandwidth is bytes over the time during which any arrived, both
+// forgotten with a half-life of such time: a pause neither lowers the estimate nor ages it, and parallel
+// requests do not count against each other. Bytes between two looks fade as if they arrived evenly, so that
+// the frequency of looks does not matter. Latency is the mean of the last few requests.
+//
+// A response that begins a few packets after another one ended waited in a queue: the link was busy between
+// them, and its wait tells of the latency only if it is less than the mean. Requests that are made by a
+// latency with its queue would lengthen the queue.
 
 /**
  * @typedef {object} Belief
@@ -20,8 +22,8 @@ const HALF_LIFE = 1;
 // With fewer bytes and less time than these the prior is used.
 const ENOUGH_BYTES = 16384, ENOUGH_SECONDS = 0.25;
 const LATENCIES = 8;
-// Ends of responses within this time of a request came before it, s.
-const AT_ONCE = 1e-3;
+// The longest pause between two responses of a queue: s, and bits that the link delivers meanwhile.
+const AT_ONCE = 1e-3, PACKETS = 3 * 8 * 1500;
 
 /** @implements {Belief} */
 export class Estimate {
@@ -57,11 +59,11 @@ export class Estimate {
     const request = this.#requests.get(id);
     if (!request || request.waited >= 0) return;
     const { latency } = this, waited = now - request.sent;
-    // Without a queue it had begun by then.
-    const due = this.#latencies.length ? Math.min(now, request.sent + latency) : now;
+    const queued = this.#ended > request.sent
+      && Math.abs(now - this.#ended) < AT_ONCE + PACKETS / this.bandwidth;
+    const due = queued ? Math.min(now, request.sent + latency) : now;
     if (!this.#arriving) this.#seen = Math.max(this.#seen, due);
-    const behind = this.#ended > request.sent + AT_ONCE;
-    request.waited = behind && waited >= latency ? NaN : waited;
+    request.waited = queued && waited >= latency ? NaN : waited;
     this.#arriving++;
   }
 

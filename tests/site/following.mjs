@@ -1,0 +1,32 @@
+// What a page on a screen of so many lines requests for an opening, and which columns it expects in view.
+
+import { Stream } from "../../web/page/stream.js";
+
+const lines = Number(process.argv[2]), asked = [];
+const preview = (level, n) => ({ file: `${level}-${n}.webp`, level, bytes: 1, width: 1, height: 1, difference: 1 });
+const texture = { file: "t.ptm", ends: [1], width: 8, height: 8, components: 3, previews: [1, 2, 3].map(preview) };
+const index = { textures: [texture, { ...texture, previews: [preview(3, "other")] }], cells: [] };
+let present = [];
+const downloads = {
+  free: () => true,
+  ask: (kind, number, priority) => (asked.push([kind, number, priority]), { kind, number, priority }),
+};
+new Stream({
+  site: { index, of: (file) => file, texture: (t) => `${t}`, cell: () => "" },
+  index,
+  client: { catalogue: { T: 2, K: 5 }, downloads, next: () => null, arrived: () => {}, failed: () => {} },
+  locator: {},
+  estimate: { concurrency: 100 },
+  fetcher: { requests: 0, bytes: 0, whole: async () => new Uint8Array(1) },
+  opening: {
+    parts: [["preview", 0, 1]], next: Promise.resolve([[3, 700], [1, 300], [2, 600]]),
+    over: Promise.resolve(), bytes: 0, take: async () => null,
+  },
+  decoders: { workers: {}, geometry: async () => null },
+  lines: () => lines,
+  rests: () => false,
+  expect: (columns) => (present = [...columns]),
+  report: (fault) => { throw fault; },
+});
+await new Promise((done) => setImmediate(done));
+console.log(JSON.stringify({ asked, present }));
