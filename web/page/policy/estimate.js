@@ -3,8 +3,8 @@
 // requests do not count against each other. Bytes between two looks fade as if they arrived evenly, so that
 // the frequency of looks does not matter. Latency is the mean of the last few requests.
 //
-// A response that begins a few packets after another one ended waited in a queue: the link was busy between
-// them, and its wait tells of the latency only if it is less than the mean. Requests that are made by a
+// A response waited in a queue if another one ended during its wait. The link was busy from the time at which
+// it was due, and its wait tells of the latency only if it is less than the mean: requests that are made by a
 // latency with its queue would lengthen the queue.
 
 /**
@@ -22,8 +22,8 @@ const HALF_LIFE = 1;
 // With fewer bytes and less time than these the prior is used.
 const ENOUGH_BYTES = 16384, ENOUGH_SECONDS = 0.25;
 const LATENCIES = 8;
-// The longest pause between two responses of a queue: s, and bits that the link delivers meanwhile.
-const AT_ONCE = 1e-3, PACKETS = 3 * 8 * 1500;
+// What ended within this time of a request ended before it, s.
+const AT_ONCE = 1e-3;
 
 /** @implements {Belief} */
 export class Estimate {
@@ -59,9 +59,8 @@ export class Estimate {
     const request = this.#requests.get(id);
     if (!request || request.waited >= 0) return;
     const { latency } = this, waited = now - request.sent;
-    const queued = this.#ended > request.sent
-      && Math.abs(now - this.#ended) < AT_ONCE + PACKETS / this.bandwidth;
-    const due = queued ? Math.min(now, request.sent + latency) : now;
+    const queued = this.#ended > request.sent + AT_ONCE;
+    const due = queued && this.#latencies.length ? Math.min(now, request.sent + latency) : now;
     if (!this.#arriving) this.#seen = Math.max(this.#seen, due);
     request.waited = queued && waited >= latency ? NaN : waited;
     this.#arriving++;
