@@ -13,9 +13,10 @@ that it asks for; FLIP at the end; requests. FLIP is against the full picture wi
 as the page's own renderer draws it. In parentheses: how many times as long as the walk page, or
 else as the best. Medians of ``--repeats`` runs.
 
-A page is looked at for ``--patience`` seconds, the walk page for three times as long. What takes
-longer is computed from the run over the next faster link, for pages that ask for the same in the
-same order whatever the link is: its bytes take as much longer, and nothing else changes.
+A page is looked at for ``--patience`` seconds, the walk page for ``--walk-patience``, three times
+as long if that is not given. What takes longer is computed from the run over the next faster link,
+for pages that ask for the same in the same order whatever the link is: its bytes take as much
+longer, and nothing else changes.
 
 Runs are kept (``results.py``): stopped and started again, the benchmark continues. Tables are
 printed scene by scene, and at the end one with the walk page beside the best of the rivals, by
@@ -80,7 +81,7 @@ LINKS = ("512k", "4M", "16M")
 #: Of the second table, bytes; the last holds everything.
 BUDGETS = tuple(kib << 10 for kib in (256, 512, 1024, 2048, 4096, 8192, 16384, 1 << 30))
 #: How many times as long the walk page is looked at, since nothing of it is computed.
-WALK_PATIENCE = 3
+LONGER = 3
 #: s at most over the fastest link.
 WHOLE = 600.0
 #: s of a round trip, near and far.
@@ -91,12 +92,14 @@ FAST = Throttle(None, 0.0)
 
 @dataclass(frozen=True)
 class Desk:
-    """What runs share: the browser, the certificate that it accepts, and the numbers given."""
+    """What runs share: the browser, the certificate that it accepts, and the numbers given; by
+    default the walk page has `LONGER` times the patience."""
 
     browser: Any
     own: Certificate
     repeats: int
     patience: float
+    walk_patience: float | None = None
 
     def run(self, entrant: Entrant, conditions: Conditions, seconds: float) -> Timeline:
         """A timeline, kept or new."""
@@ -129,6 +132,7 @@ def main() -> None:
     parser.add_argument("--rtt", default="100ms", help="of a round trip")
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--patience", type=float, default=60, help="seconds")
+    parser.add_argument("--walk-patience", type=float, help="seconds")
     parser.add_argument("--reference", type=Path, help="a database with all exact levels")
     parser.add_argument("--common", action="store_true", help="three.js's full picture for all")
     parser.add_argument("--round-trips", action="store_true", help="the table of round trips")
@@ -152,7 +156,7 @@ def main() -> None:
             print(f"\n{database.stem}\n\n{memory_table(rows)}", flush=True)
             continue
         with certificate() as own, chromium(own) as browser:
-            desk = Desk(browser, own, given.repeats, given.patience)
+            desk = Desk(browser, own, given.repeats, given.patience, given.walk_patience)
             exact = None if given.common else given.reference or database
             protocols = given.http.split(",")
             summary |= print_scene(desk, database, names, throttles, protocols, exact)
@@ -251,7 +255,8 @@ def timelines(
         if before and entrant.steady and before[0].latency == link.latency:
             computed = before[1].over(before[0], link)
         if not entrant.steady:
-            longer = replace(conditions, patience=WALK_PATIENCE * desk.patience)
+            patience = desk.walk_patience or LONGER * desk.patience
+            longer = replace(conditions, patience=patience)
             actual = desk.run(entrant, longer, longer.patience)
         elif computed is None:
             whole = replace(conditions, patience=WHOLE)

@@ -105,6 +105,7 @@ class Visitor:
 
     def go(self, viewpoint: int) -> dict[str, Any]:
         """To a viewpoint; the state once everything is there."""
+        self.until("s.complete !== undefined")  # the index is there
         self.page.evaluate("(place) => window.ptm.goTo(place)", viewpoint)
         return self.complete()
 
