@@ -20,7 +20,7 @@ from benchmarks.web_rivals.entrants import Subject, walk_page
 from benchmarks.web_rivals.images import in_form
 from benchmarks.web_rivals.models import whole_glb
 from ptmtools.output.emission import compressed
-from ptmtools.site.content import Entry, link_bytes
+from ptmtools.site.entry import Entry, link_bytes
 
 #: What of a site's data is neither geometry nor texture: first letters of names.
 _PICTURES = ("poster-", "vp-")

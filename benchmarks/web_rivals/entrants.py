@@ -45,7 +45,7 @@ from benchmarks.web_rivals.optimized import OPTIMIZE, gltf_transform
 from benchmarks.web_rivals.packages import ESBUILD, GLTF_TRANSFORM, KTX2, NEEDLE, THREE
 from benchmarks.web_rivals.progressive import progressive
 from ptmtools.scene.model import Scene
-from ptmtools.site.content import Entry
+from ptmtools.site.entry import Entry
 
 PAGES = Path(__file__).with_name("pages")
 #: Files of more bytes are textures for the most part, which gzip does not make smaller.

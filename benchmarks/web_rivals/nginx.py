@@ -22,7 +22,7 @@ from urllib.parse import unquote
 
 from benchmarks.web_rivals.link import BUFFER
 from ptmtools.output.emission import compressed
-from ptmtools.site.content import Entry
+from ptmtools.site.entry import Entry
 
 HTTP = ("1.1", "2")
 #: s until it must accept connections.

@@ -3,16 +3,14 @@
 Every file but the page has a hash of its contents in its name, so that caches may keep it for ever
 and a site that changes is never half old. The index is that of the hints, with names and sizes of
 each file instead of templates: a client plans with the sizes of records and geometry.
-The page itself is built by ``web/page/build.py`` and committed in ``page/``.
+The page itself is filled in by `ptmtools.site.program`.
 
 The geometry stays GLB, without what the page does not read (`ptmtools.site.geometry`).
 """
 
 from __future__ import annotations
 
-import html
 import json
-import math
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -30,25 +28,16 @@ from ptmtools.output.served import FORM, Served, read_served
 from ptmtools.pipeline.command import naming_command, open_database
 from ptmtools.pipeline.stages.emit import EMIT
 from ptmtools.progress import Progress, silent
+from ptmtools.site.entry import DIGITS, Entry, state_of
 from ptmtools.site.geometry import lean_glb
+from ptmtools.site.program import INDEX, address_of, page, program_files
 from ptmtools.site.textures import web_texture, without_exact
 from ptmtools.store.folder import DatabaseFolder, damaged
 from ptmtools.store.layout import SERVED, sha256
 from ptmtools.texture.previews import FORMATS
 
 FORMAT = "ptmtools site"
-INDEX, DATA = "index.html", "data"
-#: Hex digits of a SHA-256 that make a name unique.
-DIGITS = 10
-#: The page as ``web/page/build.py`` leaves it, and the media type of each file.
-PAGE = Path(__file__).parent / "page"
-HTML, JAVASCRIPT = "text/html; charset=utf-8", "text/javascript; charset=utf-8"
-PROGRAM = {
-    "viewer.js": JAVASCRIPT,
-    "later.js": JAVASCRIPT,
-    "worker.js": JAVASCRIPT,
-    "decoder.wasm": "application/wasm",
-}
+DATA = "data"
 JSON, JPEG = "application/json", "image/jpeg"
 GLB, PTM = "model/gltf-binary", "application/octet-stream"
 OPENING = "application/octet-stream"
@@ -65,43 +54,6 @@ _MAGIC = (
 #: Fields of a texture that the hints of earlier releases lack.
 _NEEDED = {"gpuTexelBytes", "differences", "color"}
 _STRANGE = re.compile(r"[^A-Za-z0-9_-]+")
-_FIELD = re.compile(r"\{\{(\w+)\}\}")
-
-
-@dataclass(frozen=True)
-class Entry:
-    """A file of a site.
-
-    Attributes
-    ----------
-    name: its URL relative to the site, percent-encoded as in links.
-    source: the file, or the bytes themselves.
-    media: its media type.
-    forever: whether the name changes with the content, so that caches may keep it for ever.
-    compressed: whether clients that accept gzip get it compressed; others may ask for ranges.
-    state: of a file, `state_of` at the time when its contents were checked.
-    digest: the recorded SHA-256 of a file, "" if none is.
-    """
-
-    name: str
-    source: Path | bytes
-    media: str
-    forever: bool = False
-    compressed: bool = False
-    state: tuple[int, int, int] | None = None
-    digest: str = ""
-
-    def read(self, end: int | None = None) -> bytes:
-        """All bytes, or those up to an end."""
-        if isinstance(self.source, bytes):
-            return self.source[:end]
-        with self.source.open("rb") as stream:
-            return stream.read(-1 if end is None else end)
-
-
-def state_of(stat: os.stat_result) -> tuple[int, int, int]:
-    """Inode, time in ns, bytes: they change when a file is written again."""
-    return stat.st_ino, stat.st_mtime_ns, stat.st_size
 
 
 @dataclass(frozen=True)
@@ -415,87 +367,7 @@ def _picture_file(file: str) -> tuple[str, str, bytes]:
     raise InputError("PTM-I125", "is no picture that browsers show", file=file, remedy=remedy)
 
 
-def program_files() -> dict[str, Entry]:
-    """The scripts and the decoder, by their names in `PAGE`, in a folder named by their contents.
-
-    Raises InputError: PTM-I122 one is missing.
-    """
-    data = {name: _built(name) for name in PROGRAM}
-    digest = sha256(b"".join(data[name] for name in sorted(data)))[:DIGITS]
-    return {
-        name: Entry(f"viewer-{digest}/{name}", data[name], media, True, compressed=True)
-        for name, media in PROGRAM.items()
-    }
-
-
-def _built(name: str) -> bytes:
-    try:
-        return (PAGE / name).read_bytes()
-    except OSError as fault:
-        raise InputError(
-            "PTM-I122",
-            f"a file of the page cannot be read ({fault.strerror or fault})",
-            file=PAGE / name,
-            remedy="install ptmtools again",
-        ) from None
-
-
-def address_of(viewpoint: Mapping[str, Any]) -> list[float]:
-    """What the page's address has of a view: x, y, z in metres and the yaw in degrees."""
-    x, _, z = viewpoint["direction"]
-    yaw = math.degrees(math.atan2(-x, -z) % math.tau)
-    return [*(round(float(part), 2) for part in viewpoint["position"]), round(yaw, 1)]
-
-
-def page(
-    settings: Mapping[str, Any],
-    script: str,
-    preload: Sequence[str],
-    openings: Mapping[str, Sequence[float]],
-) -> Entry:
-    """The page, filled in.
-
-    Parameters
-    ----------
-    settings: the JSON that its script reads (docs/guide/publish.md).
-    script: URL of its script. preload: URLs of the files that it fetches first.
-    openings: URLs, which differ in their last number, and the addresses of their views.
-
-    Raises InputError: PTM-I122 the template is missing.
-    """
-    # Workers take the module out of the cache.
-    links = [f'<link rel="modulepreload" href="{settings["worker"]}">']
-    links += [f'<link rel="preload" as="fetch" href="{url}" crossorigin>' for url in preload]
-    if openings:
-        # The page makes it a preload, with the number of the view that its address leads to.
-        views = json.dumps([*openings.values()], separators=(",", ":"))
-        links.append(
-            f'<link id="opening" rel="next" as="fetch" href="{next(iter(openings))}" '
-            f'data-views="{views}" crossorigin>'
-        )
-    text = json.dumps(settings, ensure_ascii=False, separators=(",", ":"))
-    fields = {
-        "title": html.escape(settings["title"]),
-        # Nothing in it ends the element that holds it.
-        "site": text.replace("<", "\\u003c"),
-        "preload": "\n".join(links),
-        "poster": html.escape(str(settings.get("poster") or "")),
-        "script": script,
-    }
-    template = _built(INDEX).decode()
-    filled = _FIELD.sub(lambda match: fields[match[1]], template)
-    return Entry(INDEX, filled.encode(), HTML, compressed=True)
-
-
 def title_of(database: Path) -> str:
     """The name of a database as a title: `old_town-hall.db` is "Old town hall"."""
     words = re.sub(r"[\s_-]+", " ", database.resolve().stem).strip()
     return words[:1].upper() + words[1:]
-
-
-def link_bytes(entry: Entry) -> int:
-    """Bytes of a file on the link without headers; of its gzip copy where that is sent."""
-    if isinstance(entry.source, Path) and not entry.compressed:
-        return entry.source.stat().st_size
-    data = entry.read()
-    return min(len(data), len(compressed(data))) if entry.compressed else len(data)

@@ -16,7 +16,9 @@ from urllib.parse import unquote, unquote_to_bytes
 
 from ptmtools.errors import DatabaseError, PtmError
 from ptmtools.files import leads_inside
-from ptmtools.site.content import HTML, INDEX, JAVASCRIPT, Entry, SiteOptions, site_of
+from ptmtools.site.content import SiteOptions, site_of
+from ptmtools.site.entry import Entry
+from ptmtools.site.program import HTML, INDEX, JAVASCRIPT
 from ptmtools.store.layout import MANIFEST, SERVED
 
 #: The file of a decoded name, or None; raises BlockingIOError for one that will exist later.

@@ -23,7 +23,7 @@ then     the parts, one after the other
 
 Kinds: ``record`` and ``geometry`` of a cell, as gzip packs the file; ``texture``, the beginning of
 a `.ptm`; ``preview``, a file. Textures are numbered as in the index, previews in its order, over
-all textures. A screen of no more than so many lines does not need a preview.
+all textures. A screen with at most the lines of its pair does not need a preview.
 """
 
 from __future__ import annotations

@@ -33,7 +33,9 @@ from ptmtools.files import (
 from ptmtools.options import option
 from ptmtools.output.emission import compressed
 from ptmtools.progress import Progress, silent
-from ptmtools.site.content import DATA, INDEX, Entry, Site, link_bytes
+from ptmtools.site.content import DATA, Site
+from ptmtools.site.entry import Entry, link_bytes
+from ptmtools.site.program import INDEX
 from ptmtools.store.folder import damaged, unreadable
 from ptmtools.store.layout import sha256
 

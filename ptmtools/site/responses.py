@@ -25,7 +25,7 @@ from starlette.routing import Route
 
 from ptmtools.files import open_regular
 from ptmtools.output.emission import compressed
-from ptmtools.site.content import Entry, state_of
+from ptmtools.site.entry import Entry, state_of
 from ptmtools.site.lookup import Lookup, name_of
 from ptmtools.site.throttle import Paced, Throttle, Visits
 from ptmtools.store.layout import sha256

@@ -20,7 +20,7 @@ from ptmtools.errors import InputError
 from ptmtools.lazy import component
 from ptmtools.options import option
 from ptmtools.quantities import parse_bandwidth, parse_duration
-from ptmtools.site.content import Entry
+from ptmtools.site.entry import Entry
 from ptmtools.site.lookup import Lookup, among
 from ptmtools.site.throttle import Throttle, Visits
 

@@ -23,7 +23,7 @@ from PIL import Image
 from ptmtools.glb import BINARY, glb_chunks
 from ptmtools.output.served import read_served
 from ptmtools.scene.model import Scene, SourceImage
-from ptmtools.site.content import Entry, link_bytes
+from ptmtools.site.entry import Entry, link_bytes
 from ptmtools.site.throttle import LATE, Throttle
 
 ROOT = Path(__file__).resolve().parents[2]

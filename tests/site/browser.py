@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ptmtools.site.content import Entry
+from ptmtools.site.entry import Entry
 from ptmtools.site.serving import serving
 from ptmtools.site.throttle import Throttle, Visits
 

@@ -1,4 +1,4 @@
-// A fence on a GPU whose marks are reached when they are told to be: what it says after each step.
+// A fence on a simulated GPU: what it reports after each step.
 
 import { Fence } from "../../web/page/gl/fence.js";
 
@@ -11,19 +11,19 @@ const gl = {
   getSyncParameter: () => (reached ? SIGNALED : 0),
   flush: () => {},
 };
-const fence = new Fence(gl), told = [];
-const tell = (answer) => told.push([answer, fence.busy, Math.round(1000 * fence.took)]);
-tell(fence.reached(1));
+const fence = new Fence(gl), reports = [];
+const report = (answer) => reports.push([answer, fence.busy, Math.round(1000 * fence.took)]);
+report(fence.reached(1));
 fence.mark(1);
-tell(fence.reached(1.05));
+report(fence.reached(1.05));
 reached = true;
-tell(fence.reached(1.1));
-tell(fence.reached(1.2));
+report(fence.reached(1.1));
+report(fence.reached(1.2));
 reached = false;
 fence.mark(2);
 fence.mark(3);
 reached = true;
-tell(fence.reached(3.02));
+report(fence.reached(3.02));
 fence.mark(4);
-tell(fence.reached(600));
-console.log(JSON.stringify({ told, left: made.length - deleted.length }));
+report(fence.reached(600));
+console.log(JSON.stringify({ reports, left: made.length - deleted.length }));

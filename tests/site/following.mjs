@@ -1,4 +1,4 @@
-// What a page on a screen of so many lines requests for an opening, and which columns it expects in view.
+// The requests of a page for an opening, by the lines of its screen, and the columns that it expects in view.
 
 import { Stream } from "../../web/page/stream.js";
 

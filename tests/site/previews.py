@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ptmtools.site.content import Entry, Site
+from ptmtools.site.content import Site
+from ptmtools.site.entry import Entry
 from ptmtools.texture import EncodeOptions, encode_to, read_header
 from ptmtools.texture.model import gpu_texel_bytes
 

@@ -12,8 +12,8 @@ import pytest
 
 from benchmarks.web_rivals.packages import ESBUILD
 from ptmtools.errors import InputError
-from ptmtools.site import content
-from ptmtools.site.content import PAGE, program_files
+from ptmtools.site import program
+from ptmtools.site.program import PAGE, program_files
 
 BUILD = Path(__file__).parents[2] / "web" / "page" / "build.py"
 
@@ -39,7 +39,7 @@ def test_scripts_import_nothing_at_once() -> None:
 
 
 def test_an_incomplete_installation(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(content, "PAGE", tmp_path)
+    monkeypatch.setattr(program, "PAGE", tmp_path)
     with pytest.raises(InputError, match="install ptmtools again") as raised:
         program_files()
     assert raised.value.code == "PTM-I122"

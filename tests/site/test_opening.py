@@ -16,7 +16,7 @@ import pytest
 
 from ptmtools.output.served import Served, read_served
 from ptmtools.site import opening
-from ptmtools.site.content import DATA, Site, SiteOptions, address_of, site_of
+from ptmtools.site.content import DATA, Site, SiteOptions, site_of
 from ptmtools.site.opening import (
     FEW,
     SMALL,
@@ -26,6 +26,7 @@ from ptmtools.site.opening import (
     packed_opening,
     texture_steps,
 )
+from ptmtools.site.program import address_of
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,8 @@ from typing import Any
 import pytest
 
 from ptmtools.site import opening
-from ptmtools.site.content import Site, SiteOptions, address_of, site_of
+from ptmtools.site.content import Site, SiteOptions, site_of
+from ptmtools.site.program import address_of
 from tests.web import node
 
 from .browser import Visitor

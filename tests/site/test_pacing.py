@@ -15,7 +15,7 @@ HERE = Path(__file__).parent
 def test_a_fence_tells_how_long_a_picture_took() -> None:
     """Once; of two marks the last one counts, and a page that was hidden learns nothing of it."""
     actual = json.loads(node.run(HERE / "fence.mjs"))
-    assert actual["told"] == [
+    assert actual["reports"] == [
         [False, False, 0],
         [False, True, 0],
         [True, False, 100],

@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from ptmtools.site.content import Entry
+from ptmtools.site.entry import Entry
 from ptmtools.site.lookup import Lookup, among, below
 from ptmtools.site.responses import app_of
 from ptmtools.site.serving import running, serving

@@ -21,7 +21,8 @@ import pytest
 
 from ptmtools.cli.main import main
 from ptmtools.site import lookup
-from ptmtools.site.content import Entry, SiteOptions
+from ptmtools.site.content import SiteOptions
+from ptmtools.site.entry import Entry
 from ptmtools.site.lookup import Lookup
 from ptmtools.site.responses import opened
 from ptmtools.site.serving import url_of

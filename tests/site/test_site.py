@@ -20,16 +20,10 @@ from ptmtools import schemas
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.output.emission import compressed
 from ptmtools.site import pictures as drawing
-from ptmtools.site.content import (
-    DATA,
-    PROGRAM,
-    Site,
-    SiteOptions,
-    link_bytes,
-    site_of,
-    title_of,
-)
+from ptmtools.site.content import DATA, Site, SiteOptions, site_of, title_of
+from ptmtools.site.entry import link_bytes
 from ptmtools.site.geometry import lean_glb
+from ptmtools.site.program import PROGRAM
 from ptmtools.site.publishing import weight_of
 from ptmtools.site.textures import web_texture
 from ptmtools.texture import EncodeOptions, decode, decode_levels, encode, read_header

@@ -4,7 +4,7 @@
 const LONGEST = 0.5;
 
 export class Fence {
-  /** Seconds from the last mark that was reached until it was noticed. */
+  /** Seconds from a mark to the frame in which it was reached, of the last such mark. */
   took = 0;
   /** @type {WebGLSync | null} */
   #sync = null;

@@ -1,0 +1,56 @@
+"""The files of a site."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from ptmtools.output.emission import compressed
+
+#: Hex digits of a SHA-256 that make a name unique.
+DIGITS = 10
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A file of a site.
+
+    Attributes
+    ----------
+    name: its URL relative to the site, percent-encoded as in links.
+    source: the file, or the bytes themselves.
+    media: its media type.
+    forever: whether the name changes with the content, so that caches may keep it for ever.
+    compressed: whether clients that accept gzip get it compressed; others may ask for ranges.
+    state: of a file, `state_of` at the time when its contents were checked.
+    digest: the recorded SHA-256 of a file, "" if none is.
+    """
+
+    name: str
+    source: Path | bytes
+    media: str
+    forever: bool = False
+    compressed: bool = False
+    state: tuple[int, int, int] | None = None
+    digest: str = ""
+
+    def read(self, end: int | None = None) -> bytes:
+        """All bytes, or those up to an end."""
+        if isinstance(self.source, bytes):
+            return self.source[:end]
+        with self.source.open("rb") as stream:
+            return stream.read(-1 if end is None else end)
+
+
+def state_of(stat: os.stat_result) -> tuple[int, int, int]:
+    """Inode, time in ns, bytes: they change when a file is written again."""
+    return stat.st_ino, stat.st_mtime_ns, stat.st_size
+
+
+def link_bytes(entry: Entry) -> int:
+    """Bytes of a file on the link without headers; of its gzip copy where that is sent."""
+    if isinstance(entry.source, Path) and not entry.compressed:
+        return entry.source.stat().st_size
+    data = entry.read()
+    return min(len(data), len(compressed(data))) if entry.compressed else len(data)

@@ -1,0 +1,99 @@
+"""The page and its program, as ``web/page/build.py`` leaves them in ``page/``."""
+
+from __future__ import annotations
+
+import html
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ptmtools.errors import InputError
+from ptmtools.site.entry import DIGITS, Entry
+from ptmtools.store.layout import sha256
+
+INDEX = "index.html"
+PAGE = Path(__file__).parent / "page"
+HTML, JAVASCRIPT = "text/html; charset=utf-8", "text/javascript; charset=utf-8"
+#: The media type of each file.
+PROGRAM = {
+    "viewer.js": JAVASCRIPT,
+    "later.js": JAVASCRIPT,
+    "worker.js": JAVASCRIPT,
+    "decoder.wasm": "application/wasm",
+}
+_FIELD = re.compile(r"\{\{(\w+)\}\}")
+
+
+def program_files() -> dict[str, Entry]:
+    """The scripts and the decoder, by their names in `PAGE`, in a folder named by their contents.
+
+    Raises InputError: PTM-I122 one is missing.
+    """
+    data = {name: _built(name) for name in PROGRAM}
+    digest = sha256(b"".join(data[name] for name in sorted(data)))[:DIGITS]
+    return {
+        name: Entry(f"viewer-{digest}/{name}", data[name], media, True, compressed=True)
+        for name, media in PROGRAM.items()
+    }
+
+
+def _built(name: str) -> bytes:
+    try:
+        return (PAGE / name).read_bytes()
+    except OSError as fault:
+        raise InputError(
+            "PTM-I122",
+            f"a file of the page cannot be read ({fault.strerror or fault})",
+            file=PAGE / name,
+            remedy="install ptmtools again",
+        ) from None
+
+
+def address_of(viewpoint: Mapping[str, Any]) -> list[float]:
+    """What the page's address has of a view: x, y, z in metres and the yaw in degrees."""
+    x, _, z = viewpoint["direction"]
+    yaw = math.degrees(math.atan2(-x, -z) % math.tau)
+    return [*(round(float(part), 2) for part in viewpoint["position"]), round(yaw, 1)]
+
+
+def page(
+    settings: Mapping[str, Any],
+    script: str,
+    preload: Sequence[str],
+    openings: Mapping[str, Sequence[float]],
+) -> Entry:
+    """The page, filled in.
+
+    Parameters
+    ----------
+    settings: the JSON that its script reads (docs/guide/publish.md).
+    script: URL of its script. preload: URLs of the files that it fetches first.
+    openings: URLs, which differ in their last number, and the addresses of their views.
+
+    Raises InputError: PTM-I122 the template is missing.
+    """
+    # Workers take the module out of the cache.
+    links = [f'<link rel="modulepreload" href="{settings["worker"]}">']
+    links += [f'<link rel="preload" as="fetch" href="{url}" crossorigin>' for url in preload]
+    if openings:
+        # The page makes it a preload, with the number of the view that its address leads to.
+        views = json.dumps([*openings.values()], separators=(",", ":"))
+        links.append(
+            f'<link id="opening" rel="next" as="fetch" href="{next(iter(openings))}" '
+            f'data-views="{views}" crossorigin>'
+        )
+    text = json.dumps(settings, ensure_ascii=False, separators=(",", ":"))
+    fields = {
+        "title": html.escape(settings["title"]),
+        # Nothing in it ends the element that holds it.
+        "site": text.replace("<", "\\u003c"),
+        "preload": "\n".join(links),
+        "poster": html.escape(str(settings.get("poster") or "")),
+        "script": script,
+    }
+    template = _built(INDEX).decode()
+    filled = _FIELD.sub(lambda match: fields[match[1]], template)
+    return Entry(INDEX, filled.encode(), HTML, compressed=True)
