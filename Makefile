@@ -9,7 +9,7 @@
 # make bench-walk    what clients show to a walker: all policies, links and scenes (an hour)
 # make bench-web     how soon a view is there, by the walk page and by what people do otherwise
 #                    (a day; it continues where it was stopped)
-# make fuzz    100,000 damaged and hostile files for every reader (half an hour)
+# make fuzz    100,000 damaged and hostile files for every reader, 1,000 damaged buildings (an hour)
 # make page    bundle the page of web/page into the package, with esbuild
 # make sample  only the sample museum
 # make setup   only the virtual environment
@@ -148,6 +148,7 @@ bench: $(VENV)/.installed-dev
 fuzz: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks.fuzz --jobs $(JOBS)
 	$(BIN)/python -m benchmarks.fuzz.foreign --count 200 --jobs $(JOBS)
+	$(BIN)/python -m benchmarks.fuzz.geometry --count 1000 --jobs $(JOBS)
 
 docs-tables: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/docs_tables.py

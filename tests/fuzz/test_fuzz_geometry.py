@@ -1,0 +1,52 @@
+"""A part of `python -m benchmarks.fuzz.geometry`, and that it finds what it looks for."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))  # processes that are started find it there too
+
+from benchmarks.fuzz.bases import BASES  # noqa: E402
+from benchmarks.fuzz.building import EXPECTED, FAULTS, Building  # noqa: E402
+from benchmarks.fuzz.child import generator  # noqa: E402
+from benchmarks.fuzz.distortion import DISTORTIONS  # noqa: E402
+from benchmarks.fuzz.geometry import fuzz, row_of  # noqa: E402
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="memory is measured on Linux only")
+
+
+def test_damaged_buildings_become_sound_databases() -> None:
+    summary = fuzz("rooms", seed=0, start=0, count=12)
+    assert summary.tally.findings == []
+    row = row_of(summary, seed=0)
+    assert row.counts["inputs"] == 12
+    assert row.counts["built"] >= 6
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_every_fault_is_found(fault: str) -> None:
+    summary = fuzz("two_rooms", seed=0, start=0, count=6, fault=fault)
+    findings = [what for _, what in summary.tally.findings]
+    assert any(EXPECTED[fault] in what for what in findings)
+    assert all(EXPECTED[fault] in what for what in findings)
+
+
+def test_inputs_follow_from_seed_and_number(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    first, again = (Building(tmp_path / name, tmp_path, base="doors") for name in "ab")
+    cases = [first.make(generator(1, "doors", n)) for n in range(20)]
+    assert cases == [again.make(generator(1, "doors", n)) for n in range(20)]
+    assert len({case.data for case in cases}) == 20
+
+
+@pytest.mark.parametrize("name", DISTORTIONS)
+def test_a_distortion_changes_the_model(name: str) -> None:
+    soup = BASES["two_rooms"](np.random.default_rng(1))
+    changed = [DISTORTIONS[name](soup, np.random.default_rng(n)) for n in range(30)]
+    assert any(each.obj() != soup.obj() for each in changed)
