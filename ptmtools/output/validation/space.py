@@ -84,7 +84,8 @@ def _in_face(
         return False
     if plane is None:
         return True
-    turned = planes[:, :3] @ plane[:3] <= -tolerance.cosine
+    # The normal of a narrow polygon is rounded: its side counts, its corners decide.
+    turned = planes[:, :3] @ plane[:3] < 0
     return bool((turned & (np.abs(distance).max(axis=0) <= tolerance.plane)).any())
 
 

@@ -1,0 +1,37 @@
+"""The check of portals hardly wider than the tolerance, whose own normals are rounded."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ptmtools.diagnostics import Findings, Place
+from ptmtools.output.validation.findings import CODES
+from ptmtools.output.validation.space import check_space
+
+#: Metres; the on-plane distance in a box of this size is 0.16 mm.
+SIZE = 20.0
+#: Of a box: counter-clockwise seen from outside, corners numbered by their bits x, y, z.
+FACES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+
+
+def faults(portal: np.ndarray) -> list[str]:
+    """What the check says of a portal of a box from 0 to `SIZE`."""
+    corners = SIZE * np.array([[n >> 2 & 1, n >> 1 & 1, n & 1] for n in range(8)], np.float64)
+    leaf = {"points": corners.tolist(), "faces": FACES}
+    record = {"leaves": [leaf], "portals": [{"polygon": portal.tolist()}]}
+    findings = Findings(CODES)
+    place = Place(findings, "c0000.json")
+    check_space([record], [], [place], place)
+    return [issue.code for issue in findings.issues()]
+
+
+@pytest.mark.parametrize("width", [0.0005, 0.0008, 0.002, 0.5])
+def test_a_narrow_portal_lies_in_its_face(width: float) -> None:
+    """In x = 0, turned by a rounding of the coordinates, its normal into the box."""
+    corners = np.array([[0, 5, 5], [0, 6, 5], [0, 6, 5 + width], [0, 5, 5 + width]], np.float64)
+    corners[:, 0] += [1e-6, 0.0, 0.0, -1e-6]
+    corners[2:, 0] += 1e-6
+    assert faults(corners) == []
+    assert faults(corners[::-1]) == ["PTM-D699"]
+    assert faults(corners + [0.001, 0.0, 0.0]) == ["PTM-D699"]
