@@ -106,11 +106,11 @@ def _convert(
     options, read = take(ApoOptions, values), take(IngestOptions, values)
     FORM.check(folder, force=force)
     with console.progress() as progress, open_executor(workers) as executor:
-        scene = ingest(model, read, progress, workers=workers or processors())
+        scene = ingest(model, read, progress, workers=workers or processors(), ask=False)
         if scene.space.up_guessed or scene.space.unit_guessed:
             # The estimate assumes a building; a statue stays unchanged.
             read = replace(read, up=read.up or "y", unit=read.unit or "m")
-            scene = ingest(model, read, progress, workers=workers or processors())
+            scene = ingest(model, read, progress, workers=workers or processors(), ask=False)
         octree = make_apo(scene, options, executor, progress)
     FORM.write(folder, files_of(octree), force=force)
     for warning in [*warnings(exterior_notes(scene.notes)), *octree.notes]:

@@ -177,13 +177,13 @@ def share_turned_away(points: Floats, triangles: NDArray[np.integer], two_sided:
     # A place between faces along one axis only may lie between two houses.
     room = (bounded >= 2) & (space >= ROOM)
     space, bounded = space[room], bounded[room]
-    strips = np.array(np.meshgrid(*(_strips(lines.rows(k)) for k in range(3)), indexing="ij"))
-    weight = strips[:, room].prod(axis=0) * space**3
+    widths = np.array(np.meshgrid(*(strips(lines.rows(k)) for k in range(3)), indexing="ij"))
+    weight = widths[:, room].prod(axis=0) * space**3
     ends = 2 * weight @ bounded
     return float(weight @ turned.sum(axis=0)[room] / ends) if ends else 0.0
 
 
-def _strips(row: Floats) -> Floats:
+def strips(row: Floats) -> Floats:
     """The width that each place of a row represents: the distance to the nearer neighbour, so that
     a place at the edge of a house does not represent a part of the meadow."""
     if len(row) < 2:

@@ -34,6 +34,8 @@ from ptmtools.tolerance import PLANE_SHARE
 
 #: Default colours: of faces without an image, and of images.
 PLAIN, WHITE = (0.8, 0.8, 0.8), (1.0, 1.0, 1.0)
+#: Suffixes of the formats that prescribe the unit.
+PRESCRIBED = (".glb", ".gltf")
 #: Errors of the system for circular links and sockets, and of `open_regular` for pipes and devices.
 _NO_FILE = {
     errno.ELOOP: "no such file",
@@ -48,6 +50,7 @@ def ingest(
     progress: Progress = silent,
     *,
     workers: int = 1,
+    ask: bool = True,
 ) -> Scene:
     """Read a model file.
 
@@ -57,6 +60,7 @@ def ingest(
     options: see `IngestOptions`.
     progress: called with bytes while reading, then with images and materials.
     workers: threads that decode images; does not change the result.
+    ask: whether an impossible unit is an error or a note PTM-N236.
 
     Returns
     -------
@@ -65,7 +69,8 @@ def ingest(
     Raises
     ------
     InputError: the file is absent, empty, damaged, of an unknown format, or has no usable face;
-        with ``strict`` also for misses (`Findings`).
+        with ``strict`` also for misses (`Findings`). PTM-I236: the unit cannot be guessed, or
+        is not that of the format.
     LimitError: PTM-L203 more vertices than int32 can number, or more triangles than ``options``
         allow; PTM-L204 an impossible extent, a line or a material library that is too long;
         PTM-L104 an image of more texels than ``options`` allow.
@@ -103,8 +108,9 @@ def ingest(
         kept.triangles,
         named,
         DeclaredSpace(metres, options.up),
-        DeclaredSpace(source.metres, source.up),
+        DeclaredSpace(source.metres, source.up, model.suffix.lower() in PRESCRIBED),
         findings,
+        ask=ask,
     )
     uv = _coordinates(source, kept, findings)
     used_material, triangle_material = np.unique(

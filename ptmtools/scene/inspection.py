@@ -92,7 +92,7 @@ def inspect(
     workers: int = 1,
 ) -> Inspection:
     """Reads a model and describes it. Raises the errors of `ingest`."""
-    scene = ingest(path, options, progress, workers=workers)
+    scene = ingest(path, options, progress, workers=workers, ask=False)
     suffix = path.suffix.lower()
     tree = document_json(path) if suffix in (".glb", ".gltf") else {}
     asset = tree.get("asset", {})
@@ -131,7 +131,10 @@ def _guesses(scene: Scene, usual: Up | None) -> list[Guess]:
         (scene.objects, scene.triangle_object),
         ([material.name for material in scene.materials], scene.triangle_material),
     )
-    ranked = candidates(evidence(points, scene.triangles, named), usual=usual)
+    measured = evidence(points, scene.triangles, named)
+    ranked = candidates(measured, usual=usual)
+    if ranked[0].too_low:
+        ranked = candidates(measured, usual=usual, numbers=True)
     best = ranked[0]
     axis = next(candidate for candidate in ranked if candidate.up != best.up)
     unit = next(candidate for candidate in ranked[1:] if candidate.up == best.up)

@@ -21,6 +21,7 @@ from ptmtools.scene.reference import Folder
 WARNINGS = (
     "PTM-N234",
     "PTM-N232",
+    "PTM-N236",
     "PTM-N227",
     "PTM-N233",
     "PTM-N235",
@@ -35,9 +36,9 @@ WARNINGS = (
 )
 #: The second best up axis: not a warning, but printed without ``-v``.
 RUNNER_UP = "PTM-N238"
-#: Inside out: irrelevant for models that are viewed from outside, such as statues and campus
-#: buildings, whose faces are supposed to be turned away from the rooms.
-INSIDE_OUT = "PTM-N235"
+#: Inside out, and rooms of impossible size: irrelevant for models that are viewed from outside,
+#: such as statues and campus buildings, whose faces are turned away from the rooms.
+OF_ROOMS = ("PTM-N235", "PTM-N236")
 
 
 class Findings:
@@ -138,7 +139,7 @@ class Findings:
 
 def exterior_notes(notes: Iterable[Note]) -> list[Note]:
     """The notes that are relevant for a model that is viewed from outside."""
-    return [note for note in notes if note.code != INSIDE_OUT]
+    return [note for note in notes if note.code not in OF_ROOMS]
 
 
 def line(note: Note, more: int = 0) -> str:

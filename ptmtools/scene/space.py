@@ -4,6 +4,13 @@ Values that neither the user nor the format defines are guessed (`up_axis`) and 
 format are trusted: a glTF file is in metres with Y up by its specification, and one that seems to
 violate it is noted, not rotated. Other programs read the same wrong declaration, and only the user
 knows which of them the model was viewed in.
+
+The user is asked for the unit (PTM-I236) if no guess is possible: where no visitor can stand in the
+rooms in any unit, as in a model of extent 1. A unit that the file records is not questioned, only
+doubted. A unit that the format prescribes is: many exporters write the units of their program
+instead. So the user is asked too where no visitor can stand in the rooms of a glTF file, and where
+most rooms are higher than any and another unit explains them. Models without floors between walls,
+such as statues, terrains and caves, have no rooms to judge by; they are never refused.
 """
 
 from __future__ import annotations
@@ -19,11 +26,13 @@ from ptmtools.arrays import Floats
 from ptmtools.errors import InputError, LimitError
 from ptmtools.scene.model import Space
 from ptmtools.scene.notes import Findings
+from ptmtools.scene.standing import HEIGHT
 from ptmtools.scene.up_axis import (
     CLOSE_AXIS,
     CLOSE_UNIT,
     CONVENTION,
     DOUBT_AXIS,
+    TRUST,
     UNITS,
     USUAL_UP,
     Candidate,
@@ -35,6 +44,8 @@ from ptmtools.scene.up_axis import (
 
 #: Largest number of reasons in a note.
 _REASONS = 3
+#: Number of units from which the user may choose.
+_CHOICE = 3
 #: Extent of a scene in metres, from a micrometre to a million kilometres: beyond it the unit is
 #: wrong; within it products of coordinates stay in the range of float64 and float32.
 SMALLEST_EXTENT, LARGEST_EXTENT = 1e-6, 1e9
@@ -59,10 +70,12 @@ def parse_unit(unit: str | float) -> float:
 
 @dataclass(frozen=True)
 class DeclaredSpace:
-    """A declaration of a model's space by the user or the format: metres in one unit, up axis."""
+    """A declaration of a model's space by the user or the format: metres in one unit, up axis, and
+    whether the format prescribes the unit for all files instead of recording it in this one."""
 
     metres: float | None = None
     up: Up | None = None
+    prescribed: bool = False
 
 
 def settle(
@@ -73,11 +86,14 @@ def settle(
     by_user: DeclaredSpace,
     by_format: DeclaredSpace,
     findings: Findings,
+    *,
+    ask: bool = True,
 ) -> Space:
     """The space of a model of (T, 3) triangles over (V, 3) finite points: as declared by the user,
     else as declared by the format, else as guessed.
 
-    Raises LimitError PTM-L204 if the extent of the model is impossible.
+    Raises InputError PTM-I236 if the unit can neither be guessed nor be that of the format, which
+    is a note without ``ask``, and LimitError PTM-L204 if the extent of the model is impossible.
     """
     low = points.min(axis=0)
     with np.errstate(over="ignore"):
@@ -88,13 +104,27 @@ def settle(
     if by_user.metres is None or by_user.up is None:
         measured = evidence(points, triangles, named)
         usual = None if by_format.up else USUAL_UP.get(model.suffix.lower())
-        judged = by_user.up or _judge_axis(
-            candidates(measured, metres, usual), by_format.up, findings
-        )
+        # With numbers, so that a model in none of the units does not seem to lie on its side.
+        numbers = metres is None and all(each.standing.heights for each in measured.values())
+        ranked = candidates(measured, metres, usual, numbers=numbers)
+        judged = by_user.up or _judge_axis(ranked, by_format.up, findings)
         up = up or judged
         if by_user.metres is None:
-            upright = [c for c in candidates(measured, usual=usual) if c.up == judged]
-            metres = _judge_unit(upright, by_format.metres, findings)
+            every = candidates(measured, usual=usual, numbers=True)
+            ranked = [candidate for candidate in every if candidate.up == up]
+            if by_format.metres is None:
+                metres = _guess_unit(ranked, findings, ask)
+            else:
+                given = candidates(measured, by_format.metres, usual)
+                likely = next(c for c in every if c.up == judged and c.unit in UNITS)
+                metres = _judge_unit(
+                    next(candidate for candidate in given if candidate.up == up),
+                    likely,
+                    ranked,
+                    by_format.prescribed,
+                    findings,
+                    ask,
+                )
     assert metres
     assert up
     extent = float(side.max()) * metres
@@ -170,30 +200,79 @@ def _reasons(candidate: Candidate, other: Candidate) -> str:
     return f" (reasons: {', '.join(reasons)})" if reasons else ""
 
 
-def _judge_unit(ranked: list[Candidate], by_format: float | None, findings: Findings) -> float:
-    """Metres in one unit: that of the format, or the most likely one, with a note on it."""
-    best, rival = ranked[:2]
-    if by_format is None:
-        if rival.cost - best.cost < CLOSE_UNIT:
-            findings.note(
-                "PTM-N233",
-                f"the unit is uncertain: assuming {best.unit} ({best.size}), but {rival.unit} is "
-                f"nearly as likely ({rival.size}); use --unit {best.unit} or --unit {rival.unit}",
-            )
-        else:
-            findings.note(
-                "PTM-N201", f"unit guessed: {best.unit} ({best.size}); use --unit to override"
-            )
-        return best.metres
-    known = by_format in UNITS.values()  # other units are not among the candidates
-    if known and best.metres != by_format:
-        unit = "metres" if by_format == 1 else f"units of {by_format:g} m"
+def _guess_unit(ranked: list[Candidate], findings: Findings, ask: bool) -> float:
+    """Metres in the most likely unit with a name, with a note on it; the user is asked if it is
+    impossible."""
+    best, rival = [candidate for candidate in ranked if candidate.unit in UNITS][:2]
+    if best.too_low:
+        _ask("the unit cannot be guessed", best, ranked, findings, ask)
+    elif best.small:
+        findings.note(
+            "PTM-N233",
+            f"the unit is uncertain: assuming {best.unit}, the model is lower than a visitor "
+            f"{HEIGHT:g} m tall ({best.size}); use --unit to override",
+        )
+    elif rival.cost - best.cost < CLOSE_UNIT:
+        findings.note(
+            "PTM-N233",
+            f"the unit is uncertain: assuming {best.unit} ({best.size}), but {rival.unit} is "
+            f"nearly as likely ({rival.size}); use --unit {best.unit} or --unit {rival.unit}",
+        )
+    else:
+        findings.note(
+            "PTM-N201", f"unit guessed: {best.unit} ({best.size}); use --unit to override"
+        )
+    return best.metres
+
+
+def _judge_unit(
+    given: Candidate,
+    likely: Candidate,
+    ranked: list[Candidate],
+    prescribed: bool,
+    findings: Findings,
+    ask: bool,
+) -> float:
+    """Metres in the given unit of the format, with a note if it is doubtful; the user is asked if
+    the format prescribes it and it is impossible."""
+    unit = "metres" if given.metres == 1 else f"units of {given.metres:g} m"
+    too_high = given.too_high and given.cost - ranked[0].cost > TRUST
+    if prescribed and (given.too_low or too_high):
+        _ask(f"the format is in {unit}, but the model can hardly be", given, ranked, findings, ask)
+    elif given.too_low:
         findings.note(
             "PTM-N227",
-            f"the format is in {unit}, but {best.unit} is more likely ({best.size}); use --unit "
-            "to override",
+            f"the file is in {unit} ({given.size}), but its rooms are too small for a visitor "
+            f"{HEIGHT:g} m tall; use --unit to override",
         )
-    return by_format
+    # Units without a name are not among the candidates.
+    elif given.unit in UNITS and likely.metres != given.metres:
+        findings.note(
+            "PTM-N227",
+            f"the format is in {unit}, but {likely.unit} is more likely ({likely.size}); use "
+            "--unit to override",
+        )
+    return given.metres
+
+
+def _ask(
+    message: str, doubted: Candidate, ranked: list[Candidate], findings: Findings, ask: bool
+) -> None:
+    """Raises an error with the likeliest units, among them the doubted one; without ``ask`` only
+    notes it."""
+    choice = ranked[:_CHOICE]
+    if all(candidate.metres != doubted.metres for candidate in choice):
+        choice[-1] = doubted
+    if doubted.too_low:
+        reason = f"its rooms would be too small for a visitor {HEIGHT:g} m tall"
+    else:
+        reason = "its rooms would be too high"
+    message = f"{message}: in {doubted.unit} {reason}"
+    *others, last = (f"--unit {candidate.unit} ({candidate.size})" for candidate in choice)
+    remedy = f"use {', '.join(others)} or {last}, or the metres in one unit"
+    if ask:
+        raise InputError("PTM-I236", message, file=findings.model, remedy=remedy)
+    findings.note("PTM-N236", f"{message}; {remedy}")
 
 
 def to_world(points: Floats, space: Space) -> Floats:

@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.scene.facing import Crossings, SampleLines
+from ptmtools.scene.standing import HEIGHT, NO_ROOMS, Standing, standing
 
 Up = Literal["y", "z"]
 AXES: dict[Up, int] = {"y": 1, "z": 2}
@@ -105,6 +106,7 @@ class Evidence:
     crossed: ratio of wall areas in two directions: 0 if all walls are parallel, 1 if equal.
     named: share of the named area that is level or upright as its names state; 1 without names.
     door: median height of door leaves; 0 if none is named.
+    standing: the size of the rooms with floors and walls.
     """
 
     width: float
@@ -118,6 +120,12 @@ class Evidence:
     crossed: float
     named: float
     door: float
+    standing: Standing = NO_ROOMS
+
+    @property
+    def storey(self) -> tuple[float, float]:
+        """The clear height of most rooms, and the share of rooms that have it."""
+        return self.standing.storey if self.standing.heights else (self.room, self.alike)
 
 
 def evidence(
@@ -157,8 +165,22 @@ def evidence(
             ),
             named=as_named / named_area if named_area > _NAMED * total else 1.0,
             door=float(np.median(doors)) * scale if doors else 0.0,
+            standing=standing(
+                lines, crossings, *_level_and_upright(local, triangles, axis), axis
+            ).times(scale),
         )
     return result
+
+
+def _level_and_upright(
+    points: Floats, triangles: NDArray[np.integer], axis: int
+) -> tuple[Bools, Bools]:
+    """(T,) whether each triangle is level, and whether it is upright."""
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    normal = np.cross(b - a, c - a)
+    length = np.linalg.norm(normal, axis=1)
+    slope = np.abs(normal[:, axis])
+    return slope > _LEVEL * length, slope < _UPRIGHT * length
 
 
 def _sampled_faces(
@@ -224,8 +246,20 @@ RUNNER_UP = 3.0
 #: Heights of buildings in metres: a visitor cannot stand below the first; above the second a
 #: building has several storeys, which costs little.
 HEIGHTS = (2.0, 15.0)
-#: Widths of buildings and free heights of rooms, in metres.
+#: Widths of buildings and clear heights of rooms, in metres.
 WIDTHS, ROOMS = (3.0, 500.0), (2.2, 6.0)
+#: The cost of a room grows with the logarithm of its height up to the first cost, then with this
+#: share of it: halls and blocks of a city may have any height.
+HALL, HIGHER = 0.5, 0.2
+#: The cost of rooms in which no visitor can stand, and the share of places from which on it is 0:
+#: the rest may lie in furniture and slabs.
+NO_VISITOR, ENOUGH = 4.0, 0.5
+#: Rooms are impossible if a visitor fits at a smaller share of places than this, or if half of them
+#: are higher than this, in metres.
+FEWEST, HIGHEST = 0.25, 200.0
+#: Clear heights of most rooms in metres, of houses and of halls, from which units without a name
+#: follow; the prior cost of such a unit; and its smallest ratio to every unit with a name.
+STOREYS, NUMBER, UNLIKE = (2.7, 5.0), 1.0, 1.5
 #: A model lower than this share of the width of its rooms is a plan, not a building.
 FLAT = 0.003
 #: The height of a door in metres, and the relative deviation without cost.
@@ -238,6 +272,8 @@ CLOSE_AXIS, CLOSE_UNIT = 0.5, 0.4
 #: An axis defined by the format is doubtful if the other axis costs this much less: more than the
 #: difference for a correct corridor or cube that would be cheaper on its side.
 DOUBT_AXIS = 0.35
+#: A unit prescribed by the format is impossible only if another one costs this much less.
+TRUST = 1.5
 #: Smallest difference of costs that counts as a reason.
 _REASON = 0.1
 _OTHER: dict[Up, Up] = {"y": "z", "z": "y"}
@@ -250,7 +286,7 @@ class Candidate:
     Attributes
     ----------
     up, metres: the axis, and the length of the unit.
-    unit: its name; "" if it has none.
+    unit: its name; the length in metres if it has none.
     evidence: of the model with this axis up.
     costs: by criterion; the keys are the reasons in messages.
     """
@@ -276,10 +312,26 @@ class Candidate:
         """Its size in words."""
         measured, metres = self.evidence, self.metres
         width, height = measured.width * metres, measured.height * metres
-        rooms = (
-            f", clear height of most rooms {measured.room * metres:.3g} m" if measured.room else ""
-        )
+        room = measured.storey[0] * metres
+        standing = measured.standing.heights or room >= HEIGHT
+        rooms = f", clear height of most rooms {room:.3g} m" if standing else ""
         return f"{width:.3g} m wide and {height:.3g} m high{rooms}"
+
+    @property
+    def small(self) -> bool:
+        """Whether it is lower than a visitor, and no plan."""
+        return self.evidence.height < HEIGHT / self.metres and not self.flat
+
+    @property
+    def too_low(self) -> bool:
+        """Whether no visitor can stand in its rooms, if it has rooms."""
+        return self.evidence.standing.share(HEIGHT / self.metres) < FEWEST
+
+    @property
+    def too_high(self) -> bool:
+        """Whether its rooms are higher than any."""
+        heights = self.evidence.standing.heights
+        return bool(heights) and heights[len(heights) // 2] > HIGHEST / self.metres
 
     def rivals(self, best: Candidate) -> bool:
         """Whether its cost is low enough to print it as the second-best guess."""
@@ -294,29 +346,46 @@ class Candidate:
 
 
 def candidates(
-    measured: Mapping[Up, Evidence], metres: float | None = None, usual: Up | None = None
+    measured: Mapping[Up, Evidence],
+    metres: float | None = None,
+    usual: Up | None = None,
+    *,
+    numbers: bool = False,
 ) -> list[Candidate]:
     """The candidates for the evidence of each axis, the most likely first: for every unit, or for
-    one of ``metres``. ``usual`` is the up axis by convention (`USUAL_UP`)."""
+    one of ``metres``. ``usual`` is the up axis by convention (`USUAL_UP`). With ``numbers`` also
+    units without a name, in which the rooms have a usual height."""
     names = {length: name for name, length in UNITS.items()}
-    units = UNITS if metres is None else {names.get(metres, ""): metres}
-    result = [
-        Candidate(
-            up,
-            length,
-            unit,
-            one,
-            _costs(one, measured[_OTHER[up]], unit, length)
-            | {CONVENTION: UNUSUAL_UP * (usual not in (None, up))},
-        )
-        for up, one in measured.items()
-        for unit, length in units.items()
-    ]
+    units = UNITS if metres is None else {names.get(metres, f"{metres:g}"): metres}
+    result = []
+    for up, one in measured.items():
+        extra = {f"{length:g}": length for length in _fitting_units(one) if numbers}
+        for unit, length in (units | extra).items():
+            costs = _costs(one, measured[_OTHER[up]], length)
+            if metres is None:
+                # Says nothing on the axis: that with no rooms has no rooms that are too low.
+                costs["room for a visitor"] = _visitor_cost(one.standing, length)
+                costs["usual unit"] = PRIOR.get(unit, NUMBER)
+            costs[CONVENTION] = UNUSUAL_UP * (usual not in (None, up))
+            result.append(Candidate(up, length, unit, one, costs))
     # Rounded, so that the last digits of coordinates decide nothing between equals.
     return sorted(result, key=lambda candidate: round(candidate.cost, 6))
 
 
-def _costs(measured: Evidence, other: Evidence, unit: str, metres: float) -> dict[str, float]:
+def _fitting_units(measured: Evidence) -> list[float]:
+    """The units in which most rooms have a usual height, without those similar to one with a
+    name."""
+    height, _ = measured.standing.storey
+    fitting = [float(f"{storey / height:.2g}") for storey in STOREYS] if height > 0 else []
+    return [
+        metres
+        for metres in fitting
+        if 0 < metres < math.inf
+        and all(abs(_log_ratio(metres, unit)) > math.log(UNLIKE) for unit in UNITS.values())
+    ]
+
+
+def _costs(measured: Evidence, other: Evidence, metres: float) -> dict[str, float]:
     level = measured.level + other.level
     # Without free heights along both axes there are no rooms to compare.
     rooms = _higher(measured.median, other.median) if measured.room and other.room else 0.5
@@ -329,9 +398,8 @@ def _costs(measured: Evidence, other: Evidence, unit: str, metres: float) -> dic
         "rooms of equal height": 1 - measured.alike,
         "faces match their names": 2 * (1 - measured.named),
         "usual size": _size_cost(measured, metres),
-        "usual room height": measured.alike * _room_cost(measured.room * metres),
+        "usual room height": measured.storey[1] * _room_cost(measured.storey[0] * metres),
         "usual door height": _door_cost(measured.door * metres),
-        "usual unit": PRIOR.get(unit, 0.0),
     }
 
 
@@ -348,7 +416,7 @@ def _size_cost(measured: Evidence, metres: float) -> float:
     if measured.width > 0:
         narrow, wide = WIDTHS[0] / metres, WIDTHS[1] / metres
         excess = _log_ratio(narrow, measured.width), _log_ratio(measured.built, wide)
-        cost += min(_MOST, 2 * max(0.0, *excess))
+        cost += min(_MOST, max(0.0, 2 * excess[0], excess[1]))
     if measured.height > FLAT * measured.built:
         low, high = HEIGHTS[0] / metres, HEIGHTS[1] / metres
         too_low = min(3.0, 4 * _log_ratio(low, measured.height))
@@ -359,7 +427,18 @@ def _size_cost(measured: Evidence, metres: float) -> float:
 def _room_cost(height: float) -> float:
     if not height > 0:
         return 0.0
-    return min(2.0, max(0.0, 4 * _log_ratio(ROOMS[0], height), _log_ratio(height, ROOMS[1])))
+    above = _log_ratio(height, ROOMS[1])
+    high = min(above, HALL + HIGHER * (above - HALL))
+    return min(2.0, max(0.0, 4 * _log_ratio(ROOMS[0], height), high))
+
+
+def _visitor_cost(standing: Standing, metres: float) -> float:
+    """From the share of places at which a visitor fits; a place with little more room than that
+    counts half."""
+    if not standing.visitors:
+        return 0.0
+    share = (standing.share(HEIGHT / metres) + standing.share(ROOMS[0] / metres)) / 2
+    return NO_VISITOR * max(0.0, 1 - share / ENOUGH)
 
 
 def _door_cost(height: float) -> float:

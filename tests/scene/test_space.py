@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from ptmtools.scene.space import UNITS, DeclaredSpace, parse_unit, rotated, sett
 from ptmtools.scene.up_axis import NamedFaces
 
 from .buildings import atrium, box, corridor, house, site_plan, tower, welded, y_up
+from .districts import boulder, city, flat, hills, museum, serpentine, square, table
 
 
 @pytest.mark.parametrize(
@@ -147,3 +149,97 @@ def test_a_plan_does_not_lie_on_its_side() -> None:
     """A sheet standing upright in a glTF file may be a picture or a wall."""
     sheet = site_plan()[:2]
     assert settled(sheet, by_format=DeclaredSpace(1.0, "y"))[1] == {}
+
+
+GLTF = DeclaredSpace(1.0, "y", prescribed=True)
+BUILDINGS = {
+    "house": house(),
+    "museum": museum(),
+    "serpentine": serpentine(),
+    "flat": flat(),
+    "square": square(),
+    "city": city(),
+}
+
+
+def of_extent(triangles: Floats, extent: float) -> Floats:
+    return triangles * (extent / np.ptp(triangles, axis=(0, 1)).max())
+
+
+@pytest.mark.parametrize("name", BUILDINGS)
+@pytest.mark.parametrize("by_format", [NOTHING, GLTF], ids=["obj", "gltf"])
+def test_the_unit_of_a_model_of_extent_3_is_asked(name: str, by_format: DeclaredSpace) -> None:
+    """Each of the three units is an option, in the first of which the rooms are 2 to 6 m high."""
+    small = y_up(of_extent(BUILDINGS[name], 2.9))
+    with pytest.raises(InputError, match="PTM-I236") as caught:
+        settled(small, by_format=by_format)
+    assert caught.value.exit_status == 3
+    remedy = str(caught.value.remedy)
+    offers = re.findall(r"--unit (\S+) \((\S+) m wide and \S+ m high, clear height of most", remedy)
+    rooms = [float(height) for height in re.findall(r"most rooms (\S+) m", remedy)]
+    assert len(offers) == len(rooms) == 3
+    assert 2 < rooms[0] < 6
+    assert "m" in [unit for unit, _ in offers]
+    for unit, width in offers:
+        assert float(width) == pytest.approx(_width(small) * parse_unit(unit), rel=0.01)
+        space, notes = settled(small, DeclaredSpace(parse_unit(unit)), by_format)
+        assert space.metres == parse_unit(unit)
+        assert not {"PTM-N227", "PTM-N233", "PTM-N236"} & notes.keys()
+
+
+def _width(triangles: Floats) -> float:
+    return float(np.ptp(triangles, axis=(0, 1))[[0, 2]].max())
+
+
+def test_without_asking_an_impossible_unit_is_noted() -> None:
+    points, faces = welded(y_up(of_extent(house(), 1)))
+    for by_format in (NOTHING, GLTF):
+        findings = Findings(Path("house.obj"))
+        named = NamedFaces(*np.zeros((2, len(faces)), dtype=bool))
+        model = Path("house.obj")
+        space = settle(model, points, faces, named, NOTHING, by_format, findings, ask=False)
+        assert (space.metres, space.up) == (1.0, "y")
+        assert {n.code for n in findings.notes} - {"PTM-N202", "PTM-N238"} == {"PTM-N236"}
+
+
+@pytest.mark.parametrize("name", BUILDINGS)
+def test_gltf_in_metres_is_not_questioned(name: str) -> None:
+    space, notes = settled(y_up(BUILDINGS[name]), by_format=GLTF)
+    assert (space.metres, space.up) == (1.0, "y")
+    assert not {"PTM-N227", "PTM-N236"} & notes.keys()
+
+
+@pytest.mark.parametrize("name", ["house", "museum", "serpentine", "flat"])
+@pytest.mark.parametrize("unit", ["cm", "mm"])
+def test_gltf_with_rooms_of_270_metres_is_questioned(name: str, unit: str) -> None:
+    large = y_up(BUILDINGS[name]) / UNITS[unit]
+    with pytest.raises(InputError, match=f"PTM-I236.*|--unit {unit}") as caught:
+        settled(large, by_format=GLTF)
+    offers = re.findall(r"--unit (\S+) \(", str(caught.value.remedy))
+    assert offers[0] == unit
+    assert "m" in offers
+    assert settled(large, DeclaredSpace(1.0), GLTF)[0].metres == 1.0
+
+
+def test_a_recorded_unit_is_doubted_but_kept() -> None:
+    """As in USD and IFC files: the program wrote the unit of this file."""
+    space, notes = settled(house(), by_format=DeclaredSpace(0.01, "z"))
+    assert (space.metres, list(notes)) == (0.01, ["PTM-N227"])
+    assert "too small for a visitor 1.7 m tall" in notes["PTM-N227"]
+    space, notes = settled(house() / 0.7, by_format=DeclaredSpace(0.7, "z"))
+    assert (space.metres, list(notes)) == (0.7, [])
+    space, notes = settled(house() / 0.7, by_format=DeclaredSpace(0.07, "z"))
+    assert (space.metres, list(notes)) == (0.07, ["PTM-N227"])
+
+
+@pytest.mark.parametrize(
+    "triangles", [boulder(), boulder(0.01), hills(1), table(), house(floor=False, roof=False) / 10]
+)
+def test_what_has_no_rooms_is_not_refused(triangles: Floats) -> None:
+    """Its unit cannot be judged: metres, with a warning if nobody could stand beside it."""
+    space, notes = settled(y_up(triangles))
+    assert space.metres == 1.0
+    high = np.ptp(y_up(triangles), axis=(0, 1))[1 if space.up == "y" else 2]
+    assert ("lower than a visitor" in notes.get("PTM-N233", "")) == (high < 1.7)
+    assert "PTM-I236" not in notes
+    assert settled(y_up(triangles), by_format=GLTF)[0].metres == 1.0

@@ -41,6 +41,7 @@ from .buildings import (
     welded,
     y_up,
 )
+from .districts import city, flat, office, serpentine, square
 
 WALLS = house(floor=False, roof=False)
 #: A person is sure which axis is up, and that these are metres.
@@ -74,6 +75,20 @@ SURE = {
     "on a meadow of 3 km": meadow(house(), 3000),
     "on a meadow of 20 km, without a floor": meadow(house(floor=False), 20_000),
     "site plan": site_plan(),
+}
+#: Places that are more than a house, or full of furniture. In the units of the second column they
+#: look like a house in another unit as well.
+PLACES = {
+    "city 166 m wide": (city(), ("cm",)),
+    "city with spires of 100 m": (city(tallest=100), ("cm",)),
+    "blocks without a ground": (city(ground=False), ()),
+    "small blocks, 75 m": (city(75, tallest=20), ()),
+    "square of 34 m": (square(), ()),
+    "façades of sheets": (square(solid=False), ("m",)),
+    "four halls without a ceiling": (serpentine(), ()),
+    "office": (office(), ()),
+    "flat": (flat(), ()),
+    "room of 3 × 4 × 2.5 m": (box((0, 0, 0), (3, 4, 2.5)), ()),
 }
 #: Nobody can tell which axis is up without being told.
 UNSURE = {
@@ -164,6 +179,45 @@ def test_units(name: str, unit: str) -> None:
     likely = [r.unit for r in ranked if r.up == "z" and r.cost - ranked[0].cost < CLOSE_UNIT]
     assert unit in likely
     assert unit == "ft" or likely == [unit]
+
+
+@pytest.mark.parametrize("name", PLACES)
+@pytest.mark.parametrize("unit", UNITS)
+def test_units_of_places(name: str, unit: str) -> None:
+    """OBJ files, Y up. No unit is likely in which a visitor does not fit."""
+    triangles, doubtful = PLACES[name]
+    ranked = read(y_up(triangles) / UNITS[unit], "y")
+    best = ranked[0]
+    assert best.up == "y"
+    assert not best.too_low
+    low = [c for c in ranked if c.up == "y" and c.too_low]
+    assert all(c.metres < UNITS[unit] for c in low)
+    assert all(c.cost - best.cost > CLOSE_UNIT for c in low)
+    if unit in ("m", "cm", "mm") and unit not in doubtful:
+        assert best.unit == unit
+
+
+def test_a_city_is_not_a_toy_in_inches() -> None:
+    """166 units wide, it is 166 m and not 4.2 m wide."""
+    for triangles in (city(), city(tallest=100), city(ground=False)):
+        ranked = read(y_up(triangles), "y")
+        inches = next(c for c in ranked if (c.up, c.unit) == ("y", "in"))
+        assert 3.5 < inches.evidence.width * inches.metres < 4.3
+        assert inches.too_low
+        assert inches.cost > ranked[0].cost + 2
+
+
+def test_a_unit_without_a_name_follows_from_the_height_of_rooms() -> None:
+    """A house 3 m high in units of 7 m: rooms 2.7 and 5 m high need units of 6.3 and 12 m."""
+    points, faces = welded(house() / 7)
+    named = NamedFaces(*np.zeros((2, len(faces)), dtype=bool))
+    ranked = candidates(evidence(points, faces, named), numbers=True)
+    best = next(c for c in ranked if c.up == "z")
+    assert (ranked[0].up, best.unit, best.metres) == ("z", "6.3", 6.3)
+    assert {c.unit for c in ranked if c.up == "z"} == {*UNITS, "6.3", "12"}
+    points, faces = welded(house())
+    ranked = candidates(evidence(points, faces, named), numbers=True)
+    assert {c.unit for c in ranked if c.up == "z"} == {*UNITS, "1.7"}
 
 
 def test_a_house_with_doors_8_feet_high_rooms_is_in_feet() -> None:
@@ -257,4 +311,4 @@ def test_sizes_at_the_ends_of_numbers_have_a_reading(size: float) -> None:
 def test_a_known_unit_is_the_only_one() -> None:
     look = replace(PLAIN, width=20.0)
     assert {r.unit for r in candidates({"y": look, "z": look}, 0.0254)} == {"in"}
-    assert {(r.unit, r.metres) for r in candidates({"y": look, "z": look}, 3.0)} == {("", 3.0)}
+    assert {(r.unit, r.metres) for r in candidates({"y": look, "z": look}, 3.0)} == {("3", 3.0)}
