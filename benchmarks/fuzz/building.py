@@ -37,19 +37,21 @@ from ptmtools.visibility import PvsOptions
 
 #: Random segments per input.
 SEGMENTS = 1000
-#: Options of the subdivision: most inputs have the defaults.
+#: Options of the subdivision: most inputs have the defaults, with few leaves, to build many models.
+FEW = {"max_leaves": 120}
 CELLS: tuple[dict[str, Any], ...] = (
-    *(({},) * 8),
-    {"cells": "leaf"},
-    {"gain": 0.0},
-    {"standing": "anywhere"},
-    {"doors": "closed"},
-    {"doors": "hidden"},
-    {"wall_area": 0.05},
-    {"wall_thickness": 0.0},
+    *((FEW,) * 8),
+    {},
+    FEW | {"cells": "leaf"},
+    FEW | {"gain": 0.0},
+    FEW | {"standing": "anywhere"},
+    FEW | {"doors": "closed"},
+    FEW | {"doors": "hidden"},
+    FEW | {"wall_area": 0.05},
+    FEW | {"wall_thickness": 0.0},
     {"max_leaves": 20},
-    {"reach": "main"},
-    {"detail_by_shape": False},
+    FEW | {"reach": "main"},
+    FEW | {"detail_by_shape": False},
 )
 #: What a user says of the file, or nothing.
 FILES: tuple[dict[str, Any], ...] = (

@@ -85,7 +85,7 @@ def half_floats(soup: Soup, rng: Rng) -> Soup:
 
 def coarse_grid(soup: Soup, rng: Rng) -> Soup:
     """Rounds to a grid of 14 bits, or of another number of bits."""
-    bits = 14 if rng.random() < 0.5 else int(rng.integers(6, 20))
+    bits = 14 if rng.random() < 0.5 else int(rng.integers(2, 20))
     step = (soup.extent or 1.0) / 2**bits
     low = soup.corners.reshape(-1, 3).min(axis=0)
     return soup.moved_to(low + np.round((soup.corners - low) / step) * step)
@@ -146,13 +146,32 @@ def mirror(soup: Soup, rng: Rng) -> Soup:
 def scale(soup: Soup, rng: Rng) -> Soup:
     """Other units, or other proportions."""
     if rng.random() < 0.5:
-        return soup.moved_to(soup.corners * 10.0 ** rng.integers(-6, 7))
+        power = 6 if rng.random() < 0.8 else 18
+        return soup.moved_to(soup.corners * 10.0 ** rng.integers(-power, power + 1))
     return soup.moved_to(soup.corners * [logarithmic(rng, 0.01, 100) for _ in range(3)])
+
+
+def flatten(soup: Soup, rng: Rng) -> Soup:
+    """All of it, or a part, in a plane or on a line, exactly or nearly."""
+    rows = some(soup, rng) if rng.random() < 0.5 else np.arange(len(soup))
+    factor = np.ones(3)
+    thin = rng.choice((0.0, logarithmic(rng, 1e-12, 1e-2)))
+    factor[rng.choice(3, rng.choice((1, 1, 1, 2)), replace=False)] = thin
+    corners = soup.corners.copy()
+    middle = corners[rows].reshape(-1, 3).mean(axis=0)
+    corners[rows] = middle + (corners[rows] - middle) * factor
+    return soup.moved_to(corners)
+
+
+def few(soup: Soup, rng: Rng) -> Soup:
+    """Hardly any triangles."""
+    count = min(len(soup), int(logarithmic(rng, 2, 20)))
+    return soup.take(np.sort(rng.choice(len(soup), count, replace=False)))
 
 
 def offset(soup: Soup, rng: Rng) -> Soup:
     """Far from the origin."""
-    distance = logarithmic(rng, 10.0, 1e7) if rng.random() < 0.5 else 1e6
+    distance = logarithmic(rng, 10.0, 1e12) if rng.random() < 0.5 else 1e6
     return soup.moved_to(soup.corners + unit_vectors(rng, 1) * distance)
 
 
@@ -258,6 +277,24 @@ def strays(soup: Soup, rng: Rng) -> Soup:
     return soup.with_more(corners, rng.integers(len(soup), size=count))
 
 
+def confetti(soup: Soup, rng: Rng) -> Soup:
+    """Adds random triangles to the plane of a triangle, exactly or nearly in it."""
+    row = rng.integers(len(soup))
+    corner, *others = soup.corners[row]
+    along = np.array(others) - corner
+    share = rng.uniform(-1, 2, (int(logarithmic(rng, 2, 40)), 3, 2))
+    if rng.random() < 0.3:
+        share = np.round(share * 8) / 8
+    corners = corner + share @ along
+    if rng.random() < 0.7:
+        corners += (
+            unit_vectors(rng, 1)
+            * rng.normal(size=(len(corners), 3, 1))
+            * logarithmic(rng, 1e-16, 1e-3)
+        )
+    return soup.with_more(corners, np.full(len(corners), row))
+
+
 def materials(soup: Soup, rng: Rng) -> Soup:
     """Gives triangles an image or glass."""
     material = soup.material.copy()
@@ -276,6 +313,8 @@ DISTORTIONS: dict[str, Distortion] = {
     "weld": welding,
     "mirror": mirror,
     "scale": scale,
+    "flatten": flatten,
+    "few": few,
     "offset": offset,
     "rotate": turn,
     "shear": shear,
@@ -286,5 +325,6 @@ DISTORTIONS: dict[str, Distortion] = {
     "collapse": collapse,
     "push": push,
     "stray": strays,
+    "confetti": confetti,
     "material": materials,
 }

@@ -170,14 +170,13 @@ def results(summary: Summary, seed: int) -> Iterable[tuple[tuple[str, ...], Outc
 
 def print_findings(summary: Summary) -> None:
     """Prints the findings of a base, those alike on one line."""
-    alike: dict[str, list[int]] = {}
+    alike: dict[str, list[tuple[int, str]]] = {}
     for number, what in summary.tally.findings:
-        alike.setdefault(re.sub(r"-?\d+(\.\d+)?(e-?\d+)?", "N", what), []).append(number)
-    whole = dict(summary.tally.findings)
-    for numbers in list(alike.values())[:SHOWN]:
-        more = f" and {', '.join(map(str, numbers[1:6]))}" if len(numbers) > 1 else ""
-        print(f"    ! {summary.name}:{numbers[0]}{more} ({len(numbers)}): {whole[numbers[0]]}",
-              flush=True)  # fmt: skip
+        alike.setdefault(re.sub(r"-?\d[\d.,e-]*", "N", what), []).append((number, what))
+    for findings in list(alike.values())[:SHOWN]:
+        number, what = findings[0]
+        others = "".join(f", {other}" for other, _ in findings[1:6])
+        print(f"    ! {summary.name}:{number}{others} ({len(findings)}): {what}", flush=True)
 
 
 def show(which: str, seed: int, output: str | None) -> None:

@@ -258,6 +258,8 @@ _INSIDE = 0.75
 _AWAY = 0.9
 #: Number of points that look at the walls around.
 LOOKS = 16
+#: Points whose level rays are shot at a time.
+_AT_ONCE = 1 << 14
 
 
 def spread_over(points: Floats, count: int) -> Floats:
@@ -313,12 +315,14 @@ class Surroundings:
     def inside(self, points: Floats, roofed: bool = True) -> Bools:
         """(n,) which of (n, 3) points are between walls and, if the building is ``roofed``, under a
         roof."""
-        result: Bools = self._hits(points, np.tile([0.0, 1.0, 0.0], (len(points), 1)))[0] >= 0
-        result |= not roofed
-        under = np.flatnonzero(result)
-        along = np.tile(self._level, (len(under), 1))
-        met = self._hits(np.repeat(points[under], _RAYS, axis=0), along)[0] >= 0
-        result[under] = met.reshape(-1, _RAYS).mean(axis=1) >= _INSIDE
+        result = np.zeros(len(points), dtype=np.bool_)
+        for first in range(0, len(points), _AT_ONCE):
+            some = points[first : first + _AT_ONCE]
+            above = self._hits(some, np.tile([0.0, 1.0, 0.0], (len(some), 1)))[0] >= 0
+            under = np.flatnonzero(above | (not roofed))
+            along = np.tile(self._level, (len(under), 1))
+            met = self._hits(np.repeat(some[under], _RAYS, axis=0), along)[0] >= 0
+            result[first + under] = met.reshape(-1, _RAYS).mean(axis=1) >= _INSIDE
         return result
 
     def _hits(self, points: Floats, along: Floats) -> Ints:
