@@ -112,17 +112,20 @@ def standing(
     lines: SampleLines,
     crossings: Sequence[Crossings],
     level: Bools,
-    upright: Bools,
+    upright: Sequence[Bools],
     axis: int,
 ) -> Standing:
-    """The size of the rooms with ``axis`` up; ``crossings`` are those along each axis, ``level``
-    and ``upright`` are (T,) by triangle."""
+    """The size of the rooms with ``axis`` up.
+
+    ``crossings`` are those along each axis; ``upright`` is (n,) for each, whether the face crossed
+    is upright, and ``level`` is (n,) for ``axis``.
+    """
     if not all(len(crossing.position) for crossing in crossings):
         return NO_ROOMS
     enclosed = [enclosing(lines, crossings[k], k) for k in range(3)]
     before, after = enclosed[axis]
     at = crossings[axis].position
-    floor = (before >= 0) & level[crossings[axis].triangle[before]]
+    floor = (before >= 0) & level[before]
     roofed = after >= 0
     closed = (before >= 0) & roofed
     width, walled = np.full(before.shape, np.inf), np.zeros(before.shape, dtype=bool)
@@ -131,8 +134,7 @@ def standing(
             continue
         low, high = enclosed[k]
         both = (low >= 0) & (high >= 0)
-        wall = upright[crossings[k].triangle]
-        walled |= both & wall[low] & wall[high]
+        walled |= both & upright[k][low] & upright[k][high]
         position = crossings[k].position
         width = np.minimum(width, np.where(both, position[high] - position[low], np.inf))
         closed |= both

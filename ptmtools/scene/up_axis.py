@@ -137,7 +137,8 @@ def evidence(
     local = (points - points.min(axis=0)) / scale
     lines = SampleLines(local, triangles)
     crossings = [lines.along(axis) for axis in range(3)]
-    face, normal, area = _sampled_faces(local, triangles, crossings)
+    normals = [_unit_normals(local, triangles[crossing.triangle]) for crossing in crossings]
+    face, normal, area = _sampled_faces(crossings, normals)
     named_level, named_upright = named.level[face], named.upright[face]
     named_area = float(area @ (named_level | named_upright))
     total = float(area.sum()) or 1.0
@@ -166,39 +167,35 @@ def evidence(
             named=as_named / named_area if named_area > _NAMED * total else 1.0,
             door=float(np.median(doors)) * scale if doors else 0.0,
             standing=standing(
-                lines, crossings, *_level_and_upright(local, triangles, axis), axis
+                lines,
+                crossings,
+                np.abs(normals[axis][:, axis]) > _LEVEL,
+                [np.abs(each[:, axis]) < _UPRIGHT for each in normals],
+                axis,
             ).times(scale),
         )
     return result
 
 
-def _level_and_upright(
-    points: Floats, triangles: NDArray[np.integer], axis: int
-) -> tuple[Bools, Bools]:
-    """(T,) whether each triangle is level, and whether it is upright."""
+def _unit_normals(points: Floats, triangles: NDArray[np.integer]) -> Floats:
     a, b, c = np.moveaxis(points[triangles], 1, 0)
     normal = np.cross(b - a, c - a)
-    length = np.linalg.norm(normal, axis=1)
-    slope = np.abs(normal[:, axis])
-    return slope > _LEVEL * length, slope < _UPRIGHT * length
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    return np.asarray(normal)
 
 
 def _sampled_faces(
-    points: Floats, triangles: NDArray[np.integer], crossings: Sequence[Crossings]
+    crossings: Sequence[Crossings], normals: Sequence[Floats]
 ) -> tuple[Ints, Floats, Floats]:
     """The faces that the lines along the three axes cross: (n,) triangles, (n, 3) unit normals, and
     (n,) areas that they represent. Each face counts along the axis nearest to its normal."""
     parts = []
-    for axis, crossing in enumerate(crossings):
-        a, b, c = np.moveaxis(points[triangles[crossing.triangle]], 1, 0)
-        normal = np.cross(b - a, c - a)
-        normal /= np.linalg.norm(normal, axis=1)[:, None]
+    for axis, (crossing, normal) in enumerate(zip(crossings, normals, strict=True)):
         nearest = np.abs(normal).argmax(axis=1) == axis
-        normal = normal[nearest]
-        area = crossing.section[nearest] / np.abs(normal[:, axis])
-        parts.append((crossing.triangle[nearest], normal, area))
-    face, normals, areas = zip(*parts, strict=True)
-    return np.concatenate(face), np.concatenate(normals), np.concatenate(areas)
+        area = crossing.section[nearest] / np.abs(normal[nearest, axis])
+        parts.append((crossing.triangle[nearest], normal[nearest], area))
+    face, sampled, areas = zip(*parts, strict=True)
+    return np.concatenate(face), np.concatenate(sampled), np.concatenate(areas)
 
 
 def _eigenvalue_ratio(a: float, b: float, mixed: float) -> float:
@@ -256,7 +253,7 @@ HALL, HIGHER = 0.5, 0.2
 NO_VISITOR, ENOUGH = 4.0, 0.5
 #: Rooms are impossible if a visitor fits at a smaller share of places than this, or if half of them
 #: are higher than this, in metres.
-FEWEST, HIGHEST = 0.25, 200.0
+FEWEST, HIGHEST = 0.4, 200.0
 #: Clear heights of most rooms in metres, of houses and of halls, from which units without a name
 #: follow; the prior cost of such a unit; and its smallest ratio to every unit with a name.
 STOREYS, NUMBER, UNLIKE = (2.7, 5.0), 1.0, 1.5
