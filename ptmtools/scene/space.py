@@ -267,7 +267,7 @@ def _ask(
         reason = f"its rooms would be too small for a visitor {HEIGHT:g} m tall"
     else:
         reason = "its rooms would be too high"
-    message = f"{message}: in {doubted.unit} {reason}"
+    message = f"{message}: with --unit {doubted.unit}, {reason}"
     *others, last = (f"--unit {candidate.unit} ({candidate.size})" for candidate in choice)
     remedy = f"use {', '.join(others)} or {last}, or the metres in one unit"
     if ask:
