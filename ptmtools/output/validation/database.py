@@ -136,7 +136,9 @@ class _Check:
         self._read_manifest()
         served = served_files(self._folder / SERVED, self.findings)
         check_names(served, self.findings)
-        database = ServedDatabase(self._folder / SERVED, served, self.findings, self._limits)
+        database = ServedDatabase(
+            self._folder / SERVED, served, self.findings, self._limits, self._extent()
+        )
         ours = self._ours = {path for path in served if self._is_ours(path)}
         self._note_foreign([path for path in served if path not in ours])
         self._read_files(database, progress, workers)
@@ -177,6 +179,13 @@ class _Check:
             for name, digest in record["inputs"].items():
                 if self._outputs.get(name, digest) != digest:
                     at.add("PTM-D656", f"computed from an earlier {name}")
+
+    def _extent(self) -> float:
+        """The largest side of the model, metres; 0 if it is not recorded."""
+        try:
+            return float(max(self._stages["scene"]["counts"]["size"]))
+        except (KeyError, TypeError, ValueError, OverflowError):
+            return 0.0
 
     def _is_ours(self, path: str) -> bool:
         """Whether a stage wrote a served file, or it lies in a folder of such files."""

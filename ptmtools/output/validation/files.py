@@ -157,6 +157,7 @@ class ServedDatabase:
     folder: the served folder.
     files: all paths.
     limits: of the check.
+    extent: largest side of the model, metres, by the manifest; 0 where it records none.
     contents: for each file that could be read its header if it is a `.ptm`, (width, height) of a
         served image, and the result of the form's reader of other files.
     hints: None without a readable index.
@@ -169,8 +170,9 @@ class ServedDatabase:
         files: Iterable[str],
         findings: Findings,
         limits: Limits = _LIMITS,
+        extent: float = 0.0,
     ) -> None:
-        self.folder, self.limits = folder, limits
+        self.folder, self.limits, self.extent = folder, limits, extent
         self.files = set(files)
         self.contents: dict[str, Any] = {}
         self.hints: ReadHints | None = None

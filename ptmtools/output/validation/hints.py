@@ -108,7 +108,7 @@ def check_files(database: ServedDatabase) -> None:
     for urls in map(hints.expanded, index["geometry"].values()):
         if database.files.isdisjoint(urls):  # else the check of the form compares its files
             database.resolve_each(HINTS, "geometry", urls)
-    check_space(hints.records, index["viewpoints"], places, at)
+    check_space(hints.records, index["viewpoints"], places, at, database.extent)
     for i, view in enumerate(index["viewpoints"]):
         if not index["cells"][view["cell"]].get("standing", True):
             message = f"lies in cell {view['cell']}, which has no place to stand"

@@ -27,10 +27,15 @@ _BATCH = 1 << 22
 
 
 def check_space(
-    records: Sequence[Row | None], viewpoints: Sequence[Row], places: Sequence[Place], at: Place
+    records: Sequence[Row | None],
+    viewpoints: Sequence[Row],
+    places: Sequence[Place],
+    at: Place,
+    extent: float = 0.0,
 ) -> None:
     """Checks the leaves and portals of the records, whose places are ``places``, and the viewpoints
-    of the index, whose place is ``at``; all indices must be in range."""
+    of the index, whose place is ``at``; all indices must be in range. ``extent``: see
+    `tolerance_about`."""
     leaves = [
         (i, k, leaf, np.array(leaf["points"], np.float64))
         for i, record in enumerate(records)
@@ -38,7 +43,7 @@ def check_space(
     ]
     if not leaves:
         return
-    tolerance = Tolerance.for_points(np.concatenate([points for *_, points in leaves]))
+    tolerance = tolerance_about(np.concatenate([points for *_, points in leaves]), extent)
     bodies: list[list[Planes]] = [[] for _ in records]
     for i, k, leaf, points in leaves:
         try:
@@ -87,6 +92,14 @@ def _in_face(
     # The normal of a narrow polygon is rounded: its side counts, its corners decide.
     turned = planes[:, :3] @ plane[:3] < 0
     return bool((turned & (np.abs(distance).max(axis=0) <= tolerance.plane)).any())
+
+
+def tolerance_about(points: Points, extent: float) -> Tolerance:
+    """The tolerance for the (n, 3) points of the cells of a model with this ``extent``, metres, or
+    0 if that is unknown: cells may be a small part of a model, whose extent gave the distances by
+    which they were divided."""
+    own = Tolerance.for_points(points)
+    return Tolerance.for_extent(extent) if own.extent < extent < np.inf else own
 
 
 class SolidError(Exception):

@@ -20,6 +20,7 @@ from ptmtools.output.validation.space import (
     SolidError,
     farthest,
     solid_planes,
+    tolerance_about,
 )
 from ptmtools.output.vrml import PATTERN
 from ptmtools.output.vrml_reader import Document, Node, parse
@@ -52,7 +53,7 @@ def check_files(database: ServedDatabase) -> None:
     points = points if len(points) else np.zeros((1, 3))
     box, tolerance = (
         np.stack([points.min(axis=0), points.max(axis=0)]),
-        Tolerance.for_points(points),
+        tolerance_about(points, database.extent),
     )
     for path, node in cells.items():
         _check_cell(documents[path], node, box, tolerance, database.at(path))
