@@ -8,6 +8,13 @@ and adds them; the candidate of the lowest cost is the most likely one. No singl
 reliable, because each has buildings that violate it: walls without floors, a hall of one room, a
 tower.
 
+The unit follows from the size of the building and from its rooms (`standing`): their clear height,
+and whether a visitor can stand in them. The second excludes every unit that is too short, and only
+these: low buildings are rare, high ones are not. So the cost of a high room is low. Of the 39 made
+buildings of test_up_axis.py, as OBJ with Y up, the guess is right for 38 in metres, 37 in
+centimetres, 38 in millimetres, 30 in inches and 8 in feet. Rooms of 10 m in metres and of 10
+feet have the same numbers: of 36 in feet, feet are the guess or named beside it.
+
 Tried and rejected: the share of level area and the flatness of the bounding box alone. They lay a
 house of walls without floors, 19 × 11.4 × 3 m, on its side, since its walls are then all the level
 area; that walls go in two directions separates it from a building with floors and no walls on two

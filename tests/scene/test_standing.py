@@ -60,11 +60,22 @@ def test_without_a_ceiling_a_room_is_as_high_as_its_walls() -> None:
     assert 3 < rooms.storey[0] < 5
 
 
+def test_without_a_floor_a_room_is_as_high_as_its_walls() -> None:
+    """A block of a city whose base is missing, beside a shaft that is 20 m deep."""
+    block = box((0, 0, 0), (12, 12, 9))
+    block = block[(block[:, :, 2] > 0).any(axis=1)]
+    shaft = box((14, 0, -20), (14.2, 0.2, 0))
+    rooms = of(np.concatenate([block, shaft]))
+    assert 8 < rooms.storey[0] < 10
+    assert rooms.share(8) > 0.9
+
+
 @pytest.mark.parametrize(
     "triangles",
     [
         house(),
         house(roof=False),
+        house(floor=False),
         house(12, 12, 2.7, storeys=20),
         corridor(40, 2, 3, rooms=True),
         mezzanine(),
@@ -92,7 +103,6 @@ def test_a_visitor_fits_in_metres_only(triangles: Floats) -> None:
     "triangles",
     [
         house(floor=False, roof=False),
-        house(floor=False),
         hills(),
         boulder(),
         table(),
@@ -101,7 +111,7 @@ def test_a_visitor_fits_in_metres_only(triangles: Floats) -> None:
     ],
 )
 def test_no_rooms(triangles: Floats) -> None:
-    """Walls without floors, a roof on them, terrain, objects, a slab."""
+    """Walls without floors and ceilings, terrain, objects, a slab."""
     assert of(triangles) == NO_ROOMS
     assert NO_ROOMS.share(1e9) == 1
     assert NO_ROOMS.storey == (0, 0)

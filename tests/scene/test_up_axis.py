@@ -197,6 +197,22 @@ def test_units_of_places(name: str, unit: str) -> None:
         assert best.unit == unit
 
 
+def test_how_many_units_are_right() -> None:
+    """The figures in the head of up_axis.py, of the buildings above as OBJ files with Y up."""
+    right, named = dict.fromkeys(UNITS, 0), dict.fromkeys(UNITS, 0)
+    buildings = [*SURE.values(), *(triangles for triangles, _ in PLACES.values())]
+    for triangles in buildings:
+        for unit, metres in UNITS.items():
+            ranked = read(y_up(triangles) / metres, "y")
+            near = [c.unit for c in ranked if c.up == "y" and c.cost - ranked[0].cost < CLOSE_UNIT]
+            right[unit] += (ranked[0].up, ranked[0].unit) == ("y", unit)
+            named[unit] += unit in near
+    assert len(buildings) == 39
+    least = {"m": 38, "cm": 37, "mm": 38, "in": 30, "ft": 8}
+    assert all(right[unit] >= count for unit, count in least.items())
+    assert named["ft"] >= 36
+
+
 def test_a_city_is_not_a_toy_in_inches() -> None:
     """166 units wide, it is 166 m and not 4.2 m wide."""
     for triangles in (city(), city(tallest=100), city(ground=False)):
