@@ -207,6 +207,7 @@ def make_room_row(n: int) -> tuple[Scene, Cells]:
         portal_point=np.concatenate(doors) if doors else np.zeros((0, 3)),
         portal_start=4 * np.arange(n),
         portal_area=np.full(n - 1, 6.0),
+        portal_passage=np.zeros(n - 1, np.bool_),
         vertex=scene.points,
         vertex_uv=np.tile(CORNER_UV, (len(quads), 1)),
         triangle=scene.triangles,

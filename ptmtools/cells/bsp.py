@@ -55,6 +55,7 @@ class Tree:
     unsplit: int = 0  # leaves with walls that the limit on leaves kept from splitting
     # The bodies that caps and doors split, by node.
     capped: Mapping[int, Polyhedron] = field(default_factory=dict)
+    hung: frozenset[int] = frozenset()  # nodes in the planes of door leaves that hide
 
     @cached_property
     def planes(self) -> Floats:
@@ -94,9 +95,11 @@ def build_tree(
     doors: DoorPlanes,
     options: SubdivideOptions,
     progress: Progress,
+    ceiling: WallPlane | None = None,
 ) -> Tree:
-    """Split ``box`` by the planes of ``walls``, then of ``reveals``, of ``doors`` and of the caps
-    that are in the ``structure``; in the order that the module describes."""
+    """Split ``box`` by the ``ceiling``, if there is one, by the planes of ``walls``, then of
+    ``reveals``, of ``doors`` and of the caps that are in the ``structure``; in the order that the
+    module describes."""
     tolerance = structure.tolerance
     least = (FRAGMENT_SHARE * options.wall_area, 0.0, 0.0, 0.0)
     taken: list[WallPlane] = []
@@ -105,6 +108,7 @@ def build_tree(
     queue: list[_Task] = []
     unsplit = 0
     capped: dict[int, Polyhedron] = {}
+    hung: set[int] = set()
 
     def place(parent: tuple[int, int], child: int) -> None:
         if parent[0] >= 0:
@@ -134,7 +138,13 @@ def build_tree(
         priority = (source > _REVEALS, -round(share / TIE_SHARE), len(taken), parent[1])
         heapq.heappush(queue, _Task(priority, body, fragments, best, parent, source))
 
-    push(box, _sections(box, walls, tolerance), (-1, 0), _WALLS)
+    fragments = _sections(box, walls, tolerance)
+    above = _sections(box, [ceiling] if ceiling else [], tolerance)
+    if above:
+        first = (False, 0, 0, 0)
+        heapq.heappush(queue, _Task(first, box, [*above, *fragments], 0, (-1, 0), _WALLS))
+    else:
+        push(box, fragments, (-1, 0), _WALLS)
     while queue:
         task = heapq.heappop(queue)
         if len(leaves) + len(queue) + 2 > options.max_leaves:
@@ -148,6 +158,8 @@ def build_tree(
         children.append([OUTSIDE, OUTSIDE])
         if task.source > _REVEALS:
             capped[node] = task.body
+        if task.source == _DOORS:
+            hung.add(node)
         place(task.parent, node)
         extents = _Extents(task.fragments)
         for side, body in enumerate(cut(task.body, plane, node, tolerance.rounding)):
@@ -172,6 +184,7 @@ def build_tree(
         tuple(leaves),
         unsplit,
         capped,
+        frozenset(hung if options.doors in ("pass", "closed") else ()),
     )
 
 

@@ -11,6 +11,7 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.division import Unreached, UnreachedRoom
 from ptmtools.cells.doors import DoorLeaf
 from ptmtools.cells.model import Cells
+from ptmtools.cells.options import DoorState
 from ptmtools.cells.ownership import Pieces
 from ptmtools.cells.roles import is_door_name, triangles_named
 from ptmtools.diagnostics import Warned
@@ -43,13 +44,19 @@ def detail_notes(scene: Scene, detail: Ints) -> list[str]:
     ]
 
 
-def door_notes(leaves: list[DoorLeaf], opened: Bools, hidden: bool) -> list[str]:
-    """Notes on door leaves; those ``opened``, (d,), do not block, and are not drawn if
-    ``hidden``."""
+#: The state of a door leaf that visitors pass, as a note describes it.
+_OPEN: dict[DoorState, str] = {
+    "pass": "passable: visitors walk through, but do not see through; --doors open changes that",
+    "open": "open: drawn, but hiding nothing; --doors closed shuts all doors",
+    "hidden": "open: not drawn; --doors closed shuts all doors",
+}
+
+
+def door_notes(leaves: list[DoorLeaf], opened: Bools, doors: DoorState) -> list[str]:
+    """Notes on door leaves; visitors pass those ``opened``, (d,)."""
     notes = []
-    drawn = "not drawn" if hidden else "drawn, but hiding nothing"
     for which, state in (
-        (opened, f"open: {drawn}; --doors closed shuts all doors"),
+        (opened, _OPEN[doors]),
         (~opened, "shut: no walkable floor lies beyond; --detail NAME opens it"),
     ):
         chosen = [leaves[i] for i in np.flatnonzero(which)]

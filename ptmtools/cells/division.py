@@ -15,6 +15,7 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints, summed
 from ptmtools.cells.bsp import Tree, build_tree
+from ptmtools.cells.ceilings import ceiling_height, ceiling_plane
 from ptmtools.cells.model import descend
 from ptmtools.cells.open_doors import Doors, open_doors
 from ptmtools.cells.options import SubdivideOptions, Walker
@@ -64,6 +65,7 @@ class Building:
     floors: Floors  # from their fronts
     footing: Floors  # from either side: reached space may be walkable on both
     doors: Doors
+    ceiling: float | None  # `ceiling_height`
     options: SubdivideOptions
 
     @staticmethod
@@ -78,7 +80,11 @@ class Building:
         floors = footing = Floors.of(scene, detail)
         if not scene.two_sided.all():
             footing = Floors.of(scene, detail, backs=True)
-        return Building(structure, walls, reveals, floors, footing, doors, options)
+        ceiling = None
+        if options.ceiling == "auto":
+            walker = Walker(*options.walker)
+            ceiling = ceiling_height(structure, walls, walker, options.wall_area)
+        return Building(structure, walls, reveals, floors, footing, doors, ceiling, options)
 
     @property
     def walker(self) -> Walker:
@@ -105,6 +111,7 @@ class Space:
     beyond: Unreached = field(default_factory=lambda: Unreached([]))
     # `Cells.left_out`
     left_out: Floats = field(default_factory=lambda: np.zeros((0, 3, 3)))
+    ceiling: float | None = None  # `Cells.ceiling`
     place: float = 0.0  # m² of walkable floor in ``reached``, if some floor is left out
     # Operations in a plane that ended in a safe answer, by name (`planar.counting`).
     undecided: Counter[str] = field(default_factory=Counter)
@@ -132,21 +139,39 @@ def divide(
 def _divided(building: Building, root: Polyhedron, progress: Progress, inside: bool) -> Space:
     structure, options = building.structure, building.options
     box = np.stack(bounds(root.points))
-    planes = building.doors.planes
-    tree = build_tree(root, structure, building.walls, building.reveals, planes, options, progress)
+    planes, top = building.doors.planes, building.ceiling
+    ceiling = None
+    if inside and top is not None:
+        ceiling = ceiling_plane(top, structure, root, structure.tolerance)
+    tree = build_tree(
+        root, structure, building.walls, building.reveals, planes, options, progress, ceiling
+    )
     portals = find_portals(tree, structure.tolerance)
     outer = at_box(tree)
-    start = _viewpoint_leaves(tree, box, options)
-    start = start or largest_leaf(tree, outer <= inside, structure, building.walker)
+    start, solid = _viewpoint_leaves(tree, box, options), False
+    if not start:
+        start, solid = largest_leaf(tree, outer <= inside, structure, building.walker)
     reached = flood(len(tree.leaves), portals, start)
     closed = bool(start) and not bool(np.any(reached & outer))
+    if closed and solid and not inside and _stands_elsewhere(tree, reached, building):
+        closed, reached = False, np.zeros_like(reached)
     shut = np.zeros(len(building.doors.leaves), dtype=bool)
-    space = Space(box, tree, portals, reached, closed, shut)
+    space = Space(box, tree, portals, reached, closed, shut, ceiling=top if ceiling else None)
     if inside or closed:
         space = _complete(building, space, outer & (not inside))
     if inside or space.closed:
         space = _rejoined(space, structure.tolerance)
     return space
+
+
+def _stands_elsewhere(tree: Tree, reached: Bools, building: Building) -> bool:
+    """Whether more floor is walkable between walls elsewhere than in the (L,) leaves ``reached``,
+    which may be the inside of a pillar."""
+    structure = building.structure
+    there = Standing.of(tree, ~reached, building)
+    walled = Surroundings(structure.corners, structure.tolerance).inside(there.points, roofed=False)
+    here = float(Standing.of(tree, reached, building).place.sum())
+    return float(there.place[walled].sum()) > here
 
 
 def _complete(building: Building, space: Space, outer: Bools) -> Space:
@@ -160,7 +185,8 @@ def _complete(building: Building, space: Space, outer: Bools) -> Space:
         outside = flood(len(tree.leaves), portals, tuple(np.flatnonzero(outer).tolist()))
         if building.doors.lead_to_open_rooms(structure, tree, within, outside):
             return replace(space, closed=False)
-        opened = open_doors(building.doors, structure, tree, portals, within, outer)
+        hiding = options.doors == "pass"
+        opened = open_doors(building.doors, structure, tree, portals, within, outer, hiding)
         if opened:
             doors, tree, portals = opened
             seeds = tuple(np.flatnonzero(reached).tolist())

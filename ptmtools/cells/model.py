@@ -99,6 +99,8 @@ class Cells:
     portal_point, portal_start: (Q, 3) convex polygons, counter-clockwise seen against the normal
         (from the side of `portal_leaf[:, 1]`); (K + 1,) CSR over portals.
     portal_area: (K,) m² truly open, of the shape before its convex hull.
+    portal_passage: (K,) bool, ascending, whether a drawn door leaf covers a portal: visitors pass,
+        sight does not.
     vertex: (W, 3) positions of the geometry cut to the cells.
     vertex_uv: (W, 2) texture coordinates of those vertices, exact at the cuts.
     triangle: (M, 3) int32 into `vertex`, counter-clockwise seen from the front.
@@ -113,10 +115,12 @@ class Cells:
         anywhere.
     left_out: (Z, 3, 3) walkable triangles of floor in no cell: unreachable and not kept.
     walker: size of the visitor.
+    ceiling: height, metres, of the level plane at which rooms of a building without ceilings end;
+        the leaves above belong to cells of their own. None for other buildings.
     tolerance: tolerance of the scene.
     closed: whether the flood never met the root box.
     notes: notes of the subdivision, one line each ("open above: …").
-    opened: (n,) int32 the scene's triangles, ascending, of door leaves that do not block.
+    opened: (n,) int32 the scene's triangles, ascending, of door leaves that visitors pass.
     """
 
     node_plane: NDArray[np.float64]
@@ -134,6 +138,7 @@ class Cells:
     portal_point: NDArray[np.float64]
     portal_start: NDArray[np.int64]
     portal_area: NDArray[np.float64]
+    portal_passage: NDArray[np.bool_]
     vertex: NDArray[np.float64]
     vertex_uv: NDArray[np.float64]
     triangle: NDArray[np.int32]
@@ -143,6 +148,7 @@ class Cells:
     eye_floor: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3, 3)))
     left_out: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3, 3)))
     walker: Walker = WALKER
+    ceiling: float | None = None
     closed: bool = True
     notes: tuple[str, ...] = ()
     visible: int = 0
@@ -177,6 +183,18 @@ class Cells:
     @property
     def portal_count(self) -> int:
         return len(self.portal_leaf)
+
+    @property
+    def in_ceiling(self) -> NDArray[np.bool_]:
+        """(K,) which portals lie in the ceiling."""
+        if self.ceiling is None:
+            return np.zeros(self.portal_count, dtype=np.bool_)
+        return np.asarray((self.portal_plane == [0.0, 1.0, 0.0, -self.ceiling]).all(axis=1))
+
+    @property
+    def sight_count(self) -> int:
+        """Number of the portals that sight passes, the first ones."""
+        return int(np.count_nonzero(~self.portal_passage))
 
     def portal(self, k: int) -> NDArray[np.float64]:
         """(n, 3) polygon of portal ``k``."""
@@ -254,7 +272,7 @@ class Cells:
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:
         """The subdivision as plain arrays."""
         arrays = {f.name: getattr(self, f.name) for f in fields(self)}
-        names = ("walker", "closed", "notes", "visible", "owners")
+        names = ("walker", "ceiling", "closed", "notes", "visible", "owners")
         about = {name: arrays.pop(name) for name in names}
         text = json.dumps(about, sort_keys=True, ensure_ascii=False)
         arrays |= arrays.pop("tolerance").to_arrays()
@@ -298,6 +316,9 @@ class Cells:
         ):
             if (np.diff(start) < least).any():
                 raise ValueError(f"a {name} is flat")
+        passage = stored.array("portal_passage", np.bool_, portals)
+        if (passage[:-1] > passage[1:]).any():
+            raise ValueError("portal_passage does not ascend")
         return Cells(
             node_plane=node_plane,
             node_child=node_child,
@@ -314,6 +335,7 @@ class Cells:
             portal_point=portal_point,
             portal_start=portal_start,
             portal_area=stored.array("portal_area", np.float64, portals, finite=True),
+            portal_passage=passage,
             vertex=vertex,
             vertex_uv=stored.array("vertex_uv", np.float64, len(vertex), 2, finite=True),
             triangle=triangle,
@@ -323,6 +345,7 @@ class Cells:
             eye_floor=stored.array("eye_floor", np.float64, None, 3, 3, finite=True),
             left_out=stored.array("left_out", np.float64, None, 3, 3, finite=True),
             walker=Walker(*map(float, about["walker"])),
+            ceiling=None if about["ceiling"] is None else float(about["ceiling"]),
             closed=bool(about["closed"]),
             notes=texts(about["notes"], "notes"),
             visible=int(about["visible"]),

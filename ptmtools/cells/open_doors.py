@@ -2,9 +2,9 @@
 
 The building is divided with all doors shut. A door opens if both its sides are inside: reached by
 the flood, or in an unreachable room (`division`). The parts of the tree's planes that its leaf
-covered become portals, and nothing is divided again; so a closed model stays closed. Where the
-flood reaches the outside, a point counts as inside if it has walls around it, glass included, and a
-roof above, if the building has any.
+covered become portals, or passages where the leaf hides what is behind it, and nothing is divided
+again; so a closed model stays closed. Where the flood reaches the outside, a point counts as inside
+if it has walls around it, glass included, and a roof above, if the building has any.
 """
 
 from __future__ import annotations
@@ -17,12 +17,14 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.bsp import Tree
+from ptmtools.cells.ceilings import ROOFED, roofed_share
 from ptmtools.cells.doors import DoorLeaf, find_doors
 from ptmtools.cells.doorways import RELIEF
 from ptmtools.cells.model import descend
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.places import Floors, detail_of, spread
-from ptmtools.cells.portals import ROOFED, Portal, find_portals, flood, roofed_share
+from ptmtools.cells.planar import Geometry
+from ptmtools.cells.portals import Portal, find_portals, flood
 from ptmtools.cells.split_planes import DoorPlanes
 from ptmtools.cells.structure import Opaque, Structure, Surroundings, spread_over
 from ptmtools.scene.model import Scene
@@ -125,12 +127,13 @@ def open_doors(
     portals: list[Portal],
     within: Bools,
     outer: Bools,
+    hiding: bool,
 ) -> tuple[Bools, Tree, list[Portal]] | None:
     """The (d,) doors that lead from inside to inside, and the tree and its portals with these open;
     None if none does.
 
     ``within``: (L,) leaves that are inside. ``outer``: (L,) those at the box around a closed model,
-    which the flood must not reach.
+    which the flood must not reach. ``hiding``: whether leaves still block sight.
     """
     which = np.asarray(doors.sides(tree, within).all(axis=1))
     if which.any() and not outer.any():
@@ -138,28 +141,44 @@ def open_doors(
     rooms = tuple(np.flatnonzero(within).tolist())
     outside = flood(len(tree.leaves), portals, tuple(np.flatnonzero(outer).tolist()))
     while which.any():
-        opened, passages = _opened(doors, which, structure, tree, portals)
-        if not (flood(len(tree.leaves), passages, rooms) & outer).any():
-            return which, opened, passages
-        out = doors.lead_out(passages, outside) & which
+        opened, more = _opened(doors, which, structure, tree, portals, hiding)
+        if not (flood(len(tree.leaves), more, rooms) & outer).any():
+            return which, opened, more
+        out = doors.lead_out(more, outside) & which
         which = which & ~out & out.any()
     return None
 
 
 def _opened(
-    doors: Doors, which: Bools, structure: Structure, tree: Tree, portals: list[Portal]
+    doors: Doors,
+    which: Bools,
+    structure: Structure,
+    tree: Tree,
+    portals: list[Portal],
+    hiding: bool,
 ) -> tuple[Tree, list[Portal]]:
     """The tree and its portals with the doors ``which``, (d,), open."""
     free = np.append(which, False)[doors.of]
     near = structure.tolerance.plane
     walls, fresh = list(tree.walls), []
+    united: dict[bytes, Geometry] = {}  # of planes with several nodes
     for node, wall in enumerate(tree.walls):
-        flat = structure.nearby.between(wall.frame.plane, -near, near)
+        plane, body = wall.frame.plane, tree.capped.get(node)
+        if body is None:
+            flat = structure.nearby.between(plane, -near, near)
+        else:
+            flat = structure.nearby.meeting(body.points.min(axis=0), body.points.max(axis=0))
         if free[flat].any():
-            flat = flat[structure.lie_in(wall.frame.plane, flat)]
+            flat = flat[structure.lie_in(plane, flat)]
         if free[flat].any():
-            blocking = structure.united(wall.frame, flat[~free[flat]])
-            walls[node] = replace(wall, blocking=blocking)
+            rest = flat[~free[flat]]
+            key = plane.tobytes() + rest.tobytes()
+            if key not in united:
+                united[key] = structure.united(wall.frame, rest)
+            barring = united[key]
+            walls[node] = (
+                replace(wall, barring=barring) if hiding else replace(wall, blocking=barring)
+            )
             fresh.append(node)
     tree = replace(tree, walls=tuple(walls))
     stale = set(fresh)

@@ -12,7 +12,8 @@ from ptmtools.options import option
 CellKind = Literal["leaf", "room"]
 Reach = Literal["all", "main"]
 Standing = Literal["places", "anywhere"]
-DoorState = Literal["open", "closed", "hidden"]
+CeilingKind = Literal["auto", "none"]
+DoorState = Literal["pass", "open", "closed", "hidden"]
 Position = tuple[float, float, float]
 
 
@@ -118,9 +119,10 @@ class SubdivideOptions:
         "--walker (places), or anywhere in the cell, for flying cameras (anywhere).",
     )
     doors: DoorState = option(
-        "open",
-        "Doors between rooms: open ones are drawn but hide nothing, hidden ones are not drawn, "
-        "closed ones act as walls. Exterior doors stay shut.",
+        "pass",
+        "Doors between rooms: with pass, visitors walk through leaves that hide what is behind "
+        "them; open leaves are drawn but hide nothing, hidden ones are not drawn, closed ones act "
+        "as walls. Exterior doors stay shut.",
         basic=True,
     )
     door: tuple[str, ...] = option(
@@ -129,6 +131,11 @@ class SubdivideOptions:
         "recognises by name and shape; * and ? are wildcards. --structural takes precedence. "
         "Repeatable.",
         metavar="NAME",
+    )
+    ceiling: CeilingKind = option(
+        "auto",
+        "End of rooms without a ceiling: the top of their walls, so that they see one another "
+        "through doorways only (auto), or that of the whole model (none).",
     )
     viewpoints: tuple[Position, ...] = option(
         (),
@@ -157,7 +164,7 @@ class SubdivideOptions:
             (
                 self.doors in get_args(DoorState),
                 f"doors are not {self.doors!r}",
-                "open, closed or hidden",
+                "pass, open, closed or hidden",
             ),
             (
                 len(self.walker) == 3
@@ -166,6 +173,7 @@ class SubdivideOptions:
                 f"radius, step and height of {self.walker} metres are out of range",
                 "try 0.25,0.5,1.7",
             ),
+            (self.ceiling in get_args(CeilingKind), f"no ceiling {self.ceiling!r}", "auto or none"),
             (self.cells in get_args(CellKind), f"unknown cells {self.cells!r}", "leaf or room"),
             (self.max_leaves >= 1, f"at most {self.max_leaves} leaves is too few", "try 500"),
         ):

@@ -321,6 +321,13 @@ class Places:
     plan: Geometry  # (r,) seen from above, x and z in metres
     slope: Floats  # (r, 3): the height is a·x + b·z + c
 
+    def without_tops(self, ceiling: float, radius: float) -> Places:
+        """The regions without those above a height that are narrower than a body of a radius,
+        metres: the tops of the walls of rooms without a ceiling."""
+        kept = heights(self.plan, self.slope)[0] < ceiling
+        kept[~kept] = ~shapely.is_empty(buffer(self.plan[~kept], -radius))
+        return Places(self.plan[kept], self.slope[kept])
+
     def triangles(self, tolerance: Tolerance) -> Floats:
         """(n, 3, 3) triangles of the regions, on their slopes, metres."""
         parts, region = shapely.get_parts(self.plan, return_index=True)

@@ -1,10 +1,13 @@
 """Portals, the parts of the boundaries between leaves that no wall covers, and their flood.
 
+A **passage** is a portal that a drawn door leaf covers: visitors pass, sight does not.
+
 For every BSP plane the opening is the plane's cross-section less everything opaque that lies in it,
 without cracks narrower than a hairline. The faces that leaves on both sides have in that plane are
 intersected pairwise and with the opening; each connected piece is a portal, replaced by its convex
-hull where it is not convex. A portal is never shrunk: a cell missing from a PVS is a bug, an extra
-one is a cost.
+hull where it is not convex, and divided into triangles where the hull would be mostly door leaf, as
+the gap around one. A portal is never shrunk: a cell missing from a PVS is a bug, an extra one
+is a cost.
 
 The flood starts from the viewpoints, else from the largest leaf with floor that is no solid and
 does not touch the root box. Caps that separate nothing after the flood are removed; a rejoined leaf
@@ -15,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from itertools import chain, compress
+from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
@@ -24,10 +27,18 @@ import shapely
 from ptmtools.arrays import Bools, Floats, Ints, cross, normals
 from ptmtools.cells.bsp import Tree
 from ptmtools.cells.options import Walker
-from ptmtools.cells.planar import Geometry, buffer, intersection, left_open, union
+from ptmtools.cells.planar import (
+    Geometry,
+    buffer,
+    delaunay,
+    difference,
+    intersection,
+    left_open,
+    union,
+)
 from ptmtools.cells.polyhedron import BOX_FACE, Polyhedron
 from ptmtools.cells.structure import Structure, Surroundings
-from ptmtools.tolerance import Tolerance, ranked
+from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
 
 
 @dataclass(frozen=True)
@@ -41,11 +52,11 @@ class Rejoined:
 
 def rejoined(tree: Tree, group: Ints) -> Rejoined:
     """The tree without the caps that separate nothing; ``group``: (L,) the connected group of each
-    leaf that is kept, -1 for others."""
+    leaf that is kept, -1 for others. Planes of `Tree.hung` leaves hide, and stay."""
     bodies, children = list(tree.leaves), tree.children.copy()
     part_of = np.arange(len(bodies))
     kept = np.ones(len(children), dtype=bool)
-    for node in sorted(tree.capped, reverse=True):  # parts before wholes
+    for node in sorted(tree.capped.keys() - tree.hung, reverse=True):  # parts before wholes
         first, second = sorted(-2 - children[node])
         if first >= 0 and group[first] == group[second]:
             bodies[first] = tree.capped[node]
@@ -63,6 +74,7 @@ def rejoined(tree: Tree, group: Ints) -> Rejoined:
             children=np.where(children >= 0, renumber[inner], -2 - leaf[outer]).astype(np.int32),
             leaves=tuple(_renamed(bodies[whole], renumber) for whole in wholes),
             capped={int(renumber[n]): body for n, body in tree.capped.items() if kept[n]},
+            hung=frozenset(renumber[sorted(tree.hung)].tolist()),
         ),
         leaf,
         renumber,
@@ -80,6 +92,7 @@ class Portal(NamedTuple):
     leaves: tuple[int, int]  # behind and in front of the plane
     polygon: Floats  # (n, 3) convex, counter-clockwise seen against the normal
     area: float  # m² open, of the piece before its hull
+    passage: bool = False  # whether a door leaf covers it
 
 
 def find_portals(
@@ -133,6 +146,7 @@ def _openings(
     if not ahead or not behind:
         return
     wall = tree.walls[node]
+    hung = node in tree.hung or wall.barring is not None
     one, other = (
         shapely.polygons([shapely.linearrings(wall.frame.to_plane(points)) for _, points in faces])
         for faces in (ahead, behind)
@@ -147,16 +161,40 @@ def _openings(
         return
     every = union(shared, tolerance.grid, more=True)
     opening = left_open(every, wall.blocking, tolerance)
-    if shapely.is_empty(opening):
-        return
-    pieces = intersection(shared, opening, tolerance.grid, more=True)
-    for a, b, piece in zip(i.tolist(), j.tolist(), pieces, strict=True):
-        for part in shapely.get_parts(piece):
-            if _wider_than(part, tolerance.plane):
-                hull = shapely.orient_polygons(shapely.convex_hull(part))
-                polygon = wall.frame.to_space(shapely.get_coordinates(hull)[:-1])
+    openings = [(opening, False)]
+    if wall.barring is not None:
+        way = left_open(every, wall.barring, tolerance)
+        openings.append((difference(way, opening, tolerance.grid), True))
+    for shape, passage in openings:
+        if shapely.is_empty(shape):
+            continue
+        pieces = intersection(shared, shape, tolerance.grid, more=True)
+        for a, b, piece in zip(i.tolist(), j.tolist(), pieces, strict=True):
+            for part in shapely.get_parts(piece):
+                if not _wider_than(part, tolerance.plane):
+                    continue
                 leaves = behind[b][0], ahead[a][0]
-                yield Portal(node, leaves, polygon, float(shapely.area(part)))
+                for hull, area in _hulls(part, hung):
+                    polygon = wall.frame.to_space(shapely.get_coordinates(hull)[:-1])
+                    yield Portal(node, leaves, polygon, area, passage)
+
+
+#: An opening beside a door leaf is divided if it is less than this share of its convex hull.
+_SPARSE = 0.25
+
+
+def _hulls(part: Geometry, hung: bool) -> Iterator[tuple[Geometry, float]]:
+    """Convex polygons, counter-clockwise, that cover an opening, in the plane of a door leaf if it
+    is ``hung``, and the open area of each, m²."""
+    hull, area = shapely.orient_polygons(shapely.convex_hull(part)), float(shapely.area(part))
+    triangles = np.array([], dtype=object)
+    if hung and area < _SPARSE * float(shapely.area(hull)):
+        triangles = shapely.get_parts(delaunay(np.array([part], dtype=object)))
+    if shapely.area(triangles).sum() < (1 - TIE_SHARE) * area:
+        yield hull, area
+        return
+    for triangle in shapely.orient_polygons(triangles):
+        yield triangle, float(shapely.area(triangle))
 
 
 def _wider_than(part: Geometry, width: float) -> bool:
@@ -166,13 +204,6 @@ def _wider_than(part: Geometry, width: float) -> bool:
 
 #: A surface whose normal leans less than this from the vertical is walkable (cosine of 45°).
 FLOOR_COSINE = 0.7
-#: The largest floor triangles, this many, represent the whole floor.
-FLOOR_SAMPLES = 400
-#: Surfaces nearer to one another than head room, metres, or this share of the model's height, are
-#: the two sides of a slab, or furniture.
-HEAD_ROOM, SLAB_SHARE = 1.5, 1 / 3
-#: A model is open above if less than this share of its floor has a surface above it.
-ROOFED = 0.5
 
 
 def flood(leaves: int, portals: list[Portal], start: tuple[int, ...]) -> Bools:
@@ -192,51 +223,28 @@ def at_box(tree: Tree) -> Bools:
 
 def largest_leaf(
     tree: Tree, allowed: Bools, structure: Structure, walker: Walker
-) -> tuple[int, ...]:
+) -> tuple[tuple[int, ...], bool]:
     """The largest of the (L,) allowed leaves that has floor below its middle, else the largest, as
-    a tuple of one; () if none is allowed. Leaves too thin for a walker, such as the hollow of a
-    wall, count only if all are. Where faces are turned out of solids, leaves whose walls and floor
-    face into them come first, which excludes the inside of the ground or of a thick wall."""
+    a tuple of one, and whether it may be the inside of a solid; () if none is allowed. Leaves too
+    thin for a walker, such as the hollow of a wall, count only if all are. Where faces are turned
+    out of solids, leaves whose walls and floor face into them come first, which excludes the inside
+    of the ground or of a thick wall."""
     corners = structure.corners
     roomy = np.array([body.width >= 2 * walker.radius for body in tree.leaves])
-    leaves = np.flatnonzero(allowed & roomy if roomy.any() else allowed)
-    order = leaves[ranked(np.array([tree.leaves[leaf].volume for leaf in leaves]))].tolist()
+    choice = np.flatnonzero(allowed & roomy if roomy.any() else allowed)
+    order = choice[ranked(np.array([tree.leaves[leaf].volume for leaf in choice]))].tolist()
     middle = {leaf: tree.leaves[leaf].points.mean(axis=0) for leaf in order}
     hollow: Iterable[int] = ()
-    if order and _outwards(corners):
+    outwards = bool(order) and _outwards(corners)
+    if outwards:
         around = Surroundings(corners, structure.tolerance)
         floored = around.floored(np.array(list(middle.values())))
         hollow = (leaf for leaf in compress(order, floored) if not around.solid(middle[leaf][None]))
-    for leaf in chain(hollow, order):
-        if np.any(_plumb(middle[leaf], corners) < 0):
-            return (leaf,)
-    return tuple(order[:1])
-
-
-def roofed_share(corners: Floats, floor_area: float) -> float:
-    """Share of the floor, by area, that has a surface above it (1 without any floor).
-
-    Floor is every level triangle of at least a tenth of ``floor_area`` m²; of triangles above one
-    another only the lowest is floor, the others are ceilings.
-    """
-    normal = normals(corners)
-    area = np.linalg.norm(normal, axis=1) / 2
-    level = np.abs(normal[:, 1]) >= FLOOR_COSINE * 2 * area
-    floor = np.flatnonzero(level & (area >= floor_area / 10))
-    order = floor[ranked(area[floor])][:FLOOR_SAMPLES]
-    height = float(np.ptp(corners[:, :, 1])) if len(corners) else 0.0
-    apart = min(HEAD_ROOM, SLAB_SHARE * height)
-    walkable = corners[level]
-    low, high = walkable.min(axis=1), walkable.max(axis=1)
-    covered = total = 0.0
-    for triangle in order:
-        eye = corners[triangle].mean(axis=0)
-        around = (low <= eye) & (eye <= high)
-        heights = _plumb(eye, walkable[around[:, 0] & around[:, 2]])
-        if not np.any(heights < -apart):
-            total += area[triangle]
-            covered += area[triangle] * bool(np.any(heights > apart))
-    return float(covered / total) if total else 1.0
+    for leaves, solid in ((hollow, False), (order, outwards)):
+        for leaf in leaves:
+            if np.any(plumb(middle[leaf], corners) < 0):
+                return (leaf,), solid
+    return tuple(order[:1]), outwards
 
 
 def _outwards(corners: Floats) -> bool:
@@ -248,7 +256,7 @@ def _outwards(corners: Floats) -> bool:
     return bool(np.einsum("ij,ij->", a, cross(b, c)) > 0)
 
 
-def _plumb(eye: Floats, corners: Floats) -> Floats:
+def plumb(eye: Floats, corners: Floats) -> Floats:
     """Heights above ``eye`` (metres) at which a plumb line meets walkable triangles."""
     flat = corners[:, :, [0, 2]] - eye[[0, 2]]
     turn = flat[:, [1, 2, 0]]

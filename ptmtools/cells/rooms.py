@@ -5,7 +5,8 @@ openings between them, widest first: an opening joins two *regions* if it is at 
 cross-section of the narrower one, its volume over its length in plan, and never less than that of
 anything that has joined it. Length is the area over the least width of the hull of its plan. The
 opening between two regions is the largest group of touching portals, by true area. Regions without
-standing leaves join the rooms around them leaf by leaf, through the largest opening first.
+standing leaves join the rooms around them leaf by leaf, through the largest opening first; the
+inside of a door leaf, behind passages, comes last. Openings in the ceiling join no regions.
 
 **Cells.** A room is one cell, unless dividing it saves its viewers more than
 `SubdivideOptions.gain` of their download. With v the volume of a leaf (the frequency of viewers in
@@ -36,6 +37,7 @@ from ptmtools.arrays import Bools, Floats, Ints, areas
 from ptmtools.cells.model import Cells
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry
+from ptmtools.cells.search import connected
 from ptmtools.cells.sight import from_places, sampled_sight
 from ptmtools.diagnostics import Warned
 
@@ -123,25 +125,45 @@ def room_of_leaf(cells: Cells, rank: Ints) -> Ints:
     room = regions.grown(lambda closed: -closed >= OPEN)
     standing = np.zeros(cells.leaf_count, dtype=np.bool_)
     standing[room[rank[cells.leaf_standing]]] = True
-    return _adopted(room, standing[room], openings)[rank]
+    return _with_space_above(cells, _adopted(room, standing[room], openings)[rank])
 
 
-def _adopted(room: Ints, held: Bools, openings: dict[tuple[int, int], float]) -> Ints:
+def _with_space_above(cells: Cells, room: Ints) -> Ints:
+    """(L,) rooms with the space above the ceiling that leads down into one of them only."""
+    ends = cells.portal_leaf[cells.in_ceiling]
+    if cells.ceiling is None or not len(ends):
+        return room
+    start = cells.leaf_point_start[:-1]
+    middle = np.add.reduceat(cells.leaf_point[:, 1], start) / np.diff(cells.leaf_point_start)
+    above = middle > cells.ceiling
+    joins = above[cells.portal_leaf].all(axis=1)
+    space = connected(cells.leaf_count, cells.portal_leaf[joins])
+    upper, lower = np.where(above[ends], ends, ends[:, ::-1]).T
+    result = room.copy()
+    for name in np.unique(space[upper]):
+        below = np.unique(room[lower[space[upper] == name]])
+        if len(below) == 1:
+            result[above & (space == name)] = below[0]
+    return result
+
+
+def _adopted(room: Ints, held: Bools, openings: dict[tuple[int, int, bool], float]) -> Ints:
     """(L,) rooms, those that are not ``held``, (L,), divided among the rooms around them: from
-    these on, the largest opening first."""
-    adjacent: list[list[tuple[float, int]]] = [[] for _ in room]
-    for (a, b), area in openings.items():
-        adjacent[a].append((-float(f"{area:.{DIGITS}g}"), b))
-        adjacent[b].append((-float(f"{area:.{DIGITS}g}"), a))
-    waiting = [(area, b, int(room[a])) for a in np.flatnonzero(held) for area, b in adjacent[a]]
+    these on, the largest opening first, then passages."""
+    adjacent: list[list[tuple[tuple[bool, float], int]]] = [[] for _ in room]
+    for (a, b, passage), area in openings.items():
+        order = passage, -float(f"{area:.{DIGITS}g}")
+        adjacent[a].append((order, b))
+        adjacent[b].append((order, a))
+    waiting = [(order, b, int(room[a])) for a in np.flatnonzero(held) for order, b in adjacent[a]]
     heapq.heapify(waiting)
     result, left = room.copy(), ~held
     while waiting:
         _, leaf, name = heapq.heappop(waiting)
         if left[leaf]:
             result[leaf], left[leaf] = name, False
-            for area, b in adjacent[leaf]:
-                heapq.heappush(waiting, (area, b, name))
+            for order, b in adjacent[leaf]:
+                heapq.heappush(waiting, (order, b, name))
     return result
 
 
@@ -150,7 +172,10 @@ class _Regions(Groups):
 
     def __init__(self, cells: Cells, rank: Ints) -> None:
         kept = (cells.leaf_cell[cells.portal_leaf] >= 0).all(axis=1, keepdims=True)
-        super().__init__(cells.leaf_count, np.where(kept, rank[cells.portal_leaf], 0))
+        passage, ends = cells.portal_passage, np.where(kept, rank[cells.portal_leaf], 0)
+        joins = ~(passage | cells.in_ceiling)
+        super().__init__(cells.leaf_count, np.where(joins[:, None], ends, 0))
+        self._passages = np.sort(ends[passage], axis=1).tolist(), cells.portal_area[passage]
         order = np.argsort(rank)
         self._volume = cells.leaf_volumes()[order]
         plan = cells.leaf_point[:, [0, 2]]
@@ -162,10 +187,13 @@ class _Regions(Groups):
         self._touching = _touching(cells, cells.tolerance.plane)
         self._opening: dict[tuple[int, int], float] = {}
 
-    def openings(self) -> dict[tuple[int, int], float]:
-        """m² between two regions, the lower one first."""
+    def openings(self) -> dict[tuple[int, int, bool], float]:
+        """m² between two regions, the lower one first, by portals of sight and by passages."""
         pairs = ((a, b) for a, near in enumerate(self.near) for b in near if a < b)
-        return {(a, b): self._largest_opening(self.near[a][b]) for a, b in pairs}
+        result = {(a, b, False): self._largest_opening(self.near[a][b]) for a, b in pairs}
+        for (a, b), area in zip(*self._passages, strict=True):
+            result[a, b, True] = max(float(area), result.get((a, b, True), 0.0))
+        return result
 
     def cost(self, a: int, b: int) -> float:
         """Less the opening between them, as a share of the narrower one's cross-section."""
@@ -259,7 +287,12 @@ ATTACHED = 0.5
 
 
 def join_by_gain(
-    sees: Bools, volume: Floats, area: Floats, pairs: NDArray[np.int32], gain: float
+    sees: Bools,
+    volume: Floats,
+    area: Floats,
+    pairs: NDArray[np.integer],
+    gain: float,
+    above: NDArray[np.integer] | None = None,
 ) -> Ints:
     """(L,) for each leaf the leaf that stands for its group.
 
@@ -269,9 +302,11 @@ def join_by_gain(
     volume, area: (L,) of a leaf, m³ in which viewers are, and of the surfaces in it, m².
     pairs: (n, 2) leaves through whose portals groups may grow.
     gain: threshold, 0 to 1, of the gain of dividing a group.
+    above: (m, 2) leaves through whose portals only groups with viewers may grow.
     """
     every = np.stack([volume, area], axis=1)
-    parted = _Parted(sees.copy(), every.copy(), every, pairs)
+    more = pairs if above is None else np.concatenate([pairs, above])
+    parted = _Parted(sees.copy(), every.copy(), every, more)
     group = parted.grown(lambda gained: gained < gain)
     attached = _Attached(parted.sees, parted.own, every, group[pairs])
     return attached.grown_by(ATTACHED * gain)[group]
@@ -429,14 +464,15 @@ def _groups(cells: Cells, gain: float) -> NDArray[np.integer]:
     room = room_of_leaf(cells, rank)
     if gain >= 1 or len(np.unique(room)) == len(room):
         return room
-    inner = cells.portal_leaf[room[cells.portal_leaf[:, 0]] == room[cells.portal_leaf[:, 1]]]
-    inner = inner[(cells.leaf_cell[inner] >= 0).all(axis=1)]
+    same = room[cells.portal_leaf[:, 0]] == room[cells.portal_leaf[:, 1]]
+    kept = (cells.leaf_cell[cells.portal_leaf] >= 0).all(axis=1)
+    inner, above = (rank[cells.portal_leaf[which & kept]] for which in (same, cells.in_ceiling))
     order = np.argsort(rank)
     sees = from_places(sampled_sight(cells), cells.leaf_standing)[np.ix_(order, order)]
     leaf, piece, area = _sides(cells)
     surface = np.bincount(leaf, area[piece], cells.leaf_count).astype(np.float64)
     viewers = cells.leaf_volumes() * cells.leaf_standing
-    return join_by_gain(sees, viewers[order], surface[order], rank[inner], gain)[rank]
+    return join_by_gain(sees, viewers[order], surface[order], inner, gain, above)[rank]
 
 
 def _sides(cells: Cells) -> tuple[Ints, Ints, Floats]:

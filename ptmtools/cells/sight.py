@@ -37,7 +37,7 @@ STEPS = np.array(
 def sampled_sight(cells: Cells) -> Bools:
     """(L, L) symmetric: leaves that some straight line through portals joins. A leaf sees itself
     and those with which it shares a portal."""
-    ends = cells.portal_leaf.reshape(-1, 2).astype(np.int64)
+    ends = cells.portal_leaf[: cells.sight_count].reshape(-1, 2).astype(np.int64)
     seen = np.eye(cells.leaf_count, dtype=np.bool_)
     seen[ends, ends[:, ::-1]] = True
     if len(ends) == 0:
@@ -53,7 +53,7 @@ def sampled_sight(cells: Cells) -> Bools:
     order = np.argsort(leaves, kind="stable")
     openings = Openings(
         np.ascontiguousarray(cells.portal_point, dtype=np.float64),
-        cells.portal_start.astype(np.int64),
+        cells.portal_start[: len(ends) + 1].astype(np.int64),
         ends[:, ::-1].reshape(-1),
         np.searchsorted(leaves[order], np.arange(cells.leaf_count + 1)),
         order,
@@ -129,19 +129,21 @@ def _chords(flat: Floats, height: Floats) -> tuple[Floats, Floats]:
 
 
 def portals_of(cells: Cells) -> Portals:
-    """The portals between the leaves of a subdivision."""
+    """The portals between the leaves of a subdivision that sight passes."""
+    count = cells.sight_count
+    start = cells.portal_start[: count + 1]
     return Portals(
         leaf_count=cells.leaf_count,
-        leaf=cells.portal_leaf.reshape(-1, 2),
-        normal=cells.portal_plane.reshape(-1, 4)[:, :3],
-        point=cells.portal_point.reshape(-1, 3),
-        start=cells.portal_start,
+        leaf=cells.portal_leaf[:count].reshape(-1, 2),
+        normal=cells.portal_plane[:count].reshape(-1, 4)[:, :3],
+        point=cells.portal_point[: start[-1]].reshape(-1, 3),
+        start=start,
         tolerance=cells.tolerance,
     )
 
 
 def seen_from_places(cells: Cells, executor: Executor) -> Bools:
-    """(L,) which leaves may be seen from a standing leaf, themselves included.
+    """(L,) which leaves may be seen from a standing leaf, themselves included, or have passages.
 
     The first bound of the flow decides, without its search: of the leaves of five real models the
     search would have dropped two more. With too many portals for the bound, all leaves count.
@@ -155,7 +157,9 @@ def seen_from_places(cells: Cells, executor: Executor) -> Bools:
         bound = upper_bound(portals, executor)
     except LimitError:
         return every
-    return np.asarray(leaf_matrix(portals, bound)[standing].any(axis=0))
+    seen = np.asarray(leaf_matrix(portals, bound)[standing].any(axis=0))
+    seen[cells.portal_leaf[cells.portal_passage]] = True
+    return seen
 
 
 def from_places(sees: Bools, standing: Bools) -> Bools:

@@ -23,7 +23,7 @@ import shapely
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.facets import plane_axes
-from ptmtools.cells.planar import left_open
+from ptmtools.cells.planar import Geometry, left_open
 from ptmtools.cells.polyhedron import BOX_FACE, Polyhedron, section
 from ptmtools.cells.search import Tries
 from ptmtools.cells.structure import Frame, Structure, WallPlane, parallel_gap
@@ -124,7 +124,8 @@ _SQUARE = 0.99
 class DoorPlanes:
     """The planes of door leaves, and the boxes, metres, of the triangles in them."""
 
-    planes: tuple[WallPlane, ...]
+    structure: Structure
+    planes: tuple[tuple[Frame, Geometry], ...]  # with the polygons of the leaf in each
     low: Floats  # (p, 3) and
     high: Floats  # (p, 3) least and greatest corner
 
@@ -137,22 +138,29 @@ class DoorPlanes:
         own = own[np.abs(turn) >= _SQUARE]
         order = own[np.argsort(leaf[own], kind="stable")]
         bounds = np.searchsorted(leaf[order], np.arange(len(across) + 1))
-        layers: list[tuple[WallPlane, Ints]] = []
+        layers: list[tuple[Frame, Ints]] = []
         for first, last in itertools.pairwise(bounds):
             layers += _planes(structure, order[first:last])
         boxes = [structure.corners[flat].reshape(-1, 3) for _, flat in layers]
         low = np.array([points.min(axis=0) for points in boxes]).reshape(-1, 3)
         high = np.array([points.max(axis=0) for points in boxes]).reshape(-1, 3)
-        return DoorPlanes(tuple(plane for plane, _ in layers), low, high)
+        planes = tuple((frame, structure.united(frame, flat)) for frame, flat in layers)
+        return DoorPlanes(structure, planes, low, high)
 
     def within(self, body: Polyhedron) -> list[WallPlane]:
-        """The planes whose boxes meet that of a body."""
+        """The planes whose boxes meet that of a body, with what blocks there: all that lies in the
+        plane of a leaf may be hundreds of leaves."""
         low, high = body.points.min(axis=0), body.points.max(axis=0)
-        meets = ((self.low <= high) & (self.high >= low)).all(axis=1)
-        return [self.planes[i] for i in np.flatnonzero(meets)]
+        meets = np.flatnonzero(((self.low <= high) & (self.high >= low)).all(axis=1))
+        near = self.structure.nearby.meeting(low, high) if len(meets) else meets
+        result = []
+        for frame, walls in (self.planes[i] for i in meets):
+            flat = near[self.structure.lie_in(frame.plane, near)]
+            result.append(WallPlane(frame, walls, self.structure.united(frame, flat)))
+        return result
 
 
-def _planes(structure: Structure, triangles: Ints) -> list[tuple[WallPlane, Ints]]:
+def _planes(structure: Structure, triangles: Ints) -> list[tuple[Frame, Ints]]:
     """The planes of one leaf, and its ``triangles`` in each."""
     layers: list[tuple[float, Floats, Ints]] = []
     left = triangles
@@ -162,15 +170,7 @@ def _planes(structure: Structure, triangles: Ints) -> list[tuple[WallPlane, Ints
         layers.append((float(structure.areas[left[flat]].sum()), plane, left[flat]))
         left = left[~flat] if flat.any() else left[1:]
     least = _SHARE * max((area for area, *_ in layers), default=0.0)
-    near = structure.tolerance.plane
-    result = []
-    for area, plane, own in layers:
-        if area >= least:
-            frame = Frame.of(plane)
-            every = structure.nearby.between(plane, -near, near)
-            blocking = structure.united(frame, every[structure.lie_in(plane, every)])
-            result.append((WallPlane(frame, structure.united(frame, own), blocking), own))
-    return result
+    return [(Frame.of(plane), own) for area, plane, own in layers if area >= least]
 
 
 #: Margin, as a share, of the comparison of areas that precedes that of polygons.

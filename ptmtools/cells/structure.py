@@ -68,7 +68,9 @@ class WallPlane:
 
     frame: Frame
     walls: Geometry  # the polygons that may split
-    blocking: Geometry  # everything opaque and structural
+    blocking: Geometry  # everything opaque and structural, which hides
+    # What stops visitors: ``blocking`` without the leaves that they pass; None if it has none.
+    barring: Geometry | None = None
 
 
 @dataclass(frozen=True)
@@ -136,12 +138,12 @@ def structural_triangles(
     scene: Scene, options: SubdivideOptions, opened: NDArray[np.integer] | None = None
 ) -> Bools:
     """(T,) which triangles occlude: opaque, detail neither by name, class nor shape, and no door
-    leaves that are ``opened`` (see `Cells.opened`). The first of equal triangles may stand for
-    all."""
+    leaves that are ``opened`` (see `Cells.opened`), unless these hide. The first of equal triangles
+    may stand for all."""
     opaque = Opaque.of(scene, options)
     result = np.zeros(len(scene.triangles), dtype=bool)
     result[opaque.source[~opaque.detail]] = True
-    if opened is not None:
+    if opened is not None and options.doors != "pass":
         result[opened] = False
     return result
 

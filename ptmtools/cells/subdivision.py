@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, normals
+from ptmtools.cells.ceilings import ROOFED, roofed_share
 from ptmtools.cells.diagnostics import (
     NO_PLACES,
     detail_notes,
@@ -30,6 +31,7 @@ from ptmtools.cells.diagnostics import (
     viewpoint_notes,
 )
 from ptmtools.cells.division import Building, Space, bounds, divide, divide_inside
+from ptmtools.cells.doors import THICK
 from ptmtools.cells.joining import joined
 from ptmtools.cells.model import OUTSIDE, Cells, descend
 from ptmtools.cells.options import SubdivideOptions
@@ -37,7 +39,6 @@ from ptmtools.cells.ownership import Pieces, cut_to_leaves
 from ptmtools.cells.places import eye_region, find_places, meets
 from ptmtools.cells.planar import count, counting
 from ptmtools.cells.polyhedron import Polyhedron
-from ptmtools.cells.portals import ROOFED, roofed_share
 from ptmtools.cells.roles import matches
 from ptmtools.cells.rooms import grouped
 from ptmtools.cells.sight import seen_from_places
@@ -98,13 +99,14 @@ def _subdivided(
         space = divide(building, wide, progress)
         if not space.closed:
             roofed = roofed_share(corners, options.wall_area)
-            notes.append(_open_note(space, roofed, tight))
+            outside = space
             space = replace(clipped.result(), closed=False)
+            notes.append(_open_note(outside, roofed, tight, space.ceiling))
     finally:
         clipped.cancel()
     opened = building.doors.triangles(space.doors)
     if options.doors != "closed":
-        notes += door_notes(building.doors.leaves, space.doors, options.doors == "hidden")
+        notes += door_notes(building.doors.leaves, space.doors, options.doors)
         if space.beyond.rooms or space.beyond.outside:
             notes += unrecognised_door_notes(scene, building.doors.leaves)
     notes += unreached_notes(space.beyond, options.reach == "all", space.place, options.strict)
@@ -153,7 +155,7 @@ def _thickened(low: Floats, high: Floats, tolerance: Tolerance) -> Floats:
     return np.array([low, np.where(flat, low + BOX_MARGIN * tolerance.extent, high)])
 
 
-def _open_note(space: Space, roofed: float, box: Floats) -> str:
+def _open_note(space: Space, roofed: float, box: Floats, ceiling: float | None) -> str:
     if roofed < ROOFED:
         state = f"open at the top: {1 - roofed:.0%} of the floor has no ceiling"
     elif not space.reached.any():
@@ -162,6 +164,11 @@ def _open_note(space: Space, roofed: float, box: Floats) -> str:
         state = "open: the outside can be reached from the rooms (windows, doors or gaps)"
     size = " × ".join(f"{s:.2f}" for s in box[1] - box[0])
     note = f"the model is {state}; cells end at the bounding box of its walls, {size} m"
+    if ceiling is not None:
+        note += (
+            f", and rooms at the tops of their walls, at {ceiling:.2f} m; cells above hold what is "
+            "there (--ceiling none changes that)"
+        )
     return Warned(note) if roofed < ROOFED else note
 
 
@@ -178,7 +185,7 @@ def assembled(
     keep = space.reached
     rename = compact_numbers(keep)
     bodies = [tree.leaves[i] for i in np.flatnonzero(keep)]
-    standing, eye_floor = _standing(building, bodies, space.doors)
+    standing, eye_floor = _standing(building, bodies, space)
     if not standing.any():
         standing[:], eye_floor = True, eye_floor[:0]
         notes = [*notes, NO_PLACES]
@@ -192,7 +199,11 @@ def assembled(
     leaf = np.append(leaf, _leaf_at(space, rename, cameras))
     standing[leaf[leaf >= 0]] = True
     portals = [portal for portal in space.portals if keep[[*portal.leaves]].all()]
+    portals = sorted(portals, key=lambda portal: portal.passage)
     ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
+    passage = np.array([portal.passage for portal in portals], dtype=np.bool_)
+    # Nobody stands inside a door leaf.
+    standing &= ~_in_door_leaves(bodies, rename[ends[passage]], building.structure.tolerance)
     children = tree.children.copy()
     is_leaf = children <= -2
     leaf = rename[-2 - children[is_leaf]]
@@ -221,6 +232,7 @@ def assembled(
         portal_point=np.concatenate([np.zeros((0, 3)), *(portal.polygon for portal in portals)]),
         portal_start=_starts(len(portal.polygon) for portal in portals),
         portal_area=np.array([portal.area for portal in portals]),
+        portal_passage=passage,
         vertex=vertex,
         vertex_uv=np.zeros((len(vertex), 2)),
         triangle=np.arange(len(vertex), dtype=np.int32).reshape(-1, 3),
@@ -230,9 +242,19 @@ def assembled(
         eye_floor=eye_floor,
         left_out=space.left_out,
         walker=building.walker,
+        ceiling=space.ceiling,
         closed=space.closed,
         notes=tuple(notes),
     )
+
+
+def _in_door_leaves(
+    bodies: list[Polyhedron], passages: NDArray[np.int32], tolerance: Tolerance
+) -> Bools:
+    """(L,) which leaves are inside a door leaf: thin, with passages, (n, 2), to both sides."""
+    count = np.bincount(passages.reshape(-1), minlength=len(bodies))
+    limit = THICK + tolerance.plane
+    return np.array([n > 1 and body.width <= limit for n, body in zip(count, bodies, strict=True)])
 
 
 def compact_numbers(keep: Bools) -> NDArray[np.int32]:
@@ -240,15 +262,17 @@ def compact_numbers(keep: Bools) -> NDArray[np.int32]:
     return np.where(keep, np.cumsum(keep) - 1, -1).astype(np.int32)
 
 
-def _standing(building: Building, bodies: list[Polyhedron], opened: Bools) -> tuple[Bools, Floats]:
-    """(L,) whether a viewer can stand in a leaf, and `Cells.eye_floor`; ``opened``: (d,) doors."""
+def _standing(building: Building, bodies: list[Polyhedron], space: Space) -> tuple[Bools, Floats]:
+    """(L,) whether a viewer can stand in a leaf, and `Cells.eye_floor`."""
     walker, tolerance = building.walker, building.structure.tolerance
     if building.options.standing == "anywhere":
         return np.ones(len(bodies), dtype=np.bool_), np.zeros((0, 3, 3))
     boxes = np.array([bounds(body.points) for body in bodies]).reshape(-1, 2, 3)
-    blocking = ~np.append(opened, False)[building.doors.of]
+    blocking = ~np.append(space.doors, False)[building.doors.of]
     structure = replace(building.structure, corners=building.structure.corners[blocking])
     places = find_places(building.footing, structure, walker, boxes)
+    if space.ceiling is not None:
+        places = places.without_tops(space.ceiling - tolerance.plane, walker.radius)
     eyes = eye_region(places, walker, tolerance)
     return meets(eyes, bodies, walker, tolerance), eyes.triangles(tolerance)
 

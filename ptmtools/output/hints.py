@@ -260,7 +260,8 @@ def _portals(cells: Cells) -> list[list[dict[str, Any]]]:
         if behind == ahead or min(behind, ahead) < 0:
             continue
         for cell, neighbour, loop in ((behind, ahead, polygon[::-1]), (ahead, behind, polygon)):
-            rows[cell].append({"neighbour": neighbour, "area": area[k], "polygon": loop})
+            row = {"neighbour": neighbour, "area": area[k], "polygon": loop}
+            rows[cell].append(row | ({"passage": True} if cells.portal_passage[k] else {}))
     return rows
 
 

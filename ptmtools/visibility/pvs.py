@@ -109,7 +109,7 @@ def find_leaks(cells: Cells, flow: PortalFlow, matrix: Bools) -> NDArray[np.int3
     flow: of the portals of ``cells``. matrix: (C, C) the PVS.
     """
     leaks = []
-    if cells.portal_count:
+    if cells.sight_count:
         sees = matrix.sum(axis=1)
         bound = SUSPICIOUS * float(np.median(sees))
         order = np.lexsort((np.arange(len(sees)), -sees))[:MOST]
@@ -118,8 +118,10 @@ def find_leaks(cells: Cells, flow: PortalFlow, matrix: Bools) -> NDArray[np.int3
 
 
 def _leak(cells: Cells, flow: PortalFlow, cell: int, sees: int) -> tuple[int, ...]:
-    enters, leaves = cells.portal_cell[:, ::-1].reshape(-1), cells.portal_cell.reshape(-1)
-    standing = cells.leaf_standing[cells.portal_leaf].reshape(-1)
+    count = cells.sight_count
+    ends = cells.portal_cell[:count]
+    enters, leaves = ends[:, ::-1].reshape(-1), ends.reshape(-1)
+    standing = cells.leaf_standing[cells.portal_leaf[:count]].reshape(-1)
     out = np.flatnonzero((leaves == cell) & standing)
     if not len(out):
         return ()
@@ -146,9 +148,9 @@ def compute_pvs(
     Unless it is sampled, a pair of cells is left out only if no straight line, but for hairlines
     thinner than the rounding of the coordinates (`Tolerance.rounding`), leads through portals from
     a standing leaf of one to the other, or vice versa. Cells that share a portal always see each
-    other, even without standing room. Leaves of no cell are left out. `Pvs.fallbacks` counts the
-    portals whose search was cut short. ``executor`` runs the searches; the result is the same for
-    any.
+    other, even without standing room, unless it is a passage. Leaves of no cell are left out.
+    `Pvs.fallbacks` counts the portals whose search was cut short. ``executor`` runs the searches;
+    the result is the same for any.
 
     Raises what `portal_flow` raises.
     """
@@ -178,6 +180,7 @@ def lifted(cells: Cells, leaves: Bools) -> Bools:
     rows, columns = np.nonzero(from_places(leaves, cells.leaf_standing) & owned[:, None] & owned)
     matrix = np.zeros((cells.cell_count, cells.cell_count), dtype=np.bool_)
     matrix[cells.leaf_cell[rows], cells.leaf_cell[columns]] = True
-    for cell, adjacent in enumerate(cells.adjacent()):
-        matrix[cell, adjacent] = True
+    one, other = cells.portal_cell[: cells.sight_count].T
+    kept = (one >= 0) & (other >= 0)
+    matrix[one[kept], other[kept]] = matrix[other[kept], one[kept]] = True
     return matrix

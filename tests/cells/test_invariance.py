@@ -31,8 +31,8 @@ from ptmtools.tolerance import ranked
 from ptmtools.visibility import Pvs, compute_pvs
 
 ROOT = Path(__file__).resolve().parents[2]
-ROOMS = SubdivideOptions()
-ANYWHERE = SubdivideOptions(standing="anywhere")
+ROOMS = SubdivideOptions(ceiling="none")  # another one, where what is up is unknown
+ANYWHERE = SubdivideOptions(standing="anywhere", ceiling="none")
 #: Share of the extent by which matched cells may differ in place and in the side of a cube of
 #: their size; three times that in the input's own digits are lost to a move by 1e6 extents, and
 #: walls that meet under a flat angle multiply it.

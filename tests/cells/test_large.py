@@ -108,6 +108,7 @@ def as_cells(side: int) -> Cells:
         portal_point=np.array(polygon).reshape(-1, 3),
         portal_start=4 * np.arange(len(leaf) + 1),
         portal_area=np.full(len(leaf), DOOR * LINTEL),
+        portal_passage=np.zeros(len(leaf), np.bool_),
         vertex=empty,
         vertex_uv=empty[:, :2],
         triangle=empty.astype(np.int32),

@@ -37,7 +37,7 @@ WRONG = {
 def test_what_comes_of_it(name: str, tmp_path: Path) -> None:
     made = EVERY[name]
     scene = made.scene(tmp_path)
-    cells = subdivide(scene, SubdivideOptions(**made.options))
+    cells = subdivide(scene, SubdivideOptions(**{"doors": "open"} | made.options))
     assert cells.closed == made.closed
     notes = [*map(line, scene.notes), *cells.notes]
     assert [word for word in made.notes if not any(word in note for note in notes)] == []
@@ -93,7 +93,29 @@ def test_standing_anywhere(name: str, tmp_path: Path) -> None:
     assert (cells.leaf_cell >= 0).all()
 
 
-@pytest.mark.parametrize(("doors", "drawn"), [("open", True), ("closed", True), ("hidden", False)])
+@pytest.mark.parametrize("name", [name for name, made in DOORS.items() if made.sees])
+def test_leaves_hide_what_is_behind_them(name: str, tmp_path: Path) -> None:
+    """The rooms are the same as with doors that are open, and neighbours as before."""
+    made = DOORS[name]
+    scene = made.scene(tmp_path)
+    hiding, opened = (
+        subdivide(scene, SubdivideOptions(**made.options | {"doors": doors}))
+        for doors in ("pass", "open")
+    )
+    eyes = np.concatenate([made.in_world(scene, [at]) for at in made.eyes.values()])
+    places = [cells.locate(eyes).tolist() for cells in (hiding, opened)]
+    assert len(set(places[0])) == len(eyes)
+    assert hiding.cell_count == opened.cell_count
+    pvs = compute_pvs(hiding).to_matrix()
+    assert np.array_equal(pvs[np.ix_(places[0], places[0])], np.eye(len(eyes), dtype=bool))
+    for one, other in zip(*places, strict=True):
+        near = [set(cells.adjacent()[c]) for cells, c in ((hiding, one), (opened, other))]
+        assert len(near[0]) == len(near[1]) > 0
+
+
+@pytest.mark.parametrize(
+    ("doors", "drawn"), [("pass", True), ("open", True), ("closed", True), ("hidden", False)]
+)
 def test_door_leaves_are_drawn_unless_hidden(doors: str, drawn: bool, tmp_path: Path) -> None:
     scene = DOORS["two rooms and a door leaf, by its name"].scene(tmp_path)
     cells = subdivide(scene, SubdivideOptions(doors=doors))
@@ -101,7 +123,7 @@ def test_door_leaves_are_drawn_unless_hidden(doors: str, drawn: bool, tmp_path: 
     assert (scene.objects.index("Zimmertür") in shown) == drawn
 
 
-@pytest.mark.parametrize(("doors", "walks"), [("open", True), ("closed", False)])
+@pytest.mark.parametrize(("doors", "walks"), [("pass", True), ("open", True), ("closed", False)])
 def test_one_walks_through_a_door_leaf_that_is_open(
     doors: str, walks: bool, tmp_path: Path
 ) -> None:

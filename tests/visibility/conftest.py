@@ -125,6 +125,7 @@ def make_rooms(
         portal_point=np.concatenate([transform(p) for p in portals]) if portals else empty,
         portal_start=4 * np.arange(len(portals) + 1),
         portal_area=np.ones(len(portals)),
+        portal_passage=np.zeros(len(portals), np.bool_),
         vertex=empty,
         vertex_uv=np.zeros((0, 2)),
         triangle=np.zeros((0, 3), np.int32),

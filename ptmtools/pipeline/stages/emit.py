@@ -139,8 +139,9 @@ def _summary(n: Mapping[str, Any]) -> str:
 EMIT: Stage[None] = Stage(
     name="emit",
     about="Write the served files: cells and hints.",
-    recipe=11,
-    changed="GLBs are compressed; the hints hold the previews of textures, the errors and the "
+    recipe=12,
+    changed="portals that door leaves cover are marked as passages; GLBs are compressed; the "
+    "hints hold the previews of textures, the errors and the "
     "effect of each texture level, mean colours, GPU sizes of texels, and the resolution needed in "
     "each cell; --first-look writes a bundle of coarse levels for each cell; viewpoints face "
     "pictures; hulls with slivers and portals with short edges are convex in float32 and float64",

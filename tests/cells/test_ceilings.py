@@ -1,0 +1,148 @@
+"""Rooms without a ceiling end at the tops of their walls. The expectations follow from
+docs/design/cells.md: a straight line that leaves a room above its walls enters none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ptmtools.arrays import Floats, normals
+from ptmtools.cells import Cells, SubdivideOptions, structural_triangles, subdivide
+from ptmtools.diagnostics import Warned
+from ptmtools.errors import InputError
+from ptmtools.scene import IngestOptions, Scene, ingest
+from ptmtools.scene.space import to_world
+from ptmtools.visibility import check_conservative, compute_pvs
+from tests.cells.buildings import write
+from tests.cells.strangers import Parts, office, serpentine
+from tests.scene.buildings import box
+
+NONE = SubdivideOptions(ceiling="none")
+
+
+def scene_of_parts(parts: Parts, folder: Path) -> Scene:
+    return ingest(write(folder / "model.obj", parts.items()), IngestOptions(unit="m", up="z"))
+
+
+def middles(scene: Scene, points: list[tuple[float, float, float]]) -> Floats:
+    """Points of the model in world coordinates."""
+    return np.asarray(to_world(np.array(points), scene.space))
+
+
+def halls(scene: Scene, cells: Cells, count: int = 4) -> list[int]:
+    """The cells in the middle of each hall."""
+    at = middles(scene, [(8.3 * k + 4.3, 6.0, 1.6) for k in range(count)])
+    return cells.locate(at).tolist()
+
+
+def sees(cells: Cells, one: int, other: int) -> bool:
+    return bool(compute_pvs(cells).to_matrix()[one, other])
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.01, 0.03, 0.1])
+def test_halls_without_a_ceiling_see_through_doorways_only(apart: float, tmp_path: Path) -> None:
+    scene = scene_of_parts(serpentine(apart=apart), tmp_path)
+    cells = subdivide(scene)
+    a, b, c, d = halls(scene, cells)
+    assert len({a, b, c, d}) == 4
+    assert sees(cells, a, b)
+    assert sees(cells, b, c)
+    assert sees(cells, a, c)  # from one doorway to the next
+    assert not sees(cells, a, d)
+    structural = scene.corners[structural_triangles(scene, SubdivideOptions())]
+    report = check_conservative(structural, cells, compute_pvs(cells), 50_000)
+    assert report.unoccluded > 1000
+    assert report.missed == ()
+    (note,) = [note for note in cells.notes if "open at the top" in note]
+    assert isinstance(note, Warned)
+    assert (apart > 0) == ("tops of their walls" in note) == (cells.ceiling is not None)
+
+
+def test_without_it_all_halls_see_one_another(tmp_path: Path) -> None:
+    scene = scene_of_parts(serpentine(), tmp_path)
+    cells = subdivide(scene, NONE)
+    assert cells.ceiling is None
+    a, b, c, d = halls(scene, cells)
+    assert all(sees(cells, one, other) for one, other in ((a, c), (b, d), (a, d)))
+
+
+def test_what_towers_over_the_walls_is_seen_from_afar(tmp_path: Path) -> None:
+    """A pillar of 9 m in the last hall: its upper part belongs to a cell that the first one sees,
+    nobody stands there, and its lower part is hidden."""
+    parts = serpentine() | {"pillar": box((29.5, 2, 0), (29.8, 2.3, 9))}
+    scene = scene_of_parts(parts, tmp_path)
+    cells = subdivide(scene)
+    first, *_, last = halls(scene, cells)
+    high, low = cells.locate(middles(scene, [(29, 2, 8), (29, 2, 1)])).tolist()
+    assert sees(cells, first, high)
+    assert not sees(cells, first, low)
+    assert not sees(cells, first, last)
+    assert not cells.standing[high]
+    structural = scene.corners[structural_triangles(scene, SubdivideOptions())]
+    assert check_conservative(structural, cells, compute_pvs(cells), 50_000).missed == ()
+
+
+def test_the_inside_of_a_pillar_is_no_room(tmp_path: Path) -> None:
+    """It is the largest leaf that does not touch the box around the model, and has a floor."""
+    parts = serpentine() | {"pillar": box((29.5, 2, 0), (31, 3.5, 9))}
+    scene = scene_of_parts(parts, tmp_path)
+    cells = subdivide(scene)
+    assert not cells.closed
+    assert cells.locate(middles(scene, [(30, 2.5, 1)])).tolist() == [-1]
+    assert len(set(halls(scene, cells)) - {-1}) == 4
+
+
+def test_space_above_one_room_belongs_to_it(tmp_path: Path) -> None:
+    """A hall with a partition that is lower than its walls."""
+    parts = serpentine(1, apart=0) | {"partition": box((4, 3, 0), (4.2, 9, 3))}
+    cells = subdivide(scene_of_parts(parts, tmp_path))
+    assert cells.ceiling is None or cells.standing.all()
+
+
+def test_nothing_that_can_be_seen_is_lost(tmp_path: Path) -> None:
+    """Upright surfaces are drawn to the same area with a ceiling and without."""
+    scene = scene_of_parts(serpentine(), tmp_path)
+    drawn = []
+    for cells in (subdivide(scene), subdivide(scene, NONE)):
+        pieces, _ = cells.emitted(np.zeros(len(scene.triangles), dtype=np.bool_))
+        corners = cells.vertex[cells.triangle[np.unique(pieces)]]
+        across = normals(corners)
+        upright = np.abs(across[:, 1]) < 1e-6 * np.linalg.norm(across, axis=1)
+        drawn.append(np.linalg.norm(across[upright], axis=1).sum() / 2)
+    assert drawn[0] == pytest.approx(drawn[1])
+
+
+def test_a_building_with_ceilings_stays_as_it_is(tmp_path: Path) -> None:
+    scene = scene_of_parts(office(4), tmp_path)
+    cells, without = subdivide(scene), subdivide(scene, NONE)
+    assert cells.ceiling is None
+    np.testing.assert_array_equal(cells.node_plane, without.node_plane)
+
+
+def test_walls_of_all_heights_have_no_ceiling(tmp_path: Path) -> None:
+    """Towers of 3 to 30 m on a square: none of their heights is a room's."""
+    towers = {
+        f"tower {k}": box(
+            (10 * k, 10 * (k * 7 % 5), 0), (10 * k + 6, 10 * (k * 7 % 5) + 6, 3 + 3 * k)
+        )
+        for k in range(10)
+    }
+    scene = scene_of_parts({"ground": box((-5, -5, -1), (105, 55, 0)), **towers}, tmp_path)
+    assert subdivide(scene).ceiling is None
+
+
+def test_the_ceiling_is_stored(tmp_path: Path) -> None:
+    cells = subdivide(scene_of_parts(serpentine(), tmp_path))
+    assert cells.ceiling == pytest.approx(4.2)  # above the bottom of the floor
+    assert Cells.from_arrays(cells.to_arrays()).ceiling == cells.ceiling
+    assert cells.in_ceiling.any()
+    np.testing.assert_allclose(
+        np.concatenate([cells.portal(k) for k in np.flatnonzero(cells.in_ceiling)])[:, 1], 4.2
+    )
+
+
+def test_an_unknown_ceiling_is_an_error() -> None:
+    with pytest.raises(InputError, match="auto or none"):
+        SubdivideOptions(ceiling="flat")  # type: ignore[arg-type]
