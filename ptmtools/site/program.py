@@ -17,10 +17,12 @@ from ptmtools.store.layout import sha256
 INDEX = "index.html"
 PAGE = Path(__file__).parent / "page"
 HTML, JAVASCRIPT = "text/html; charset=utf-8", "text/javascript; charset=utf-8"
+#: Scripts that few visits need.
+LATER = ("later.js", "compare.js")
 #: The media type of each file.
 PROGRAM = {
     "viewer.js": JAVASCRIPT,
-    "later.js": JAVASCRIPT,
+    **dict.fromkeys(LATER, JAVASCRIPT),
     "worker.js": JAVASCRIPT,
     "decoder.wasm": "application/wasm",
 }

@@ -35,7 +35,7 @@ from ptmtools.output.emission import compressed
 from ptmtools.progress import Progress, silent
 from ptmtools.site.content import DATA, Site
 from ptmtools.site.entry import Entry, link_bytes
-from ptmtools.site.program import INDEX
+from ptmtools.site.program import INDEX, LATER
 from ptmtools.store.folder import damaged, unreadable
 from ptmtools.store.layout import sha256
 
@@ -291,7 +291,7 @@ def weight_of(site: Site) -> Weight:
 
 def _walked(name: str) -> bool:
     """Whether every walk may need a file."""
-    later = name.endswith("/later.js")
+    later = name.rpartition("/")[2] in LATER
     return name == INDEX or (name.startswith(("viewer-", f"{DATA}/")) and not later)
 
 

@@ -85,6 +85,11 @@ const functions = {
       return [cell, candidates];
     });
   },
+  around({ records, eyes, cell }) {
+    const locator = new Locator(records.map(() => [0, 0, 0, 0, 0, 0]));
+    records.forEach((record, number) => locator.learn(number, record));
+    return eyes.map((eye) => locator.around(eye, cell));
+  },
   crossing({ eye, way, polygon }) {
     return crossing(eye, way, polygon);
   },

@@ -32,7 +32,7 @@ def test_the_sources_give_the_page(require: Callable[[str, str], None], tmp_path
 
 def test_scripts_import_nothing_at_once() -> None:
     """Each is one request: no other script is found only after it."""
-    for name in ("viewer.js", "later.js", "worker.js"):
+    for name in ("viewer.js", "later.js", "compare.js", "worker.js"):
         script = (PAGE / name).read_text()
         assert not re.search(r"""\bimport\s*["{*\w]""", script)
         assert not re.search(r"/\*\*|\n\s*//", script)

@@ -327,9 +327,9 @@ def test_weight(site: Site) -> None:
     """Sums of what is on the disk."""
     weight = weight_of(site)
     sizes = {name: link_bytes(entry) for name, entry in site.entries.items()}
-    program = [n for n in sizes if not n.startswith("data/") and not n.endswith("/later.js")]
-    assert weight.page == sum(sizes[name] for name in program)
-    assert weight.whole == sum(v for n, v in sizes.items() if not n.endswith("/later.js"))
+    needed = [name for name in sizes if not name.endswith(("/later.js", "/compare.js"))]
+    assert weight.page == sum(sizes[name] for name in needed if not name.startswith("data/"))
+    assert weight.whole == sum(sizes[name] for name in needed)
     row = site.index["cells"][site.index["viewpoints"][0]["cell"]]
     record = json.loads(site.entries[f"data/{row['record']}"].read())
     room = sizes[f"data/{row['record']}"] + sizes[f"data/{row['geometry']}"]

@@ -126,6 +126,32 @@ def test_the_cell_anywhere(tmp_path: Path, world: World) -> None:
     assert len(set(actual)) > 2
 
 
+def test_the_cells_on_both_sides_of_a_door_leaf(tmp_path: Path) -> None:
+    """Cells 0, 1 and 2 along x, passages at 4 and at 4.05, a portal at 0; the reach is 0.5 m."""
+
+    def portal(neighbour: int, x: float, **more: bool) -> dict[str, Any]:
+        return {"neighbour": neighbour, "polygon": [[x, 0, 0], [x, 2, 0], [x, 2, 1]], **more}
+
+    portals = [
+        [portal(1, 4, passage=True), portal(3, 0)],
+        [portal(0, 4, passage=True), portal(2, 4.05, passage=True)],
+        [portal(1, 4.05, passage=True)],
+        [portal(0, 0, passage=False)],
+    ]
+    records = [{"leaves": [], "adjacent": [], "portals": row} for row in portals]
+    expected = {
+        (3.4, 1.0, 0.5): [0],
+        (3.52, 1.0, 0.5): [0, 1],
+        (3.6, 1.0, 0.5): [0, 1, 2],
+        (3.99, 2.4, 0.5): [0, 1, 2],
+        (3.99, 2.6, 0.5): [0],
+        (3.99, 1.0, 1.6): [0],
+        (0.1, 1.0, 0.5): [0],
+    }
+    call = {"records": records, "eyes": [*expected], "cell": 0}
+    assert called(tmp_path, [("around", call)]) == [[*expected.values()]]
+
+
 def test_cells_whose_record_is_not_there(tmp_path: Path, world: World) -> None:
     """By their boxes, those next to the cell before first."""
     stock = world.catalogue

@@ -23,6 +23,8 @@ from benchmarks.web_rivals.packages import ESBUILD  # noqa: E402
 
 PTM = ROOT / "web" / "ptm" / "src"
 OUTPUT = ROOT / "ptmtools" / "site" / "page"
+#: Scripts that the page loads when it needs them.
+LATER = ("later.js", "compare.js")
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _LINE_END = re.compile(r"\s*\n\s*")
 #: Template strings with shaders, and what esbuild leaves in them.
@@ -33,7 +35,7 @@ _SHADER_REMARK = re.compile(r"\s*//[^\n]*")
 def minified(source: Path) -> bytes:
     """A module with all that it imports, or a style sheet. CalledProcessError if esbuild fails."""
     options = ["--bundle", "--minify", "--format=esm", "--target=es2022", "--charset=utf8"]
-    options.append("--external:./later.js")
+    options += [f"--external:./{name}" for name in LATER]
     command = [ESBUILD.folder / "bin/esbuild", source.name, *options, "--log-level=warning"]
     return subprocess.run(command, cwd=source.parent, stdout=subprocess.PIPE, check=True).stdout
 
@@ -53,7 +55,7 @@ def build(folder: Path) -> None:
     files = {
         "index.html": html.encode(),
         "viewer.js": _SHADER.sub(plain_shader, minified(HERE / "main.js").decode()).encode(),
-        "later.js": minified(HERE / "later.js"),
+        **{name: minified(HERE / name) for name in LATER},
         "worker.js": minified(PTM / "worker.js"),
         "decoder.wasm": (PTM / "decoder.wasm").read_bytes(),
     }

@@ -1,2 +1,4 @@
-/** Loads `later.js`, which the build leaves beside this script. */
+// Scripts that the build leaves beside this one.
+
 export const loadLater = () => import("./later.js");
+export const loadComparison = () => import("./compare.js");

@@ -3,7 +3,6 @@
 
 import { Locator } from "../client/src/locating.js";
 import { beginningOf } from "./beginning.js";
-import { Comparison } from "./compare.js";
 import { fitting, levelsOf } from "./data/site.js";
 import { cameraOf } from "./gl/camera.js";
 import { Fence } from "./gl/fence.js";
@@ -12,6 +11,7 @@ import { Renderer } from "./gl/renderer.js";
 import { Reserve } from "./gl/reserve.js";
 import { Sharpness } from "./gl/sharpness.js";
 import { TextureMemory } from "./gl/texture-memory.js";
+import { loadComparison } from "./load-later.js";
 import { clock, Fetcher } from "./net/fetcher.js";
 import { watchLink } from "./net/timings.js";
 import { catalogueOf } from "./policy/catalogue.js";
@@ -48,6 +48,8 @@ export class Walkthrough {
   cell = -1;
   /** All errors, in order. @type {{code: string, message: string}[]} */
   faults = [];
+  /** @type {ArrayLike<number>} */
+  #eye = [0, 0, 0];
   /** Whether the first picture of the room has been drawn, and whether it can be. */
   begun = false;
   #ready = false;
@@ -57,7 +59,7 @@ export class Walkthrough {
   saving = false;
   /** Whether to compare with full resolution, and the means for it. */
   comparing = false;
-  /** @type {Comparison | null} */
+  /** @type {import("./compare.js").Comparison | null} */
   comparison = null;
   /** @type {import("./recorder.js").Recorder | null} */
   recorder = null;
@@ -152,7 +154,7 @@ export class Walkthrough {
     canvas.addEventListener("webglcontextrestored", () => {
       this.#make();
       this.memory.resume();
-      this.comparison = this.comparing ? new Comparison(this) : null;
+      this.#compare();
     });
   }
 
@@ -189,10 +191,12 @@ export class Walkthrough {
     this.#turned = this.#changed;
   }
 
-  /** Cells visible from the visitor's cell, itself first. */
+  /** Cells visible from those that the visitor is in, his own first. */
   get visible() {
-    const { known, cell } = this.client;
-    return (known[this.cell] ?? known[cell])?.visible ?? (this.cell < 0 ? [] : [this.cell]);
+    const { known, cell } = this.client, here = known[this.cell] ? this.cell : cell;
+    if (!known[here]) return this.cell < 0 ? [] : [this.cell];
+    const cells = this.locator.around(this.#eye, here);
+    return [...new Set(cells.flatMap((c) => known[c]?.visible ?? [c]))];
   }
 
   /** Vertical field of view, radians: `angle` is the smaller one. */
@@ -208,6 +212,7 @@ export class Walkthrough {
 
   /** @param {Pose} pose */
   locate(pose) {
+    this.#eye = pose.eye;
     const cell = this.locator.locate(pose.eye, this.cell);
     if (cell >= 0) return this.enter(cell);
     // Among cells without a record, one whose box holds the eye.
@@ -304,7 +309,17 @@ export class Walkthrough {
     this.comparing = on;
     if (this.gl.isContextLost()) return;
     this.comparison?.delete();
-    this.comparison = on ? new Comparison(this) : null;
+    this.#compare();
+  }
+
+  /** Makes the means for a comparison, if there is one. */
+  async #compare() {
+    this.comparison = null;
+    this.touch();
+    if (!this.comparing) return;
+    const { Comparison } = await loadComparison();
+    if (!this.comparing || this.comparison || this.gl.isContextLost()) return;
+    this.comparison = new Comparison(this);
     this.touch();
   }
 

@@ -3,11 +3,19 @@
 import { dot, facing } from "./vectors.js";
 
 /** @typedef {ArrayLike<number>} Vector */
-/** @typedef {{leaves: {points: number[][], faces: number[][]}[], adjacent: number[]}} CellRecord */
+/**
+ * @typedef {object} CellRecord
+ * @property {{points: number[][], faces: number[][]}[]} leaves
+ * @property {number[]} adjacent
+ * @property {{neighbour: number, polygon: number[][], passage?: boolean}[]} [portals]
+ */
 
 // Metres that an eye may be in front of a plane: leaves that touch then overlap
 // (docs/formats/hints.md).
 const SLACK = 1e-3;
+// Metres from a passage, a portal that a door leaf covers, within which an eye belongs to the cells on
+// both sides: it may be inside the leaf, or so near that the picture has no leaf.
+const REACH = 0.5;
 
 /**
  * The planes of the faces of a leaf: unit normal, outwards, and offset of each.
@@ -23,10 +31,23 @@ function planesOf({ points, faces }) {
   });
 }
 
+/**
+ * Whether a point is at most `REACH` from the box around a polygon.
+ * @param {Vector} eye
+ * @param {number[][]} polygon
+ */
+function isNear(eye, polygon) {
+  return [0, 1, 2].every((k) => {
+    const along = polygon.map((point) => point[k]);
+    return Math.min(...along) - REACH <= eye[k] && eye[k] <= Math.max(...along) + REACH;
+  });
+}
+
 /** Locates points among the cells whose records it has learned. */
 export class Locator {
   #boxes;
-  /** @type {({leaves: number[][][], adjacent: number[]} | undefined)[]} by cell */
+  /** @type {({leaves: number[][][], adjacent: number[], passages: NonNullable<CellRecord["portals"]>}
+   *   | undefined)[]} by cell */
   #cells;
 
   /** @param {Vector[]} boxes of each cell: x, y, z of the low corner, then of the high one, metres */
@@ -36,8 +57,24 @@ export class Locator {
   }
 
   /** @param {number} cell @param {CellRecord} record */
-  learn(cell, { leaves, adjacent }) {
-    this.#cells[cell] = { leaves: leaves.map(planesOf), adjacent };
+  learn(cell, { leaves, adjacent, portals = [] }) {
+    const passages = portals.filter(({ passage }) => passage);
+    this.#cells[cell] = { leaves: leaves.map(planesOf), adjacent, passages };
+  }
+
+  /**
+   * The cells that an eye in a cell belongs to: this one, and those beyond near passages.
+   * @param {Vector} eye
+   * @param {number} cell
+   */
+  around(eye, cell) {
+    const cells = [cell];
+    for (const one of cells) {
+      for (const { neighbour, polygon } of this.#cells[one]?.passages ?? []) {
+        if (!cells.includes(neighbour) && isNear(eye, polygon)) cells.push(neighbour);
+      }
+    }
+    return cells;
   }
 
   /**

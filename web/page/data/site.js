@@ -70,7 +70,7 @@ import { levelSizes } from "../../client/src/levels.js";
  * @property {number[][]} textures
  * @property {number[][]} [need]
  * @property {Leaf[]} leaves
- * @property {{neighbour: number, area: number, polygon: number[][]}[]} portals
+ * @property {{neighbour: number, area: number, polygon: number[][], passage?: boolean}[]} portals
  */
 
 /** The schema of the index that this page reads. */

@@ -32,6 +32,7 @@ import { RangeFile } from "./range-file.js";
  * @property {number} floor
  * @property {number[][]} textures
  * @property {{points: number[][], faces: number[][]}[]} leaves
+ * @property {{neighbour: number, polygon: number[][], passage?: boolean}[]} portals
  */
 
 /**
@@ -51,6 +52,8 @@ export class Walk {
   shown = new Group();
   /** The cell that the viewer is in, -1 at first. */
   cell = -1;
+  /** This cell and those beyond near passages. @type {number[]} */
+  #around = [];
   #renderer;
   #url;
   #options;
@@ -109,7 +112,8 @@ export class Walk {
   }
 
   /**
-   * To be called in each frame: enters the cell that holds the viewer if it has changed.
+   * To be called in each frame: enters the cell that holds the viewer, with those beyond near door
+   * leaves, if they have changed.
    * @param {Vector3} position
    */
   async update(position) {
@@ -118,7 +122,9 @@ export class Walk {
     const cell = await this.locate(position)
       .catch((error) => (this.#report(error), -1))
       .finally(() => (this.#locating = false));
-    if (cell >= 0 && cell !== this.cell) await this.enter(cell);
+    if (cell < 0) return;
+    const around = this.#locator.around(position.toArray(), cell);
+    if (around.join() !== this.#around.join()) await this.#enter(around);
   }
 
   /**
@@ -144,17 +150,21 @@ export class Walk {
    * @returns {Promise<boolean>} whether everything is loaded; false if another cell was entered since
    */
   async enter(cell, budget = this.budget) {
+    this.budget = budget;
+    return this.#enter([cell]);
+  }
+
+  /** @param {number[]} around the viewer's cell, then those beyond near passages */
+  async #enter(around) {
     this.#entered.abort();
     const { signal } = (this.#entered = new AbortController());
-    this.cell = cell;
-    this.budget = budget;
+    [this.cell] = this.#around = around;
     try {
-      const record = await this.#record(cell);
+      const records = await Promise.all(around.map((cell) => this.#record(cell)));
       if (signal.aborted) return false;
-      const shares = sharesOf(record);
-      this.#free(new Set(record.visible), shares);
-      const order = [...record.visible.keys()].sort((a, b) => record.ach[b] - record.ach[a]);
-      await this.#all(order.map((n) => () => this.#load(record.visible[n])), signal);
+      const shares = sharesOf(records), cells = new Set(records.flatMap(byCoverage));
+      this.#free(cells, shares);
+      await this.#all([...cells].map((cell) => () => this.#load(cell)), signal);
       if (!signal.aborted) await this.#refine(shares, signal);
     } catch (error) {
       this.#report(error);
@@ -312,15 +322,22 @@ export class Walk {
 
 /**
  * The share of the view covered by the cells that use each texture.
- * @param {CellRecord} record
+ * @param {CellRecord[]} records
  */
-function sharesOf({ ach, floor, textures }) {
+function sharesOf(records) {
   /** @type {Map<number, number>} */
   const shares = new Map();
-  textures.forEach((used, k) => {
-    for (const t of used) shares.set(t, (shares.get(t) ?? 0) + Math.max(ach[k], floor));
-  });
+  for (const { ach, floor, textures } of records) {
+    textures.forEach((used, k) => {
+      for (const t of used) shares.set(t, (shares.get(t) ?? 0) + Math.max(ach[k], floor));
+    });
+  }
   return shares;
+}
+
+/** The cells visible from one, by their coverage. @param {CellRecord} record */
+function byCoverage({ visible, ach }) {
+  return [...visible.keys()].sort((a, b) => ach[b] - ach[a]).map((n) => visible[n]);
 }
 
 /** @param {URL} url */
