@@ -211,7 +211,15 @@ def _connect(kind: Any, address: str) -> Any:
 
 
 async def _fetch(remote: Any) -> Any:
-    return await remote
+    """The result of a Dask future; drops its task if cancelled. Dask's fetch goes on then, because
+    it is one for many results: if it were cancelled while it waits its turn, the client would join
+    all later results to it, which would be cancelled too."""
+    fetch = asyncio.ensure_future(remote.result())
+    fetch.add_done_callback(lambda done: done.cancelled() or done.exception())  # logged otherwise
+    try:
+        return await asyncio.shield(fetch)
+    finally:
+        remote.release()
 
 
 def _other_software(worker: str, difference: str) -> WorkerError:

@@ -7,6 +7,8 @@ import os
 import signal
 import sys
 import threading
+import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +17,7 @@ import pytest
 
 from ptmtools import cluster as module
 from ptmtools.cli.main import main
-from ptmtools.cluster import software
+from ptmtools.cluster import Cluster, software
 from ptmtools.errors import MissingComponentError, WorkerError
 from ptmtools.parallel import open_executor
 
@@ -79,6 +81,64 @@ def test_dying_workers(require, monkeypatch):
                 processes = set(executor.each(tasks.process, None, range(20)))
             with pytest.raises(WorkerError, match="PTM-W004"):
                 list(executor.each(tasks.die, 1, [0, 1]))
+
+
+@pytest.fixture
+def alone(scheduler) -> Iterator[Cluster]:
+    """An executor of its own, since a fault of these tests could outlast them."""
+    with Cluster(scheduler) as executor:
+        yield executor
+
+
+@pytest.fixture
+def gate(tmp_path) -> Iterator[Path]:
+    """A file for `wait_for`, so that no task waits longer than the test."""
+    yield tmp_path / "gate"
+    (tmp_path / "gate").touch()
+
+
+def test_closing_while_results_wait_to_be_fetched(alone, gate):
+    """Dask keeps the one fetch that all results join which come while five fetches go on."""
+    client = alone._client
+    fetches = client._gather_semaphore
+    actual = alone.each(tasks.wait_for, gate, range(100))
+    assert next(actual) == 0
+
+    async def occupy() -> int:
+        count = 0
+        while not fetches.locked():
+            await fetches.acquire()
+            count += 1
+        return count
+
+    async def free() -> None:
+        for _ in range(count):
+            fetches.release()
+
+    count = client.sync(occupy)
+    assert count > 0
+    gate.touch()
+    while client._gather_future is None:
+        time.sleep(0.01)
+    actual.close()
+    client.sync(free)
+    assert list(alone.each(tasks.wait_for, gate, [3])) == [3]
+
+
+def test_closing_drops_the_tasks(alone, gate):
+    def known(dask_scheduler) -> int:
+        return len(dask_scheduler.tasks)
+
+    actual = alone.each(tasks.wait_for, gate, range(100))
+    assert next(actual) == 0
+    while alone._client.run_on_scheduler(known) <= alone.workers:
+        time.sleep(0.01)
+    actual.close()
+    for _ in range(1000):
+        if not (left := alone._client.run_on_scheduler(known)):
+            break
+        time.sleep(0.01)
+    assert left == 0
 
 
 def test_the_command(tmp_path, capfd, monkeypatch):

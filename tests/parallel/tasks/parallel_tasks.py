@@ -118,6 +118,13 @@ class Unreadable:
         return {}
 
 
+def wait_for(file: Path, i: int) -> int:
+    """All tasks but the first wait until ``file`` exists."""
+    while i and not file.exists():
+        time.sleep(0.01)
+    return i
+
+
 def unsendable(_: Any, i: int) -> Any:
     """What cannot be pickled, now and then."""
     return (lambda: i) if i == 1 else i
