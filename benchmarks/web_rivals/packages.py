@@ -11,11 +11,13 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @dataclass(frozen=True)
 class Package:
-    """``name`` of a version, in a folder below ``build/browsers``."""
+    """``name`` of a version, in a folder below ``build/browsers``, with ``others`` of fixed
+    versions (``NAME@VERSION``) that it needs."""
 
     name: str
     version: str
     prefix: str
+    others: tuple[str, ...] = ()
 
     @property
     def folder(self) -> Path:
@@ -33,7 +35,8 @@ class Package:
         options = "--no-save --no-package-lock --ignore-scripts --no-audit --no-fund"
         options += " --legacy-peer-deps"  # one three.js for all
         prefix = f"--prefix build/browsers/{self.prefix}"
-        return f"npm install {options} {prefix} {self.name}@{self.version}"
+        packages = " ".join([f"{self.name}@{self.version}", *self.others])
+        return f"npm install {options} {prefix} {packages}"
 
     def remedy(self) -> str | None:
         """What to install first, or None."""
@@ -51,7 +54,19 @@ class Package:
 
 THREE = Package("three", "0.187.0", "three")
 KTX2 = Package("ktx2-encoder", "0.6.0", "ktx2")
-GLTF_TRANSFORM = Package("@gltf-transform/cli", "4.5.1", "gltf-transform")
+#: The last that runs on Node 18, with parts of that time: newer ones need a sharp for Node 20.
+GLTF_TRANSFORM = Package(
+    "@gltf-transform/cli",
+    "4.3.0",
+    "gltf-transform",
+    (
+        "@gltf-transform/core@4.3.0",
+        "@gltf-transform/extensions@4.3.0",
+        "@gltf-transform/functions@4.3.0",
+        "ndarray-pixels@5.0.1",
+        "sharp@0.34.5",
+    ),
+)
 NEEDLE = Package("@needle-tools/gltf-progressive", "3.3.5", "needle")
 #: Joins and shortens the modules of a page, as those who use three.js do.
 ESBUILD = Package("esbuild", "0.28.2", "esbuild")
