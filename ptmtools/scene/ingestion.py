@@ -22,7 +22,7 @@ from ptmtools.scene.baking import LARGEST, bake, emitted_wraps, near_origin
 from ptmtools.scene.faces import KeptFaces, keep_faces
 from ptmtools.scene.facing import TURNED_AWAY, share_turned_away
 from ptmtools.scene.images import ImageStore
-from ptmtools.scene.model import Camera, Material, Scene, Space, Storey
+from ptmtools.scene.model import Camera, Material, RoomVolume, Scene, Space, Storey
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.options import IngestOptions
 from ptmtools.scene.orientation import tolerance_of
@@ -172,6 +172,10 @@ def ingest(
         colors=colors,
         kinds=tuple(source.kinds[i] for i in used_object.tolist()) if source.kinds else (),
         storeys=_storeys(source, space),
+        rooms=tuple(
+            RoomVolume(room.name, to_world(room.points, space), room.triangles)
+            for room in source.rooms
+        ),
         space=space,
         notes=findings.notes,
         files=tuple(findings.folder.sought),

@@ -16,7 +16,14 @@ import numpy as np
 
 from ptmtools import schemas
 from ptmtools.errors import DatabaseError
-from ptmtools.scene.model import FACE_ARRAYS, Camera, Storey, fields_of
+from ptmtools.scene.model import (
+    FACE_ARRAYS,
+    Camera,
+    Storey,
+    fields_of,
+    room_arrays,
+    rooms_of,
+)
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.sandbox import run_in_sandbox, unreadable
 from ptmtools.scene.source import FileRange, Source, SourceMaterial, SourceWrap, Texture
@@ -63,7 +70,7 @@ def pack_source(
     arrays = {name: getattr(source, name) for name in FACE_ARRAYS}
     if source.colors is not None:
         arrays["colors"] = source.colors
-    Path(scratch, _ARRAYS).write_bytes(pack_arrays(arrays))
+    Path(scratch, _ARRAYS).write_bytes(pack_arrays(arrays | room_arrays(source.rooms)))
     return {
         "objects": source.objects,
         "materials": [vars(material) for material in source.materials],
@@ -71,6 +78,7 @@ def pack_source(
         "cameras": [vars(camera) for camera in source.cameras],
         "kinds": source.kinds,
         "storeys": [vars(storey) for storey in source.storeys],
+        "rooms": [room.name for room in source.rooms],
         "metres": source.metres,
         "up": source.up,
         "findings": findings.records(),
@@ -126,6 +134,7 @@ def read_in_sandbox(
             colors=stored.array("colors", np.uint8, n, 3, 3) if "colors" in arrays else None,
             kinds=tuple(message["kinds"]),
             storeys=tuple(Storey(**row) for row in message["storeys"]),
+            rooms=rooms_of(stored, message["rooms"]),
         )
     except _FAULTS as error:  # the library has corrupted its own process
         raise unreadable(library, model, str(error)) from None

@@ -131,6 +131,27 @@ class Storey:
     height: float
 
 
+@dataclass(frozen=True, eq=False)
+class RoomVolume:
+    """The volume of a room by the model, an IfcSpace: a mesh that nothing draws.
+
+    Attributes
+    ----------
+    name: "" if it has none.
+    points: (P, 3) float64, metres.
+    triangles: (T, 3) int32 indices into `points`. Not checked: the mesh may be open.
+    """
+
+    name: str
+    points: NDArray[np.float64]
+    triangles: NDArray[np.int32]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, RoomVolume) and all(
+            map(np.array_equal, vars(self).values(), vars(other).values())
+        )
+
+
 @dataclass(frozen=True)
 class Note:
     """A guess, conversion or omission of ingest: stable code, one line of text, place, count."""
@@ -161,6 +182,7 @@ class Scene:
         colour. Materials of triangles with colours other than white are white.
     kinds: for each object its role by class; empty for formats without classes.
     storeys: named by the model, from the lowest.
+    rooms: volumes of rooms in the order of the model file; empty for formats without them.
     space: the map from model to world coordinates.
     notes: in the order of the model file.
     files: other files that were read or are missing, relative to the model's folder, "/" between
@@ -182,6 +204,7 @@ class Scene:
     colors: NDArray[np.uint8] | None = None
     kinds: tuple[Kind, ...] = ()
     storeys: tuple[Storey, ...] = ()
+    rooms: tuple[RoomVolume, ...] = ()
     space: Space = Space((0.0, 0.0, 0.0), 1.0, "y")
     notes: tuple[Note, ...] = ()
     files: tuple[str, ...] = field(default=(), compare=False)
@@ -215,13 +238,14 @@ class Scene:
             "notes": [vars(n) for n in self.notes],
             **({"kinds": self.kinds} if self.kinds else {}),
             **({"storeys": [vars(s) for s in self.storeys]} if self.storeys else {}),
+            **({"rooms": [room.name for room in self.rooms]} if self.rooms else {}),
         }
         text = json.dumps(about, sort_keys=True, ensure_ascii=False)
         arrays = {name: getattr(self, name) for name in (*FACE_ARRAYS, "two_sided")}
         if self.colors is not None:
             arrays["colors"] = self.colors
         arrays["about"] = np.frombuffer(text.encode(), dtype=np.uint8)
-        return arrays | self.tolerance.to_arrays()
+        return arrays | room_arrays(self.rooms) | self.tolerance.to_arrays()
 
     @staticmethod
     def from_arrays(
@@ -256,9 +280,46 @@ class Scene:
             cameras=tuple(Camera(**fields_of(row)) for row in about["cameras"]),
             kinds=_kinds(about.get("kinds", []), len(objects)),
             storeys=tuple(Storey(**row) for row in about.get("storeys", [])),
+            rooms=rooms_of(stored, about.get("rooms", [])),
             space=Space(**fields_of(about["space"])),
             notes=tuple(Note(**row) for row in about["notes"]),
         )
+
+
+def room_arrays(rooms: Sequence[RoomVolume]) -> dict[str, NDArray[np.generic]]:
+    """The meshes of rooms as CSR arrays; no arrays without rooms."""
+    if not rooms:
+        return {}
+    sizes = [(len(room.points), len(room.triangles)) for room in rooms]
+    points, triangles = np.cumsum([(0, 0), *sizes], axis=0).T.astype(np.int64)
+    return {
+        "room_points": np.concatenate([room.points for room in rooms]),
+        "room_point_start": points,
+        "room_triangles": np.concatenate([room.triangles for room in rooms]).astype(np.int32),
+        "room_triangle_start": triangles,
+    }
+
+
+def rooms_of(stored: Stored, names: Sequence[str]) -> tuple[RoomVolume, ...]:
+    """Inverse of `room_arrays` for rooms of these names.
+
+    Raises KeyError or ValueError for arrays that are not those of as many rooms.
+    """
+    if not names:
+        return ()
+    count = len(names)
+    points = stored.array("room_points", np.float64, None, 3, finite=True)
+    triangles = stored.indices("room_triangles", np.int32, None, 3, high=len(points))
+    first = stored.starts("room_point_start", count, len(points))
+    begin = stored.starts("room_triangle_start", count, len(triangles))
+    rooms = []
+    for k, name in enumerate(names):
+        own = points[first[k] : first[k + 1]]
+        faces = triangles[begin[k] : begin[k + 1]]
+        if faces.max(initial=-1) >= len(own):
+            raise ValueError("a triangle of a room refers to a missing point")
+        rooms.append(RoomVolume(name, own, faces))
+    return tuple(rooms)
 
 
 def _material_row(material: Material) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import LimitError
 from ptmtools.files import open_regular
-from ptmtools.scene.model import Camera, Kind, Shine, Storey, Wrap
+from ptmtools.scene.model import Camera, Kind, RoomVolume, Shine, Storey, Wrap
 
 SourceWrap = Literal[Wrap, "mirror"]
 #: `Scene.triangles` is int32: more vertices cannot be numbered.
@@ -148,6 +148,7 @@ class Source:
     step: step of the coarsest grid of coordinates, in units of the file; 0 for float32.
     kinds: the kind of each object by its class (IFC); empty for formats without classes.
     storeys: named by the file; heights along its up axis, in its units.
+    rooms: volumes of rooms, finite, in the space of the file.
     """
 
     points: NDArray[np.float64]
@@ -164,6 +165,7 @@ class Source:
     step: float = 0.0
     kinds: tuple[Kind, ...] = ()
     storeys: tuple[Storey, ...] = ()
+    rooms: tuple[RoomVolume, ...] = ()
 
 
 @dataclass

@@ -277,8 +277,8 @@ def _summary(n: Mapping[str, Any]) -> str:
 SCENE: Stage[Scene] = Stage(
     name="scene",
     about="Read a model.",
-    recipe=7,
-    changed="OBJ has Y up by convention, and opaque materials ignore the alpha of textures",
+    recipe=8,
+    changed="the spaces of an IFC model bound and name rooms",
     options=IngestOptions,
     inputs=_inputs,
     artifact=Lazy("ptmtools.scene.model:Scene"),

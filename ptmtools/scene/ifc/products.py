@@ -21,6 +21,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,8 +30,10 @@ import numpy as np
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError
+from ptmtools.scene.ifc.entities import FAULTS, has_body, items, name_of, one_line, title_of
+from ptmtools.scene.ifc.spaces import named_rooms, rooms_of
 from ptmtools.scene.messages import pack_source
-from ptmtools.scene.model import Kind, Storey
+from ptmtools.scene.model import Kind, RoomVolume, Storey
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.sandbox import serve, unreadable
 from ptmtools.scene.source import Rows, Source, SourceMaterial, too_many_triangles
@@ -40,8 +43,6 @@ _THREADS = 1
 _TRIANGLE = 3
 #: Excluding subclasses, which have holes.
 _FACE, _BREP = "IfcIndexedPolygonalFace", "IfcFacetedBrep"
-#: Largest depth of mapped representations, which are circular in a damaged file.
-_DEEPEST = 16
 
 
 def elements(file: Any, products: list[Any]) -> Iterator[Any]:
@@ -61,15 +62,6 @@ def elements(file: Any, products: list[Any]) -> Iterator[Any]:
             yield from geom.iterator(
                 settings, file, _THREADS, include=chosen, geometry_library=kernel
             )
-
-
-def items(representation: Any, deep: int = _DEEPEST) -> Iterator[Any]:
-    """The items of a representation, with mapped ones replaced by their sources."""
-    for item in representation.Items or ():
-        if item.is_a("IfcMappedItem") and deep:
-            yield from items(item.MappingSource.MappedRepresentation, deep - 1)
-        else:
-            yield item
 
 
 def _of_triangles(product: Any) -> bool:
@@ -92,12 +84,6 @@ def _is_triangles(item: Any) -> bool:
     return False
 
 
-#: Representations that are not drawn.
-_NO_BODY = frozenset(
-    ["Annotation", "Axis", "Box", "Clearance", "CoG", "FootPrint", "Plan", "Profile", "Reference"]
-)
-#: Items without a surface.
-_LINES = ("IfcCurve", "IfcPoint", "IfcGeometricCurveSet", "IfcTextLiteral", "IfcAnnotationFillArea")
 #: The preferred representation of a product.
 _BODY = "Body"
 #: A line of the library's log: severity, code, time, GlobalId and message.
@@ -158,7 +144,25 @@ def read_products(file: Any, findings: Findings, max_triangles: int) -> Source:
         up="z",
         kinds=tuple(_kind(shape.product) for shape in shapes),
         storeys=storeys(file, metres or 1.0),
+        rooms=_rooms(file, findings),
     )
+
+
+def _rooms(file: Any, findings: Findings) -> tuple[RoomVolume, ...]:
+    """The volumes of the spaces that are rooms; a volume that cannot be computed costs a name."""
+    spaces = rooms_of(file, findings)
+    meshes: dict[int, tuple[Floats, Ints]] = {}
+    ranks: dict[int, tuple[bool, str]] = {}
+    with suppress(*FAULTS):
+        for element in elements(file, spaces) if spaces else ():
+            rank = _rank(element)
+            if element.id not in ranks or rank < ranks[element.id]:
+                shape = _shape(file, element)
+                ranks[element.id] = rank
+                meshes[element.id] = shape.points, shape.triangles
+    for _ in _errors():  # of spaces, which `named_rooms` notes
+        pass
+    return named_rooms(spaces, meshes, findings)
 
 
 def _kind(product: Any) -> Kind:
@@ -176,22 +180,13 @@ def _drawn_products(file: Any, findings: Findings) -> list[Any]:
             continue
         if not drawn(product.is_a):
             hidden[product.is_a()] += 1
-        elif not _has_body(product):
+        elif not has_body(product):
             findings.note("PTM-N215", f"{product.is_a()}: lines without a surface")
         else:
             result.append(product)
     for name, count in hidden.items():
         findings.note("PTM-N215", f"{name}: not drawn", "", count)
     return result
-
-
-def _has_body(product: Any) -> bool:
-    try:
-        every = product.Representation.Representations or ()
-        bodies = (one for one in every if one.RepresentationIdentifier not in _NO_BODY)
-        return any(not any(map(item.is_a, _LINES)) for one in bodies for item in items(one))
-    except FAULTS:
-        return True  # becomes a miss if the kernel fails
 
 
 def _shapes(file: Any, products: list[Any], most: int, model: Path) -> list[Shape]:
@@ -203,7 +198,7 @@ def _shapes(file: Any, products: list[Any], most: int, model: Path) -> list[Shap
         size = len(shape.triangles)
         if not size:
             continue
-        rank = element.context != _BODY, _padded(element.geometry.id)
+        rank = _rank(element)
         if element.id in best:
             other, replaced = best[element.id]
             if other <= rank:
@@ -214,6 +209,11 @@ def _shapes(file: Any, products: list[Any], most: int, model: Path) -> list[Shap
             raise too_many_triangles(most, model)
         best[element.id] = rank, shape
     return [shape for _, (_, shape) in sorted(best.items())]
+
+
+def _rank(element: Any) -> tuple[bool, str]:
+    """Of several shapes of a product the one of the least rank counts."""
+    return element.context != _BODY, _padded(element.geometry.id)
 
 
 def _padded(name: str) -> str:
@@ -303,25 +303,6 @@ def drawn(is_a: Callable[[str], bool]) -> bool:
 def kind_of(is_a: Callable[[str], bool]) -> Kind:
     """The role of products of a class."""
     return next((kind for kind, classes in _KINDS if any(map(is_a, classes.split()))), "")
-
-
-#: Exceptions for an attribute of the wrong type, which the kernel may not require.
-FAULTS = (AttributeError, LookupError, RuntimeError, TypeError, ValueError)
-
-
-def one_line(text: object) -> str:
-    """Text of a file for a message: on one line, in valid UTF-8."""
-    return " ".join(str(text).encode("utf-8", "replace").decode().split())
-
-
-def name_of(thing: Any) -> str:
-    """The name of an entity, "" without one."""
-    return one_line(getattr(thing, "Name", None) or "")
-
-
-def title_of(product: Any) -> str:
-    """A product's class and name, or its class and GlobalId without a name."""
-    return f"{product.is_a()} {name_of(product) or one_line(product.GlobalId)}"
 
 
 def length_unit(file: Any) -> tuple[str, float | None]:
