@@ -45,6 +45,7 @@ CELLS: tuple[dict[str, Any], ...] = (
     FEW | {"cells": "leaf"},
     FEW | {"gain": 0.0},
     FEW | {"standing": "anywhere"},
+    FEW | {"doors": "open"},
     FEW | {"doors": "closed"},
     FEW | {"doors": "hidden"},
     FEW | {"wall_area": 0.05},
