@@ -31,6 +31,8 @@ from ptmtools.cells.portals import (
     portals_rejoined,
     rejoined,
 )
+from ptmtools.cells.room_planes import Contact, contacts, split_at
+from ptmtools.cells.room_volumes import Volumes
 from ptmtools.cells.search import connected
 from ptmtools.cells.split_planes import Reveals
 from ptmtools.cells.structure import (
@@ -67,6 +69,8 @@ class Building:
     doors: Doors
     ceiling: float | None  # `ceiling_height`
     options: SubdivideOptions
+    volumes: Volumes = field(default_factory=Volumes)
+    contacts: tuple[Contact, ...] = ()  # of the volumes
 
     @staticmethod
     def of(scene: Scene, options: SubdivideOptions) -> Building:
@@ -84,7 +88,20 @@ class Building:
         if options.ceiling == "auto":
             walker = Walker(*options.walker)
             ceiling = ceiling_height(structure, walls, walker, options.wall_area)
-        return Building(structure, walls, reveals, floors, footing, doors, ceiling, options)
+        volumes = Volumes.of(scene, options)
+        touching = contacts(volumes.rooms, options, tolerance)
+        return Building(
+            structure,
+            walls,
+            reveals,
+            floors,
+            footing,
+            doors,
+            ceiling,
+            options,
+            volumes,
+            touching,
+        )
 
     @property
     def walker(self) -> Walker:
@@ -161,6 +178,10 @@ def _divided(building: Building, root: Polyhedron, progress: Progress, inside: b
         space = _complete(building, space, outer & (not inside))
     if inside or space.closed:
         space = _rejoined(space, structure.tolerance)
+        tree, portals, reached = split_at(
+            building.contacts, space.tree, space.portals, space.reached, structure, options
+        )
+        space = replace(space, tree=tree, portals=portals, reached=reached)
     return space
 
 

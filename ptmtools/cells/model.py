@@ -121,6 +121,9 @@ class Cells:
     closed: whether the flood never met the root box.
     notes: notes of the subdivision, one line each ("open above: …").
     opened: (n,) int32 the scene's triangles, ascending, of door leaves that visitors pass.
+    rooms: names of the model for rooms, in the order of their first cells; several may be equal.
+    cell_room: (C,) int32 the room that each cell belongs to, -1 for one without a name; empty if
+        no room has one.
     """
 
     node_plane: NDArray[np.float64]
@@ -154,6 +157,8 @@ class Cells:
     visible: int = 0
     owners: int = 0
     opened: NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
+    rooms: tuple[str, ...] = ()
+    cell_room: NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
 
     @property
     def leaf_count(self) -> int:
@@ -162,6 +167,11 @@ class Cells:
     @property
     def cell_count(self) -> int:
         return int(self.leaf_cell.max()) + 1 if len(self.leaf_cell) else 0
+
+    def room_name(self, cell: int) -> str:
+        """The name of the room that a cell belongs to, "" for none."""
+        room = int(self.cell_room[cell]) if self.rooms else -1
+        return self.rooms[room] if room >= 0 else ""
 
     @property
     def standing(self) -> NDArray[np.bool_]:
@@ -274,6 +284,9 @@ class Cells:
         arrays = {f.name: getattr(self, f.name) for f in fields(self)}
         names = ("walker", "ceiling", "closed", "notes", "visible", "owners")
         about = {name: arrays.pop(name) for name in names}
+        rooms, of = arrays.pop("rooms"), arrays.pop("cell_room")
+        if rooms:
+            about["rooms"], arrays["cell_room"] = rooms, of
         text = json.dumps(about, sort_keys=True, ensure_ascii=False)
         arrays |= arrays.pop("tolerance").to_arrays()
         return {**arrays, "about": np.frombuffer(text.encode(), dtype=np.uint8)}
@@ -316,6 +329,10 @@ class Cells:
         ):
             if (np.diff(start) < least).any():
                 raise ValueError(f"a {name} is flat")
+        rooms = texts(about.get("rooms", []), "rooms")
+        cell_room = np.zeros(0, dtype=np.int32)
+        if rooms:
+            cell_room = stored.indices("cell_room", np.int32, cells, low=-1, high=len(rooms))
         passage = stored.array("portal_passage", np.bool_, portals)
         if (passage[:-1] > passage[1:]).any():
             raise ValueError("portal_passage does not ascend")
@@ -350,6 +367,8 @@ class Cells:
             notes=texts(about["notes"], "notes"),
             visible=int(about["visible"]),
             owners=int(about["owners"]),
+            rooms=rooms,
+            cell_room=cell_room,
             opened=stored.indices("opened", np.int32, None, high=1 << 31),
         )
 

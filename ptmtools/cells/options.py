@@ -13,6 +13,7 @@ CellKind = Literal["leaf", "room"]
 Reach = Literal["all", "main"]
 Standing = Literal["places", "anywhere"]
 CeilingKind = Literal["auto", "none"]
+SpacesKind = Literal["auto", "none"]
 DoorState = Literal["pass", "open", "closed", "hidden"]
 Position = tuple[float, float, float]
 
@@ -137,6 +138,10 @@ class SubdivideOptions:
         "End of rooms without a ceiling: the top of their walls, so that they see one another "
         "through doorways only (auto), or that of the whole model (none).",
     )
+    spaces: SpacesKind = option(
+        "auto",
+        "Spaces of an IFC model: they bound and name rooms (auto), or count for nothing (none).",
+    )
     viewpoints: tuple[Position, ...] = option(
         (),
         "Viewpoint inside the building: position in metres, Y up, and yaw in degrees, "
@@ -174,6 +179,7 @@ class SubdivideOptions:
                 "try 0.25,0.5,1.7",
             ),
             (self.ceiling in get_args(CeilingKind), f"no ceiling {self.ceiling!r}", "auto or none"),
+            (self.spaces in get_args(SpacesKind), f"no spaces {self.spaces!r}", "auto or none"),
             (self.cells in get_args(CellKind), f"unknown cells {self.cells!r}", "leaf or room"),
             (self.max_leaves >= 1, f"at most {self.max_leaves} leaves is too few", "try 500"),
         ):

@@ -8,6 +8,12 @@ opening between two regions is the largest group of touching portals, by true ar
 standing leaves join the rooms around them leaf by leaf, through the largest opening first; the
 inside of a door leaf, behind passages, comes last. Openings in the ceiling join no regions.
 
+**Named rooms.** Where the model has volumes of rooms (`room_volumes`), leaves in one volume grow
+together first, and an opening joins them if it is at least `OPEN_WITHIN` of the cross-section: the
+model says that a bay belongs to its room, but a door within a flat still divides. Regions in two
+volumes never join. Leaves in no volume, such as doorways, join as above. A volume of which no
+region has more than half consists of several rooms, and does not count.
+
 **Cells.** A room is one cell, unless dividing it saves its viewers more than
 `SubdivideOptions.gain` of their download. With v the volume of a leaf (the frequency of viewers in
 it), w the area of the surfaces in it (their cost) and S the leaves that it sees (`sight`), a group
@@ -33,13 +39,17 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, areas
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.cells.file_order import leaf_of_cell, rank_in_file, sides
 from ptmtools.cells.model import Cells
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry
+from ptmtools.cells.room_names import named, unused_notes
+from ptmtools.cells.room_volumes import Volumes
 from ptmtools.cells.search import connected
 from ptmtools.cells.sight import from_places, sampled_sight
 from ptmtools.diagnostics import Warned
+from ptmtools.tolerance import TIE_SHARE
 
 
 class Groups(ABC):
@@ -107,6 +117,11 @@ class Groups(ABC):
 
 #: An opening joins two regions if it is at least this share of the narrower one's cross-section.
 OPEN = 0.7
+#: The same within one volume: a bay is part of its room, but a doorway of 1.9 m² divides unless it
+#: leads into less than 5 m² of cross-section.
+OPEN_WITHIN = 0.4
+#: A volume is one room if a region has more than this share of its standing leaves.
+ONE_ROOM = 0.5
 #: Shares, and gains, are compared in this many significant digits: symmetrical buildings have many
 #: equal ones, which rounding must not order, not even that of a sliver far from the origin.
 DIGITS = 4
@@ -114,18 +129,35 @@ DIGITS = 4
 AT_ONCE = 2048
 
 
-def room_of_leaf(cells: Cells, rank: Ints) -> Ints:
+def room_of_leaf(cells: Cells, rank: Ints, volume: Ints) -> Ints:
     """(L,) the room of each leaf, named by the rank of one of its leaves.
 
     Of equally open pairs the one whose leaves come first by (L,) ``rank`` is joined first: a
-    doorway between two equal rooms.
+    doorway between two equal rooms. ``volume``: (L,) the volume that each leaf is in, -1 for none.
     """
-    regions = _Regions(cells, rank)
+    regions = _Regions(cells, rank, volume)
     openings = regions.openings()
+    regions.grown_within()
     room = regions.grown(lambda closed: -closed >= OPEN)
     standing = np.zeros(cells.leaf_count, dtype=np.bool_)
     standing[room[rank[cells.leaf_standing]]] = True
     return _with_space_above(cells, _adopted(room, standing[room], openings)[rank])
+
+
+def of_one_room(cells: Cells, volume: Ints) -> Ints:
+    """(L,) the volume that each leaf is in, -1 for none and for volumes of several rooms."""
+    if volume.max(initial=-1) < 0:
+        return volume
+    rank = rank_in_file(cells)
+    region = _Regions(cells, rank, volume).grown_within()[rank]
+    size = cells.leaf_volumes() * cells.leaf_standing
+    several = []
+    for name in range(int(volume.max()) + 1):
+        own = volume == name
+        parts = np.bincount(region[own], size[own]) if own.any() else np.zeros(1)
+        if parts.sum() and parts.max() <= (1 + TIE_SHARE) * ONE_ROOM * parts.sum():
+            several.append(name)
+    return np.where(np.isin(volume, several), -1, volume)
 
 
 def _with_space_above(cells: Cells, room: Ints) -> Ints:
@@ -170,7 +202,10 @@ def _adopted(room: Ints, held: Bools, openings: dict[tuple[int, int, bool], floa
 class _Regions(Groups):
     """Groups of leaves, by rank, that cost little where the opening between them is large."""
 
-    def __init__(self, cells: Cells, rank: Ints) -> None:
+    _only_within = False  # whether only regions in one volume are joined
+
+    def __init__(self, cells: Cells, rank: Ints, volume: Ints) -> None:
+        """``volume``: (L,) the volume that each leaf is in, -1 for none."""
         kept = (cells.leaf_cell[cells.portal_leaf] >= 0).all(axis=1, keepdims=True)
         passage, ends = cells.portal_passage, np.where(kept, rank[cells.portal_leaf], 0)
         joins = ~(passage | cells.in_ceiling)
@@ -186,6 +221,21 @@ class _Regions(Groups):
         self._area = cells.portal_area.tolist()
         self._touching = _touching(cells, cells.tolerance.plane)
         self._opening: dict[tuple[int, int], float] = {}
+        self._within = volume[order].tolist()
+
+    def grown_within(self) -> Ints:
+        """(L,) the groups, once those in one volume are joined."""
+        if max(self._within, default=-1) < 0:
+            return self._parent
+        self._only_within = True
+        result = self.grown(lambda closed: -closed >= OPEN_WITHIN)
+        self._only_within = False
+        return result
+
+    def _apart(self, a: int, b: int) -> bool:
+        """Whether the volumes that two regions are in keep them apart."""
+        one, two = self._within[a], self._within[b]
+        return bool(one != two and (self._only_within or min(one, two) >= 0))
 
     def openings(self) -> dict[tuple[int, int, bool], float]:
         """m² between two regions, the lower one first, by portals of sight and by passages."""
@@ -197,6 +247,8 @@ class _Regions(Groups):
 
     def cost(self, a: int, b: int) -> float:
         """Less the opening between them, as a share of the narrower one's cross-section."""
+        if self._apart(a, b):
+            return np.inf
         if (a, b) not in self._opening:
             self._opening[a, b] = self._largest_opening(self.near[a][b])
         share = self._opening[a, b] / min(self._section[a], self._section[b])
@@ -207,6 +259,7 @@ class _Regions(Groups):
         if len(self.near[a]) < len(self.near[b]):
             a, b = b, a
         self._volume[a] += self._volume[b]
+        self._within[a] = max(self._within[a], self._within[b])
         both = shapely.geometrycollections([self._plan[a], self._plan[b]])
         self._plan[a] = shapely.convex_hull(both)
         self._section[a] = max(
@@ -380,32 +433,34 @@ class _Attached(_Costs):
         return super().join(a, b)
 
 
-#: Shares of a triangle that differ by less are equal, in digits.
-GAIN_DIGITS = 6
 #: The warning on a model of one cell.
 ONE_HALL = Warned("visibility culling saves nothing here: the model is a single hall")
 
 
-def grouped(cells: Cells, options: SubdivideOptions) -> Cells:
-    """Groups cells that are single leaves by the options.
+def grouped(cells: Cells, options: SubdivideOptions, volumes: Volumes | None = None) -> Cells:
+    """Groups cells that are single leaves by the options, and names those in ``volumes``.
 
     Cells are numbered in the order of their first leaves; geometry in a boundary between two
     leaves of one cell lies inside that cell.
     """
-    leaf = leaf_of_cell(cells)
-    group = _groups(cells, options.gain)[leaf] if options.cells == "room" else leaf
-    name = np.append(numbered(group), np.int32(-1))
+    leaf, volumes = leaf_of_cell(cells), volumes or Volumes()
+    volume = volumes.of_leaves(cells)
+    kept = of_one_room(cells, volume)
+    cells = replace(cells, notes=(*cells.notes, *unused_notes(volumes, volume, kept)))
+    room, group = kept, np.arange(cells.leaf_count)
+    if options.cells == "room":
+        rank = rank_in_file(cells)
+        room = room_of_leaf(cells, rank, kept)
+        group = _groups(cells, rank, room, options.gain)
+    name = np.append(numbered(group[leaf]), np.int32(-1))
     leaf_cell = np.full(cells.leaf_count, -1, dtype=np.int32)
     leaf_cell[leaf] = name[:-1]
     cells = replace(cells, leaf_cell=leaf_cell, triangle_cell=name[cells.triangle_cell])
+    if volumes.rooms:
+        cells = named(cells, volumes, kept, room)
     if cells.cell_count == 1:
         cells = replace(cells, notes=(*cells.notes, ONE_HALL))
     return cells
-
-
-def leaf_of_cell(cells: Cells) -> Ints:
-    """(C,) the leaves that are cells, of cells that are single leaves."""
-    return np.flatnonzero(cells.leaf_cell >= 0)
 
 
 def numbered(group: NDArray[np.integer]) -> NDArray[np.int32]:
@@ -416,52 +471,8 @@ def numbered(group: NDArray[np.integer]) -> NDArray[np.int32]:
     return np.asarray(place[row.reshape(-1)])
 
 
-def rank_in_file(cells: Cells) -> Ints:
-    """(L,) the place of each leaf in an order that no transformation of the model changes: leaves
-    are compared by the share that they hold of the model's first triangle of which one of them
-    holds more, and go by number where they hold the same of all.
-
-    Leaves themselves are numbered as planes split them, and which side of a plane is its front
-    depends on how the model is turned.
-    """
-    leaf, piece, area = _sides(cells)
-    source = cells.triangle_source
-    count = int(source.max(initial=-1)) + 1
-    pair, row = np.unique(leaf * count + source[piece], return_inverse=True)
-    held = np.bincount(row, area[piece])
-    whole = np.bincount(source, area)[pair % max(count, 1)]
-    share = np.round(np.divide(held, whole, out=np.zeros(len(held)), where=whole > 0), GAIN_DIGITS)
-    holds = share > 0
-    return _in_order(pair[holds] // count, pair[holds] % count, share[holds], cells.leaf_count)
-
-
-def _in_order(leaf: Ints, source: Ints, share: Floats, leaves: int) -> Ints:
-    """(leaves,) the places of leaves in order, given the share that each, ascending, holds of each
-    source, ascending: the more of an earlier one, the earlier. A leaf that holds nothing more
-    comes last, not first."""
-    start = np.searchsorted(leaf, np.arange(leaves + 1))
-    source, share = np.append(source, np.iinfo(np.int64).max), np.append(share, 0.0)
-    before = np.zeros(leaves, dtype=np.int64)  # how many leaves come before each
-    tied, k = np.arange(leaves), 0
-    while len(tied):
-        at = np.where(start[tied] + k < start[tied + 1], start[tied] + k, len(leaf))
-        order = np.lexsort((-share[at], source[at], before[tied]))
-        tied, at = tied[order], at[order]
-        group = np.diff(before[tied], prepend=-1) > 0
-        run = group | (np.diff(source[at], prepend=-1) != 0) | (np.diff(share[at], prepend=-1) != 0)
-        row = np.arange(len(tied))
-        first_of_run = np.maximum.accumulate(np.where(run, row, 0))
-        before[tied] += first_of_run - np.maximum.accumulate(np.where(group, row, 0))
-        alone = run & np.append(run[1:], True)
-        tied, k = tied[~alone & (at < len(leaf))], k + 1
-    rank = np.empty(leaves, dtype=np.int64)
-    rank[np.lexsort((np.arange(leaves), before))] = np.arange(leaves)
-    return rank
-
-
-def _groups(cells: Cells, gain: float) -> NDArray[np.integer]:
-    rank = rank_in_file(cells)
-    room = room_of_leaf(cells, rank)
+def _groups(cells: Cells, rank: Ints, room: Ints, gain: float) -> Ints:
+    """(L,) the groups into which the (L,) rooms are divided."""
     if gain >= 1 or len(np.unique(room)) == len(room):
         return room
     same = room[cells.portal_leaf[:, 0]] == room[cells.portal_leaf[:, 1]]
@@ -469,17 +480,7 @@ def _groups(cells: Cells, gain: float) -> NDArray[np.integer]:
     inner, above = (rank[cells.portal_leaf[which & kept]] for which in (same, cells.in_ceiling))
     order = np.argsort(rank)
     sees = from_places(sampled_sight(cells), cells.leaf_standing)[np.ix_(order, order)]
-    leaf, piece, area = _sides(cells)
+    leaf, piece, area = sides(cells)
     surface = np.bincount(leaf, area[piece], cells.leaf_count).astype(np.float64)
     viewers = cells.leaf_volumes() * cells.leaf_standing
     return join_by_gain(sees, viewers[order], surface[order], inner, gain, above)[rank]
-
-
-def _sides(cells: Cells) -> tuple[Ints, Ints, Floats]:
-    """(n,) leaves and (n,) their pieces of geometry, of cells that are single leaves; pieces in a
-    boundary count on both sides. And (M,) the areas of the pieces, m²."""
-    front, back = np.append(leaf_of_cell(cells), -1)[cells.triangle_cell].T
-    behind = (back >= 0) & (back != front)
-    leaf = np.concatenate([front[front >= 0], back[behind]])
-    piece = np.concatenate([np.flatnonzero(front >= 0), np.flatnonzero(behind)])
-    return leaf, piece, areas(cells.vertex[cells.triangle])

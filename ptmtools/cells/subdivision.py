@@ -93,7 +93,7 @@ def _subdivided(
     wide = Polyhedron.box(low - margin, high + margin)
     wide = replace(wide, points=wide.points @ axes)
     tight = _thickened(*bounds(corners if len(corners) else scene.corners), tolerance)
-    notes = detail_notes(scene, building.structure.detail)
+    notes = [*detail_notes(scene, building.structure.detail), *building.volumes.notes]
     clipped = executor.submit(divide_inside, building, tight, long=len(scene.triangles) >= LARGE)
     try:
         space = divide(building, wide, progress)
@@ -124,7 +124,7 @@ def _subdivided(
     name = np.append(compact_numbers(seen_from_places(cells, executor)), np.int32(-1))
     cells = replace(cells, leaf_cell=name[:-1], triangle_cell=name[cells.triangle_cell])
     dropped = [*leaf_notes(cells, space.reached), *triangle_notes(scene, pieces, name[owner])]
-    cells = grouped(replace(cells, notes=(*cells.notes, *dropped)), options)
+    cells = grouped(replace(cells, notes=(*cells.notes, *dropped)), options, building.volumes)
     owner = np.append(cells.leaf_cell, np.int32(-1))[owner]
     if options.doors == "hidden":
         owner[np.isin(pieces.source, opened)] = -1

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ptmtools.cells import Cells, SubdivideOptions, rooms as grouping, subdivide
+from ptmtools.cells import Cells, SubdivideOptions, file_order, subdivide
 from ptmtools.cells.rooms import join_by_gain
 from ptmtools.cells.sight import _even, _lines, sampled_sight
 from ptmtools.errors import InputError
@@ -242,5 +242,5 @@ def test_leaves_are_put_in_order_as_their_lists_of_shares_are() -> None:
             [(s, -held[i, s]) for s in np.flatnonzero(held[i])] + [(99, 0.0)] for i in range(leaves)
         ]
         order = sorted(range(leaves), key=lists.__getitem__)
-        rank = grouping._in_order(leaf, source, held[leaf, source], leaves)
+        rank = file_order._in_order(leaf, source, held[leaf, source], leaves)
         assert np.argsort(rank).tolist() == order

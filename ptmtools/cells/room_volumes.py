@@ -1,0 +1,226 @@
+"""The rooms that a model names (IfcSpace): which volumes are usable, and which leaves are in them.
+
+A volume may be anything: open, a duplicate, that of a storey, far too large. One is left out, with
+a note, unless it
+
+- is closed: winding numbers are whole at nearly all points of its box;
+- has space for a visitor, and is no larger than the building;
+- is no duplicate of an earlier one;
+- does not consist of other volumes: it is a storey, a flat or an area if at least two others, which
+  together have half of its size, lie in it.
+
+A leaf is in a volume if at least half of it is: of the part where eyes can be, if there is any,
+because volumes often end at a suspended ceiling. Of several volumes the one counts that has the
+largest share, of equal ones the smallest: volumes overlap where programs export areas of several
+kinds. Points spread over volumes and leaves decide (intersecting leaves with meshes exactly would
+take seconds for a thousand leaves); after the splits of `room_planes` most shares are 0 or 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ptmtools.arrays import Bools, Floats, Ints, cross, volumes
+from ptmtools.cells.model import Cells
+from ptmtools.cells.options import SubdivideOptions
+from ptmtools.quantities import count
+from ptmtools.scene.model import RoomVolume, Scene
+
+#: Points in the box of a volume, and in a leaf.
+_IN_BOX, _IN_LEAF = 216, 32
+#: A winding number is whole if it differs from an integer by less; it is at all but this share of
+#: the points around a closed mesh.
+_WHOLE, _NOT_WHOLE = 0.05, 0.05
+#: Of two volumes, one is in the other if this share of it is; and they are the same if each is.
+_WITHIN = 0.9
+#: A volume consists of others if at least so many, with this share of its size, are in it.
+_SEVERAL, _COVERED = 2, 0.5
+#: A leaf is in a volume if this share of it is.
+_MOST = 0.5
+#: Shares are compared in this many digits.
+_DIGITS = 6
+#: Pairs of points and triangles that are handled at a time.
+_AT_ONCE = 1 << 19
+#: Names in a note.
+_NAMED = 3
+#: Steps of an even sequence in three dimensions (Roberts's R3).
+_STEPS = 1 / 1.2207440846057596 ** np.arange(1, 4)
+
+
+@dataclass(frozen=True)
+class Volume:
+    """A closed volume: name, (T, 3, 3) corners of its mesh in metres, faces outwards, and m³."""
+
+    name: str
+    corners: Floats
+    size: float
+
+    @staticmethod
+    def of(room: RoomVolume) -> Volume:
+        """A volume of any mesh, with its faces outwards if it is closed."""
+        corners = room.points[room.triangles]
+        middle = corners.reshape(-1, 3).sum(axis=0) / max(3 * len(corners), 1)
+        a, b, c = (corners - middle).transpose(1, 0, 2)
+        size = float(np.einsum("ij,ij->", a, cross(b, c))) / 6
+        return Volume(room.name, corners if size >= 0 else corners[:, ::-1], abs(size))
+
+    @cached_property
+    def box(self) -> Floats:
+        """(2, 3) least and greatest corner."""
+        return np.stack([self.corners.min(axis=(0, 1)), self.corners.max(axis=(0, 1))])
+
+    @cached_property
+    def samples(self) -> tuple[Floats, Floats]:
+        """(n, 3) points of its box, and (n,) how often it winds around each."""
+        low, high = self.box
+        points = low + _even(_IN_BOX) * (high - low)
+        return points, windings(points, self.corners)
+
+    @property
+    def closed(self) -> bool:
+        """Whether the mesh is closed, but for small gaps."""
+        winding = self.samples[1]
+        return bool((np.abs(winding - np.rint(winding)) >= _WHOLE).mean() <= _NOT_WHOLE)
+
+    def contains(self, points: Floats) -> Bools:
+        """(n,) whether each of (n, 3) points is in the volume."""
+        low, high = self.box
+        result: Bools = ((points >= low) & (points <= high)).all(axis=1)
+        result[result] = windings(points[result], self.corners) > 1 / 2
+        return result
+
+    def share_in(self, other: Volume) -> float:
+        """The share of it that is in another volume."""
+        points, winding = self.samples
+        own = points[winding > 1 / 2]
+        return float(other.contains(own).mean()) if len(own) else 0.0
+
+
+def windings(points: Floats, corners: Floats) -> Floats:
+    """(n,) how often (T, 3, 3) triangles wind around (n, 3) points: 1 within a closed mesh with its
+    faces outwards, 0 outside; the solid angle of each triangle by Van Oosterom & Strackee (1983).
+    """
+    result = np.zeros(len(points))
+    step = max(1, _AT_ONCE // max(len(corners), 1))
+    for first in range(0, len(points), step):
+        a, b, c = (corners - points[first : first + step, None, None]).transpose(2, 0, 1, 3)
+        la, lb, lc = (np.linalg.norm(side, axis=-1) for side in (a, b, c))
+        up = np.einsum("...i,...i", a, cross(b, c))
+        ab, bc, ca = (np.einsum("...i,...i", p, q) for p, q in ((a, b), (b, c), (c, a)))
+        angle = np.arctan2(up, la * lb * lc + ab * lc + bc * la + ca * lb)
+        result[first : first + step] = angle.sum(axis=1) / (2 * np.pi)
+    return result
+
+
+def _even(count: int) -> Floats:
+    """(count, 3) points spread evenly over the unit cube."""
+    return np.asarray((np.arange(1, count + 1)[:, None] * _STEPS) % 1.0)
+
+
+@dataclass(frozen=True)
+class Volumes:
+    """The usable volumes of a model, in the order of the file, and notes on the others."""
+
+    rooms: tuple[Volume, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @staticmethod
+    def of(scene: Scene, options: SubdivideOptions) -> Volumes:
+        """The usable volumes of a scene; none with `--spaces none`."""
+        if options.spaces == "none" or not scene.rooms:
+            return Volumes()
+        radius, _, height = options.walker
+        least, most = (2 * radius) ** 2 * height, float(np.ptp(scene.points, axis=0).prod())
+        left: dict[str, list[str]] = {}
+        rooms: list[Volume] = []
+        for room in map(Volume.of, scene.rooms):
+            if not room.size >= least:
+                left.setdefault("too small for a visitor", []).append(room.name)
+            elif room.size > most:
+                left.setdefault("larger than the building", []).append(room.name)
+            elif not room.closed:
+                left.setdefault("not closed", []).append(room.name)
+            else:
+                rooms.append(room)
+        kept = []
+        for room, fault in zip(rooms, _repeated(rooms), strict=True):
+            if fault:
+                left.setdefault(fault, []).append(room.name)
+            else:
+                kept.append(room)
+        notes = tuple(left_out(names, fault) for fault, names in left.items())
+        return Volumes(tuple(kept), notes)
+
+    def of_leaves(self, cells: Cells) -> Ints:
+        """(L,) the volume that each leaf is in, -1 for none."""
+        if not self.rooms:
+            return np.full(cells.leaf_count, -1, dtype=np.int64)
+        points = _points_in_leaves(cells)
+        flat = points.reshape(-1, 3)
+        weight = cells.eyes.contains(flat).reshape(points.shape[:2])
+        weight &= cells.leaf_standing[:, None]
+        weight |= ~weight.any(axis=1, keepdims=True)
+        total = weight.sum(axis=1)
+        low, high = points.min(axis=1), points.max(axis=1)
+        best, result = np.zeros(cells.leaf_count), np.full(cells.leaf_count, -1, dtype=np.int64)
+        for k in np.argsort([room.size for room in self.rooms], kind="stable").tolist():
+            room = self.rooms[k]
+            near = np.flatnonzero(((low <= room.box[1]) & (high >= room.box[0])).all(axis=1))
+            inside = room.contains(points[near].reshape(-1, 3)).reshape(-1, _IN_LEAF)
+            share = np.round((inside & weight[near]).sum(axis=1) / total[near], _DIGITS)
+            more = (share >= _MOST) & (share > best[near])
+            best[near[more]], result[near[more]] = share[more], k
+        return result
+
+
+def _repeated(rooms: Sequence[Volume]) -> list[str]:
+    """For each closed volume why it is left out beside the others, or ""."""
+    faults = [""] * len(rooms)
+    boxes = np.array([room.box for room in rooms]).reshape(-1, 2, 3)
+    inner: list[list[int]] = [[] for _ in rooms]
+    for i, room in enumerate(rooms):
+        meets = ((boxes[:, 0] <= room.box[1]) & (boxes[:, 1] >= room.box[0])).all(axis=1)
+        for j in np.flatnonzero(meets).tolist():
+            other = rooms[j]
+            if i == j or faults[i] or faults[j] or room.size < _WITHIN * other.size:
+                continue
+            if other.share_in(room) < _WITHIN:
+                continue
+            if _WITHIN * room.size > other.size or room.share_in(other) < _WITHIN:
+                inner[i].append(j)
+            else:
+                faults[max(i, j)] = "a duplicate of another"
+    for i, others in enumerate(inner):
+        own = [j for j in others if faults[j] != "a duplicate of another"]
+        covered = sum(rooms[j].size for j in own)
+        if not faults[i] and len(own) >= _SEVERAL and covered >= _COVERED * rooms[i].size:
+            faults[i] = "around several others"
+    return faults
+
+
+def left_out(names: Sequence[str], reason: str) -> str:
+    """The note on spaces that were left out."""
+    called = ", ".join(name for name in names[:_NAMED] if name)
+    more = ", …" if len(names) > _NAMED else ""
+    return f"{count(len(names), 'space')} of the model left out, {reason}" + (
+        f": {called}{more}" if called else ""
+    )
+
+
+def _points_in_leaves(cells: Cells) -> Floats:
+    """(L, n, 3) points spread over the volume of each leaf."""
+    corners, leaf = cells.tetrahedra()
+    filled = np.cumsum(volumes(corners))
+    start = np.searchsorted(leaf, np.arange(cells.leaf_count + 1))
+    before = np.append(0.0, filled)[start]
+    share = (np.arange(_IN_LEAF) + 1 / 2) / _IN_LEAF
+    at = before[:-1, None] + share * np.diff(before)[:, None]
+    chosen = np.searchsorted(filled, at)
+    chosen = np.clip(chosen, start[:-1, None], start[1:, None] - 1)
+    # Uniform over a tetrahedron: the gaps between sorted numbers.
+    parts = np.diff(np.sort(_even(_IN_LEAF), axis=1), axis=1, prepend=0.0, append=1.0)
+    return np.asarray(np.einsum("nk,lnki->lni", parts, corners[chosen]))
