@@ -27,8 +27,10 @@ from ptmtools.cli.parameters import (
 from ptmtools.quantities import count, size
 from ptmtools.site.content import SiteOptions, site_of
 from ptmtools.site.lookup import files_of
-from ptmtools.site.publishing import COARSE, PublishOptions, publish as write, weight_of
+from ptmtools.site.published import PublishOptions
+from ptmtools.site.publishing import COARSE, publish as write, weight_of
 from ptmtools.site.serving import ServeOptions, require, serving
+from ptmtools.store.objects import is_url
 
 _ORIGIN = re.compile(r"\*|https?://[^\s/?#@]+")
 
@@ -104,31 +106,47 @@ def _open_in_browser(url: str) -> bool:
         return False
 
 
+def _only_target(url: str | None, output: str | None) -> str:
+    """The one target that the user gave."""
+    if url is not None and output is not None:
+        raise click.UsageError("specify either a URL or -o, not both")
+    if not (target := url if output is None else output):
+        raise click.UsageError("specify a URL such as s3://bucket/prefix, or a folder with -o")
+    if url is not None and not is_url(url):
+        raise click.UsageError(f"{url!r} is no URL; specify a folder with -o")
+    return target
+
+
 @click.command("publish", cls=Command)
 @database_argument
-@output_option("Folder of the site to write.", "folder", required=True)
+@click.argument("target", required=False, metavar="[URL]")
+@output_option("Folder of the site to write; or the URL.", "output")
 @options_of(SiteOptions, PublishOptions)
 @force_option(
-    "Write into a folder that is not a site, and replace files with the same names in it."
+    "Write into a folder or URL that is not a site, and replace files with the same names in it."
 )
 @json_option
 @with_console
-def publish(console: Console, db: str, folder: str, force: bool, **values: Any) -> None:
-    """Write DB as a web site: a folder that any web server can serve.
+def publish(
+    console: Console, db: str, target: str | None, output: str | None, force: bool, **values: Any
+) -> None:
+    """Write DB as a web site: a folder that any web server can serve, or the objects below a URL
+    such as s3://bucket/prefix or gs://bucket/prefix.
 
     A second run rewrites only the files that have changed.
     """
+    target = _only_target(target, output)
     site_options, options = take(SiteOptions, values), take(PublishOptions, values)
     with console.progress() as progress:
         site = site_of(db, site_options, progress)
-        done = write(site, folder, options, force=force, progress=progress)
+        done = write(site, target, options, force=force, progress=progress)
     weight = weight_of(site)
     changed = {name: list(names) for name, names in asdict(done).items()}
     for note in site.notes if not console.as_json else ():
         console.warn(note)
     removed = f", {count(len(done.removed), 'file')} removed" if done.removed else ""
     lines = (
-        f"{folder}: {count(len(done.written), 'file')} written, "
+        f"{target}: {count(len(done.written), 'file')} written, "
         f"{len(done.unchanged):,} unchanged{removed}",
         f"download: page {size(weight.page)}; with the first room {size(weight.first_room)} "
         f"(textures up to {COARSE} texels per side)",

@@ -1,4 +1,4 @@
-"""Writes a site to a folder, for any static host, and counts what its visitors download.
+"""Writes a site to a folder or a URL, for any static host, and counts what its visitors download.
 
 A visitor during publication gets the old site or the new one: the files of the new page are written
 first, then the page; files of the old page alone are removed last. A list in the folder names our
@@ -12,12 +12,11 @@ import hashlib
 import json
 import os
 import shutil
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any, ClassVar
-from urllib.parse import unquote
+from typing import IO, Any
 
 from ptmtools.errors import OutputError
 from ptmtools.files import (
@@ -30,77 +29,67 @@ from ptmtools.files import (
     write_with,
     writing,
 )
-from ptmtools.options import option
-from ptmtools.output.emission import compressed
 from ptmtools.progress import Progress, silent
 from ptmtools.site.content import DATA, Site
 from ptmtools.site.entry import Entry, link_bytes
 from ptmtools.site.program import INDEX, LATER
-from ptmtools.store.folder import damaged, unreadable
+from ptmtools.site.published import (
+    LIST,
+    Published,
+    PublishOptions,
+    digest_of,
+    file_digest,
+    in_order,
+    plain_files,
+    reading,
+)
+from ptmtools.site.uploading import upload
+from ptmtools.store.folder import damaged
 from ptmtools.store.layout import sha256
+from ptmtools.store.objects import is_url, local_path
 
 #: Texels of the longer side up to which the textures of a room count in `Weight`.
 COARSE = 64
-#: The list of our files, and its format.
-LIST, FORMAT, SCHEMA = ".ptm-site.json", "ptmtools site files", 1
-HEADERS = "_headers"
-
-
-@dataclass(frozen=True)
-class PublishOptions:
-    """Options of `publish`."""
-
-    heading: ClassVar[str] = "Site"
-
-    gzip: bool = option(
-        False,
-        "Also write gzip copies, for servers that send precompressed files (nginx: gzip_static).",
-    )
-    keep: bool = option(
-        False, "Keep the files of earlier versions of the site, for visitors who are using them."
-    )
-
-
-@dataclass(frozen=True)
-class Published:
-    """Names of the files of a folder that were written, left unchanged, and removed."""
-
-    written: tuple[str, ...]
-    unchanged: tuple[str, ...]
-    removed: tuple[str, ...]
+#: Format of the list of our files.
+FORMAT, SCHEMA = "ptmtools site files", 1
 
 
 def publish(
     site: Site,
-    folder: str | os.PathLike[str],
+    target: str | os.PathLike[str],
     options: PublishOptions | None = None,
     *,
     force: bool = False,
     progress: Progress = silent,
 ) -> Published:
-    """Writes a site to a folder, or brings that up to date.
+    """Writes a site to a folder or a URL such as ``s3://bucket/prefix``, or brings it up to date.
 
-    ``force`` allows a folder that is not a site, and replaces files of the same names in it.
+    ``force`` allows a target that is not a site, and replaces files of the same names in it.
 
     Raises
     ------
-    OutputError: PTM-O001 a file is in the way; PTM-O010 the folder is not empty and no site;
-        PTM-O002, O003, O005 it cannot be written.
+    OutputError: PTM-O001 a file is in the way; PTM-O010 the target is not empty and no site;
+        PTM-O002, O003, O005 the folder cannot be written; PTM-O012 the URL.
+    InputError: PTM-I111; MissingComponentError: PTM-M100, see `Objects`.
     DatabaseError: PTM-D005, D006 a file of the database is missing or damaged.
     """
-    root = Path(folder)
-    before = _checked(root, force)
     options = options or PublishOptions()
-    files = dict(_files(site, options))
-    # The page last, after the files that it names.
-    names = [*sorted(files.keys() - {INDEX}), INDEX]
+    if is_url(target):
+        path = local_path(str(target))
+        if path is None:
+            return upload(site, str(target), options, force=force, progress=progress)
+        target = path
+    root = Path(target)
+    before = _checked(root, force)
+    files = dict(plain_files(site, options))
+    names = in_order(files)
     for name in names:
         if name not in before and not force:
             with writing(root):
                 refuse_existing(root / name, "move it away, or use --force to replace it")
     with writing(root):
         root.mkdir(parents=True, exist_ok=True)
-    now = {name: _digest(files[name]) for name in names}
+    now = {name: digest_of(files[name]) for name in names}
     _write_list(root, before | now)
     written = []
     for number, name in enumerate(names):
@@ -159,59 +148,13 @@ def _write_list(root: Path, files: Mapping[str, str]) -> None:
         write_bytes(root / LIST, data, force=True)
 
 
-def _files(site: Site, options: PublishOptions) -> Iterator[tuple[str, Entry]]:
-    """The files of a site by their names in the folder."""
-    for name, entry in site.entries.items():
-        yield unquote(name), entry
-        if options.gzip and entry.compressed:
-            data = entry.read()
-            packed = compressed(data)
-            if len(packed) < len(data):
-                yield f"{unquote(name)}.gz", Entry(f"{name}.gz", packed, "application/gzip")
-    yield HEADERS, Entry(HEADERS, _headers(site.entries.values()), "text/plain")
-
-
-def _headers(entries: Iterable[Entry]) -> bytes:
-    """Types and caching for Netlify and Cloudflare Pages, by folder and suffix."""
-    folders = sorted({f"/{e.name.partition('/')[0]}/*" for e in entries if e.forever})
-    forever = "\n  Cache-Control: public, max-age=31536000, immutable\n"
-    parts = [f"{folder}{forever}" for folder in folders]
-    parts += [f"{page}\n  Cache-Control: no-cache\n" for page in ("/", f"/{INDEX}")]
-    parts.append("/data/*.glb\n  Content-Type: model/gltf-binary\n")
-    return "".join(parts).encode()
-
-
-def _digest(entry: Entry) -> str:
-    """The SHA-256 of an entry, which must be the recorded one, if there is one."""
-    if isinstance(entry.source, bytes):
-        return sha256(entry.source)
-    with _reading(entry.source):
-        digest = _file_digest(entry.source)
-    if entry.digest and digest != entry.digest:
-        raise damaged(entry.source, "its SHA-256 is not the recorded one")
-    return digest
-
-
-@contextmanager
-def _reading(file: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as fault:
-        raise unreadable(file, fault) from fault
-
-
-def _file_digest(file: Path) -> str:
-    with open_regular(file) as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
 def _held(root: Path, name: str) -> str | None:
     """The SHA-256 of a file of the folder, None if it does not exist."""
     file = real_file(root, name)
     if file is None:
         return None
     with writing(file):
-        return _file_digest(file)
+        return file_digest(file)
 
 
 def _write(root: Path, name: str, entry: Entry, digest: str) -> None:
@@ -223,7 +166,7 @@ def _write(root: Path, name: str, entry: Entry, digest: str) -> None:
         return
 
     def copy(file: IO[bytes]) -> None:
-        with _reading(source), open_regular(source) as stream:
+        with reading(source), open_regular(source) as stream:
             shutil.copyfileobj(stream, file)
         file.seek(0)
         if hashlib.file_digest(file, "sha256").hexdigest() != digest:  # type: ignore[arg-type]

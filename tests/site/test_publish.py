@@ -14,7 +14,8 @@ import pytest
 from ptmtools.errors import DatabaseError, OutputError
 from ptmtools.site import publishing
 from ptmtools.site.content import Site, SiteOptions, site_of
-from ptmtools.site.publishing import HEADERS, LIST, PublishOptions, publish
+from ptmtools.site.published import HEADERS, LIST, PublishOptions
+from ptmtools.site.publishing import publish
 from tests.conftest import files_below
 from tests.e2e.conftest import Ptm
 

@@ -1,0 +1,104 @@
+"""What a publication of a site consists of, whether in a folder or at a URL."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+from urllib.parse import unquote
+
+from ptmtools.files import open_regular
+from ptmtools.options import option
+from ptmtools.output.emission import compressed
+from ptmtools.site.content import Site
+from ptmtools.site.entry import Entry
+from ptmtools.site.program import INDEX
+from ptmtools.store.folder import damaged, unreadable
+from ptmtools.store.layout import sha256
+
+#: The list of our files, and the caching rules for hosts that read them from a file.
+LIST, HEADERS = ".ptm-site.json", "_headers"
+
+
+@dataclass(frozen=True)
+class PublishOptions:
+    """Options of `publish`."""
+
+    heading: ClassVar[str] = "Site"
+
+    gzip: bool = option(
+        False,
+        "Also write gzip copies, for servers that send precompressed files (nginx: gzip_static). "
+        "Not for s3:// and gs://, where files are stored compressed.",
+    )
+    keep: bool = option(
+        False, "Keep the files of earlier versions of the site, for visitors who are using them."
+    )
+
+
+@dataclass(frozen=True)
+class Published:
+    """Names of the files of a folder or URL that were written, left unchanged, and removed."""
+
+    written: tuple[str, ...]
+    unchanged: tuple[str, ...]
+    removed: tuple[str, ...]
+
+
+def in_order(names: Iterable[str]) -> list[str]:
+    """Names in the order of writing: the page last, after the files that it names."""
+    return [*sorted(set(names) - {INDEX}), INDEX]
+
+
+def plain_files(site: Site, options: PublishOptions) -> Iterator[tuple[str, Entry]]:
+    """The files of a site, for a host whose files have no headers, by their names."""
+    for name, entry in site.entries.items():
+        yield unquote(name), entry
+        if options.gzip and entry.compressed:
+            data = entry.read()
+            packed = compressed(data)
+            if len(packed) < len(data):
+                yield f"{unquote(name)}.gz", Entry(f"{name}.gz", packed, "application/gzip")
+    yield HEADERS, Entry(HEADERS, _headers(site.entries.values()), "text/plain")
+
+
+def _headers(entries: Iterable[Entry]) -> bytes:
+    """Types and caching for Netlify and Cloudflare Pages, by folder and suffix."""
+    folders = sorted({f"/{e.name.partition('/')[0]}/*" for e in entries if e.forever})
+    forever = "\n  Cache-Control: public, max-age=31536000, immutable\n"
+    parts = [f"{folder}{forever}" for folder in folders]
+    parts += [f"{page}\n  Cache-Control: no-cache\n" for page in ("/", f"/{INDEX}")]
+    parts.append("/data/*.glb\n  Content-Type: model/gltf-binary\n")
+    return "".join(parts).encode()
+
+
+def digest_of(entry: Entry) -> str:
+    """The SHA-256 of an entry.
+
+    Raises DatabaseError: PTM-D006 it is not the recorded one, PTM-D005 the file cannot be read.
+    """
+    if isinstance(entry.source, bytes):
+        return sha256(entry.source)
+    with reading(entry.source):
+        digest = file_digest(entry.source)
+    if entry.digest and digest != entry.digest:
+        raise damaged(entry.source, "its SHA-256 is not the recorded one")
+    return digest
+
+
+@contextmanager
+def reading(file: Path) -> Iterator[None]:
+    """Turns an OSError while a file of the database is read into a DatabaseError."""
+    try:
+        yield
+    except OSError as fault:
+        raise unreadable(file, fault) from fault
+
+
+def file_digest(file: Path, algorithm: str = "sha256") -> str:
+    """A digest of a file, hexadecimal; raises OSError."""
+    with open_regular(file) as stream:
+        return hashlib.file_digest(stream, algorithm).hexdigest()

@@ -1,0 +1,213 @@
+"""Writes a site to the objects below a URL, from which the store itself serves it.
+
+Object stores send what they hold with the headers that they hold: they compress nothing. So files
+that are worth compressing are stored as gzip with ``Content-Encoding``, which all browsers accept;
+textures, which are read in ranges, are stored as they are. The page is revalidated before each use,
+all other files are immutable. A store whose objects have no headers gets the files of a folder.
+
+The order is that of a folder: the list, the new files, the page, removal, the list. Each object
+appears whole, so an interrupted upload leaves the former site, and the next run sends only what is
+missing. The list has for each object the SHA-256 of its contents and headers, the MD5 of its bytes
+and the version that the store gave it; an object counts as ours while one of the last two is that
+of the store's listing.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+from ptmtools.errors import OutputError
+from ptmtools.files import leads_inside
+from ptmtools.output.emission import compressed
+from ptmtools.parallel import ordered
+from ptmtools.progress import Progress
+from ptmtools.site.content import Site
+from ptmtools.site.entry import Entry, state_of
+from ptmtools.site.program import INDEX
+from ptmtools.site.published import (
+    LIST,
+    Published,
+    PublishOptions,
+    digest_of,
+    file_digest,
+    in_order,
+    plain_files,
+    reading,
+)
+from ptmtools.store.folder import damaged
+from ptmtools.store.layout import sha256
+from ptmtools.store.objects import Headers, Held, Objects
+
+FORMAT, SCHEMA = "ptmtools site objects", 1
+FOREVER, FRESH = "public, max-age=31536000, immutable", "no-cache"
+#: Objects that are sent at a time: each waits for the network.
+AT_ONCE = 16
+
+
+@dataclass(frozen=True)
+class Row:
+    """An object in the list: SHA-256 of contents and headers, MD5 of the bytes, and its version;
+    "" where unknown."""
+
+    sha256: str
+    md5: str
+    version: str = ""
+
+    def is_of(self, held: Held | None) -> bool:
+        """Whether the object in a listing has the bytes of this row."""
+        return held is not None and (
+            bool(self.version and self.version == held.version)
+            or bool(self.md5 and self.md5 == held.md5)
+        )
+
+
+@dataclass(frozen=True)
+class Item:
+    """An object to store: its bytes or file, its headers, its row of the list."""
+
+    entry: Entry
+    body: bytes | Path
+    headers: Headers
+    row: Row
+
+
+def upload(
+    site: Site, url: str, options: PublishOptions, *, force: bool, progress: Progress
+) -> Published:
+    """Writes a site to the objects below a URL, or brings them up to date; see `publish`."""
+    objects = Objects(url)
+    held = objects.listing()
+    before = _rows(objects, held, force)
+    # Headers take the place of gzip copies and of the file with caching rules.
+    files = (
+        {unquote(name): entry for name, entry in site.entries.items()}
+        if objects.kind
+        else dict(plain_files(site, options))
+    )
+    names = in_order(files)
+    for name in names:
+        if name in held and name not in before and not force:
+            raise OutputError(
+                "PTM-O001",
+                "already exists and was not changed",
+                file=f"{objects.url}/{name}",
+                remedy="move it away, or use --force to replace it",
+            )
+    items = {name: _item(files[name], encode=objects.kind is not None) for name in names}
+
+    def current(name: str) -> bool:
+        row = before.get(name)
+        return bool(row and row.sha256 == items[name].row.sha256 and row.is_of(held.get(name)))
+
+    unchanged = tuple(name for name in names if current(name))
+    written = tuple(name for name in names if name not in unchanged)
+    old = {name: row for name, row in before.items() if name not in items}
+    # Until the end an object that exists keeps its row; one that --force replaces has an empty row.
+    new = {
+        name: Row("", "") if name in held else items[name].row
+        for name in written
+        if name not in before
+    }
+    if written:
+        _write_list(objects, new | before)
+
+    def send(name: str) -> None:
+        item = items[name]
+        objects.write(name, item.body, item.headers)
+        if isinstance(item.body, Path):
+            with reading(item.body):
+                state = state_of(item.body.stat())
+            if item.entry.state not in (None, state):
+                raise damaged(item.body, "it changed while it was copied")
+
+    first = [name for name in written if name != INDEX]
+    for number, _ in enumerate(ordered(send, first, AT_ONCE)):
+        progress(number, len(written), "files")
+    if INDEX in written:
+        send(INDEX)
+    removed: tuple[str, ...] = ()
+    if not options.keep:
+        removed = tuple(name for name, row in old.items() if row.is_of(held.get(name)))
+        list(ordered(objects.remove, removed, AT_ONCE))
+    rows = {name: before[name] for name in unchanged} | (old if options.keep else {})
+    if written:
+        after = objects.listing()
+        rows |= {
+            name: replace(items[name].row, version=after[name].version)
+            for name in written
+            if name in after
+        }
+    if rows != before:
+        _write_list(objects, rows)
+    return Published(written, unchanged, removed)
+
+
+def _item(entry: Entry, *, encode: bool) -> Item:
+    """The object of a file; its contents are checked."""
+    digest = digest_of(entry)
+    body = entry.source
+    headers = Headers(entry.media, FOREVER if entry.forever else FRESH)
+    if encode and entry.compressed:
+        data = entry.read()
+        if sha256(data) != digest:
+            raise damaged(Path(entry.name), "it changed while it was copied")
+        packed = compressed(data)
+        body = data
+        if len(packed) < len(data):
+            body, headers = packed, replace(headers, encoding="gzip")
+    if isinstance(body, bytes):
+        md5 = hashlib.md5(body, usedforsecurity=False).hexdigest()
+    else:
+        with reading(body):
+            md5 = file_digest(body, "md5")
+    text = json.dumps([digest, *asdict(headers).values()])
+    return Item(entry, body, headers, Row(sha256(text.encode()), md5))
+
+
+def _rows(objects: Objects, held: Mapping[str, Held], force: bool) -> dict[str, Row]:
+    """The list of an earlier publication; empty for a new one, or one that was forced.
+
+    Raises OutputError PTM-O010 if other objects are there.
+    """
+    if not held:
+        return {}
+    rows = _read_list(objects.read(LIST)) if LIST in held else None
+    if rows is None and not force:
+        raise OutputError(
+            "PTM-O010",
+            "the URL has objects and is not a site that `ptm publish` wrote",
+            file=objects.url,
+            remedy="specify another prefix, or use --force to write beside them",
+        )
+    return rows or {}
+
+
+def _read_list(data: bytes) -> dict[str, Row] | None:
+    """The rows of a list that may be ours; None if it is no list."""
+    try:
+        document: Any = json.loads(data)
+        if (document["format"], document["schema"]) != (FORMAT, SCHEMA):
+            return None
+        return dict(_valid(document["files"]))
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+def _valid(files: Mapping[str, Any]) -> Iterator[tuple[str, Row]]:
+    for name, fields in files.items():
+        parts = [fields["sha256"], fields["md5"], fields["version"]]
+        if leads_inside(name) and name != LIST and all(isinstance(part, str) for part in parts):
+            yield name, Row(*parts)
+
+
+def _write_list(objects: Objects, rows: Mapping[str, Row]) -> None:
+    files = {name: asdict(row) for name, row in sorted(rows.items())}
+    document = {"format": FORMAT, "schema": SCHEMA, "files": files}
+    data = (json.dumps(document, indent=0, ensure_ascii=False) + "\n").encode()
+    objects.write(LIST, data, Headers("application/json", FRESH))
