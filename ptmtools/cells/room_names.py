@@ -21,7 +21,7 @@ def unused_notes(volumes: Volumes, before: Ints, after: Ints) -> Iterator[str]:
     rooms = range(len(volumes.rooms))
     empty = [k for k in rooms if not (before == k).any()]
     several = [k for k in rooms if (before == k).any() and not (after == k).any()]
-    for which, reason in ((empty, "no cell lies in them"), (several, "several rooms in one")):
+    for which, reason in ((empty, "no cell lies there"), (several, "several rooms in one")):
         if which:
             yield left_out([volumes.rooms[k].name for k in which], reason)
 

@@ -29,6 +29,7 @@ from ptmtools.cells.model import Cells
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.quantities import count
 from ptmtools.scene.model import RoomVolume, Scene
+from ptmtools.tolerance import TIE_SHARE
 
 #: Points in the box of a volume, and in a leaf.
 _IN_BOX, _IN_LEAF = 216, 32
@@ -140,7 +141,7 @@ class Volumes:
         for room in map(Volume.of, scene.rooms):
             if not room.size >= least:
                 left.setdefault("too small for a visitor", []).append(room.name)
-            elif room.size > most:
+            elif room.size > (1 + TIE_SHARE) * most:
                 left.setdefault("larger than the building", []).append(room.name)
             elif not room.closed:
                 left.setdefault("not closed", []).append(room.name)

@@ -12,7 +12,7 @@ inside of a door leaf, behind passages, comes last. Openings in the ceiling join
 together first, and an opening joins them if it is at least `OPEN_WITHIN` of the cross-section: the
 model says that a bay belongs to its room, but a door within a flat still divides. Regions in two
 volumes never join. Leaves in no volume, such as doorways, join as above. A volume of which no
-region has more than half consists of several rooms, and does not count.
+region has more than two thirds consists of several rooms, and does not count.
 
 **Cells.** A room is one cell, unless dividing it saves its viewers more than
 `SubdivideOptions.gain` of their download. With v the volume of a leaf (the frequency of viewers in
@@ -121,7 +121,7 @@ OPEN = 0.7
 #: leads into less than 5 m² of cross-section.
 OPEN_WITHIN = 0.4
 #: A volume is one room if a region has more than this share of its standing leaves.
-ONE_ROOM = 0.5
+ONE_ROOM = 2 / 3
 #: Shares, and gains, are compared in this many significant digits: symmetrical buildings have many
 #: equal ones, which rounding must not order, not even that of a sliver far from the origin.
 DIGITS = 4
