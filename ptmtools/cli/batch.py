@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import glob
 import os
+import re
 import stat
 import sys
 from collections.abc import Callable, Iterable, Sequence
@@ -26,6 +27,7 @@ from ptmtools.cli.parameters import (
 )
 from ptmtools.errors import InputError, OutputError, PtmError, naming
 from ptmtools.files import output_error, refuse_existing, write_with, writing
+from ptmtools.store.layout import sha256
 
 if TYPE_CHECKING:
     from ptmtools.texture.model import Limits
@@ -113,6 +115,11 @@ class Job:
     fault: PtmError | None = None
 
     @property
+    def streams(self) -> bool:
+        """Whether the source or the result is a stream."""
+        return self.to_stdout or _streams(self.source)
+
+    @property
     def to_stdout(self) -> bool:
         """Whether standard output carries the result."""
         return self.target is None and self.fault is None
@@ -127,6 +134,48 @@ class Job:
                 with writing(self.folder):
                     self.folder.mkdir(parents=True, exist_ok=True)
             write_with(self.target, write, force=force)
+
+
+@dataclass(frozen=True)
+class Shard:
+    """The ``number``-th of ``count`` parts of the jobs of a command, from 1 on. Together they are
+    all jobs, and each job is in one."""
+
+    number: int
+    count: int
+
+    def __str__(self) -> str:
+        return f"{self.number}/{self.count}"
+
+    def jobs(self, jobs: Sequence[Job]) -> list[Job]:
+        """The jobs of this part: by a digest of the path of each source below the folder that all
+        have in common. So a machine may have mounted that folder elsewhere than another, and a
+        new file in it changes the part of no other."""
+        folders = [os.path.dirname(os.path.abspath(job.source)) for job in jobs if job.source]
+        common = os.path.commonpath(folders) if folders else ""
+
+        def part(job: Job) -> int:
+            name = os.path.relpath(os.path.abspath(job.source), common) if job.source else ""
+            digest = sha256(os.fsencode(name.replace(os.sep, "/")))
+            return int(digest[:16], 16) % self.count + 1
+
+        return [job for job in jobs if part(job) == self.number]
+
+
+class ShardOf(click.ParamType):  # type: ignore[type-arg]  # generic only in newer Clicks
+    """``K/N``."""
+
+    name = "shard"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Shard:
+        if isinstance(value, Shard):
+            return value
+        match = re.fullmatch(r"(\d{1,6})/(\d{1,6})", str(value), re.ASCII)
+        if not match or not 1 <= int(match[1]) <= int(match[2]):
+            self.fail(f"{value!r} is not a part such as 3/16, with 1 <= 3 <= 16", param, ctx)
+        return Shard(int(match[1]), int(match[2]))
 
 
 def jobs_for(
@@ -263,17 +312,13 @@ class Batch:
         work: Callable[[Job, int], Report],
         lines: Callable[[Report], Iterable[str]],
     ) -> tuple[int, list[Report]]:
-        """Runs ``work(job, threads)`` for every job, several at a time; returns the exit status of
-        the first failure, and the reports of the other jobs, in order.
-
-        Prints the ``lines`` of each report, or all reports as JSON at the end; warnings go to
-        stderr. The other jobs continue after a failure. A single job has all the threads; each
-        of several has one.
+        """Runs ``work(job, threads)`` for every job, several at a time; a single job has all the
+        threads, each of several has one. The other jobs continue after a failure. See `report`.
         """
         from ptmtools.parallel import ordered
 
-        console, workers = self.console, self.workers or os.cpu_count() or 1
-        console.to_stderr = any(job.to_stdout for job in jobs)
+        workers = self.workers or os.cpu_count() or 1
+        self.console.to_stderr = any(job.to_stdout for job in jobs)
         at_once = min(workers, len(jobs))
 
         def guarded(job: Job) -> Report | Exception:
@@ -284,11 +329,22 @@ class Batch:
             except Exception as fault:
                 return fault
 
-        status = 0
+        return self.report(ordered(guarded, jobs, at_once), len(jobs), lines)
+
+    def report(
+        self,
+        results: Iterable[Report | Exception],
+        total: int,
+        lines: Callable[[Report], Iterable[str]],
+    ) -> tuple[int, list[Report]]:
+        """Prints the ``lines`` of each report, or all reports as JSON at the end; warnings and
+        failures go to stderr. Returns the exit status of the first failure, and the reports of
+        the other jobs, in order."""
+        console, status = self.console, 0
         reports: list[Report] = []
         with console.progress() as progress:
-            for done, result in enumerate(ordered(guarded, jobs, at_once)):
-                progress(done, len(jobs), "files")
+            for done, result in enumerate(results):
+                progress(done, total, "files")
                 if isinstance(result, Exception):
                     with console.above_progress():
                         failed = report(result, console.verbose)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,6 +16,8 @@ from ptmtools.cli.batch import (
     Batch,
     Job,
     Report,
+    Shard,
+    ShardOf,
     expanded,
     jobs_for,
     many_files,
@@ -22,6 +25,7 @@ from ptmtools.cli.batch import (
     standard_input,
 )
 from ptmtools.cli.console import Console
+from ptmtools.cli.encoding import FileCoding, FilePreviews, encoded_by_cluster, encoded_file
 from ptmtools.cli.parameters import (
     Command,
     Named,
@@ -31,37 +35,17 @@ from ptmtools.cli.parameters import (
     option,
     options_of,
     output_option,
+    scheduler_address,
     take,
     with_console,
 )
 from ptmtools.errors import InputError, OutputError, naming
-from ptmtools.options import option as option_field
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Description, EncodeOptions, Limits
-from ptmtools.texture.previews import Exact, PreviewOptions
 from ptmtools.texture.profiles import PROFILES
 
 if TYPE_CHECKING:
     from ptmtools.texture.comparison import Measured
-    from ptmtools.texture.steps import EncodedSteps
-
-
-@dataclass(frozen=True)
-class FilePreviews(PreviewOptions):
-    """Options of the previews beside a `.ptm`."""
-
-    preview: int = option_field(
-        0,
-        "Also write previews of this quality, 1 to 100: lossy images of single levels, "
-        "NAME-SIDE.webp. 0 writes none.",
-        metavar="QUALITY",
-    )
-    exact: Exact = option_field(
-        "always",
-        "Levels in the .ptm: always all of them; lossless-sources only the coarsest of a JPEG, "
-        "lossy WebP or AVIF, whose own bytes become the finest preview; never more than the "
-        "coarsest, and the finest preview is the finest level.",
-    )
 
 
 @click.command("encode", cls=Command)
@@ -76,75 +60,50 @@ class FilePreviews(PreviewOptions):
     help="Rotate the texels according to the EXIF orientation of the image instead of storing the "
     "orientation.",
 )
+@option(
+    "--shard",
+    type=ShardOf(),
+    metavar="K/N",
+    help="Encode only the K-th of N parts of the images, K from 1 to N: one for each task of a "
+    "batch array. The name of an image decides its part.",
+)
+@option(
+    "--scheduler",
+    metavar="ADDRESS",
+    callback=scheduler_address,
+    help="Encode on the cluster of this Dask scheduler, such as tcp://10.0.0.1:8786, whose workers "
+    "see the files under the same paths; -j then limits the images at a time.",
+)
 @many_files
 def encode(
-    batch: Batch, images: tuple[str, ...], output: str | None, orient: bool, **values: Any
+    batch: Batch,
+    images: tuple[str, ...],
+    output: str | None,
+    orient: bool,
+    shard: Shard | None,
+    scheduler: str | None,
+    **values: Any,
 ) -> int:
     """Encode images as progressive textures (.ptm).
 
     IMAGE is a file, a pattern such as 'scans/*.tif', a folder (all images in it), or - for stdin.
     After an image that cannot be read, the command continues with the others.
     """
-    from ptmtools.texture.container import HEAD_MAX, read_header
-    from ptmtools.texture.encoder import check_options, encode_to, level_above
-    from ptmtools.texture.images import SUFFIXES, load_image
-    from ptmtools.texture.steps import encode_steps
+    from ptmtools.texture.encoder import check_options
+    from ptmtools.texture.images import SUFFIXES
 
     options, previews = take(EncodeOptions, values), take(FilePreviews, values)
     check_options(options)
-    stepped = bool(previews.preview) or previews.exact != "always"
-    if stepped and output == STANDARD:
+    if previews.wanted and output == STANDARD:
         raise InputError(
             "PTM-I111", "previews are files beside the .ptm", remedy="use -o FILE instead of -o -"
         )
     jobs = jobs_for(images, SUFFIXES, output, ".ptm", (".ptm", *SUFFIXES))
     if output and any(job.target and not job.folder for job in jobs):
         _refuse_image_suffix(output)
-
-    def work(job: Job, threads: int) -> Report:
-        source, target = job.source, job.target
-        report: Report = {
-            "image": source,
-            "file": os.fspath(target) if target else STANDARD,
-            "skipped": batch.skips(target),
-        }
-        if report["skipped"]:
-            return report
-
-        def write(file: IO[bytes]) -> None:
-            if encoded:
-                file.write(encoded.ptm)
-            else:
-                encode_to(
-                    file, picture.texels, options, description=picture.description, threads=threads
-                )
-            report["ptm_bytes"] = file.tell()
-            file.seek(0)
-            header = read_header(file.read(HEAD_MAX))
-            file.seek(0, os.SEEK_END)
-            report["raw_bytes"] = header.width * header.height * header.texel_bytes
-            report["levels"] = len(header.levels)
-            finest, above = header.levels[-1], level_above(header)
-            report["finest"] = finest.width, finest.height
-            report["left_out"] = above and dict(
-                zip(("width", "height", "bytes"), above, strict=True)
-            )
-
-        with naming(source):
-            data = standard_input() if source == STANDARD else source
-            picture = load_image(data, batch.limits)
-            report["image_bytes"] = len(data) if isinstance(data, bytes) else os.path.getsize(data)
-            report["lossy"] = picture.lossy
-            if orient and picture.description.orientation != 1:
-                picture = replace(picture.upright(), lossy=None)
-            encoded = None
-            if stepped:
-                read = data if isinstance(data, bytes) else Path(data).read_bytes()
-                encoded = encode_steps(picture, read, options, previews, threads)
-            job.put(write, batch.force)
-            if encoded and target:
-                report["previews"] = list(_put_previews(target, encoded, batch.force))
-        return report
+    if (shard or scheduler) and any(job.streams for job in jobs):
+        raise click.UsageError("--shard and --scheduler need named files, not -")
+    coding = FileCoding(options, previews, orient, batch)
 
     def lines(report: Report) -> Iterator[str]:
         if report["skipped"]:
@@ -165,22 +124,18 @@ def encode(
         elif note := _note_on_sides(report, options.max_side):
             yield f"  {note}"
 
-    status, reports = batch.each(jobs, work, lines)
+    if shard:
+        total, jobs = len(jobs), shard.jobs(jobs)
+        if not batch.console.as_json:
+            batch.console.print(f"shard {shard}: {len(jobs):,} of {count(total, 'image')}")
+    if scheduler:
+        results = encoded_by_cluster(coding, jobs, scheduler)
+        status, reports = batch.report(results, len(jobs), lines)
+    else:
+        status, reports = batch.each(jobs, partial(encoded_file, coding), lines)
     if not batch.console.as_json and (hint := _hint_on_lossy(reports, options)):
         batch.console.print(hint)
     return status
-
-
-def _put_previews(target: Path, encoded: EncodedSteps, force: bool) -> Iterator[dict[str, object]]:
-    """Writes the previews beside a `.ptm`; the properties of each."""
-    from ptmtools.files import write_bytes
-    from ptmtools.texture.previews import FORMATS
-
-    for preview, data in zip(encoded.steps.previews, encoded.previews, strict=True):
-        side = max(preview.width, preview.height)
-        file = target.with_name(f"{target.stem}-{side}{FORMATS[preview.format].suffix}")
-        write_bytes(file, data, force=force)
-        yield {"file": os.fspath(file), **asdict(preview)}
 
 
 def _note_on_sides(report: Report, max_side: int) -> str | None:

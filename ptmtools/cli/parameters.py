@@ -395,13 +395,16 @@ def cluster_options(function: Function) -> Function:
     return option(
         "--scheduler",
         metavar="ADDRESS",
-        callback=_address,
+        callback=scheduler_address,
         help="Run the tasks on the cluster of this Dask scheduler, such as tcp://10.0.0.1:8786; "
         "-j then limits the number of tasks that run at the same time.",
     )(jobs_option(function))
 
 
-def _address(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
+def scheduler_address(
+    context: click.Context, parameter: click.Parameter, value: str | None
+) -> str | None:
+    """The callback of ``--scheduler``: refuses what is no address."""
     if value is not None and not _ADDRESS.fullmatch(value):
         raise click.BadParameter(f"{value!r} is not an address such as tcp://10.0.0.1:8786")
     return value
