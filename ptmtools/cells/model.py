@@ -174,6 +174,12 @@ class Cells:
         return self.rooms[room] if room >= 0 else ""
 
     @property
+    def room_numbers(self) -> NDArray[np.int32]:
+        """(C,) `cell_room`, with a number of its own for each cell in no named room."""
+        own = np.arange(len(self.rooms), len(self.rooms) + self.cell_count, dtype=np.int32)
+        return np.where(self.cell_room >= 0, self.cell_room, own) if self.rooms else own
+
+    @property
     def standing(self) -> NDArray[np.bool_]:
         """(C,) which cells have a standing leaf; the others are only seen."""
         result = np.zeros(self.cell_count, dtype=np.bool_)

@@ -243,6 +243,8 @@ def _rows(model: Inspection, around: Enclosure, *, every: bool) -> Iterator[tupl
     yield "doors", f"{len(around.doors)} recognised{names}"
     if scene.storeys:
         yield "storeys", some([f"{s.name} at {s.height:.3g} m" for s in scene.storeys])
+    if scene.rooms:
+        yield "rooms", f"{len(scene.rooms)}: {some([r.name or 'unnamed' for r in scene.rooms])}"
     for warning in warnings(scene.notes):
         yield "warning", warning
     for note in scene.notes if every else ():
@@ -307,5 +309,6 @@ def _record(model: Inspection, around: Enclosure) -> dict[str, Any]:
         "looks": [asdict(guess) for guess in (model.best, *model.others)],
         "enclosure": asdict(around) | {"closed": around.closed},
         "storeys": [vars(storey) for storey in scene.storeys],
+        "rooms": [room.name for room in scene.rooms],
         "notes": [vars(note) for note in scene.notes],
     }

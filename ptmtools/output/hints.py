@@ -77,7 +77,9 @@ def index_text(content: Content) -> str:
         "textures": [_texture(r, content.options.fallback) for r in content.textures],
         "octrees": [_octree(r) for r in content.octrees],
         "cells": [
-            {"name": cell_name(c), "box": box} | ({} if standing else {"standing": False})
+            {"name": cell_name(c), "box": box}
+            | ({} if standing else {"standing": False})
+            | ({"room": room} if (room := cells.room_name(c)) else {})
             for c, (box, standing) in enumerate(
                 zip(_boxes(content), cells.standing.tolist(), strict=True)
             )

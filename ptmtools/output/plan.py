@@ -87,6 +87,8 @@ _EVEN = 0.005
 _DARK = 0.02
 #: Numbers are left out of cells narrower than this many points on paper.
 _NARROWEST = 9.0
+#: And where letters would be smaller than this, points.
+_SMALLEST = 4.5
 #: Inches: around everything, above each panel, below it for the scale bar, between panels, and for
 #: the colour bar.
 _MARGIN, _CAPTION, _FOOT, _GAP, _BAR = 0.15, 0.26, 0.3, 0.25, 0.75
@@ -295,8 +297,8 @@ class _Plan:
     def _numbers(
         self, axis: Any, sections: list[tuple[int, NDArray[np.float64]]], points: float
     ) -> None:
-        """Writes each cell's number once, in its largest section, if there is room; ``points`` of
-        paper are a metre."""
+        """Writes each cell's number once, in its largest section, if there is room, and below it,
+        in the largest section of a named room, the name; ``points`` of paper are a metre."""
         import shapely
         from matplotlib.patheffects import withStroke
 
@@ -304,11 +306,17 @@ class _Plan:
         for cell, polygon in sections:
             if cell not in largest or area(polygon) > area(largest[cell]):
                 largest[cell] = polygon
+        numbers, home = self._cells.room_numbers.tolist(), dict[int, int]()
+        for cell in sorted(largest, key=lambda cell: -area(largest[cell])):
+            home.setdefault(numbers[cell], cell)
         for cell, polygon in largest.items():
-            text = str(cell)
+            name = self._cells.room_name(cell) if home[numbers[cell]] == cell else ""
             width, depth = np.ptp(self._shown(polygon), axis=0) * points
-            size = min(depth * 0.6, width / (0.65 * len(text)), 8.0)
-            if min(width, depth) < _NARROWEST or size < 4.5:
+            text = f"{cell}\n{name}" if name else str(cell)
+            if _letters(text, width, depth) < _SMALLEST:
+                text = str(cell)
+            size = _letters(text, width, depth)
+            if min(width, depth) < _NARROWEST or size < _SMALLEST:
                 continue
             (middle,) = shapely.get_coordinates(shapely.centroid(shapely.Polygon(polygon)))
             x, y = self._shown(middle)
@@ -323,6 +331,7 @@ class _Plan:
                 ha="center",
                 va="center",
                 zorder=7,
+                parse_math=False,
                 path_effects=[withStroke(linewidth=1.6, foreground=paper, alpha=0.6)],
             )
 
@@ -436,6 +445,12 @@ class _Plan:
             Line2D([], [], color=colour, linewidth=2.5, label=label) for colour, label in lines
         ]
         return handles + hatches(self._cells)
+
+
+def _letters(text: str, width: float, depth: float) -> float:
+    """The size of letters, in points, at which lines of text fit into a section, in points."""
+    lines = text.split("\n")
+    return min(depth * 0.6 / len(lines), width / (0.65 * max(map(len, lines))), 8.0)
 
 
 def _outlines(

@@ -1,5 +1,5 @@
 """Places to stand in the rooms of a scene: one in each of the cells with the largest floors, at eye
-height, away from the walls, with the best view (`views`).
+height, away from the walls, with the best view (`views`). A room that the model names has one only.
 
 `Ground` finds the floor below a point: the nearest upward-facing surface. The squares of a grid in
 plan list the floor triangles whose boxes they touch, so that a query looks at the triangles of one
@@ -144,22 +144,23 @@ def places(
         section = leaf_section(cells, leaf, floor + eye)
         if len(section) >= 3:
             rooms.append(_Room(leaf, floor, section))
-    by_cell: dict[int, Place] = {}
+    by_room: dict[int, Place] = {}
+    numbers = cells.room_numbers.tolist()
     begin: list[Place] = []
     least = 0.0
     for room in sorted(rooms, key=lambda room: (-area(room.section), room.leaf)):
-        cell, size = int(cells.leaf_cell[room.leaf]), area(room.section)
-        if len(by_cell) >= count and size < least:
+        number, size = numbers[cells.leaf_cell[room.leaf]], area(room.section)
+        if len(by_room) >= count and size < least:
             break
-        if cell not in by_cell:
+        if number not in by_room:
             place = _place_in(room, cells, ground, outlook, avatar_size)
             if place is not None:
-                by_cell[cell] = place
+                by_room[number] = place
                 least = least or _AS_LARGE * size
                 if size >= least and abs(place.floor - (begin or [place])[0].floor) < eye:
                     begin.append(place)
     first = max(begin, key=lambda place: place.worth, default=None)
-    ordered = sorted(by_cell.values(), key=lambda place: place is not first)
+    ordered = sorted(by_room.values(), key=lambda place: place is not first)
     return ordered[:count]
 
 

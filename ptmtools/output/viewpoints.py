@@ -2,8 +2,9 @@
 the navigation can start").
 
 They are the user's, else the model's cameras; then one in each of the largest rooms without one
-(`standpoints`, `views`). A browser that ignores cells lists them in its menu and leads from one to
-the next in the order of the file, so the next one should be next door. The shortest ways from the
+(`standpoints`, `views`), with the name that the model gives the room, if any. A browser that
+ignores cells lists them in its menu and leads from one to the next in the order of the file, so
+the next one should be next door. The shortest ways from the
 first room form a tree (Dijkstra, over leaves and portals); the rooms are in the order of a walk
 around that tree, the shortest branch first, one storey after the other. A browser in WALK mode
 drops the viewpoint onto the floor, so it is put there beforehand: at the height of the eye above
@@ -255,10 +256,11 @@ def _touring(
     initial: Sequence[Viewpoint],
 ) -> list[Viewpoint]:
     """A viewpoint for each room without one, in the order of a walk from the first."""
-    taken = {v.cell for v in initial}
+    numbers = cells.room_numbers.tolist()
+    taken = {numbers[v.cell] for v in initial}
     count = max(options.viewpoint_count, not initial)
     rooms = places(cells, ground, outlook, options.avatar(cells.walker), count + len(taken))
-    rooms = [place for place in rooms if place.cell not in taken][:count]
+    rooms = [place for place in rooms if numbers[place.cell] not in taken][:count]
     if not rooms:
         return [] if initial else [_anywhere(cells, outlook, options)]
     leaf = cells.locate_leaf(np.array([place.position for place in rooms])).tolist()
@@ -269,15 +271,25 @@ def _touring(
     first = list(dict.fromkeys(storey[i] for i in order))
     order.sort(key=lambda i: first.index(storey[i]))
     names = _storey_names(scene, [place.floor for place in rooms], storey, eye)
-    number: Counter[str] = Counter()
+    number: Counter[tuple[str, str]] = Counter()
     views: list[Viewpoint] = []
     for i in order:
         place, field = rooms[i], options.field_of_view
         level = names[i] if len(first) > 1 else ""
-        number[level] += 1
-        name = f"{level}, room {number[level]}" if level else f"Room {number[level]}"
+        name = _name(cells.room_name(place.cell), level, number)
         views.append(_viewpoint(name, place.position, _heading(place.yaw), field, place.cell))
     return views
+
+
+def _name(room: str, level: str, number: Counter[tuple[str, str]]) -> str:
+    """The name of a viewpoint in a room, "" for one without a name, on a storey, "" for the only
+    one; counts the viewpoints of equal rooms in ``number``."""
+    number[level, room] += 1
+    count = number[level, room]
+    if not room:
+        return f"{level}, room {count}" if level else f"Room {count}"
+    name = f"{level}, {room}" if level else room
+    return f"{name} ({count})" if count > 1 else name
 
 
 def _storey_names(
