@@ -79,6 +79,27 @@ def test_storeys_have_their_names(
     assert (tmp_path / "0.5.png").read_bytes() != plain_bytes
 
 
+def test_rooms_have_their_names(artifacts, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Once for a room of two cells, below the number of one, if there is space for it."""
+    from matplotlib.axes import Axes
+
+    texts: list[str] = []
+    plain = Axes.text
+
+    def overheard(self: Axes, x: float, y: float, text: str, **style: object) -> object:
+        texts.append(text)
+        return plain(self, x, y, text, **style)
+
+    monkeypatch.setattr(Axes, "text", overheard)
+    of = np.array([0, 0, 1], dtype=np.int32)
+    for number, names in enumerate((("$Hall", "Lab"), ("x" * 500, "Lab"))):
+        cells = replace(artifacts.cells, rooms=names, cell_room=of)
+        draw(replace(artifacts, cells=cells), tmp_path / f"{number}.png")
+    marks = [text for text in texts if text[0].isdigit()]
+    assert sorted(marks[:3]) == ["0\n$Hall", "1", "2\nLab"]
+    assert sorted(marks[3:]) == ["0", "1", "2\nLab"]
+
+
 @pytest.mark.parametrize("width", [5, 8, 12])
 def test_heading_and_legend_do_not_overlap(
     artifacts, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, width: float

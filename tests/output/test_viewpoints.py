@@ -171,6 +171,38 @@ def test_one_storey_needs_no_name(room_row) -> None:
     assert [v.description for v in views] == ["Room 1", "Room 2"]
 
 
+def test_rooms_with_names(room_row) -> None:
+    """A named room of two cells has one viewpoint; the rooms without a name are counted."""
+    scene, cells = room_row(5)
+    of = np.array([0, 0, -1, 1, 2], dtype=np.int32)
+    cells = replace(cells, rooms=("Foyer", "Lab", "Lab"), cell_room=of)
+    views, _ = place_viewpoints(scene, cells, EmitOptions())
+    assert {v.cell: v.description for v in views[1:]} | {views[0].cell: "Foyer"} == {
+        views[0].cell: "Foyer",
+        2: "Room 1",
+        3: "Lab",
+        4: "Lab (2)",
+    }
+    assert views[0].cell in (0, 1)
+    assert views[0].description == "Foyer"
+    begin = EmitOptions(viewpoints=(GivenViewpoint((2.0, 1.0, 0.0)),))
+    views, _ = place_viewpoints(scene, cells, begin)
+    assert [v.cell for v in views] == [0, 2, 3, 4], "the foyer has one already"
+
+
+def test_names_of_rooms_follow_those_of_storeys(room_row) -> None:
+    scene, cells = two_storeys(room_row)
+    of = np.array([0, 1, -1, -1], dtype=np.int32)
+    cells = replace(cells, rooms=("Hall", "Hall"), cell_room=of)
+    views, _ = place_viewpoints(scene, cells, EmitOptions())
+    assert sorted(v.description for v in views) == [
+        "Storey 1, Hall",
+        "Storey 1, room 1",
+        "Storey 2, Hall",
+        "Storey 2, room 1",
+    ]
+
+
 def test_storeys_of_heights() -> None:
     assert storey_numbers([0.0, 4.0, 0.2, 4.1, 1.7], 1.6) == [0, 1, 0, 1, 0]
     assert storey_numbers([], 1.6) == []

@@ -95,6 +95,28 @@ class Ifc:
             spatial.assign_container(self.file, products=[product], relating_structure=storey)
         return product
 
+    def space(
+        self,
+        name: str | None,
+        long_name: str | None,
+        low: Point,
+        high: Point,
+        storey: Any = None,
+        whole: Any = None,
+        composition: str = "ELEMENT",
+        **attributes: Any,
+    ) -> Any:
+        """A space that fills a box, part of a storey or of a ``whole``."""
+        from ifcopenshell.api import aggregate
+
+        space = self.box("IfcSpace", name, low, high, storey)
+        space.LongName, space.CompositionType = long_name, composition
+        for attribute, value in attributes.items():
+            setattr(space, attribute, value)
+        if whole or storey:
+            aggregate.assign_object(self.file, products=[space], relating_object=whole or storey)
+        return space
+
     def represent(self, product: Any, item: Any, kind: str, identifier: str = "Body") -> None:
         """Gives a product one representation of one item."""
         shape = self.file.create_entity(
