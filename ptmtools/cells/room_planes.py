@@ -7,14 +7,14 @@ the two, splits the leaves around it, once all other splits and the flood are do
 depends on it. Nothing blocks in it but the structure that lies in it, so it becomes a portal.
 
 Volumes often end in the middle of walls, where a contact would split the wall's inside and every
-doorway. So both parts of a leaf must be deeper than a wall may be.
+doorway. So both parts of a leaf must be deeper than a wall may be, and the part of the contact in
+the leaf wider than a visitor: volumes overlap their neighbours by some centimetres.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 
 import numpy as np
 import shapely
@@ -22,15 +22,13 @@ import shapely
 from ptmtools.arrays import Bools, Floats, Ints, areas, normals
 from ptmtools.cells.bsp import Tree
 from ptmtools.cells.options import SubdivideOptions
-from ptmtools.cells.planar import Geometry, intersection, unite
+from ptmtools.cells.planar import Geometry, buffer, intersection, unite
 from ptmtools.cells.polyhedron import Polyhedron, cut, section
 from ptmtools.cells.portals import Portal, find_portals
 from ptmtools.cells.room_volumes import Volume
 from ptmtools.cells.structure import Frame, Structure, WallPlane
 from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
 
-#: The part of a contact in a leaf has at least this share of the area of a wall.
-_PART = 0.1
 #: Contacts are compared by the share of the leaf's section that they cover, in this many digits.
 _DIGITS = 4
 
@@ -51,18 +49,20 @@ def contacts(
     """The contacts of volumes with the area of a wall, in the order of the volumes."""
     gap = options.wall_thickness + tolerance.plane
     boxes = np.array([room.box for room in rooms]).reshape(-1, 2, 3)
-    layers: dict[int, list[tuple[Floats, Geometry]]] = {}
+    layers: dict[int, list[tuple[Floats, Floats]]] = {}
     result = []
-    for i, j in combinations(range(len(rooms)), 2):
-        if (boxes[i, 0] > boxes[j, 1] + gap).any() or (boxes[j, 0] > boxes[i, 1] + gap).any():
-            continue
-        for k in (i, j):
-            if k not in layers:
+    for i, box in enumerate(boxes):
+        later = boxes[i + 1 :]
+        near = ((later[:, 0] <= box[1] + gap) & (later[:, 1] >= box[0] - gap)).all(axis=1)
+        for j in (i + 1 + np.flatnonzero(near)).tolist():
+            for k in {i, j} - layers.keys():
                 layers[k] = _layers(rooms[k].corners, options.wall_area, tolerance)
-        for plane, faces in layers[i]:
-            for other, others in layers[j]:
-                contact = _contact(plane, faces, other, others, gap, options.wall_area, tolerance)
-                result += [contact] if contact else []
+            for plane, faces in layers[i]:
+                for other, others in layers[j]:
+                    contact = _contact(
+                        plane, faces, other, others, gap, options.wall_area, tolerance
+                    )
+                    result += [contact] if contact else []
     return tuple(result)
 
 
@@ -128,6 +128,7 @@ def split_at(
 ) -> tuple[Tree, list[Portal], Bools]:
     """A tree, its portals and its (L,) reached leaves, with those leaves split at the contacts."""
     tolerance = structure.tolerance
+    boxes = np.array([(contact.low, contact.high) for contact in contacts]).reshape(-1, 2, 3)
     leaves, walls = list(tree.leaves), list(tree.walls)
     children = [row.tolist() for row in tree.children]
     parent = {-2 - c: (n, side) for n, row in enumerate(children) for side, c in enumerate(row)}
@@ -136,7 +137,10 @@ def split_at(
     while waiting and len(leaves) < options.max_leaves:
         leaf = waiting.pop()
         body = leaves[leaf]
-        contact = _best(contacts, body, options, tolerance)
+        low, high = body.points.min(axis=0), body.points.max(axis=0)
+        near = ((boxes[:, 0] <= high) & (boxes[:, 1] >= low)).all(axis=1)
+        around = [contacts[k] for k in np.flatnonzero(near).tolist()]
+        contact = _best(around, body, options, tolerance)
         if contact is None:
             continue
         node, back = len(walls), len(leaves)
@@ -171,12 +175,9 @@ def _best(
     contacts: Sequence[Contact], body: Polyhedron, options: SubdivideOptions, tolerance: Tolerance
 ) -> Contact | None:
     """The contact that covers the largest share of a body's section, None if none splits it."""
-    low, high = body.points.min(axis=0), body.points.max(axis=0)
-    deep = max(options.wall_thickness, tolerance.thin)
+    deep, radius = max(options.wall_thickness, tolerance.thin), options.walker[0]
     best, most = None, 0.0
     for contact in contacts:
-        if (contact.low > high).any() or (contact.high < low).any():
-            continue
         plane = contact.frame.plane
         reach = body.points @ plane[:3] + plane[3]
         if min(reach.max(), -reach.min()) < deep:
@@ -187,7 +188,7 @@ def _best(
         region = shapely.polygons(contact.frame.to_plane(outline))
         shape = intersection(np.array([contact.shape]), np.array([region]), tolerance.grid)[0]
         share = round(float(shapely.area(shape) / shapely.area(region)), _DIGITS)
-        if shapely.area(shape) >= _PART * options.wall_area and share > most:
+        if share > most and not shapely.is_empty(buffer(shape, -radius, join_style="mitre")):
             best, most = contact, share
     return best
 

@@ -153,6 +153,21 @@ def test_walls_hide_where_volumes_meet_in_the_middle_of_them(made: Made) -> None
     assert cells.leaf_count == plain.leaf_count
 
 
+def test_volumes_that_reach_a_little_into_another_room_split_nothing(made: Made) -> None:
+    """Two rooms along a corridor have 0.2 m of it, where their common side would split it."""
+    corridor = room(0, -2.2, 10.2, -0.2)
+    building = carved([WEST, EAST, corridor], [((1, -0.2, 0), (2, 0, 2.1))])
+    rooms = [
+        ("Corridor", box(*corridor)),
+        ("Kitchen", box((0, -0.4, 0), (5.1, 4, 2.8))),
+        ("Bath", box((5.1, -0.4, 0), (10.2, 4, 2.8))),
+    ]
+    scene = made(building, rooms)
+    cells = subdivide(scene, WHOLE)
+    assert cells.leaf_count == subdivide(replace(scene, rooms=()), WHOLE).leaf_count
+    assert name_at(scene, cells, 5, -1, 1) == "Corridor"
+
+
 def test_a_volume_through_a_wall_joins_nothing(made: Made) -> None:
     """It has a metre of the next room, which has no volume of its own, and keeps its walls."""
     scene = made(carved([WEST, EAST], [DOORWAY]), [("Kitchen", box((0, 0, 0), (6.2, 4, 2.8)))])
