@@ -9,8 +9,9 @@ standing leaves join the rooms around them leaf by leaf, through the largest ope
 inside of a door leaf, behind passages, comes last. Openings in the ceiling join no regions.
 
 **Named rooms.** Where the model has volumes of rooms (`room_volumes`), leaves in one volume grow
-together first, and an opening joins them if it is at least `OPEN_WITHIN` of the cross-section: the
-model says that a bay belongs to its room, but a door within a flat still divides. Regions in two
+together first, through openings of at least `OPEN_WITHIN` of the cross-section or larger than a
+double door: the model says that a bay belongs to its room, and that a hall goes on behind a core of
+lifts, but a door within a flat still divides. Regions in two
 volumes never join. Leaves in no volume, such as doorways, join as above. A volume of which no
 region has more than two thirds consists of several rooms, and does not count.
 
@@ -120,6 +121,8 @@ OPEN = 0.7
 #: The same within one volume: a bay is part of its room, but a doorway of 1.9 m² divides unless it
 #: leads into less than 5 m² of cross-section.
 OPEN_WITHIN = 0.4
+#: m²: an opening of this size joins regions in one volume; a double door has 1.8 × 2.1 m.
+LARGE_OPENING = 4.0
 #: A volume is one room if a region has more than this share of its standing leaves.
 ONE_ROOM = 2 / 3
 #: Shares, and gains, are compared in this many significant digits: symmetrical buildings have many
@@ -252,6 +255,8 @@ class _Regions(Groups):
         if (a, b) not in self._opening:
             self._opening[a, b] = self._largest_opening(self.near[a][b])
         share = self._opening[a, b] / min(self._section[a], self._section[b])
+        if self._only_within and self._opening[a, b] >= LARGE_OPENING:
+            share = max(share, OPEN_WITHIN)
         return -float(f"{share:.{DIGITS}g}")
 
     def join(self, a: int, b: int) -> list[tuple[int, int]]:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings, strategies as st
 
 from ptmtools.arrays import Floats
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
@@ -74,6 +75,24 @@ def same(one: Cells, other: Cells) -> bool:
     return first.keys() == second.keys() and all(
         np.array_equal(value, second[name]) for name, value in first.items()
     )
+
+
+def junk(random: np.random.Generator) -> list[tuple[str, Floats]]:
+    """Flat, thin, huge, open, doubled and tangled meshes."""
+    rooms = []
+    for number in range(random.integers(1, 6)):
+        low = random.uniform(-2, 8, 3) * [1, 0.5, 0.2]
+        solid = box(tuple(low), tuple(low + random.choice([1e-9, 0.3, 2, 5, 12], 3)))
+        shapes = (
+            solid,
+            solid[random.random(12) < 0.8],
+            random.normal(4, 3, (random.integers(1, 30), 3, 3)),
+            np.concatenate([solid, solid]),
+            np.concatenate([solid, solid[:, ::-1]]),
+            np.concatenate([solid, solid + 0.5]),
+        )
+        rooms.append((f"Junk {number}", shapes[random.integers(len(shapes))]))
+    return [room for room in rooms if len(room[1])]
 
 
 def test_rooms_have_the_names_of_the_model(made: Made) -> None:
@@ -185,6 +204,15 @@ def test_a_wide_opening_within_a_volume_joins(made: Made) -> None:
     assert (cells.cell_count, cells.rooms) == (1, ("Salon",))
 
 
+def test_a_hall_goes_on_behind_a_core(made: Made) -> None:
+    """Ways of 2 m lead around a core of 6 × 3 m, much narrower than the hall on either side."""
+    core: Box = (2, 8, 0), (8, 11, 2.8)
+    scene = made(carved([room(0, 0, 10, 18)], (), [core]), [("Hall", box(*room(0, 0, 10, 18)))])
+    assert subdivide(replace(scene, rooms=()), WHOLE).cell_count > 1
+    cells = subdivide(scene, WHOLE)
+    assert (cells.cell_count, cells.rooms) == (1, ("Hall",))
+
+
 def test_two_storeys_of_one_plan(made: Made) -> None:
     """Volumes that reach up to the next floor touch through the slab."""
     low, high = room(0, 0, 6, 4, 0, 2.8), room(0, 0, 6, 4, 3, 5.8)
@@ -247,6 +275,18 @@ class TestBad:
         nothing = RoomVolume("Nothing", np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32))
         scene = replace(made(self.BUILDING, []), rooms=(nothing,))
         assert same(subdivide(scene, WHOLE), subdivide(replace(scene, rooms=()), WHOLE))
+
+    @given(st.integers(0, 2**32 - 1))
+    @settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
+    def test_of_any_shape(self, made: Made, seed: int) -> None:
+        """Whatever the volumes are, the rooms have the same walls and the same space."""
+        scene = with_rooms(made(self.BUILDING, []), junk(np.random.default_rng(seed)))
+        cells = subdivide(scene, WHOLE)
+        doorway = 0.2 * 0.9 * LINTEL
+        assert cells.leaf_volumes().sum() == pytest.approx(2 * 5 * 4 * 2.8 + doorway)
+        assert cell_at(scene, cells, 2, 2, 1) != cell_at(scene, cells, 8, 2, 1)
+        again = Cells.from_arrays(cells.to_arrays())
+        assert again.rooms == cells.rooms
 
     def test_overlapping_ones(self, made: Made) -> None:
         """Of two over one room the one counts that has more of it; both keep their own rooms."""
