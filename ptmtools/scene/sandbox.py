@@ -5,7 +5,8 @@ Libraries in C++ trust the sizes that a file declares: an STL file of 134 bytes 
 file, and the size of the file bounds memory and time.
 
 A module with such a reader ends with ``serve(reader)`` under ``__main__``. The reader gets the
-``arguments`` of `run_in_sandbox` as strings and returns a value that JSON can represent.
+``arguments`` of `run_in_sandbox` as strings and returns a value that JSON can represent. Before it
+tries something that it can do without, it may call `reply_so_far`.
 """
 
 from __future__ import annotations
@@ -59,21 +60,27 @@ def run_in_sandbox(
             env={**os.environ, "PYTHONPATH": f"{root}{os.pathsep}{search}" if search else root},
         )
     except subprocess.TimeoutExpired as error:
-        raise unreadable(library, model, f"it did not end in {error.timeout:.0f} s") from None
-    _, mark, text = run.stdout.decode("utf-8", "replace").rpartition(_MARK)
-    try:
-        reply = json.loads(text) if mark else {}
-    except ValueError:
-        reply = {}
-    if not isinstance(reply, dict):
-        reply = {}
+        reply = _last_reply(error.stdout or b"")
+        reason = f"it did not end in {error.timeout:.0f} s"
+    else:
+        reply = _last_reply(run.stdout)
+        reason = f"it ended with status {run.returncode}"
     if "error" in reply:
         kind, fields = reply["error"]
         raise _ERRORS.get(kind, InputError)(**fields)
     if "answer" not in reply:
-        reason = reply.get("fault") or f"it ended with status {run.returncode}"
-        raise unreadable(library, model, reason)
+        raise unreadable(library, model, reply.get("fault") or reason)
     return reply["answer"]
+
+
+def _last_reply(output: bytes) -> dict[str, Any]:
+    """The last complete reply in the output of a child; {} without one."""
+    for text in reversed(output.decode("utf-8", "replace").split(_MARK)[1:]):
+        with suppress(ValueError):
+            reply = json.loads(text.partition("\n")[0])
+            if isinstance(reply, dict):
+                return reply
+    return {}
 
 
 def require(module: str, message: str, remedy: str, file: Path | None = None) -> None:
@@ -107,5 +114,14 @@ def serve(reader: Callable[..., Any]) -> None:
     except Exception as error:  # the libraries share no exception class
         lines = str(error).splitlines() or [type(error).__name__]
         reply = {"fault": lines[0]}
-    print(f"\n{_MARK}{json.dumps(reply)}", flush=True)
+    _send(reply)
     os._exit(0)  # a library may crash while it is unloaded
+
+
+def reply_so_far(answer: Any) -> None:
+    """Replies in case that this process crashes, or exceeds its time, before the reader returns."""
+    _send({"answer": answer})
+
+
+def _send(reply: dict[str, Any]) -> None:
+    print(f"\n{_MARK}{json.dumps(reply)}", flush=True)

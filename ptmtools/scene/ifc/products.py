@@ -22,7 +22,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +35,7 @@ from ptmtools.scene.ifc.spaces import named_rooms, rooms_of
 from ptmtools.scene.messages import pack_source
 from ptmtools.scene.model import Kind, RoomVolume, Storey
 from ptmtools.scene.notes import Findings
-from ptmtools.scene.sandbox import serve, unreadable
+from ptmtools.scene.sandbox import reply_so_far, serve, unreadable
 from ptmtools.scene.source import Rows, Source, SourceMaterial, too_many_triangles
 
 _PLAIN, _DIRECT = "opencascade", "passthrough"
@@ -103,8 +103,14 @@ class Shape:
     material: Ints  # (T,) indices into them
 
 
-def read_products(file: Any, findings: Findings, max_triangles: int) -> Source:
-    """The source of an IfcOpenShell file.
+def read_products(
+    file: Any,
+    findings: Findings,
+    max_triangles: int,
+    before_rooms: Callable[[Source, int], None] = lambda source, spaces: None,
+) -> Source:
+    """The source of an IfcOpenShell file. ``before_rooms`` is called with the source without rooms
+    and the number of spaces, if there are any, before the kernel computes their volumes.
 
     Raises InputError PTM-I247 without geometry, LimitError PTM-L203.
     """
@@ -138,23 +144,25 @@ def read_products(file: Any, findings: Findings, max_triangles: int) -> Source:
             len(rows.names),
         )
         rows.names.append(title_of(shape.product))
-    return rows.source(
+    source = rows.source(
         materials=tuple(numbers),
         metres=None if metres is None else 1.0,
         up="z",
         kinds=tuple(_kind(shape.product) for shape in shapes),
         storeys=storeys(file, metres or 1.0),
-        rooms=_rooms(file, findings),
     )
+    if spaces := rooms_of(file, findings):
+        before_rooms(source, len(spaces))
+        source = replace(source, rooms=_rooms(file, spaces, findings))
+    return source
 
 
-def _rooms(file: Any, findings: Findings) -> tuple[RoomVolume, ...]:
-    """The volumes of the spaces that are rooms; a volume that cannot be computed costs a name."""
-    spaces = rooms_of(file, findings)
+def _rooms(file: Any, spaces: list[Any], findings: Findings) -> tuple[RoomVolume, ...]:
+    """The rooms of spaces; the kernel may fail without harm to the model."""
     meshes: dict[int, tuple[Floats, Ints]] = {}
     ranks: dict[int, tuple[bool, str]] = {}
     with suppress(*FAULTS):
-        for element in elements(file, spaces) if spaces else ():
+        for element in elements(file, spaces):
             rank = _rank(element)
             if element.id not in ranks or rank < ranks[element.id]:
                 shape = _shape(file, element)
@@ -428,7 +436,14 @@ def _open(path: str, findings: Findings) -> Any:
 
 def _read_in_child(scratch: str, model: str, path: str, most: str) -> dict[str, Any]:
     findings = Findings(Path(model))
-    source = read_products(_open(path, findings), findings, int(most))
+
+    def reply_without_rooms(source: Source, spaces: int) -> None:
+        without = Findings(Path(model))
+        without.add_records(findings.records())
+        without.note("PTM-N215", "IfcSpace: no room (IfcOpenShell fails on them)", "", spaces)
+        reply_so_far(pack_source(source, {}, without, scratch))
+
+    source = read_products(_open(path, findings), findings, int(most), reply_without_rooms)
     return pack_source(source, {}, findings, scratch)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
@@ -12,7 +13,7 @@ import pytest
 
 from ptmtools.cells import SubdivideOptions, subdivide
 from ptmtools.cli.main import main
-from ptmtools.scene import Scene, ingest
+from ptmtools.scene import Scene, ingest, sandbox
 from tests.scene.ifc.ifc_house import DEEP, HIGH, STOREY, THICK, WIDE, Ifc, house
 
 SCHEMAS = ("IFC2X3", "IFC4", "IFC4X3")
@@ -132,6 +133,34 @@ def test_a_volume_that_cannot_be_computed_is_no_miss(tmp_path: Path) -> None:
     assert [room.name for room in scene.rooms] == ["Good"]
     assert spaces_left(scene) == {"its volume cannot be computed": 1}
     assert not any(note.code == "PTM-N253" for note in scene.notes)
+
+
+@pytest.mark.parametrize("fault", ["os.abort()", "time.sleep(600)"])
+def test_the_kernel_fails_on_spaces(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: str
+) -> None:
+    """A crash, or an endless loop, costs the rooms only."""
+    made = walled()
+    made.space("1", "Kitchen", LOW, TOP)
+    whole = read(made, tmp_path)
+    child = tmp_path / "python"
+    child.write_text(
+        f"""#!{sys.executable}
+import os, sys, time
+from ptmtools.scene.ifc import products
+from ptmtools.scene.sandbox import serve
+products._rooms = lambda *_: {fault}
+sys.argv = sys.argv[3:]
+serve(products._read_in_child)
+"""
+    )
+    child.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(child))
+    monkeypatch.setattr(sandbox, "_SECONDS", 5.0)
+    scene = read(made, tmp_path)
+    assert np.array_equal(scene.points, whole.points)
+    assert (len(whole.rooms), scene.rooms) == (1, ())
+    assert spaces_left(scene) == {"IfcOpenShell fails on them": 1}
 
 
 def test_an_open_plan(tmp_path: Path) -> None:
