@@ -21,33 +21,33 @@ def unused_notes(volumes: Volumes, before: Ints, after: Ints) -> Iterator[str]:
     rooms = range(len(volumes.rooms))
     empty = [k for k in rooms if not (before == k).any()]
     several = [k for k in rooms if (before == k).any() and not (after == k).any()]
-    for which, reason in ((empty, "no cell lies there"), (several, "several rooms in one")):
+    for which, reason in ((empty, "no cell is mostly inside"), (several, "several rooms in one")):
         if which:
             yield left_out([volumes.rooms[k].name for k in which], reason)
 
 
 def named(cells: Cells, volumes: Volumes, volume: Ints, room: Ints) -> Cells:
-    """Cells with names: those of the volume that most of their room is in.
+    """Cells with names: those of the volume that most of their room is in. A cell of several rooms
+    has the name of one that is most of it.
 
     ``volume``, ``room``: (L,) the volume, -1 for none, and the room that each leaf is in.
     """
     leaf = np.flatnonzero(cells.leaf_cell >= 0)
-    size = (cells.leaf_volumes() * cells.leaf_standing)[leaf]
+    cell, size = cells.leaf_cell[leaf], cells.leaf_volumes()[leaf]
     rooms, row = np.unique(room[leaf], return_inverse=True)
     row = row.reshape(-1)
-    inside = np.zeros((len(rooms), len(volumes.rooms) + 1))
-    np.add.at(inside, (row, volume[leaf]), size)  # the last column: in no volume
+    inside = np.zeros((len(rooms), len(volumes.rooms) + 1))  # the last column: in no volume
+    np.add.at(inside, (row, volume[leaf]), size * cells.leaf_standing[leaf])
     best = inside[:, :-1].argmax(axis=1)
-    most = inside[np.arange(len(rooms)), best]
-    called = [
-        volumes.rooms[k].name if part > _MOST * whole else ""
-        for k, part, whole in zip(best.tolist(), most, inside.sum(axis=1), strict=True)
-    ]
+    most = inside[np.arange(len(rooms)), best] > _MOST * inside.sum(axis=1)
+    called = [volumes.rooms[k].name * bool(m) for k, m in zip(best.tolist(), most, strict=True)]
+    pair, part = np.unique(cell.astype(np.int64) * len(rooms) + row, return_inverse=True)
+    share = np.bincount(part.reshape(-1), size) / np.bincount(cell, size)[pair // len(rooms)]
     number: dict[int, int] = {}
     cell_room = np.full(cells.cell_count, -1, dtype=np.int32)
-    for cell, r in sorted(zip(cells.leaf_cell[leaf].tolist(), row.tolist(), strict=True)):
-        if called[r]:
-            cell_room[cell] = number.setdefault(r, len(number))
+    for k in pair[share > _MOST].tolist():
+        if called[k % len(rooms)]:
+            cell_room[k // len(rooms)] = number.setdefault(k % len(rooms), len(number))
     if not number:
         return cells
     return replace(cells, cell_room=cell_room, rooms=tuple(called[r] for r in number))

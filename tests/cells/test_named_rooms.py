@@ -254,7 +254,7 @@ class TestBad:
             (box((1, 1, 1), (1.5, 1.5, 1.5)), "too small for a visitor"),
             (box((1, 1, 1), (1, 3, 2)), "too small for a visitor"),
             (box((-500, -500, -500), (500, 500, 500)), "larger than the building"),
-            (box((90, 90, 0), (94, 94, 2)), "no cell lies there"),
+            (box((90, 90, 0), (94, 94, 2)), "no cell is mostly inside"),
         ],
     )
     def test_beside_good_ones(self, made: Made, bad: Floats, reason: str) -> None:
