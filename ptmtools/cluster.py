@@ -58,6 +58,7 @@ class Cluster(Executor):
     """
 
     remote = True
+    machines = True
 
     def __init__(self, address: str, workers: int = 0) -> None:
         component("distributed", "PTM-M100", "a cluster needs Dask", "cluster")

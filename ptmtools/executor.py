@@ -68,9 +68,11 @@ class Executor:
     ----------
     workers: number of tasks that run at the same time.
     remote: whether all tasks run in other processes, which may see the disks of this machine.
+    machines: whether these may be on other machines.
     """
 
     remote = False
+    machines = False
 
     @property
     def workers(self) -> int:

@@ -18,6 +18,7 @@ import click
 from ptmtools.cli.console import Console
 from ptmtools.cli.parameters import (
     Command,
+    changed_database_argument,
     cluster_options,
     database_argument,
     force_option,
@@ -38,6 +39,7 @@ from ptmtools.pipeline.stage import Artifacts, Stage
 from ptmtools.pipeline.stages import CELLS, EMIT, PVS, STAGES
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import SERVED
+from ptmtools.store.objects import is_url
 
 if TYPE_CHECKING:
     from ptmtools.pipeline.status import StagePlan
@@ -98,11 +100,14 @@ def _from_model(last: Stage[Any] | None) -> Callable[..., None]:
         """Build a database from MODEL, or bring it up to date.
 
         MODEL is an OBJ, glTF or GLB file, or a file in a format that trimesh, pymeshlab,
-        IfcOpenShell or usd-core reads. The database is a folder. A second run repeats only the
-        stages whose input or options have changed.
+        IfcOpenShell or usd-core reads. The database is a folder. Both may be URLs such as
+        s3://bucket/house.db. A second run repeats only the stages whose input or options have
+        changed.
         """
         options: list[Any] = [take(stage.options, values) for stage in stages]
         if dry_run:
+            if is_url(model) or is_url(db):
+                raise click.UsageError("--dry-run needs a model and a database on this machine")
             from ptmtools.pipeline.status import plan_build
 
             plans = plan_build(model, db, *options, force=force)[: len(stages)]
@@ -130,7 +135,7 @@ def _from_model(last: Stage[Any] | None) -> Callable[..., None]:
 def _of_database(stage: Stage[Any]) -> Callable[..., None]:
     """The function of a command that runs one stage of a database."""
 
-    @database_argument
+    @changed_database_argument
     @options_of(stage.options)
     @cluster_options
     @json_option
@@ -264,7 +269,9 @@ def _print_next_steps(console: Console, database: str) -> None:
     ptm, db = _invoked(), shlex.quote(database)
     console.print("")
     console.print(f"Database: {db}. Next steps:")
-    if all((Path(database) / SERVED / own).exists() for own in GLTF.owns):
+    if is_url(database):
+        first = f"{ptm} publish {db} -o site", "write a web site"
+    elif all((Path(database) / SERVED / own).exists() for own in GLTF.owns):
         first = f"{ptm} serve {db} --open", "walk through it in a browser"
     else:
         first = f"{ptm} emit {db} --format vrml,gltf", "also write the files of `ptm serve`"

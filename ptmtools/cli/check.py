@@ -19,6 +19,7 @@ from ptmtools.cli.parameters import (
     jobs_option,
     json_option,
     limit_option,
+    local_copy,
     option,
     options_of,
     output_option,
@@ -51,7 +52,7 @@ def _print_codes(context: click.Context, option: click.Option, given: bool) -> N
 
 
 @click.command("validate", cls=Command)
-@click.argument("target", metavar="FILE|DB", type=click.Path())
+@click.argument("target", metavar="FILE|DB", type=click.Path(), callback=local_copy)
 @option(
     "--segments",
     type=click.IntRange(0),

@@ -14,7 +14,6 @@ import typing
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import Field, fields
 from functools import partial, wraps
-from pathlib import Path
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, get_args, get_origin
 
@@ -360,7 +359,29 @@ json_option = option(
     help="Print the report as JSON.",
 )
 
-database_argument = click.argument("db", type=click.Path())
+
+def local_copy(context: click.Context, parameter: click.Parameter, value: str) -> str:
+    """The folder of a database, for one at a URL that of its copy."""
+    from ptmtools.store.objects import is_url, plain_path
+
+    if not is_url(plain_path(value)):
+        return os.fspath(plain_path(value))
+    from ptmtools.store.remote import fetch_database
+
+    return os.fspath(fetch_database(value))
+
+
+def _folder_alone(context: click.Context, parameter: click.Parameter, value: str) -> str:
+    from ptmtools.store.objects import is_url
+
+    if is_url(value):
+        raise click.BadParameter(f"{value} is a URL, which only `ptm build-scene` writes to")
+    return value
+
+
+database_argument = click.argument("db", type=click.Path(), callback=local_copy)
+#: A database that the command changes.
+changed_database_argument = click.argument("db", type=click.Path(), callback=_folder_alone)
 
 
 def output_option(text: str, variable: str = "output", **settings: Any) -> Decorator:
@@ -441,7 +462,7 @@ def new_database_option(function: Function) -> Function:
     def command(*arguments: Any, model: str, db: str | None, **values: Any) -> Any:
         if not model or db == "":
             raise click.UsageError("a name is empty")
-        place = os.fspath(Path(model).with_suffix(".db")) if db is None else db
+        place = os.path.splitext(model)[0] + ".db" if db is None else db
         return function(*arguments, model=model, db=place, **values)
 
     return command

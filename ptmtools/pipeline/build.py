@@ -11,6 +11,7 @@ import os
 import time
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,8 @@ from ptmtools.pipeline.report import BuildReport, Visitor, peak_memory
 from ptmtools.pipeline.stage import Options, Run, Stage
 from ptmtools.pipeline.stages import EMIT, STAGES
 from ptmtools.progress import Progress, silent
+from ptmtools.store.objects import is_url, plain_path
+from ptmtools.store.remote import RemoteDatabase, fetch_model, naming_url
 from ptmtools.store.writer import DatabaseWriter
 
 PathLike = str | os.PathLike[str]
@@ -48,6 +51,7 @@ def build_scene(
 
     Parameters
     ----------
+    model, db: paths, or URLs such as ``s3://bucket/prefix``, see `ptmtools.store.remote`.
     options: of stages, such as ``IngestOptions(unit="cm")``; other stages have their defaults.
     until: the last stage to run; all by default.
     workers, scheduler: of the executor, see `open_executor`. They do not change the result.
@@ -61,20 +65,33 @@ def build_scene(
     OutputError, DatabaseError: the database is wrong, from `DatabaseWriter`.
     """
     start = time.perf_counter()
-    if not Path(model).is_file():
-        from ptmtools.scene.ingestion import check_file
-
-        check_file(Path(model))
     stages = list(STAGES.values())
     if until:
         stages = stages[: stages.index(until) + 1]
     chosen = chosen_options(options)
-    with (
-        DatabaseWriter.open_for_model(db, Path(model).name, force=force) as writer,
-        Workers(workers, scheduler) as used,
-    ):
-        run = Run(writer, used, progress, Path(model), rebuild=rebuild)
-        return _run(run, stages, chosen, start, tell)
+    with ExitStack() as stack:
+        model, db = plain_path(model), plain_path(db)
+        file, folder, remote = Path(model), Path(db), None
+        if is_url(model):
+            file = fetch_model(str(model))
+            stack.enter_context(naming_url(str(model).rpartition("/")[0], file.parent))
+        if not file.is_file():
+            from ptmtools.scene.ingestion import check_file
+
+            check_file(file)
+        if is_url(db):
+            remote = RemoteDatabase(str(db))
+            folder = remote.folder
+            stack.enter_context(naming_url(remote.url, folder))
+            remote.fetch(force=force)
+        writer = stack.enter_context(DatabaseWriter.open_for_model(folder, file.name, force=force))
+        used = stack.enter_context(Workers(workers, scheduler))
+        run = Run(writer, used, progress, file, rebuild=rebuild, remote=remote)
+        report = _run(run, stages, chosen, start, tell)
+        if remote is None:
+            return report
+        remote.commit()
+        return replace(report, database=remote.url, seconds=time.perf_counter() - start)
 
 
 def run_stage(

@@ -4,7 +4,8 @@
 others, that see the disk of the database: only names and digests travel. (Sending the bytes of
 images and textures limits the building process to eight workers, docs/design/scaling.md.) A worker
 writes to a folder with a new name in every run, so one that an interrupted run has left behind
-writes nowhere.
+writes nowhere. `encoded_at_url` is for machines without a shared disk: they read and write objects
+at the URL of the database.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
@@ -25,6 +27,7 @@ from ptmtools.texture.previews import FORMATS, Preview, PreviewOptions
 
 if TYPE_CHECKING:
     from ptmtools.executor import Executor
+    from ptmtools.store.remote import RemoteDatabase
     from ptmtools.store.transaction import Transaction
     from ptmtools.texture.images import Picture
     from ptmtools.texture.model import PtmHeader
@@ -235,6 +238,40 @@ def encoded_on_disk(disk: SharedDisk, image: ImageTask) -> list[tuple[str, str, 
         file = Path(disk.out, f"{image.stem}-{number}")
         write_bytes(file, data, force=True)
         files.append((name, str(file), sha256(data)))
+    return files
+
+
+@dataclass(frozen=True)
+class SharedUrl:
+    """The options of all tasks, and the URL of the database."""
+
+    options: TextureOptions
+    url: str
+
+    @cached_property
+    def database(self) -> RemoteDatabase:
+        """The database, of which a worker uses the objects alone."""
+        from ptmtools.store.remote import RemoteDatabase
+
+        return RemoteDatabase(self.url)
+
+    def __getstate__(self) -> dict[str, object]:
+        return {"options": self.options, "url": self.url}
+
+
+def encoded_at_url(place: SharedUrl, image: ImageTask) -> list[tuple[str, str]]:
+    """Reads the object of an image, and writes the results of `encoded_image` as objects: (name,
+    SHA-256) of each.
+
+    Raises as that, and as `RemoteDatabase`.
+    """
+    data = place.database.read(image.sha256)
+    results = encoded_image(place.options, ImageFile(image.name, data, image.unresolved))
+    files = []
+    for name, output in results:
+        digest = sha256(output)
+        place.database.write(digest, output)
+        files.append((name, digest))
     return files
 
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from ptmtools.parallel import Workers
     from ptmtools.store.folder import DatabaseFolder
     from ptmtools.store.manifest import StageRecord
+    from ptmtools.store.remote import RemoteDatabase
     from ptmtools.store.transaction import Transaction
     from ptmtools.store.writer import DatabaseWriter
 
@@ -290,9 +291,12 @@ class Run(Artifacts):
         model: Path | None = None,
         *,
         rebuild: bool = False,
+        remote: RemoteDatabase | None = None,
     ) -> None:
         super().__init__(db, model)
         self.writer, self.workers, self.progress, self.rebuild = db, workers, progress, rebuild
+        #: The URL whose copy the database is.
+        self.remote = remote
         self.reports: list[StageReport] = []
         self._joint: Transaction | None = None
         self._uncommitted: dict[str, StageRecord] = {}

@@ -46,7 +46,7 @@ from ptmtools.site.published import (
 from ptmtools.site.uploading import upload
 from ptmtools.store.folder import damaged
 from ptmtools.store.layout import sha256
-from ptmtools.store.objects import is_url, local_path
+from ptmtools.store.objects import is_url, plain_path
 
 #: Texels of the longer side up to which the textures of a room count in `Weight`.
 COARSE = 64
@@ -74,11 +74,9 @@ def publish(
     DatabaseError: PTM-D005, D006 a file of the database is missing or damaged.
     """
     options = options or PublishOptions()
+    target = plain_path(target)
     if is_url(target):
-        path = local_path(str(target))
-        if path is None:
-            return upload(site, str(target), options, force=force, progress=progress)
-        target = path
+        return upload(site, str(target), options, force=force, progress=progress)
     root = Path(target)
     before = _checked(root, force)
     files = dict(plain_files(site, options))

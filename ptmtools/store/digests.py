@@ -38,7 +38,7 @@ class Digests:
 
     def __init__(self, database: Path) -> None:
         name = hashlib.sha256(os.fsencode(database.absolute())).hexdigest()[:32]
-        folder = _cache_folder()
+        folder = cache_folder("digests")
         self._file = None if folder is None else folder / f"{name}.json"
         self._known: dict[str, tuple[Stamp, str]] = {}
         self._written: dict[str, tuple[Stamp, str]] = {}
@@ -112,10 +112,11 @@ def _settled(stamp: Stamp, now: int) -> bool:
     return max(stamp[2:]) + tick < now
 
 
-def _cache_folder() -> Path | None:
+def cache_folder(kind: str) -> Path | None:
+    """The user's folder for caches of a kind; None without a home."""
     # Not Path.home, which raises for a user without a home.
     caches = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
-    return caches / "ptmtools" / "digests" if caches.is_absolute() else None
+    return caches / "ptmtools" / kind if caches.is_absolute() else None
 
 
 def _forget_old(folder: Path) -> None:

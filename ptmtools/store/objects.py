@@ -62,11 +62,13 @@ class Kind:
     ----------
     arguments: the headers as arguments of fsspec's calls.
     version, md5: of a row of a listing, see `Held`.
+    condition: that an object still has a version, or with "" that there is none, as arguments.
     """
 
     arguments: Callable[[Headers], dict[str, Any]]
     version: Callable[[Mapping[str, Any]], str]
     md5: Callable[[Mapping[str, Any]], str]
+    condition: Callable[[str], dict[str, Any]]
 
 
 def _s3_arguments(headers: Headers) -> dict[str, Any]:
@@ -92,8 +94,17 @@ def _gs_md5(row: Mapping[str, Any]) -> str:
     return base64.b64decode(row.get("md5Hash", "")).hex()
 
 
-_S3 = Kind(_s3_arguments, lambda row: str(row.get("ETag", "")).strip('"'), _s3_md5)
-_GS = Kind(_gs_arguments, lambda row: str(row.get("generation", "")), _gs_md5)
+def _s3_condition(version: str) -> dict[str, Any]:
+    return {"IfMatch": version} if version else {"IfNoneMatch": "*"}
+
+
+def _gs_condition(version: str) -> dict[str, Any]:
+    """gcsfs has no condition for objects that exist."""
+    return {} if version else {"mode": "create"}
+
+
+_S3 = Kind(_s3_arguments, lambda row: str(row.get("ETag", "")).strip('"'), _s3_md5, _s3_condition)
+_GS = Kind(_gs_arguments, lambda row: str(row.get("generation", "")), _gs_md5, _gs_condition)
 #: Stores whose objects have headers, by the protocol of their URLs.
 KINDS = {"s3": _S3, "s3a": _S3, "gs": _GS, "gcs": _GS}
 
@@ -103,14 +114,19 @@ def is_url(target: str | os.PathLike[str]) -> bool:
     return isinstance(target, str) and bool(_URL.match(target))
 
 
-def local_path(url: str) -> str | None:
-    """The path of a URL of this machine's files, ``file:///path``; None for others."""
-    parts = urlsplit(url)
-    return unquote(parts.path) if parts.scheme in ("file", "local") else None
+def plain_path(target: str | os.PathLike[str]) -> str | os.PathLike[str]:
+    """The path that a URL of this machine's files names, ``file:///path``; else the target."""
+    if is_url(target):
+        parts = urlsplit(str(target))
+        if parts.scheme in ("file", "local"):
+            return unquote(parts.path)
+    return target
 
 
 class Objects:
     """The objects below a URL. All methods may be called from several threads.
+
+    ``reading``: they are an input, so that failures are InputErrors PTM-I122.
 
     Raises
     ------
@@ -118,8 +134,9 @@ class Objects:
     MissingComponentError: PTM-M100 a package is not installed.
     """
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, *, reading: bool = False) -> None:
         self.url = url.rstrip("/")
+        self._reading = reading
         fsspec = component("fsspec", "PTM-M100", f"{url}: object stores need fsspec", "cloud")
         protocol, _, place = url.partition("://")
         if not place.strip("/"):
@@ -169,9 +186,14 @@ class Objects:
         with self._asking("cannot be read", name):
             return bytes(self._system.cat_file(self._path(name)))
 
-    def write(self, name: str, source: bytes | Path, headers: Headers) -> None:
-        """Writes an object whole, or not at all; replaces one of the same name."""
+    def write(
+        self, name: str, source: bytes | Path, headers: Headers, *, instead_of: str | None = None
+    ) -> None:
+        """Writes an object whole, or not at all; replaces one of the same name, and with
+        ``instead_of`` only one of that version, "" for none, where the store can check that."""
         arguments = self.kind.arguments(headers) if self.kind else {}
+        if self.kind and instead_of is not None:
+            arguments |= self.kind.condition(instead_of)
         with self._asking("cannot be written", name):
             if isinstance(source, bytes):
                 self._system.pipe_file(self._path(name), source, **arguments)
@@ -196,9 +218,12 @@ class Objects:
             raise
         except Exception as fault:
             reason = str(fault) or type(fault).__name__
-            raise OutputError(
-                "PTM-O012",
-                f"{what} ({reason})",
-                file=f"{self.url}/{name}" if name else self.url,
-                remedy="check the URL, the credentials and their rights, and the connection",
-            ) from fault
+            file = f"{self.url}/{name}" if name else self.url
+            raise self.failure(f"{what} ({reason})", file) from fault
+
+    def failure(self, what: str, file: str) -> PtmError:
+        """The error that something fails."""
+        remedy = "check the URL, the credentials and their rights, and the connection"
+        if self._reading:
+            return InputError("PTM-I122", what, file=file, remedy=remedy)
+        return OutputError("PTM-O012", what, file=file, remedy=remedy)

@@ -210,12 +210,12 @@ def _complete(folder: Path, relative: str) -> None:
                 source.replace(real_folder(folder, parent) / base)
         for name in before.outputs() if before else ():
             if name not in after:
-                _remove(folder, name)
+                remove_output(folder, name)
         (staging / MANIFEST).replace(folder / MANIFEST)
         shutil.rmtree(staging)  # not its parent, where another transaction may begin
 
 
-def _remove(folder: Path, name: str) -> None:
+def remove_output(folder: Path, name: str) -> None:
     """Removes an obsolete output, and the folders that this empties."""
     file = real_file(folder, name)
     if file is None:

@@ -16,6 +16,7 @@ import json
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from itertools import takewhile
 from pathlib import Path
@@ -25,7 +26,9 @@ from ptmtools.errors import naming
 from ptmtools.pipeline.encoding import (
     ImageFile,
     ImageTask,
+    SharedUrl,
     TextureOptions,
+    encoded_at_url,
     encoded_image,
     encoded_on_disk,
     ptm_file,
@@ -48,10 +51,13 @@ if TYPE_CHECKING:
     from ptmtools.executor import Executor
     from ptmtools.parallel import BackgroundLoop
     from ptmtools.store.manifest import StageRecord
+    from ptmtools.store.remote import RemoteDatabase
     from ptmtools.store.transaction import Transaction
     from ptmtools.texture.model import PtmHeader
     from ptmtools.texture.previews import Steps
 
+#: Objects that are sent, and textures that are fetched, at a time.
+OBJECTS_AHEAD = 8
 #: Largest number of images in one message to a worker; a message costs a few ms.
 IMAGES_PER_MESSAGE = 4
 
@@ -299,13 +305,20 @@ class TexturesJob(Job):
         start, transaction = time.perf_counter(), self._transaction
         total, images, fewer = len(self._names), images_of(self.run), self._fewer
         wanted = takewhile(lambda _: stop is None or not stop.is_set(), tuple(self._left))
-        with shared_disk(transaction, self.run.db.path, self.options, executor) as disk:
+        chunk = max(1, min(IMAGES_PER_MESSAGE, len(self._left) // (8 * executor.workers)))
+        remote = self.run.remote if executor.machines else None
+        with ExitStack() as stack:
             results: Iterator[Sequence[tuple[str, bytes] | tuple[str, str, str]]]
-            if disk is None:
+            disk = None
+            if remote is None:
+                path = self.run.db.path
+                disk = stack.enter_context(shared_disk(transaction, path, self.options, executor))
+            if remote is not None:
+                results = self._encoded_at_url(remote, executor, wanted, chunk)
+            elif disk is None:
                 sources = (ImageFile(images[i].name, images[i].load(), fewer[i]) for i in wanted)
                 results = executor.each(encoded_image, self.options, sources, releases_lock=True)
             else:
-                chunk = max(1, min(IMAGES_PER_MESSAGE, len(self._left) // (8 * executor.workers)))
                 tasks = (
                     ImageTask(images[i].name, images[i].sha256, str(i), fewer[i]) for i in wanted
                 )
@@ -323,6 +336,26 @@ class TexturesJob(Job):
                 transaction.finish(self._task(self._left.popleft()), names)
         self.run.progress(total - len(self._left), total, "textures")
         self._seconds += time.perf_counter() - start
+
+    def _encoded_at_url(
+        self, remote: RemoteDatabase, executor: Executor, wanted: Iterable[int], chunk: int
+    ) -> Iterator[list[tuple[str, bytes]]]:
+        """The files of textures that workers have encoded from and to objects at the URL."""
+        from ptmtools.parallel import ordered
+
+        images = images_of(self.run)
+
+        def sent(i: int) -> ImageTask:
+            remote.provide(images[i].sha256, images[i].load)
+            return ImageTask(images[i].name, images[i].sha256, str(i), self._fewer[i])
+
+        def fetched(files: list[tuple[str, str]]) -> list[tuple[str, bytes]]:
+            return [(name, remote.read(digest)) for name, digest in files]
+
+        place = SharedUrl(self.options, remote.url)
+        tasks = ordered(sent, wanted, OBJECTS_AHEAD)
+        encoded = executor.each(encoded_at_url, place, tasks, releases_lock=True, chunk=chunk)
+        yield from ordered(fetched, encoded, OBJECTS_AHEAD)
 
     def _task(self, i: int) -> str:
         """A digest of everything that the files of a texture depend on, their names included."""
