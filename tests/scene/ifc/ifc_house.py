@@ -233,3 +233,38 @@ def house(ifc: Ifc, storeys: Sequence[str] = ("Ground floor", "Upper floor")) ->
     line = ifc.file.create_entity("IfcPolyline", [ifc.point(0, 0, 0), ifc.point(1, 0, 0)])
     ifc.represent(note, line, "Curve3D", "Annotation")
     return ifc
+
+
+#: Of the office: from one room to the next along the corridor, and the height of the ceilings.
+BAY, CEILING = 4.2, 2.6
+
+
+def office(ifc: Ifc, columns: int = 3) -> Ifc:
+    """A corridor with rooms on both sides behind doors, under suspended ceilings. Spaces end in the
+    middle of walls; between the last two in the north there is none."""
+    long, t, top = BAY * columns - THICK, THICK, HIGH + 0.3
+    at = ifc.storey("Level 1", 0)
+    for name, low in (("Slab", -t), ("Roof", top)):
+        ifc.box("IfcSlab", name, (-t, -5.4, low), (long + t, 7.4, low + t), at)
+    for y in (-5.4, 7.2):
+        ifc.box("IfcWall", "Long", (-t, y, 0), (long + t, y + t, top), at)
+    for x in (-t, long):
+        ifc.box("IfcWall", "End", (x, -5.2, 0), (x + t, 7.2, top), at)
+    for y in (-t, 2.0):
+        wall = ifc.box("IfcWall", "Corridor", (0, y, 0), (long, y + t, top), at)
+        for x in (BAY * k + 1 for k in range(columns)):
+            ifc.opening(wall, (x, y - 0.1, 0), (x + 0.9, y + t + 0.1, 2.1), at)
+            ifc.box("IfcDoor", "Leaf", (x, y + 0.08, 0), (x + 0.9, y + 0.13, 2.1), at)
+    ifc.box("IfcCovering", "Ceiling", (0, 0, CEILING), (long, 2, CEILING + 0.03), at)
+    half = t / 2
+    ifc.space("0", "Corridor", (-half, -half, 0), (long + half, 2 + half, CEILING), at)
+    for number in range(2 * columns):
+        k, north = divmod(number, 2)
+        x, y = BAY * k, 2.2 if north else -5.2
+        if k and not (north and k == columns - 1):
+            ifc.box("IfcWall", "Party", (x - t, y, 0), (x, y + 5, top), at)
+        gap = BAY - 4 if north and k == columns - 2 else 0.0
+        ifc.box("IfcCovering", "Ceiling", (x, y, CEILING), (x + 4 + gap, y + 5, CEILING + 0.03), at)
+        low, high = (x - half, y - half, 0), (x + 4 + half, y + 5 + half, CEILING)
+        ifc.space(str(number + 1), "Office", low, high, at)
+    return ifc

@@ -14,7 +14,7 @@ import pytest
 from ptmtools.cells import SubdivideOptions, subdivide
 from ptmtools.cli.main import main
 from ptmtools.scene import Scene, ingest, sandbox
-from tests.scene.ifc.ifc_house import DEEP, HIGH, STOREY, THICK, WIDE, Ifc, house
+from tests.scene.ifc.ifc_house import DEEP, HIGH, STOREY, THICK, WIDE, Ifc, house, office
 
 SCHEMAS = ("IFC2X3", "IFC4", "IFC4X3")
 LOW, TOP = (0, 0, 0), (4, 3, 2.5)
@@ -135,32 +135,49 @@ def test_a_volume_that_cannot_be_computed_is_no_miss(tmp_path: Path) -> None:
     assert not any(note.code == "PTM-N253" for note in scene.notes)
 
 
-@pytest.mark.parametrize("fault", ["os.abort()", "time.sleep(600)"])
-def test_the_kernel_fails_on_spaces(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: str
-) -> None:
-    """A crash, or an endless loop, costs the rooms only."""
+def test_the_kernel_crashes_on_spaces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """That costs the rooms only."""
     made = walled()
     made.space("1", "Kitchen", LOW, TOP)
     whole = read(made, tmp_path)
-    child = tmp_path / "python"
-    child.write_text(
-        f"""#!{sys.executable}
-import os, sys, time
+    crashing = """
+import os
 from ptmtools.scene.ifc import products
 from ptmtools.scene.sandbox import serve
-products._rooms = lambda *_: {fault}
+products._rooms = lambda *_: os.abort()
 sys.argv = sys.argv[3:]
 serve(products._read_in_child)
 """
-    )
-    child.chmod(0o755)
-    monkeypatch.setattr(sys, "executable", str(child))
-    monkeypatch.setattr(sandbox, "_SECONDS", 5.0)
+    monkeypatch.setattr(sys, "executable", program(tmp_path, crashing))
     scene = read(made, tmp_path)
     assert np.array_equal(scene.points, whole.points)
     assert (len(whole.rooms), scene.rooms) == (1, ())
     assert spaces_left(scene) == {"IfcOpenShell fails on them": 1}
+
+
+@pytest.mark.parametrize("end", ["time.sleep(600)", "sys.exit(1)", "print('{', flush=True)"])
+def test_the_last_reply_of_a_child_counts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, end: str
+) -> None:
+    """Also if it crashes later, or exceeds its time."""
+    replies = f"""
+import time
+from ptmtools.scene.sandbox import reply_so_far
+reply_so_far(1)
+reply_so_far([2])
+{end}
+"""
+    monkeypatch.setattr(sys, "executable", program(tmp_path, replies))
+    monkeypatch.setattr(sandbox, "_SECONDS", 3.0)
+    assert sandbox.run_in_sandbox("module", "library", tmp_path / "python") == [2]
+
+
+def program(folder: Path, source: str) -> str:
+    """A program that runs instead of Python."""
+    file = folder / "python"
+    file.write_text(f"#!{sys.executable}\nimport sys\n{source}")
+    file.chmod(0o755)
+    return str(file)
 
 
 def test_an_open_plan(tmp_path: Path) -> None:
@@ -183,6 +200,19 @@ def test_an_open_plan(tmp_path: Path) -> None:
     named = {cells.room_name(c): v for c, v in enumerate(cells.cell_volumes().tolist())}
     assert named == pytest.approx({"Kitchen": 3 * 4 * 2.8, "Living": 5 * 4 * 2.8})
     assert subdivide(scene, SubdivideOptions(gain=1.0, spaces="none")).cell_count == 1
+
+
+def test_an_office_has_a_cell_for_each_space(tmp_path: Path) -> None:
+    """Without its spaces, the last two rooms in the north are one; with them there may be half as
+    many cells again."""
+    scene = read(office(Ifc()), tmp_path)
+    names = ["Corridor", *(f"Office {k}" for k in range(1, 7))]
+    assert [room.name for room in scene.rooms] == names
+    plain = subdivide(scene, SubdivideOptions(spaces="none"))
+    cells = subdivide(scene)
+    assert (plain.cell_count, plain.rooms) == (len(names) - 1, ())
+    assert sorted(cells.rooms) == sorted(names)
+    assert len(names) <= cells.cell_count <= 1.5 * len(names)
 
 
 def test_a_build_names_viewpoints_and_cells(tmp_path: Path) -> None:
