@@ -32,7 +32,7 @@ from ptmtools.cells.polyhedron import Polyhedron, clip_polygon, cut, section
 from ptmtools.cells.split_planes import DoorPlanes, Reveals
 from ptmtools.cells.structure import Structure, WallPlane
 from ptmtools.progress import Progress
-from ptmtools.tolerance import TIE_SHARE, Tolerance
+from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
 
 OCCLUSION_WEIGHT = 0.5
 BALANCE_WEIGHT = 0.3
@@ -41,6 +41,8 @@ SPLIT_WEIGHT = 0.2
 FRAGMENT_SHARE = 0.01
 #: Up to this many fragments of a node are tested by their corners, more by their boxes first.
 _FEW = 64
+#: Up to this many pairs of a plane and a fragment are compared in a node.
+_PAIRS = 1 << 21
 #: Sources of splits, in this order.
 _WALLS, _REVEALS, _DOORS, _CAPS = range(4)
 
@@ -264,7 +266,8 @@ def _best_split(
         return -1
     extents = _Extents(fragments)
     best, best_score = -1, -np.inf
-    for i, f in enumerate(fragments):
+    for i in _candidates(fragments):
+        f = fragments[i]
         if f.area < (1 - TIE_SHARE) * least:
             continue
         plane = f.wall.frame.plane
@@ -286,6 +289,15 @@ def _best_split(
         if score > best_score + TIE_SHARE:
             best, best_score = i, score
     return best
+
+
+def _candidates(fragments: list[_Fragment]) -> list[int]:
+    """The fragments, ascending, whose planes are compared: all, or the largest of very many."""
+    count = len(fragments)
+    if count * count <= _PAIRS:
+        return list(range(count))
+    order = ranked(np.array([f.area for f in fragments]))
+    return sorted(order[: max(_FEW, _PAIRS // count)].tolist())
 
 
 def _closes(

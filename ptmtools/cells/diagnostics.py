@@ -44,6 +44,16 @@ def detail_notes(scene: Scene, detail: Ints) -> list[str]:
     ]
 
 
+def facet_notes(facets: int) -> list[str]:
+    """The note on planes of a scanned surface."""
+    if not facets:
+        return []
+    return [
+        f"{facets:,} flat pieces lean in all directions, like a scan or terrain, and do not divide "
+        "space"
+    ]
+
+
 #: The state of a door leaf that visitors pass, as a note describes it.
 _OPEN: dict[DoorState, str] = {
     "pass": "passable: visitors walk through, but do not see through; --doors open changes that",

@@ -41,6 +41,7 @@ from ptmtools.cells.structure import (
     Structure,
     Surroundings,
     WallPlane,
+    built,
     find_walls,
     spread_over,
 )
@@ -71,6 +72,7 @@ class Building:
     options: SubdivideOptions
     volumes: Volumes = field(default_factory=Volumes)
     contacts: tuple[Contact, ...] = ()  # of the volumes
+    facets: int = 0  # planes of a scanned surface, which do not split
 
     @staticmethod
     def of(scene: Scene, options: SubdivideOptions) -> Building:
@@ -78,7 +80,8 @@ class Building:
         opaque = Opaque.of(scene, options)
         structure = Structure.of(opaque, tolerance)
         doors, structure = Doors.recognise(scene, opaque, structure, options)
-        walls = find_walls(structure, options.wall_area)
+        every = find_walls(structure, options.wall_area)
+        walls = built(every)
         reveals = Reveals(structure, options.wall_thickness)
         detail = detail_of(scene, structure, options)
         floors = footing = Floors.of(scene, detail)
@@ -101,6 +104,7 @@ class Building:
             options,
             volumes,
             touching,
+            len(every) - len(walls),
         )
 
     @property

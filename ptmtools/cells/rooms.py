@@ -15,25 +15,13 @@ lifts, but a door within a flat still divides. Regions in two
 volumes never join. Leaves in no volume, such as doorways, join as above. A volume of which no
 region has more than two thirds consists of several rooms, and does not count.
 
-**Cells.** A room is one cell, unless dividing it saves its viewers more than
-`SubdivideOptions.gain` of their download. With v the volume of a leaf (the frequency of viewers in
-it), w the area of the surfaces in it (their cost) and S the leaves that it sees (`sight`), a group
-G of leaves costs
-
-    apart     Σ v·w(S) + w·v(S)  over the leaves of G
-    together  v(G)·w(∪S) + w(G)·v(∪S)
-
-and the **gain** of dividing it is 1 - apart / together. Groups are joined in the order of the gain
-of dividing the two, as long as it is less than the threshold. Leaves without standing room come
-last: the pair that adds least to the cost of all groups is joined first, until half of the
-threshold has been added. Cells never reach through a door.
+**Cells.** A room is one cell, unless dividing it gains enough (`gain`). Cells never reach through a
+door.
 """
 
 from __future__ import annotations
 
 import heapq
-from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -42,6 +30,8 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.file_order import leaf_of_cell, rank_in_file, sides
+from ptmtools.cells.gain import gain_of, join_by_gain
+from ptmtools.cells.groups import DIGITS, Groups
 from ptmtools.cells.model import Cells
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry
@@ -52,70 +42,6 @@ from ptmtools.cells.sight import from_places, sampled_sight
 from ptmtools.diagnostics import Warned
 from ptmtools.tolerance import TIE_SHARE
 
-
-class Groups(ABC):
-    """Groups of leaves, each named by one of its leaves, initially of one leaf each.
-
-    Attributes
-    ----------
-    near: for each group its neighbours, each with the portals between the two.
-    """
-
-    def __init__(self, count: int, pairs: NDArray[np.integer]) -> None:
-        """``pairs``: (K, 2) the leaves on both sides of each portal."""
-        self.near: list[dict[int, list[int]]] = [{} for _ in range(count)]
-        self._parent = np.arange(count)
-        for k, (a, b) in enumerate(pairs.tolist()):
-            if a != b:
-                self.near[a].setdefault(b, []).append(k)
-                self.near[b][a] = self.near[a][b]
-
-    @abstractmethod
-    def cost(self, a: int, b: int) -> float:
-        """The cost of joining two adjacent groups, the lower one first; rounded, so that last
-        digits do not decide the order."""
-
-    def join(self, a: int, b: int) -> list[tuple[int, int]]:
-        """Adds b to a; returns the pairs that are new or may cost less than before."""
-        self._parent[b] = a
-        changed, self.near[b] = self.near[b], {}
-        del changed[a], self.near[a][b]
-        for c, portals in changed.items():
-            del self.near[c][b]
-            both = [*self.near[a].get(c, ()), *portals]
-            self.near[a][c] = self.near[c][a] = both
-        return [(a, c) for c in changed]
-
-    def grown(self, joins: Callable[[float], bool]) -> Ints:
-        """(L,) the group of each leaf, once all pairs are joined whose cost ``joins``; equally
-        cheap ones in the order of their names."""
-        waiting: list[tuple[float, int, int]] = []
-        latest: dict[tuple[int, int], float] = {}
-
-        def put(a: int, b: int) -> None:
-            pair = (min(a, b), max(a, b))
-            latest[pair] = self.cost(*pair)
-            heapq.heappush(waiting, (latest[pair], *pair))
-
-        for a, near in enumerate(self.near):
-            for b in near:
-                if a < b:
-                    put(a, b)
-        while waiting and joins(waiting[0][0]):
-            cost, a, b = heapq.heappop(waiting)
-            if b not in self.near[a] or cost != latest[a, b]:
-                continue
-            if cost != self.cost(a, b):  # one of them has grown meanwhile
-                put(a, b)
-                continue
-            for pair in self.join(a, b):
-                put(*pair)
-        result = self._parent
-        while not np.array_equal(result, result[result]):
-            result = result[result]
-        return result
-
-
 #: An opening joins two regions if it is at least this share of the narrower one's cross-section.
 OPEN = 0.7
 #: The same within one volume: a bay is part of its room, but a doorway of 1.9 m² divides unless it
@@ -125,9 +51,6 @@ OPEN_WITHIN = 0.4
 LARGE_OPENING = 4.0
 #: A volume is one room if a region has more than this share of its standing leaves.
 ONE_ROOM = 2 / 3
-#: Shares, and gains, are compared in this many significant digits: symmetrical buildings have many
-#: equal ones, which rounding must not order, not even that of a sliver far from the origin.
-DIGITS = 4
 #: Pairs of portals that are compared at a time.
 AT_ONCE = 2048
 
@@ -340,104 +263,6 @@ def _distance(points: Floats, polygon: Floats) -> Floats:
     return np.asarray(nearest.min(axis=(1, 2)))
 
 
-#: Joining leaves without viewers may add this share of the threshold to the whole download.
-ATTACHED = 0.5
-
-
-def join_by_gain(
-    sees: Bools,
-    volume: Floats,
-    area: Floats,
-    pairs: NDArray[np.integer],
-    gain: float,
-    above: NDArray[np.integer] | None = None,
-) -> Ints:
-    """(L,) for each leaf the leaf that stands for its group.
-
-    Parameters
-    ----------
-    sees: (L, L) symmetric, visibility between leaves.
-    volume, area: (L,) of a leaf, m³ in which viewers are, and of the surfaces in it, m².
-    pairs: (n, 2) leaves through whose portals groups may grow.
-    gain: threshold, 0 to 1, of the gain of dividing a group.
-    above: (m, 2) leaves through whose portals only groups with viewers may grow.
-    """
-    every = np.stack([volume, area], axis=1)
-    more = pairs if above is None else np.concatenate([pairs, above])
-    parted = _Parted(sees.copy(), every.copy(), every, more)
-    group = parted.grown(lambda gained: gained < gain)
-    attached = _Attached(parted.sees, parted.own, every, group[pairs])
-    return attached.grown_by(ATTACHED * gain)[group]
-
-
-class _Costs(Groups):
-    """Groups and their costs."""
-
-    def __init__(self, sees: Bools, own: Floats, every: Floats, pairs: NDArray[np.integer]) -> None:
-        """``sees``: (L, L) which leaves a group sees; ``own``: (L, 2) its volume and area,
-        ``every``: those of the leaves. The first two change as groups grow, and a group that
-        has joined another has nothing."""
-        super().__init__(len(sees), pairs)
-        self.sees, self.own, self.every = sees, own, every
-        self.before = [self.of(row, each) for row, each in zip(sees, own, strict=True)]
-
-    def together(self, a: int, b: int) -> float:
-        """The cost of two groups joined."""
-        return self.of(self.sees[a] | self.sees[b], self.own[a] + self.own[b])
-
-    def of(self, seen: Bools, own: Floats) -> float:
-        """The cost of a group that sees leaves, (L,), and has a volume and an area."""
-        volume, area = self.every[seen].sum(axis=0)
-        return float(own[0] * area + own[1] * volume)
-
-    def join(self, a: int, b: int) -> list[tuple[int, int]]:
-        self.sees[a] |= self.sees[b]
-        self.own[a] += self.own[b]
-        self.own[b] = 0.0
-        super().join(a, b)
-        return [(a, c) for c in self.near[a]]
-
-
-class _Parted(_Costs):
-    """Groups with viewers; the cost of a pair is the gain of dividing it."""
-
-    def cost(self, a: int, b: int) -> float:
-        if not (self.own[a][0] and self.own[b][0]):
-            return np.inf
-        together = self.together(a, b)
-        gain = 1 - (self.before[a] + self.before[b]) / together if together > 0 else 0.0
-        return round(gain, DIGITS)
-
-    def join(self, a: int, b: int) -> list[tuple[int, int]]:
-        self.before[a] += self.before[b]  # of all its leaves apart
-        return super().join(a, b)
-
-
-class _Attached(_Costs):
-    """Pairs of groups, one without viewers; the cost is the share that joining adds to all
-    costs."""
-
-    def __init__(self, sees: Bools, own: Floats, every: Floats, pairs: NDArray[np.integer]) -> None:
-        super().__init__(sees, own, every, pairs)
-        self._all = sum(self.before)
-        self._added = 0.0
-
-    def grown_by(self, share: float) -> Ints:
-        """(L,) the groups, before joining has added ``share``; none is joined for 0."""
-        return self.grown(lambda added: self._added + added < share)
-
-    def cost(self, a: int, b: int) -> float:
-        if self.own[a][0] and self.own[b][0]:
-            return np.inf
-        added = self.together(a, b) - self.before[a] - self.before[b]
-        return round(added / self._all, 2 * DIGITS) if self._all else 0.0
-
-    def join(self, a: int, b: int) -> list[tuple[int, int]]:
-        self._added += self.cost(a, b)
-        self.before[a] = self.together(a, b)
-        return super().join(a, b)
-
-
 #: The warning on a model of one cell.
 ONE_HALL = Warned("visibility culling saves nothing here: the model is a single hall")
 
@@ -456,7 +281,7 @@ def grouped(cells: Cells, options: SubdivideOptions, volumes: Volumes | None = N
     if options.cells == "room":
         rank = rank_in_file(cells)
         room = room_of_leaf(cells, rank, kept)
-        group = _groups(cells, rank, room, options.gain)
+        group = _groups(cells, rank, room, options.gain, bool(volumes.rooms))
     name = np.append(numbered(group[leaf]), np.int32(-1))
     leaf_cell = np.full(cells.leaf_count, -1, dtype=np.int32)
     leaf_cell[leaf] = name[:-1]
@@ -476,8 +301,9 @@ def numbered(group: NDArray[np.integer]) -> NDArray[np.int32]:
     return np.asarray(place[row.reshape(-1)])
 
 
-def _groups(cells: Cells, rank: Ints, room: Ints, gain: float) -> Ints:
-    """(L,) the groups into which the (L,) rooms are divided."""
+def _groups(cells: Cells, rank: Ints, room: Ints, gain: float, named: bool) -> Ints:
+    """(L,) the groups into which the (L,) rooms, maybe ``named`` ones, are divided; without a
+    ceiling all are one hall if that costs little."""
     if gain >= 1 or len(np.unique(room)) == len(room):
         return room
     same = room[cells.portal_leaf[:, 0]] == room[cells.portal_leaf[:, 1]]
@@ -488,4 +314,9 @@ def _groups(cells: Cells, rank: Ints, room: Ints, gain: float) -> Ints:
     leaf, piece, area = sides(cells)
     surface = np.bincount(leaf, area[piece], cells.leaf_count).astype(np.float64)
     viewers = cells.leaf_volumes() * cells.leaf_standing
-    return join_by_gain(sees, viewers[order], surface[order], inner, gain, above)[rank]
+    group = join_by_gain(sees, viewers[order], surface[order], inner, gain, above)[rank]
+    if cells.ceiling is not None and not named:
+        every = np.stack([viewers, surface], axis=1)
+        if gain_of(sees[np.ix_(rank, rank)], every, group) < gain:
+            return np.zeros(cells.leaf_count, dtype=np.int64)
+    return group

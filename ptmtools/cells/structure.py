@@ -195,6 +195,17 @@ def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:
     return [walls_by_area[i][1] for i in ranked(np.array([area for area, _ in walls_by_area]))]
 
 
+def built(walls: list[WallPlane]) -> list[WallPlane]:
+    """The walls without the facets of a scanned surface, which would divide space by the thousand
+    and enclose nothing: if most of very many walls, by area, are neither upright nor level."""
+    rise = np.abs([wall.frame.plane[1] for wall in walls])
+    straight = (rise < _STRAIGHT) | (rise > np.sqrt(1 - _STRAIGHT**2))
+    area = np.array([float(shapely.area(wall.walls)) for wall in walls])
+    if len(walls) < _MANY or area[straight].sum() >= area.sum() / 2:
+        return walls
+    return [wall for wall, keeps in zip(walls, straight, strict=True) if keeps]
+
+
 def planes_of(corners: Floats) -> tuple[Floats, Floats]:
     """(n, 4) planes with one sign for both windings, and (n,) areas, of (n, 3, 3) triangles."""
     normal = normals(corners)
@@ -250,6 +261,12 @@ def parallel_gap(plane: Floats, other: Floats, tolerance: Tolerance) -> float:
     if abs(turn) < tolerance.cosine:
         return float("inf")
     return abs(float(plane[3]) - float(np.sign(turn)) * float(other[3]))
+
+
+#: A plane is upright or level if it leans by less than this (sine).
+_STRAIGHT = 3e-3
+#: Number of walls from which a surface may be a scan.
+_MANY = 1000
 
 
 #: Level rays from a point.

