@@ -27,19 +27,25 @@ def local() -> Iterator[Executor]:
 
 @pytest.fixture(scope="module")
 def scheduler(require) -> Iterator[str]:
-    """The address of a cluster of two processes on this machine, of two threads each."""
+    """The address of a cluster of two processes on this machine, of two threads each. Its memory
+    manager is off: it drops copies from idle workers, which fetch them again as other objects."""
     try:
+        from dask import config
         from distributed import LocalCluster
     except ImportError:
         require("distributed", "pip install 'ptmtools[cluster]'")
-    with LocalCluster(
-        n_workers=2,
-        threads_per_worker=2,
-        host="127.0.0.1",
-        scheduler_port=0,
-        dashboard_address=":0",
-        silence_logs=logging.CRITICAL,
-    ) as cluster:
+    keep = config.set({"distributed.scheduler.active-memory-manager.start": False})
+    with (
+        keep,
+        LocalCluster(
+            n_workers=2,
+            threads_per_worker=2,
+            host="127.0.0.1",
+            scheduler_port=0,
+            dashboard_address=":0",
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+    ):
         yield cluster.scheduler_address
 
 
