@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
 from ptmtools.errors import DatabaseError
@@ -131,6 +132,7 @@ def visit_of(content: Content, sizes: Mapping[str, int]) -> Visit:
     if len(used):
         shares = over_places(sees @ texels / texels[used].sum(), pvs.viewers)
     mean, most = over_places(at_hand, pvs.viewers)
+    until = _until_shares(content, geometry, paints, whole)
     volume = pvs.volume_at_hand
     images = sum(records[i].fallback_bytes for i in used.tolist() if content.options.fallback)
     browsed = [sizes[f.entry] + int(_geometry(content, f, sizes).sum()) for f in forms if f.entry]
@@ -139,11 +141,38 @@ def visit_of(content: Content, sizes: Mapping[str, int]) -> Visit:
         first_room=int(sum(opening)),
         mean_at_hand=round(mean),
         most_at_hand=round(most),
+        mean_90=round(over_places(until[:, 0], pvs.viewers)[0]),
+        mean_99=round(over_places(until[:, 1], pvs.viewers)[0]),
+        everything=int(geometry.sum() + whole[used].sum()),
         mean_volume=volume[0],
         most_volume=volume[1],
         mean_texels=shares[0],
         most_texels=shares[1],
     )
+
+
+#: Shares of the average view of a cell whose bytes are reported.
+SHARES = (0.9, 0.99)
+
+
+def _until_shares(
+    content: Content, geometry: NDArray[np.int64], paints: Bools, whole: NDArray[np.int64]
+) -> Floats:
+    """(C, 2) bytes of the fewest cells that cover each of `SHARES` of the average view of a cell,
+    with their textures; the cell itself, where the viewer is, comes first.
+
+    ``geometry``: (C,) bytes of cells; ``paints``: (C, T) which textures each uses, and ``whole``:
+    (T,) their bytes.
+    """
+    result = np.zeros((content.pvs.cell_count, len(SHARES)))
+    for cell in range(len(result)):
+        seen, share = content.pvs.row(cell), content.ach.row(cell)
+        order = np.lexsort((np.arange(len(seen)), -share, seen != cell))
+        covered = np.cumsum(share[order])
+        for k, least in enumerate(SHARES):
+            some = seen[order[: int(np.searchsorted(covered, least)) + 1]]
+            result[cell, k] = geometry[some].sum() + whole[paints[some].any(axis=0)].sum()
+    return result
 
 
 def finest_bytes(record: TextureRecord) -> int:

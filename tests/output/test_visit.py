@@ -63,6 +63,17 @@ class Client:
         files += [self.index["textures"][t]["file"] for t in self.textures(cell)]
         return sum(map(self.size, files))
 
+    def until(self, cell: int, share: float) -> int:
+        """Bytes of the cell itself, and of others by coverage, up to a share of the view."""
+        record, covered, files = self.records[cell], 0.0, set()
+        rows = list(zip(record["visible"], record["ach"], record["textures"], strict=True))
+        for other, part, textures in [rows[0], *sorted(rows[1:], key=lambda row: -row[1])]:
+            if covered < share:
+                files.add(self.geometry[other])
+                files |= {self.index["textures"][t]["file"] for t in textures}
+                covered += part
+        return sum(map(self.size, files))
+
     def first_room(self) -> int:
         cell = self.index["viewpoints"][0]["cell"]
         own = set(self.records[cell]["textures"][0])
@@ -94,6 +105,11 @@ def test_figures_are_those_of_the_files(
     at_hand = [client.at_hand(cell) for cell in range(3)]
     assert visit.mean_at_hand == round(float(np.average(at_hand, weights=VOLUME)))
     assert visit.most_at_hand == max(at_hand)
+    for share, actual in ((0.9, visit.mean_90), (0.99, visit.mean_99)):
+        until = [client.until(cell, share) for cell in range(3)]
+        assert actual == round(float(np.average(until, weights=VOLUME)))
+    every = {client.index["textures"][t]["file"] for c in range(3) for t in client.textures(c)}
+    assert visit.everything == sum(map(client.size, [*client.geometry, *every]))
     assert visit.mean_volume == pytest.approx((64 * 192 + 128 * 224 + 32 * 160) / 224**2)
     assert visit.most_volume == 1
     all_texels = client.texels({t for cell in range(3) for t in client.textures(cell)})

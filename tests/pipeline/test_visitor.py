@@ -47,6 +47,21 @@ def test_images_inside_the_model_are_not_counted_apart() -> None:
     assert Visitor(1_500_000, 0, VISIT).lines()[0] == "source model, for comparison: 1.5 MB"
 
 
+@pytest.mark.parametrize(
+    ("held", "until", "word"),
+    [
+        (100, 90, "visible sets; visitors hold 10% of the model"),
+        (900, 100, "the order of cells; 99% of the view takes 11% of what visitors hold"),
+        (900, 800, "resolution; visitors hold 90% of the model"),
+    ],
+)
+def test_what_saves_most(held: int, until: int, word: str) -> None:
+    sizes = {"everything": 1000, "mean_at_hand": held, "mean_90": until // 2, "mean_99": until}
+    *_, order, gain = Visitor(None, None, VISIT | sizes).lines()
+    assert order.startswith(f"in order of coverage: 90% of the average view after {until // 2} B")
+    assert gain.startswith(f"what saves most: {word}")
+
+
 @pytest.mark.parametrize(("model", "heavier"), [(3_960_000, False), (3_700_000, True)])
 def test_a_few_percent_are_not_heavier(model: int, heavier: bool) -> None:
     browser = Visitor(model, 0, VISIT).lines()[1]
