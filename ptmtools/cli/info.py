@@ -15,7 +15,7 @@ import click
 
 from ptmtools.cli.batch import STANDARD, no_name, standard_input
 from ptmtools.cli.console import Console
-from ptmtools.cli.parameters import Command, json_option, options_of, take, with_console
+from ptmtools.cli.parameters import Command, json_option, local_copy, options_of, take, with_console
 from ptmtools.errors import InputError, naming
 from ptmtools.pipeline.validation import kind_of
 from ptmtools.quantities import count, size
@@ -34,7 +34,7 @@ _SHOWN = 5
 
 
 @click.command("info", cls=Command)
-@click.argument("target", metavar="MODEL|FILE|DB", type=click.Path())
+@click.argument("target", metavar="MODEL|FILE|DB", type=click.Path(), callback=local_copy)
 @options_of(IngestOptions)
 @json_option
 @with_console

@@ -15,6 +15,7 @@ from ptmtools.cli.parameters import (
     force_option,
     given_options,
     json_option,
+    local_copy,
     options_of,
     output_option,
     take,
@@ -28,7 +29,7 @@ from ptmtools.rendering.drawing import ViewOptions, draw_view
 
 
 @click.command("render", cls=Command)
-@click.argument("target", metavar="DB|DIR", type=click.Path())
+@click.argument("target", metavar="DB|DIR", type=click.Path(), callback=local_copy)
 @output_option("PNG to write.", metavar="FILE", required=True)
 @options_of(ViewOptions, RenderOptions)
 @force_option("Replace an existing picture.")

@@ -15,7 +15,7 @@ import os
 import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -63,12 +63,14 @@ class Kind:
     arguments: the headers as arguments of fsspec's calls.
     version, md5: of a row of a listing, see `Held`.
     condition: that an object still has a version, or with "" that there is none, as arguments.
+    settings: arguments of the file system.
     """
 
     arguments: Callable[[Headers], dict[str, Any]]
     version: Callable[[Mapping[str, Any]], str]
     md5: Callable[[Mapping[str, Any]], str]
     condition: Callable[[str], dict[str, Any]]
+    settings: Mapping[str, Any] = field(default_factory=dict)
 
 
 def _s3_arguments(headers: Headers) -> dict[str, Any]:
@@ -103,7 +105,14 @@ def _gs_condition(version: str) -> dict[str, Any]:
     return {} if version else {"mode": "create"}
 
 
-_S3 = Kind(_s3_arguments, lambda row: str(row.get("ETag", "")).strip('"'), _s3_md5, _s3_condition)
+_S3 = Kind(
+    _s3_arguments,
+    lambda row: str(row.get("ETag", "")).strip('"'),
+    _s3_md5,
+    _s3_condition,
+    # Otherwise s3fs asks for the size of each object before it reads it.
+    {"max_concurrency": 1},
+)
 _GS = Kind(_gs_arguments, lambda row: str(row.get("generation", "")), _gs_md5, _gs_condition)
 #: Stores whose objects have headers, by the protocol of their URLs.
 KINDS = {"s3": _S3, "s3a": _S3, "gs": _GS, "gcs": _GS}
@@ -144,8 +153,9 @@ class Objects:
         self.kind = KINDS.get(protocol.lower())
         with self._asking("cannot be opened"):
             try:
+                settings = self.kind.settings if self.kind else {}
                 opened = fsspec.core.url_to_fs(
-                    self.url, use_listings_cache=False, skip_instance_cache=True
+                    self.url, use_listings_cache=False, skip_instance_cache=True, **settings
                 )
             except ImportError as fault:
                 extra = "pip install 'ptmtools[cloud]'" if self.kind else None

@@ -361,6 +361,8 @@ def test_the_commands(
     machine()
     done = ptm("validate", url, "--json")
     assert done.status == 0, done.err
+    done = ptm("info", url)
+    assert (done.status, "two_rooms.obj" in done.out) == (0, True)
     done = ptm("publish", url, f"s3://{bucket}/site", "--no-pictures", "--json")
     assert done.status == 0, done.err
     assert "index.html" in json.loads(done.out)["written"]
