@@ -40,7 +40,7 @@ def sees(db: Path, one: int, other: int) -> bool:
 
 
 def test_a_house(ptm: Ptm, ifc: Path, tmp_path: Path) -> None:
-    """Two rooms on each storey, joined by a portal in the doorway, in which there is a leaf."""
+    """Two rooms on each storey, named by their spaces, and a door between them that hides."""
     db = tmp_path / "house.db"
     done = ptm("build-scene", ifc, "-o", db, "--json")
     assert (done.status, done.err) == (0, "")
@@ -54,17 +54,25 @@ def test_a_house(ptm: Ptm, ifc: Path, tmp_path: Path) -> None:
         points = cells.portal(int(portal))
         assert np.allclose(np.ptp(points, axis=0), [0, 2.1, 0.9], atol=1e-6)
         assert abs(points[:, 0]).max() <= THICK / 2 + 1e-6
-        assert sees(db, *rooms)
+        assert cells.portal_passage[portal]
+        assert not sees(db, *rooms)
     below, above = cells.locate(np.array([[WEST, EYE, 0], [WEST, EYE + STOREY, 0]])).tolist()
     assert not sees(db, below, above)
     hints = json.loads((db / "www" / "hints.json").read_text("utf-8"))
     assert sorted(view["description"] for view in hints["viewpoints"]) == [
-        "Ground floor, room 1",
-        "Ground floor, room 2",
-        "Upper floor, room 1",
-        "Upper floor, room 2",
+        "Ground floor, East",
+        "Ground floor, West",
+        "Upper floor, East",
+        "Upper floor, West",
     ]
     assert ptm("validate", db).status == 0
+
+
+def test_open_doors(ptm: Ptm, ifc: Path, tmp_path: Path) -> None:
+    db = tmp_path / "house.db"
+    assert ptm("build-scene", ifc, "-o", db, "--doors", "open").status == 0
+    rooms = read_cells(db).locate(np.array([[WEST, EYE, 0], [EAST, EYE, 0]])).tolist()
+    assert sees(db, *rooms)
 
 
 def test_closed_doors(ptm: Ptm, ifc: Path, tmp_path: Path) -> None:

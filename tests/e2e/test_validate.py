@@ -77,12 +77,13 @@ def resealed(*damages: Damage) -> Damage:
     return damage
 
 
-def spoilt(name: str) -> Damage:
-    """One bit is another."""
+def spoilt(name: str, share: float = 0.5) -> Damage:
+    """One bit is another, at a share of the file: not in the date of a member, which nothing
+    reads."""
 
     def changed(data: bytes) -> bytes:
-        middle = len(data) // 2
-        return data[:middle] + bytes([data[middle] ^ 1]) + data[middle + 1 :]
+        at = int(share * len(data))
+        return data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :]
 
     return rewritten(name, changed)
 
@@ -103,7 +104,7 @@ FAULTS: dict[str, tuple[int, str, Damage]] = {
         put("cells/mine"),
     ),
     "a stage is exchanged": (8, "D652", spoilt("../stages/pvs.npz")),
-    "a stage is damaged, its hash not": (8, "D720", resealed(spoilt("../stages/cells.npz"))),
+    "a stage is damaged, its hash not": (8, "D720", resealed(spoilt("../stages/cells.npz", 0.9))),
     "a count is wrong": (8, "D699", stages(lambda s: s["cells"]["counts"].update(leaves=4))),
     "a stage is stale": (
         8,
