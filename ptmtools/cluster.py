@@ -119,16 +119,18 @@ class Cluster(Executor):
 
         loop = self._client.loop.asyncio_loop
         for left in range(AGAIN, -1, -1):
-            with self._losses():
-                [value] = self._client.scatter([shared], broadcast=True, hash=False)
             todo = chain(tuple(sent), taken())
             try:
+                with self._losses():
+                    [value] = self._client.scatter([shared], broadcast=True, hash=False)
                 for done in in_order(submit, todo, self._ahead, result=self._result):
                     sent.popleft()
                     yield done
                 return
             except WorkerError as fault:
-                lost = isinstance(fault.__cause__, CancelledError)  # with all that had the value
+                # A worker ended, with what had the value, or while it was to get it.
+                lost = isinstance(fault.__cause__, (CancelledError, OSError))
+                lost &= fault.code == "PTM-W004"
                 if not (left and lost and self._client.status == "running"):
                     raise
                 self._wait_for_workers()

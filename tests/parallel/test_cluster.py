@@ -141,6 +141,22 @@ def test_closing_drops_the_tasks(alone, gate):
     assert left == 0
 
 
+def test_a_worker_that_ends_before_it_gets_the_value(cluster, monkeypatch):
+    from distributed.comm import CommClosedError
+
+    scatter, calls = cluster._client.scatter, []
+
+    def ends_once(*values, **options):
+        calls.append(values)
+        if len(calls) == 1:
+            raise CommClosedError("Stream is closed")
+        return scatter(*values, **options)
+
+    monkeypatch.setattr(cluster._client, "scatter", ends_once)
+    assert list(cluster.each(tasks.slower_at_first, 0.0, [3, 4])) == [9, 16]
+    assert len(calls) == 2
+
+
 def test_the_command(tmp_path, capfd, monkeypatch):
     """One line, its own exit status, and no database."""
     monkeypatch.setattr(module, "PATIENCE", 0.1)
