@@ -14,7 +14,7 @@ than the cluster distance, the wall must close an opening of the near boundary.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -266,7 +266,9 @@ def _best_split(
         return -1
     extents = _Extents(fragments)
     best, best_score = -1, -np.inf
-    for i in _candidates(fragments):
+    for turn, i in _candidates(fragments):
+        if turn and best >= 0:
+            break
         f = fragments[i]
         if f.area < (1 - TIE_SHARE) * least:
             continue
@@ -291,13 +293,17 @@ def _best_split(
     return best
 
 
-def _candidates(fragments: list[_Fragment]) -> list[int]:
-    """The fragments, ascending, whose planes are compared: all, or the largest of very many."""
+def _candidates(fragments: list[_Fragment]) -> Iterator[tuple[int, int]]:
+    """Turns and the fragments, ascending, whose planes are compared in each: all in the first, or
+    the largest of very many, and the others only if none of these splits."""
     count = len(fragments)
-    if count * count <= _PAIRS:
-        return list(range(count))
-    order = ranked(np.array([f.area for f in fragments]))
-    return sorted(order[: max(_FEW, _PAIRS // count)].tolist())
+    each = count if count * count <= _PAIRS else max(_FEW, _PAIRS // count)
+    order = np.arange(count)
+    if each < count:
+        order = ranked(np.array([f.area for f in fragments]))
+    for turn, first in enumerate(range(0, count, each)):
+        for i in sorted(order[first : first + each].tolist()):
+            yield turn, i
 
 
 def _closes(

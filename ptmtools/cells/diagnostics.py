@@ -50,7 +50,7 @@ def facet_notes(facets: int) -> list[str]:
         return []
     return [
         f"{facets:,} flat pieces lean in all directions, like a scan or terrain, and do not divide "
-        "space"
+        "space; --structural NAME makes objects do so"
     ]
 
 

@@ -81,7 +81,7 @@ class Building:
         structure = Structure.of(opaque, tolerance)
         doors, structure = Doors.recognise(scene, opaque, structure, options)
         every = find_walls(structure, options.wall_area)
-        walls = built(every)
+        walls = every if options.structural else built(every)
         reveals = Reveals(structure, options.wall_thickness)
         detail = detail_of(scene, structure, options)
         floors = footing = Floors.of(scene, detail)

@@ -174,7 +174,7 @@ def _openings(
                 if not _wider_than(part, tolerance.plane):
                     continue
                 leaves = behind[b][0], ahead[a][0]
-                for hull, area in _hulls(part, hung):
+                for hull, area in _hulls(part, hung and not passage):
                     polygon = wall.frame.to_space(shapely.get_coordinates(hull)[:-1])
                     yield Portal(node, leaves, polygon, area, passage)
 

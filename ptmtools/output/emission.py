@@ -158,8 +158,8 @@ SHARES = (0.9, 0.99)
 def _until_shares(
     content: Content, geometry: NDArray[np.int64], paints: Bools, whole: NDArray[np.int64]
 ) -> Floats:
-    """(C, 2) bytes of the fewest cells that cover each of `SHARES` of the average view of a cell,
-    with their textures; the cell itself, where the viewer is, comes first.
+    """(C, 2) bytes, with their textures, of the cell itself and of the fewest others that cover
+    each of `SHARES` of the average view of a cell.
 
     ``geometry``: (C,) bytes of cells; ``paints``: (C, T) which textures each uses, and ``whole``:
     (T,) their bytes.

@@ -295,8 +295,8 @@ class Visit:
     browser: bytes that a VRML browser fetches; None without VRML.
     first_room: bytes until the first room is complete.
     mean_at_hand, most_at_hand: resident bytes.
-    mean_90, mean_99: bytes of the fewest cells, with their textures, that cover 90 and 99 % of the
-        average view, mean over places.
+    mean_90, mean_99: bytes, with their textures, of the cell itself and of the fewest others that
+        cover 90 and 99 % of the average view, mean over places.
     everything: bytes of all cells and textures.
     mean_volume, most_volume: share of the volume of all cells that is resident.
     mean_texels, most_texels: share of the texels in use; None without textures.

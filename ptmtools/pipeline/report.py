@@ -75,7 +75,8 @@ class Visitor:
                 f"in order of coverage: 90% of the average view after {size(visit['mean_90'])}, "
                 f"99% after {size(visit['mean_99'])}"
             )
-            lines.append(f"what saves most: {_gain(visit)}")
+            if gain := _gain(visit):
+                lines.append(f"what saves most: {gain}")
         return lines
 
 
@@ -84,10 +85,13 @@ _GAIN = 0.4
 
 
 def _gain(visit: Mapping[str, Any]) -> str:
-    """Whether visible sets, their order or the resolution of textures saves a visitor most."""
+    """Whether visible sets, their order or the resolution of textures saves a visitor most; empty
+    if nothing does."""
     whole, held = max(visit["everything"], 1), max(visit["mean_at_hand"], 1)
     by_cells, by_order = 1 - held / whole, 1 - visit["mean_99"] / held
     if max(by_cells, by_order) < _GAIN:
+        if visit["mean_texels"] is None:
+            return ""
         return (
             f"resolution; visitors hold {held / whole:.0%} of the model, and cells in order of "
             "coverage save little"

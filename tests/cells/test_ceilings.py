@@ -95,10 +95,19 @@ def test_the_inside_of_a_pillar_is_no_room(tmp_path: Path) -> None:
 
 
 def test_space_above_one_room_belongs_to_it(tmp_path: Path) -> None:
-    """A hall with a partition that is lower than its walls."""
-    parts = serpentine(1, apart=0) | {"partition": box((4, 3, 0), (4.2, 9, 3))}
-    cells = subdivide(scene_of_parts(parts, tmp_path))
-    assert cells.ceiling is None or cells.standing.all()
+    """A hall whose walls are not quite of one height is one cell, with what is above."""
+    walls = [
+        box((0, 0, -0.2), (8, 12, 0)),
+        box((0, 0, 0), (0.3, 12, 4)),
+        box((7.7, 0, 0), (8, 12, 4.03)),
+        box((0.3, 0, 0), (7.7, 0.3, 4.06)),
+        box((0.3, 11.7, 0), (7.7, 12, 4.03)),
+    ]
+    cells = subdivide(scene_of_parts({"hall": np.concatenate(walls)}, tmp_path))
+    assert cells.ceiling is not None
+    lower, upper = cells.leaf_cell[cells.portal_leaf[cells.in_ceiling]].T
+    assert len(lower) > 0
+    assert (lower == upper).all()
 
 
 def test_nothing_that_can_be_seen_is_lost(tmp_path: Path) -> None:

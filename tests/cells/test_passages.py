@@ -32,6 +32,7 @@ from tests.cells.test_doors import (
     scene,
     see,
     sheet,
+    solid,
     together,
     wall,
 )
@@ -113,6 +114,21 @@ def polygon_area(points: Floats) -> float:
     """m² of a convex polygon in space."""
     across = np.cross(points - points[0], np.roll(points, -1, axis=0) - points[0]).sum(axis=0)
     return float(np.linalg.norm(across)) / 2
+
+
+def test_a_leaf_of_bars_is_passed_as_a_whole() -> None:
+    """Visitors are not stopped by a rail between two openings of the leaf: each of its faces has
+    one passage, as large as the doorway. Sight passes between the bars."""
+    y0, y1, z0, z1 = HOLE
+    bars = [(y0, y1, z0, z0 + 0.1), (y0, y1, z1 - 0.1, z1), (y0, 0.1, z0, z1)]
+    bars += [(y1 - 0.1, y1, z0, z1), (1.0, 1.1, z0, z1)]
+    door = [face for a, b, c, d in bars for face in solid((4.05, a, c), (4.09, b, d))]
+    cells = subdivide(scene(rooms(), Door=door), SubdivideOptions(door=("Door",)))
+    assert see(cells, A, B)
+    passages = np.flatnonzero(cells.portal_passage)
+    assert len(passages) == 2
+    for k in passages:
+        assert polygon_area(cells.portal(k)) == pytest.approx(2.1)
 
 
 def test_a_room_behind_two_leaves_is_no_neighbour() -> None:

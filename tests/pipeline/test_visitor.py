@@ -109,7 +109,7 @@ def test_the_model_as_it_was(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert main(["info", str(db)]) == 0
     reported = capsys.readouterr().out
     lines = Visitor.of(DatabaseFolder.open(db).manifest).lines()  # type: ignore[union-attr]
-    assert len(lines) == 5
+    assert len(lines) == 7
     assert [line.removeprefix("download").strip() for line in reported.splitlines()[-5:]] == lines
 
 

@@ -196,6 +196,8 @@ export class Walkthrough {
     const { known, cell } = this.client, here = known[this.cell] ? this.cell : cell;
     if (!known[here]) return this.cell < 0 ? [] : [this.cell];
     const cells = this.locator.around(this.#eye, here);
+    // The record of the present cell may be on its way.
+    if (this.cell >= 0) cells.push(this.cell);
     return [...new Set(cells.flatMap((c) => known[c]?.visible ?? [c]))];
   }
 
@@ -317,7 +319,12 @@ export class Walkthrough {
     this.comparison = null;
     this.touch();
     if (!this.comparing) return;
-    const { Comparison } = await loadComparison();
+    const script = await loadComparison().catch(() => null);
+    if (!script) {
+      this.comparing = false;
+      return this.emit("notice", { message: "The comparison could not be loaded." });
+    }
+    const { Comparison } = script;
     if (!this.comparing || this.comparison || this.gl.isContextLost()) return;
     this.comparison = new Comparison(this);
     this.touch();

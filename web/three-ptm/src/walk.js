@@ -160,7 +160,10 @@ export class Walk {
     const { signal } = (this.#entered = new AbortController());
     [this.cell] = this.#around = around;
     try {
-      const records = await Promise.all(around.map((cell) => this.#record(cell)));
+      // Neighbours whose record fails are left out.
+      const [own, ...near] = around.map((cell) => this.#record(cell));
+      const others = near.map((record) => record.catch((error) => this.#report(error)));
+      const records = (await Promise.all([own, ...others])).filter((record) => record !== undefined);
       if (signal.aborted) return false;
       const shares = sharesOf(records), cells = new Set(records.flatMap(byCoverage));
       this.#free(cells, shares);
