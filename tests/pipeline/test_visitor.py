@@ -110,7 +110,7 @@ def test_the_model_as_it_was(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     reported = capsys.readouterr().out
     lines = Visitor.of(DatabaseFolder.open(db).manifest).lines()  # type: ignore[union-attr]
     assert len(lines) == 7
-    assert [line.removeprefix("download").strip() for line in reported.splitlines()[-5:]] == lines
+    assert [line.removeprefix("download").strip() for line in reported.splitlines()[-7:]] == lines
 
 
 @pytest.mark.parametrize(("volume", "little"), [(91.0, True), (1.0, False)])
