@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import PLAIN, build
 
 from ptmtools.site.content import Site, site_of
 from tests.cells.buildings import carved, room, write
 from tests.scene.buildings import box
+from tests.site.conftest import PLAIN, build
 
 ROOMS = [room(0, 0, 5, 4), room(5.2, 0, 9, 4)]
 DOORWAY = ((5.0, 1.5, 0.0), (5.2, 2.5, 2.1))
