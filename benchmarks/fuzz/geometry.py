@@ -31,7 +31,7 @@ from benchmarks.fuzz.runner import Summary, run
 
 #: Processor time that an input may take, seconds; and after how many of the clock it hangs.
 SLOW, HANGS = 60.0, 600.0
-#: One input of so many is built twice.
+#: One input in this number is built twice.
 TWICE = 50
 #: Findings that are printed for a base.
 SHOWN = 15

@@ -1,7 +1,7 @@
 """Ceilings: how much of a building has one, and where rooms without one end.
 
-Cells of a model without ceilings would end at its top, and whoever stands in one room would see
-all others through the gap above walls whose heights differ by centimetres. So a level plane, the
+Cells of a model without ceilings would end at its top, and a visitor of one room would see all
+others through the gap above walls whose heights differ by centimetres. So a level plane, the
 **ceiling**, at the lowest top of the walls around the open floor splits the building first. It
 hides nothing. But a straight line that leads up through it never leads down again, so rooms see
 one another through their doorways only; space above it belongs to cells of its own, and what is

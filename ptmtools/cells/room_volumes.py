@@ -38,7 +38,7 @@ _IN_BOX, _IN_LEAF = 216, 32
 _WHOLE, _NOT_WHOLE = 0.05, 0.05
 #: Of two volumes, one is in the other if this share of it is; and they are the same if each is.
 _WITHIN = 0.9
-#: A volume consists of others if at least so many, with this share of its size, are in it.
+#: A volume consists of others if at least this number, with this share of its size, are in it.
 _SEVERAL, _COVERED = 2, 0.5
 #: A leaf is in a volume if this share of it is.
 _MOST = 0.5

@@ -204,7 +204,7 @@ def assembled(
     portals = sorted(portals, key=lambda portal: portal.passage)
     ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
     passage = np.array([portal.passage for portal in portals], dtype=np.bool_)
-    # Nobody stands inside a door leaf.
+    # The inside of a door leaf is no place.
     standing &= ~_in_door_leaves(bodies, rename[ends[passage]], building.structure.tolerance)
     children = tree.children.copy()
     is_leaf = children <= -2

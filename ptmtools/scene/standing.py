@@ -9,7 +9,7 @@ ground, the next face above must be level, and upright faces enclose the place a
 there is no room under a table. Without a ceiling or a floor a room is as high as its walls.
 
 The interior of a wall is too slender for a room: without this condition, walls without floors,
-19 × 11.4 × 3 m, count as rooms in which nobody taller than 0.68 m fits. In all made and real
+19 × 11.4 × 3 m, count as rooms for visitors of at most 0.68 m. In all made and real
 buildings of the tests, read in their own unit, the default visitor fits at 60 % of the places or
 more; the rest lies in furniture and slabs. The free width along the sample lines is an upper bound
 of that in other directions.

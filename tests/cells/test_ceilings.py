@@ -70,7 +70,7 @@ def test_without_it_all_halls_see_one_another(tmp_path: Path) -> None:
 
 def test_what_towers_over_the_walls_is_seen_from_afar(tmp_path: Path) -> None:
     """A pillar of 9 m in the last hall: its upper part belongs to a cell that the first one sees,
-    nobody stands there, and its lower part is hidden."""
+    that is view-only, and its lower part is hidden."""
     parts = serpentine() | {"pillar": box((29.5, 2, 0), (29.8, 2.3, 9))}
     scene = scene_of_parts(parts, tmp_path)
     cells = subdivide(scene)

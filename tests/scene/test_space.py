@@ -236,7 +236,7 @@ def test_a_recorded_unit_is_doubted_but_kept() -> None:
     "triangles", [boulder(), boulder(0.01), hills(1), table(), house(floor=False, roof=False) / 10]
 )
 def test_what_has_no_rooms_is_not_refused(triangles: Floats) -> None:
-    """Its unit cannot be judged: metres, with a warning if nobody could stand beside it."""
+    """Its unit cannot be judged: metres, with a warning if it is lower than a visitor."""
     space, notes = settled(y_up(triangles))
     assert space.metres == 1.0
     high = np.ptp(y_up(triangles), axis=(0, 1))[1 if space.up == "y" else 2]
