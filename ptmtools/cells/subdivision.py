@@ -168,8 +168,8 @@ def _open_note(space: Space, roofed: float, box: Floats, ceiling: float | None) 
     note = f"the model is {state}; cells end at the bounding box of its walls, {size} m"
     if ceiling is not None:
         note += (
-            f", and rooms at the tops of their walls, at {ceiling:.2f} m; cells above hold what is "
-            "there (--ceiling none changes that)"
+            f", and rooms at the tops of their walls, at {ceiling:.2f} m (--ceiling none changes "
+            "that)"
         )
     return Warned(note) if roofed < ROOFED else note
 
