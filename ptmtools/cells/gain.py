@@ -60,16 +60,11 @@ class _Costs(Groups):
         has joined another has nothing."""
         super().__init__(len(sees), pairs)
         self.sees, self.own, self.every = sees, own, every
-        self.before = [self.of(row, each) for row, each in zip(sees, own, strict=True)]
+        self.before = [_cost(row, each, every) for row, each in zip(sees, own, strict=True)]
 
     def together(self, a: int, b: int) -> float:
         """The cost of two groups joined."""
-        return self.of(self.sees[a] | self.sees[b], self.own[a] + self.own[b])
-
-    def of(self, seen: Bools, own: Floats) -> float:
-        """The cost of a group that sees leaves, (L,), and has a volume and an area."""
-        volume, area = self.every[seen].sum(axis=0)
-        return float(own[0] * area + own[1] * volume)
+        return _cost(self.sees[a] | self.sees[b], self.own[a] + self.own[b], self.every)
 
     def join(self, a: int, b: int) -> list[tuple[int, int]]:
         self.sees[a] |= self.sees[b]
@@ -119,14 +114,20 @@ class _Attached(_Costs):
         return super().join(a, b)
 
 
+def _cost(seen: Bools, own: Floats, every: Floats) -> float:
+    """The cost of a group that sees leaves, (L,), and has a volume and an area, (2,); ``every``:
+    (L, 2) those of the leaves."""
+    volume, area = every[seen].sum(axis=0)
+    return float(own[0] * area + own[1] * volume)
+
+
 def gain_of(sees: Bools, every: Floats, group: Ints) -> float:
     """The gain of dividing everything into groups, (L,), of leaves that see, (L, L), one another;
     ``every``: (L, 2) their volumes and areas."""
 
     def cost(members: Bools) -> float:
-        seen = every[sees[members].any(axis=0)].sum(axis=0)
-        own = every[members].sum(axis=0)
-        return float(own[0] * seen[1] + own[1] * seen[0])
+        seen = np.asarray(sees[members].any(axis=0))
+        return _cost(seen, every[members].sum(axis=0), every)
 
     together = cost(np.ones(len(group), dtype=np.bool_))
     apart = sum(cost(group == name) for name in np.unique(group))
