@@ -14,7 +14,7 @@ than the cluster distance, the wall must close an opening of the near boundary.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -43,6 +43,8 @@ FRAGMENT_SHARE = 0.01
 _FEW = 64
 #: Up to this many pairs of a plane and a fragment are compared in a node.
 _PAIRS = 1 << 21
+#: Number of leaves at which a division is first examined for its worth, and the factor to the next.
+_FIRST_LOOK, _LOOKS = 512, 4
 #: Sources of splits, in this order.
 _WALLS, _REVEALS, _DOORS, _CAPS = range(4)
 
@@ -55,6 +57,7 @@ class Tree:
     children: NDArray[np.int32]  # (N, 2) as in `Cells.node_child`
     leaves: tuple[Polyhedron, ...]  # face tags are node indices
     unsplit: int = 0  # leaves with walls that the limit on leaves kept from splitting
+    kept: int = 0  # parts with walls that are not worth a split
     # The bodies that caps and doors split, by node.
     capped: Mapping[int, Polyhedron] = field(default_factory=dict)
     hung: frozenset[int] = frozenset()  # nodes in the planes of door leaves that hide
@@ -98,19 +101,25 @@ def build_tree(
     options: SubdivideOptions,
     progress: Progress,
     ceiling: WallPlane | None = None,
+    worth: Callable[[Tree], Bools] | None = None,
 ) -> Tree:
     """Split ``box`` by the ``ceiling``, if there is one, by the planes of ``walls``, then of
     ``reveals``, of ``doors`` and of the caps that are in the ``structure``; in the order that the
-    module describes."""
+    module describes. At `_FIRST_LOOK` leaves, and whenever there are `_LOOKS` times as many,
+    ``worth`` tells which (L,) leaves of the tree so far are divided further."""
     tolerance = structure.tolerance
     least = (FRAGMENT_SHARE * options.wall_area, 0.0, 0.0, 0.0)
     taken: list[WallPlane] = []
     children: list[list[int]] = []
     leaves: list[Polyhedron] = []
     queue: list[_Task] = []
-    unsplit = 0
+    unsplit = kept = 0
+    look = _FIRST_LOOK
     capped: dict[int, Polyhedron] = {}
     hung: set[int] = set()
+
+    def hidden(nodes: set[int]) -> frozenset[int]:
+        return frozenset(nodes if options.doors in ("pass", "closed") else ())
 
     def place(parent: tuple[int, int], child: int) -> None:
         if parent[0] >= 0:
@@ -148,6 +157,21 @@ def build_tree(
     else:
         push(box, fragments, (-1, 0), _WALLS)
     while queue:
+        if worth and len(leaves) + len(queue) >= look:
+            look *= _LOOKS
+            waiting, queue = queue, []
+            slots = np.array(children, dtype=np.int32).reshape(-1, 2)
+            for k, task in enumerate(waiting):
+                slots[task.parent] = -2 - len(leaves) - k
+            bodies = (*leaves, *(task.body for task in waiting))
+            divide = worth(Tree(tuple(taken), slots, bodies, hung=hidden(hung)))[len(leaves) :]
+            for task, more in zip(waiting, divide.tolist(), strict=True):
+                if more:
+                    heapq.heappush(queue, task)
+                else:
+                    finish(task.body, task.parent)
+                    kept += task.source <= _REVEALS
+            continue
         task = heapq.heappop(queue)
         if len(leaves) + len(queue) + 2 > options.max_leaves:
             finish(task.body, task.parent)
@@ -185,8 +209,9 @@ def build_tree(
         np.array(children, dtype=np.int32).reshape(-1, 2),
         tuple(leaves),
         unsplit,
+        kept,
         capped,
-        frozenset(hung if options.doors in ("pass", "closed") else ()),
+        hidden(hung),
     )
 
 

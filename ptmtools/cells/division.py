@@ -16,10 +16,11 @@ import numpy as np
 from ptmtools.arrays import Bools, Floats, Ints, summed
 from ptmtools.cells.bsp import Tree, build_tree
 from ptmtools.cells.ceilings import ceiling_height, ceiling_plane
+from ptmtools.cells.floors import Floors, detail_of
 from ptmtools.cells.model import descend
 from ptmtools.cells.open_doors import Doors, open_doors
 from ptmtools.cells.options import SubdivideOptions, Walker
-from ptmtools.cells.places import Floors, detail_of, find_places, spread
+from ptmtools.cells.places import Places, find_places, spread
 from ptmtools.cells.planar import counting
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.portals import (
@@ -45,7 +46,9 @@ from ptmtools.cells.structure import (
     find_walls,
     spread_over,
 )
+from ptmtools.cells.worth import Worth
 from ptmtools.errors import InputError
+from ptmtools.executor import Executor
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import Tolerance, ranked
@@ -54,6 +57,8 @@ from ptmtools.tolerance import Tolerance, ranked
 LEAST_PLACE = 0.05
 #: and outside, where bus shelters are, with less than this.
 LEAST_INSIDE = 2.0
+#: Side of a patch of floor, in radii of a body.
+GRAIN = 0.5
 #: Number of points from which the ones that test the walls are chosen.
 _CHOICE = 256
 
@@ -65,8 +70,7 @@ class Building:
     structure: Structure
     walls: list[WallPlane]
     reveals: Reveals
-    floors: Floors  # from their fronts
-    footing: Floors  # from either side: reached space may be walkable on both
+    places: Places  # shut door leaves stop nobody, unless they act as walls
     doors: Doors
     ceiling: float | None  # `ceiling_height`
     options: SubdivideOptions
@@ -75,7 +79,7 @@ class Building:
     facets: int = 0  # planes of a scanned surface, which do not split
 
     @staticmethod
-    def of(scene: Scene, options: SubdivideOptions) -> Building:
+    def of(scene: Scene, options: SubdivideOptions, executor: Executor | None = None) -> Building:
         tolerance = scene.tolerance.for_walls(options.wall_thickness)
         opaque = Opaque.of(scene, options)
         structure = Structure.of(opaque, tolerance)
@@ -83,13 +87,13 @@ class Building:
         every = find_walls(structure, options.wall_area)
         walls = every if options.structural else built(every)
         reveals = Reveals(structure, options.wall_thickness)
+        walker = Walker(*options.walker)
         detail = detail_of(scene, structure, options)
-        floors = footing = Floors.of(scene, detail)
-        if not scene.two_sided.all():
-            footing = Floors.of(scene, detail, backs=True)
+        floors = Floors.of(scene, detail, GRAIN * walker.radius)
+        solid = structure.corners[~structure.door | (options.doors == "closed")]
+        places = find_places(floors, solid, walker, tolerance, executor)
         ceiling = None
         if options.ceiling == "auto":
-            walker = Walker(*options.walker)
             ceiling = ceiling_height(structure, walls, walker, options.wall_area)
         volumes = Volumes.of(scene, options)
         touching = contacts(volumes.rooms, options, tolerance)
@@ -97,8 +101,7 @@ class Building:
             structure,
             walls,
             reveals,
-            floors,
-            footing,
+            places,
             doors,
             ceiling,
             options,
@@ -110,6 +113,15 @@ class Building:
     @property
     def walker(self) -> Walker:
         return Walker(*self.options.walker)
+
+    def worth(self, *, whole: bool) -> Worth | None:
+        """Whether parts of a division are worth dividing further, or only the ``whole``; None if
+        every part is."""
+        options, corners = self.options, self.structure.corners
+        if options.cells == "leaf" or not 0 < options.gain < 1:
+            return None
+        middle, tolerance = self.walker.middle, self.structure.tolerance
+        return Worth.of(self.places, middle, corners, options.gain, whole, tolerance)
 
     def with_glass(self) -> Surroundings:
         """The surroundings in which glass counts as a wall."""
@@ -164,8 +176,9 @@ def _divided(building: Building, root: Polyhedron, progress: Progress, inside: b
     ceiling = None
     if inside and top is not None:
         ceiling = ceiling_plane(top, structure, root, structure.tolerance)
+    worth = building.worth(whole=not inside)
     tree = build_tree(
-        root, structure, building.walls, building.reveals, planes, options, progress, ceiling
+        root, structure, building.walls, building.reveals, planes, options, progress, ceiling, worth
     )
     portals = find_portals(tree, structure.tolerance)
     outer = at_box(tree)
@@ -387,12 +400,11 @@ def floor_of(
 
 
 def _floor_about(tree: Tree, leaves: Bools, building: Building) -> Floats:
-    """(n, 3, 3) walkable triangles of floor in the boxes around (L,) leaves."""
-    boxes = [bounds(tree.leaves[leaf].points) for leaf in np.flatnonzero(leaves)]
-    places = find_places(
-        building.floors, building.structure, building.walker, np.array(boxes).reshape(-1, 2, 3)
-    )
-    return places.triangles(building.structure.tolerance)
+    """(n, 3, 3) walkable triangles of floor, those about (L,) leaves among them."""
+    boxes = np.array([bounds(tree.leaves[leaf].points) for leaf in np.flatnonzero(leaves)])
+    places, middle = building.places, building.walker.middle
+    near = places.near(boxes.reshape(-1, 2, 3) - [0, middle, 0])
+    return places.only(near & places.front).triangles(building.structure.tolerance)
 
 
 def _within(tree: Tree, leaves: Bools, points: Floats) -> tuple[Bools, Ints]:

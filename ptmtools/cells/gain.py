@@ -60,11 +60,11 @@ class _Costs(Groups):
         has joined another has nothing."""
         super().__init__(len(sees), pairs)
         self.sees, self.own, self.every = sees, own, every
-        self.before = [_cost(row, each, every) for row, each in zip(sees, own, strict=True)]
+        self.before = [cost(row, each, every) for row, each in zip(sees, own, strict=True)]
 
     def together(self, a: int, b: int) -> float:
         """The cost of two groups joined."""
-        return _cost(self.sees[a] | self.sees[b], self.own[a] + self.own[b], self.every)
+        return cost(self.sees[a] | self.sees[b], self.own[a] + self.own[b], self.every)
 
     def join(self, a: int, b: int) -> list[tuple[int, int]]:
         self.sees[a] |= self.sees[b]
@@ -114,7 +114,7 @@ class _Attached(_Costs):
         return super().join(a, b)
 
 
-def _cost(seen: Bools, own: Floats, every: Floats) -> float:
+def cost(seen: Bools, own: Floats, every: Floats) -> float:
     """The cost of a group that sees leaves, (L,), and has a volume and an area, (2,); ``every``:
     (L, 2) those of the leaves."""
     volume, area = every[seen].sum(axis=0)
@@ -125,10 +125,10 @@ def gain_of(sees: Bools, every: Floats, group: Ints) -> float:
     """The gain of dividing everything into groups, (L,), of leaves that see, (L, L), one another;
     ``every``: (L, 2) their volumes and areas."""
 
-    def cost(members: Bools) -> float:
+    def joined(members: Bools) -> float:
         seen = np.asarray(sees[members].any(axis=0))
-        return _cost(seen, every[members].sum(axis=0), every)
+        return cost(seen, every[members].sum(axis=0), every)
 
-    together = cost(np.ones(len(group), dtype=np.bool_))
-    apart = sum(cost(group == name) for name in np.unique(group))
+    together = joined(np.ones(len(group), dtype=np.bool_))
+    apart = sum(joined(group == name) for name in np.unique(group))
     return 1 - apart / together if together > 0 else 0.0

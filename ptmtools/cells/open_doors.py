@@ -20,9 +20,10 @@ from ptmtools.cells.bsp import Tree
 from ptmtools.cells.ceilings import ROOFED, roofed_share
 from ptmtools.cells.doors import DoorLeaf, find_doors
 from ptmtools.cells.doorways import RELIEF
+from ptmtools.cells.floors import Floors, detail_of
 from ptmtools.cells.model import descend
 from ptmtools.cells.options import SubdivideOptions
-from ptmtools.cells.places import Floors, detail_of, spread
+from ptmtools.cells.places import spread
 from ptmtools.cells.planar import Geometry
 from ptmtools.cells.portals import Portal, find_portals, flood
 from ptmtools.cells.split_planes import DoorPlanes
@@ -224,7 +225,7 @@ def enclosure(scene: Scene, options: SubdivideOptions | None = None) -> Enclosur
     corners, names = structure.corners, tuple(leaf.name for leaf in doors.leaves)
     if not len(corners):
         return Enclosure(names, 0.0, 0, 0.0)
-    floors = Floors.of(scene, detail_of(scene, structure, options), backs=True)
+    floors = Floors.of(scene, detail_of(scene, structure, options))
     around = Surroundings(corners, tolerance)
     points, _ = spread(floors.corners)
     points = spread_over(points, 4 * _POINTS) + [0.0, _EYE, 0.0]

@@ -38,7 +38,7 @@ from ptmtools.cells.planar import Geometry
 from ptmtools.cells.room_names import named, unused_notes
 from ptmtools.cells.room_volumes import Volumes
 from ptmtools.cells.search import connected
-from ptmtools.cells.sight import from_places, sampled_sight
+from ptmtools.cells.sight import from_places, portals_of, sampled_sight
 from ptmtools.diagnostics import Warned
 from ptmtools.tolerance import TIE_SHARE
 
@@ -310,7 +310,7 @@ def _groups(cells: Cells, rank: Ints, room: Ints, gain: float, named: bool) -> I
     kept = (cells.leaf_cell[cells.portal_leaf] >= 0).all(axis=1)
     inner, above = (rank[cells.portal_leaf[which & kept]] for which in (same, cells.in_ceiling))
     order = np.argsort(rank)
-    sees = from_places(sampled_sight(cells), cells.leaf_standing)[np.ix_(order, order)]
+    sees = from_places(sampled_sight(portals_of(cells)), cells.leaf_standing)[np.ix_(order, order)]
     leaf, piece, area = sides(cells)
     surface = np.bincount(leaf, area[piece], cells.leaf_count).astype(np.float64)
     viewers = cells.leaf_volumes() * cells.leaf_standing

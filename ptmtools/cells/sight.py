@@ -34,11 +34,11 @@ STEPS = np.array(
 )
 
 
-def sampled_sight(cells: Cells) -> Bools:
+def sampled_sight(portals: Portals) -> Bools:
     """(L, L) symmetric: leaves that some straight line through portals joins. A leaf sees itself
     and those with which it shares a portal."""
-    ends = cells.portal_leaf[: cells.sight_count].reshape(-1, 2).astype(np.int64)
-    seen = np.eye(cells.leaf_count, dtype=np.bool_)
+    ends = portals.leaf.astype(np.int64)
+    seen = np.eye(portals.leaf_count, dtype=np.bool_)
     seen[ends, ends[:, ::-1]] = True
     if len(ends) == 0:
         return seen
@@ -47,15 +47,16 @@ def sampled_sight(cells: Cells) -> Bools:
     count = min(max(LINES // len(ends), LEAST_LINES), MOST_LINES) // 8 * 8
     share = _even(count)
     origin, along = np.empty((2, len(ends), count, 3))
-    for k in range(len(ends)):
-        origin[k], along[k] = _lines(cells.portal(k), cells.portal_plane[k, :3], share)
+    for k, normal in enumerate(portals.normal):
+        polygon = portals.point[portals.start[k] : portals.start[k + 1]]
+        origin[k], along[k] = _lines(polygon, normal, share)
     leaves = ends.reshape(-1)
     order = np.argsort(leaves, kind="stable")
     openings = Openings(
-        np.ascontiguousarray(cells.portal_point, dtype=np.float64),
-        cells.portal_start[: len(ends) + 1].astype(np.int64),
+        np.ascontiguousarray(portals.point, dtype=np.float64),
+        portals.start.astype(np.int64),
         ends[:, ::-1].reshape(-1),
-        np.searchsorted(leaves[order], np.arange(cells.leaf_count + 1)),
+        np.searchsorted(leaves[order], np.arange(portals.leaf_count + 1)),
         order,
     )
     path = np.empty(2 * LONGEST, np.int64)

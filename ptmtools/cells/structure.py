@@ -21,12 +21,12 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, cross, normals
+from ptmtools.arrays import Bools, Floats, Ints, cross, normals, summed
 from ptmtools.cells.facets import UPWARD, Facets, Welded
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, neighbours, unite
 from ptmtools.cells.roles import Designated, detail_by_shape
-from ptmtools.cells.search import Bins, Nearby, Tries
+from ptmtools.cells.search import Bins, Nearby, Tries, connected
 from ptmtools.embree import ray_tree
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
@@ -180,6 +180,8 @@ def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:
         frame = Frame.of(plane)
         near = structure.nearby.between(plane, -tolerance.plane, tolerance.plane)
         flat = near[structure.lie_in(plane, near)]
+        if not _clustered(structure, frame, flat, least):
+            continue
         blocking = structure.united(frame, flat)
         shapely.prepare(blocking)
         masonry = flat[~structure.door[flat]]
@@ -193,6 +195,18 @@ def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:
             walls = shapely.multipolygons(parts[large])
             walls_by_area.append((float(shapely.area(walls)), WallPlane(frame, walls, blocking)))
     return [walls_by_area[i][1] for i in ranked(np.array([area for area, _ in walls_by_area]))]
+
+
+def _clustered(structure: Structure, frame: Frame, flat: Ints, least: float) -> bool:
+    """Whether these triangles in a plane may hold a wall of an area, m²: not the seats of a hundred
+    benches, which are in small clusters by their boxes."""
+    if len(flat) > _SEVERAL or structure.forced[flat].any():
+        return True
+    corner, gap = frame.to_plane(structure.corners[flat]), structure.tolerance.hairline
+    low, high = corner.min(axis=1) - gap / 2, corner.max(axis=1) + gap / 2
+    boxes = shapely.box(*low.T, *high.T)
+    group = connected(len(flat), shapely.STRtree(boxes).query(boxes).T)
+    return bool((summed(group, structure.areas[flat], len(flat)) >= least).any())
 
 
 def built(walls: list[WallPlane]) -> list[WallPlane]:
@@ -263,6 +277,8 @@ def parallel_gap(plane: Floats, other: Floats, tolerance: Tolerance) -> float:
     return abs(float(plane[3]) - float(np.sign(turn)) * float(other[3]))
 
 
+#: Number of triangles in a plane from which all of them count as one cluster.
+_SEVERAL = 4096
 #: A plane is upright or level if it leans by less than this (sine).
 _STRAIGHT = 3e-3
 #: Number of walls from which a surface may be a scan.

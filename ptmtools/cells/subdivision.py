@@ -37,7 +37,7 @@ from ptmtools.cells.joining import joined
 from ptmtools.cells.model import OUTSIDE, Cells, descend
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.ownership import Pieces, cut_to_leaves
-from ptmtools.cells.places import eye_region, find_places, meets
+from ptmtools.cells.places import eye_region, meets
 from ptmtools.cells.planar import count, counting
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.roles import matches
@@ -87,7 +87,7 @@ def _subdivided(
     scene: Scene, options: SubdivideOptions, progress: Progress, executor: Executor
 ) -> Cells:
     axes = main_axes(scene.corners)
-    building = Building.of(scene, options)
+    building = Building.of(scene, options, executor)
     corners, tolerance = building.structure.corners, building.structure.tolerance
     low, high = bounds(scene.corners @ axes.T)
     margin = BOX_MARGIN * tolerance.extent
@@ -119,6 +119,12 @@ def _subdivided(
                 "of them contain walls that do not divide them, so the space behind these walls "
                 "counts as visible; raise --max-leaves"
             )
+        )
+    if space.tree.kept:
+        notes.append(
+            f"{space.tree.kept:,} of {len(space.tree.leaves):,} leaves contain walls that do not "
+            "divide them: further division would save visitors little, since sight goes around "
+            "these walls or over them (--gain changes that)"
         )
     pieces = cut_to_leaves(scene, space.tree, tolerance)
     owner = compact_numbers(space.reached)[pieces.leaf]
@@ -270,9 +276,8 @@ def _standing(building: Building, bodies: list[Polyhedron], space: Space) -> tup
     if building.options.standing == "anywhere":
         return np.ones(len(bodies), dtype=np.bool_), np.zeros((0, 3, 3))
     boxes = np.array([bounds(body.points) for body in bodies]).reshape(-1, 2, 3)
-    blocking = ~np.append(space.doors, False)[building.doors.of]
-    structure = replace(building.structure, corners=building.structure.corners[blocking])
-    places = find_places(building.footing, structure, walker, boxes)
+    places = building.places
+    places = places.only(places.near(boxes - [0, walker.middle, 0]))
     if space.ceiling is not None:
         places = places.without_tops(space.ceiling - tolerance.plane, walker.radius)
     eyes = eye_region(places, walker, tolerance)

@@ -8,16 +8,16 @@ import pytest
 import shapely
 
 from ptmtools.arrays import Floats
-from ptmtools.cells import SubdivideOptions, places as clearance
+from ptmtools.cells import SubdivideOptions, clearance
+from ptmtools.cells.floors import Floors, detail_of
 from ptmtools.cells.options import Walker
-from ptmtools.cells.places import Floors, detail_of, eye_region, find_places
+from ptmtools.cells.places import eye_region, find_places
 from ptmtools.cells.structure import Opaque, Structure
 from ptmtools.tolerance import Tolerance
 from tests.cells.conftest import box
 from tests.conftest import scene_of, subdivided
 
 WALKER = Walker(0.25, 0.5, 1.7)
-EVERYWHERE = np.array([[[-1e5] * 3, [1e5] * 3]])
 
 
 def turned(faces: Floats, degrees: float) -> Floats:
@@ -47,8 +47,8 @@ def areas_of(faces: Floats, walker: Walker = WALKER, times: int = 1) -> tuple[fl
     scene = subdivided(scene_of(faces.tolist()), times)
     options = SubdivideOptions(detail_by_shape=False)
     structure = Structure.of(Opaque.of(scene, options), scene.tolerance)
-    floors = Floors.of(scene, detail_of(scene, structure, options), backs=True)
-    places = find_places(floors, structure, walker, EVERYWHERE)
+    floors = Floors.of(scene, detail_of(scene, structure, options))
+    places = find_places(floors, structure.corners, walker, scene.tolerance)
     eyes = eye_region(places, walker, structure.tolerance)
     return float(shapely.area(places.plan).sum()), float(shapely.area(shapely.union_all(eyes.plan)))
 

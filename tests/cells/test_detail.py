@@ -9,7 +9,7 @@ import pytest
 
 from ptmtools.arrays import areas
 from ptmtools.cells import SubdivideOptions, structural_triangles, subdivide
-from ptmtools.cells.places import Floors, detail_of
+from ptmtools.cells.floors import Floors, detail_of
 from ptmtools.cells.structure import Opaque, Structure
 from ptmtools.scene.model import Material, Scene
 from tests.conftest import scene_of, subdivided

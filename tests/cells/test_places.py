@@ -12,8 +12,9 @@ import pytest
 
 from ptmtools.arrays import areas
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
+from ptmtools.cells.floors import Floors, detail_of
 from ptmtools.cells.options import Walker
-from ptmtools.cells.places import Floors, detail_of, find_places
+from ptmtools.cells.places import find_places
 from ptmtools.cells.structure import Opaque, Structure
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
@@ -21,15 +22,14 @@ from ptmtools.scene.model import Scene
 from tests.conftest import scene_of, subdivided
 
 WALKER = Walker(0.25, 0.5, 1.7)
-EVERYWHERE = np.array([[[-1e3] * 3, [1e3] * 3]])
 SLACK = 0.02  # m², for circles that are polygons
 
 
 def place_area(scene: Scene, options: SubdivideOptions = SubdivideOptions()) -> float:  # noqa: B008
     structure = Structure.of(Opaque.of(scene, options), scene.tolerance)
     floors = Floors.of(scene, detail_of(scene, structure, options))
-    places = find_places(floors, structure, Walker(*options.walker), EVERYWHERE)
-    return float(areas(places.triangles(scene.tolerance)).sum())
+    places = find_places(floors, structure.corners, Walker(*options.walker), scene.tolerance)
+    return float(areas(places.only(places.front).triangles(scene.tolerance)).sum())
 
 
 def floor_of(x0: float, x1: float, z0: float, z1: float, y: float = 0.0, rise: float = 0.0) -> list:
@@ -76,7 +76,8 @@ def test_a_ramp_under_a_sloping_ceiling_has_its_head_room_along_the_slope() -> N
         scene = scene_of([ramp, ceiling])
         structure = Structure.of(Opaque.of(scene, options), scene.tolerance)
         floors = Floors.of(scene, detail_of(scene, structure, options))
-        actual = find_places(floors, structure, WALKER, EVERYWHERE).triangles(scene.tolerance)
+        places = find_places(floors, structure.corners, WALKER, scene.tolerance)
+        actual = places.only(places.front).triangles(scene.tolerance)
         below = actual[:, :, 1].mean(axis=1) < actual[:, :, 0].mean(axis=1) / 2 + above / 2
         assert areas(actual[below]).sum() == pytest.approx(area, abs=0.3)
 

@@ -11,7 +11,7 @@ import pytest
 
 from ptmtools.cells import Cells, SubdivideOptions, file_order, subdivide
 from ptmtools.cells.gain import join_by_gain
-from ptmtools.cells.sight import _even, _lines, sampled_sight
+from ptmtools.cells.sight import _even, _lines, portals_of, sampled_sight
 from ptmtools.errors import InputError
 from ptmtools.scene import ingest
 from ptmtools.scene.model import Scene
@@ -208,7 +208,7 @@ def test_gain_by_hand() -> None:
 
 def test_sampled_sight_is_within_the_flow_and_finds_most_of_it(corridor: Scene) -> None:
     cells = subdivide(corridor, SubdivideOptions(cells="leaf"))
-    sees = sampled_sight(cells)
+    sees = sampled_sight(portals_of(cells))
     flow = compute_pvs(cells).to_matrix()
     assert np.array_equal(sees, sees.T)
     assert not np.any(sees & ~flow)
@@ -221,9 +221,9 @@ def test_any_number_of_lines_comes_in_eights(
 ) -> None:
     cells = subdivide(corridor, SubdivideOptions(cells="leaf"))
     monkeypatch.setattr("ptmtools.cells.sight.LINES", 128 * cells.portal_count)
-    even = sampled_sight(cells)
+    even = sampled_sight(portals_of(cells))
     monkeypatch.setattr("ptmtools.cells.sight.LINES", 135 * cells.portal_count)
-    assert np.array_equal(sampled_sight(cells), even)
+    assert np.array_equal(sampled_sight(portals_of(cells)), even)
 
 
 @pytest.mark.parametrize("gain", [-0.1, 1.1, float("nan")])
