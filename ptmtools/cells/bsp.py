@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -44,7 +44,8 @@ _FEW = 64
 #: Up to this many pairs of a plane and a fragment are compared in a node.
 _PAIRS = 1 << 21
 #: Number of leaves at which a division is first examined for its worth, and the factor to the next.
-_FIRST_LOOK, _LOOKS = 512, 4
+_FIRST_LOOK, _LOOKS = 512, 8
+NOWHERE = np.zeros((0, 3))
 #: Sources of splits, in this order.
 _WALLS, _REVEALS, _DOORS, _CAPS = range(4)
 
@@ -68,8 +69,7 @@ class Tree:
         return np.array([wall.frame.plane for wall in self.walls]).reshape(-1, 4)
 
 
-@dataclass(frozen=True)
-class _Fragment:
+class _Fragment(NamedTuple):
     """The part of one wall plane inside a node."""
 
     wall: WallPlane
@@ -188,21 +188,23 @@ def build_tree(
             hung.add(node)
         place(task.parent, node)
         extents = _Extents(task.fragments)
+        ahead = [extents.ahead(facing, tolerance) for facing in (plane, -plane)]
+        cut_by = ahead[0] & ahead[1]
         for side, body in enumerate(cut(task.body, plane, node, tolerance.rounding)):
             if body is None:
                 raise AssertionError("a split that was accepted has two sides")
-            facing = plane if side == 0 else -plane
-            ahead = extents.ahead(facing, tolerance)
-            inherited = [
-                (f.wall, f.shape, clip_polygon(f.outline, facing, tolerance.rounding))
-                for i, f in enumerate(task.fragments)
-                if ahead[i] and i != task.best
-            ]
             # A part of a node that a door or a cap split may have further reveals and doors.
             if task.source > _REVEALS:
                 push(body, [], (node, side), _REVEALS)
-            else:
-                push(body, _fragments(inherited, tolerance), (node, side), task.source)
+                continue
+            facing = plane if side == 0 else -plane
+            inherited = [
+                f._replace(outline=clip_polygon(f.outline, facing, tolerance.rounding))
+                for i, f in enumerate(task.fragments)
+                if ahead[side][i] and i != task.best
+            ]
+            whole = [not cut_by[i] for i in np.flatnonzero(ahead[side]).tolist() if i != task.best]
+            push(body, _fragments(inherited, whole, tolerance), (node, side), task.source)
         progress(len(leaves), len(leaves) + len(queue), "splitting")
     return Tree(
         tuple(taken),
@@ -220,34 +222,38 @@ def _sections(
 ) -> list[_Fragment]:
     """The fragments of walls inside a body; those that close its ``whole`` section have exactly the
     area of the section."""
-    cuts = [(w, w.walls, section(body, w.frame.plane, tolerance.rounding)) for w in walls]
-    fragments = _fragments(cuts, tolerance)
-    return [replace(f, area=f.section_area) for f in fragments] if whole else fragments
+    cuts = [
+        _Fragment(w, w.walls, 0.0, NOWHERE, section(body, w.frame.plane, tolerance.rounding), 0.0)
+        for w in walls
+    ]
+    fragments = _fragments(cuts, [False] * len(cuts), tolerance)
+    return [f._replace(area=f.section_area) for f in fragments] if whole else fragments
 
 
-def _fragments(
-    shapes: list[tuple[WallPlane, Geometry, Floats]], tolerance: Tolerance
-) -> list[_Fragment]:
-    """Wall polygons (wall, shape, outline of the node in the wall's plane) clipped to a node,
-    without those of no more area than the rounding of the outline."""
-    shapes = [(wall, shape, outline) for wall, shape, outline in shapes if len(outline) >= 3]
-    if not shapes:
+def _fragments(before: list[_Fragment], whole: list[bool], tolerance: Tolerance) -> list[_Fragment]:
+    """Fragments of which the outline alone is that of a node, clipped to it unless they are
+    ``whole`` in it, without those of no more area than the rounding of the outline."""
+    rows = [i for i, f in enumerate(before) if len(f.outline) >= 3]
+    if not rows:
         return []
-    flat = [wall.frame.to_plane(outline) for wall, _, outline in shapes]
+    flat = [before[i].wall.frame.to_plane(before[i].outline) for i in rows]
     of = np.repeat(np.arange(len(flat)), [len(outline) for outline in flat])
     regions = shapely.polygons(shapely.linearrings(np.concatenate(flat), indices=of))
-    inside = intersection(np.array([shape for _, shape, _ in shapes]), regions, tolerance.grid)
-    areas = shapely.area(inside)
-    corners, of = shapely.get_coordinates(inside, return_index=True)
-    start = np.searchsorted(of, np.arange(len(shapes) + 1))
-    sections = shapely.area(regions)
+    sections = shapely.area(regions).tolist()
+    some = np.array([not whole[i] for i in rows], dtype=np.bool_)
+    shapes = np.array([before[i].shape for i in rows], dtype=object)
+    shapes[some] = intersection(shapes[some], regions[some], tolerance.grid)
+    areas = shapely.area(shapes)
+    corners, of = shapely.get_coordinates(shapes[some], return_index=True)
+    start = np.searchsorted(of, np.arange(np.count_nonzero(some) + 1))
+    place = np.cumsum(some) - 1
     kept: list[_Fragment] = []
     for i in np.flatnonzero(areas > tolerance.rounding * tolerance.extent).tolist():
-        wall, _, outline = shapes[i]
-        points = wall.frame.to_space(corners[start[i] : start[i + 1]])
-        kept.append(
-            _Fragment(wall, inside[i], float(areas[i]), points, outline, float(sections[i]))
-        )
+        f = before[rows[i]]._replace(section_area=sections[i])
+        if some[i]:
+            points = f.wall.frame.to_space(corners[start[place[i]] : start[place[i] + 1]])
+            f = f._replace(shape=shapes[i], area=float(areas[i]), points=points)
+        kept.append(f)
     return kept
 
 

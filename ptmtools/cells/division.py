@@ -114,14 +114,13 @@ class Building:
     def walker(self) -> Walker:
         return Walker(*self.options.walker)
 
-    def worth(self, *, whole: bool) -> Worth | None:
-        """Whether parts of a division are worth dividing further, or only the ``whole``; None if
-        every part is."""
+    def worth(self) -> Worth | None:
+        """Whether parts of a division are worth dividing further; None if every part is."""
         options, corners = self.options, self.structure.corners
         if options.cells == "leaf" or not 0 < options.gain < 1:
             return None
         middle, tolerance = self.walker.middle, self.structure.tolerance
-        return Worth.of(self.places, middle, corners, options.gain, whole, tolerance)
+        return Worth.of(self.places, middle, corners, options.gain, tolerance)
 
     def with_glass(self) -> Surroundings:
         """The surroundings in which glass counts as a wall."""
@@ -176,7 +175,8 @@ def _divided(building: Building, root: Polyhedron, progress: Progress, inside: b
     ceiling = None
     if inside and top is not None:
         ceiling = ceiling_plane(top, structure, root, structure.tolerance)
-    worth = building.worth(whole=not inside)
+    # A closed building is closed only when all walls around it divide.
+    worth = building.worth() if inside else None
     tree = build_tree(
         root, structure, building.walls, building.reveals, planes, options, progress, ceiling, worth
     )

@@ -160,6 +160,8 @@ def _openings(
     if len(shared) == 0:
         return
     every = union(shared, tolerance.grid, more=True)
+    if wall.barring is None and shapely.covered_by(every, wall.blocking):
+        return
     opening = left_open(every, wall.blocking, tolerance)
     openings = [(opening, False)]
     if wall.barring is not None:

@@ -19,7 +19,7 @@ from ptmtools.cells.bsp import Tree
 from ptmtools.cells.gain import cost
 from ptmtools.cells.model import descend
 from ptmtools.cells.places import Places, spread
-from ptmtools.cells.portals import Portal, at_box, find_portals
+from ptmtools.cells.portals import Portal, find_portals
 from ptmtools.cells.sight import from_places, sampled_sight
 from ptmtools.portal_flow.flow import Portals
 from ptmtools.tolerance import Tolerance
@@ -37,28 +37,20 @@ class Worth:
     viewers: tuple[Floats, Floats]  # (n, 3) the middles of bodies, and (n,) their m² of floor
     surfaces: tuple[Floats, Floats]  # (n, 3) points beside the structure, and (n,) their m²
     gain: float  # `SubdivideOptions.gain`
-    whole: bool  # whether all districts are divided if one is
     tolerance: Tolerance
 
     @staticmethod
     def of(
-        places: Places,
-        middle: float,
-        structure: Floats,
-        gain: float,
-        whole: bool,
-        tolerance: Tolerance,
+        places: Places, middle: float, structure: Floats, gain: float, tolerance: Tolerance
     ) -> Worth:
         """``middle``: height of the middle of a body; ``structure``: (n, 3, 3) triangles."""
         points, area = _thinned(*spread(places.triangles(tolerance)))
         beside, size = _beside(structure, 2 * tolerance.plane)
-        return Worth((points + [0.0, middle, 0.0], area), (beside, size), gain, whole, tolerance)
+        return Worth((points + [0.0, middle, 0.0], area), (beside, size), gain, tolerance)
 
     def __call__(self, tree: Tree) -> Bools:
         """(L,) which leaves of a tree, and parts of it that wait for their division, to divide."""
         every = np.stack([_held(tree, *self.viewers), _held(tree, *self.surfaces)], axis=1)
-        if self.whole:  # a visitor of a closed building is not outside
-            every[at_box(tree), 0] = 0.0
         portals = _portals(tree, find_portals(tree, self.tolerance), self.tolerance)
         sees = from_places(sampled_sight(portals), every[:, 0] > 0)
         apart = every[:, 0] * (sees @ every[:, 1]) + every[:, 1] * (sees @ every[:, 0])
@@ -70,7 +62,7 @@ class Worth:
             saved = cost(seen, every[members].sum(axis=0), every) - apart[members].sum()
             least = self.gain * np.count_nonzero(members) / len(members) * apart.sum()
             divide[district == node] = saved >= least
-        return divide if not self.whole or not divide.any() else np.ones_like(divide)
+        return divide
 
 
 def districts(tree: Tree) -> Ints:
