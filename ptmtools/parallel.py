@@ -383,7 +383,7 @@ class Workers:
 
 
 class _Alone(Executor):
-    """One thread, and a process for the task that it submits.
+    """One thread, a process for the task that it submits, and workers that end with each call.
 
     On two processors that task comes first: a background loop waits until ``free`` is set.
     """
@@ -393,6 +393,17 @@ class _Alone(Executor):
         self.free = threading.Event()
         if not wait:
             self.free.set()
+
+    def _each(
+        self, function: Task, shared: Any, tasks: Iterable[Any], releases_lock: bool, chunk: int
+    ) -> Iterator[Any]:
+        if self._processors == 1:
+            yield from super()._each(function, shared, tasks, releases_lock, chunk)
+            return
+        with Local(self._processors) as workers:
+            yield from workers.each(
+                function, shared, tasks, releases_lock=releases_lock, chunk=chunk
+            )
 
     def submit(
         self, function: Callable[[S, T], R], shared: S, task: T, *, long: bool = True

@@ -117,7 +117,8 @@ def find_places(
     order = along_a_curve(middle) if len(plan) else np.arange(0)
     blocks = np.array_split(order, max(1, -(-len(order) // _BLOCK)))
     tasks = ((plan[block], region[block]) for block in blocks)
-    done = (executor or Executor()).each(_Search.places, search, tasks)
+    doer = executor if executor and len(blocks) >= _MANY_BLOCKS else Executor()
+    done = doer.each(_Search.places, search, tasks)
     plans, regions, undecided = zip(*done, strict=True)
     for names in undecided:
         count(names)
@@ -131,8 +132,8 @@ def find_places(
 
 #: Parts of floors longer than this, metres, and than this share of the model, are cut in two.
 _LONG, _LONG_SHARE = 16.0, 1 / 32
-#: Number of parts of floors in a block.
-_BLOCK = 512
+#: Number of parts of floors in a block, and of blocks that are worth starting workers for.
+_BLOCK, _MANY_BLOCKS = 512, 8
 
 
 def _tiles(floors: Floors, tolerance: Tolerance) -> tuple[Geometry, Ints]:

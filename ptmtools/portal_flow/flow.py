@@ -91,6 +91,7 @@ def portal_flow(
     budget: int,
     progress: Progress = silent,
     executor: Executor = Executor(),  # noqa: B008 - has no state
+    open_question: OpenQuestion | None = None,
 ) -> PortalFlow:
     """Conservative visibility from portal to portal (Teller & Séquin; paper §3).
 
@@ -99,6 +100,8 @@ def portal_flow(
     budget: operations for each search from a directed portal; see the module's head. Near ties may
         make a search be repeated until three budgets are spent.
     executor: does the searches; see `searching`. The result is the same for any.
+    open_question: the pairs of leaves whose visibility matters, all by default. Of other pairs the
+        result is the initial upper bound.
 
     Raises InputError PTM-I400 (arrays that do not fit together, or a coordinate that is not
     finite); LimitError PTM-L400 (more portals than fit into memory).
@@ -112,7 +115,8 @@ def portal_flow(
 
     g = geometry(portals)
     together = BATCH // 8
-    searching = Searching(g, known, budget)
+    answered = open_question.answered(portals) if open_question else None
+    searching = Searching(g, known, budget, answered)
     sizes = BITS_OF_BYTE[searching.known.view(np.uint8)].sum(axis=1)
     order = np.argsort(sizes, kind="stable")
     for first in range(0, count, BATCH):
@@ -254,20 +258,50 @@ GROWTH = 24
 NEAR_TIE_WORDS = 1 << 16
 
 Tools = tuple[Scratch, SequenceTest]
+#: (G, W) for each group of leaves, the directed portals into leaves that it need not be tested
+#: against, as bits; and (2K,) the group of the leaf behind each directed portal.
+Answered = tuple[Bits, Ints]
+
+
+@dataclass(frozen=True)
+class OpenQuestion:
+    """Which pairs of leaves a flow decides."""
+
+    group: Ints  # (L,) the group of each leaf, from 0
+    pairs: Bools  # (G, G) the pairs of groups that are not known to see each other
+
+    def answered(self, portals: Portals) -> Answered:
+        """See `Answered`."""
+        enters, leaves = portals.leaf[:, ::-1].reshape(-1), portals.leaf.reshape(-1)
+        words = (len(enters) + 63) // 64
+        bits = np.zeros((len(self.pairs), 64 * words), dtype=np.bool_)
+        bits[:, : len(enters)] = ~self.pairs[:, self.group[enters]]
+        rows = np.packbits(bits, axis=1, bitorder="little").view(np.uint64)
+        return rows, self.group[leaves]
 
 
 class Searching:
     """The portals; the portals that each may see so far, (2K, W) bits; and the budget of each
     search, see `portal_flow`."""
 
-    def __init__(self, geometry: Geometry, known: Bits, budget: int) -> None:
+    def __init__(
+        self, geometry: Geometry, known: Bits, budget: int, answered: Answered | None = None
+    ) -> None:
         self.geometry, self.known, self.budget = geometry, known, budget
+        self._answered = answered
         self._idle: list[Tools] = []
 
     @property
     def words(self) -> int:
         """Words in a row."""
         return (len(self.geometry.leaf) + 63) // 64
+
+    def row(self, source: int) -> Bits:
+        """(W,) the portals that a search from a directed portal need not find."""
+        if self._answered is None:
+            return np.zeros(self.words, np.uint64)
+        row, group = self._answered
+        return np.asarray(self.known[source] & row[group[source]])
 
     @contextmanager
     def tools(self) -> Iterator[Tools]:
@@ -300,7 +334,9 @@ def flood_from(shared: Searching, span: tuple[int, int]) -> Bits:
 def search_from(shared: Searching, source: int) -> tuple[Bits, Searched]:
     """As a task: a (W,) row of bits, the portals that the directed portal ``source`` sees; and the
     cost."""
-    seen = np.zeros(shared.words, np.uint64)
+    seen = shared.row(source)
+    if (seen == shared.known[source]).all():
+        return seen, Searched(False, 0, 0, 0, 0)
     with shared.tools() as (storage, test):
         given = shared.geometry, storage, test, shared.known, source, shared.budget
         return seen, searched(*given, seen)

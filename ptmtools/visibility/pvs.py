@@ -15,14 +15,24 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.model import Cells
-from ptmtools.cells.sight import LONGEST, from_places, portals_of
+from ptmtools.cells.sight import LONGEST, from_places, portals_of, sampled_sight
 from ptmtools.executor import Executor
-from ptmtools.portal_flow.flow import PortalFlow, Portals, check, geometry, leaf_matrix, portal_flow
+from ptmtools.portal_flow.flow import (
+    OpenQuestion,
+    PortalFlow,
+    Portals,
+    check,
+    geometry,
+    leaf_matrix,
+    portal_flow,
+)
 from ptmtools.portal_flow.storage import Geometry
 from ptmtools.progress import Progress, silent
 from ptmtools.visibility.model import Pvs
 from ptmtools.visibility.options import PvsOptions
 
+#: Number of portals from which lines precede the flow.
+MANY_PORTALS = 512
 #: Tasks that the lines are distributed to.
 SPANS = 64
 
@@ -160,7 +170,8 @@ def compute_pvs(
         leaves = sampled_leaves(portals, options.lines, executor)
         return Pvs.from_matrix(lifted(cells, leaves), **volumes, conservative=False)
     budget = options.budget if options.method == "full" else 0
-    flow = portal_flow(portals, budget, progress, executor)
+    question = _open_question(cells, portals) if budget else None
+    flow = portal_flow(portals, budget, progress, executor, question)
     matrix = lifted(cells, leaf_matrix(portals, flow))
     return Pvs.from_matrix(
         matrix,
@@ -172,6 +183,17 @@ def compute_pvs(
         leak=find_leaks(cells, flow, matrix),
         **volumes,
     )
+
+
+def _open_question(cells: Cells, portals: Portals) -> OpenQuestion | None:
+    """The pairs of cells that sampled lines have not shown to see each other: a search costs far
+    more than lines, and in an open building most pairs do. None where searches are few."""
+    if len(portals.leaf) < MANY_PORTALS:
+        return None
+    pairs = np.zeros((cells.cell_count + 1,) * 2, dtype=np.bool_)  # the last one: of no cell
+    pairs[:-1, :-1] = ~lifted(cells, sampled_sight(portals))
+    group = np.where(cells.leaf_cell < 0, cells.cell_count, cells.leaf_cell).astype(np.int64)
+    return OpenQuestion(group, pairs)
 
 
 def lifted(cells: Cells, leaves: Bools) -> Bools:

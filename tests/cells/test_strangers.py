@@ -12,16 +12,18 @@ from ptmtools.visibility import check_conservative, compute_pvs
 from tests.cells.buildings import write
 from tests.cells.strangers import STRANGERS
 
+#: They take ten seconds each; `test_scans` and `test_worth` have smaller ones.
+LARGE = {"tile", "street", "scanned hall"}
 
-@pytest.mark.parametrize("name", ["office", "institute", "serpentine"])
+
+@pytest.mark.parametrize("name", sorted(STRANGERS.keys() - LARGE))
 def test_resident_share_and_cells(name: str, tmp_path: Path) -> None:
-    """The tile, of which all is resident, is in `test_scans`."""
     stranger = STRANGERS[name]
     model = write(tmp_path / "model.obj", stranger.parts().items())
     scene = ingest(model, IngestOptions(unit="m", up="z"))
     cells = subdivide(scene)
     pvs = compute_pvs(cells)
-    assert pvs.volume_at_hand[0] <= stranger.resident
+    assert round(pvs.volume_at_hand[0], 2) <= stranger.resident
     least, most = stranger.cells
     assert least <= cells.standing.sum() <= most
     blocking = structural_triangles(scene, SubdivideOptions(), cells.opened)

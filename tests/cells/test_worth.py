@@ -1,0 +1,83 @@
+"""Dividing goes on where it saves visitors something, and stops where it saves nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ptmtools.cells import Cells, SubdivideOptions, bsp, subdivide
+from ptmtools.cells.bsp import Tree
+from ptmtools.cells.worth import DISTRICT, districts, within
+from ptmtools.scene import IngestOptions, ingest
+from ptmtools.visibility import compute_pvs
+from tests.cells.buildings import write
+from tests.cells.strangers import Parts, office
+from tests.scene.buildings import box, turned_in_plan
+
+
+@pytest.fixture(autouse=True)
+def early(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Small models are examined, too."""
+    monkeypatch.setattr(bsp, "_FIRST_LOOK", 64)
+    monkeypatch.setattr(bsp, "_LOOKS", 2)
+
+
+def divided(parts: Parts, folder: Path, **options: object) -> Cells:
+    model = write(folder / "model.obj", parts.items())
+    scene = ingest(model, IngestOptions(unit="m", up="z"))
+    return subdivide(scene, SubdivideOptions(ceiling="none", **options))
+
+
+def scattered(count: int) -> Parts:
+    """Solid kiosks of 3 m on open ground, each turned its own way."""
+    rng = np.random.default_rng(2)
+    parts: Parts = {"ground": box((-5, -5, -0.3), (65, 65, 0))}
+    for k in range(count):
+        kiosk = turned_in_plan(box((-1.5, -1.5, 0), (1.5, 1.5, rng.uniform(3, 6))), 37.0 * k)
+        parts[f"kiosk_{k}"] = kiosk + [*rng.uniform(0, 60, 2), 0]
+    return parts
+
+
+def kept(cells: Cells) -> bool:
+    return any("further division would save" in note for note in cells.notes)
+
+
+def test_open_ground_is_not_divided_by_every_kiosk(tmp_path: Path) -> None:
+    kiosks = scattered(30)
+    cells, every = (divided(kiosks, tmp_path, gain=gain) for gain in (0.1, 0.0))
+    assert kept(cells)
+    assert not kept(every)
+    assert cells.leaf_count < every.leaf_count / 2
+    assert cells.visible >= every.visible  # the bases of some kiosks, too
+    # What the further division saves, leaf by leaf, is less than the threshold.
+    assert compute_pvs(every).volume_at_hand[0] > 0.9
+
+
+def test_an_office_is_divided_to_the_end(tmp_path: Path) -> None:
+    rooms = office(30)
+    walls = {"walls": rooms["walls"]}  # its doorways are open
+    outside = {"ground": rooms["walls"] * [3, 3, 0] - [0, 0, 0.5]}
+    cells = divided(walls | outside, tmp_path)
+    assert not kept(cells)
+    assert cells.standing.sum() > 30
+
+
+def test_a_division_into_single_leaves_is_never_stopped(tmp_path: Path) -> None:
+    assert not kept(divided(scattered(30), tmp_path, cells="leaf"))
+
+
+def test_districts_are_the_lowest_nodes_with_enough_leaves() -> None:
+    """A chain of nodes, each with one leaf in front, has a district at its end and one node above
+    it for each further leaf."""
+    leaves = 3 * DISTRICT
+    children = np.array([[-2 - k, k + 1] for k in range(leaves - 1)], dtype=np.int32)
+    children[-1, 1] = -2 - (leaves - 1)
+    tree = Tree((), children, (None,) * leaves)  # type: ignore[arg-type]
+    district = districts(tree)
+    last = leaves - DISTRICT
+    assert (district[last:] == last).all()
+    assert district[:last].tolist() == list(range(last))
+    assert np.flatnonzero(within(tree, last)).tolist() == list(range(last, leaves))
+    assert within(tree, 0).all()
