@@ -58,7 +58,7 @@ class Tree:
     children: NDArray[np.int32]  # (N, 2) as in `Cells.node_child`
     leaves: tuple[Polyhedron, ...]  # face tags are node indices
     unsplit: int = 0  # leaves with walls that the limit on leaves kept from splitting
-    kept: int = 0  # parts with walls that are not worth a split
+    kept: int = 0  # leaves with walls that are not worth a split
     # The bodies that caps and doors split, by node.
     capped: Mapping[int, Polyhedron] = field(default_factory=dict)
     hung: frozenset[int] = frozenset()  # nodes in the planes of door leaves that hide
@@ -101,12 +101,12 @@ def build_tree(
     options: SubdivideOptions,
     progress: Progress,
     ceiling: WallPlane | None = None,
-    worth: Callable[[Tree], Bools] | None = None,
+    cost: Callable[[Tree], float] | None = None,
 ) -> Tree:
     """Split ``box`` by the ``ceiling``, if there is one, by the planes of ``walls``, then of
     ``reveals``, of ``doors`` and of the caps that are in the ``structure``; in the order that the
-    module describes. At `_FIRST_LOOK` leaves, and whenever there are `_LOOKS` times as many,
-    ``worth`` tells which (L,) leaves of the tree so far are divided further."""
+    module describes. Splitting ends if the ``cost`` of the tree so far, 1 before the first split,
+    is lowered too little between `_FIRST_LOOK` and every `_LOOKS` times as many leaves."""
     tolerance = structure.tolerance
     least = (FRAGMENT_SHARE * options.wall_area, 0.0, 0.0, 0.0)
     taken: list[WallPlane] = []
@@ -114,7 +114,7 @@ def build_tree(
     leaves: list[Polyhedron] = []
     queue: list[_Task] = []
     unsplit = kept = 0
-    look = _FIRST_LOOK
+    look, now = _FIRST_LOOK, 1.0
     capped: dict[int, Polyhedron] = {}
     hung: set[int] = set()
 
@@ -157,21 +157,18 @@ def build_tree(
     else:
         push(box, fragments, (-1, 0), _WALLS)
     while queue:
-        if worth and len(leaves) + len(queue) >= look:
+        if cost and len(leaves) + len(queue) >= look:
             look *= _LOOKS
-            waiting, queue = queue, []
             slots = np.array(children, dtype=np.int32).reshape(-1, 2)
-            for k, task in enumerate(waiting):
+            for k, task in enumerate(queue):
                 slots[task.parent] = -2 - len(leaves) - k
-            bodies = (*leaves, *(task.body for task in waiting))
-            divide = worth(Tree(tuple(taken), slots, bodies, hung=hidden(hung)))[len(leaves) :]
-            for task, more in zip(waiting, divide.tolist(), strict=True):
-                if more:
-                    heapq.heappush(queue, task)
-                else:
+            bodies = (*leaves, *(task.body for task in queue))
+            before, now = now, cost(Tree(tuple(taken), slots, bodies, hung=hidden(hung)))
+            if now > (1 - options.gain) * before:
+                for task in queue:
                     finish(task.body, task.parent)
                     kept += task.source <= _REVEALS
-            continue
+                break
         task = heapq.heappop(queue)
         if len(leaves) + len(queue) + 2 > options.max_leaves:
             finish(task.body, task.parent)

@@ -8,7 +8,7 @@ outside; floor under a roof and between walls there is reported.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -46,7 +46,7 @@ from ptmtools.cells.structure import (
     find_walls,
     spread_over,
 )
-from ptmtools.cells.worth import Worth
+from ptmtools.cells.worth import Viewing
 from ptmtools.errors import InputError
 from ptmtools.executor import Executor
 from ptmtools.progress import Progress, silent
@@ -114,13 +114,12 @@ class Building:
     def walker(self) -> Walker:
         return Walker(*self.options.walker)
 
-    def worth(self) -> Worth | None:
-        """Whether parts of a division are worth dividing further; None if every part is."""
+    def cost(self) -> Callable[[Tree], float] | None:
+        """The cost of a division, which may end for it; None if it may not."""
         options, corners = self.options, self.structure.corners
         if options.cells == "leaf" or not 0 < options.gain < 1:
             return None
-        middle, tolerance = self.walker.middle, self.structure.tolerance
-        return Worth.of(self.places, middle, corners, options.gain, tolerance)
+        return Viewing.of(self.places, self.walker.middle, corners, self.structure.tolerance).cost
 
     def with_glass(self) -> Surroundings:
         """The surroundings in which glass counts as a wall."""
@@ -176,9 +175,9 @@ def _divided(building: Building, root: Polyhedron, progress: Progress, inside: b
     if inside and top is not None:
         ceiling = ceiling_plane(top, structure, root, structure.tolerance)
     # A closed building is closed only when all walls around it divide.
-    worth = building.worth() if inside else None
+    cost = building.cost() if inside else None
     tree = build_tree(
-        root, structure, building.walls, building.reveals, planes, options, progress, ceiling, worth
+        root, structure, building.walls, building.reveals, planes, options, progress, ceiling, cost
     )
     portals = find_portals(tree, structure.tolerance)
     outer = at_box(tree)

@@ -71,7 +71,7 @@ class SubdivideOptions:
         metavar="METRES",
     )
     max_leaves: int = option(
-        10_000,
+        50_000,
         "Maximum number of leaves. The most useful divisions are made first.",
         was=("max-cells",),
     )

@@ -47,6 +47,7 @@ from ptmtools.cells.structure import LOOKS, Surroundings, spread_over
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
 from ptmtools.executor import Executor
+from ptmtools.portal_flow.flow import MOST_PORTALS
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.scene.orientation import main_axes
@@ -106,6 +107,11 @@ def _subdivided(
             notes.append(_open_note(outside, roofed, tight, space.ceiling))
     finally:
         clipped.cancel()
+    limit, many = options.max_leaves, _passed(space) > MOST_PORTALS
+    while _passed(space) > MOST_PORTALS:
+        limit = len(space.tree.leaves) // 2
+        building = replace(building, options=replace(options, max_leaves=limit))
+        space = replace(divide_inside(building, tight), closed=False)
     opened = building.doors.triangles(space.doors)
     if options.doors != "closed":
         notes += door_notes(building.doors.leaves, space.doors, options.doors)
@@ -113,18 +119,19 @@ def _subdivided(
             notes += unrecognised_door_notes(scene, building.doors.leaves)
     notes += unreached_notes(space.beyond, options.reach == "all", space.place, options.strict)
     if space.tree.unsplit:
+        remedy = "name furniture with --detail" if many else "raise --max-leaves"
         notes.append(
             Warned(
-                f"the limit of {options.max_leaves:,} leaves was reached: {space.tree.unsplit:,} "
-                "of them contain walls that do not divide them, so the space behind these walls "
-                "counts as visible; raise --max-leaves"
+                f"the limit of {limit:,} leaves {'for visible sets ' * many}was reached: "
+                f"{space.tree.unsplit:,} of them contain walls that do not divide them, so the "
+                f"space behind these walls counts as visible; {remedy}"
             )
         )
     if space.tree.kept:
         notes.append(
-            f"{space.tree.kept:,} of {len(space.tree.leaves):,} leaves contain walls that do not "
-            "divide them: further division would save visitors little, since sight goes around "
-            "these walls or over them (--gain changes that)"
+            f"division ended at {len(space.tree.leaves):,} leaves: more would save visitors less "
+            f"than {options.gain:.0%}, since sight goes around the walls or over them (--gain "
+            "changes that)"
         )
     pieces = cut_to_leaves(scene, space.tree, tolerance)
     owner = compact_numbers(space.reached)[pieces.leaf]
@@ -138,6 +145,12 @@ def _subdivided(
         owner[np.isin(pieces.source, opened)] = -1
     count(space.undecided)
     return replace(cells, **vars(joined(scene, pieces, owner, tolerance)), opened=opened)
+
+
+def _passed(space: Space) -> int:
+    """The number of portals between reached leaves."""
+    ends = np.array([portal.leaves for portal in space.portals], dtype=np.int64).reshape(-1, 2)
+    return int(np.count_nonzero(space.reached[ends].all(axis=1)))
 
 
 def _check(scene: Scene, options: SubdivideOptions) -> None:

@@ -1,11 +1,12 @@
-"""Whether dividing leaves further saves visitors anything.
+"""Whether dividing a model further saves visitors anything.
 
-At some sizes of the tree, every leaf is judged by its **district**: all leaves under the lowest
-node with `DISTRICT` of them. What dividing the district has saved is measured as for rooms
-(`gain`): viewers are the walkable floor in a leaf, cost is the surface in it, and lines through the
-openings so far show which leaves see one another. The leaf is divided further if the district has
-saved, of the whole cost, at least the threshold times its share of all leaves, which are the work
-of dividing it. Elsewhere sight goes around the walls or over them, as in a street.
+At some sizes of the tree, the **cost** of the leaves so far is estimated: the share of all surfaces
+that visitors see, by lines through the openings so far. Division ends, everywhere, if it has not
+lowered the cost by the threshold since the last look: sight goes around the walls or over them, as
+in a street, and the next ones would take as long again.
+
+(Tried: to stop by districts of the tree. A few leaves that are not divided join the rooms, and the
+hollows of the walls, of a museum of a thousand rooms.)
 """
 
 from __future__ import annotations
@@ -14,96 +15,52 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ptmtools.arrays import Bools, Floats, Ints, normals, summed
+from ptmtools.arrays import Floats, normals, summed
 from ptmtools.cells.bsp import Tree
-from ptmtools.cells.gain import cost
 from ptmtools.cells.model import descend
 from ptmtools.cells.places import Places, spread
-from ptmtools.cells.portals import Portal, find_portals
-from ptmtools.cells.sight import from_places, sampled_sight
+from ptmtools.cells.portals import find_portals
+from ptmtools.cells.sight import sampled_sight
 from ptmtools.portal_flow.flow import Portals
 from ptmtools.tolerance import Tolerance
 
-#: The least number of leaves whose gain is measured.
-DISTRICT = 16
 #: Points that represent the viewers, and the surfaces.
 _POINTS = 100_000
 
 
 @dataclass(frozen=True)
-class Worth:
-    """Measures what a division gains."""
+class Viewing:
+    """Viewers, and the surfaces that they may see."""
 
     viewers: tuple[Floats, Floats]  # (n, 3) the middles of bodies, and (n,) their m² of floor
     surfaces: tuple[Floats, Floats]  # (n, 3) points beside the structure, and (n,) their m²
-    gain: float  # `SubdivideOptions.gain`
     tolerance: Tolerance
 
     @staticmethod
-    def of(
-        places: Places, middle: float, structure: Floats, gain: float, tolerance: Tolerance
-    ) -> Worth:
+    def of(places: Places, middle: float, structure: Floats, tolerance: Tolerance) -> Viewing:
         """``middle``: height of the middle of a body; ``structure``: (n, 3, 3) triangles."""
         points, area = _thinned(*spread(places.triangles(tolerance)))
-        beside, size = _beside(structure, 2 * tolerance.plane)
-        return Worth((points + [0.0, middle, 0.0], area), (beside, size), gain, tolerance)
+        beside = _beside(structure, 2 * tolerance.plane)
+        return Viewing((points + [0.0, middle, 0.0], area), beside, tolerance)
 
-    def __call__(self, tree: Tree) -> Bools:
-        """(L,) which leaves of a tree, and parts of it that wait for their division, to divide."""
-        every = np.stack([_held(tree, *self.viewers), _held(tree, *self.surfaces)], axis=1)
-        portals = _portals(tree, find_portals(tree, self.tolerance), self.tolerance)
-        sees = from_places(sampled_sight(portals), every[:, 0] > 0)
-        apart = every[:, 0] * (sees @ every[:, 1]) + every[:, 1] * (sees @ every[:, 0])
-        district = districts(tree)
-        divide = np.ones(len(tree.leaves), dtype=np.bool_)
-        for node in np.unique(district):
-            members = within(tree, node)
-            seen = np.asarray(sees[members].any(axis=0))
-            saved = cost(seen, every[members].sum(axis=0), every) - apart[members].sum()
-            least = self.gain * np.count_nonzero(members) / len(members) * apart.sum()
-            divide[district == node] = saved >= least
-        return divide
+    def cost(self, tree: Tree) -> float:
+        """The mean share of all surfaces that a viewer sees from any point of a leaf, in a tree
+        that may not be complete. Surfaces that nobody sees, such as the insides of solids, do not
+        count."""
+        viewers, surface = (_held(tree, *points) for points in (self.viewers, self.surfaces))
+        sees = sampled_sight(_openings(tree, self.tolerance))
+        most = viewers.sum() * surface[sees[viewers > 0].any(axis=0)].sum()
+        return float(viewers @ (sees @ surface) / most) if most > 0 else 1.0
 
 
-def districts(tree: Tree) -> Ints:
-    """(L,) for each leaf the lowest node above it with at least `DISTRICT` leaves, or the root."""
-    count = np.zeros(len(tree.children), dtype=np.int64)
-    for node in range(len(tree.children) - 1, -1, -1):  # children follow their parents
-        count[node] = sum(count[child] if child >= 0 else 1 for child in tree.children[node])
-    lowest = np.zeros(len(tree.children), dtype=np.int64)
-    result = np.zeros(len(tree.leaves), dtype=np.int64)
-    for node, children in enumerate(tree.children.tolist()):
-        name = node if count[node] >= DISTRICT else lowest[node]
-        for child in children:
-            if child >= 0:
-                lowest[child] = name
-            else:
-                result[-2 - child] = name
-    return result
-
-
-def within(tree: Tree, node: int) -> Bools:
-    """(L,) which leaves are under a node."""
-    result = np.zeros(len(tree.leaves), dtype=np.bool_)
-    below = [node]
-    while below:
-        front, back = tree.children[below.pop()].tolist()
-        for child in (front, back):
-            if child >= 0:
-                below.append(child)
-            else:
-                result[-2 - child] = True
-    return result
-
-
-def _portals(tree: Tree, portals: list[Portal], tolerance: Tolerance) -> Portals:
-    sight = [portal for portal in portals if not portal.passage]
+def _openings(tree: Tree, tolerance: Tolerance) -> Portals:
+    portals = [portal for portal in find_portals(tree, tolerance) if not portal.passage]
     return Portals(
         leaf_count=len(tree.leaves),
-        leaf=np.array([portal.leaves for portal in sight], dtype=np.int32).reshape(-1, 2),
-        normal=tree.planes[[portal.node for portal in sight], :3].reshape(-1, 3),
-        point=np.concatenate([np.zeros((0, 3)), *(portal.polygon for portal in sight)]),
-        start=np.cumsum([0, *(len(portal.polygon) for portal in sight)]),
+        leaf=np.array([portal.leaves for portal in portals], dtype=np.int32).reshape(-1, 2),
+        normal=tree.planes[[portal.node for portal in portals], :3].reshape(-1, 3),
+        point=np.concatenate([np.zeros((0, 3)), *(portal.polygon for portal in portals)]),
+        start=np.cumsum([0, *(len(portal.polygon) for portal in portals)]),
         tolerance=tolerance,
     )
 

@@ -38,8 +38,8 @@ TASK = 80_000
 SPAN = 64
 #: Rounds of the bitwise pre-pass; the third changes next to nothing.
 ROUNDS = 3
-#: Bytes that the two bit matrices may take: 60,000 portals.
-MATRIX_BYTES = 1 << 32
+#: With more portals the two bit matrices would take over 4 GiB.
+MOST_PORTALS = 65_536
 BITS_OF_BYTE = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1).sum(
     axis=1, dtype=np.uint8
 )
@@ -142,7 +142,7 @@ def upper_bound(
     check(portals)
     count = 2 * len(portals.leaf)
     words = (count + 63) // 64
-    if 2 * count * words * 8 > MATRIX_BYTES:
+    if count > 2 * MOST_PORTALS:
         raise LimitError(
             "PTM-L400",
             f"{count // 2:,} portals are too many for the portal flow",

@@ -7,9 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ptmtools.cells import Cells, SubdivideOptions, bsp, subdivide
-from ptmtools.cells.bsp import Tree
-from ptmtools.cells.worth import DISTRICT, districts, within
+from ptmtools.cells import Cells, SubdivideOptions, bsp, subdivide, subdivision
 from ptmtools.scene import IngestOptions, ingest
 from ptmtools.visibility import compute_pvs
 from tests.cells.buildings import write
@@ -41,7 +39,7 @@ def scattered(count: int) -> Parts:
 
 
 def kept(cells: Cells) -> bool:
-    return any("further division would save" in note for note in cells.notes)
+    return any("division ended at" in note for note in cells.notes)
 
 
 def test_open_ground_is_not_divided_by_every_kiosk(tmp_path: Path) -> None:
@@ -68,16 +66,14 @@ def test_a_division_into_single_leaves_is_never_stopped(tmp_path: Path) -> None:
     assert not kept(divided(scattered(30), tmp_path, cells="leaf"))
 
 
-def test_districts_are_the_lowest_nodes_with_enough_leaves() -> None:
-    """A chain of nodes, each with one leaf in front, has a district at its end and one node above
-    it for each further leaf."""
-    leaves = 3 * DISTRICT
-    children = np.array([[-2 - k, k + 1] for k in range(leaves - 1)], dtype=np.int32)
-    children[-1, 1] = -2 - (leaves - 1)
-    tree = Tree((), children, (None,) * leaves)  # type: ignore[arg-type]
-    district = districts(tree)
-    last = leaves - DISTRICT
-    assert (district[last:] == last).all()
-    assert district[:last].tolist() == list(range(last))
-    assert np.flatnonzero(within(tree, last)).tolist() == list(range(last, leaves))
-    assert within(tree, 0).all()
+def test_a_model_with_too_many_portals_is_divided_less(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """The visible sets of more portals would not fit into memory; none is refused for it."""
+    kiosks = scattered(12)
+    most = divided(kiosks, tmp_path, gain=0.0).portal_count
+    monkeypatch.setattr(subdivision, "MOST_PORTALS", most // 2)
+    cells = divided(kiosks, tmp_path, gain=0.0)
+    assert 0 < cells.portal_count <= most // 2
+    assert any("leaves for visible sets was reached" in note for note in cells.notes)
+    compute_pvs(cells)

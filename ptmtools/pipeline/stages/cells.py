@@ -46,10 +46,10 @@ def _fits_scene(cells: Cells, scene: Scene) -> str:
 CELLS: Stage[Cells] = Stage(
     name="cells",
     about="Read a model and divide its space into cells and portals.",
-    recipe=7,
+    recipe=8,
     options=SubdivideOptions,
     reads=(APO,),
-    changed="door leaves hide what is behind them (--doors pass); cells are walkable space, or "
+    changed="division ends where it saves visitors little (--gain); cells are walkable space, or "
     "space visible from it",
     artifact=Lazy("ptmtools.cells.model:Cells"),
     compute=Lazy("ptmtools.cells:subdivide"),

@@ -61,7 +61,7 @@ def _fits_cells(pvs: Pvs, cells: Cells) -> str:
 PVS: Stage[Pvs] = Stage(
     name="pvs",
     about="Compute which cells can see each other.",
-    recipe=5,
+    recipe=6,
     options=PvsOptions,
     reads=(CELLS,),
     artifact=Lazy("ptmtools.visibility.model:Pvs"),
