@@ -1,6 +1,7 @@
-"""Growth of time and memory with the model: ``python benchmarks/growth.py [rooms|walls|furniture]``
+"""Growth of time and memory with the model: ``python benchmarks/growth.py [KIND…] [--jobs 2]``
 
 rooms         sample museums of 12, 50, 200 and 800 rooms (`sample_data/make_museum.py`)
+buildings     streets of 6, 12, 24 and 48 buildings (`sample_data/make_campus.py`)
 walls         the museum of 12 rooms, its walls subdivided into 200,000 to 5 million triangles
 furniture     the same with an equal number of triangles of curved furniture (`enlarging.py`)
 
@@ -8,21 +9,21 @@ The models have minimal textures, are written to a temporary folder, or to ``--f
 through the stages with default options:
 
 scene         reading the model
-leaves        the subdivision into convex leaves with their portals
-rooms         grouping the leaves into cells
+cells         the subdivision into cells, of convex leaves, with their portals
 pvs           the portal flow
 ach           coverage hints, Embree, the default preset
 emit          the served files except textures, which do not depend on cells
 
 Every stage of every model runs in a separate process, after a warm-up on the two rooms of the
 sample data, which compiles the kernels and loads the libraries. *CPU* and *wall* are seconds of the
-stage alone, without reading and writing between stages. *Peak* is the maximum resident memory of
+stage alone, without reading and writing between stages, and without those of the processes that
+more than one job starts. *Peak* is the maximum resident memory of
 the stage less that before it, with inputs read; on systems without this figure it is that of the
 process.
 
-The last rows are the exponents b of seconds or megabytes = a · leavesᵇ (for models with constant
-rooms, of triangles instead of leaves) by least squares in the logarithms, with the standard error
-of b. An asterisk marks a museum that hit `--max-leaves`.
+The last rows are the exponents b of seconds or megabytes = a · leavesᵇ (of triangles instead of
+leaves where rooms are constant, and for streets) by least squares in the logarithms, with the
+standard error of b. An asterisk marks a model that hit `--max-leaves`.
 """
 
 from __future__ import annotations
@@ -45,11 +46,11 @@ from enlarging import enlarged
 from memory import with_peak
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
-from ptmtools.cells.rooms import grouped
 from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
 from ptmtools.output import TextureRecord, emit
+from ptmtools.parallel import Workers
 from ptmtools.scene import Scene, SourceImage, ingest
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.visibility import Pvs, compute_pvs
@@ -59,31 +60,36 @@ SMALL = ROOT / "sample_data/two_rooms/two_rooms.obj"
 #: Kinds of growth: the counted quantity, its values, and the quantity that exponents refer to.
 KINDS = {
     "rooms": ("rooms", (12, 50, 200, 800), "leaves"),
+    "buildings": ("buildings", (6, 12, 24, 48), "triangles"),
     "walls": ("triangles", (200_000, 1_000_000, 5_000_000), "triangles"),
     "furniture": ("triangles", (200_000, 1_000_000, 5_000_000), "triangles"),
 }
 #: The rooms of the museum that other things than rooms are added to.
 FEW_ROOMS = 12
-STAGES = ("scene", "leaves", "rooms", "pvs", "ach", "emit")
+STAGES = ("scene", "cells", "pvs", "ach", "emit")
+#: Metres of street for a building.
+PLOT = 25
 FIGURES = ("cpu", "wall", "peak")
 
 
 @dataclass(frozen=True)
 class Work:
-    """A museum's folder, in which a stage leaves its result for the next, and the options."""
+    """A model's folder, in which a stage leaves its result for the next, and the options."""
 
     folder: Path
     model: Path
     wall_area: float
     max_leaves: int
+    jobs: int
 
     def run(self, stage: str) -> dict[str, float]:
         """Runs a stage, leaves its result and returns its figures."""
-        work = self._prepared(stage)
-        gc.collect()
-        cpu, wall = time.process_time(), time.perf_counter()
-        result, peak = with_peak(work)
-        cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
+        with Workers(self.jobs, None) as workers:
+            work = self._prepared(stage, workers)
+            gc.collect()
+            cpu, wall = time.process_time(), time.perf_counter()
+            result, peak = with_peak(work)
+            cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
         figures = {"cpu": cpu, "wall": wall, "peak": peak / 1e6}
         if isinstance(result, Scene | Cells | Pvs | Ach):
             (self.folder / f"{stage}.npz").write_bytes(pack_arrays(result.to_arrays()))
@@ -100,31 +106,28 @@ class Work:
             }
         return figures
 
-    def _prepared(self, stage: str) -> Callable[[], Any]:
+    def _prepared(self, stage: str, workers: Workers) -> Callable[[], Any]:
         """The stage as a function, its inputs read."""
         if stage == "scene":
             return lambda: ingest(self.model)
         scene = Scene.from_arrays(self._arrays("scene"), self._images())
         options = SubdivideOptions(wall_area=self.wall_area, max_leaves=self.max_leaves)
-        if stage == "leaves":
-            return lambda: subdivide(scene, replace(options, cells="leaf"))
-        if stage == "rooms":
-            leaves = Cells.from_arrays(self._arrays("leaves"))
-            return lambda: grouped(leaves, options)
-        cells = Cells.from_arrays(self._arrays("rooms"))
+        if stage == "cells":
+            return lambda: subdivide(scene, options, executor=workers.alone)
+        cells = Cells.from_arrays(self._arrays("cells"))
         if stage == "pvs":
-            return lambda: compute_pvs(cells)
+            return lambda: compute_pvs(cells, executor=workers.executor)
         pvs = Pvs.from_arrays(self._arrays("pvs"))
         if stage == "ach":
             asked = AchOptions(backend="embree")
-            return lambda: compute_ach(scene, cells, pvs, asked)
+            return lambda: compute_ach(scene, cells, pvs, asked, executor=workers.executor)
         ach = Ach.from_arrays(self._arrays("ach"))
         textures = tuple(
             TextureRecord(i, f"textures/{image.name}.ptm", f"{image.name}.png", 1, 1, 3, (), "")
             for i, image in enumerate(scene.images)
         )
         out = self.folder / "www"
-        return lambda: emit(scene, cells, pvs, ach, textures, out, force=True)
+        return lambda: emit(scene, cells, pvs, ach, textures, out, force=True, workers=self.jobs)
 
     def _images(self) -> list[SourceImage]:
         """Their names; nothing here asks for their bytes."""
@@ -146,9 +149,16 @@ def one_stage(stage: str, work: Work) -> None:
 
 
 def make_model(kind: str, size: int, folder: Path) -> None:
-    """Makes a museum of ``size`` rooms, or of `FEW_ROOMS` rooms with ``size`` triangles."""
+    """Makes a museum of ``size`` rooms, or of `FEW_ROOMS` rooms with ``size`` triangles, or a
+    street of ``size`` buildings."""
     model = folder / "model/museum.obj"
     if model.is_file():
+        return
+    if kind == "buildings":
+        maker = [sys.executable, str(ROOT / "sample_data/make_campus.py"), "-o", str(model.parent)]
+        maker += ["--buildings", str(size), "--length", str(PLOT * size), "--texture", "16"]
+        subprocess.run([*maker, "--force"], check=True, stdout=subprocess.DEVNULL)
+        model.with_name("campus.obj").rename(model)
         return
     rooms = size if kind == "rooms" else FEW_ROOMS
     maker = [sys.executable, str(ROOT / "sample_data/make_museum.py"), "-o", str(model.parent)]
@@ -205,16 +215,18 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--sizes", metavar="N,N,…", help="other numbers of rooms or triangles")
     parser.add_argument("--wall-area", type=float, default=SubdivideOptions().wall_area)
     parser.add_argument("--max-leaves", type=int, default=SubdivideOptions().max_leaves)
+    parser.add_argument("--jobs", type=int, default=1, help="workers of every stage")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="the figures as a table")
     parser.add_argument("--folder", type=Path, help="where museums are made, left and found again")
     parser.add_argument("--stage", choices=STAGES, help=argparse.SUPPRESS)
     given = parser.parse_args(arguments)
     if given.stage:
         model = given.folder / "model/museum.obj"
-        work = Work(given.folder, model, given.wall_area, given.max_leaves)
+        work = Work(given.folder, model, given.wall_area, given.max_leaves, given.jobs)
         one_stage(given.stage, work)
         return 0
     options = [f"--wall-area={given.wall_area}", f"--max-leaves={given.max_leaves}"]
+    options.append(f"--jobs={given.jobs}")
     with tempfile.TemporaryDirectory() as scratch:
         folder = given.folder or Path(scratch)
         rows = []

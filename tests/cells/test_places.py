@@ -9,15 +9,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 
 from ptmtools.arrays import areas
-from ptmtools.cells import Cells, SubdivideOptions, subdivide
+from ptmtools.cells import Cells, SubdivideOptions, places as places_module, subdivide
 from ptmtools.cells.floors import Floors, detail_of
 from ptmtools.cells.options import Walker
 from ptmtools.cells.places import find_places
 from ptmtools.cells.structure import Opaque, Structure
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
+from ptmtools.parallel import Local
 from ptmtools.scene.model import Scene
 from tests.conftest import scene_of, subdivided
 
@@ -242,3 +244,40 @@ def test_many_rooms_are_counted_after_the_largest(quads, room_faces) -> None:
     size = [float(note.split(" ")[0]) for note in printed]
     assert size == pytest.approx([33.25, 26.25, 19.25], abs=0.06)
     assert any("2 more such areas" in note for note in cells.notes)
+
+
+def rough_floor(step: float) -> list:
+    """A floor of 4 × 3 m in triangles of a step, none of which lies in the plane of another."""
+    rng = np.random.default_rng(4)
+    x, z = np.meshgrid(np.arange(0, 4 + step / 2, step), np.arange(0, 3 + step / 2, step))
+    points = np.stack([x, rng.normal(0, step / 20, x.shape), z], axis=2)
+    a, b, c, d = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
+    return np.stack([a, b, c, d], axis=2).reshape(-1, 4, 3).tolist()
+
+
+def test_a_scanned_floor_is_searched_in_patches() -> None:
+    faces = [*rough_floor(0.03), wall_at(2, 0.2, 3, 0, 3)]
+    scene, options = scene_of(faces), SubdivideOptions()
+    structure = Structure.of(Opaque.of(scene, options), scene.tolerance)
+    detail = detail_of(scene, structure, options)
+    floors = Floors.of(scene, detail, grain=0.125)
+    assert floors.patch.all()
+    assert len(floors.slope) < len(Floors.of(scene, detail).slope) / 10
+    places = find_places(floors, structure.corners, WALKER, scene.tolerance)
+    # Patches overlap at their rims.
+    covered = shapely.union_all(places.plan)
+    assert covered.area == pytest.approx(4 * 3 - 0.5 * 3, abs=0.1)
+
+
+def test_workers_find_the_same_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    faces = [*rough_floor(0.2), wall_at(2, 0.2, 3, 0, 3)]
+    scene, options = scene_of(faces), SubdivideOptions()
+    structure = Structure.of(Opaque.of(scene, options), scene.tolerance)
+    floors = Floors.of(scene, detail_of(scene, structure, options))
+    monkeypatch.setattr(places_module, "_BLOCK", 50)
+    monkeypatch.setattr(places_module, "_MANY_BLOCKS", 2)
+    here = find_places(floors, structure.corners, WALKER, scene.tolerance)
+    with Local(2, threads=False) as executor:
+        there = find_places(floors, structure.corners, WALKER, scene.tolerance, executor)
+    assert shapely.equals_exact(here.plan, there.plan).all()
+    assert np.array_equal(here.slope, there.slope)
