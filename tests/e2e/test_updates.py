@@ -127,7 +127,7 @@ def test_a_plan_says_why(model: Path, tmp_path: Path, ptm: Ptm) -> None:
     assert plan["cells"] == {
         "stage": "cells",
         "plan": "run",
-        "reasons": ["max leaves: 10000 → 2"],
+        "reasons": ["max leaves: 50000 → 2"],
         "textures": [],
     }
     assert plan["pvs"]["plan"] == plan["ach"]["plan"] == plan["emit"]["plan"] == "maybe"
