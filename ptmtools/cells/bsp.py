@@ -58,7 +58,7 @@ class Tree:
     children: NDArray[np.int32]  # (N, 2) as in `Cells.node_child`
     leaves: tuple[Polyhedron, ...]  # face tags are node indices
     unsplit: int = 0  # leaves with walls that the limit on leaves kept from splitting
-    kept: int = 0  # leaves with walls that are not worth a split
+    ended: bool = False  # whether further splits are not worth it
     # The bodies that caps and doors split, by node.
     capped: Mapping[int, Polyhedron] = field(default_factory=dict)
     hung: frozenset[int] = frozenset()  # nodes in the planes of door leaves that hide
@@ -113,7 +113,7 @@ def build_tree(
     children: list[list[int]] = []
     leaves: list[Polyhedron] = []
     queue: list[_Task] = []
-    unsplit = kept = 0
+    unsplit, ended = 0, False
     look, now = _FIRST_LOOK, 1.0
     capped: dict[int, Polyhedron] = {}
     hung: set[int] = set()
@@ -167,7 +167,7 @@ def build_tree(
             if now > (1 - options.gain) * before:
                 for task in queue:
                     finish(task.body, task.parent)
-                    kept += task.source <= _REVEALS
+                ended = True
                 break
         task = heapq.heappop(queue)
         if len(leaves) + len(queue) + 2 > options.max_leaves:
@@ -208,7 +208,7 @@ def build_tree(
         np.array(children, dtype=np.int32).reshape(-1, 2),
         tuple(leaves),
         unsplit,
-        kept,
+        ended,
         capped,
         hidden(hung),
     )

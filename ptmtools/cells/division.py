@@ -16,6 +16,7 @@ import numpy as np
 from ptmtools.arrays import Bools, Floats, Ints, summed
 from ptmtools.cells.bsp import Tree, build_tree
 from ptmtools.cells.ceilings import ceiling_height, ceiling_plane
+from ptmtools.cells.doors import THICK
 from ptmtools.cells.floors import Floors, detail_of
 from ptmtools.cells.model import descend
 from ptmtools.cells.open_doors import Doors, open_doors
@@ -59,6 +60,8 @@ LEAST_PLACE = 0.05
 LEAST_INSIDE = 2.0
 #: Side of a patch of floor, in radii of a body.
 GRAIN = 0.5
+#: A model has rooms if this much of its places, m², is in them, by so many samples.
+_ROOM, _SAMPLES = 20.0, 1 << 17
 #: Number of points from which the ones that test the walls are chosen.
 _CHOICE = 256
 
@@ -116,10 +119,23 @@ class Building:
 
     def cost(self) -> Callable[[Tree], float] | None:
         """The cost of a division, which may end for it; None if it may not."""
-        options, corners = self.options, self.structure.corners
-        if options.cells == "leaf" or not 0 < options.gain < 1:
+        options, structure = self.options, self.structure
+        fixed = options.cells == "leaf" or options.standing == "anywhere" or self.doors.leaves
+        if fixed or not 0 < options.gain < 1 or not len(self.places.plan) or self._has_rooms():
             return None
-        return Viewing.of(self.places, self.walker.middle, corners, self.structure.tolerance).cost
+        middle = self.walker.middle
+        return Viewing.of(self.places, middle, structure.corners, structure.tolerance).cost
+
+    def _has_rooms(self) -> bool:
+        """Whether some of the places are inside a building that is not solid."""
+        structure = self.structure
+        points, size = spread(self.places.triangles(structure.tolerance))
+        points = spread_over(points, _SAMPLES) + [0.0, self.walker.middle, 0.0]
+        around = Surroundings(structure.corners, structure.tolerance)
+        inside = around.inside(points)
+        some = spread_over(points[inside], LOOKS)
+        hollow = np.mean([not around.solid(point[None]) for point in some]) if len(some) else 0.0
+        return bool(inside.mean() * hollow * size.sum() >= _ROOM)
 
     def with_glass(self) -> Surroundings:
         """The surroundings in which glass counts as a wall."""
@@ -377,8 +393,11 @@ def unreached(
         points = spread_over(room.points, _CHOICE)
         indoors = points[around.inside(points)]  # outside, walls without a back face away
         points = spread_over(indoors if len(indoors) else points, LOOKS)
-        if not (recognisable and around.solid(points)):
-            rooms.append(UnreachedRoom.of(np.flatnonzero(group == group[room.leaf[0]]), room))
+        leaves = np.flatnonzero(group == group[room.leaf[0]])
+        # The inside of a shut door leaf is no room.
+        thin = max(tree.leaves[leaf].width for leaf in leaves) <= THICK + structure.tolerance.plane
+        if not (thin or (recognisable and around.solid(points))):
+            rooms.append(UnreachedRoom.of(leaves, room))
     return Unreached(rooms, outside_room)
 
 

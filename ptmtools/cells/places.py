@@ -69,11 +69,9 @@ class Places:
     def near(self, boxes: Floats) -> Bools:
         """(r,) which regions have a box that meets one of (m, 2, 3) boxes, metres."""
         least, most = heights(self.plan, self.slope)
-        (x0, low, z0), (x1, high, z1) = boxes.transpose(1, 2, 0)
-        row, region = shapely.STRtree(self.plan).query(shapely.box(x0, z0, x1, z1))
-        result = np.zeros(len(self.plan), dtype=np.bool_)
-        result[region[(least[region] <= high[row]) & (most[region] >= low[row])]] = True
-        return result
+        x0, z0, x1, z1 = shapely.bounds(self.plan).reshape(-1, 4).T
+        low, high = np.column_stack([x0, least, z0]), np.column_stack([x1, most, z1])
+        return boxes_meet(low, high, boxes)
 
     def without_tops(self, ceiling: float, radius: float) -> Places:
         """The regions without those above a height that are narrower than a body of a radius,
@@ -103,6 +101,17 @@ class Places:
         return np.stack([plan[..., 0], height, plan[..., 1]], axis=2)
 
 
+def boxes_meet(low: Floats, high: Floats, boxes: Floats) -> Bools:
+    """(n,) which of the boxes between (n, 3) corners meet one of (m, 2, 3) boxes."""
+    x0, z0 = low[:, PLAN].T
+    x1, z1 = high[:, PLAN].T
+    (u0, least, w0), (u1, most, w1) = boxes.transpose(1, 2, 0)
+    row, one = shapely.STRtree(shapely.box(x0, z0, x1, z1)).query(shapely.box(u0, w0, u1, w1))
+    result = np.zeros(len(low), dtype=np.bool_)
+    result[one[(low[one, 1] <= most[row]) & (high[one, 1] >= least[row])]] = True
+    return result
+
+
 def find_places(
     floors: Floors,
     structure: Floats,
@@ -127,6 +136,9 @@ def find_places(
     )
     # Without corners on straight edges, and in an order independent of the computation.
     plan = straightened(shapely.normalize(plan), tolerance.grid)
+    # Walls part what is inside from what is outside.
+    plan, part = shapely.get_parts(plan, return_index=True)
+    names = names[part]
     return Places(plan, floors.slope[names], floors.front[names])
 
 
@@ -140,6 +152,8 @@ def _tiles(floors: Floors, tolerance: Tolerance) -> tuple[Geometry, Ints]:
     """(k,) the floors in parts that are not long, seen from above, and (k,) the region of each."""
     region = np.arange(len(floors.slope))
     plan = floors.plan(region, tolerance.grid)
+    region = region[some := ~shapely.is_empty(plan)]
+    plan = plan[some]
     plans, regions = [plan[:0]], [region[:0]]
     most = max(_LONG, _LONG_SHARE * tolerance.extent)
     while len(plan):

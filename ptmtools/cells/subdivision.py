@@ -37,7 +37,7 @@ from ptmtools.cells.joining import joined
 from ptmtools.cells.model import OUTSIDE, Cells, descend
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.ownership import Pieces, cut_to_leaves
-from ptmtools.cells.places import eye_region, meets
+from ptmtools.cells.places import boxes_meet, eye_region, meets
 from ptmtools.cells.planar import count, counting
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.roles import matches
@@ -111,7 +111,8 @@ def _subdivided(
     while _passed(space) > MOST_PORTALS:
         limit = len(space.tree.leaves) // 2
         building = replace(building, options=replace(options, max_leaves=limit))
-        space = replace(divide_inside(building, tight), closed=False)
+        closed = divide(building, wide) if space.closed else space
+        space = closed if closed.closed else replace(divide_inside(building, tight), closed=False)
     opened = building.doors.triangles(space.doors)
     if options.doors != "closed":
         notes += door_notes(building.doors.leaves, space.doors, options.doors)
@@ -127,7 +128,7 @@ def _subdivided(
                 f"space behind these walls counts as visible; {remedy}"
             )
         )
-    if space.tree.kept:
+    if space.tree.ended:
         notes.append(
             f"division ended at {len(space.tree.leaves):,} leaves: more would save visitors less "
             f"than {options.gain:.0%}, since sight goes around the walls or over them (--gain "
@@ -294,7 +295,10 @@ def _standing(building: Building, bodies: list[Polyhedron], space: Space) -> tup
     if space.ceiling is not None:
         places = places.without_tops(space.ceiling - tolerance.plane, walker.radius)
     eyes = eye_region(places, walker, tolerance)
-    return meets(eyes, bodies, walker, tolerance), eyes.triangles(tolerance)
+    floor = eyes.triangles(tolerance)
+    reach = [0.0, walker.reach, 0.0]
+    near = boxes_meet(floor.min(axis=1), floor.max(axis=1) + reach, boxes)
+    return meets(eyes, bodies, walker, tolerance), floor[near]
 
 
 def _leaf_at(space: Space, rename: NDArray[np.int32], points: Floats) -> NDArray[np.int32]:

@@ -5,8 +5,9 @@ that visitors see, by lines through the openings so far. Division ends, everywhe
 lowered the cost by the threshold since the last look: sight goes around the walls or over them, as
 in a street, and the next ones would take as long again.
 
-(Tried: to stop by districts of the tree. A few leaves that are not divided join the rooms, and the
-hollows of the walls, of a museum of a thousand rooms.)
+Buildings with rooms are divided to the end: on a large plot most floor is outside, and doors come
+last. (Tried: to stop by districts of the tree. A few leaves that are not divided join the rooms,
+and the hollows of the walls, of a museum of a thousand rooms.)
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from ptmtools.arrays import Floats, normals, summed
 from ptmtools.cells.bsp import Tree
 from ptmtools.cells.model import descend
 from ptmtools.cells.places import Places, spread
+from ptmtools.cells.planar import counting
 from ptmtools.cells.portals import find_portals
 from ptmtools.cells.sight import sampled_sight
 from ptmtools.portal_flow.flow import Portals
@@ -45,12 +47,16 @@ class Viewing:
 
     def cost(self, tree: Tree) -> float:
         """The mean share of all surfaces that a viewer sees from any point of a leaf, in a tree
-        that may not be complete. Surfaces that nobody sees, such as the insides of solids, do not
-        count."""
+        that may not be complete. Surfaces that no viewer sees do not count."""
         viewers, surface = (_held(tree, *points) for points in (self.viewers, self.surfaces))
-        sees = sampled_sight(_openings(tree, self.tolerance))
-        most = viewers.sum() * surface[sees[viewers > 0].any(axis=0)].sum()
-        return float(viewers @ (sees @ surface) / most) if most > 0 else 1.0
+        with counting():  # what is undecided here decides nothing
+            sees = sampled_sight(_openings(tree, self.tolerance))
+        held, seen = 0.0, np.zeros(len(surface), dtype=np.bool_)
+        for leaf in np.flatnonzero(viewers):
+            held += viewers[leaf] * surface[sees[leaf]].sum()
+            seen |= sees[leaf]
+        most = viewers.sum() * surface[seen].sum()
+        return float(held / most) if most > 0 else 1.0
 
 
 def _openings(tree: Tree, tolerance: Tolerance) -> Portals:

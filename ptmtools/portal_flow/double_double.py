@@ -98,8 +98,8 @@ class Searched(NamedTuple):
 def searched(
     g: Geometry, s: Scratch, test: SequenceTest, known: Bits, source: int, budget: int, seen: Bits
 ) -> Searched:
-    """Fills the zeroed row ``seen`` (W,) with what a directed portal sees; the arguments are those
-    of `flow_kernels.flow`."""
+    """Adds to the row ``seen`` (W,), zeroed or with what is seen already, what a directed portal
+    sees; the arguments are those of `flow_kernels.flow`."""
     from ptmtools.portal_flow import flow_kernels as kernels
 
     none = np.zeros(0, np.uint64)

@@ -273,10 +273,11 @@ class OpenQuestion:
     def answered(self, portals: Portals) -> Answered:
         """See `Answered`."""
         enters, leaves = portals.leaf[:, ::-1].reshape(-1), portals.leaf.reshape(-1)
-        words = (len(enters) + 63) // 64
-        bits = np.zeros((len(self.pairs), 64 * words), dtype=np.bool_)
-        bits[:, : len(enters)] = ~self.pairs[:, self.group[enters]]
-        rows = np.packbits(bits, axis=1, bitorder="little").view(np.uint64)
+        rows = np.zeros((len(self.pairs), (len(enters) + 63) // 64), dtype=np.uint64)
+        behind = self.group[enters]
+        for row, pairs in zip(rows.view(np.uint8), self.pairs, strict=True):
+            bits = np.packbits(~pairs[behind], bitorder="little")
+            row[: len(bits)] = bits
         return rows, self.group[leaves]
 
 

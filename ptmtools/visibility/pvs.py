@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.model import Cells
-from ptmtools.cells.sight import LONGEST, from_places, portals_of, sampled_sight
+from ptmtools.cells.sight import LONGEST, from_places, portals_of
 from ptmtools.executor import Executor
 from ptmtools.portal_flow.flow import (
+    MOST_PORTALS,
     OpenQuestion,
     PortalFlow,
     Portals,
@@ -31,8 +32,8 @@ from ptmtools.progress import Progress, silent
 from ptmtools.visibility.model import Pvs
 from ptmtools.visibility.options import PvsOptions
 
-#: Number of portals from which lines precede the flow.
-MANY_PORTALS = 512
+#: Number of portals from which lines precede the flow, and of lines through each.
+MANY_PORTALS, FIRST_LINES = 512, 512
 #: Tasks that the lines are distributed to.
 SPANS = 64
 
@@ -170,7 +171,7 @@ def compute_pvs(
         leaves = sampled_leaves(portals, options.lines, executor)
         return Pvs.from_matrix(lifted(cells, leaves), **volumes, conservative=False)
     budget = options.budget if options.method == "full" else 0
-    question = _open_question(cells, portals) if budget else None
+    question = _open_question(cells, portals, executor) if budget else None
     flow = portal_flow(portals, budget, progress, executor, question)
     matrix = lifted(cells, leaf_matrix(portals, flow))
     return Pvs.from_matrix(
@@ -185,23 +186,28 @@ def compute_pvs(
     )
 
 
-def _open_question(cells: Cells, portals: Portals) -> OpenQuestion | None:
-    """The pairs of cells that sampled lines have not shown to see each other: a search costs far
-    more than lines, and in an open building most pairs do. None where searches are few."""
-    if len(portals.leaf) < MANY_PORTALS:
+def _open_question(cells: Cells, portals: Portals, executor: Executor) -> OpenQuestion | None:
+    """The pairs of cells that random lines have not shown to see each other: a search costs far
+    more than lines, and in an open building most pairs do. None where searches are few, or too
+    many."""
+    if not MANY_PORTALS <= len(portals.leaf) <= MOST_PORTALS:
         return None
     pairs = np.zeros((cells.cell_count + 1,) * 2, dtype=np.bool_)  # the last one: of no cell
-    pairs[:-1, :-1] = ~lifted(cells, sampled_sight(portals))
+    pairs[:-1, :-1] = ~lifted(cells, sampled_leaves(portals, FIRST_LINES, executor))
     group = np.where(cells.leaf_cell < 0, cells.cell_count, cells.leaf_cell).astype(np.int64)
     return OpenQuestion(group, pairs)
 
 
 def lifted(cells: Cells, leaves: Bools) -> Bools:
     """(C, C) from (L, L): a cell sees the cells seen from its standing leaves, symmetrically."""
-    owned = cells.leaf_cell >= 0
-    rows, columns = np.nonzero(from_places(leaves, cells.leaf_standing) & owned[:, None] & owned)
+    order = np.argsort(cells.leaf_cell, kind="stable")
+    order = order[cells.leaf_cell[order] >= 0]
+    first = np.searchsorted(cells.leaf_cell[order], np.arange(cells.cell_count))
+    sees = from_places(leaves, cells.leaf_standing)[order]
     matrix = np.zeros((cells.cell_count, cells.cell_count), dtype=np.bool_)
-    matrix[cells.leaf_cell[rows], cells.leaf_cell[columns]] = True
+    if cells.cell_count:
+        by_row = np.logical_or.reduceat(sees, first, axis=0)
+        matrix = np.logical_or.reduceat(by_row[:, order], first, axis=1)
     one, other = cells.portal_cell[: cells.sight_count].T
     kept = (one >= 0) & (other >= 0)
     matrix[one[kept], other[kept]] = matrix[other[kept], one[kept]] = True

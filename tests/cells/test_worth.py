@@ -10,8 +10,8 @@ import pytest
 from ptmtools.cells import Cells, SubdivideOptions, bsp, subdivide, subdivision
 from ptmtools.scene import IngestOptions, ingest
 from ptmtools.visibility import compute_pvs
-from tests.cells.buildings import write
-from tests.cells.strangers import Parts, office
+from tests.cells.buildings import carved, room, write
+from tests.cells.strangers import WALL, Parts, doorway
 from tests.scene.buildings import box, turned_in_plan
 
 
@@ -53,13 +53,32 @@ def test_open_ground_is_not_divided_by_every_kiosk(tmp_path: Path) -> None:
     assert compute_pvs(every).volume_at_hand[0] > 0.9
 
 
-def test_an_office_is_divided_to_the_end(tmp_path: Path) -> None:
-    rooms = office(30)
-    walls = {"walls": rooms["walls"]}  # its doorways are open
-    outside = {"ground": rooms["walls"] * [3, 3, 0] - [0, 0, 0.5]}
-    cells = divided(walls | outside, tmp_path)
+def house(rooms: int, *, doors: bool) -> Parts:
+    """Rooms with windows off a corridor that is open at its end, on a plot of 200 m."""
+    spaces, holes, parts = [room(0, 0, 4.2 * rooms, 2)], [((-0.2, 0.5, 0), (0, 1.5, 2.1))], {}
+    for k in range(rooms):
+        x = 4.2 * k
+        spaces.append(room(x, 2 + WALL, x + 4, 7))
+        hole, leaf = doorway(x + 1, 2.0, "x")
+        holes += [hole, ((x + 1, 7, 1), (x + 3, 7.2, 2))]
+        if doors:
+            parts[f"Door_{k}"] = box(*leaf)
+    plot = box((-100, -100, -0.5), (100, 100, -0.2))
+    return {"walls": carved(spaces, holes), "plot": plot, **parts}
+
+
+@pytest.mark.parametrize("doors", [False, True])
+def test_a_house_on_a_plot_is_divided_to_the_end(doors: bool, tmp_path: Path) -> None:
+    """Most floor is outside, and its visitors see everything; doors are the last to divide."""
+    cells = divided(house(12, doors=doors), tmp_path)
     assert not kept(cells)
-    assert cells.standing.sum() > 30
+    assert cells.standing.sum() >= 13
+
+
+def test_a_model_without_a_floor_is_divided_to_the_end(tmp_path: Path) -> None:
+    kiosks = scattered(30)
+    del kiosks["ground"]
+    assert not kept(divided(kiosks, tmp_path, standing="anywhere"))
 
 
 def test_a_division_into_single_leaves_is_never_stopped(tmp_path: Path) -> None:
