@@ -34,7 +34,8 @@ def scattered(count: int) -> Parts:
     parts: Parts = {"ground": box((-5, -5, -0.3), (65, 65, 0))}
     for k in range(count):
         kiosk = turned_in_plan(box((-1.5, -1.5, 0), (1.5, 1.5, rng.uniform(3, 6))), 37.0 * k)
-        parts[f"kiosk_{k}"] = kiosk + [*rng.uniform(0, 60, 2), 0]
+        at = 10 * np.array(divmod(k, 6)) + rng.uniform(3, 7, 2)
+        parts[f"kiosk_{k}"] = kiosk + [*at, 0]
     return parts
 
 
