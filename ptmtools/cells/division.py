@@ -8,8 +8,9 @@ outside; floor under a roof and between walls there is reported.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -117,14 +118,17 @@ class Building:
     def walker(self) -> Walker:
         return Walker(*self.options.walker)
 
-    def cost(self) -> Callable[[Tree], float] | None:
-        """The cost of a division, which may end for it; None if it may not."""
-        options, structure = self.options, self.structure
+    def cost(self, tree: Tree) -> float:
+        """`Viewing.cost`; 0 if the model is divided to the end, whatever that saves."""
+        return self._viewing.cost(tree) if self._viewing else 0.0
+
+    @cached_property
+    def _viewing(self) -> Viewing | None:
+        options, structure, places = self.options, self.structure, self.places
         fixed = options.cells == "leaf" or options.standing == "anywhere" or self.doors.leaves
-        if fixed or not 0 < options.gain < 1 or not len(self.places.plan) or self._has_rooms():
+        if fixed or not 0 < options.gain < 1 or not len(places.plan) or self._has_rooms():
             return None
-        middle = self.walker.middle
-        return Viewing.of(self.places, middle, structure.corners, structure.tolerance).cost
+        return Viewing.of(places, self.walker.middle, structure.corners, structure.tolerance)
 
     def _has_rooms(self) -> bool:
         """Whether some of the places are inside a building that is not solid."""
@@ -191,7 +195,7 @@ def _divided(building: Building, root: Polyhedron, progress: Progress, inside: b
     if inside and top is not None:
         ceiling = ceiling_plane(top, structure, root, structure.tolerance)
     # A closed building is closed only when all walls around it divide.
-    cost = building.cost() if inside else None
+    cost = building.cost if inside else None
     tree = build_tree(
         root, structure, building.walls, building.reveals, planes, options, progress, ceiling, cost
     )
