@@ -1,7 +1,7 @@
 """Growth of time and memory with the model: ``python benchmarks/growth.py [KIND…] [--jobs 2]``
 
 rooms         sample museums of 12, 50, 200 and 800 rooms (`sample_data/make_museum.py`)
-buildings     streets of 6, 12 and 24 buildings (`sample_data/make_campus.py`)
+buildings     streets of 3, 6 and 12 buildings (`sample_data/make_campus.py`)
 walls         the museum of 12 rooms, its walls subdivided into 200,000 to 5 million triangles
 furniture     the same with an equal number of triangles of curved furniture (`enlarging.py`)
 
@@ -60,7 +60,7 @@ SMALL = ROOT / "sample_data/two_rooms/two_rooms.obj"
 #: Kinds of growth: the counted quantity, its values, and the quantity that exponents refer to.
 KINDS = {
     "rooms": ("rooms", (12, 50, 200, 800), "leaves"),
-    "buildings": ("buildings", (6, 12, 24), "triangles"),
+    "buildings": ("buildings", (3, 6, 12), "triangles"),
     "walls": ("triangles", (200_000, 1_000_000, 5_000_000), "triangles"),
     "furniture": ("triangles", (200_000, 1_000_000, 5_000_000), "triangles"),
 }
