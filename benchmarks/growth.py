@@ -68,7 +68,7 @@ KINDS = {
 FEW_ROOMS = 12
 STAGES = ("scene", "cells", "pvs", "ach", "emit")
 #: Metres of street for a building.
-PLOT = 25
+PLOT = 32
 FIGURES = ("cpu", "wall", "peak")
 
 
