@@ -45,7 +45,7 @@ _FEW = 64
 _PAIRS = 1 << 21
 #: Number of leaves at which a division is first examined for its worth, and the factor to the next.
 _FIRST_LOOK, _LOOKS = 512, 8
-NOWHERE = np.zeros((0, 3))
+_NOWHERE = np.zeros((0, 3))  # no points
 #: Sources of splits, in this order.
 _WALLS, _REVEALS, _DOORS, _CAPS = range(4)
 
@@ -118,8 +118,8 @@ def build_tree(
     capped: dict[int, Polyhedron] = {}
     hung: set[int] = set()
 
-    def hidden(nodes: set[int]) -> frozenset[int]:
-        return frozenset(nodes if options.doors in ("pass", "closed") else ())
+    def hiding() -> frozenset[int]:
+        return frozenset(hung if options.doors in ("pass", "closed") else ())
 
     def place(parent: tuple[int, int], child: int) -> None:
         if parent[0] >= 0:
@@ -163,7 +163,7 @@ def build_tree(
             for k, task in enumerate(queue):
                 slots[task.parent] = -2 - len(leaves) - k
             bodies = (*leaves, *(task.body for task in queue))
-            before, now = now, cost(Tree(tuple(taken), slots, bodies, hung=hidden(hung)))
+            before, now = now, cost(Tree(tuple(taken), slots, bodies, hung=hiding()))
             if now > (1 - options.gain) * before:
                 for task in queue:
                     finish(task.body, task.parent)
@@ -210,7 +210,7 @@ def build_tree(
         unsplit,
         ended,
         capped,
-        hidden(hung),
+        hiding(),
     )
 
 
@@ -220,7 +220,7 @@ def _sections(
     """The fragments of walls inside a body; those that close its ``whole`` section have exactly the
     area of the section."""
     cuts = [
-        _Fragment(w, w.walls, 0.0, NOWHERE, section(body, w.frame.plane, tolerance.rounding), 0.0)
+        _Fragment(w, w.walls, 0.0, _NOWHERE, section(body, w.frame.plane, tolerance.rounding), 0.0)
         for w in walls
     ]
     fragments = _fragments(cuts, [False] * len(cuts), tolerance)

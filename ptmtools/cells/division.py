@@ -61,7 +61,7 @@ LEAST_PLACE = 0.05
 LEAST_INSIDE = 2.0
 #: Side of a patch of floor, in radii of a body.
 GRAIN = 0.5
-#: A model has rooms if this much of its places, m², is in them, by so many samples.
+#: A model has rooms if this much of its places, m², is in them, and the number of samples.
 _ROOM, _SAMPLES = 20.0, 1 << 17
 #: Number of points from which the ones that test the walls are chosen.
 _CHOICE = 256
@@ -74,7 +74,7 @@ class Building:
     structure: Structure
     walls: list[WallPlane]
     reveals: Reveals
-    places: Places  # shut door leaves stop nobody, unless they act as walls
+    places: Places  # shut door leaves do not block, unless they act as walls
     doors: Doors
     ceiling: float | None  # `ceiling_height`
     options: SubdivideOptions

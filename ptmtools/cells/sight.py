@@ -15,7 +15,6 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats, cross
 from ptmtools.cells.model import Cells
-from ptmtools.errors import LimitError
 from ptmtools.executor import Executor
 from ptmtools.portal_flow.flow import Portals, leaf_matrix, upper_bound
 
@@ -147,17 +146,13 @@ def seen_from_places(cells: Cells, executor: Executor) -> Bools:
     """(L,) which leaves may be seen from a standing leaf, themselves included, or have passages.
 
     The first bound of the flow decides, without its search: of the leaves of five real models the
-    search would have dropped two more. With too many portals for the bound, all leaves count.
+    search would have dropped two more.
     """
     standing = cells.leaf_standing
-    every = np.ones(cells.leaf_count, dtype=np.bool_)
     if standing.all():
-        return every
+        return standing.copy()
     portals = portals_of(cells)
-    try:
-        bound = upper_bound(portals, executor)
-    except LimitError:
-        return every
+    bound = upper_bound(portals, executor)
     seen = np.asarray(leaf_matrix(portals, bound)[standing].any(axis=0))
     seen[cells.portal_leaf[cells.portal_passage]] = True
     return seen

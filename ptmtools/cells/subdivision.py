@@ -111,8 +111,8 @@ def _subdivided(
     while _passed(space) > MOST_PORTALS:
         limit = len(space.tree.leaves) // 2
         building = replace(building, options=replace(options, max_leaves=limit))
-        closed = divide(building, wide) if space.closed else space
-        space = closed if closed.closed else replace(divide_inside(building, tight), closed=False)
+        again = divide(building, wide) if space.closed else space
+        space = again if again.closed else replace(divide_inside(building, tight), closed=False)
     opened = building.doors.triangles(space.doors)
     if options.doors != "closed":
         notes += door_notes(building.doors.leaves, space.doors, options.doors)
@@ -120,10 +120,11 @@ def _subdivided(
             notes += unrecognised_door_notes(scene, building.doors.leaves)
     notes += unreached_notes(space.beyond, options.reach == "all", space.place, options.strict)
     if space.tree.unsplit:
+        kind = "leaves for visible sets" if many else "leaves"
         remedy = "name furniture with --detail" if many else "raise --max-leaves"
         notes.append(
             Warned(
-                f"the limit of {limit:,} leaves {'for visible sets ' * many}was reached: "
+                f"the limit of {limit:,} {kind} was reached: "
                 f"{space.tree.unsplit:,} of them contain walls that do not divide them, so the "
                 f"space behind these walls counts as visible; {remedy}"
             )
