@@ -12,6 +12,8 @@ close together turns by the difference over their distance.
   other triangles over the same vertices, no longer the exact hull in either reading; fewer
   vertices, which do not enclose the cell: a cell with a bevel of 0.1 mm has no hull without
   slivers.)
+- A leaf may be thin for a model of kilometres: its faces are hardly wider than the distance within
+  which a point lies in a plane, and float32 turns them. Such a leaf has float64's digits, too.
 - A portal may have a vertex in the middle of a side, with a short edge beside it: rounding bends
   the side inwards there, and the line through the short edge leaves corners outside. The vertex is
   dropped, as the convex hull of the rounded polygon would drop it. (Rejected: float64 digits.
@@ -30,6 +32,8 @@ now.)
 """
 
 from __future__ import annotations
+
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,6 +76,51 @@ def hull_rows(
     height = unit[slivers] @ decimals.T
     height -= np.einsum("ij,ij->i", unit[slivers], decimals[triangles[slivers, 0]])[:, None]
     return rows if (height <= slack).all() else row_texts(exact)
+
+
+def leaf_numbers(cells: Cells, slack: float) -> list[list[list[float]]]:
+    """The vertices of each leaf as the numbers to write: float32's, or float64's where the leaf is
+    not convex in those within ``slack`` metres.
+
+    Raises DatabaseError: PTM-D601 a number is not finite in float32.
+    """
+    points = coordinates(cells.leaf_point, "leaf points")
+    decimals, start, faces = np.array(points, np.float64), cells.leaf_point_start, cells.face_start
+    unit = _face_units(cells, decimals)
+    turn = np.linalg.norm(unit - _face_units(cells, cells.leaf_point), axis=1)
+    low, high = (
+        end.reduceat(cells.leaf_point, start[:-1], axis=0) for end in (np.minimum, np.maximum)
+    )
+    reach = np.maximum.reduceat(turn, cells.leaf_face_start[:-1])
+    reach *= np.linalg.norm(high - low, axis=1)
+    numbers: list[list[list[float]]] = []
+    for leaf, (a, b) in enumerate(pairwise(start.tolist())):
+        numbers.append(points[a:b])
+        if reach[leaf] > slack:
+            own = slice(*cells.leaf_face_start[leaf : leaf + 2].tolist())
+            corner = decimals[cells.face_index[faces[:-1][own]]]
+            height = unit[own] @ decimals[a:b].T - np.einsum("ij,ij->i", unit[own], corner)[:, None]
+            if height.max() > slack:
+                numbers[-1] = cells.leaf_point[a:b].tolist()
+    return numbers
+
+
+def _face_units(cells: Cells, point: Floats) -> Floats:
+    """(F, 3) unit normals of the faces of all leaves with vertices at ``point``; 0 for a sliver,
+    the plane of which is arbitrary."""
+    size = np.diff(cells.face_start)
+    here = point[cells.face_index]
+    following = np.arange(1, len(here) + 1)
+    following[cells.face_start[1:] - 1] = cells.face_start[:-1]
+    first = np.repeat(here[cells.face_start[:-1]], size, axis=0)
+    turns = cross(here - first, here[following] - first)
+    normal = np.add.reduceat(turns, cells.face_start[:-1], axis=0)
+    edge = np.linalg.norm(here[following] - here, axis=1)
+    longest = np.maximum.reduceat(edge, cells.face_start[:-1])
+    area = np.linalg.norm(normal, axis=1)
+    sound = area > 2 * cells.tolerance.plane * longest
+    unit: Floats = normal * (sound / np.where(sound, area, 1.0))[:, None]
+    return unit
 
 
 def portal_polygons(

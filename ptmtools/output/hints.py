@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
-from ptmtools.output.convexity import portal_polygons, slack_of
+from ptmtools.output.convexity import leaf_numbers, portal_polygons, slack_of
 from ptmtools.output.first_look import FirstLooks
 from ptmtools.output.model import OctreeRecord, PreviewRecord, TextureRecord, Viewpoint
 from ptmtools.output.names import (
@@ -191,6 +191,7 @@ class RecordWriter:
         self._content = content
         self._adjacent = content.cells.adjacent()
         self._portals = _portals(content.cells)
+        self._leaves = leaf_numbers(content.cells, slack_of(content.cells))
 
     def record(self, cell: int, first_look: Sequence[Piece] | None) -> str:
         """The text of a cell's record; ``first_look`` is its bundle; None if the database has none.
@@ -217,8 +218,15 @@ class RecordWriter:
             head["firstLook"] = [[piece.texture, piece.level] for piece in first_look]
         if content.need:
             head["need"] = self._need(content.need, cell)
-        leaves = [_leaf(content.cells, leaf) for leaf in content.leaves[cell]]
+        leaves = [self._leaf(leaf) for leaf in content.leaves[cell]]
         return document_text(head, {"leaves": leaves, "portals": self._portals[cell]})
+
+    def _leaf(self, leaf: int) -> dict[str, Any]:
+        cells = self._content.cells
+        faces = cells.face_start[cells.leaf_face_start[leaf] : cells.leaf_face_start[leaf + 1] + 1]
+        index = (cells.face_index[faces[0] : faces[-1]] - cells.leaf_point_start[leaf]).tolist()
+        loops = [index[a:b] for a, b in pairwise((faces - faces[0]).tolist())]
+        return {"points": self._leaves[leaf], "faces": loops}
 
     def _need(self, need: Need, cell: int) -> list[list[Any]]:
         """For each visible texture its index, the coarsest required level, and shares."""
@@ -238,15 +246,6 @@ class RecordWriter:
         of_entry = slice(*ach.texture_start[entry : entry + 2].tolist())
         place = [records[i][0] if i in records else None for i in ach.texture[of_entry].tolist()]
         return [list(p) for p in zip(place, significant(ach.texture_value[of_entry]), strict=True)]
-
-
-def _leaf(cells: Cells, leaf: int) -> dict[str, Any]:
-    faces = cells.face_start[cells.leaf_face_start[leaf] : cells.leaf_face_start[leaf + 1] + 1]
-    index = (cells.face_index[faces[0] : faces[-1]] - cells.leaf_point_start[leaf]).tolist()
-    return {
-        "points": coordinates(cells.leaf_points(leaf), "leaf points"),
-        "faces": [index[a:b] for a, b in pairwise((faces - faces[0]).tolist())],
-    }
 
 
 def _portals(cells: Cells) -> list[list[dict[str, Any]]]:
