@@ -26,12 +26,12 @@ from ptmtools.errors import InputError, LimitError, naming
 from ptmtools.files import open_regular
 
 #: Kinds of files that arrive without a request of the client; ``page``: files of the page itself.
-KINDS = ("page", "index", "record", "geometry", "preview")
+KINDS = ("page", "index", "record", "geometry", "preview", "mesh")
 
 
 class PushedFile(NamedTuple):
     """A file that arrived without a request of the client: seconds since navigation, one of
-    `KINDS`, number of the cell or preview, bytes on the link."""
+    `KINDS`, number of the cell, preview or mesh, bytes on the link."""
 
     asked: float
     kind: str
@@ -100,7 +100,8 @@ class Browser:
         cells, problem = len(self.record_bytes), ""
         least, most = self.cell.min(initial=-1), self.cell.max(initial=-1)
         if any(
-            f.kind not in KINDS or (f.number >= cells and f.kind != "preview") for f in self.files
+            f.kind not in KINDS or (f.number >= cells and f.kind not in ("preview", "mesh"))
+            for f in self.files
         ):
             problem = "a file that cannot be"
         elif len(self.geometry_bytes) != cells or not -1 <= least <= most < cells:

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints, normals
+from ptmtools.lab.meshes import Meshes, meshes_of
 from ptmtools.lab.previews import LEAST, Previews, no_previews, previews_of
 from ptmtools.output.model import sizes_of
 from ptmtools.output.served import Document, Served
@@ -142,7 +143,7 @@ class Catalogue:
         leaves only of cells whose record has arrived.
     records, statistics: of each cell.
     shapes: see `Shapes`.
-    previews: see `Previews`.
+    previews: see `Previews`. meshes: see `Meshes`.
     """
 
     levels: Ints
@@ -162,6 +163,7 @@ class Catalogue:
     statistics: Sequence[Document]
     shapes: Shapes
     previews: Previews
+    meshes: Meshes
 
     @property
     def texture_count(self) -> int:
@@ -309,6 +311,7 @@ def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalog
         statistics=served.statistics["cells"],
         shapes=_shapes(served),
         previews=previews_of(textures),
+        meshes=meshes_of(served.index.get("meshes", ()), served.mesh_bytes),
     )
 
 

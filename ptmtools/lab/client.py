@@ -1,8 +1,8 @@
 """The base of all clients: requests of files, storage of arrivals, and an estimate of the link.
 
 A client has the index once it has arrived, then the record of its cell and the geometry of the
-visible cells; it requests ranges of a `.ptm` from its beginning on, and whole previews. Downloaded
-bytes stay in main memory; texture memory is limited.
+visible cells; it requests ranges of a `.ptm` from its beginning on, and whole previews and meshes.
+Downloaded bytes stay in main memory; texture memory is limited.
 
 `Estimate` is the client's estimate of its link, from recent downloads (§6.2: "network bandwidth and
 latency analysis performed for some recent downloadings"). Bandwidth is bytes over the time during
@@ -97,6 +97,7 @@ class Kind(IntEnum):
     TEXTURE = 3
     STATISTICS = 4
     PREVIEW = 5
+    MESH = 6
 
 
 #: Kinds that are neither textures nor geometry.
@@ -160,7 +161,8 @@ class Client(ABC):
     ----------
     world, link, budget: the walk, the link, and the limit of texture memory, bytes.
     frame: current frame.
-    index: whether it has the index. records, geometry, textures, previews: see `Files`.
+    index: whether it has the index.
+    records, geometry, textures, previews, meshes: see `Files`.
     column: (T,) resident column of each texture. source: (T,) its source, a row of tables by source
         (`ptmtools.lab.catalogue`).
     estimate: estimate of the link.
@@ -180,9 +182,11 @@ class Client(ABC):
             Kind.TEXTURE: Files(Kind.TEXTURE, stock.ends[:, -1]),
             Kind.STATISTICS: Files(Kind.STATISTICS, np.array([stock.statistics_bytes])),
             Kind.PREVIEW: Files(Kind.PREVIEW, stock.previews.bytes.copy()),
+            Kind.MESH: Files(Kind.MESH, stock.meshes.bytes.copy()),
         }
         self.records, self.geometry = self.files[Kind.RECORD], self.files[Kind.GEOMETRY]
         self.textures, self.previews = self.files[Kind.TEXTURE], self.files[Kind.PREVIEW]
+        self.meshes = self.files[Kind.MESH]
         self.column = np.zeros(stock.texture_count, np.int64)
         self.source = np.arange(stock.texture_count)
         self.estimate = Estimate(link, *PRIOR)
@@ -250,6 +254,12 @@ class Client(ABC):
             return False
         self.ask(kind, number, int(files.size[number]), priority)
         return True
+
+    def modelled(self, cells: Ints) -> list[int]:
+        """The files that have objects in some cells as modelled."""
+        meshes = self.world.catalogue.meshes
+        own: list[int] = np.flatnonzero(meshes.finest & np.isin(meshes.cell, cells)).tolist()
+        return own
 
     def loaded_shapes(self, first: int = 0) -> Ints:
         """The shapes of cells with loaded geometry whose texture is ``first`` or a later one."""

@@ -134,7 +134,9 @@ def simulate(world: World, policy: PolicyEntry, conditions: Conditions, budget: 
         body=float(fetched[-1]),
         overhead=link.overhead_bytes,
         documents=sum(int(client.files[kind].loaded.sum()) for kind in DOCUMENTS),
-        useful=textures + float(stock.geometry_bytes[drawn].sum()),
+        useful=textures
+        + float(stock.geometry_bytes[drawn].sum())
+        + float(stock.meshes.bytes[client.meshes.whole & drawn[stock.meshes.cell]].sum()),
         uploads=int(np.where(replaced, held, grown).sum()),
         switches=int(np.count_nonzero(np.diff(state, axis=0, prepend=0))),
         requests=link.requests - clock.page,

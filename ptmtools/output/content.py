@@ -30,6 +30,7 @@ from ptmtools.visibility.model import Pvs
 
 if TYPE_CHECKING:
     from ptmtools.coverage.required_levels import Need
+    from ptmtools.output.mesh_levels import MeshLevels
 
 
 @dataclass(frozen=True)
@@ -215,6 +216,19 @@ class Content:
         from ptmtools.output.grid import position_exponent
 
         return position_exponent(self.scene, self.options.gltf_step)
+
+    @cached_property
+    def meshes(self) -> tuple[MeshLevels, ...]:
+        """The levels of objects with many triangles, by cell and object."""
+        from ptmtools.output.mesh_levels import mesh_levels
+
+        has_files = any(emitter.mesh_files for emitter in self.emitters)
+        return mesh_levels(self) if has_files and self.options.lods == "auto" else ()
+
+    @cached_property
+    def mesh_of(self) -> Mapping[tuple[int, int], int]:
+        """Cell and object → the place of its levels in `meshes`."""
+        return {(mesh.cell, mesh.object): place for place, mesh in enumerate(self.meshes)}
 
     @cached_property
     def leaves(self) -> list[list[int]]:

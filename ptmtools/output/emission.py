@@ -11,7 +11,8 @@ client of the *hints* fetches the index, the record of its cell, and the geometr
 of the cells visible from it; the geometry in a form without an entry file, if one was written. Its
 **first room is complete** with the index, the record of the first viewpoint's cell, the geometry of
 all cells visible from it, the cell's own textures and the coarsest level of the others: nothing is
-missing, and the room has the model's resolution. The **resident** set in a cell is everything that
+missing, and the room has the model's resolution. Before, it is drawn with the simplified meshes of
+objects that have levels of detail. The **resident** set in a cell is everything that
 the client holds once all visible cells are loaded. Means are over places: a cell counts by its
 volume.
 """
@@ -37,7 +38,7 @@ from ptmtools.output.content import Content
 from ptmtools.output.emitter import GZIP, Emitter, File
 from ptmtools.output.emitters import chosen_emitters
 from ptmtools.output.model import EmitReport, OctreeRecord, TextureRecord, Visit
-from ptmtools.output.names import BUNDLE, HINTS, RECORD_FILES, path_of
+from ptmtools.output.names import BUNDLE, HINTS, RECORD_FILES, mesh_path, path_of
 from ptmtools.output.options import EmitOptions
 from ptmtools.output.viewpoints import place_viewpoints
 from ptmtools.parallel import ordered
@@ -109,6 +110,7 @@ def visit_of(content: Content, sizes: Mapping[str, int]) -> Visit:
     nothing = np.zeros(pvs.cell_count, np.int64)
     fetched = [f for f in forms if not f.entry] or forms
     geometry = _geometry(content, fetched[0], sizes) if fetched else nothing
+    meshes = _meshes(content, fetched[0], sizes) if fetched else nothing
     paints = np.zeros((pvs.cell_count, len(records)), dtype=np.bool_)
     for cell, places in enumerate(content.painted):
         paints[cell, places] = True
@@ -139,6 +141,7 @@ def visit_of(content: Content, sizes: Mapping[str, int]) -> Visit:
     return Visit(
         browser=browsed[0] + images if browsed else None,
         first_room=int(sum(opening)),
+        simplified=int(sum(opening) - meshes[pvs.row(first)].sum()) if content.meshes else None,
         mean_at_hand=round(mean),
         most_at_hand=round(most),
         mean_90=round(over_places(until[:, 0], pvs.viewers)[0]),
@@ -183,9 +186,17 @@ def finest_bytes(record: TextureRecord) -> int:
 
 
 def _geometry(content: Content, form: Emitter, sizes: Mapping[str, int]) -> NDArray[np.int64]:
-    """(C,) bytes of the cells in a form."""
+    """(C,) bytes of the cells in a form, with all objects as modelled."""
     paths = (path_of(cell, form.cell_files) for cell in range(content.cells.cell_count))
-    return np.array([sizes[path] for path in paths], np.int64)
+    return np.array([sizes[path] for path in paths], np.int64) + _meshes(content, form, sizes)
+
+
+def _meshes(content: Content, form: Emitter, sizes: Mapping[str, int]) -> NDArray[np.int64]:
+    """(C,) of these, bytes of objects that have levels of detail."""
+    finest = np.zeros(content.cells.cell_count, np.int64)
+    for mesh in content.meshes if form.mesh_files else ():
+        finest[mesh.cell] += sizes[mesh_path(mesh.files[-1])]
+    return finest
 
 
 def emit(

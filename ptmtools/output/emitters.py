@@ -13,6 +13,7 @@ from ptmtools.output.names import (
     CELL_FOLDER,
     GLTF_FILES,
     GLTF_FOLDER,
+    GLTF_MESHES,
     HINTS,
     HINTS_FOLDER,
     INTERLACE_FILES,
@@ -23,12 +24,13 @@ from ptmtools.output.names import (
 
 GLTF = Emitter(
     name=names.GLTF,
-    about="a GLB of each cell, in gltf/",
+    about="a GLB of each cell, and finer meshes of its objects, in gltf/",
     owns=(f"{GLTF_FOLDER}/",),
     writer=Lazy("ptmtools.output.gltf:gltf_files"),
     reader=Lazy("ptmtools.output.validation.gltf:read_file"),
     check=Lazy("ptmtools.output.validation.gltf:check_files"),
     cell_files=GLTF_FILES,
+    mesh_files=GLTF_MESHES,
 )
 INTERLACE = Emitter(
     name=names.INTERLACE,

@@ -1,5 +1,9 @@
 """A cell as a GLB: a node and a mesh for each object, a primitive for each of its shapes.
 
+Of an object with levels of detail (`ptmtools.output.mesh_levels`) it holds the coarsest mesh, and
+further GLBs hold one finer mesh each. The material of a coarsest mesh names its row in the hints,
+as materials are all that the GLBs of a site keep of objects.
+
 The shapes are those of the VRML file, in its order. Triangles are indexed; a vertex is a position
 with, where the material has an image, its texture coordinates, whose origin is the upper left in
 glTF, and with its colour where the shape has several. There are no normals: the scene has none, and
@@ -17,7 +21,7 @@ alpha still needs one.)
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import PurePath
 from typing import Any
@@ -28,11 +32,11 @@ import numpy as np
 from ptmtools import schemas
 from ptmtools.errors import LimitError
 from ptmtools.glb import BINARY, JSON, glb, glb_chunks
-from ptmtools.output.content import Content
+from ptmtools.output.content import Content, Shape
 from ptmtools.output.gltf_compressed import CompressedBuffer
-from ptmtools.output.gltf_shapes import PlainBuffer, vertices_of
+from ptmtools.output.gltf_shapes import PlainBuffer, Tables, vertices_of
 from ptmtools.output.model import FileError, TextureRecord, shaped
-from ptmtools.output.names import GLTF_FILES, UP, cell_name, path_of
+from ptmtools.output.names import GLTF_FILES, UP, cell_name, mesh_name, mesh_path, path_of
 from ptmtools.scene.colors import to_linear
 from ptmtools.scene.model import Material, Wrap
 
@@ -99,17 +103,19 @@ class MaterialWriter:
         self._scene = materials
         self._records = textures
         self._fallback = fallback
-        self._known: dict[tuple[int, bool], int] = {}
+        self._known: dict[tuple[int, bool, int | None], int] = {}
         self._materials: list[dict[str, Any]] = []
         self._textures: dict[tuple[int, int], int] = {}
         self._images: dict[str, int] = {}
         self._samplers: dict[tuple[Wrap, Wrap], int] = {}
 
-    def take(self, material: int, two_sided: bool) -> int:
-        """The index of a scene's material, seen from one side or from both."""
-        place = self._known.setdefault((material, two_sided), len(self._materials))
+    def take(self, material: int, two_sided: bool, mesh: int | None) -> int:
+        """The index of a scene's material, seen from one side or from both; of a coarsest mesh with
+        finer ones, its row in the hints is ``mesh``."""
+        key = material, two_sided, mesh
+        place = self._known.setdefault(key, len(self._materials))
         if place == len(self._materials):
-            self._materials.append(self._material(self._scene[material], two_sided))
+            self._materials.append(self._material(self._scene[material], two_sided, mesh))
         return place
 
     def members(self) -> dict[str, Any]:
@@ -135,7 +141,7 @@ class MaterialWriter:
         used = {IMAGE_EXTENSIONS.get(PurePath(uri).suffix, "") for uri in self._images}
         return sorted(used - {""})
 
-    def _material(self, material: Material, two_sided: bool) -> dict[str, Any]:
+    def _material(self, material: Material, two_sided: bool, mesh: int | None) -> dict[str, Any]:
         alpha = min(max(material.opacity, 0.0), 1.0)
         factor = [*map(linear, material.color), float(str(np.float32(alpha)))]
         surface: dict[str, Any] = {} if factor == WHITE else {"baseColorFactor": factor}
@@ -150,6 +156,8 @@ class MaterialWriter:
             if self._fallback and record.fallback is not None:
                 index = self._texture(UP + quote(record.fallback), material)
                 surface["baseColorTexture"] = {"index": index}
+        if mesh is not None:
+            extras["mesh"] = mesh
         row: dict[str, Any] = {"name": material.name}
         row["pbrMetallicRoughness"] = surface | {"metallicFactor": 0}
         if cutoff is not None:
@@ -182,22 +190,48 @@ def gltf_files(content: Content) -> Iterator[tuple[str, bytes]]:
     count = content.cells.cell_count
     for cell in range(count):
         content.progress(cell, count, "glTF")
-        yield path_of(cell, GLTF_FILES), _glb(content, cell)
+        yield path_of(cell, GLTF_FILES), _glb(content, cell, cell_name(cell), _drawn(content, cell))
     content.progress(count, count, "glTF")
+    for mesh in content.meshes:
+        own = [s for s in content.geometry.shapes(mesh.cell) if s.object == mesh.object]
+        finer: list[tuple[Tables, Iterable[Shape]]] = [(m, m.shapes) for m in mesh.levels[1:]]
+        for number, (tables, shapes) in zip(
+            mesh.files, [*finer, (content.geometry, own)], strict=True
+        ):
+            drawn = ((tables, shape, None) for shape in shapes)
+            yield mesh_path(number), _glb(content, mesh.cell, mesh_name(number), drawn)
 
 
-def _glb(content: Content, cell: int) -> bytes:
+#: A shape, the tables that it refers to, and the row of its object's levels in the hints if its
+#: mesh is the coarsest.
+_Drawn = tuple[Tables, Shape, int | None]
+
+
+def _drawn(content: Content, cell: int) -> Iterator[_Drawn]:
+    """The shapes of a cell, of objects with levels those of the coarsest mesh."""
+    done = set()
+    for shape in content.geometry.shapes(cell):
+        place = content.mesh_of.get((cell, shape.object))
+        if place is None:
+            yield content.geometry, shape, None
+        elif place not in done:
+            done.add(place)
+            level = content.meshes[place].levels[0]
+            yield from ((level, coarse, place) for coarse in level.shapes)
+
+
+def _glb(content: Content, cell: int, name: str, shapes: Iterable[_Drawn]) -> bytes:
     scene, options = content.scene, content.options
     buffer = PlainBuffer() if options.plain_gltf else CompressedBuffer(content.position_exponent)
     materials = MaterialWriter(scene.materials, content.records, options.fallback)
     nodes: list[dict[str, Any]] = []
     meshes: list[dict[str, Any]] = []
     last = -1
-    for shape in content.geometry.shapes(cell):
+    for tables, shape, place in shapes:
         image = scene.materials[shape.material].image
         record = content.records[image][1] if image >= 0 else None
-        vertices = vertices_of(content.geometry, shape, textured=record is not None)
-        material = materials.take(shape.material, shape.two_sided)
+        vertices = vertices_of(tables, shape, textured=record is not None)
+        material = materials.take(shape.material, shape.two_sided, place)
         size = None if record is None else record.finest
         primitive = buffer.take(vertices, material, size)
         if primitive is None:
@@ -211,7 +245,7 @@ def _glb(content: Content, cell: int) -> bytes:
             meshes.append({"primitives": []})
         meshes[-1]["primitives"].append(primitive)
     buffer.finish()
-    top: dict[str, Any] = {"name": cell_name(cell), "extras": {"cell": cell}}
+    top: dict[str, Any] = {"name": name, "extras": {"cell": cell}}
     if nodes:
         top["nodes"] = list(range(len(nodes)))
     document: dict[str, Any] = {

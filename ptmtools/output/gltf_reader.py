@@ -35,6 +35,7 @@ class ReadMaterial:
     image: URI of the base colour texture, or None.
     ptm, texture: URI of the `.ptm` and its index in the hints, or None.
     wrap: numbers of the sampler for s and t.
+    mesh: its object's row in the hints if this mesh is the coarsest of several, or None.
     """
 
     factor: tuple[float, ...]
@@ -45,6 +46,7 @@ class ReadMaterial:
     ptm: str | None
     texture: int | None
     wrap: tuple[int, int]
+    mesh: int | None
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,7 @@ class ReadPrimitive:
 
 @dataclass(frozen=True)
 class ReadGlb:
-    """The content of a cell's GLB."""
+    """The content of a GLB, of a cell or of a finer mesh of an object in it."""
 
     name: str
     cell: int
@@ -255,6 +257,8 @@ class _Reader:
         material = self._row("materials", index)
         surface, extras = material["pbrMetallicRoughness"], material.get("extras", {})
         factor = surface.get("baseColorFactor", WHITE)
+        if extras.keys() not in ({"mesh"}, set()) and not {"ptm", "texture"} <= extras.keys():
+            _foreign(f"materials[{index}].extras", "names a .ptm or its place, and not both")
         wrap, image = _wrap(extras), None
         if "baseColorTexture" in surface:
             texture = self._row("textures", surface["baseColorTexture"]["index"])
@@ -276,6 +280,7 @@ class _Reader:
             ptm=extras.get("ptm"),
             texture=extras.get("texture"),
             wrap=wrap,
+            mesh=extras.get("mesh"),
         )
 
 

@@ -3,18 +3,33 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.glb import COMPONENTS, FLOAT, INT, ITEMS, SHORT, BufferWriter
 from ptmtools.meshopt.encoding import by_first_use
-from ptmtools.output.content import Geometry, Shape
+from ptmtools.output.content import Shape
 from ptmtools.scene.colors import packed, to_linear, unpacked
 
 #: Whole numbers below this are written without the ".0" that Python gives them.
 _WHOLE = 1e15
+
+
+class Tables(Protocol):
+    """The rows that shapes refer to.
+
+    Attributes
+    ----------
+    point, uv: (n, 3), (k, 2) float32.
+    """
+
+    @property
+    def point(self) -> NDArray[np.float32]: ...
+
+    @property
+    def uv(self) -> NDArray[np.float32]: ...
 
 
 @dataclass(frozen=True)
@@ -35,7 +50,7 @@ class Vertices:
     triangle: NDArray[np.int64]
 
 
-def vertices_of(geometry: Geometry, shape: Shape, *, textured: bool) -> Vertices:
+def vertices_of(tables: Tables, shape: Shape, *, textured: bool) -> Vertices:
     """The vertices of a shape in the order of their first use."""
     # A vertex for each that differs in position, texture coordinates or colour.
     width = len(shape.uv) if textured else 1
@@ -48,8 +63,8 @@ def vertices_of(geometry: Geometry, shape: Shape, *, textured: bool) -> Vertices
         # 8 bits of linear light would be too few in the dark.
         rgba = np.full((len(color), 4), 65535, np.uint16)
         rgba[:, :3] = np.rint(65535 * to_linear(color / 255))
-    point = geometry.point[shape.point[vertex // width]]
-    uv = flipped(geometry.uv[shape.uv[vertex % width]]) if textured else None
+    point = tables.point[shape.point[vertex // width]]
+    uv = flipped(tables.uv[shape.uv[vertex % width]]) if textured else None
     return Vertices(point, uv, rgba, triangle)
 
 

@@ -32,6 +32,7 @@ from ptmtools.output.names import (
     RECORD_FILES,
     STATISTICS,
     cell_name,
+    mesh_path,
     path_of,
 )
 from ptmtools.output.numbers import coordinates, document_text, significant, whole
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from ptmtools.coverage.required_levels import Need
     from ptmtools.output.content import Content
     from ptmtools.output.first_look import Piece
+    from ptmtools.output.mesh_levels import MeshLevels
     from ptmtools.texture.model import Level
 
 
@@ -85,8 +87,10 @@ def index_text(content: Content) -> str:
             )
         ],
     }
-    if not content.octrees:
-        del lists["octrees"]
+    lists["meshes"] = [_mesh(each) for each in content.meshes]
+    for name in ("octrees", "meshes"):
+        if not lists[name]:
+            del lists[name]
     return document_text(head, lists)
 
 
@@ -153,6 +157,15 @@ def _octree(record: OctreeRecord) -> Mapping[str, Any]:
         "levels": list(record.levels),
         "ends": list(record.ends),
         "crc32": list(record.crc32),
+    }
+
+
+def _mesh(levels: MeshLevels) -> Mapping[str, Any]:
+    return {
+        "cell": levels.cell,
+        "box": coordinates(levels.box, "meshes"),
+        "errors": significant(np.array(levels.errors), NEED_DIGITS),
+        "files": [mesh_path(number) for number in levels.files],
     }
 
 

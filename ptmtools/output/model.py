@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ptmtools import schemas
 from ptmtools.errors import InputError
@@ -238,6 +238,12 @@ class WriterOptions:
         metavar="DEGREES",
         degrees=True,
     )
+    lods: Literal["auto", "none"] = option(
+        "auto",
+        "Levels of detail of objects with thousands of triangles: auto (clients of the GLBs draw a "
+        "simplified mesh first, and finer ones where the difference can be seen) or none.",
+        default_before=(13, "none"),
+    )
     first_look: int = option(
         0,
         "For each cell, also write one file that holds the levels up to this width and height of "
@@ -294,6 +300,8 @@ class Visit:
     ----------
     browser: bytes that a VRML browser fetches; None without VRML.
     first_room: bytes until the first room is complete.
+    simplified: bytes until it is drawn with simplified meshes; None where no object has levels of
+        detail.
     mean_at_hand, most_at_hand: resident bytes.
     mean_90, mean_99: bytes, with their textures, of the cell itself and of the fewest others that
         cover 90 and 99 % of the average view, mean over places.
@@ -304,6 +312,7 @@ class Visit:
 
     browser: int | None
     first_room: int
+    simplified: int | None
     mean_at_hand: int
     most_at_hand: int
     mean_90: int

@@ -30,6 +30,8 @@ BUNDLE = ".bin"
 FIRST_LOOK_FILES = f"{HINTS_FOLDER}/{{name}}{BUNDLE}"
 VRML_FILES = f"{CELL_FOLDER}/{{name}}.wrl"
 GLTF_FILES = f"{GLTF_FOLDER}/{{name}}.glb"
+#: The files of finer meshes of objects likewise.
+GLTF_MESHES = f"{GLTF_FOLDER}/{{name}}.glb"
 #: The folder of a texture's interlaced set likewise.
 INTERLACE_FILES = f"{INTERLACE_FOLDER}/{{name}}/"
 
@@ -47,6 +49,16 @@ def plain_name(name: str, default: str) -> str:
 def cell_name(cell: int) -> str:
     """ "c0000"; more digits where they are needed."""
     return f"c{cell:04d}"
+
+
+def mesh_name(number: int) -> str:
+    """ "m0000": of a file with a finer mesh of an object."""
+    return f"m{number:04d}"
+
+
+def mesh_path(number: int) -> str:
+    """The path of such a file relative to the served folder."""
+    return GLTF_MESHES.replace("{name}", mesh_name(number))
 
 
 def cell_file(cell: int) -> str:

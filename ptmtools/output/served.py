@@ -14,7 +14,7 @@ from __future__ import annotations
 import os
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -184,9 +184,10 @@ class Served:
     ----------
     folder: its path.
     index: `hints.json`. records: of each cell. statistics: of all of them.
-    index_bytes, statistics_bytes: on the link, and record_bytes, geometry_bytes: (C,). All sizes
-        are compressed by gzip, as servers send the files (docs/design/walkthrough.md).
-    surfaces: the geometry of all cells.
+    index_bytes, statistics_bytes: on the link, and record_bytes, geometry_bytes: (C,);
+        mesh_bytes: of each file of each of the index's meshes. All sizes are compressed by gzip, as
+        servers send the files (docs/design/walkthrough.md).
+    surfaces: the geometry of all cells, as modelled.
     locator: of the cells.
     """
 
@@ -198,6 +199,7 @@ class Served:
     statistics_bytes: int
     record_bytes: NDArray[np.int64]
     geometry_bytes: NDArray[np.int64]
+    mesh_bytes: tuple[tuple[int, ...], ...]
     surfaces: Surfaces
     locator: Locator
 
@@ -271,6 +273,17 @@ def read_served(database: str | os.PathLike[str]) -> Served:
         lists = len(index["textures"]), len(index.get("octrees", ()))
         geometry.append(_glb(file, data, cell, *lists))
         sizes.append(on_link(data))
+    mesh_bytes = []
+    for number, row in enumerate(index.get("meshes", ())):
+        files = [_inside(folder, url) for url in row["files"]]
+        bodies = [_bytes(file) for file in files]
+        mesh_bytes.append(tuple(map(on_link, bodies)))
+        if row["cell"] >= len(names):
+            message = f"the index {row['cell']} is out of range"
+            place = f"meshes[{number}].cell"
+            raise DatabaseError("PTM-D006", message, file=folder / HINTS, place=place, remedy=BUILD)
+        whole = _glb(files[-1], bodies[-1], row["cell"], *lists)
+        geometry[row["cell"]] = _refined(geometry[row["cell"]], number, whole)
     locator = Locator(records)
     return Served(
         folder,
@@ -281,6 +294,7 @@ def read_served(database: str | os.PathLike[str]) -> Served:
         statistics_bytes,
         np.array([size for _, size in pairs], dtype=np.int64),
         np.array(sizes, dtype=np.int64),
+        tuple(mesh_bytes),
         _surfaces(geometry, locator),
         locator,
     )
@@ -360,6 +374,12 @@ def _glb(file: Path, data: bytes, cell: int, textures: int, octrees: int) -> Rea
     if read.cell != cell or out_of_range:
         raise DatabaseError("PTM-D006", "belongs to another cell", file=file, remedy=BUILD)
     return read
+
+
+def _refined(cell: ReadGlb, mesh: int, whole: ReadGlb) -> ReadGlb:
+    """A cell with an object as modelled in place of its coarsest mesh."""
+    others = (each for each in cell.primitives if each.material.mesh != mesh)
+    return replace(cell, primitives=(*others, *whole.primitives))
 
 
 def _surfaces(geometry: list[ReadGlb], locator: Locator) -> Surfaces:

@@ -65,6 +65,8 @@ class Visitor:
         if visit["browser"] is not None:
             lines.append(f"a VRML browser downloads {compared(visit['browser'])}")
         lines.append(f"the first room is complete after {compared(visit['first_room'])}")
+        if visit.get("simplified") is not None:
+            lines.append(f"with simplified meshes it is drawn after {size(visit['simplified'])}")
         for key, when in (("mean", "on average"), ("most", "at most")):
             shares = f"{visit[f'{key}_volume']:.1%} of the volume"
             if visit[f"{key}_texels"] is not None:
@@ -85,10 +87,14 @@ _GAIN = 0.4
 
 
 def _gain(visit: Mapping[str, Any]) -> str:
-    """Whether visible sets, their order or the resolution of textures saves a visitor most; empty
-    if nothing does."""
+    """Whether visible sets, their order, levels of detail or the resolution of textures saves a
+    visitor most; empty if nothing does."""
     whole, held = max(visit["everything"], 1), max(visit["mean_at_hand"], 1)
     by_cells, by_order = 1 - held / whole, 1 - visit["mean_99"] / held
+    room, drawn = max(visit["first_room"], 1), visit.get("simplified")
+    by_meshes = 0.0 if drawn is None else 1 - drawn / room
+    if drawn is not None and by_meshes > max(_GAIN, by_cells, by_order):
+        return f"levels of detail; the first room is drawn after {size(drawn)} of {size(room)}"
     if max(by_cells, by_order) < _GAIN:
         if visit["mean_texels"] is None:
             return ""

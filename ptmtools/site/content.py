@@ -149,6 +149,8 @@ class _Builder:
             index.pop(name, None)
         index["format"] = FORMAT
         index["cells"] = list(self._cells())
+        if "meshes" in index:
+            index["meshes"] = list(self._meshes())
         index["textures"] = list(self._textures())
         index["viewpoints"], poster = self._pictures()
         openings = self._openings(index) if self._options.opening else ()
@@ -213,19 +215,29 @@ class _Builder:
             self._progress(number, len(index["cells"]), "cells")
             row = dict(cell)
             for kind, template in templates.items():
-                file, digest = self._place(template.replace("{name}", cell["name"]))
-                data = self._folder.read(file.relative_to(self._folder.path).as_posix(), digest)
-                source: Path | bytes = file
-                if kind == "geometry":
-                    try:
-                        source = data = lean_glb(data)
-                    except FileError as fault:
-                        raise damaged(file, str(fault)) from None
-                row[kind] = self._add(
-                    cell["name"], *media[kind], source, digest=digest, compressed=True
-                )
-                row[f"{kind}Bytes"] = min(len(data), len(compressed(data)))
+                url = template.replace("{name}", cell["name"])
+                row[kind], row[f"{kind}Bytes"] = self._data(url, cell["name"], *media[kind])
             yield row
+
+    def _meshes(self) -> Iterator[dict[str, Any]]:
+        for row in self._served.index["meshes"]:
+            stem = self._served.index["cells"][row["cell"]]["name"]
+            files = [self._data(url, f"{stem}-mesh", ".glb", GLB) for url in row["files"]]
+            names, sizes = zip(*files, strict=True)
+            yield row | {"files": names, "bytes": sizes}
+
+    def _data(self, url: str, stem: str, suffix: str, media: str) -> tuple[str, int]:
+        """The name in the site, and the bytes on the link, of a document or a GLB."""
+        file, digest = self._place(url)
+        data = self._folder.read(file.relative_to(self._folder.path).as_posix(), digest)
+        source: Path | bytes = file
+        if media == GLB:
+            try:
+                source = data = lean_glb(data)
+            except FileError as fault:
+                raise damaged(file, str(fault)) from None
+        name = self._add(stem, suffix, media, source, digest=digest, compressed=True)
+        return name, min(len(data), len(compressed(data)))
 
     def _textures(self) -> Iterator[Mapping[str, Any]]:
         rows = self._served.index["textures"]

@@ -21,6 +21,7 @@ from render import Look, View, load, render  # noqa: E402
 
 from ptmtools.cli.main import main  # noqa: E402
 from tests.e2e.conftest import make_museum  # noqa: E402
+from tests.neighbours.apo.statues import write_rooms  # noqa: E402
 
 #: What MeshBasicMaterial shows before a background of nothing.
 LOOK = Look("none", sky=(0, 0, 0), mipmaps=True)
@@ -245,3 +246,23 @@ def test_the_example_walks(three: Any, gltf_museum: Path, tmp_path: Path) -> Non
     assert visit.messages == []
     assert actual["line"].startswith(f"cell {first}, {len(visible)} cells in sight, textures: ")
     assert actual["colors"] > 50
+
+
+def test_three_js_shows_objects_as_modelled(
+    three: Any, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """The files of a cell's objects follow it, and none of the simplified meshes stays."""
+    folder = tmp_path_factory.mktemp("statues")
+    model = write_rooms(folder / "model", 5)
+    assert main(["-q", "build-scene", str(model), "-o", str(folder / "db"), "-j", "1"]) == 0
+    www = folder / "db" / "www"
+    rows = read(www, "hints.json")["meshes"]
+    assert len(rows) == 2
+    walked = three.walk(www, width=320, height=240, stays=[(0, 1 << 30)] * 2)
+    assert walked.messages == ()
+    cells, _ = seen_from(www, 0)
+    own = [row["files"] for row in rows if row["cell"] in cells]
+    assert {file for file in walked.files if file.startswith("gltf/m")} == {f[-1] for f in own}
+    for stay in walked.stays:
+        assert stay["groups"] == len(cells) + len(own)
+    assert walked.left["bytes"] == walked.left["geometries"] == 0

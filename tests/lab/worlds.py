@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.lab.catalogue import Catalogue, Shapes
+from ptmtools.lab.meshes import Meshes, meshes_of
 from ptmtools.lab.opening import Parts
 from ptmtools.lab.policies import POLICIES
 from ptmtools.lab.previews import AVERAGING, LEAST, previews_of
@@ -77,6 +78,7 @@ def catalogue(
     *,
     random: np.random.Generator | None = None,
     geometry: int = 4000,
+    meshes: Meshes | None = None,
 ) -> Catalogue:
     """What is served: ``shapes`` are cells and textures, ascending by cell. Without ``random`` each
     shape is the whole of its room, and a cell covers the more the nearer it is."""
@@ -118,6 +120,7 @@ def catalogue(
         statistics=[{"views": np.tile(r["ach"], (6, 1)).tolist()} for r in records],
         shapes=own,
         previews=previews_of([texture.row for texture in textures]),
+        meshes=meshes or meshes_of((), ()),
     )
 
 
@@ -286,7 +289,9 @@ def strolling(stock: Catalogue, seconds: float) -> World:
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-def any_world(seed: int, frames: int = 25, *, previews: bool = False) -> World:
+def any_world(
+    seed: int, frames: int = 25, *, previews: bool = False, meshes: bool = False
+) -> World:
     """A few rooms and textures, and a walk that turns, stops and comes back."""
     random = np.random.default_rng(seed)
     cells, count = int(random.integers(1, 6)), int(random.integers(1, 7))
@@ -302,9 +307,9 @@ def any_world(seed: int, frames: int = 25, *, previews: bool = False) -> World:
         (int(random.integers(cells)), int(random.integers(-1, count)))
         for _ in range(int(random.integers(1, 12)))
     )
-    stock = catalogue(
-        textures, shapes, cells, random=random, geometry=int(random.integers(1, 9000))
-    )
+    geometry = int(random.integers(1, 9000))
+    finer = _any_meshes(random, cells) if meshes else None
+    stock = catalogue(textures, shapes, cells, random=random, geometry=geometry, meshes=finer)
     moves = random.random(frames) < 0.7
     step = np.where(moves, random.choice([-1, 1, 1], frames) * random.uniform(0, 1.5, frames), 0)
     x = np.clip(0.5 + np.abs(np.cumsum(step)), 0.1, cells * ROOM[0] - 0.1)
@@ -313,6 +318,18 @@ def any_world(seed: int, frames: int = 25, *, previews: bool = False) -> World:
     direction = np.stack([np.cos(yaw), np.zeros(frames), np.sin(yaw)], axis=1)
     walked = world(stock, eye, direction, random)
     return replace(walked, opening=_any_opening(random, stock, int(walked.cell[0])))
+
+
+def _any_meshes(random: np.random.Generator, cells: int) -> Meshes:
+    """Finer meshes of up to four objects."""
+    rows, sizes = [], []
+    for _ in range(int(random.integers(1, 5))):
+        cell, count = int(random.integers(cells)), int(random.integers(1, 4))
+        ends = np.sort(random.uniform(0, 1, (2, 3)), axis=0) * ROOM + [cell * ROOM[0], 0, 0]
+        errors = [*np.sort(random.uniform(0, 0.1, count))[::-1].tolist(), 0.0]
+        rows.append({"cell": cell, "box": ends.ravel().tolist(), "errors": errors})
+        sizes.append(np.sort(random.integers(1, 9000, count)).tolist())
+    return meshes_of(rows, sizes)
 
 
 def _any_opening(random: np.random.Generator, stock: Catalogue, cell: int) -> Parts:

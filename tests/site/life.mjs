@@ -4,13 +4,14 @@
 import { readFileSync } from "node:fs";
 
 import { Client } from "../../web/page/policy/client.js";
-import { POLICIES } from "../../web/page/policy/policies.js";
+import { loadPolicy, POLICIES } from "../../web/page/policy/policies.js";
 import { frustumOf } from "../../web/page/space/frustum.js";
 import { catalogueFrom } from "./typed.mjs";
 
 const { catalogue, records, shapes, policy, seed, view } =
   JSON.parse(readFileSync(process.argv[2], "utf8"));
 const stock = catalogueFrom(catalogue), { T, C, K } = stock;
+await loadPolicy(policy);
 const client = new Client(stock, { budget: stock.whole, policy: POLICIES[policy] });
 const frustum = frustumOf({ eye: [1, 1.6, 2], yaw: -Math.PI / 2, pitch: 0 }, ...view);
 const estimate = { bandwidth: 1e5, latency: 0.1, concurrency: 6 };

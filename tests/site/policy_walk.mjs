@@ -4,12 +4,13 @@
 import { readFileSync } from "node:fs";
 
 import { Client } from "../../web/page/policy/client.js";
-import { POLICIES } from "../../web/page/policy/policies.js";
+import { loadPolicy, POLICIES } from "../../web/page/policy/policies.js";
 import { frustumOf } from "../../web/page/space/frustum.js";
 import { catalogueFrom } from "./typed.mjs";
 
 const { catalogue, records, shapes, policy, budget, events, view } =
   JSON.parse(readFileSync(process.argv[2], "utf8"));
+await loadPolicy(policy);
 const client = new Client(catalogueFrom(catalogue), { budget, policy: POLICIES[policy] });
 const asked = [];
 

@@ -252,15 +252,16 @@ def test_requests_at_a_time(tmp_path: Path) -> None:
 
 @EACH
 @settings(max_examples=25)
-@given(SEEDS, st.booleans())
+@given(SEEDS, st.booleans(), st.booleans())
 def test_walks(
-    tmp_path_factory: pytest.TempPathFactory, policy: str, seed: int, previews: bool
+    tmp_path_factory: pytest.TempPathFactory, policy: str, seed: int, previews: bool, meshes: bool
 ) -> None:
     """What it holds, has, lacks and asks for, at each look and each arrival."""
     random = np.random.default_rng(seed)
     # The paper's client knows none; the page's fetches those that the `.ptm` lacks.
     previews &= policy == "best"
-    witness = Witness(any_world(seed, 40, previews=previews), policy, int(random.integers(0, 3000)))
+    made = any_world(seed, 40, previews=previews, meshes=meshes)
+    witness = Witness(made, policy, int(random.integers(0, 3000)))
     bandwidth = float(random.choice([2e3, 2e4, 2e5, 1e7]))
     witness.walk(Conditions(bandwidth, float(random.choice([0.0, 0.05, 0.3]))))
     assert same(witness.in_javascript(tmp_path_factory.mktemp("walk")), witness.answers)

@@ -14,8 +14,8 @@ export function stockFrom({ ends, stored, previews: { first, column, bytes, loss
 
 /** The catalogue of a document. */
 export function catalogueFrom(report) {
-  const { T, C, K, levels, stored, whole, ends, previews, ...tables } = report;
-  const stock = { T, C, K, whole, levels: Int32Array.from(levels) };
+  const { T, C, K, levels, stored, whole, ends, previews, meshes, ...tables } = report;
+  const stock = { T, C, K, whole, meshes, levels: Int32Array.from(levels) };
   for (const [name, rows] of Object.entries(tables)) stock[name] = Float64Array.from(rows.flat());
   return Object.assign(stock, stockFrom({ T, ends, stored, previews }));
 }

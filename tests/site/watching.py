@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +14,10 @@ import numpy as np
 from ptmtools.lab.allocation import allocate
 from ptmtools.lab.catalogue import Catalogue
 from ptmtools.lab.client import Client, Kind
+from ptmtools.lab.meshes import Meshes
 from ptmtools.lab.network import Link, Request
 from ptmtools.lab.policies import POLICIES
-from ptmtools.lab.policies.engine import HELD_ON, EngineClient
+from ptmtools.lab.policies.engine import BEHIND, HELD_ON, NEAREST, EngineClient
 from ptmtools.lab.previews import AVERAGING, Previews
 from ptmtools.lab.simulation import simulate
 from ptmtools.lab.world import World
@@ -138,6 +139,9 @@ def _missing(client: Client) -> int | None:
     seen = client.frustum.meets_boxes(stock.low[known], stock.high[known])
     seen |= (known == here) | (client.placeholders(1)[known] > 0)
     count += int((seen & ~client.geometry.whole[known]).sum())
+    shown = client.geometry.whole & np.isin(np.arange(stock.cell_count), known)
+    gains = stock.meshes.gains(client.meshes.whole, client.frustum, NEAREST, BEHIND)
+    count += int(((gains > 0) & shown[stock.meshes.cell]).sum())
     hold, kept, wanted = client._worth.hold, client._kept, np.zeros(len(stock.levels), np.int64)
     worth = hold + HELD_ON * kept + HELD_ON**2 * stock.gains
     allocate(worth[: len(wanted)], stock.memory, stock.levels, client.budget, wanted, False)
@@ -187,7 +191,15 @@ def tables(stock: Catalogue) -> dict[str, Any]:
     }
     sizes = {"T": count, "C": stock.cell_count, "K": wide, "whole": stock.whole}
     flat = {name: np.asarray(array).tolist() for name, array in arrays.items()}
-    return {**sizes, **flat, "previews": preview_tables(stock.previews)}
+    meshes = mesh_rows(stock.meshes)
+    return {**sizes, **flat, "previews": preview_tables(stock.previews), "meshes": meshes}
+
+
+def mesh_rows(meshes: Meshes) -> list[dict[str, Any]]:
+    """Finer meshes as the viewer has them, without the names of their files."""
+    names = [f.name for f in fields(meshes)]
+    columns = [getattr(meshes, name).tolist() for name in names]
+    return [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]
 
 
 def preview_tables(previews: Previews) -> dict[str, Any]:
@@ -205,8 +217,8 @@ def documents(world: World) -> dict[str, Any]:
     stock, camera = world.catalogue, world.camera
     shapes: list[list[Any]] = [[] for _ in range(stock.cell_count)]
     rows = stock.shapes
-    fields = (x.tolist() for x in (rows.cell, rows.texture, rows.low, rows.high))
-    for cell, texture, low, high in zip(*fields, strict=True):
+    columns = (x.tolist() for x in (rows.cell, rows.texture, rows.low, rows.high))
+    for cell, texture, low, high in zip(*columns, strict=True):
         shapes[cell].append({"texture": texture, "low": low, "high": high})
     return {
         "catalogue": tables(stock),

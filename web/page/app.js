@@ -1,7 +1,7 @@
 // The application: what the interface, tests and users of the console (`window.ptm`) call.
 
 import { clock } from "./net/fetcher.js";
-import { POLICIES } from "./policy/policies.js";
+import { loadPolicy } from "./policy/policies.js";
 import { Recorder } from "./recorder.js";
 import { footprintOf } from "./space/footprint.js";
 import { stateOf } from "./state.js";
@@ -33,13 +33,14 @@ export class App {
    * @param {import("./data/site.js").Site} site
    * @param {import("./data/site.js").SiteConfig} config
    * @param {Decoders} decoders
-   * @param {import("./net/opening.js").Opening | null} [opening] of the view that the address leads to
+   * @param {object} begin
+   * @param {import("./net/opening.js").Opening | null} begin.opening of the view that the address leads to
+   * @param {string} begin.policy one of `POLICIES`
    */
-  constructor(canvas, gl, site, config, decoders, opening = null) {
+  constructor(canvas, gl, site, config, decoders, { opening, policy }) {
     const query = new URLSearchParams(location.search);
     const small = matchMedia("(pointer: coarse)").matches;
     const megabytes = Number(query.get("memory"));
-    const policy = query.get("policy") ?? "best";
     this.canvas = canvas;
     this.config = config;
     this.index = site.index;
@@ -47,7 +48,7 @@ export class App {
       decoders,
       opening,
       covered: Boolean(config.poster),
-      policy: Object.hasOwn(POLICIES, policy) ? policy : "best",
+      policy,
       budget: megabytes > 0 ? Math.min(megabytes, MOST) * 2 ** 20 : small ? SMALL_BUDGET : BUDGET,
     };
     const walk = (this.walk = new Walkthrough(canvas, gl, site, options, this.emit));
@@ -128,8 +129,11 @@ export class App {
   }
 
   /** @param {string} name of a policy */
-  setPolicy(name) {
-    this.walk.choose(name);
+  async setPolicy(name) {
+    const known = await loadPolicy(name).catch(() => {
+      this.emit("notice", { message: "The policy could not be loaded." });
+    });
+    if (known) this.walk.choose(name);
   }
 
   /** @param {boolean} on whether texture memory stays as it is */
@@ -187,7 +191,7 @@ export class App {
     solids.keep(new Set([...walk.visible, ...(record?.adjacent ?? [])]));
     for (const cell of record ? [walk.cell, ...record.adjacent] : []) {
       const its = records.get(cell), geometry = shapes.get(cell);
-      if (!its || !geometry || solids.has(cell)) continue;
+      if (!its || !geometry || solids.has(cell, geometry)) continue;
       if (!solids.add(cell, geometry, its, late) || late()) return;
     }
   }

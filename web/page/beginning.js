@@ -26,6 +26,6 @@ export function beginningOf(walk) {
       total: 2 + STEPS,
     },
     // Without the room there is no picture; an item buffer says that it has been drawn.
-    over: parts === 2 && !walk.expects && ((!room && share >= ENOUGH * total) || walk.complete),
+    over: parts === 2 && !walk.expects && ((!room && share >= ENOUGH * total) || walk.has(false)),
   };
 }

@@ -6,6 +6,7 @@ import { readConfig, Site } from "./data/site.js";
 import { PageError } from "./net/errors.js";
 import { clock, Fetcher } from "./net/fetcher.js";
 import { Opening } from "./net/opening.js";
+import { loadPolicy } from "./policy/policies.js";
 import { attachUi } from "./ui/all.js";
 import { showError } from "./ui/errors.js";
 
@@ -54,7 +55,10 @@ async function main() {
     const opening = preload ? new Opening(preload.href) : null;
     const gl = contextOf(canvas);
     if (!gl) throw new PageError("PTM-V101", "This browser cannot draw with WebGL 2.");
-    const app = new App(canvas, gl, await site, config, decoders, opening);
+    const policy = new URLSearchParams(location.search).get("policy") ?? "best";
+    const known = await loadPolicy(policy).catch(() => false);
+    const options = { opening, policy: known ? policy : "best" };
+    const app = new App(canvas, gl, await site, config, decoders, options);
     Object.assign(window, { ptm: app });
     const controls = attachUi(app);
     let before = clock();

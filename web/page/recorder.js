@@ -57,12 +57,13 @@ export class Recorder {
 
   /** Files that the client did not request: time, kind, number, bytes. */
   #files() {
-    const { site, stream } = this.walk, { opening } = stream, asked = new Map([[site.address, ["index", 0]]]);
+    const { site, stream, catalogue } = this.walk, { opening } = stream, asked = new Map([[site.address, ["index", 0]]]);
     site.index.cells.forEach((_, cell) => {
       asked.set(stream.url("record", cell), ["record", cell]);
       asked.set(stream.url("geometry", cell), ["geometry", cell]);
     });
     stream.previews.forEach((_, p) => asked.set(stream.url("preview", p), ["preview", p]));
+    catalogue.meshes.forEach((_, k) => asked.set(stream.url("mesh", k), ["mesh", k]));
     const entries = [...performance.getEntriesByType("navigation"),
       ...performance.getEntriesByType("resource")];
     const address = opening && new URL(opening.url, location.href).href;

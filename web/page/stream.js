@@ -108,6 +108,7 @@ export class Stream {
    */
   url(kind, number) {
     if (kind === "preview") return this.site.of(this.previews[number].row.file);
+    if (kind === "mesh") return this.site.of(this.client.catalogue.meshes[number].file);
     return kind === "texture" ? this.site.texture(number) : this.site.cell(kind, number);
   }
 
@@ -151,6 +152,7 @@ export class Stream {
     try {
       if (kind === "texture") await this.#texture(request);
       else if (kind === "preview") await this.#preview(request);
+      else if (kind === "mesh") await this.#mesh(request);
       else await this.#cell(kind, request);
       this.news = true;
     } catch (fault) {
@@ -178,14 +180,36 @@ export class Stream {
       client.arrived(request);
       client.learnRecord(cell, record);
     } else {
-      const textures = this.site.index.textures.length;
-      const read = (/** @type {Uint8Array<ArrayBuffer>} */ body) =>
-        readShapes(body, cell, textures, this.geometry);
-      const shapes = await this.#whole(request, read);
+      const shapes = await this.#shapes(request, cell);
       this.shapes.set(cell, shapes);
       client.arrived(request);
       client.learnGeometry(cell, shapes);
     }
+  }
+
+  /**
+   * A finer mesh takes the place of a coarser one.
+   * @param {Request} request
+   */
+  async #mesh(request) {
+    const { client } = this, { meshes } = client.catalogue;
+    const { mesh, cell, error } = meshes[request.number];
+    const shapes = await this.#shapes(request, cell);
+    const over = meshes.some((row, k) =>
+      row.mesh === mesh && row.error <= error && client.downloads.has("mesh", k));
+    const before = this.shapes.get(cell) ?? [];
+    client.arrived(request);
+    if (over) return;
+    const others = before.filter((shape) => shape.mesh !== mesh);
+    this.shapes.set(cell, [...others, ...shapes.map((shape) => ({ ...shape, mesh }))]);
+  }
+
+  /** @param {Request} request @param {number} cell */
+  #shapes(request, cell) {
+    const textures = this.site.index.textures.length;
+    const read = (/** @type {Uint8Array<ArrayBuffer>} */ body) =>
+      readShapes(body, cell, textures, this.geometry);
+    return this.#whole(request, read);
   }
 
   /**

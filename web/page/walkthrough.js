@@ -330,9 +330,8 @@ export class Walkthrough {
     this.touch();
   }
 
-  /** @param {string} policy by name */
+  /** @param {string} policy one of `POLICIES` */
   choose(policy) {
-    if (!Object.hasOwn(POLICIES, policy)) return;
     this.policy = policy;
     this.client.policy = POLICIES[policy];
   }
@@ -353,10 +352,11 @@ export class Walkthrough {
     const late = () => clock() > until;
     for (const cell of visible) {
       const shapes = this.stream.shapes.get(cell);
-      if (!shapes || renderer.cells.has(cell)) continue;
+      const before = renderer.cells.get(cell);
+      if (!shapes || before?.shapes === shapes) continue;
       if (!renderer.add(cell, shapes, late)) break;
       // None of it may be in view, but now the item buffer has the room.
-      if (cell === this.cell) this.#turn();
+      if (before || cell === this.cell) this.#turn();
       if (late()) break;
     }
   }
@@ -470,11 +470,16 @@ export class Walkthrough {
 
   /** Whether everything that this view could use within the budget is present, in the best form. */
   get complete() {
+    return this.has(true);
+  }
+
+  /** Whether that is so, of objects with any mesh unless `finer`. @param {boolean} finer */
+  has(finer) {
     const { client, memory, present, renderer, stream, catalogue: { T, K } } = this;
     if (!present || this.#sightDrawn < this.#turned || this.#looked < this.#changed) return false;
     if (this.#ready && this.#painted < this.#changed) return false;
-    if (this.visible.some((c) => stream.shapes.has(c) && !renderer?.cells.has(c))) return false;
-    if (client.cell !== this.cell || client.missing() > 0 || !this.sharpness.full) return false;
+    if (this.visible.some((c) => renderer?.cells.get(c)?.shapes !== stream.shapes.get(c))) return false;
+    if (client.cell !== this.cell || client.missing(false, false, finer) > 0 || !this.sharpness.full) return false;
     for (let t = 0; t < T; t++) {
       const held = memory.held[t];
       const better = client.downloads.loss(t, client.column[t]) < memory.loss[t];

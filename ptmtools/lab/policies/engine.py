@@ -109,6 +109,8 @@ CONCURRENCY = {"h1": CONNECTIONS, "h2": 24}
 OVERHEAD, LONGEST_WAIT = 300, 1 << 20
 #: Error of a pixel without geometry: the measured mean, 0 to 255.
 NOTHING = 64.0
+#: Least distance, metres; nearer shapes count as this far. Weight of what is out of sight.
+NEAREST, BEHIND = 0.5, 0.2
 #: Worth of the record of a neighbouring cell, as a share of the screen.
 RECORD_SHARE = 0.005
 #: Share of its worth at which a level stays when it is no longer wanted, and its half-life, s.
@@ -315,12 +317,15 @@ class EngineClient(Client):
         size = np.maximum(self.geometry.size, 1)
         density = np.where(self.geometry.asked == 0, worth.geometry / size, 0.0)
         cell = int(density.argmax())
+        mesh, finer = self._next_mesh()
         records = [c for c in stock.adjacent[self.cell].tolist() if not self.records.asked[c]]
         if records:
             least = min(records, key=lambda c: int(self.records.size[c]))
             record = NOTHING * RECORD_SHARE / float(self.records.size[least])
-            if record > max(best, float(density[cell])):
+            if record > max(best, float(density[cell]), finer):
                 return self.whole(Kind.RECORD, least, record)
+        if finer > max(best, float(density[cell])):
+            return self.whole(Kind.MESH, mesh, finer)
         if density[cell] > best:
             return self.whole(Kind.GEOMETRY, cell, float(density[cell]))
         if source < 0 and worth.ahead is not None:
@@ -330,6 +335,19 @@ class EngineClient(Client):
         if source >= stock.texture_count:
             return self.whole(Kind.PREVIEW, source - stock.texture_count, best)
         return self._range(source, int(stock.ends[source, column]), best)
+
+    def _next_mesh(self) -> tuple[int, float]:
+        """The finer mesh of the greatest worth per byte, and that; -1 and 0 if there is none."""
+        stock = self.world.catalogue
+        meshes, asked = stock.meshes, self.meshes.asked > 0
+        shown = self.geometry.whole & np.isin(np.arange(stock.cell_count), self.known())
+        free = ~asked & shown[meshes.cell]
+        if not free.any():
+            return -1, 0.0
+        gains = NOTHING * meshes.gains(asked, self.frustum, NEAREST, BEHIND)
+        density = np.where(free, gains / (meshes.bytes + self._overhead()), 0.0)
+        best = int(density.argmax())
+        return best, float(density[best])
 
     def _next_fetch(self, worth: Floats, last: Ints) -> tuple[float, int, int]:
         """See `next_fetch`; with one range a file at a time, no more while one is pending."""

@@ -166,6 +166,10 @@ class PaperClient(Client):
             return
         for other in self.known().tolist():
             self._request(Kind.GEOMETRY, other, VISIBLE)
+        # The paper has no levels of detail: the objects as modelled follow the cells.
+        known = self.known()
+        for mesh in self.modelled(known[self.geometry.whole[known]]):
+            self._request(Kind.MESH, mesh, VISIBLE)
         following = self._next()
         if following >= 0:
             self._request(Kind.RECORD, following, NEXT)

@@ -33,13 +33,10 @@ import numpy as np
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.lab.catalogue import Catalogue
-from ptmtools.lab.policies.engine import NOTHING, EngineClient, Worth
+from ptmtools.lab.policies.engine import BEHIND, NEAREST, NOTHING, EngineClient, Worth
 
-#: Least distance, metres; nearer shapes count as this far.
-NEAREST = 0.5
-#: Weights of a cell out of sight, and of one seen only from a neighbouring cell, beside one in
-#: view.
-BEHIND, BEYOND = 0.2, 0.05
+#: Weight of a cell seen only from a neighbouring cell, beside one in view.
+BEYOND = 0.05
 
 
 def geometry_by_coverage(client: EngineClient) -> Floats:

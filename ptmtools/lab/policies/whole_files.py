@@ -55,6 +55,8 @@ class WholeFileClient(Client, ABC):
         if self.cell >= 0:
             for cell in self.world.catalogue.visible[self.cell].tolist():
                 self.request(Kind.GEOMETRY, cell)
+            for mesh in self.modelled(self.world.catalogue.visible[self.cell]):
+                self.request(Kind.MESH, mesh)
         return True
 
     def request(self, kind: Kind, number: int) -> None:

@@ -296,7 +296,7 @@ def served_bytes(stock: Catalogue) -> int:
     """Bytes that clients of the hints can fetch."""
     documents = stock.index_bytes + stock.statistics_bytes + int(stock.record_bytes.sum())
     textures = int(stock.ends[:, -1].sum() + stock.previews.bytes.sum())
-    return documents + int(stock.geometry_bytes.sum()) + textures
+    return documents + int(stock.geometry_bytes.sum() + stock.meshes.bytes.sum()) + textures
 
 
 def minutes(seconds: float) -> str:

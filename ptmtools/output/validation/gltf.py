@@ -1,11 +1,12 @@
-"""The check of the GLBs: each is that of its cell, and names textures and octrees that exist."""
+"""The check of the GLBs: each is that of a cell or of a finer mesh of an object in one, and names
+textures, octrees and meshes that exist."""
 
 from __future__ import annotations
 
 from pathlib import PurePosixPath
 
 from ptmtools.output.gltf_reader import ReadGlb, read_glb
-from ptmtools.output.names import GLTF, GLTF_FOLDER, cell_name
+from ptmtools.output.names import GLTF, GLTF_FOLDER
 from ptmtools.output.validation.files import ServedDatabase
 
 
@@ -18,15 +19,20 @@ def check_files(database: ServedDatabase) -> None:
     """Checks the names and the references of the GLBs."""
     hints = database.hints
     present = {path for path in database.files if PurePosixPath(path).match(f"{GLTF_FOLDER}/*.glb")}
-    expected = set(hints.urls(GLTF) or ()) if hints else present
+    cell_of: dict[str, int] = {}
+    if hints:
+        cell_of = {path: cell for cell, path in enumerate(hints.urls(GLTF) or ())}
+        meshes = hints.index.get("meshes", ()) if cell_of else ()
+        cell_of |= {path: row["cell"] for row in meshes for path in row["files"]}
+    expected = set(cell_of) if hints else present
     for path in sorted(expected ^ present):
-        message = "is missing" if path in expected else "belongs to no cell"
+        message = "is missing" if path in expected else "belongs to no cell and to no object"
         database.at(path).add("PTM-D699", message)
     for path in sorted(present):
         glb: ReadGlb | None = database.contents.get(path)
         if glb is None:
             continue
-        if not glb.name == PurePosixPath(path).stem == cell_name(glb.cell):
+        if glb.name != PurePosixPath(path).stem or glb.cell != cell_of.get(path, glb.cell):
             database.at(path, "scene").add("PTM-D731", f"is named {glb.name!r}, cell {glb.cell}")
         materials = dict.fromkeys(primitive.material for primitive in glb.primitives)
         for material in materials:
@@ -37,9 +43,11 @@ def check_files(database: ServedDatabase) -> None:
             continue
         numbers = [("texture", m.texture, "materials") for m in materials]
         numbers += [("octree texture", p.octree, p.place) for p in glb.primitives]
+        numbers += [("mesh", m.mesh, "materials") for m in materials]
         lists = {
             "texture": hints.index["textures"],
             "octree texture": hints.index.get("octrees", ()),
+            "mesh": hints.index.get("meshes", ()),
         }
         for noun, number, place in numbers:
             if number is not None and not 0 <= number < len(lists[noun]):

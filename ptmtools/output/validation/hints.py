@@ -103,6 +103,7 @@ def check_files(database: ServedDatabase) -> None:
             database.at(STATISTICS, f"cells[{i}]").add("PTM-D703", message)
     _check_first_looks(hints, database)
     check_octrees(hints, database)
+    _check_meshes(index, at)
     if not index["geometry"]:
         at.add("PTM-D700", "names no form", "geometry")
     for urls in map(hints.expanded, index["geometry"].values()):
@@ -115,6 +116,16 @@ def check_files(database: ServedDatabase) -> None:
             at.add("PTM-D699", message, f"viewpoints[{i}]")
         if abs(math.hypot(*view["direction"]) - 1) > 1 - PARALLEL_COSINE:
             at.add("PTM-D699", "is no unit vector", f"viewpoints[{i}].direction")
+
+
+def _check_meshes(index: Row, at: Place) -> None:
+    for i, row in enumerate(index.get("meshes", ())):
+        errors = row["errors"]
+        if row["cell"] >= len(index["cells"]):
+            at.add("PTM-D700", f"the index {row['cell']} is out of range", f"meshes[{i}].cell")
+        elif len(errors) != len(row["files"]) + 1 or errors[-1] or errors != sorted(errors)[::-1]:
+            message = "is not one error more than files, descending to 0"
+            at.add("PTM-D700", message, f"meshes[{i}].errors")
 
 
 def _record_fault(record: Any, i: int, cells: Sequence[Row], textures: int) -> FileError | None:

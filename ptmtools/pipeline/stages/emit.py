@@ -139,12 +139,13 @@ def _summary(n: Mapping[str, Any]) -> str:
 EMIT: Stage[None] = Stage(
     name="emit",
     about="Write the served files: cells and hints.",
-    recipe=12,
+    recipe=13,
     changed="portals that door leaves cover are marked as passages; GLBs are compressed; the "
     "hints hold the previews of textures, the errors and the "
     "effect of each texture level, mean colours, GPU sizes of texels, and the resolution needed in "
     "each cell; --first-look writes a bundle of coarse levels for each cell; viewpoints face "
-    "pictures; hulls with slivers and portals with short edges are convex in float32 and float64",
+    "pictures; hulls with slivers and portals with short edges are convex in float32 and float64; "
+    "objects with thousands of triangles have levels of detail",
     options=EmitOptions,
     reads=(APO, CELLS, PVS, ACH, TEXTURES),
     files=(APO,),

@@ -56,6 +56,7 @@ import { levelSizes } from "../../client/src/levels.js";
  * @property {Viewpoint[]} viewpoints
  * @property {TextureRow[]} textures
  * @property {CellRow[]} cells
+ * @property {{cell: number, box: number[], errors: number[], files: string[], bytes: number[]}[]} [meshes]
  *
  * @typedef {object} Leaf
  * @property {number[][]} points

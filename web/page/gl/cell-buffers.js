@@ -103,9 +103,11 @@ export class CellBuffers {
   /**
    * @param {WebGL2RenderingContext} gl
    * @param {Packed} packed
+   * @param {Shape[]} shapes those that were packed
    */
-  constructor(gl, { data, painted, index, batches }) {
+  constructor(gl, { data, painted, index, batches }, shapes) {
     this.gl = gl;
+    this.shapes = shapes;
     this.batches = batches;
     this.bytes = data.byteLength + index.byteLength;
     this.type = index instanceof Uint32Array ? gl.UNSIGNED_INT : gl.UNSIGNED_SHORT;

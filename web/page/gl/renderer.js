@@ -4,6 +4,7 @@ import { CellBuffers, pack } from "./cell-buffers.js";
 import { aim, programOf } from "./program.js";
 
 /** @typedef {import("./cell-buffers.js").Batch} Batch */
+/** @typedef {import("../data/glb.js").Shape} Shape */
 
 /**
  * The visible batches of a cell.
@@ -19,7 +20,7 @@ const SKY = [0.16, 0.17, 0.19, 1];
 export class Renderer {
   /** @type {Map<number, CellBuffers>} */
   cells = new Map();
-  /** Packing of cells under way. @type {Map<number, ReturnType<typeof pack>>} */
+  /** Packing of cells under way. @type {Map<number, {shapes: Shape[], steps: ReturnType<typeof pack>}>} */
   #packing = new Map();
 
   /**
@@ -35,21 +36,25 @@ export class Renderer {
   }
 
   /**
-   * Adds a cell, or as much of it as time permits; true once it is complete.
+   * Adds a cell, or as much of it as time permits; true once it is complete. It then takes the place of the
+   * same cell with other shapes.
    * @param {number} cell
-   * @param {import("../data/glb.js").Shape[]} shapes
+   * @param {Shape[]} shapes
    * @param {() => boolean} late whether the time has come
    */
   add(cell, shapes, late) {
-    const steps = this.#packing.get(cell) ?? pack(shapes);
-    this.#packing.set(cell, steps);
+    let packing = this.#packing.get(cell);
+    if (packing?.shapes !== shapes) packing = { shapes, steps: pack(shapes) };
+    this.#packing.set(cell, packing);
+    const { steps } = packing;
     let step = steps.next();
     while (!step.done) {
       if (late()) return false;
       step = steps.next();
     }
     this.#packing.delete(cell);
-    this.cells.set(cell, new CellBuffers(this.gl, step.value));
+    this.cells.get(cell)?.delete();
+    this.cells.set(cell, new CellBuffers(this.gl, step.value, shapes));
     return true;
   }
 

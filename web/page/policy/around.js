@@ -8,9 +8,10 @@ import { distance } from "../space/frustum.js";
 /** Error of a pixel without geometry, 0 to 255. */
 export const NOTHING = 64;
 // The least distance that counts, metres.
-const NEAREST = 0.5;
+export const NEAREST = 0.5;
 // Weight of a cell out of sight, and of one seen from a neighbouring cell only.
-const BEHIND = 0.2, BEYOND = 0.05;
+export const BEHIND = 0.2;
+const BEYOND = 0.05;
 
 /**
  * (T) shares that fall with the square of the distance of the nearest shape; they sum to 1.

@@ -7,6 +7,7 @@
 import { allocate, nextFetch } from "./allocation.js";
 import { lookAround, NOTHING, weighGeometry } from "./around.js";
 import { NO_SOURCE, OVERHEAD } from "./downloads.js";
+import { gainsOf } from "./meshes.js";
 import { meetsBox } from "../space/frustum.js";
 
 /** @typedef {import("./client.js").Client} Client */
@@ -183,6 +184,8 @@ export class Best {
       const seen = c === here || hidden[c] > 0 || meetsBox(frustum, low, high, 3 * c);
       if (seen && !downloads.has("geometry", c) && counts("geometry", c)) count++;
     }
+    const meshes = gainsOf(this.#client, (k) => downloads.has("mesh", k));
+    meshes.forEach((gain, k) => gain > 0 && counts("mesh", k) && count++);
     allocate(this.#holding(), memory, levels, budget, this.#wanted);
     for (let t = 0; t < T; t++) {
       const { exact } = downloads.reach(t);
@@ -247,6 +250,12 @@ export class Best {
       if (fewer && downloads.free("record", c)) least = c;
     }
     const record = least < 0 ? 0 : NOTHING * RECORD_SHARE / recordBytes[least];
+    let mesh = -1, finer = 0;
+    gainsOf(this.#client, (k) => !downloads.free("mesh", k)).forEach((gain, k) => {
+      const density = gain / (catalogue.meshes[k].bytes + overhead);
+      if (density > finer && downloads.free("mesh", k)) [mesh, finer] = [k, density];
+    });
+    if (finer > Math.max(step.density, geometry, record)) return downloads.ask("mesh", mesh, finer);
     if (record > Math.max(step.density, geometry)) return downloads.ask("record", least, record);
     if (geometry > step.density) return downloads.ask("geometry", nearest, geometry);
     if (step.texture < 0) step = next(this.#ahead, levels);

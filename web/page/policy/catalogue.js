@@ -5,6 +5,7 @@
 // worth have T + P rows: those of the textures, then those of the previews (docs/formats/client.md).
 
 import { levelSizes } from "../../client/src/levels.js";
+import { meshesOf } from "./meshes.js";
 
 /**
  * @typedef {object} Catalogue
@@ -25,6 +26,7 @@ import { levelSizes } from "../../client/src/levels.js";
  * @property {Float64Array} high (C × 3)
  * @property {Float64Array} recordBytes (C) on the link
  * @property {Float64Array} geometryBytes (C)
+ * @property {import("./meshes.js").FinerMesh[]} meshes the files of finer meshes of objects
  * @property {number} whole bytes of texture memory that all textures take
  */
 
@@ -45,6 +47,7 @@ import { levelSizes } from "../../client/src/levels.js";
  *   gpuTexelBytes?: number, ends: number[], differences?: number[], color?: number[],
  *   previews?: {level: number, width: number, height: number, bytes: number, difference: number,
  *   exact?: boolean}[]}[]} textures
+ * @property {Parameters<typeof meshesOf>[0]} [meshes]
  * @property {{box: number[], recordBytes?: number, geometryBytes?: number}[]} cells
  */
 
@@ -59,7 +62,7 @@ const GREY = [128, 128, 128];
  * @param {Index} index
  * @returns {Catalogue}
  */
-export function catalogueOf({ textures, cells }) {
+export function catalogueOf({ textures, cells, meshes = [] }) {
   const T = textures.length, C = cells.length;
   const levels = Int32Array.from(textures, (texture) => levelSizes(texture).length);
   const stored = Int32Array.from(textures, ({ ends }) => ends.length);
@@ -80,7 +83,7 @@ export function catalogueOf({ textures, cells }) {
   const previews = previewsOf(textures);
   return {
     T, C, K, levels, stored, ends, memory, differences, whole, previews,
-    gains: gainsOf(differences, K, previews),
+    gains: gainsOf(differences, K, previews), meshes: meshesOf(meshes),
     colors: Float64Array.from(textures.flatMap((texture) => texture.color ?? GREY)),
     low: Float64Array.from(cells.flatMap((cell) => cell.box.slice(0, 3))),
     high: Float64Array.from(cells.flatMap((cell) => cell.box.slice(3))),

@@ -156,10 +156,11 @@ export class Client {
    * Number of files and levels that this view could use within the budget and that are missing.
    * @param {boolean} [free] whether to omit those that are requested already or cannot be now
    * @param {boolean} [gone] whether to count those that are unavailable
+   * @param {boolean} [finer] whether to count finer meshes
    */
-  missing(free = false, gone = false) {
+  missing(free = false, gone = false, finer = true) {
     const { downloads } = this;
-    return this.#policy.missing((kind, number) =>
+    return this.#policy.missing((kind, number) => kind === "mesh" && !finer ? false :
       free ? downloads.free(kind, number) : gone || !downloads.gone(kind, number));
   }
 

@@ -1,15 +1,15 @@
-// Requested and downloaded bytes. Records, geometry and previews are requested whole; of a texture's
+// Requested and downloaded bytes. Records, geometry, meshes and previews are requested whole; of a texture's
 // `.ptm` one range at a time, each where the last one ended: caches of browsers request ranges again
 // while they still receive the file.
 
 /** @typedef {import("./catalogue.js").Catalogue} Catalogue */
-/** @typedef {"record" | "geometry" | "texture" | "preview"} Kind */
+/** @typedef {"record" | "geometry" | "texture" | "preview" | "mesh"} Kind */
 
 /**
  * Bytes `begin` to `end` of a file.
  * @typedef {object} Request
  * @property {Kind} kind
- * @property {number} number of the cell, texture or preview
+ * @property {number} number of the cell, texture, preview or file of a mesh
  * @property {number} begin
  * @property {number} end an estimate for whole files whose size is not in the index
  * @property {number} priority the greater, the sooner; it may grow
@@ -35,14 +35,12 @@ export class Downloads {
   constructor(stock) {
     const { T, C } = stock, P = stock.previews.column.length;
     this.#stock = stock;
-    this.#state = {
-      record: new Uint8Array(C), geometry: new Uint8Array(C), texture: new Uint8Array(T),
-      preview: new Uint8Array(P),
-    };
-    this.#rests = {
-      record: new Float64Array(C), geometry: new Float64Array(C), texture: new Float64Array(T),
-      preview: new Float64Array(P),
-    };
+    const sizes = { record: C, geometry: C, texture: T, preview: P, mesh: stock.meshes.length };
+    /** @template A @param {new (count: number) => A} Kinds @returns {Record<Kind, A>} */
+    const each = (Kinds) => /** @type {any} */ (Object.fromEntries(
+      Object.entries(sizes).map(([kind, count]) => [kind, new Kinds(count)])));
+    this.#state = each(Uint8Array);
+    this.#rests = each(Float64Array);
     /** (T) bytes of each texture's `.ptm`, from its beginning. */
     this.bytes = new Float64Array(T);
     /** (T) the same with those that are on the way. */
@@ -69,7 +67,7 @@ export class Downloads {
     return this.#rests[kind][number] === Infinity;
   }
 
-  /** Whether a record, geometry or preview is complete. @param {Kind} kind @param {number} number */
+  /** Whether a record, geometry, mesh or preview is complete. @param {Kind} kind @param {number} number */
   has(kind, number) {
     return this.#state[kind][number] === THERE;
   }
@@ -129,9 +127,9 @@ export class Downloads {
    * @returns {Request}
    */
   ask(kind, number, priority, end) {
-    const { recordBytes, geometryBytes, previews } = this.#stock;
+    const { recordBytes, geometryBytes, previews, meshes } = this.#stock;
     const whole = { record: recordBytes, geometry: geometryBytes, preview: previews.bytes };
-    end ??= kind === "texture" ? 0 : whole[kind][number];
+    end ??= kind === "texture" ? 0 : kind === "mesh" ? meshes[number].bytes : whole[kind][number];
     const begin = kind === "texture" ? this.bytes[number] : 0;
     const request = { kind, number, begin, end, priority, left: OVERHEAD + end - begin };
     this.#state[kind][number] = ASKED;
@@ -148,7 +146,7 @@ export class Downloads {
   over(request, end) {
     const { kind, number } = request, { K, ends, stored } = this.#stock;
     this.waiting.delete(request);
-    if (kind === "preview") this.came(kind, number);
+    if (kind === "preview" || kind === "mesh") this.came(kind, number);
     if (kind !== "texture") return;
     this.lost(kind, number);
     this.bytes[number] = this.asked[number] = Math.max(this.bytes[number], end);

@@ -109,13 +109,19 @@ export class Paper {
 
   /** @param {Belief} estimate */
   next(estimate) {
-    const { cell, here, known } = this.#client;
+    const { catalogue, cell, here, known, downloads } = this.#client;
     const own = known[cell];
     /** @type {[Kind, number, number][]} */
     const files = [["record", here, CURRENT], ["geometry", here, CURRENT]];
     if (own) {
       for (const c of own.visible) files.push(["geometry", c, VISIBLE]);
       const following = this.#following();
+      // The paper has no levels of detail: the objects as modelled follow the cells.
+      catalogue.meshes.forEach(({ mesh, cell: c }, k) => {
+        const finest = catalogue.meshes[k + 1]?.mesh !== mesh;
+        const drawn = own.visible.includes(c) && downloads.has("geometry", c);
+        if (finest && drawn) files.push(["mesh", k, VISIBLE]);
+      });
       if (following >= 0) files.push(["record", following, NEXT], ["geometry", following, NEXT]);
     }
     return this.#first(files) ?? this.#level(estimate);

@@ -6,7 +6,6 @@ import { attachControls } from "./controls.js";
 import { find } from "./elements.js";
 import { attachErrors, showNotice } from "./errors.js";
 import { attachLoading } from "./loading.js";
-import { attachMenu } from "./menu.js";
 
 /**
  * The parts of the application that the interface uses.
@@ -63,9 +62,9 @@ import { attachMenu } from "./menu.js";
  * @property {{message: string}} notice
  */
 
-/** Fill a panel. @type {Record<string, (panel: HTMLElement, app: App) => void | Promise<void>>} */
+/** Fill a panel. @type {Record<string, (panel: HTMLElement, app: App) => Promise<void>>} */
 const PANELS = {
-  places: attachMenu,
+  places: async (panel, app) => (await loadLater()).attachMenu(panel, app),
   map: async (panel, app) => (await loadLater()).attachMinimap(panel, app),
   details: async (panel, app) => (await loadLater()).attachOverlay(panel, app),
 };
@@ -75,7 +74,7 @@ function attachPanels(root, app) {
   /** @type {NodeListOf<HTMLButtonElement>} */
   const buttons = root.querySelectorAll("nav [aria-controls]");
   const narrow = matchMedia("(max-width: 640px)");
-  /** @type {Map<string, void | Promise<void>>} */
+  /** @type {Map<string, Promise<void>>} */
   const filled = new Map();
   /** @param {HTMLButtonElement} button @param {boolean} open */
   const show = async (button, open) => {

@@ -67,6 +67,7 @@ class Tree {
 
   /** @param {Shape[]} shapes @param {Openings} record */
   constructor(shapes, record) {
+    this.shapes = shapes;
     this.steps = this.#make(shapes, record);
   }
 
@@ -176,7 +177,8 @@ export class Solids {
    * @param {() => boolean} [late] whether the time has come
    */
   add(cell, shapes, record, late = () => false) {
-    const tree = this.#growing.get(cell) ?? new Tree(shapes, record);
+    let tree = this.#growing.get(cell);
+    if (tree?.shapes !== shapes) tree = new Tree(shapes, record);
     this.#growing.set(cell, tree);
     while (!tree.steps.next().done) if (late()) return false;
     this.#growing.delete(cell);
@@ -192,9 +194,10 @@ export class Solids {
     }
   }
 
-  /** @param {number} cell */
-  has(cell) {
-    return this.#trees.has(cell);
+  /** Whether a cell was added, with these shapes. @param {number} cell @param {Shape[]} [shapes] */
+  has(cell, shapes) {
+    const tree = this.#trees.get(cell);
+    return tree !== undefined && (tree.shapes === shapes || !shapes);
   }
 
   /**

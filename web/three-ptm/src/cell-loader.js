@@ -73,12 +73,29 @@ export class CellLoader {
 
   /** @param {import("three").Material} material the loader's, with the extras as `userData` */
   #look({ color, opacity, transparent, alphaTest, vertexColors, side, userData }) {
-    const { texture, wrapS, wrapT } = userData;
-    const wrap = (/** @type {number} */ n) => (n === CLAMP ? ClampToEdgeWrapping : RepeatWrapping);
+    const { texture, wrapS, wrapT, mesh } = userData;
+    const wrap = (/** @type {number | undefined} */ n) => (n === CLAMP ? ClampToEdgeWrapping : RepeatWrapping);
     const map = texture === undefined ? null : this.#textureOf(texture, wrap(wrapS), wrap(wrapT));
     const depthWrite = !transparent;
     const drawn = { opacity, transparent, alphaTest, vertexColors, side, depthWrite };
-    return new MeshBasicMaterial({ color, map, ...drawn });
+    return Object.assign(new MeshBasicMaterial({ color, map, ...drawn }), { userData: { mesh } });
+  }
+}
+
+/**
+ * Removes the coarsest mesh of an object from its cell.
+ * @param {Group} cell
+ * @param {number} mesh place of the object in the index
+ */
+export function disposeMesh(cell, mesh) {
+  /** @type {Mesh[]} */
+  const coarse = [];
+  cell.traverse((node) => {
+    if (node instanceof Mesh && node.material.userData.mesh === mesh) coarse.push(node);
+  });
+  for (const node of coarse) {
+    node.removeFromParent();
+    node.geometry.dispose();
   }
 }
 

@@ -5,7 +5,7 @@ import { Group } from "three";
 import { Locator, levelSizes } from "ptm-client";
 import { DecoderWorkers } from "ptm-decoder";
 import { shareOut } from "./budget.js";
-import { CellLoader, disposeCell } from "./cell-loader.js";
+import { CellLoader, disposeCell, disposeMesh } from "./cell-loader.js";
 import { PtmTexture } from "./ptm-texture.js";
 import { RangeFile } from "./range-file.js";
 
@@ -22,6 +22,7 @@ import { RangeFile } from "./range-file.js";
  *   components?: number, offsets?: number[], previews?: {file: string, level: number, width: number,
  *   height: number, bytes: number, exact?: boolean}[]}[]} textures
  * @property {{name: string, box: number[], record?: string, geometry?: string}[]} cells
+ * @property {{cell: number, files: string[]}[]} [meshes] objects with levels of detail
  */
 
 /**
@@ -62,8 +63,10 @@ export class Walk {
   #locator;
   /** @type {Map<number, Promise<CellRecord>>} */
   #records = new Map();
-  /** @type {Map<number, {control: AbortController, done: Promise<void>}>} */
+  /** @type {Map<number, {control: AbortController, done: Promise<Group | undefined>}>} */
   #cells = new Map();
+  /** Objects as modelled, by their place in the index. @type {Map<number, Promise<void>>} */
+  #meshes = new Map();
   /** The file of each texture and its copies, by wraps.
    * @type {Map<number, {file: RangeFile, copies: Map<string, PtmTexture>}>} */
   #textures = new Map();
@@ -169,6 +172,7 @@ export class Walk {
       this.#free(cells, shares);
       await this.#all([...cells].map((cell) => () => this.#load(cell)), signal);
       if (!signal.aborted) await this.#refine(shares, signal);
+      await this.#all([...cells].flatMap((cell) => this.#coarse(cell)), signal);
     } catch (error) {
       this.#report(error);
     }
@@ -213,7 +217,7 @@ export class Walk {
     return new URL(url, this.#url);
   }
 
-  /** @param {number} cell */
+  /** @param {number} cell @returns {Promise<unknown>} */
   #load(cell) {
     const loading = this.#cells.get(cell);
     if (loading) return loading.done;
@@ -224,6 +228,7 @@ export class Walk {
         const group = await this.#loader.load(url, control.signal);
         control.signal.addEventListener("abort", () => disposeCell(group));
         this.shown.add(group);
+        return group;
       } catch (error) {
         if (control.signal.aborted) return;
         this.#cells.delete(cell);
@@ -232,6 +237,42 @@ export class Walk {
     };
     const done = load();
     this.#cells.set(cell, { control, done });
+    return done;
+  }
+
+  /**
+   * What loads the objects of a cell as modelled, of those that it has simplified meshes of.
+   * @param {number} cell
+   */
+  #coarse(cell) {
+    return (this.index.meshes ?? []).flatMap((row, mesh) =>
+      row.cell === cell ? [() => this.#model(cell, mesh, row.files[row.files.length - 1])] : []);
+  }
+
+  /**
+   * Puts an object as modelled in place of its coarsest mesh.
+   * @param {number} cell
+   * @param {number} mesh
+   * @param {string} file
+   */
+  async #model(cell, mesh, file) {
+    const place = this.#cells.get(cell);
+    if (!place) return;
+    const { signal } = place.control;
+    const load = async () => {
+      try {
+        const coarse = await place.done;
+        const group = await this.#loader.load(new URL(file, this.#url), signal);
+        signal.addEventListener("abort", () => (disposeCell(group), this.#meshes.delete(mesh)));
+        if (coarse) disposeMesh(coarse, mesh);
+        this.shown.add(group);
+      } catch (error) {
+        this.#meshes.delete(mesh);
+        if (!signal.aborted) throw error;
+      }
+    };
+    const done = this.#meshes.get(mesh) ?? load();
+    this.#meshes.set(mesh, done);
     return done;
   }
 
@@ -309,7 +350,7 @@ export class Walk {
 
   /**
    * Runs jobs in order, a few at a time; errors are reported.
-   * @param {(() => Promise<void>)[]} jobs
+   * @param {(() => Promise<unknown>)[]} jobs
    * @param {AbortSignal} signal
    */
   async #all(jobs, signal) {

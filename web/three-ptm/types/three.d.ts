@@ -60,7 +60,7 @@ export class Material {
   alphaTest: number;
   vertexColors: boolean;
   side: number;
-  userData: { texture?: number; wrapS: number; wrapT: number };
+  userData: { texture?: number; wrapS?: number; wrapT?: number; mesh?: number };
   dispose(): void;
 }
 export class MeshBasicMaterial extends Material {
