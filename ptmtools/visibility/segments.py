@@ -152,20 +152,25 @@ def check_conservative(
 
 
 class _Eyes:
-    """The places of eyes: the eye region, regardless of leaves; and all of a leaf that is standing
-    without a floor, because of a camera or a viewpoint."""
+    """The places of eyes: the eye region, regardless of leaves but for those inside a door leaf,
+    where an eye belongs to the cells on both sides; and all of a leaf that is standing without a
+    floor, because of a camera or a viewpoint."""
 
     def __init__(self, cells: Cells) -> None:
         self._cells, self._eyes = cells, cells.eyes
         bodies = [cells.leaf_points(leaf) for leaf in range(cells.leaf_count)]
         floored = [self._eyes.about(body.min(axis=0), body.max(axis=0)) for body in bodies]
         self._whole = cells.leaf_standing & ~np.array(floored, dtype=np.bool_)
+        passages = cells.portal_leaf[cells.portal_passage].ravel()
+        self._doors = np.bincount(passages, minlength=cells.leaf_count) > 1
+        self._doors &= ~cells.leaf_standing
 
     def at(self, points: Floats, leaf: NDArray[np.int32]) -> Bools:
         """(n,) whether an eye can be at the (n, 3) points, in (n,) leaves or -1."""
         inside = leaf >= 0
         standing = inside & self._whole[leaf]
         if not self._eyes.everywhere:
+            inside[inside] = ~self._doors[leaf[inside]]
             standing[inside] |= self._eyes.contains(points[inside])
         return np.asarray(standing)
 

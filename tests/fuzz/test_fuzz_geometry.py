@@ -35,6 +35,11 @@ def test_leaves_that_are_thin_for_kilometres(base: str, number: int) -> None:
     assert fuzz(base, seed=94, start=number, count=1).tally.findings == []
 
 
+def test_a_door_leaf_that_is_open_above() -> None:
+    """An eye inside of it belongs to the cells on both sides."""
+    assert fuzz("doors", seed=95, start=631, count=1).tally.findings == []
+
+
 @pytest.mark.parametrize("fault", FAULTS)
 def test_every_fault_is_found(fault: str) -> None:
     summary = fuzz("two_rooms", seed=0, start=0, count=6, fault=fault)
