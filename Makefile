@@ -126,6 +126,7 @@ bench-web: build/museum/.made $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks.web_rivals.bytes
 	$(BIN)/python -m benchmarks.web_rivals
 	$(BIN)/python -m benchmarks.web_rivals --memory --scene museum,rooms
+	$(BIN)/python benchmarks/mesh_levels.py
 
 bench: $(VENV)/.installed-dev
 	@mkdir -p build/bench

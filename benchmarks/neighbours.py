@@ -100,7 +100,9 @@ def world_of(scene: Scene, policies: Sequence[PolicyEntry]) -> World:
     FOLDER.mkdir(parents=True, exist_ok=True)
     made(scene.script, scene.model)
     database, walk = FOLDER / f"{scene.name}.db", FOLDER / f"{scene.name}-{SECONDS}.json"
-    ptm("build-scene", scene.model, "-o", database, "--format", "vrml,gltf,interlace")
+    # The simulator's pictures have no coarser meshes.
+    options = ("--format", "vrml,gltf,interlace", "--lods", "none")
+    ptm("build-scene", scene.model, "-o", database, *options)
     ptm("path", database, "-o", walk, "--duration", SECONDS, "--force")
     served = read_served(database)
     pyramids = read_pyramids(served)
