@@ -258,7 +258,10 @@ class _Reader:
         surface, extras = material["pbrMetallicRoughness"], material.get("extras", {})
         factor = surface.get("baseColorFactor", WHITE)
         if extras.keys() not in ({"mesh"}, set()) and not {"ptm", "texture"} <= extras.keys():
-            _foreign(f"materials[{index}].extras", "names a .ptm or its place, and not both")
+            _foreign(
+                f"materials[{index}].extras",
+                "has members of a texture, but not its .ptm and its place",
+            )
         wrap, image = _wrap(extras), None
         if "baseColorTexture" in surface:
             texture = self._row("textures", surface["baseColorTexture"]["index"])

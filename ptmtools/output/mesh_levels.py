@@ -14,10 +14,10 @@ meshes, an eighth of the whole, cost less.)
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -185,3 +185,14 @@ def _level(mesh: Mesh, shapes: Sequence[Shape], error: float) -> Level:
 def _used(corner: NDArray[np.integer]) -> tuple[Ints, Ints]:
     used, place = np.unique(corner, return_inverse=True)
     return used.astype(np.int64), place.reshape(-1, 3).astype(np.int64)
+
+
+def row_fault(row: Mapping[str, Any], cells: int) -> tuple[str, str]:
+    """The member of a row of the hints that is wrong, and a message; two empty texts if it is
+    right. ``cells``: their number."""
+    errors = row["errors"]
+    if row["cell"] >= cells:
+        return "cell", f"the index {row['cell']} is out of range"
+    if len(errors) != len(row["files"]) + 1 or errors[-1] or errors != sorted(errors)[::-1]:
+        return "errors", "is not one error more than files, descending to 0"
+    return "", ""

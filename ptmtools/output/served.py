@@ -28,6 +28,7 @@ from ptmtools.errors import DatabaseError, Rebuild
 from ptmtools.files import open_regular
 from ptmtools.output.gltf import WRAPS
 from ptmtools.output.gltf_reader import ReadGlb, ReadPrimitive, read_glb
+from ptmtools.output.mesh_levels import row_fault
 from ptmtools.output.model import FileError, sizes_of
 from ptmtools.output.names import HINTS, texture_name
 from ptmtools.scene.colors import to_srgb
@@ -275,13 +276,13 @@ def read_served(database: str | os.PathLike[str]) -> Served:
         sizes.append(on_link(data))
     mesh_bytes = []
     for number, row in enumerate(index.get("meshes", ())):
+        member, message = row_fault(row, len(names))
+        if member:
+            place = f"meshes[{number}].{member}"
+            raise DatabaseError("PTM-D006", message, file=folder / HINTS, place=place, remedy=BUILD)
         files = [_inside(folder, url) for url in row["files"]]
         bodies = [_bytes(file) for file in files]
         mesh_bytes.append(tuple(map(on_link, bodies)))
-        if row["cell"] >= len(names):
-            message = f"the index {row['cell']} is out of range"
-            place = f"meshes[{number}].cell"
-            raise DatabaseError("PTM-D006", message, file=folder / HINTS, place=place, remedy=BUILD)
         whole = _glb(files[-1], bodies[-1], row["cell"], *lists)
         geometry[row["cell"]] = _refined(geometry[row["cell"]], number, whole)
     locator = Locator(records)

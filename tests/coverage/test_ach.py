@@ -304,7 +304,10 @@ def test_any_seed_will_do_with_a_tolerance(room_row):
         ("llvmpipe (LLVM 15)", 100_000, 64, "embree"),
         ("llvmpipe (LLVM 15)", 100_000, 512, "gl"),
         ("llvmpipe (LLVM 15)", 40, 2, "embree"),
-        ("NVIDIA", 100_000, 2, "gl"),
+        ("NVIDIA", 40, 2, "embree"),
+        ("NVIDIA", 100_000, 64, "embree"),
+        ("NVIDIA", 5000, 64, "gl"),
+        ("NVIDIA", 100_000, 512, "gl"),
     ],
 )
 def test_auto_goes_by_the_device_and_the_size_of_the_task(

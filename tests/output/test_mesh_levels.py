@@ -176,6 +176,8 @@ def test_objects_whose_seams_leave_nothing_to_simplify(tmp_path: Path) -> None:
 DAMAGE: dict[str, tuple[Callable[[Any], None], str, str]] = {
     "cell": (lambda row: row.update(cell=9), "PTM-D700", "out of range"),
     "errors": (lambda row: row["errors"].reverse(), "PTM-D700", "descending"),
+    "fewer": (lambda row: row["errors"].pop(0), "PTM-D700", "one error more"),
+    "twice": (lambda row: row["files"].append(row["files"][0]), "PTM-D700", "one error more"),
     "other": (lambda row: row.update(cell=1), "PTM-D731", "cell 0"),
     "none": (lambda row: row["files"].__setitem__(0, "gltf/m9999.glb"), "PTM-D699", "missing"),
 }
@@ -191,9 +193,24 @@ def test_damaged_rows(levels: Path, tmp_path: Path, name: str) -> None:
     file.write_text(json.dumps(index))
     found = [i for i in validate(database, workers=1).issues if i.code == code]
     assert not code or any(words in issue.message for issue in found)
-    if name == "cell":
-        with pytest.raises(DatabaseError, match="out of range"):
+    if code == "PTM-D700":
+        with pytest.raises(DatabaseError, match=words):
             read_served(database)
+
+
+def test_exchanged_rows(levels: Path, tmp_path: Path) -> None:
+    """The materials then name rows of other cells, and a file belongs to two rows."""
+    database = Path(shutil.copytree(levels, tmp_path / "db"))
+    file = database / "www/hints.json"
+    index = json.loads(file.read_text())
+    index["meshes"].reverse()
+    file.write_text(json.dumps(index))
+    issues = validate(database, workers=1).issues
+    assert sum("not that of an object" in issue.message for issue in issues) == 2
+    index["meshes"][1]["files"] = index["meshes"][0]["files"]
+    file.write_text(json.dumps(index))
+    issues = validate(database, workers=1).issues
+    assert any("file of another row" in issue.message for issue in issues)
 
 
 def test_a_coarsest_mesh_without_a_row(levels: Path, tmp_path: Path) -> None:

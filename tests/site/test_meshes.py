@@ -119,3 +119,32 @@ def test_a_finer_mesh_that_is_missing(visit: Callable[..., Any], site: Site) -> 
         visitor.until("window.ptm.errors.length > 0")
         assert visitor.page.evaluate("ptm.errors[0].code") == "PTM-V103"
         assert 0 < visitor.page.evaluate(COUNTS)["drawn"] < 8000
+
+
+def test_a_finest_mesh_that_is_missing(visit: Callable[..., Any], site: Site) -> None:
+    """The one before it takes its place, and the view is complete."""
+    finest = {row["files"][-1] for row in site.index["meshes"]}
+
+    def without(page: Any) -> None:
+        for name in finest:
+            page.route(f"**/{name}", lambda route: route.fulfill(status=404, body="no"))
+
+    with visit(site, prepare=without) as visitor:
+        visitor.until("window.ptm?.walk.begun")
+        for eye in NEAR:
+            visitor.page.evaluate("(eye) => ptm.goTo({ eye, yaw: 0, pitch: 0 })", eye)
+            visitor.complete()
+        assert visitor.page.evaluate("ptm.errors.map(({ code }) => code)") == ["PTM-V103"] * 2
+        assert 15_000 < visitor.page.evaluate(COUNTS)["drawn"] < 30_000
+
+
+def test_the_last_of_two_policies_counts(visit: Callable[..., Any], site: Site) -> None:
+    """The first one is still on its way."""
+    with visit(site) as visitor:
+        visitor.until("window.ptm?.walk.begun")
+        visitor.page.evaluate("Promise.all([ptm.setPolicy('paper'), ptm.setPolicy('best')])")
+        assert visitor.state()["policy"] == "best"
+        visitor.page.evaluate("ptm.setPolicy('paper')")
+        assert visitor.state()["policy"] == "paper"
+        visitor.page.evaluate("ptm.setPolicy('none')")
+        assert visitor.state()["policy"] == "paper"

@@ -141,7 +141,8 @@ def _missing(client: Client) -> int | None:
     count += int((seen & ~client.geometry.whole[known]).sum())
     shown = client.geometry.whole & np.isin(np.arange(stock.cell_count), known)
     gains = stock.meshes.gains(client.meshes.whole, client.frustum, NEAREST, BEHIND)
-    count += int(((gains > 0) & shown[stock.meshes.cell]).sum())
+    ahead = client.frustum.meets_boxes(stock.meshes.low, stock.meshes.high)
+    count += int(((gains > 0) & ahead & shown[stock.meshes.cell]).sum())
     hold, kept, wanted = client._worth.hold, client._kept, np.zeros(len(stock.levels), np.int64)
     worth = hold + HELD_ON * kept + HELD_ON**2 * stock.gains
     allocate(worth[: len(wanted)], stock.memory, stock.levels, client.budget, wanted, False)

@@ -26,6 +26,8 @@ const LONGEST = 0.1;
 export class App {
   /** @type {Map<string, ((detail: any) => void)[]>} */
   #listeners = new Map();
+  /** The policy that was chosen last; it may be on its way. */
+  #wanted = "";
 
   /**
    * @param {HTMLCanvasElement} canvas
@@ -130,10 +132,11 @@ export class App {
 
   /** @param {string} name of a policy */
   async setPolicy(name) {
+    this.#wanted = name;
     const known = await loadPolicy(name).catch(() => {
       this.emit("notice", { message: "The policy could not be loaded." });
     });
-    if (known) this.walk.choose(name);
+    if (known && this.#wanted === name) this.walk.choose(name);
   }
 
   /** @param {boolean} on whether texture memory stays as it is */

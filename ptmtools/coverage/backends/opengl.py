@@ -37,6 +37,8 @@ PROBE_FACE, PROBE_POINTS = 8, 16
 #: it can show in) and each pixel. Fitted, as `embree.RAY_COST`, to `benchmarks/ach.py`; only their
 #: proportions matter.
 TRIANGLE_COST, PIXEL_COST = 1.0, 0.05
+#: Of a graphics card for each sample point, triangle and pixel; fitted to an NVIDIA H200.
+CARD_POINT_COST, CARD_TRIANGLE_COST, CARD_PIXEL_COST = 300.0, 0.15, 0.04
 
 VERTEX = """
 #version 330
@@ -73,7 +75,9 @@ def cost(triangles: float, pixels: int, gpu: int | None) -> float:
     context = create_context(gpu)
     software = is_software(context.info["GL_RENDERER"])
     context.release()
-    return TRIANGLE_COST * triangles + PIXEL_COST * pixels if software else 0.0
+    if software:
+        return TRIANGLE_COST * triangles + PIXEL_COST * pixels
+    return CARD_POINT_COST + CARD_TRIANGLE_COST * triangles + CARD_PIXEL_COST * pixels
 
 
 class OpenGLRenderer:

@@ -52,3 +52,8 @@ def check_files(database: ServedDatabase) -> None:
         for noun, number, place in numbers:
             if number is not None and not 0 <= number < len(lists[noun]):
                 database.at(path, place).add("PTM-D704", f"the hints have no {noun} {number}")
+            elif noun == "mesh" and number is not None:
+                row = lists[noun][number]
+                if row["cell"] != glb.cell or path in row["files"]:
+                    message = f"mesh {number} of the hints is not that of an object of this cell"
+                    database.at(path, place).add("PTM-D731", message)

@@ -13,6 +13,7 @@ import numpy as np
 from ptmtools import schemas
 from ptmtools.diagnostics import Place
 from ptmtools.output.hints import RECORD_FORMAT as FORMAT, SCHEMA
+from ptmtools.output.mesh_levels import row_fault
 from ptmtools.output.model import FileError, shaped, sizes_of
 from ptmtools.output.names import BUNDLE, HINTS, HINTS_FOLDER, STATISTICS
 from ptmtools.output.validation.files import Images, ReadHints, Row, ServedDatabase
@@ -119,13 +120,14 @@ def check_files(database: ServedDatabase) -> None:
 
 
 def _check_meshes(index: Row, at: Place) -> None:
+    named: set[str] = set()
     for i, row in enumerate(index.get("meshes", ())):
-        errors = row["errors"]
-        if row["cell"] >= len(index["cells"]):
-            at.add("PTM-D700", f"the index {row['cell']} is out of range", f"meshes[{i}].cell")
-        elif len(errors) != len(row["files"]) + 1 or errors[-1] or errors != sorted(errors)[::-1]:
-            message = "is not one error more than files, descending to 0"
-            at.add("PTM-D700", message, f"meshes[{i}].errors")
+        member, message = row_fault(row, len(index["cells"]))
+        if member:
+            at.add("PTM-D700", message, f"meshes[{i}].{member}")
+        if not named.isdisjoint(row["files"]):
+            at.add("PTM-D700", "has a file of another row", f"meshes[{i}].files")
+        named.update(row["files"])
 
 
 def _record_fault(record: Any, i: int, cells: Sequence[Row], textures: int) -> FileError | None:

@@ -92,7 +92,10 @@ def test_rays_draw_the_same(gl: None, levels: int, what: str, distance: float) -
     other = drawn(levels, "embree", what=what, distance=distance)
     both = one.covered & other.covered
     assert (one.covered != other.covered).mean() < 1e-3
-    assert np.abs(one.place - other.place)[both].max() < 1e-4
+    away = np.abs(one.place - other.place)[both].max(axis=1)
+    # Graphics cards move vertices by up to 1/256 of a pixel, which counts most at outlines.
+    assert np.median(away) < 1e-4
+    assert away.max() < 2e-3
     # Apart from pixels whose place or size is within rounding of a boundary.
     assert (one.stop != other.stop)[both].mean() < 0.01
     assert (one.address != other.address)[both].mean() < 0.01

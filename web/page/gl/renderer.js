@@ -37,14 +37,13 @@ export class Renderer {
 
   /**
    * Adds a cell, or as much of it as time permits; true once it is complete. It then takes the place of the
-   * same cell with other shapes.
+   * same cell with other shapes. Of a cell that is being added, other shapes have to wait.
    * @param {number} cell
    * @param {Shape[]} shapes
    * @param {() => boolean} late whether the time has come
    */
   add(cell, shapes, late) {
-    let packing = this.#packing.get(cell);
-    if (packing?.shapes !== shapes) packing = { shapes, steps: pack(shapes) };
+    const packing = this.#packing.get(cell) ?? { shapes, steps: pack(shapes) };
     this.#packing.set(cell, packing);
     const { steps } = packing;
     let step = steps.next();
@@ -54,7 +53,7 @@ export class Renderer {
     }
     this.#packing.delete(cell);
     this.cells.get(cell)?.delete();
-    this.cells.set(cell, new CellBuffers(this.gl, step.value, shapes));
+    this.cells.set(cell, new CellBuffers(this.gl, step.value, packing.shapes));
     return true;
   }
 

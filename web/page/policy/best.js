@@ -184,8 +184,12 @@ export class Best {
       const seen = c === here || hidden[c] > 0 || meetsBox(frustum, low, high, 3 * c);
       if (seen && !downloads.has("geometry", c) && counts("geometry", c)) count++;
     }
-    const meshes = gainsOf(this.#client, (k) => downloads.has("mesh", k));
-    meshes.forEach((gain, k) => gain > 0 && counts("mesh", k) && count++);
+    const there = (/** @type {number} */ k) => downloads.has("mesh", k)
+      || (downloads.requested("mesh", k) && !counts("mesh", k));
+    gainsOf(this.#client, there).forEach((gain, k) => {
+      const { low, high } = catalogue.meshes[k];
+      if (gain > 0 && counts("mesh", k) && meetsBox(frustum, low, high)) count++;
+    });
     allocate(this.#holding(), memory, levels, budget, this.#wanted);
     for (let t = 0; t < T; t++) {
       const { exact } = downloads.reach(t);
@@ -236,7 +240,8 @@ export class Best {
     const overhead = overheadOf(estimate);
     /** @param {Float64Array} worth @param {Int32Array} last */
     const next = (worth, last) => nextFetch(
-      worth, catalogue, downloads.asked, last, overhead, downloads.free, downloads.requested);
+      worth, catalogue, downloads.asked, last, overhead, downloads.free,
+      (preview) => downloads.requested("preview", preview));
     let step = next(this.#fetch, this.#limits());
 
     let nearest = -1, geometry = 0;
@@ -251,7 +256,7 @@ export class Best {
     }
     const record = least < 0 ? 0 : NOTHING * RECORD_SHARE / recordBytes[least];
     let mesh = -1, finer = 0;
-    gainsOf(this.#client, (k) => !downloads.free("mesh", k)).forEach((gain, k) => {
+    gainsOf(this.#client, (k) => downloads.requested("mesh", k)).forEach((gain, k) => {
       const density = gain / (catalogue.meshes[k].bytes + overhead);
       if (density > finer && downloads.free("mesh", k)) [mesh, finer] = [k, density];
     });

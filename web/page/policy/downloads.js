@@ -72,8 +72,8 @@ export class Downloads {
     return this.#state[kind][number] === THERE;
   }
 
-  /** Whether a preview is on its way or complete. @param {number} preview */
-  requested = (preview) => this.#state.preview[preview] !== ABSENT;
+  /** Whether it is on its way or complete. @param {Kind} kind @param {number} number */
+  requested = (kind, number) => this.#state[kind][number] !== ABSENT;
 
   /**
    * The best source present of a texture's column: `EXACT`, a preview, or `NO_SOURCE`.

@@ -91,7 +91,17 @@ export class Paper {
       const seen = c === cell || this.#boxed(c);
       if (seen && !downloads.has("geometry", c) && counts("geometry", c)) count++;
     }
+    for (const k of this.#modelled()) {
+      if (!downloads.has("mesh", k) && counts("mesh", k)) count++;
+    }
     return count + this.#asks.filter((t) => counts(...this.#nextOf(t))).length;
+  }
+
+  /** The files that have objects of visible cells with geometry as modelled: the paper has no others. */
+  #modelled() {
+    const { catalogue: { meshes }, cell, known, downloads } = this.#client;
+    return [...meshes.keys()].filter((k) => meshes[k + 1]?.mesh !== meshes[k].mesh
+      && known[cell]?.visible.includes(meshes[k].cell) && downloads.has("geometry", meshes[k].cell));
   }
 
   /**
@@ -109,19 +119,14 @@ export class Paper {
 
   /** @param {Belief} estimate */
   next(estimate) {
-    const { catalogue, cell, here, known, downloads } = this.#client;
+    const { cell, here, known } = this.#client;
     const own = known[cell];
     /** @type {[Kind, number, number][]} */
     const files = [["record", here, CURRENT], ["geometry", here, CURRENT]];
     if (own) {
       for (const c of own.visible) files.push(["geometry", c, VISIBLE]);
       const following = this.#following();
-      // The paper has no levels of detail: the objects as modelled follow the cells.
-      catalogue.meshes.forEach(({ mesh, cell: c }, k) => {
-        const finest = catalogue.meshes[k + 1]?.mesh !== mesh;
-        const drawn = own.visible.includes(c) && downloads.has("geometry", c);
-        if (finest && drawn) files.push(["mesh", k, VISIBLE]);
-      });
+      for (const k of this.#modelled()) files.push(["mesh", k, VISIBLE]);
       if (following >= 0) files.push(["record", following, NEXT], ["geometry", following, NEXT]);
     }
     return this.#first(files) ?? this.#level(estimate);

@@ -20,7 +20,7 @@ import { attachLoading } from "./loading.js";
  * @property {() => Plan} plan
  * @property {(bytes: number) => void} setBudget of texture memory
  * @property {(seconds: number) => void} setPatience
- * @property {(name: string) => void} setPolicy
+ * @property {(name: string) => Promise<void>} setPolicy
  * @property {(on: boolean) => void} setDataSaver
  * @property {(on: boolean) => void} freeze
  * @property {(on: boolean) => void} compare

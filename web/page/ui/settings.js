@@ -34,8 +34,9 @@ export function attachSettings(root, app) {
   const waiting = slider("Patience, δt", [0.0625, 4], patience, seconds, (s) => app.setPatience(s));
   // Only the paper's policy uses it.
   waiting.hidden = policy !== "paper";
-  choice.onchange = () => {
-    app.setPolicy(choice.value);
+  choice.onchange = async () => {
+    await app.setPolicy(choice.value);
+    choice.value = app.state().policy;
     waiting.hidden = choice.value !== "paper";
   };
 

@@ -177,8 +177,8 @@ export class Solids {
    * @param {() => boolean} [late] whether the time has come
    */
   add(cell, shapes, record, late = () => false) {
-    let tree = this.#growing.get(cell);
-    if (tree?.shapes !== shapes) tree = new Tree(shapes, record);
+    // Other shapes have to wait: meshes may arrive faster than a tree grows.
+    const tree = this.#growing.get(cell) ?? new Tree(shapes, record);
     this.#growing.set(cell, tree);
     while (!tree.steps.next().done) if (late()) return false;
     this.#growing.delete(cell);

@@ -96,6 +96,7 @@ export function disposeMesh(cell, mesh) {
   for (const node of coarse) {
     node.removeFromParent();
     node.geometry.dispose();
+    node.material.dispose();
   }
 }
 

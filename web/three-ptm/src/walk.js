@@ -44,6 +44,14 @@ import { RangeFile } from "./range-file.js";
  * @property {(error: unknown) => void} [onError] called for a file that cannot be loaded
  */
 
+/**
+ * A cell that is loaded or on its way.
+ * @typedef {object} Loaded
+ * @property {AbortController} control
+ * @property {Promise<Group | undefined>} done
+ * @property {Map<number, Promise<void>>} meshes objects as modelled, by their place in the index
+ */
+
 /** Texels of a side to which all textures are refined before any is refined further. */
 const FIRST_LOOK = 64;
 
@@ -63,10 +71,8 @@ export class Walk {
   #locator;
   /** @type {Map<number, Promise<CellRecord>>} */
   #records = new Map();
-  /** @type {Map<number, {control: AbortController, done: Promise<Group | undefined>}>} */
+  /** @type {Map<number, Loaded>} */
   #cells = new Map();
-  /** Objects as modelled, by their place in the index. @type {Map<number, Promise<void>>} */
-  #meshes = new Map();
   /** The file of each texture and its copies, by wraps.
    * @type {Map<number, {file: RangeFile, copies: Map<string, PtmTexture>}>} */
   #textures = new Map();
@@ -172,7 +178,9 @@ export class Walk {
       this.#free(cells, shares);
       await this.#all([...cells].map((cell) => () => this.#load(cell)), signal);
       if (!signal.aborted) await this.#refine(shares, signal);
+      const textures = this.#textures.size;
       await this.#all([...cells].flatMap((cell) => this.#coarse(cell)), signal);
+      if (!signal.aborted && this.#textures.size > textures) await this.#refine(shares, signal);
     } catch (error) {
       this.#report(error);
     }
@@ -236,7 +244,7 @@ export class Walk {
       }
     };
     const done = load();
-    this.#cells.set(cell, { control, done });
+    this.#cells.set(cell, { control, done, meshes: new Map() });
     return done;
   }
 
@@ -245,35 +253,38 @@ export class Walk {
    * @param {number} cell
    */
   #coarse(cell) {
-    return (this.index.meshes ?? []).flatMap((row, mesh) =>
-      row.cell === cell ? [() => this.#model(cell, mesh, row.files[row.files.length - 1])] : []);
+    const place = this.#cells.get(cell);
+    if (!place) return [];
+    return (this.index.meshes ?? []).flatMap((row, mesh) => {
+      if (row.cell !== cell) return [];
+      const load = () => this.#model(place, mesh, row.files[row.files.length - 1]);
+      return [
+        () => {
+          const done = place.meshes.get(mesh) ?? load();
+          place.meshes.set(mesh, done);
+          return done;
+        },
+      ];
+    });
   }
 
   /**
    * Puts an object as modelled in place of its coarsest mesh.
-   * @param {number} cell
+   * @param {Loaded} place
    * @param {number} mesh
    * @param {string} file
    */
-  async #model(cell, mesh, file) {
-    const place = this.#cells.get(cell);
-    if (!place) return;
-    const { signal } = place.control;
-    const load = async () => {
-      try {
-        const coarse = await place.done;
-        const group = await this.#loader.load(new URL(file, this.#url), signal);
-        signal.addEventListener("abort", () => (disposeCell(group), this.#meshes.delete(mesh)));
-        if (coarse) disposeMesh(coarse, mesh);
-        this.shown.add(group);
-      } catch (error) {
-        this.#meshes.delete(mesh);
-        if (!signal.aborted) throw error;
-      }
-    };
-    const done = this.#meshes.get(mesh) ?? load();
-    this.#meshes.set(mesh, done);
-    return done;
+  async #model({ control: { signal }, done, meshes }, mesh, file) {
+    try {
+      const coarse = await done;
+      const group = await this.#loader.load(new URL(file, this.#url), signal);
+      signal.addEventListener("abort", () => disposeCell(group));
+      if (coarse) disposeMesh(coarse, mesh);
+      this.shown.add(group);
+    } catch (error) {
+      meshes.delete(mesh);
+      if (!signal.aborted) throw error;
+    }
   }
 
   /**
