@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, fans, volumes
 from ptmtools.cells.options import WALKER, Walker
-from ptmtools.cells.search import Nearby
-from ptmtools.store.archive import Stored, texts
+from ptmtools.cells.search import Nearby, distinct
+from ptmtools.store.archive import Stored, texts, without_repeats
 from ptmtools.tolerance import Tolerance
 
 
@@ -295,6 +295,11 @@ class Cells:
             about["rooms"], arrays["cell_room"] = rooms, of
         text = json.dumps(about, sort_keys=True, ensure_ascii=False)
         arrays |= arrays.pop("tolerance").to_arrays()
+        floor = arrays["eye_floor"].reshape(-1, 3)
+        first, corner = distinct(floor)
+        arrays["eye_point"] = floor[first]
+        arrays["eye_floor"] = corner.reshape(-1, 3).astype(np.int32)
+        arrays = without_repeats(arrays, "vertex_uv", "triangle_cell")
         return {**arrays, "about": np.frombuffer(text.encode(), dtype=np.uint8)}
 
     @staticmethod
@@ -323,6 +328,7 @@ class Cells:
         vertex = stored.array("vertex", np.float64, None, 3, finite=True)
         triangle = stored.indices("triangle", np.int32, None, 3, high=len(vertex))
         n = len(triangle)
+        stored = stored.repeated(len(vertex), "vertex_uv").repeated(n, "triangle_cell")
         cells = int(leaf_cell.max()) + 1 if leaves else 0
         leaf_point_start = stored.starts("leaf_point_start", leaves, len(leaf_point))
         leaf_face_start = stored.starts("leaf_face_start", leaves, len(face_start) - 1)
@@ -342,6 +348,11 @@ class Cells:
         passage = stored.array("portal_passage", np.bool_, portals)
         if (passage[:-1] > passage[1:]).any():
             raise ValueError("portal_passage does not ascend")
+        if "eye_point" in arrays:
+            corners = stored.array("eye_point", np.float64, None, 3, finite=True)
+            eye_floor = corners[stored.indices("eye_floor", np.int32, None, 3, high=len(corners))]
+        else:  # of an earlier release
+            eye_floor = stored.array("eye_floor", np.float64, None, 3, 3, finite=True)
         return Cells(
             node_plane=node_plane,
             node_child=node_child,
@@ -365,7 +376,7 @@ class Cells:
             triangle_source=stored.indices("triangle_source", np.int32, n, high=1 << 31),
             triangle_cell=stored.indices("triangle_cell", np.int32, n, 2, low=-1, high=cells),
             tolerance=Tolerance.from_arrays(arrays),
-            eye_floor=stored.array("eye_floor", np.float64, None, 3, 3, finite=True),
+            eye_floor=eye_floor,
             left_out=stored.array("left_out", np.float64, None, 3, 3, finite=True),
             walker=Walker(*map(float, about["walker"])),
             ceiling=None if about["ceiling"] is None else float(about["ceiling"]),

@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 
 from ptmtools import schemas
 from ptmtools.scene.orientation import tolerance_of
-from ptmtools.store.archive import Stored
+from ptmtools.store.archive import Stored, without_repeats
 from ptmtools.tolerance import Tolerance
 
 #: Names of the arrays that the output of a reader and a scene have in common.
 FACE_ARRAYS = ("points", "triangles", "uv", "triangle_object", "triangle_material")
+#: Arrays of which all rows are equal in many models.
+_OFTEN_ALIKE = ("uv", "triangle_object", "triangle_material", "two_sided")
 Wrap = Literal["repeat", "clamp"]
 #: The role of an object by its class in the model: structure, never structure, a door leaf, or ""
 #: if its shape and name decide.
@@ -245,6 +247,7 @@ class Scene:
         if self.colors is not None:
             arrays["colors"] = self.colors
         arrays["about"] = np.frombuffer(text.encode(), dtype=np.uint8)
+        arrays = without_repeats(arrays, *_OFTEN_ALIKE)
         return arrays | room_arrays(self.rooms) | self.tolerance.to_arrays()
 
     @staticmethod
@@ -265,6 +268,7 @@ class Scene:
         points = stored.array("points", np.float64, None, 3, finite=True)
         triangles = stored.indices("triangles", np.int32, None, 3, high=len(points))
         n = len(triangles)
+        stored = stored.repeated(n, *_OFTEN_ALIKE)
         return Scene(
             points=points,
             triangles=triangles,

@@ -67,6 +67,17 @@ def pack_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> bytes:
     return out.getvalue()
 
 
+def without_repeats(arrays: Arrays, *names: str) -> dict[str, NDArray[np.generic]]:
+    """The arrays, and of those of these names only the first row where all rows are equal: readers
+    know their number (`Stored.repeated`)."""
+    kept = dict(arrays)
+    for name in names:
+        array = np.asarray(arrays[name])
+        if len(array) > 1 and (array == array[:1]).all():
+            kept[name] = array[:1]
+    return kept
+
+
 def unpack_arrays(data: bytes, *, file: str | PathLike[str]) -> dict[str, NDArray[np.generic]]:
     """Inverse of `pack_arrays`; ``file`` is named in the errors.
 
@@ -141,6 +152,16 @@ class Stored:
         if finite and not np.isfinite(array).all():
             raise ValueError(f"{name} has numbers that are not finite")
         return array.astype(dtype, copy=False)
+
+    def repeated(self, rows: int, *names: str) -> Stored:
+        """The same arrays, of those of these names with a single row as many: the inverse of
+        `without_repeats`."""
+        arrays = dict(self._arrays)
+        for name in names:
+            array = np.asarray(arrays[name])
+            if array.shape[:1] == (1,):
+                arrays[name] = np.repeat(array, rows, axis=0)
+        return Stored(arrays)
 
     def indices(
         self, name: str, dtype: type[np.integer[Any]], *shape: int | None, low: int = 0, high: int

@@ -14,7 +14,7 @@ from hypothesis import given, strategies as st
 from hypothesis.extra import numpy as npst
 
 from ptmtools.errors import DatabaseError
-from ptmtools.store.archive import pack_arrays, unpack_arrays
+from ptmtools.store.archive import Stored, pack_arrays, unpack_arrays, without_repeats
 from tests.memory import little_memory
 
 DTYPES = st.sampled_from(["<f8", "<i4", "<i8", "|u1", "|b1"])
@@ -42,6 +42,22 @@ def test_bytes_depend_on_the_arrays_alone() -> None:
     assert packed == pack_arrays({"b": b, "a": a})
     assert packed == pack_arrays({"a": a.astype(">f8"), "b": np.asfortranarray(b)})
     assert packed != pack_arrays({"a": a + 1, "b": b})
+
+
+def test_equal_rows_are_stored_once() -> None:
+    """Readers ask for as many as there are of something else, which bounds them."""
+    uv, number = np.zeros((5, 3, 2)), np.arange(5, dtype=np.int32)
+    arrays = without_repeats({"uv": uv, "number": number, "other": uv}, "uv", "number")
+    assert [len(array) for array in arrays.values()] == [1, 5, 5]
+    stored = Stored(unpack_arrays(pack_arrays(arrays), file="x.npz"))
+    with pytest.raises(ValueError, match="shape"):
+        stored.array("uv", np.float64, 5, 3, 2)
+    again = stored.repeated(5, "uv", "number")
+    assert np.array_equal(again.array("uv", np.float64, 5, 3, 2), uv)
+    assert np.array_equal(again.array("number", np.int32, 5), number)
+    with pytest.raises(ValueError, match="shape"):
+        again.array("number", np.int32, 4)
+    assert len(without_repeats({"none": uv[:0]}, "none")["none"]) == 0
 
 
 def test_numpy_reads_it() -> None:
