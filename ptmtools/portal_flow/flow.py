@@ -92,6 +92,7 @@ def portal_flow(
     progress: Progress = silent,
     executor: Executor = Executor(),  # noqa: B008 - has no state
     open_question: OpenQuestion | None = None,
+    bound: PortalFlow | None = None,
 ) -> PortalFlow:
     """Conservative visibility from portal to portal (Teller & Séquin; paper §3).
 
@@ -102,11 +103,12 @@ def portal_flow(
     executor: does the searches; see `searching`. The result is the same for any.
     open_question: the pairs of leaves whose visibility matters, all by default. Of other pairs the
         result is the initial upper bound.
+    bound: that of `upper_bound`, if it is known; it is changed.
 
     Raises InputError PTM-I400 (arrays that do not fit together, or a coordinate that is not
     finite); LimitError PTM-L400 (more portals than fit into memory).
     """
-    bound = upper_bound(portals, executor)
+    bound = upper_bound(portals, executor) if bound is None else bound
     known, cut = bound.sees, bound.cut.repeat(2)
     count = len(known)
     counts = np.zeros((4, count), dtype=np.int64)

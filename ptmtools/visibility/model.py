@@ -35,6 +35,8 @@ class Pvs:
     volume: (C,) float64 m³ of each cell, for shares of the building; empty if not known.
     standing: (C,) float64 m³ of each cell with standing room; empty if not known.
     conservative: False for sets sampled by random lines.
+    spared: by how much searches that were left out could reduce what visitors hold, as a share;
+        0 if they were done.
     """
 
     start: NDArray[np.int64]
@@ -48,6 +50,7 @@ class Pvs:
     volume: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     standing: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     conservative: bool = True
+    spared: float = 0.0
 
     @property
     def fallbacks(self) -> int:
@@ -106,7 +109,8 @@ class Pvs:
 
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:
         """The sets as plain arrays."""
-        return vars(self) | {"conservative": np.array([self.conservative])}
+        single = {name: np.array([getattr(self, name)]) for name in ("conservative", "spared")}
+        return vars(self) | single
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> Pvs:
@@ -136,6 +140,7 @@ class Pvs:
             leak=leak,
             **volumes,
             conservative=bool(stored.array("conservative", np.bool_, 1)[0]),
+            spared=float(stored.array("spared", np.float64, 1, finite=True)[0]),
         )
 
 

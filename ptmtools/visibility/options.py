@@ -29,6 +29,14 @@ class PvsOptions:
         "a portal. Beyond it, undecided cells count as visible: sets become larger, never wrong.",
         name="pvs-budget",
     )
+    gain: float = option(
+        0.01,
+        "With --pvs full, leave the searches out where they could reduce what visitors hold by at "
+        "most this share, as random lines show; 0 always searches.",
+        name="pvs-gain",
+        metavar="SHARE",
+        default_before=(7, 0.0),
+    )
     lines: int = option(
         1000, "Number of random lines through each portal, with --pvs sampled.", name="pvs-lines"
     )
@@ -47,6 +55,12 @@ class PvsOptions:
                 "PTM-I111",
                 f"budget {self.budget} is out of range",
                 remedy="use a budget of at least 0",
+            )
+        if not 0 <= self.gain < 1:
+            raise InputError(
+                "PTM-I111",
+                f"--pvs-gain {self.gain:g} is out of range",
+                remedy="use a share of at least 0, below 1",
             )
         if self.method not in ("full", "fast", "sampled") or self.lines < 1:
             raise InputError(

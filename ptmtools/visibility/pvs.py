@@ -26,6 +26,7 @@ from ptmtools.portal_flow.flow import (
     geometry,
     leaf_matrix,
     portal_flow,
+    upper_bound,
 )
 from ptmtools.portal_flow.storage import Geometry
 from ptmtools.progress import Progress, silent
@@ -160,8 +161,9 @@ def compute_pvs(
     thinner than the rounding of the coordinates (`Tolerance.rounding`), leads through portals from
     a standing leaf of one to the other, or vice versa. Cells that share a portal always see each
     other, even without standing room, unless it is a passage. Leaves of no cell are left out.
-    `Pvs.fallbacks` counts the portals whose search was cut short. ``executor`` runs the searches;
-    the result is the same for any.
+    `Pvs.fallbacks` counts the portals whose search was cut short. With many portals the searches
+    are left out where random lines show that they could reduce what visitors hold by at most
+    ``options.gain`` (`Pvs.spared`). ``executor`` runs the searches; the result is the same for any.
 
     Raises what `portal_flow` raises.
     """
@@ -171,13 +173,27 @@ def compute_pvs(
         leaves = sampled_leaves(portals, options.lines, executor)
         return Pvs.from_matrix(lifted(cells, leaves), **volumes, conservative=False)
     budget = options.budget if options.method == "full" else 0
-    question = _open_question(cells, portals, executor) if budget else None
-    flow = portal_flow(portals, budget, progress, executor, question)
+    question, bound, spared = None, None, 0.0
+    reports_cut = options.method == "full"
+    if budget and MANY_PORTALS <= len(portals.leaf) <= MOST_PORTALS:
+        lines = lifted(cells, sampled_leaves(portals, FIRST_LINES, executor))
+        bound = upper_bound(portals, executor)
+        least, most = (
+            Pvs.from_matrix(sees, **volumes).volume_at_hand[0]
+            for sees in (lines, lifted(cells, leaf_matrix(portals, bound)))
+        )
+        spared = 1 - least / most
+        if spared <= options.gain:
+            budget, reports_cut = 0, False
+        else:
+            question, spared = _open_question(cells, lines), 0.0
+    flow = portal_flow(portals, budget, progress, executor, question, bound)
     matrix = lifted(cells, leaf_matrix(portals, flow))
     return Pvs.from_matrix(
         matrix,
+        spared=spared,
         work=flow.work,
-        cut=flow.cut & (options.method == "full"),
+        cut=flow.cut & reports_cut,
         ties=flow.ties,
         decided=flow.decided,
         opened=flow.opened,
@@ -186,14 +202,11 @@ def compute_pvs(
     )
 
 
-def _open_question(cells: Cells, portals: Portals, executor: Executor) -> OpenQuestion | None:
-    """The pairs of cells that random lines have not shown to see each other: a search costs far
-    more than lines, and in an open building most pairs do. None where searches are few, or too
-    many."""
-    if not MANY_PORTALS <= len(portals.leaf) <= MOST_PORTALS:
-        return None
+def _open_question(cells: Cells, lines: Bools) -> OpenQuestion:
+    """The pairs of cells that random lines, (C, C), have not shown to see each other: a search
+    costs far more than lines, and in an open building most pairs do."""
     pairs = np.zeros((cells.cell_count + 1,) * 2, dtype=np.bool_)  # the last one: of no cell
-    pairs[:-1, :-1] = ~lifted(cells, sampled_leaves(portals, FIRST_LINES, executor))
+    pairs[:-1, :-1] = ~lines
     group = np.where(cells.leaf_cell < 0, cells.cell_count, cells.leaf_cell).astype(np.int64)
     return OpenQuestion(group, pairs)
 

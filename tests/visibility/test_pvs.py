@@ -174,6 +174,27 @@ def test_the_number_of_workers_changes_nothing(build_rooms, budget):
         assert one.fallbacks == other.fallbacks
 
 
+def test_searches_that_can_save_little_are_left_out(build_rooms, monkeypatch):
+    """Random lines and the first bound differ by less than the gain; else the sets are those of the
+    searches."""
+    rooms = random_grid(build_rooms, np.random.default_rng(3), (5, 2, 4), 0.8)
+    searched = compute_pvs(rooms.cells, PvsOptions(gain=0))
+    bound = compute_pvs(rooms.cells, PvsOptions(method="fast"))
+    assert searched.volume_at_hand[0] < bound.volume_at_hand[0]
+    monkeypatch.setattr("ptmtools.visibility.pvs.MANY_PORTALS", 1)
+    for gain in (0.0, 0.001):
+        again = compute_pvs(rooms.cells, PvsOptions(gain=gain))
+        assert np.array_equal(again.cell, searched.cell)
+        assert again.spared == 0
+    spared = compute_pvs(rooms.cells, PvsOptions(gain=0.9))
+    assert np.array_equal(spared.cell, bound.cell)
+    assert 1 - searched.volume_at_hand[0] / bound.volume_at_hand[0] <= spared.spared < 0.9
+    assert not spared.fallbacks
+    assert Pvs.from_arrays(spared.to_arrays()).spared == spared.spared
+    with pytest.raises(InputError, match="pvs-gain"):
+        PvsOptions(gain=1)
+
+
 def random_grid(build_rooms, rng, shape, share):
     cuts = [np.concatenate([[0], np.cumsum(rng.uniform(1, 5, n))]) for n in shape]
     doors = {}

@@ -31,6 +31,7 @@ def _counts(pvs: Pvs) -> Mapping[str, Any]:
         "opened": int(pvs.opened.sum()),
         "leaks": len(pvs.leak),
         "conservative": pvs.conservative,
+        "spared": pvs.spared,
     }
 
 
@@ -47,6 +48,11 @@ def _notes(pvs: Pvs, _: PvsOptions) -> Iterator[str]:
             "the visible sets are incomplete (--pvs sampled), so clients will show holes; build "
             "with `--pvs full` or `--pvs fast` before you publish"
         )
+    if pvs.spared:
+        yield (
+            "no searches: they could reduce what a client keeps in memory by at most "
+            f"{pvs.spared:.1%} (--pvs-gain)"
+        )
     if pvs.fallbacks:
         yield (
             f"the search reached its budget at {pvs.fallbacks:,} portals; their sets are larger "
@@ -61,7 +67,8 @@ def _fits_cells(pvs: Pvs, cells: Cells) -> str:
 PVS: Stage[Pvs] = Stage(
     name="pvs",
     about="Compute which cells can see each other.",
-    recipe=6,
+    recipe=7,
+    changed="searches that could save visitors next to nothing are left out (--pvs-gain)",
     options=PvsOptions,
     reads=(CELLS,),
     artifact=Lazy("ptmtools.visibility.model:Pvs"),
