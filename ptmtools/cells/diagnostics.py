@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.cells.division import Unreached, UnreachedRoom
 from ptmtools.cells.doors import DoorLeaf
 from ptmtools.cells.model import Cells
 from ptmtools.cells.options import DoorState
 from ptmtools.cells.ownership import Pieces
 from ptmtools.cells.roles import is_door_name, triangles_named
+from ptmtools.cells.unreached import Unreached, UnreachedRoom
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
 from ptmtools.quantities import count

@@ -31,7 +31,7 @@ from ptmtools.cells.diagnostics import (
     unrecognised_door_notes,
     viewpoint_notes,
 )
-from ptmtools.cells.division import Building, Space, bounds, divide, divide_inside
+from ptmtools.cells.division import Building, Space, divide, divide_inside
 from ptmtools.cells.doors import THICK
 from ptmtools.cells.joining import joined
 from ptmtools.cells.model import OUTSIDE, Cells, descend
@@ -39,7 +39,7 @@ from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.ownership import Pieces, cut_to_leaves
 from ptmtools.cells.places import boxes_meet, eye_region, meets
 from ptmtools.cells.planar import count, counting
-from ptmtools.cells.polyhedron import Polyhedron
+from ptmtools.cells.polyhedron import Polyhedron, bounds
 from ptmtools.cells.roles import matches
 from ptmtools.cells.rooms import grouped
 from ptmtools.cells.sight import seen_from_places

@@ -1,0 +1,193 @@
+"""Walkable space of a division that the flood does not reach.
+
+Leaves that portals connect, but not with the start, are a group. A group with walkable floor is an
+*unreachable room*, unless it is a solid. Groups that touch the root box of a closed model are the
+outside; floor under a roof and between walls there is reported.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ptmtools.arrays import Bools, Floats, Ints, summed
+from ptmtools.cells.bsp import Tree
+from ptmtools.cells.doors import THICK
+from ptmtools.cells.model import descend
+from ptmtools.cells.places import spread
+from ptmtools.cells.polyhedron import bounds
+from ptmtools.cells.portals import Portal
+from ptmtools.cells.search import connected
+from ptmtools.cells.structure import LOOKS, Surroundings, spread_over
+from ptmtools.tolerance import ranked
+
+if TYPE_CHECKING:
+    from ptmtools.cells.division import Building
+
+#: A group of leaves with less walkable floor than this, m², is dropped without a note,
+LEAST_PLACE = 0.05
+#: and outside, where bus shelters are, with less than this.
+LEAST_INSIDE = 2.0
+#: Number of points from which the ones that test the walls are chosen.
+_CHOICE = 256
+
+
+@dataclass(frozen=True)
+class UnreachedRoom:
+    """A group of leaves with walkable floor that the flood did not reach."""
+
+    leaves: Ints  # of the tree, ascending
+    place: float  # m² of walkable floor
+    eye: tuple[float, float, float]  # a viewpoint in it, metres
+
+    @staticmethod
+    def of(leaves: Ints, standing: Standing) -> UnreachedRoom:
+        """The room of (n,) leaves and the bodies that stand in them."""
+        points = standing.points
+        away = ((points - points.mean(axis=0)) ** 2).sum(axis=1)
+        x, y, z = points[np.argmin(away)].tolist()
+        return UnreachedRoom(leaves, float(standing.place.sum()), (x, y, z))
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Bodies that stand in some leaves, spread over all walkable floor."""
+
+    points: Floats  # (n, 3) the middles of the bodies, metres
+    place: Floats  # (n,) m² of floor that each represents
+    leaf: Ints  # (n,) the leaf of each
+
+    @staticmethod
+    def of(tree: Tree, leaves: Bools, building: Building) -> Standing:
+        """Bodies in these (L,) leaves."""
+        points, place = spread(_floor_about(tree, leaves, building))
+        points = points + [0.0, building.walker.middle, 0.0]
+        inside, leaf = _within(tree, leaves, points)
+        return Standing(points, place, leaf).only(inside)
+
+    def joined(self, other: Standing) -> Standing:
+        """These bodies, then the others."""
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        return Standing(*map(np.concatenate, pairs))
+
+    def only(self, rows: Bools | Ints) -> Standing:
+        """The bodies of some rows."""
+        return Standing(self.points[rows], self.place[rows], self.leaf[rows])
+
+
+@dataclass(frozen=True)
+class Unreached:
+    """Walkable space that the flood did not reach."""
+
+    rooms: list[UnreachedRoom]  # the largest first
+    outside: UnreachedRoom | None = None  # in a building, but outside the closed model
+
+    def without(self, reached: Bools, portals: list[Portal]) -> Unreached:
+        """The rest once the flood reaches the (L,) leaves ``reached`` through more ``portals``;
+        rooms that these connect are one."""
+        group = groups(len(reached), portals)
+        connected_rooms: dict[int, list[UnreachedRoom]] = {}
+        for room in self.rooms:
+            if not reached[room.leaves[0]]:
+                connected_rooms.setdefault(int(group[room.leaves[0]]), []).append(room)
+        rooms = [
+            UnreachedRoom(
+                np.flatnonzero(group == name), sum(room.place for room in parts), parts[0].eye
+            )
+            for name, parts in connected_rooms.items()
+        ]
+        return Unreached(sorted(rooms, key=lambda room: -room.place), self.outside)
+
+    def added_to(self, reached: Bools) -> Bools:
+        """(L,) the ``reached`` leaves, (L,), and those of unreachable rooms."""
+        result = reached.copy()
+        for room in self.rooms:
+            result[room.leaves] = True
+        return result
+
+
+def unreached(
+    tree: Tree, portals: list[Portal], reached: Bools, outer: Bools, building: Building
+) -> Unreached:
+    """Walkable space outside the (L,) ``reached`` leaves; groups with one of the (L,) ``outer``
+    leaves are the outside."""
+    group, structure = groups(len(tree.leaves), portals), building.structure
+    outside = np.isin(group, group[outer]) & ~reached
+    waiting = ~reached & ~outside & ~np.isin(group, group[reached])
+    if not ((waiting | outside).any() and len(structure.corners)):
+        return Unreached([])
+    standing = Standing.of(tree, waiting, building)
+    around = Surroundings(structure.corners, structure.tolerance)
+    # Apart, since the ground may be so large that few samples on it are in a building.
+    sheltered = Standing.of(tree, outside & ~outer, building)
+    sheltered = sheltered.joined(Standing.of(tree, outside & outer, building))
+    if len(sheltered.leaf):
+        sheltered = sheltered.only(building.with_glass().inside(sheltered.points))
+    outside_room = None
+    if sheltered.place.sum() >= LEAST_INSIDE:
+        outside_room = UnreachedRoom.of(np.unique(sheltered.leaf), sheltered)
+    # In a model whose room faces point outwards, solids cannot be recognised.
+    volumes = np.array([body.volume for body in tree.leaves]) * reached
+    middles = np.array([tree.leaves[i].points.mean(axis=0) for i in ranked(volumes)[:LOOKS]])
+    recognisable = not around.solid(middles)
+    rooms = []
+    for room in _rooms(group, standing.only(waiting[standing.leaf])):
+        points = spread_over(room.points, _CHOICE)
+        indoors = points[around.inside(points)]  # outside, walls without a back face away
+        points = spread_over(indoors if len(indoors) else points, LOOKS)
+        leaves = np.flatnonzero(group == group[room.leaf[0]])
+        # The inside of a shut door leaf is no room.
+        thin = max(tree.leaves[leaf].width for leaf in leaves) <= THICK + structure.tolerance.plane
+        if not (thin or (recognisable and around.solid(points))):
+            rooms.append(UnreachedRoom.of(leaves, room))
+    return Unreached(rooms, outside_room)
+
+
+def floor_of(
+    rooms: list[UnreachedRoom], outside: UnreachedRoom | None, tree: Tree, building: Building
+) -> Floats:
+    """(n, 3, 3) walkable triangles of floor, metres, whose middles are in any of these rooms or, in
+    a building, in ``outside``."""
+    leaves = np.zeros(len(tree.leaves), dtype=bool)
+    for room in [*rooms, *([outside] if outside else [])]:
+        leaves[room.leaves] = True
+    floor = _floor_about(tree, leaves, building)
+    middle = floor.mean(axis=1) + [0.0, building.walker.middle, 0.0]
+    kept, leaf = _within(tree, leaves, middle)
+    if outside:
+        kept &= ~np.isin(leaf, outside.leaves) | building.with_glass().inside(middle)
+    return floor[kept]
+
+
+def _floor_about(tree: Tree, leaves: Bools, building: Building) -> Floats:
+    """(n, 3, 3) walkable triangles of floor, those about (L,) leaves among them."""
+    boxes = np.array([bounds(tree.leaves[leaf].points) for leaf in np.flatnonzero(leaves)])
+    places, middle = building.places, building.walker.middle
+    near = places.near(boxes.reshape(-1, 2, 3) - [0, middle, 0])
+    return places.only(near & places.front).triangles(building.structure.tolerance)
+
+
+def _within(tree: Tree, leaves: Bools, points: Floats) -> tuple[Bools, Ints]:
+    """(n,) whether each of (n, 3) points is in one of the (L,) leaves, and (n,) its leaf."""
+    low, high = bounds(np.concatenate([body.points for body in tree.leaves]))
+    leaf = np.asarray(-2 - descend(tree.planes, tree.children, points))
+    return ((points >= low) & (points <= high)).all(axis=1) & leaves[leaf], leaf
+
+
+def _rooms(group: Ints, standing: Standing) -> Iterator[Standing]:
+    """The bodies in each group of leaves with enough floor, the largest first."""
+    of = group[standing.leaf]
+    order = np.argsort(of, kind="stable")
+    start = np.searchsorted(of[order], np.arange(len(group) + 1))
+    area = summed(of, standing.place, len(group))
+    for name in ranked(area)[: np.count_nonzero(area >= LEAST_PLACE)]:
+        yield standing.only(order[start[name] : start[name + 1]])
+
+
+def groups(leaves: int, portals: list[Portal]) -> Ints:
+    """(leaves,) the least leaf to which portals connect each."""
+    ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
+    return connected(leaves, ends)
