@@ -65,11 +65,15 @@ def build(model: Path, database: Path, *options: str) -> tuple[float, float]:
     """Builds a database; returns CPU seconds and the peak in MB."""
     command = [sys.executable, "-m", "ptmtools", "-q", "build-scene", str(model), "-o"]
     command += [str(database), "--unit", "m", "--up", "z", "-j", "1", *options]
-    child = subprocess.Popen(command, cwd=ROOT)
-    _, status, usage = os.wait4(child.pid, 0)
-    if status:
-        raise SystemExit(f"{' '.join(command)}: exit status {os.waitstatus_to_exitcode(status)}")
-    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+    with tempfile.TemporaryFile() as report:
+        child = subprocess.Popen([*command, "--json"], cwd=ROOT, stdout=report)
+        _, status, usage = os.wait4(child.pid, 0)
+        if status:
+            code = os.waitstatus_to_exitcode(status)
+            raise SystemExit(f"{' '.join(command)}: exit status {code}")
+        report.seek(0)
+        peak = json.load(report)["peak_memory"]
+    return usage.ru_utime + usage.ru_stime, peak / 1e6
 
 
 def measured(stages: Any) -> list[str]:

@@ -226,7 +226,7 @@ def spread(corners: Floats) -> tuple[Floats, Floats]:
 #: Eyes stay farther from what the body touches than rounding, but by no more of its radius.
 _SLACK = 0.1
 #: Pairs of leaf and floor that are compared at a time.
-_AT_ONCE = 1 << 16
+_AT_ONCE = 1 << 13
 
 
 def eye_region(places: Places, walker: Walker, tolerance: Tolerance) -> Places:
@@ -257,8 +257,11 @@ def meets(
     edges = [body.points[body.edges] for body in bodies]
     number = np.array([len(each) for each in edges], dtype=np.int64)
     for first in range(0, len(leaf), _AT_ONCE):
-        some = slice(first, first + _AT_ONCE)
-        pair = np.repeat(np.arange(len(leaf[some])), number[leaf[some]])
+        some = np.arange(first, min(first + _AT_ONCE, len(leaf)))
+        some = some[~result[leaf[some]]]
+        if not len(some):
+            continue
+        pair = np.repeat(np.arange(len(some)), number[leaf[some]])
         edge = np.concatenate([edges[i] for i in leaf[some].tolist()])
         height = above(edge, eyes.slope[floor[some]][pair])
         names, shadow = shadows(edge[:, :, PLAN], height, band, pair)
