@@ -177,12 +177,12 @@ def compute_pvs(
     reports_cut = options.method == "full"
     if budget and MANY_PORTALS <= len(portals.leaf) <= MOST_PORTALS:
         lines = lifted(cells, sampled_leaves(portals, FIRST_LINES, executor))
+        least = Pvs.from_matrix(lines, **volumes).volume_at_hand[0]
+        if 1 - least <= options.gain > 0:  # all cells are bound enough
+            return Pvs.from_matrix(np.ones_like(lines), spared=max(1 - least, 0.0), **volumes)
         bound = upper_bound(portals, executor)
-        least, most = (
-            Pvs.from_matrix(sees, **volumes).volume_at_hand[0]
-            for sees in (lines, lifted(cells, leaf_matrix(portals, bound)))
-        )
-        spared = 1 - least / most
+        most = lifted(cells, leaf_matrix(portals, bound))
+        spared = 1 - least / Pvs.from_matrix(most, **volumes).volume_at_hand[0]
         if spared <= options.gain:
             budget, reports_cut = 0, False
         else:
