@@ -87,7 +87,7 @@ class MeshLevels:
 
 def mesh_levels(content: Content) -> tuple[MeshLevels, ...]:
     """The levels of all objects that have some, by cell and object."""
-    found: list[MeshLevels] = []
+    meshes: list[MeshLevels] = []
     geometry, first = content.geometry, 0
     heavy = list(_heavy(geometry, content.octree_of.keys()))
     for done, (cell, rows) in enumerate(heavy):
@@ -96,9 +96,9 @@ def mesh_levels(content: Content) -> tuple[MeshLevels, ...]:
         if levels := _levels(geometry, shapes):
             point = geometry.point[np.concatenate([shape.point for shape in shapes])]
             box = np.concatenate([point.min(axis=0), point.max(axis=0)])
-            found.append(MeshLevels(cell, shapes[0].object, box, levels, first))
+            meshes.append(MeshLevels(cell, shapes[0].object, box, levels, first))
             first += len(levels)
-    return tuple(found)
+    return tuple(meshes)
 
 
 def _heavy(geometry: Geometry, left_out: Collection[int]) -> Iterator[tuple[int, range]]:

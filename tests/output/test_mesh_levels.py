@@ -191,8 +191,8 @@ def test_damaged_rows(levels: Path, tmp_path: Path, name: str) -> None:
     index = json.loads(file.read_text())
     change(index["meshes"][0])
     file.write_text(json.dumps(index))
-    found = [i for i in validate(database, workers=1).issues if i.code == code]
-    assert not code or any(words in issue.message for issue in found)
+    faults = [i for i in validate(database, workers=1).issues if i.code == code]
+    assert not code or any(words in issue.message for issue in faults)
     if code == "PTM-D700":
         with pytest.raises(DatabaseError, match=words):
             read_served(database)
