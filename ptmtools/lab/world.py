@@ -338,21 +338,14 @@ def read_forms(
 
 def _require_fitting(browser: Browser, served: Served) -> None:
     previews = sum(len(row.get("previews", ())) for row in served.index["textures"])
-    numbers = [file.number for file in browser.files if file.kind == "preview"]
-    if max(numbers, default=-1) >= previews:
-        raise InputError(
-            "PTM-I700",
-            f"was recorded with preview {max(numbers)}, and there are {previews}",
-            remedy="use the database whose site it was recorded on",
-        )
-    meshes = sum(map(len, served.mesh_bytes))
-    numbers = [file.number for file in browser.files if file.kind == "mesh"]
-    if max(numbers, default=-1) >= meshes:
-        raise InputError(
-            "PTM-I700",
-            f"was recorded with the finer mesh {max(numbers)}, and there are {meshes}",
-            remedy="use the database whose site it was recorded on",
-        )
+    for kind, present in (("preview", previews), ("mesh", sum(map(len, served.mesh_bytes)))):
+        numbers = [file.number for file in browser.files if file.kind == kind]
+        if max(numbers, default=-1) >= present:
+            raise InputError(
+                "PTM-I700",
+                f"was recorded with {kind} {max(numbers)}, and there are {present}",
+                remedy="use the database whose site it was recorded on",
+            )
     if len(browser.record_bytes) != served.cell_count:
         raise InputError(
             "PTM-I700",

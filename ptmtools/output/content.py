@@ -222,7 +222,7 @@ class Content:
         """The levels of objects with many triangles, by cell and object."""
         from ptmtools.output.mesh_levels import mesh_levels
 
-        has_files = any(emitter.mesh_files for emitter in self.emitters)
+        has_files = any(emitter.has_meshes for emitter in self.emitters)
         return mesh_levels(self) if has_files and self.options.lods == "auto" else ()
 
     @cached_property

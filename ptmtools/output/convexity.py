@@ -38,7 +38,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, cross, normals
+from ptmtools.arrays import Floats, cross, normals, polygon_planes
 from ptmtools.cells.model import Cells
 from ptmtools.errors import DatabaseError
 from ptmtools.output.numbers import coordinates, row_texts
@@ -108,18 +108,11 @@ def leaf_numbers(cells: Cells, slack: float) -> list[list[list[float]]]:
 def _face_units(cells: Cells, point: Floats) -> Floats:
     """(F, 3) unit normals of the faces of all leaves with vertices at ``point``; 0 for a sliver,
     the plane of which is arbitrary."""
-    size = np.diff(cells.face_start)
-    here = point[cells.face_index]
-    following = np.arange(1, len(here) + 1)
+    following = np.arange(1, len(cells.face_index) + 1)
     following[cells.face_start[1:] - 1] = cells.face_start[:-1]
-    first = np.repeat(here[cells.face_start[:-1]], size, axis=0)
-    turns = cross(here - first, here[following] - first)
-    normal = np.add.reduceat(turns, cells.face_start[:-1], axis=0)
-    edge = np.linalg.norm(here[following] - here, axis=1)
-    longest = np.maximum.reduceat(edge, cells.face_start[:-1])
-    area = np.linalg.norm(normal, axis=1)
-    sound = area > 2 * cells.tolerance.plane * longest
-    unit: Floats = normal * (sound / np.where(sound, area, 1.0))[:, None]
+    here, start = point[cells.face_index], cells.face_start[:-1]
+    planes, sound = polygon_planes(here, here[following], start, cells.tolerance.plane)
+    unit: Floats = planes[:, :3] * sound[:, None]
     return unit
 
 

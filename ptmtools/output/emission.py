@@ -194,7 +194,7 @@ def _geometry(content: Content, form: Emitter, sizes: Mapping[str, int]) -> NDAr
 def _meshes(content: Content, form: Emitter, sizes: Mapping[str, int]) -> NDArray[np.int64]:
     """(C,) of these, bytes of objects that have levels of detail."""
     finest = np.zeros(content.cells.cell_count, np.int64)
-    for mesh in content.meshes if form.mesh_files else ():
+    for mesh in content.meshes if form.has_meshes else ():
         finest[mesh.cell] += sizes[mesh_path(mesh.files[-1])]
     return finest
 

@@ -27,8 +27,7 @@ class Emitter:
     entry: the file that leads to the others and that a browser opens, written last; "" for a form
         that only clients of the hints read.
     cell_files: template of the paths of the cells' geometry (`names.path_of`), if it has geometry.
-    mesh_files: template of the paths of finer meshes of objects, by the name of the file
-        (`names.mesh_name`), if it has some.
+    has_meshes: whether finer meshes of objects are files of their own (`names.mesh_path`).
     texture_files: template of the folders of the textures' files, if it has a texture form of its
         own (`names.texture_name`).
     writer: function from a `Content` to the files, in the order of writing. The call itself,
@@ -47,7 +46,7 @@ class Emitter:
     check: Lazy[Callable[[Any], None]] | None = None
     entry: str = ""
     cell_files: str = ""
-    mesh_files: str = ""
+    has_meshes: bool = False
     texture_files: str = ""
 
     def is_owner(self, path: str) -> bool:

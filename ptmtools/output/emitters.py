@@ -13,7 +13,6 @@ from ptmtools.output.names import (
     CELL_FOLDER,
     GLTF_FILES,
     GLTF_FOLDER,
-    GLTF_MESHES,
     HINTS,
     HINTS_FOLDER,
     INTERLACE_FILES,
@@ -30,7 +29,7 @@ GLTF = Emitter(
     reader=Lazy("ptmtools.output.validation.gltf:read_file"),
     check=Lazy("ptmtools.output.validation.gltf:check_files"),
     cell_files=GLTF_FILES,
-    mesh_files=GLTF_MESHES,
+    has_meshes=True,
 )
 INTERLACE = Emitter(
     name=names.INTERLACE,

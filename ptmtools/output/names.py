@@ -30,8 +30,6 @@ BUNDLE = ".bin"
 FIRST_LOOK_FILES = f"{HINTS_FOLDER}/{{name}}{BUNDLE}"
 VRML_FILES = f"{CELL_FOLDER}/{{name}}.wrl"
 GLTF_FILES = f"{GLTF_FOLDER}/{{name}}.glb"
-#: The files of finer meshes of objects likewise.
-GLTF_MESHES = f"{GLTF_FOLDER}/{{name}}.glb"
 #: The folder of a texture's interlaced set likewise.
 INTERLACE_FILES = f"{INTERLACE_FOLDER}/{{name}}/"
 
@@ -58,7 +56,7 @@ def mesh_name(number: int) -> str:
 
 def mesh_path(number: int) -> str:
     """The path of such a file relative to the served folder."""
-    return GLTF_MESHES.replace("{name}", mesh_name(number))
+    return GLTF_FILES.replace("{name}", mesh_name(number))
 
 
 def cell_file(cell: int) -> str:

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles, areas, fans, volumes
+from ptmtools.cells.doors import THICK
 from ptmtools.cells.model import Cells
 from ptmtools.embree import ray_tree
 from ptmtools.errors import InputError
@@ -161,9 +162,15 @@ class _Eyes:
         bodies = [cells.leaf_points(leaf) for leaf in range(cells.leaf_count)]
         floored = [self._eyes.about(body.min(axis=0), body.max(axis=0)) for body in bodies]
         self._whole = cells.leaf_standing & ~np.array(floored, dtype=np.bool_)
-        passages = cells.portal_leaf[cells.portal_passage].ravel()
-        self._doors = np.bincount(passages, minlength=cells.leaf_count) > 1
+        passages = cells.portal_leaf[cells.portal_passage]
+        self._doors = np.bincount(passages.ravel(), minlength=cells.leaf_count) > 1
         self._doors &= ~cells.leaf_standing
+        thin = np.zeros(cells.leaf_count, dtype=np.bool_)
+        normals = cells.portal_plane[cells.portal_passage, :3]
+        for leaves, normal in zip(passages.tolist(), normals, strict=True):
+            for leaf in leaves:
+                thin[leaf] |= np.ptp(bodies[leaf] @ normal) <= THICK + cells.tolerance.plane
+        self._doors &= thin
 
     def at(self, points: Floats, leaf: NDArray[np.int32]) -> Bools:
         """(n,) whether an eye can be at the (n, 3) points, in (n,) leaves or -1."""

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import polygon_planes
 from ptmtools.diagnostics import Place
 from ptmtools.tolerance import Tolerance
 
@@ -128,9 +129,9 @@ def solid_planes(points: Points, loops: Sequence[Sequence[int]], tolerance: Tole
         np.setdiff1d(edges, following * len(points) + index)
     ):
         raise SolidError("is not closed")
-    planes, sound = _newell(points[index], points[following], start, tolerance.plane)
+    planes, sound = polygon_planes(points[index], points[following], start, tolerance.plane)
     if not sound.any():  # small: a client computes the planes of all of its faces
-        planes, sound = _newell(points[index], points[following], start, 0.0)
+        planes, sound = polygon_planes(points[index], points[following], start, 0.0)
     if not sound.any():
         raise SolidError("is flat")
     if not farthest(planes[sound], points).max() <= tolerance.plane:
@@ -149,7 +150,7 @@ def polygon_plane(polygon: Points, tolerance: Tolerance) -> Planes | None:
     Raises SolidError: it is not flat, or not convex.
     """
     following = np.roll(polygon, -1, axis=0)
-    planes, sound = _newell(polygon, following, np.zeros(1, np.int64), tolerance.plane)
+    planes, sound = polygon_planes(polygon, following, np.zeros(1, np.int64), tolerance.plane)
     if not sound[0]:
         return None
     plane: Planes = planes[0]
@@ -174,19 +175,3 @@ def farthest(planes: Planes, points: Points) -> Points:
         part = points[i : i + step]
         far[i : i + step] = (part @ planes[:, :3].T + planes[:, 3]).max(axis=1)
     return far
-
-
-def _newell(
-    here: Points, following: Points, start: NDArray[np.int64], thinnest: float
-) -> tuple[Planes, NDArray[np.bool_]]:
-    """The planes of polygons whose edges begin ``here``, and whether each is sound: thicker than
-    ``thinnest``, metres. The normal of a sliver thinner than the on-plane distance is arbitrary."""
-    size = np.diff([*start, len(here)])
-    first = np.repeat(here[start], size, axis=0)
-    normal = np.add.reduceat(np.cross(here - first, following - first), start, axis=0)
-    longest = np.maximum.reduceat(np.linalg.norm(following - here, axis=1), start)
-    twice_area = np.linalg.norm(normal, axis=1)
-    sound = twice_area > 2 * thinnest * longest
-    normal /= np.where(sound, twice_area, 1.0)[:, None]
-    middle = np.add.reduceat(here, start, axis=0) / size[:, None]
-    return np.column_stack([normal, -np.einsum("ij,ij->i", normal, middle)]), sound

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
+from ptmtools.coverage.backends.opengl import create_context, is_software
 from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.neighbours.apo import rays
 from ptmtools.neighbours.apo.picture import RenderOptions, render
@@ -24,6 +25,13 @@ def mesh(rows: int = 16) -> tuple[np.ndarray, np.ndarray]:
     """The sphere that `ball` is of."""
     points, triangles = sphere(rows)
     return np.array(LOW) + SIDE * (0.5 + 0.45 * points), triangles
+
+
+def draws_in_software() -> bool:
+    context = create_context()
+    software = is_software(context.info["GL_RENDERER"])
+    context.release()
+    return software
 
 
 def drawn(levels: int, backend: str, **options: object) -> Frame:
@@ -93,9 +101,9 @@ def test_rays_draw_the_same(gl: None, levels: int, what: str, distance: float) -
     both = one.covered & other.covered
     assert (one.covered != other.covered).mean() < 1e-3
     away = np.abs(one.place - other.place)[both].max(axis=1)
-    # Graphics cards move vertices by up to 1/256 of a pixel, which counts most at outlines.
     assert np.median(away) < 1e-4
-    assert away.max() < 2e-3
+    # Graphics cards move vertices by up to 1/256 of a pixel, which counts most at outlines.
+    assert away.max() < (1e-4 if draws_in_software() else 2e-3)
     # Apart from pixels whose place or size is within rounding of a boundary.
     assert (one.stop != other.stop)[both].mean() < 0.01
     assert (one.address != other.address)[both].mean() < 0.01
