@@ -125,13 +125,19 @@ def _restored(hint: Any, value: Any) -> Any:
 
 
 def reasons(
-    before: StageRecord | None, work: StageRecord, db: DatabaseFolder, changed: str = ""
+    stage: str,
+    before: StageRecord | None,
+    work: StageRecord,
+    db: DatabaseFolder,
+    changed: str = "",
 ) -> tuple[str, ...]:
     """Why a stage with the record ``before`` has to do ``work``; empty if it is current.
     ``changed`` describes the change of its recipe."""
     from ptmtools.store.manifest import SCHEMA
 
     if before is None:
+        if lost := db.manifest.lost.get(stage):
+            return (f"{lost} is missing or damaged",)
         earlier = db.manifest.replaced
         if earlier is None:
             return NEVER_RUN

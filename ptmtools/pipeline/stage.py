@@ -417,7 +417,7 @@ class Job:
                 )
         if run.rebuild:
             return work, ("--rebuild was given",)
-        return work, reasons(run.before(stage), work, run.db, stage.changed)
+        return work, reasons(stage.name, run.before(stage), work, run.db, stage.changed)
 
     def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
         """Puts the outputs into the transaction; returns the record, still without outputs."""

@@ -88,6 +88,7 @@ def database_status(path: str | os.PathLike[str]) -> DatabaseStatus:
     if manifest is None and not begun and not (folder / LOCK).exists():
         DatabaseFolder.open(folder)  # raises
     db = DatabaseFolder(folder, manifest or Manifest(""))
+    db.manifest = db.without_lost()
     artifacts = Artifacts(db)
     stages = tuple(_status(artifacts, stage) for stage in STAGES.values())
     db.digests.save()
@@ -106,6 +107,8 @@ def database_status(path: str | os.PathLike[str]) -> DatabaseStatus:
 def _status(artifacts: Artifacts, stage: Stage[Any]) -> StageStatus:
     db = artifacts.db
     record = db.manifest.stages.get(stage.name)
+    if lost := db.manifest.lost.get(stage.name):
+        return StageStatus(stage.name, "damaged", f"{lost} is missing or damaged", {}, 0, 0)
     if record is None:
         # Databases of earlier releases lack stages that change an artifact; they changed nothing.
         done = stage.changes is not None and stage.changes.name in db.manifest.stages
@@ -166,7 +169,9 @@ def plan_build(
     check_file(Path(model))
     folder = Path(db)
     manifest = admitted(folder, Path(model).name, force=force)
-    artifacts = Artifacts(DatabaseFolder(folder, manifest), Path(model), planned=True)
+    database = DatabaseFolder(folder, manifest)
+    database.manifest = database.without_lost()
+    artifacts = Artifacts(database, Path(model), planned=True)
     #: Stages whose outputs may change.
     changing: set[Stage[Any]] = set()
     plans = tuple(_plan(artifacts, stage, chosen[stage], changing) for stage in STAGES.values())
@@ -186,7 +191,7 @@ def _plan(
     else:
         inputs = artifacts.inputs(stage, options)
     work = stage.work(options, inputs)
-    why = reasons(before, work, artifacts.db, stage.changed)
+    why = reasons(stage.name, before, work, artifacts.db, stage.changed)
     tasks = stage.job.tasks(artifacts, work)
     plan: Plan = "run" if why else "maybe" if anew else "current"
     if plan == "maybe":

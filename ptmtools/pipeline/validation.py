@@ -39,6 +39,7 @@ def check_stages(db: DatabaseFolder, faulty: Collection[str] = ()) -> tuple[Issu
     """The faults of the stages that have run. ``faulty`` are files with known faults, relative to
     the database: artifacts that need them are not checked."""
     findings = Findings(CODES)
+    db.manifest = db.without_lost()
     for name in db.manifest.stages.keys() - STAGES.keys():
         findings.add("PTM-D650", MANIFEST, f"stages.{name}", "this ptmtools has no such stage")
     together = Artifacts(db)

@@ -28,7 +28,7 @@ from typing import Any
 
 #: Names of the schemas.
 HINTS, CELL, STATISTICS = "hints", "cell", "statistics"
-MANIFEST, VALIDATION, GLB, SCENE = "manifest", "validation", "glb", "scene"
+MANIFEST, FILES, VALIDATION, GLB, SCENE = "manifest", "files", "validation", "glb", "scene"
 WALK, TRACE, SIMULATION, SITE = "walk", "trace", "simulation", "site"
 MESSAGES = "messages"
 INTERLACE, APO, CAMPUS, CAMPUS_WALK = "interlace", "apo", "campus", "campus_walk"

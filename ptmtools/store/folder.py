@@ -12,6 +12,7 @@ from ptmtools.errors import DatabaseError, Rebuild
 from ptmtools.files import open_regular
 from ptmtools.store.digests import Digests
 from ptmtools.store.layout import MANIFEST, arrays_of, sha256
+from ptmtools.store.lists import ReadList, list_file, read_list
 from ptmtools.store.manifest import Manifest, StageRecord, damaged_manifest, listed_before
 
 if TYPE_CHECKING:
@@ -78,15 +79,7 @@ class DatabaseFolder:
         ------
         DatabaseError: PTM-D005 if it is missing, PTM-D006 if its hash is not the recorded one.
         """
-        file = self.path / name
-        try:
-            with open_regular(file) as stream:
-                data = stream.read()
-        except OSError as fault:
-            raise unreadable(file, fault) from fault
-        if sha256(data) != digest:
-            raise damaged(file, "its SHA-256 is not the recorded one")
-        return data
+        return _read(self.path / name, digest)
 
     def read_output(self, stage: str, name: str) -> bytes:
         """The bytes of an output that a stage must have; raises as `output` and `read`."""
@@ -107,6 +100,12 @@ class DatabaseFolder:
         name = arrays_of(stage)
         return unpack_arrays(self.read_output(stage, name), file=self.path / name)
 
+    def without_lost(self) -> Manifest:
+        """The manifest without stages that lack one of their lists (`Manifest.lost`)."""
+        lists = {name: record.list_files() for name, record in self.manifest.stages.items()}
+        lost = {name: self.damaged(files) for name, files in lists.items()}
+        return self.manifest.without({name: file for name, file in lost.items() if file})
+
     def damaged(self, outputs: Mapping[str, str]) -> str | None:
         """The first file that is missing or has another hash, or None."""
         for name, digest in outputs.items():
@@ -116,6 +115,28 @@ class DatabaseFolder:
             except OSError:
                 return name
         return None
+
+
+def _read(file: Path, digest: str) -> bytes:
+    """See `DatabaseFolder.read`."""
+    try:
+        with open_regular(file) as stream:
+            data = stream.read()
+    except OSError as fault:
+        raise unreadable(file, fault) from fault
+    if sha256(data) != digest:
+        raise damaged(file, "its SHA-256 is not the recorded one")
+    return data
+
+
+def lists_in(folder: Path) -> ReadList:
+    """Reads the lists of a database; raises PTM-D005 and PTM-D006."""
+
+    def read(digest: str) -> Mapping[str, str]:
+        file = folder / list_file(digest)
+        return read_list(_read(file, digest), file=file)
+
+    return read
 
 
 def unreadable(file: Path, fault: OSError) -> DatabaseError:
@@ -149,7 +170,7 @@ def read_manifest(folder: Path) -> Manifest | None:
         raise DatabaseError(
             "PTM-D001", f"cannot be read ({fault.strerror or fault})", file=file
         ) from fault
-    return Manifest.from_bytes(data, file=file)
+    return Manifest.from_bytes(data, file=file, lists=lists_in(folder))
 
 
 def last_manifest(folder: Path) -> Manifest | None:

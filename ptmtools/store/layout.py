@@ -8,6 +8,7 @@
     stages/images/      a copy of each, under its SHA-256
     stages/octrees.json the list of the octree textures
     stages/textures/    the details of the levels of each texture
+    stages/lists/       names and digests of the files of large stages, see `lists`
     www/                the served files, and nothing else
     .ptm-new/           outputs before their commit, see `transaction`
     .ptm-lock           the writing process, see `writer`
@@ -24,6 +25,7 @@ STAGES_FOLDER = "stages"
 WRITTEN = (STAGES_FOLDER, SERVED)
 IMAGES, IMAGE_LIST = f"{STAGES_FOLDER}/images", f"{STAGES_FOLDER}/images.json"
 OCTREE_LIST = f"{STAGES_FOLDER}/octrees.json"
+LISTS = f"{STAGES_FOLDER}/lists"
 STAGING = ".ptm-new"
 LOCK = ".ptm-lock"
 

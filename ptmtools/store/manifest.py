@@ -2,7 +2,7 @@
 
 ::
 
-    {"format": "ptmtools database", "schema": 2,
+    {"format": "ptmtools database", "schema": 3,
      "model": "museum.obj",                          the file's name, never its folder
      "stages": {"cells": {
          "recipe": 1,                                the version of the stage's computation
@@ -16,24 +16,29 @@
 
 Stages are sorted by name. It contains no time and no folder of the machine: the same model and
 options give the same manifest anywhere. A stage is current if recipe, parameters and inputs would
-be the same, and all its outputs exist.
+be the same, and all its outputs exist. Instead of more than a thousand inputs or outputs there are
+the SHA-256 of lists of them (`lists`); schema 2 had no lists.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from collections import ChainMap
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from os import PathLike
-from typing import Any
+from typing import Any, cast
 
 from ptmtools import schemas
 from ptmtools.errors import DatabaseError, Rebuild
 from ptmtools.files import leads_inside
 from ptmtools.store.layout import WRITTEN
+from ptmtools.store.lists import FileList, ReadList, in_lists, list_file, stored
 
 FORMAT = "ptmtools database"
-SCHEMA = 2
+SCHEMA = 3
+#: The earlier schema that this one extends.
+_EXTENDED = 2
 
 #: Largest depth of nested lists and objects.
 _MAX_DEPTH = 16
@@ -54,6 +59,31 @@ class StageRecord:
     notes: Sequence[str] = ()
     warnings: Sequence[str] = field(default_factory=list)
 
+    def list_files(self) -> dict[str, str]:
+        """The files of its lists, with their SHA-256."""
+        lists = [
+            files.lists for files in (self.inputs, self.outputs) if isinstance(files, FileList)
+        ]
+        return {list_file(digest): digest for own in lists for digest in own}
+
+    def listed(self, read: ReadList, write: Callable[[str, bytes], None]) -> StageRecord:
+        """A copy with lists instead of many inputs or outputs, see `in_lists`."""
+        inputs, outputs = (in_lists(each, read, write) for each in (self.inputs, self.outputs))
+        return replace(self, inputs=inputs, outputs=outputs)
+
+    def entry(self) -> dict[str, Any]:
+        """Its entry in the manifest."""
+        files = {"inputs": stored(self.inputs), "outputs": stored(self.outputs)}
+        return {name: files.get(name, getattr(self, name)) for name in _FIELDS}
+
+
+_FIELDS = tuple(StageRecord.__dataclass_fields__)
+
+
+def _no_list(digest: str) -> Mapping[str, str]:
+    """Where no lists are known."""
+    raise DatabaseError("PTM-D005", "cannot be read (no such file)", file=list_file(digest))
+
 
 @dataclass(frozen=True)
 class Manifest:
@@ -64,32 +94,62 @@ class Manifest:
     model: the file's name.
     stages: by name.
     replaced: the earlier schema of this manifest, or of the one that it replaces; not written.
+    lost: stages without a record because a list of their files is missing or damaged, with that
+        list; not written.
     """
 
     model: str
     stages: Mapping[str, StageRecord] = field(default_factory=dict)
     replaced: int | None = field(default=None, compare=False)
+    lost: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     def with_stages(self, records: Mapping[str, StageRecord]) -> Manifest:
         """A copy with these records replaced."""
         return replace(self, stages={**self.stages, **records})
 
-    def outputs(self) -> dict[str, str]:
+    def outputs(self) -> Mapping[str, str]:
+        """The outputs of all stages with their SHA-256; looks a name up in lists last."""
+        outputs = [record.outputs for record in self.stages.values()]
+        outputs.sort(key=lambda files: isinstance(files, FileList))
+        return ChainMap(*cast(list[dict[str, str]], outputs))
+
+    def lists(self) -> dict[str, str]:
+        """The files of all lists with their SHA-256."""
+        return {n: d for record in self.stages.values() for n, d in record.list_files().items()}
+
+    def files(self) -> dict[str, str]:
         """Every file of the database with its SHA-256, except the manifest itself."""
-        return {p: h for record in self.stages.values() for p, h in record.outputs.items()}
+        return {**self.outputs(), **self.lists()}
+
+    def beyond(self, former: Manifest | None) -> dict[str, str]:
+        """The outputs that are not in a list of the former manifest: all that it lacks or has with
+        other digests, and more."""
+        outputs: dict[str, str] = {}
+        for stage, record in self.stages.items():
+            own, before = record.outputs, former.stages.get(stage) if former else None
+            known = before.outputs if before else None
+            if isinstance(own, FileList):
+                own = own.without(set(known.lists) if isinstance(known, FileList) else ())
+            outputs |= own
+        return outputs
+
+    def without(self, lost: Mapping[str, str]) -> Manifest:
+        """A copy without these stages, see `lost`."""
+        stages = {name: record for name, record in self.stages.items() if name not in lost}
+        return replace(self, stages=stages, lost=lost)
 
     def to_bytes(self) -> bytes:
         """The text of `manifest.json`."""
-        stages = {name: asdict(self.stages[name]) for name in sorted(self.stages)}
-        for record in stages.values():
-            for part in ("inputs", "outputs"):
-                record[part] = dict(sorted(record[part].items()))
+        stages = {name: self.stages[name].entry() for name in sorted(self.stages)}
         document = {"format": FORMAT, "schema": SCHEMA, "model": self.model, "stages": stages}
         return (json.dumps(document, indent=1, ensure_ascii=False) + "\n").encode()
 
     @staticmethod
-    def from_bytes(data: bytes, *, file: str | PathLike[str]) -> Manifest:
-        """Inverse of `to_bytes`; ``file`` is named in the errors.
+    def from_bytes(
+        data: bytes, *, file: str | PathLike[str], lists: ReadList = _no_list
+    ) -> Manifest:
+        """Inverse of `to_bytes`; ``file`` is named in the errors, ``lists`` reads the lists when
+        they are used.
 
         Raises
         ------
@@ -106,6 +166,7 @@ class Manifest:
             raise DatabaseError(
                 "PTM-D001", "not a ptmtools database", file=file, remedy="use a database folder"
             )
+        document = as_current(document)
         if document.get("schema") != SCHEMA:
             raise DatabaseError(
                 "PTM-D003",
@@ -119,14 +180,27 @@ class Manifest:
             schemas.check(document, schemas.MANIFEST)
         except schemas.ShapeError as fault:
             raise damaged_manifest(file, str(fault)) from fault
-        names = StageRecord.__dataclass_fields__
-        return Manifest(
-            document["model"],
-            {
-                stage: StageRecord(**{name: entry[name] for name in names if name in entry})
-                for stage, entry in document["stages"].items()
-            },
-        )
+
+        def outputs(digest: str) -> Mapping[str, str]:
+            files = lists(digest)
+            if not all(own and _is_output(name) for name, own in files.items()):
+                raise damaged_manifest(file, f"{list_file(digest)} is no list of outputs")
+            return files
+
+        def record(entry: dict[str, Any]) -> StageRecord:
+            for name, read in (("inputs", lists), ("outputs", outputs)):
+                if isinstance(entry[name], list):
+                    entry = entry | {name: FileList(entry[name], read)}
+            return StageRecord(**{name: entry[name] for name in _FIELDS if name in entry})
+
+        stages = {stage: record(entry) for stage, entry in document["stages"].items()}
+        return Manifest(document["model"], stages)
+
+
+def as_current(document: dict[str, Any]) -> dict[str, Any]:
+    """A document of the schema that this one extends, as one of this schema; others unchanged."""
+    extended = type(document.get("schema")) is int and document["schema"] == _EXTENDED
+    return document | {"schema": SCHEMA} if extended else document
 
 
 def listed_before(data: bytes) -> Manifest | None:
@@ -138,7 +212,7 @@ def listed_before(data: bytes) -> Manifest | None:
     try:
         document = json.loads(data)
         schema, model = document["schema"], document["model"]
-        earlier = type(schema) is int and 0 < schema < SCHEMA
+        earlier = type(schema) is int and 0 < schema < _EXTENDED
         if document["format"] != FORMAT or not earlier or not isinstance(model, str):
             return None
         records = {}

@@ -20,8 +20,8 @@ files with the old manifest, and S3 renames nothing.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ptmtools.errors import DatabaseError, OutputError, PtmError
@@ -29,11 +29,12 @@ from ptmtools.files import leads_inside, real_file, real_folder, write_bytes, wr
 from ptmtools.parallel import ordered
 from ptmtools.progress import announce
 from ptmtools.store.digests import Digests, cache_folder
-from ptmtools.store.folder import damaged, last_manifest, unreadable
+from ptmtools.store.folder import damaged, last_manifest, lists_in, read_manifest, unreadable
 from ptmtools.store.layout import MANIFEST, sha256
+from ptmtools.store.lists import read_list
 from ptmtools.store.manifest import Manifest, listed_before
 from ptmtools.store.objects import Headers, Held, Objects
-from ptmtools.store.transaction import recover, remove_output
+from ptmtools.store.transaction import recover, remove_former, remove_output
 from ptmtools.store.writer import acquire
 
 #: Objects that are sent or fetched at a time: each waits for the network.
@@ -93,7 +94,8 @@ class RemoteDatabase:
             return
         data = self._objects.read(MANIFEST)
         try:
-            self._before = Manifest.from_bytes(data, file=f"{self.url}/{MANIFEST}")
+            file = f"{self.url}/{MANIFEST}"
+            self._before = Manifest.from_bytes(data, file=file, lists=self._list)
         except DatabaseError:
             if reading or not (force or listed_before(data)):
                 raise
@@ -115,6 +117,11 @@ class RemoteDatabase:
             )
         return data
 
+    def _list(self, digest: str) -> Mapping[str, str]:
+        with suppress(DatabaseError):
+            return lists_in(self.folder)(digest)
+        return read_list(self.read(digest), file=f"{self.url}/{object_of(digest)}")
+
     def write(self, digest: str, data: bytes) -> None:
         """Writes an object."""
         self._objects.write(object_of(digest), data, _DATA)
@@ -134,8 +141,10 @@ class RemoteDatabase:
         """
         announce(f"writing {self.url}")
         data = (self.folder / MANIFEST).read_bytes()
-        now = Manifest.from_bytes(data, file=self.folder / MANIFEST).outputs()
-        before = self._before.outputs() if self._before else {}
+        manifest = read_manifest(self.folder)
+        assert manifest
+        now = manifest.files()
+        before = self._before.files() if self._before else {}
         held = self._objects.listing()
         if _version(held) != self._version:
             raise self._overtaken()
@@ -184,12 +193,11 @@ class RemoteDatabase:
                 place = real_folder(self.folder, folder) / base
                 write_bytes(place, self.read(digest), force=True)
 
-        for _ in ordered(bring, manifest.outputs().items(), AT_ONCE):
+        for _ in ordered(bring, manifest.files().items(), AT_ONCE):
             pass
-        with writing(self.folder):
-            for name in former.outputs() if former else ():
-                if name not in manifest.outputs():
-                    remove_output(self.folder, name)
+        if former:
+            with writing(self.folder):
+                remove_former(self.folder, former, manifest)
         write_bytes(self.folder / MANIFEST, data, force=True)
 
     @contextmanager

@@ -22,9 +22,9 @@ from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING
 
-from ptmtools.errors import OutputError
+from ptmtools.errors import DatabaseError, OutputError
 from ptmtools.files import real_file, real_folder, write_bytes, writing
-from ptmtools.store.folder import DatabaseFolder, last_manifest
+from ptmtools.store.folder import DatabaseFolder, last_manifest, lists_in
 from ptmtools.store.layout import MANIFEST, STAGING, arrays_of, sha256
 from ptmtools.store.manifest import Manifest, StageRecord
 
@@ -134,7 +134,10 @@ class Transaction:
     def commit(self, records: Mapping[str, StageRecord]) -> None:
         """Commits the outputs with the records of their stages."""
         with self._turn:
-            manifest = self._db.manifest.with_stages(records)
+            read = lists_in(self._db.path)
+            stages = {**self._db.manifest.stages, **records}
+            listed = {name: each.listed(read, self._put_list) for name, each in stages.items()}
+            manifest = self._db.manifest.with_stages(listed)
             write_bytes(self.subfolder() / MANIFEST, manifest.to_bytes(), force=True)
             _complete(self._db.path, self._relative)
             self._db.manifest = manifest
@@ -142,6 +145,10 @@ class Transaction:
             self._db.digests.note(self._db.path / name, digest)
         self._pending, self._finished = {}, {}
         self._committed = manifest.outputs()
+
+    def _put_list(self, name: str, data: bytes) -> None:
+        if self._db.damaged({name: sha256(data)}):
+            write_bytes(self._place(name), data, force=True)
 
     def _place(self, name: str) -> Path:
         """The path of a staged output, whose folder is created."""
@@ -202,17 +209,32 @@ def _complete(folder: Path, relative: str) -> None:
     staging = folder / relative
     with writing(folder):
         data = (staging / MANIFEST).read_bytes()
-        after = Manifest.from_bytes(data, file=staging / MANIFEST).outputs()
+        after = Manifest.from_bytes(data, file=staging / MANIFEST, lists=lists_in(folder))
         before = last_manifest(folder)
-        for name in after:
-            parent, _, base = name.rpartition("/")
-            if source := real_file(staging, name):
-                source.replace(real_folder(folder, parent) / base)
-        for name in before.outputs() if before else ():
-            if name not in after:
-                remove_output(folder, name)
+        for name in after.lists():  # the outputs are read from them
+            _move(staging, name, folder)
+        for name in after.beyond(before):
+            _move(staging, name, folder)
+        if before:
+            remove_former(folder, before, after)
         (staging / MANIFEST).replace(folder / MANIFEST)
         shutil.rmtree(staging)  # not its parent, where another transaction may begin
+
+
+def _move(staging: Path, name: str, folder: Path) -> None:
+    parent, _, base = name.rpartition("/")
+    if source := real_file(staging, name):
+        source.replace(real_folder(folder, parent) / base)
+
+
+def remove_former(folder: Path, before: Manifest, after: Manifest) -> None:
+    """Removes the files that a former manifest alone lists. Its lists are removed last: where one
+    is missing, an interrupted call has removed all other files."""
+    with suppress(DatabaseError):
+        for name in before.beyond(after).keys() - after.beyond(before).keys():
+            remove_output(folder, name)
+    for name in before.lists().keys() - after.lists().keys():
+        remove_output(folder, name)
 
 
 def remove_output(folder: Path, name: str) -> None:

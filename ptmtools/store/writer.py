@@ -44,6 +44,7 @@ class DatabaseWriter(DatabaseFolder):
         try:
             recover(path)
             super().__init__(path, manifest())
+            self.manifest = self.without_lost()
         except BaseException:
             self._release()
             raise

@@ -8,7 +8,7 @@ import os
 import pickle
 import shutil
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from importlib.util import find_spec
 from itertools import count
 from pathlib import Path
@@ -22,7 +22,9 @@ from ptmtools.coverage.options import AchOptions
 from ptmtools.errors import DatabaseError, InputError, OutputError
 from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.encoding import TextureOptions
+from ptmtools.store import lists
 from ptmtools.store.layout import IMAGES, MANIFEST
+from ptmtools.store.lists import read_list
 from ptmtools.store.manifest import Manifest
 from ptmtools.store.objects import Objects
 from ptmtools.store.remote import RemoteDatabase, fetch_database, fetch_model
@@ -91,7 +93,12 @@ def built_here(model: Path, folder: Path, *options: Any) -> dict[str, bytes]:
 
 def manifest_of(store: Store, bucket: str, prefix: str) -> Manifest:
     body = store.client().get_object(Bucket=bucket, Key=f"{prefix}/{MANIFEST}")["Body"]
-    return Manifest.from_bytes(body.read(), file=MANIFEST)
+
+    def read(digest: str) -> Mapping[str, str]:
+        key = f"{prefix}/objects/{digest}"
+        return read_list(store.client().get_object(Bucket=bucket, Key=key)["Body"].read(), file=key)
+
+    return Manifest.from_bytes(body.read(), file=MANIFEST, lists=read)
 
 
 def objects_of(store: Store, bucket: str, prefix: str) -> set[str]:
@@ -178,13 +185,23 @@ def test_workers_that_share_no_folder(
     assert files_below(fetch_database(f"s3://{bucket}/museum.db")) == expected
 
 
+@pytest.mark.parametrize("inline", [lists.INLINE, 4])
 def test_an_update_sends_what_changed_and_removes_the_rest(
-    store: Store, bucket: str, rooms: Path, tmp_path: Path, machine: Callable[[], Path]
+    store: Store,
+    bucket: str,
+    rooms: Path,
+    tmp_path: Path,
+    machine: Callable[[], Path],
+    monkeypatch: pytest.MonkeyPatch,
+    inline: int,
 ) -> None:
+    """Also where the manifest has lists."""
+    monkeypatch.setattr(lists, "INLINE", inline)
+    monkeypatch.setattr(lists, "MEAN", 4)
     url = f"s3://{bucket}/db"
     report = build_scene(rooms, url, EMBREE, FAST, workers=1)
     assert report.database == url
-    before = manifest_of(store, bucket, "db").outputs()
+    before = manifest_of(store, bucket, "db").files()
     assert objects_of(store, bucket, "db") == set(before.values())
     store.requests.clear()
     build_scene(rooms, url, EMBREE, FAST, workers=1)
@@ -193,7 +210,7 @@ def test_an_update_sends_what_changed_and_removes_the_rest(
     (rooms.parent / "floor.png").write_bytes(png_bytes(np.zeros((8, 8, 3), np.uint8)))
     store.requests.clear()
     build_scene(rooms, url, EMBREE, FAST, workers=1)
-    after = manifest_of(store, bucket, "db").outputs()
+    after = manifest_of(store, bucket, "db").files()
     new = {f"db/objects/{digest}" for digest in set(after.values()) - set(before.values())}
     written = store.written(bucket)
     assert (set(written[:-1]), written[-1]) == (new, f"db/{MANIFEST}")

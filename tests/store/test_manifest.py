@@ -38,6 +38,13 @@ def test_reads_one_of_an_earlier_release() -> None:
     assert again.stages["cells"].warnings == []
 
 
+def test_reads_one_of_the_earlier_schema() -> None:
+    """Which had no lists."""
+    earlier = json.dumps(document() | {"schema": 2}).encode()
+    again = Manifest.from_bytes(earlier, file="manifest.json")
+    assert again.to_bytes() == Manifest("m.obj", {"cells": RECORD}).to_bytes()
+
+
 def test_the_order_of_inputs_does_not_show() -> None:
     turned = StageRecord(
         1, RECORD.parameters, {"a": DIGEST, "b": ""}, RECORD.outputs, RECORD.counts, []
@@ -79,6 +86,8 @@ def broken(change: dict[str, Any]) -> bytes:
         (broken({"outputs": {"manifest.json": DIGEST}}), "PTM-D002"),
         (broken({"outputs": {"www/../mine.txt": DIGEST}}), "PTM-D002"),
         (broken({"inputs": []}), "PTM-D002"),
+        (broken({"outputs": ["zz"]}), "PTM-D002"),
+        (broken({"outputs": [["ab" * 32]]}), "PTM-D002"),
         (broken({"notes": None}), "PTM-D002"),
         (broken({"outputs": {"stages/x.npz": "zz"}}), "PTM-D002"),
         (broken({"outputs": {"../x.npz": DIGEST}}), "PTM-D002"),

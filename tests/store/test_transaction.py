@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from ptmtools.errors import OutputError
-from ptmtools.store.layout import MANIFEST, STAGING
+from ptmtools.store import lists
+from ptmtools.store.layout import LISTS, MANIFEST, STAGING
 from ptmtools.store.manifest import StageRecord
 from ptmtools.store.transaction import finished_tasks
 from ptmtools.store.writer import DatabaseWriter
@@ -23,8 +24,11 @@ import sys
 from pathlib import Path
 sys.path.insert(0, {benchmarks!r})
 from kills import dying
+from ptmtools.store import lists
 from ptmtools.store.manifest import StageRecord
 from ptmtools.store.writer import DatabaseWriter
+
+lists.INLINE, lists.MEAN = {limits!r}
 
 dying({n}, Path({db!r}))
 with DatabaseWriter.open_for_model({db!r}, "m.obj") as writer:
@@ -52,22 +56,31 @@ def stamp(file: Path) -> tuple[int, int]:
 
 
 def without(found: dict[str, bytes]) -> dict[str, bytes]:
-    return {name: data for name, data in found.items() if name != MANIFEST}
+    return {n: data for n, data in found.items() if n != MANIFEST and not n.startswith(LISTS)}
 
 
-def test_killed_at_any_change_of_a_name(tmp_path: Path) -> None:
+@pytest.mark.parametrize("limits", [(lists.INLINE, lists.MEAN), (0, 2), (2, 1)])
+def test_killed_at_any_change_of_a_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limits: tuple[int, int]
+) -> None:
+    """With the outputs in the manifest, in lists of several files, and of one each."""
+    for name, value in zip(("INLINE", "MEAN"), limits, strict=True):
+        monkeypatch.setattr(lists, name, value)
     first, second = tmp_path / "first", tmp_path / "second"
     write(first, BEFORE, 1)
     write(second, BEFORE, 1)
     write(second, AFTER, 2)
     before, after = files_below(first), files_below(second)
     assert without(after) == AFTER
+    assert bool(list(second.glob("stages/lists/*"))) == (limits[0] < len(AFTER))
     outcomes = []
     for n in range(1, 100):
         db = tmp_path / f"{n}"
         write(db, BEFORE, 1)
         (db / "www/mine.txt").write_text("mine")
-        script = UPDATE.format(benchmarks=str(ROOT / "benchmarks"), n=n, db=str(db), files=AFTER)
+        script = UPDATE.format(
+            benchmarks=str(ROOT / "benchmarks"), n=n, db=str(db), files=AFTER, limits=limits
+        )
         status = subprocess.run([sys.executable, "-c", script], cwd=ROOT).returncode
         if status == 0:
             break

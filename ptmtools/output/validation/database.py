@@ -35,7 +35,10 @@ from ptmtools.output.validation.hints import gather
 from ptmtools.output.validation.textures import IMAGES, read_picture, read_ptm
 from ptmtools.progress import Progress, silent
 from ptmtools.quantities import count
+from ptmtools.store.folder import lists_in
 from ptmtools.store.layout import MANIFEST, SERVED
+from ptmtools.store.lists import list_file
+from ptmtools.store.manifest import as_current
 from ptmtools.texture.model import Limits
 
 #: Foreign files listed by name in a note.
@@ -129,6 +132,8 @@ class _Check:
         self._stages: dict[str, dict[str, Any]] = {}
         #: Name relative to the database → hash in the manifest.
         self._outputs: dict[str, str] = {}
+        #: Whether all lists of the manifest could be read.
+        self._complete = True
         #: The served files that are checked, relative to the served folder.
         self._ours: set[str] = set()
 
@@ -162,13 +167,20 @@ class _Check:
     def _read_manifest(self) -> None:
         try:
             with open_regular(self._folder / MANIFEST) as file:
-                self._stages = schemas.read(file.read(), schemas.MANIFEST)["stages"]
+                document = schemas.parse(file.read())
+            if isinstance(document, dict):
+                document = as_current(document)
+            schemas.check(document, schemas.MANIFEST)
+            self._stages = document["stages"]
         except FileNotFoundError:
             self._manifest.add("PTM-D650", "missing")
         except OSError as fault:
             self._manifest.add("PTM-D650", f"cannot be read ({fault.strerror or fault})")
         except schemas.ShapeError as fault:
             self._manifest.add("PTM-D650", fault.message, fault.place)
+        for record in self._stages.values():
+            for field in ("inputs", "outputs"):
+                record[field] = self._files(record[field])
         for stage, record in self._stages.items():
             at = self._manifest.at(f"stages.{stage}")
             for name in sorted(self._outputs.keys() & record["outputs"].keys()):
@@ -179,6 +191,21 @@ class _Check:
             for name, digest in record["inputs"].items():
                 if self._outputs.get(name, digest) != digest:
                     at.add("PTM-D656", f"computed from an earlier {name}")
+
+    def _files(self, listed: dict[str, str] | list[str]) -> dict[str, str]:
+        """Inputs or outputs of a stage, of the manifest or of lists."""
+        if isinstance(listed, dict):
+            return listed
+        self._outputs |= {list_file(digest): digest for digest in listed}
+        files: dict[str, str] = {}
+        for digest in listed:
+            try:
+                files |= lists_in(self._folder)(digest)
+            except DatabaseError as fault:  # the file is reported as all others
+                self._complete = False
+                if fault.code == "PTM-D006":
+                    self.findings.at(list_file(digest)).add("PTM-D650", fault.message)
+        return files
 
     def _extent(self) -> float:
         """The largest side of the model, metres; 0 if it is not recorded."""
@@ -242,7 +269,7 @@ class _Check:
             at.add("PTM-D651", f"cannot be read ({fault.strerror or fault})")
             return reading
         reading.size = size
-        if self._outputs and name not in self._outputs:
+        if self._outputs and self._complete and name not in self._outputs:
             at.add("PTM-D653", "no stage wrote this file")
         elif self._outputs.get(name, digest) != digest:
             at.add("PTM-D652", "the hash differs from the manifest's")
