@@ -18,7 +18,6 @@ import click
 from ptmtools.cli.console import Console
 from ptmtools.cli.parameters import (
     Command,
-    changed_database_argument,
     cluster_options,
     database_argument,
     force_option,
@@ -27,6 +26,7 @@ from ptmtools.cli.parameters import (
     new_database_option,
     option,
     options_of,
+    readable_folder,
     take,
     with_console,
 )
@@ -106,8 +106,6 @@ def _from_model(last: Stage[Any] | None) -> Callable[..., None]:
         """
         options: list[Any] = [take(stage.options, values) for stage in stages]
         if dry_run:
-            if is_url(model) or is_url(db):
-                raise click.UsageError("--dry-run needs a model and a database on this machine")
             from ptmtools.pipeline.status import plan_build
 
             plans = plan_build(model, db, *options, force=force)[: len(stages)]
@@ -135,7 +133,7 @@ def _from_model(last: Stage[Any] | None) -> Callable[..., None]:
 def _of_database(stage: Stage[Any]) -> Callable[..., None]:
     """The function of a command that runs one stage of a database."""
 
-    @changed_database_argument
+    @click.argument("db", type=click.Path())
     @options_of(stage.options)
     @cluster_options
     @json_option
@@ -162,7 +160,7 @@ def _of_database(stage: Stage[Any]) -> Callable[..., None]:
         if wanted:
             from ptmtools.visibility.report import report as describe, report_lines
 
-            artifacts = Artifacts(open_database(db))
+            artifacts = Artifacts(open_database(readable_folder(db)))
             details = describe(artifacts[CELLS], artifacts[PVS])
             console.result(asdict(details), report_lines(details, verbose=console.verbose))
 

@@ -360,28 +360,23 @@ json_option = option(
 )
 
 
-def local_copy(context: click.Context, parameter: click.Parameter, value: str) -> str:
-    """The folder of a database, for one at a URL that of its copy."""
+def readable_folder(db: str) -> str:
+    """The folder of a database to read; of one at a URL that of its copy."""
     from ptmtools.store.objects import is_url, plain_path
 
-    if not is_url(plain_path(value)):
-        return os.fspath(plain_path(value))
+    if not is_url(plain_path(db)):
+        return os.fspath(plain_path(db))
     from ptmtools.store.remote import fetch_database
 
-    return os.fspath(fetch_database(value))
+    return os.fspath(fetch_database(db))
 
 
-def _folder_alone(context: click.Context, parameter: click.Parameter, value: str) -> str:
-    from ptmtools.store.objects import is_url
-
-    if is_url(value):
-        raise click.BadParameter(f"{value} is a URL, which only `ptm build-scene` writes to")
-    return value
+def local_copy(context: click.Context, parameter: click.Parameter, value: str) -> str:
+    """`readable_folder` of an argument."""
+    return readable_folder(value)
 
 
 database_argument = click.argument("db", type=click.Path(), callback=local_copy)
-#: A database that the command changes.
-changed_database_argument = click.argument("db", type=click.Path(), callback=_folder_alone)
 
 
 def output_option(text: str, variable: str = "output", **settings: Any) -> Decorator:

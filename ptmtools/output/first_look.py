@@ -21,8 +21,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.errors import naming
-from ptmtools.files import open_regular
+from ptmtools.texture.sources import first_bytes
 
 if TYPE_CHECKING:
     from ptmtools.output.content import Content
@@ -81,7 +80,7 @@ class FirstLooks:
         return pieces
 
     def bundle(self, pieces: Iterable[Piece]) -> bytes:
-        """The bytes of a bundle; raises OSError if a texture has vanished."""
+        """The bytes of a bundle; raises InputError PTM-I120, PTM-I122 if a texture is missing."""
         return b"".join(self._heads[p.texture][p.start : p.end] for p in pieces)
 
     @cached_property
@@ -91,8 +90,7 @@ class FirstLooks:
         for record, steps in zip(self._content.textures, self._steps, strict=True):
             head = b""
             if steps and record.stored:
-                with naming(record.stored), open_regular(record.stored) as file:
-                    head = file.read(steps[-1].end)
+                head = first_bytes(record.stored, steps[-1].end)
             heads.append(head)
         return heads
 

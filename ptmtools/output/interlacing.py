@@ -8,7 +8,6 @@ become eight bits, as clients show them, since the image formats lack them.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,6 +27,7 @@ from ptmtools.texture.images import Picture
 from ptmtools.texture.model import Limits
 from ptmtools.texture.previews import decoded_preview
 from ptmtools.texture.samples import in_eight_bits
+from ptmtools.texture.sources import first_bytes
 
 #: Files that a set's manifest does not name; the check of the database reports them.
 _STRAY = "PTM-D806"
@@ -56,20 +56,22 @@ def interlaced_files(content: Content) -> Iterator[tuple[str, str | bytes]]:
 
 
 def _interlaced(record: TextureRecord) -> Written:
-    assert record.stored
     width, height = record.finest
     # Enough for all levels of a texture that has been encoded.
     limits = Limits(64 * width * height * record.components + (1 << 20))
-    with naming(record.stored):
-        return interlace(Picture(_finest(record, record.stored, limits)), limits=limits)
+    with naming(record.file):
+        return interlace(Picture(_finest(record, limits)), limits=limits)
 
 
-def _finest(record: TextureRecord, file: Path, limits: Limits) -> NDArray[Any]:
+def _finest(record: TextureRecord, limits: Limits) -> NDArray[Any]:
     """The finest level of a texture, floats in eight bits."""
     if record.level_count > len(record.levels):
-        preview = file.parents[1] / record.previews[-1].file
-        return decoded_preview(preview.read_bytes(), record.components)
-    with reader.open(file, limits=limits) as ptm:
+        finest = record.previews[-1]
+        assert finest.stored
+        data = first_bytes(finest.stored, finest.preview.bytes)
+        return decoded_preview(data, record.components)
+    assert record.stored
+    with reader.open(record.stored, limits=limits) as ptm:
         texels = ptm.level(len(ptm.header.levels) - 1)
     return np.ascontiguousarray(in_eight_bits(texels) if texels.dtype.kind == "f" else texels)
 

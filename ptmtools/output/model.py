@@ -9,7 +9,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ptmtools import schemas
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
     from ptmtools.texture.detail import Detail
     from ptmtools.texture.model import Level
     from ptmtools.texture.previews import Preview
+    from ptmtools.texture.sources import Source
 
 
 Vector = tuple[float, float, float]
@@ -31,10 +31,12 @@ EYE = 1.6 / 1.7
 
 @dataclass(frozen=True)
 class PreviewRecord:
-    """A preview of a texture: its file, relative to the served folder, and its properties."""
+    """A preview of a texture: its file, relative to the served folder, its properties, and the file
+    to read, if it was encoded."""
 
     file: str
     preview: Preview
+    stored: Source | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class TextureRecord:
         the finest of the `.ptm`.
     fallback_bytes: of the fallback image; 0 without.
     detail: mean colour and differences of all levels; None if unknown.
-    stored: the `.ptm` on the disk; None if it was not encoded.
+    stored: the `.ptm` to read; None if it was not encoded.
     errors: root mean square of each level from the finest, 0 to 255; empty if unknown.
     previews: by ascending level; the finest may be of levels that the `.ptm` lacks.
     """
@@ -69,7 +71,7 @@ class TextureRecord:
     fallback_level: int | None = None
     fallback_bytes: int = 0
     detail: Detail | None = None
-    stored: Path | None = field(default=None, compare=False)
+    stored: Source | None = field(default=None, compare=False)
     errors: tuple[float, ...] = ()
     previews: tuple[PreviewRecord, ...] = ()
 

@@ -11,8 +11,6 @@ import os
 import time
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
-from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from ptmtools.parallel import Workers
@@ -22,8 +20,7 @@ from ptmtools.pipeline.report import BuildReport, Visitor, peak_memory
 from ptmtools.pipeline.stage import Options, Run, Stage
 from ptmtools.pipeline.stages import EMIT, STAGES
 from ptmtools.progress import Progress, silent
-from ptmtools.store.objects import is_url, plain_path
-from ptmtools.store.remote import RemoteDatabase, fetch_model, naming_url
+from ptmtools.store.remote import folder_to_build, model_file
 from ptmtools.store.writer import DatabaseWriter
 
 PathLike = str | os.PathLike[str]
@@ -70,28 +67,18 @@ def build_scene(
         stages = stages[: stages.index(until) + 1]
     chosen = chosen_options(options)
     with ExitStack() as stack:
-        model, db = plain_path(model), plain_path(db)
-        file, folder, remote = Path(model), Path(db), None
-        if is_url(model):
-            file = fetch_model(str(model))
-            stack.enter_context(naming_url(str(model).rpartition("/")[0], file.parent))
+        file, folder_url = stack.enter_context(model_file(model))
         if not file.is_file():
             from ptmtools.scene.ingestion import check_file
 
             check_file(file)
-        if is_url(db):
-            remote = RemoteDatabase(str(db))
-            folder = remote.folder
-            stack.enter_context(naming_url(remote.url, folder))
-            remote.fetch(force=force)
+        folder, remote = stack.enter_context(folder_to_build(db, force=force))
         writer = stack.enter_context(DatabaseWriter.open_for_model(folder, file.name, force=force))
         used = stack.enter_context(Workers(workers, scheduler))
-        run = Run(writer, used, progress, file, rebuild=rebuild, remote=remote)
-        report = _run(run, stages, chosen, start, tell)
-        if remote is None:
-            return report
-        remote.commit()
-        return replace(report, database=remote.url, seconds=time.perf_counter() - start)
+        run = Run(
+            writer, used, progress, file, rebuild=rebuild, remote=remote, folder_url=folder_url
+        )
+        return _run(run, stages, chosen, start, tell)
 
 
 def run_stage(
@@ -109,12 +96,12 @@ def run_stage(
     start = time.perf_counter()
     chosen = chosen_options([options])
     stages = [stage for stage in STAGES.values() if isinstance(options, stage.options)]
-    with (
-        naming_command(db),
-        DatabaseWriter.open_for_stage(db) as writer,
-        Workers(workers, scheduler) as used,
-    ):
-        run = Run(writer, used, progress, rebuild=rebuild)
+    with ExitStack() as stack:
+        folder, remote = stack.enter_context(folder_to_build(db))
+        stack.enter_context(naming_command(folder))
+        writer = stack.enter_context(DatabaseWriter.open_for_stage(folder))
+        used = stack.enter_context(Workers(workers, scheduler))
+        run = Run(writer, used, progress, rebuild=rebuild, remote=remote)
         return _run(run, stages, chosen, start, tell)
 
 
@@ -169,9 +156,11 @@ def _run(
             for job in jobs:
                 abandoned.callback(job.abandon)
         raise
+    if run.remote:
+        run.remote.commit()
     return BuildReport(
         model=run.db.manifest.model,
-        database=str(run.db.path),
+        database=run.remote.url if run.remote else str(run.db.path),
         stages=tuple(run.reports),
         seconds=time.perf_counter() - start,
         peak_memory=peak_memory(),

@@ -27,6 +27,7 @@ from ptmtools.texture.previews import FORMATS, Preview, PreviewOptions
 
 if TYPE_CHECKING:
     from ptmtools.executor import Executor
+    from ptmtools.store.objects import Objects
     from ptmtools.store.remote import RemoteDatabase
     from ptmtools.store.transaction import Transaction
     from ptmtools.texture.images import Picture
@@ -130,8 +131,8 @@ class ImageFile:
 
 
 def encoded_image(options: TextureOptions, image: ImageFile) -> list[tuple[str, bytes]]:
-    """The files of a texture, named relative to the database: its `.ptm`, its `Steps` as JSON, its
-    previews and, if the options ask for one, its fallback image.
+    """The files of a texture, named relative to the database: first its `.ptm` and its `Steps` as
+    JSON, then its previews and, if the options ask for one, its fallback image.
 
     Raises as `encode_steps` and `load_image`.
     """
@@ -189,13 +190,19 @@ class SharedDisk:
 
 @dataclass(frozen=True)
 class ImageTask:
-    """An image of the database, the stem of its result files, and the number of its finest levels
-    to leave out."""
+    """An image of the database.
+
+    Attributes
+    ----------
+    name, unresolved: see `ImageFile`. sha256: of its bytes. stem: of its result files on a disk.
+    file: relative to the model's folder, for an image that is not in the database yet.
+    """
 
     name: str
     sha256: str
-    stem: str
+    stem: str = ""
     unresolved: int = 0
+    file: str = ""
 
 
 @contextmanager
@@ -243,10 +250,12 @@ def encoded_on_disk(disk: SharedDisk, image: ImageTask) -> list[tuple[str, str, 
 
 @dataclass(frozen=True)
 class SharedUrl:
-    """The options of all tasks, and the URL of the database."""
+    """The options of all tasks, and the URLs of the database and of the model's folder, if it has
+    one."""
 
     options: TextureOptions
     url: str
+    model: str = ""
 
     @cached_property
     def database(self) -> RemoteDatabase:
@@ -255,24 +264,57 @@ class SharedUrl:
 
         return RemoteDatabase(self.url)
 
+    @cached_property
+    def files(self) -> Objects:
+        """The files of the model."""
+        from ptmtools.store.objects import Objects
+
+        return Objects(self.model, reading=True)
+
     def __getstate__(self) -> dict[str, object]:
-        return {"options": self.options, "url": self.url}
+        return {"options": self.options, "url": self.url, "model": self.model}
 
 
-def encoded_at_url(place: SharedUrl, image: ImageTask) -> list[tuple[str, str]]:
-    """Reads the object of an image, and writes the results of `encoded_image` as objects: (name,
-    SHA-256) of each.
+@dataclass(frozen=True)
+class EncodedAtUrl:
+    """The result of `encoded_at_url`.
 
-    Raises as that, and as `RemoteDatabase`.
+    Attributes
+    ----------
+    files: (name, SHA-256, bytes) of each object written; the image's name is "".
+    head: of the `.ptm`, `HEAD_MAX` bytes or all.
+    steps: the file of its `Steps`.
     """
-    data = place.database.read(image.sha256)
+
+    files: list[tuple[str, str, int]]
+    head: bytes
+    steps: bytes
+
+
+def encoded_at_url(place: SharedUrl, image: ImageTask) -> EncodedAtUrl:
+    """Reads the object of an image, and writes the results of `encoded_image` as objects. An image
+    that is no object yet is read from the model's folder and written, too.
+
+    Raises as that, and as `RemoteDatabase`; InputError PTM-I122 if the model's file has changed.
+    """
+    from ptmtools.texture.container import HEAD_MAX
+
+    outputs = []
+    if image.file:
+        data = place.files.read(image.file)
+        if sha256(data) != image.sha256:
+            raise place.files.failure("has changed since the model was read", image.file)
+        outputs.append(("", data))
+    else:
+        data = place.database.read(image.sha256)
     results = encoded_image(place.options, ImageFile(image.name, data, image.unresolved))
     files = []
-    for name, output in results:
+    for name, output in (*outputs, *results):
         digest = sha256(output)
         place.database.write(digest, output)
-        files.append((name, digest))
-    return files
+        files.append((name, digest, len(output)))
+    ptm, steps = (output for _, output in results[:2])
+    return EncodedAtUrl(files, ptm[:HEAD_MAX], steps)
 
 
 def _image(disk: SharedDisk, image: ImageTask) -> bytes:

@@ -292,11 +292,14 @@ class Run(Artifacts):
         *,
         rebuild: bool = False,
         remote: RemoteDatabase | None = None,
+        folder_url: str = "",
     ) -> None:
         super().__init__(db, model)
         self.writer, self.workers, self.progress, self.rebuild = db, workers, progress, rebuild
-        #: The URL whose copy the database is.
-        self.remote = remote
+        #: The database at a URL whose copy this is.
+        self.remote = db.elsewhere = remote
+        #: That of the model's folder, if the model is at a URL.
+        self.folder_url = folder_url
         self.reports: list[StageReport] = []
         self._joint: Transaction | None = None
         self._uncommitted: dict[str, StageRecord] = {}

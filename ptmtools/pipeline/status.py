@@ -20,6 +20,7 @@ from ptmtools.pipeline.stages import STAGES
 from ptmtools.store.folder import DatabaseFolder, read_manifest
 from ptmtools.store.layout import LOCK, STAGING
 from ptmtools.store.manifest import Manifest
+from ptmtools.store.remote import folder_to_build, model_file
 from ptmtools.store.transaction import finished_tasks
 from ptmtools.store.writer import admitted, holder, is_held
 
@@ -166,16 +167,16 @@ def plan_build(
     from ptmtools.scene.ingestion import check_file
 
     chosen = chosen_options(options)
-    check_file(Path(model))
-    folder = Path(db)
-    manifest = admitted(folder, Path(model).name, force=force)
-    database = DatabaseFolder(folder, manifest)
-    database.manifest = database.without_lost()
-    artifacts = Artifacts(database, Path(model), planned=True)
-    #: Stages whose outputs may change.
-    changing: set[Stage[Any]] = set()
-    plans = tuple(_plan(artifacts, stage, chosen[stage], changing) for stage in STAGES.values())
-    artifacts.db.digests.save()
+    with model_file(model) as (file, _), folder_to_build(db, force=force) as (folder, remote):
+        check_file(file)
+        database = DatabaseFolder(folder, admitted(folder, file.name, force=force))
+        database.elsewhere = remote
+        database.manifest = database.without_lost()
+        artifacts = Artifacts(database, file, planned=True)
+        #: Stages whose outputs may change.
+        changing: set[Stage[Any]] = set()
+        plans = tuple(_plan(artifacts, stage, chosen[stage], changing) for stage in STAGES.values())
+        database.digests.save()
     return plans
 
 

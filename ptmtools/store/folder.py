@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from ptmtools.errors import DatabaseError, Rebuild
 from ptmtools.files import open_regular
@@ -20,6 +20,16 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
+class Elsewhere(Protocol):
+    """Files of a database that its folder lacks, by their SHA-256."""
+
+    def size(self, digest: str) -> int | None:
+        """Bytes of a file; None if there is none."""
+
+    def read(self, digest: str, start: int = 0, end: int | None = None) -> bytes:
+        """The bytes of a file from ``start`` to before ``end``; checked, if these are all."""
+
+
 class DatabaseFolder:
     """A database on disk.
 
@@ -28,7 +38,10 @@ class DatabaseFolder:
     path: the folder.
     manifest: its last committed state.
     digests: of its files and of the model's.
+    elsewhere: further files; None if the folder must have all.
     """
+
+    elsewhere: Elsewhere | None = None
 
     def __init__(self, path: Path, manifest: Manifest) -> None:
         self.path = path
@@ -79,7 +92,30 @@ class DatabaseFolder:
         ------
         DatabaseError: PTM-D005 if it is missing, PTM-D006 if its hash is not the recorded one.
         """
-        return _read(self.path / name, digest)
+        try:
+            return _read(self.path / name, digest)
+        except DatabaseError:
+            if self.elsewhere is None or self.elsewhere.size(digest) is None:
+                raise
+            return self.elsewhere.read(digest)
+
+    def source(self, name: str, digest: str) -> Path | Callable[[int, int], bytes]:
+        """A file of the database, or a function ``read(offset, length)`` if it is elsewhere."""
+        elsewhere, file = self.elsewhere, self.path / name
+        if elsewhere is None or self._is_here(name, digest):
+            return file
+        return lambda offset, length: elsewhere.read(digest, offset, offset + length)
+
+    def size(self, name: str, digest: str) -> int:
+        """Bytes of a file of the database; raises PTM-D005 if it is missing."""
+        size = self.elsewhere.size(digest) if self.elsewhere else None
+        if size is not None:
+            return size
+        file = self.path / name
+        try:
+            return file.stat().st_size
+        except OSError as fault:
+            raise unreadable(file, fault) from fault
 
     def read_output(self, stage: str, name: str) -> bytes:
         """The bytes of an output that a stage must have; raises as `output` and `read`."""
@@ -108,13 +144,19 @@ class DatabaseFolder:
 
     def damaged(self, outputs: Mapping[str, str]) -> str | None:
         """The first file that is missing or has another hash, or None."""
+        elsewhere = self.elsewhere
         for name, digest in outputs.items():
-            try:
-                if self.digests.of(self.path / name) != digest:
-                    return name
-            except OSError:
+            if not self._is_here(name, digest) and (
+                elsewhere is None or elsewhere.size(digest) is None
+            ):
                 return name
         return None
+
+    def _is_here(self, name: str, digest: str) -> bool:
+        """Whether the folder has a file."""
+        with suppress(OSError):
+            return self.digests.of(self.path / name) == digest
+        return False
 
 
 def _read(file: Path, digest: str) -> bytes:

@@ -191,10 +191,11 @@ class Objects:
             return Held(size, self.kind.version(row), self.kind.md5(row))
         return Held(size, " ".join(str(row[key]) for key in _CHANGING if key in row), "")
 
-    def read(self, name: str) -> bytes:
-        """The bytes of an object."""
+    def read(self, name: str, start: int = 0, end: int | None = None) -> bytes:
+        """The bytes of an object, or those from ``start`` to before ``end``."""
+        limits = {"start": start, "end": end} if start or end is not None else {}
         with self._asking("cannot be read", name):
-            return bytes(self._system.cat_file(self._path(name)))
+            return bytes(self._system.cat_file(self._path(name), **limits))
 
     def write(
         self, name: str, source: bytes | Path, headers: Headers, *, instead_of: str | None = None

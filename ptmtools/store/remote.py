@@ -10,8 +10,10 @@ their digests alone, and a build that is killed leaves the state that the manife
 manifest is written last, on condition that it is still the one that was read; S3 checks that at
 the moment of writing, other stores shortly before.
 
-A build works in the copy, which is ahead of the URL after an interrupted build; it is replaced if
-the manifest at the URL is another than at the last exchange.
+A build works in a copy, which need not have all files (`Elsewhere`): textures of machines that
+share no folder with this one never come here. The copy is ahead of the URL after an interrupted
+build. If the manifest at the URL is another than at the last exchange, it replaces that of the
+copy. A command that reads a database has a copy of its own, with all files.
 
 Tried and rejected: the names of the database as names of objects. A reader would then meet new
 files with the old manifest, and S3 renames nothing.
@@ -20,11 +22,13 @@ files with the old manifest, and S3 renames nothing.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 
-from ptmtools.errors import DatabaseError, OutputError, PtmError
+from ptmtools.errors import DatabaseError, OutputError, PtmError, Rebuild
 from ptmtools.files import leads_inside, real_file, real_folder, write_bytes, writing
 from ptmtools.parallel import ordered
 from ptmtools.progress import announce
@@ -33,7 +37,7 @@ from ptmtools.store.folder import damaged, last_manifest, lists_in, read_manifes
 from ptmtools.store.layout import MANIFEST, sha256
 from ptmtools.store.lists import read_list
 from ptmtools.store.manifest import Manifest, listed_before
-from ptmtools.store.objects import Headers, Held, Objects
+from ptmtools.store.objects import Headers, Held, Objects, is_url, plain_path
 from ptmtools.store.transaction import recover, remove_former, remove_output
 from ptmtools.store.writer import acquire
 
@@ -52,38 +56,41 @@ def object_of(digest: str) -> str:
 class RemoteDatabase:
     """A database at a URL.
 
+    It is the `Elsewhere` of its copy.
+
     Attributes
     ----------
-    url: its URL. folder: its copy.
+    url: its URL. folder: its copy. reading: whether that is to be read, and not built.
 
     Raises as `Objects`; all methods raise OutputError PTM-O012 if the store refuses.
     """
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, *, reading: bool = False) -> None:
         self._objects = Objects(url)
-        self.url = self._objects.url
-        self.folder = _cached("databases", self.url) / "db"
-        self._base = self.folder.parent / "version"
+        self.url, self.reading = self._objects.url, reading
+        self.folder = _cached("databases", self.url) / ("read" if reading else "db")
+        self._base = self.folder.with_name(f"{self.folder.name}-version")
         self._version = ""
         self._before: Manifest | None = None
-        self._present: set[str] = set()
+        self._sizes: dict[str, int] = {}
 
-    def fetch(self, *, force: bool = False, reading: bool = False) -> None:
-        """Brings the copy up to the state at the URL, unless it is that, or ahead of it. Without
-        ``reading``, a manifest of an earlier schema counts as none, since a build replaces it.
+    def fetch(self, *, force: bool = False) -> None:
+        """Brings the copy up to the state at the URL, unless it is that, or ahead of it: to read,
+        all files; to build, the manifest and its lists. A build replaces a manifest of an earlier
+        schema, which counts as none.
 
         Raises
         ------
         OutputError: PTM-O010 other objects are there, without ``force``.
-        DatabaseError: PTM-D001 to D003 the manifest is wrong; PTM-D006 an object is damaged;
-            PTM-D007 another process is writing the copy.
+        DatabaseError: PTM-D001 to D003 there is no manifest to read, or a wrong one; PTM-D006 an
+            object is damaged; PTM-D007 another process is writing the copy.
         """
         announce(f"reading {self.url}")
         real_folder(self.folder.parent)
         held = self._objects.listing()
         self._note(held)
         foreign = [name for name in held if not name.startswith(f"{OBJECTS}/")]
-        if foreign and MANIFEST not in held and not force:
+        if foreign and MANIFEST not in held and not (force or self.reading):
             raise OutputError(
                 "PTM-O010",
                 "the URL has objects and is not a ptmtools database",
@@ -91,24 +98,35 @@ class RemoteDatabase:
                 remedy="specify another prefix, or use --force to write beside them",
             )
         if MANIFEST not in held:
+            if self.reading:
+                raise DatabaseError("PTM-D001", "there is no such database", file=self.url)
             return
         data = self._objects.read(MANIFEST)
         try:
             file = f"{self.url}/{MANIFEST}"
             self._before = Manifest.from_bytes(data, file=file, lists=self._list)
         except DatabaseError:
-            if reading or not (force or listed_before(data)):
+            if self.reading or not (force or listed_before(data)):
                 raise
             return
-        if self._version != self._last_version():
+        if self.reading:
+            wanted, current = self._before.files(), self._is_copied(self._before, data)
+        else:
+            wanted, current = self._before.lists(), self._version == self._last_version()
+        if not current:
             with self._locked():
-                self._replace_copy(self._before, data)
+                self._bring(wanted)
+                self._replace_manifest(self._before, data)
                 self._remember()
 
-    def read(self, digest: str) -> bytes:
-        """The bytes of an object; raises DatabaseError PTM-D006 if they are others."""
-        data = self._objects.read(object_of(digest))
-        if sha256(data) != digest:
+    def size(self, digest: str) -> int | None:
+        """See `Elsewhere.size`, at the last listing."""
+        return self._sizes.get(digest)
+
+    def read(self, digest: str, start: int = 0, end: int | None = None) -> bytes:
+        """See `Elsewhere.read`; raises DatabaseError PTM-D006 if the bytes are others."""
+        data = self._objects.read(object_of(digest), start, end)
+        if start == 0 and end is None and sha256(data) != digest:
             raise DatabaseError(
                 "PTM-D006",
                 "damaged: its SHA-256 is not its name",
@@ -127,10 +145,15 @@ class RemoteDatabase:
         self._objects.write(object_of(digest), data, _DATA)
 
     def provide(self, digest: str, load: Callable[[], bytes]) -> None:
-        """Writes an object unless it was there at the last listing."""
-        if digest not in self._present:
-            self.write(digest, load())
-            self._present.add(digest)
+        """Writes an object unless it is there."""
+        if digest not in self._sizes:
+            data = load()
+            self.write(digest, data)
+            self.note(digest, len(data))
+
+    def note(self, digest: str, size: int) -> None:
+        """Notes an object that was written since the last listing."""
+        self._sizes[digest] = size
 
     def commit(self) -> None:
         """Writes what the copy has and the URL lacks, then the manifest, then removes the objects
@@ -149,7 +172,7 @@ class RemoteDatabase:
         if _version(held) != self._version:
             raise self._overtaken()
         self._note(held)
-        missing = {d: name for name, d in now.items() if d not in self._present}
+        missing = {d: name for name, d in now.items() if d not in self._sizes}
         for _ in ordered(self._send, missing.items(), AT_ONCE):
             pass
         if self._before is None or data != self._before.to_bytes():
@@ -161,13 +184,13 @@ class RemoteDatabase:
                 raise
             self._version = _version(self._objects.listing())
         self._remember()
-        old = set(before.values()).difference(now.values()) & self._present
+        old = set(before.values()).difference(now.values()) & self._sizes.keys()
         for _ in ordered(self._objects.remove, map(object_of, sorted(old)), AT_ONCE):
             pass
 
     def _note(self, held: dict[str, Held]) -> None:
         self._version = _version(held)
-        self._present = {name.partition("/")[2] for name in held if name != MANIFEST}
+        self._sizes = {n.partition("/")[2]: row.size for n, row in held.items() if n != MANIFEST}
 
     def _send(self, item: tuple[str, str]) -> None:
         digest, name = item
@@ -180,10 +203,17 @@ class RemoteDatabase:
             raise damaged(file, "its SHA-256 is not the recorded one")
         self.write(digest, data)
 
-    def _replace_copy(self, manifest: Manifest, data: bytes) -> None:
+    def _is_copied(self, manifest: Manifest, data: bytes) -> bool:
+        """Whether the copy has this manifest, and all its files."""
+        file = real_file(self.folder, MANIFEST)
+        if file is None or file.read_bytes() != data:
+            return False
+        return all(real_file(self.folder, name) for name in manifest.files())
+
+    def _bring(self, files: Mapping[str, str]) -> None:
+        """Fetches files that the copy lacks or has with other bytes."""
         recover(self.folder)
         digests = Digests(self.folder)
-        former = last_manifest(self.folder)
 
         def bring(item: tuple[str, str]) -> None:
             name, digest = item
@@ -193,9 +223,12 @@ class RemoteDatabase:
                 place = real_folder(self.folder, folder) / base
                 write_bytes(place, self.read(digest), force=True)
 
-        for _ in ordered(bring, manifest.files().items(), AT_ONCE):
+        for _ in ordered(bring, files.items(), AT_ONCE):
             pass
-        if former:
+
+    def _replace_manifest(self, manifest: Manifest, data: bytes) -> None:
+        """Replaces that of the copy, and removes the files that it alone lists."""
+        if former := last_manifest(self.folder):
             with writing(self.folder):
                 remove_former(self.folder, former, manifest)
         write_bytes(self.folder / MANIFEST, data, force=True)
@@ -226,19 +259,16 @@ class RemoteDatabase:
 
 
 def fetch_database(url: str) -> Path:
-    """The copy of a database at a URL, to read; raises as `RemoteDatabase.fetch`, and PTM-D001 if
-    there is none."""
-    remote = RemoteDatabase(url)
+    """The copy of a database at a URL, to read; raises as `RemoteDatabase.fetch`."""
+    remote = RemoteDatabase(url, reading=True)
     with naming_url(url, remote.folder):
-        remote.fetch(reading=True)
-        if not (remote.folder / MANIFEST).is_file():
-            raise DatabaseError("PTM-D001", "there is no such database", file=url)
+        remote.fetch()
     return remote.folder
 
 
 def fetch_model(url: str) -> Path:
-    """The copy of a model at a URL, with all other files of its folder; fetches those that have
-    changed.
+    """The copy of a model at a URL, with all other files of its folder but those of databases;
+    fetches those that have changed.
 
     Raises InputError PTM-I122 if the store refuses or has no such model; OutputError PTM-O002,
     PTM-O003.
@@ -246,7 +276,14 @@ def fetch_model(url: str) -> Path:
     base, _, name = url.rpartition("/")
     objects = Objects(base, reading=True)
     announce(f"reading {base}")
-    held = {own: row for own, row in objects.listing().items() if leads_inside(own)}
+    listing = objects.listing()
+    databases = {n.removesuffix(MANIFEST) for n in listing if n.endswith(f"/{MANIFEST}")}
+    databases &= {n.partition(f"{OBJECTS}/")[0] for n in listing if f"/{OBJECTS}/" in n}
+    held = {
+        own: row
+        for own, row in listing.items()
+        if leads_inside(own) and not own.startswith(tuple(databases))
+    }
     if name not in held:
         raise objects.failure("there is no such model", url)
     folder = real_folder(_cached("models", base))
@@ -270,14 +307,44 @@ def fetch_model(url: str) -> Path:
 
 
 @contextmanager
+def folder_to_build(
+    db: str | os.PathLike[str], *, force: bool = False
+) -> Iterator[tuple[Path, RemoteDatabase | None]]:
+    """The folder of a database to build; of one at a URL that of its copy, after `fetch`."""
+    db = plain_path(db)
+    if not is_url(db):
+        yield Path(db), None
+        return
+    remote = RemoteDatabase(str(db))
+    with naming_url(remote.url, remote.folder):
+        remote.fetch(force=force)
+        yield remote.folder, remote
+
+
+@contextmanager
+def model_file(model: str | os.PathLike[str]) -> Iterator[tuple[Path, str]]:
+    """The file of a model, of one at a URL that of its copy; and the URL of its folder, or ""."""
+    model = plain_path(model)
+    if not is_url(model):
+        yield Path(model), ""
+        return
+    file, folder = fetch_model(str(model)), str(model).rpartition("/")[0]
+    with naming_url(folder, file.parent):
+        yield file, folder
+
+
+@contextmanager
 def naming_url(url: str, copy: Path) -> Iterator[None]:
-    """Errors that name a file of a copy name its URL instead."""
+    """Errors that name a copy, or a file of it, name its URL instead."""
     try:
         yield
     except PtmError as fault:
         if fault.file and Path(fault.file).is_relative_to(copy):
             name = Path(fault.file).relative_to(copy).as_posix()
             fault.file = url if name == "." else f"{url}/{name}"
+        if isinstance(fault.remedy, Rebuild):
+            command = fault.remedy.command.replace(os.fspath(copy), url)
+            fault.remedy = replace(fault.remedy, command=command)
         raise
 
 

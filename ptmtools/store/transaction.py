@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from threading import Lock
@@ -87,6 +87,22 @@ class Transaction:
                 file.replace(self._place(name))
         self._pending[name] = digest
 
+    def leave(self, name: str, digest: str) -> None:
+        """Stages an output that is elsewhere (`DatabaseFolder.elsewhere`). Raises as `put`."""
+        with writing(self._db.path):
+            remove_output(self._db.path, name)  # an earlier one, for the new one's digest
+        self._pending[name] = digest
+
+    def source(self, name: str) -> Path | Callable[[int, int], bytes]:
+        """A staged output, see `DatabaseFolder.source`."""
+        staged = real_file(self.folder, name)
+        return staged or self._db.source(name, self._pending[name])
+
+    def read(self, name: str) -> bytes:
+        """The bytes of a staged output; raises as `DatabaseFolder.read`."""
+        staged = real_file(self.folder, name)
+        return staged.read_bytes() if staged else self._db.read(name, self._pending[name])
+
     def subfolder(self, name: str = "") -> Path:
         """A folder below `folder`, created where it is absent, removed with the transaction.
 
@@ -124,8 +140,9 @@ class Transaction:
     def _staged(self, name: str, digest: str) -> bool:
         with suppress(OSError, OutputError):
             file = real_file(self.folder, name)
-            return file is not None and sha256(file.read_bytes()) == digest
-        return False
+            if file is not None:
+                return sha256(file.read_bytes()) == digest
+        return self._db.elsewhere is not None and self._db.elsewhere.size(digest) is not None
 
     def pending(self) -> dict[str, str]:
         """The outputs so far: name → SHA-256."""

@@ -73,6 +73,15 @@ def ranges_of(source: Source) -> Ranges:
     return _ranges_of_file(source)
 
 
+def first_bytes(source: Source, length: int) -> bytes:
+    """The first bytes of a file, ``length`` or all; raises as `ranges_of`."""
+    ranges = ranges_of(source)
+    try:
+        return ranges.read(0, length)
+    finally:
+        ranges.close()
+
+
 def _called(read: RangeReader, offset: int, length: int) -> bytes:
     """Calls the caller's function, which may read over a network."""
     data: object = read(offset, length)

@@ -20,9 +20,11 @@ import pytest
 from ptmtools.cluster import Cluster
 from ptmtools.coverage.options import AchOptions
 from ptmtools.errors import DatabaseError, InputError, OutputError
+from ptmtools.output import EmitOptions
 from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.encoding import TextureOptions
 from ptmtools.store import lists
+from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import IMAGES, MANIFEST
 from ptmtools.store.lists import read_list
 from ptmtools.store.manifest import Manifest
@@ -166,16 +168,19 @@ def test_workers_that_share_no_folder(
     requests = list(store.requests)
     by_workers = [request for request in requests if "app/worker" in request.agent]
     begin = f"/{bucket}/museum.db/objects/"
-    read = {r.path.removeprefix(begin) for r in by_workers if r.method == "GET"}
+    read = {r.path for r in by_workers if r.method == "GET"}
     written = {r.path.removeprefix(begin) for r in by_workers if r.method == "PUT"}
-    outputs = manifest_of(store, bucket, "museum.db").outputs()
+    manifest = manifest_of(store, bucket, "museum.db")
+    outputs = manifest.outputs()
     images = {digest for name, digest in outputs.items() if name.startswith(f"{IMAGES}/")}
-    textures = {digest for name, digest in outputs.items() if name.startswith("www/textures/")}
+    textures = set(manifest.stages["textures"].outputs.values())
     assert len(images) == 9
-    assert read == images
-    assert textures <= written
-    others = {r.path.removeprefix(begin) for r in requests if r.method == "PUT"} - written
-    assert not textures & others
+    files = set(manifest.stages["scene"].inputs) - {"museum.obj", "museum.mtl"}
+    assert read == {f"/{bucket}/models/{name}" for name in files}
+    assert images | textures <= written
+    # No image is sent, and no texture fetched.
+    others = {r.path.removeprefix(begin) for r in requests if r not in by_workers}
+    assert not others & (images | textures)
     # Names and digests alone passed through the scheduler.
     assert {name for name, _ in asked if name.startswith("encoded")} == {"encoded_at_url"}
     assert max(size for name, size in asked if name.startswith("encoded")) < 2000
@@ -238,6 +243,10 @@ def test_an_interrupted_build_leaves_the_former_database(
     assert manifest_of(store, bucket, "db") == before
     assert set(before.outputs().values()) <= objects_of(store, bucket, "db")
     monkeypatch.setattr(store, "refuse", lambda request: False)
+    # A reader sees the former state, and leaves the copy of the build alone.
+    former = DatabaseFolder.open(fetch_database(url))
+    assert former.manifest == before
+    assert former.damaged(before.files()) is None
     store.requests.clear()
     report = build_scene(rooms, url, EMBREE, FAST, workers=1)
     # The copy was ahead: nothing is computed or sent again.
@@ -245,6 +254,26 @@ def test_an_interrupted_build_leaves_the_former_database(
     assert store.written(bucket) == [f"db/{MANIFEST}"]
     machine()
     assert MANIFEST in files_below(fetch_database(url))
+
+
+def test_later_stages_read_what_they_need(
+    store: Store, bucket: str, rooms: Path, tmp_path: Path, machine: Callable[[], Path]
+) -> None:
+    """On another machine, with served files that need the heads and bytes of textures."""
+    url = f"s3://{bucket}/db"
+    build_scene(rooms, url, EMBREE, FAST, workers=1)
+    machine()
+    store.requests.clear()
+    (rooms.parent / "floor.png").write_bytes(png_bytes(np.zeros((8, 8, 3), np.uint8)))
+    options = EmitOptions(format="vrml,gltf,interlace", first_look=16)
+    build_scene(rooms, url, EMBREE, FAST, options, workers=1)
+    outputs = manifest_of(store, bucket, "db").outputs()
+    read = {r.path.rpartition("/")[2] for r in store.requests if r.method == "GET"}
+    cells = {digest for name, digest in outputs.items() if name.startswith("www/cells/")}
+    assert cells
+    assert not read & cells
+    expected = built_here(rooms, tmp_path / "here", FAST, options)
+    assert files_below(fetch_database(url)) == expected
 
 
 @pytest.mark.parametrize("checked_by", ["listing", "store"])
@@ -352,7 +381,7 @@ def test_what_is_no_database_or_model(store: Store, bucket: str, rooms: Path, pt
     done = ptm("validate", f"s3://{bucket}/none.db")
     assert (done.status, "PTM-D001" in done.err) == (5, True)
     done = ptm("pvs", f"s3://{bucket}/none.db")
-    assert (done.status, "build-scene" in done.err) == (2, True)
+    assert (done.status, "PTM-D001" in done.err) == (5, True)
 
 
 def test_a_damaged_object_is_an_error(
@@ -382,6 +411,25 @@ def test_the_commands(
     assert done.status == 0, done.err
     done = ptm("info", url)
     assert (done.status, "two_rooms.obj" in done.out) == (0, True)
+    copy = fetch_model(f"s3://{bucket}/m/two_rooms.obj").parent
+    assert files_below(copy) == files_below(rooms.parent)
+    build = ("build-scene", f"s3://{bucket}/m/two_rooms.obj", "-o", url)
+    store.requests.clear()
+    done = ptm(*build, "--dry-run", "--samples", "8", "--json")
+    assert done.status == 0, done.err
+    plans = {plan["stage"]: plan["plan"] for plan in json.loads(done.out)["stages"]}
+    assert [stage for stage, plan in plans.items() if plan != "current"] == ["ach", "emit"]
+    assert store.written(bucket) == []
+    done = ptm("pvs", url, "--report", "--json")
+    assert (done.status, "cells" in json.loads(done.out)) == (0, True), done.err
+    assert store.written(bucket) == []
+    done = ptm("emit", url, "--format", "gltf", "-j", "1")
+    assert (done.status, f"ptm publish {url}" in done.out) == (0, True), done.err
+    assert not any(n.endswith(".wrl") for n in manifest_of(store, bucket, "m/two_rooms.db").files())
+    done = ptm("ach", url, "--samples", "8", "--backend", "embree", "-v")
+    assert (done.status, "PTM" in done.err) == (0, False), done.err
+    (fetch_database(url) / "manifest.json").unlink()
+    assert ptm("validate", url).status == 8  # emission is out of date
     done = ptm("publish", url, f"s3://{bucket}/site", "--no-pictures", "--json")
     assert done.status == 0, done.err
     assert "index.html" in json.loads(done.out)["written"]

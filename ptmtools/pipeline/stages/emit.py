@@ -11,9 +11,7 @@ from ptmtools.pipeline.encoding import (
     fallback_level,
     fallback_preview,
     preview_file,
-    read_steps,
     stem_of,
-    steps_file,
 )
 from ptmtools.pipeline.stage import Artifacts, Job, Stage, described
 from ptmtools.pipeline.stages.ach import ACH
@@ -21,7 +19,12 @@ from ptmtools.pipeline.stages.apo import APO, octree_records
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.pvs import PVS
 from ptmtools.pipeline.stages.scene import image_digests
-from ptmtools.pipeline.stages.textures import TEXTURES, header_of, texture_files
+from ptmtools.pipeline.stages.textures import (
+    OBJECTS_AHEAD,
+    TEXTURES,
+    stored_texture,
+    texture_files,
+)
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import SERVED
 
@@ -30,6 +33,7 @@ if TYPE_CHECKING:
     from ptmtools.output.model import TextureRecord
     from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
+    from ptmtools.texture.sources import Source
 
 
 class EmissionJob(Job):
@@ -85,20 +89,26 @@ def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
     """The textures of a database, for the served files."""
     from ptmtools.output import TextureRecord
     from ptmtools.output.model import PreviewRecord
+    from ptmtools.parallel import ordered
 
-    record = run.record(TEXTURES)
-    options, served = run.recorded(TEXTURES), run.db.path / SERVED
+    db, outputs, options = run.db, run.record(TEXTURES).outputs, run.recorded(TEXTURES)
 
-    def one(image: int, name: str) -> TextureRecord:
-        stem = stem_of(name)
-        file = steps_file(stem)
-        steps = run.cached(file, lambda: read_steps(run.db.read_output(TEXTURES.name, file)))
-        header = header_of(served / name)
+    def read(name: str) -> bytes:
+        return db.read_output(TEXTURES.name, name)
+
+    def source(name: str) -> Source:
+        return db.source(name, db.output(TEXTURES.name, name))
+
+    def one(numbered: tuple[int, str]) -> TextureRecord:
+        image, name = numbered
+        texture = stored_texture(run, name, source, read)
+        header, steps, stem = texture.header, texture.steps, stem_of(name)
         png, fallback, level = f"{name.removesuffix('ptm')}png", None, None
-        if f"{SERVED}/{png}" in record.outputs:
+        if f"{SERVED}/{png}" in outputs:
             fallback, level = png, fallback_level(header, options.fallback_size)
         elif options.fallback and (preview := fallback_preview(steps, options.fallback_size)):
             fallback, level = preview_file(stem, preview), preview.level
+        served = f"{SERVED}/{fallback}"
         return TextureRecord(
             image=image,
             file=name,
@@ -107,18 +117,20 @@ def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
             height=header.levels[-1].height,
             components=header.components,
             levels=header.levels,
-            sha256=run.db.output(TEXTURES.name, f"{SERVED}/{name}"),
+            sha256=db.output(TEXTURES.name, f"{SERVED}/{name}"),
             fallback_level=level,
-            fallback_bytes=(served / fallback).stat().st_size if fallback else 0,
+            fallback_bytes=db.size(served, outputs[served]) if fallback else 0,
             detail=steps.detail,
-            stored=served / name,
+            stored=source(f"{SERVED}/{name}"),
             errors=steps.errors,
             previews=tuple(
-                PreviewRecord(preview_file(stem, preview), preview) for preview in steps.previews
+                PreviewRecord(file, preview, source(f"{SERVED}/{file}"))
+                for preview in steps.previews
+                for file in (preview_file(stem, preview),)
             ),
         )
 
-    return tuple(one(i, name) for i, name in enumerate(texture_files(image_digests(run))))
+    return tuple(ordered(one, enumerate(texture_files(image_digests(run))), OBJECTS_AHEAD))
 
 
 def _summary(n: Mapping[str, Any]) -> str:

@@ -15,7 +15,7 @@ import io
 import json
 import time
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from itertools import takewhile
@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 from ptmtools.errors import naming
 from ptmtools.pipeline.encoding import (
+    EncodedAtUrl,
     ImageFile,
     ImageTask,
     SharedUrl,
@@ -55,6 +56,7 @@ if TYPE_CHECKING:
     from ptmtools.store.transaction import Transaction
     from ptmtools.texture.model import PtmHeader
     from ptmtools.texture.previews import Steps
+    from ptmtools.texture.sources import Source
 
 #: Objects that are sent, and textures that are fetched, at a time.
 OBJECTS_AHEAD = 8
@@ -308,7 +310,7 @@ class TexturesJob(Job):
         chunk = max(1, min(IMAGES_PER_MESSAGE, len(self._left) // (8 * executor.workers)))
         remote = self.run.remote if executor.machines else None
         with ExitStack() as stack:
-            results: Iterator[Sequence[tuple[str, bytes] | tuple[str, str, str]]]
+            results: Iterator[Sequence[tuple[str, bytes] | tuple[str, str, str]] | EncodedAtUrl]
             disk = None
             if remote is None:
                 path = self.run.db.path
@@ -326,36 +328,61 @@ class TexturesJob(Job):
                     encoded_on_disk, disk, tasks, releases_lock=True, chunk=chunk
                 )
             for result in results:
-                for output in result:
-                    if len(output) == 2:
-                        transaction.put(*output)
-                    else:
-                        transaction.take(output[0], Path(output[1]), output[2])
+                names = self._put(transaction, result)
                 self.run.progress(total - len(self._left), total, "textures")
-                names = [output[0] for output in result]
                 transaction.finish(self._task(self._left.popleft()), names)
         self.run.progress(total - len(self._left), total, "textures")
         self._seconds += time.perf_counter() - start
 
+    def _put(
+        self,
+        transaction: Transaction,
+        result: Sequence[tuple[str, bytes] | tuple[str, str, str]] | EncodedAtUrl,
+    ) -> list[str]:
+        """Stages the files of a texture; their names."""
+        if isinstance(result, EncodedAtUrl):
+            return self._leave(transaction, result)
+        for output in result:
+            if len(output) == 2:
+                transaction.put(*output)
+            else:
+                transaction.take(output[0], Path(output[1]), output[2])
+        return [output[0] for output in result]
+
+    def _leave(self, transaction: Transaction, result: EncodedAtUrl) -> list[str]:
+        """See `_put`. Later stages need the head and the steps."""
+        from ptmtools.texture.container import read_header
+
+        run, names = self.run, []
+        assert run.remote
+        for name, digest, length in result.files:
+            run.remote.note(digest, length)
+            if name:
+                transaction.leave(name, digest)
+                names.append(name)
+        run.cache(names[0], read_header(result.head))
+        run.cache(names[1], read_steps(result.steps))
+        return names
+
     def _encoded_at_url(
         self, remote: RemoteDatabase, executor: Executor, wanted: Iterable[int], chunk: int
-    ) -> Iterator[list[tuple[str, bytes]]]:
-        """The files of textures that workers have encoded from and to objects at the URL."""
+    ) -> Iterator[EncodedAtUrl]:
+        """The textures that workers have encoded from and to objects at the URL."""
         from ptmtools.parallel import ordered
 
-        images = images_of(self.run)
+        images, folder = images_of(self.run), self.run.folder_url
 
         def sent(i: int) -> ImageTask:
-            remote.provide(images[i].sha256, images[i].load)
-            return ImageTask(images[i].name, images[i].sha256, str(i), self._fewer[i])
+            image, file = images[i], ""
+            if folder and image.files and remote.size(image.sha256) is None:
+                file = image.files[0]
+            if not file:
+                remote.provide(image.sha256, image.load)
+            return ImageTask(image.name, image.sha256, unresolved=self._fewer[i], file=file)
 
-        def fetched(files: list[tuple[str, str]]) -> list[tuple[str, bytes]]:
-            return [(name, remote.read(digest)) for name, digest in files]
-
-        place = SharedUrl(self.options, remote.url)
+        place = SharedUrl(self.options, remote.url, folder)
         tasks = ordered(sent, wanted, OBJECTS_AHEAD)
-        encoded = executor.each(encoded_at_url, place, tasks, releases_lock=True, chunk=chunk)
-        yield from ordered(fetched, encoded, OBJECTS_AHEAD)
+        return executor.each(encoded_at_url, place, tasks, releases_lock=True, chunk=chunk)
 
     def _task(self, i: int) -> str:
         """A digest of everything that the files of a texture depend on, their names included."""
@@ -365,14 +392,24 @@ class TexturesJob(Job):
 
     def _stored(self, transaction: Transaction) -> Iterator[Stored]:
         """All textures, staged or committed."""
+        from ptmtools.parallel import ordered
 
-        def place(name: str) -> Path:
-            staged = transaction.folder / name
-            return staged if staged.is_file() else self.run.db.path / name
+        def one(name: str) -> Stored:
+            return stored_texture(self.run, name, transaction.source, transaction.read)
 
-        for name in self._names:
-            steps = read_steps(place(steps_file(stem_of(name))).read_bytes())
-            yield Stored(name, header_of(place(f"{SERVED}/{name}")), steps)
+        return ordered(one, self._names, OBJECTS_AHEAD)
+
+
+def stored_texture(
+    artifacts: Artifacts, name: str, source: Callable[[str], Source], read: Callable[[str], bytes]
+) -> Stored:
+    """The texture of a `.ptm`; ``source`` and ``read`` open files of the database."""
+    ptm, steps = f"{SERVED}/{name}", steps_file(stem_of(name))
+    return Stored(
+        name,
+        artifacts.cached(ptm, lambda: header_of(source(ptm))),
+        artifacts.cached(steps, lambda: read_steps(read(steps))),
+    )
 
 
 def counts_of(textures: Iterable[Stored]) -> dict[str, int]:
@@ -405,13 +442,13 @@ def notes_on_size(textures: Iterable[Stored], most: int) -> Iterator[str]:
         )
 
 
-def header_of(file: Path) -> PtmHeader:
-    """The header of a `.ptm`; raises as `read_header`."""
-    from ptmtools.files import open_regular
+def header_of(source: Source) -> PtmHeader:
+    """The header of a `.ptm`; raises as `ranges_of` and `read_header`."""
     from ptmtools.texture.container import HEAD_MAX, read_header
+    from ptmtools.texture.sources import first_bytes
 
-    with open_regular(file) as stream, naming(file):
-        return read_header(stream.read(HEAD_MAX))
+    with naming(str(source) if isinstance(source, Path) else None):
+        return read_header(first_bytes(source, HEAD_MAX))
 
 
 def _summary(n: Mapping[str, Any]) -> str:
