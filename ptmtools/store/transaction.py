@@ -15,6 +15,7 @@ Only files that a manifest lists and `.ptm-new/` are removed. No link is followe
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
@@ -58,14 +59,15 @@ class Transaction:
         """The folder of the outputs, each under its name in the database."""
         return self._db.path / self._relative
 
-    def put(self, name: str, data: bytes) -> None:
-        """Stages one output, unless the database already has it.
+    def put(self, name: str, data: bytes, digest: str = "") -> None:
+        """Stages one output, unless the database already has it. Computes the ``digest`` if it is
+        not given. May be called from several threads.
 
         Raises
         ------
         OutputError: PTM-O002, PTM-O003, PTM-O005.
         """
-        digest = sha256(data)
+        digest = digest or sha256(data)
         if not self.keep({name: digest}):
             write_bytes(self._place(name), data, force=True)
         self._pending[name] = digest
@@ -228,14 +230,24 @@ def _complete(folder: Path, relative: str) -> None:
         data = (staging / MANIFEST).read_bytes()
         after = Manifest.from_bytes(data, file=staging / MANIFEST, lists=lists_in(folder))
         before = last_manifest(folder)
-        for name in after.lists():  # the outputs are read from them
+        staged = _files_below(staging)
+        for name in sorted(after.lists().keys() & staged):  # the outputs are read from them
             _move(staging, name, folder)
-        for name in after.beyond(before):
+        for name in sorted(after.beyond(before).keys() & staged):
             _move(staging, name, folder)
         if before:
             remove_former(folder, before, after)
         (staging / MANIFEST).replace(folder / MANIFEST)
         shutil.rmtree(staging)  # not its parent, where another transaction may begin
+
+
+def _files_below(folder: Path) -> set[str]:
+    """The files below a folder, without those behind links, relative to it."""
+    files: set[str] = set()
+    for place, _, names in os.walk(folder):
+        relative = Path(place).relative_to(folder).as_posix()
+        files.update(names if relative == "." else (f"{relative}/{name}" for name in names))
+    return files
 
 
 def _move(staging: Path, name: str, folder: Path) -> None:

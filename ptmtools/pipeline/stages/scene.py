@@ -226,6 +226,7 @@ class ReadingJob(Job):
         fresh: Iterable[SourceImage],
     ) -> None:
         """Stages the list of images, and a copy of each fresh one, which must be decodable."""
+        from ptmtools.parallel import ordered
         from ptmtools.texture.images import check_image
         from ptmtools.texture.model import Limits
 
@@ -238,11 +239,15 @@ class ReadingJob(Job):
         self.run.cache(IMAGE_LIST, rows)
         text = json.dumps({"images": rows}, indent=1, ensure_ascii=False) + "\n"
         transaction.put(IMAGE_LIST, text.encode())
-        for image in fresh:
+
+        def put(image: SourceImage) -> None:
             data = image.load()
             with naming(image.name):
                 check_image(data, Limits(self.options.limit << 20))
-            transaction.put(f"{IMAGES}/{image.sha256}", data)
+            transaction.put(f"{IMAGES}/{image.sha256}", data, image.sha256)
+
+        for _ in ordered(put, fresh, self.run.workers.here):
+            pass
 
 
 def _counts(scene: Scene) -> Mapping[str, Any]:
