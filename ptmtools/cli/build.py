@@ -19,14 +19,12 @@ from ptmtools.cli.console import Console
 from ptmtools.cli.parameters import (
     Command,
     cluster_options,
-    database_argument,
     force_option,
     jobs_option,
     json_option,
     new_database_option,
     option,
     options_of,
-    readable_folder,
     take,
     with_console,
 )
@@ -40,6 +38,7 @@ from ptmtools.pipeline.stages import CELLS, EMIT, PVS, STAGES
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import SERVED
 from ptmtools.store.objects import is_url
+from ptmtools.store.remote import folder_to_build
 
 if TYPE_CHECKING:
     from ptmtools.pipeline.status import StagePlan
@@ -160,15 +159,18 @@ def _of_database(stage: Stage[Any]) -> Callable[..., None]:
         if wanted:
             from ptmtools.visibility.report import report as describe, report_lines
 
-            artifacts = Artifacts(open_database(readable_folder(db)))
-            details = describe(artifacts[CELLS], artifacts[PVS])
+            with folder_to_build(db) as (folder, remote):
+                database = open_database(folder)
+                database.elsewhere = remote
+                artifacts = Artifacts(database)
+                details = describe(artifacts[CELLS], artifacts[PVS])
             console.result(asdict(details), report_lines(details, verbose=console.verbose))
 
     return report_option(command) if stage is PVS else command
 
 
 @click.command("status", cls=Command)
-@database_argument
+@click.argument("db", type=click.Path())
 @json_option
 @with_console
 def status(console: Console, db: str) -> None:

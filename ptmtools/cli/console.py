@@ -172,6 +172,10 @@ def describe(fault: BaseException) -> tuple[int, str]:
                 from ptmtools.pipeline.command import complete_remedy
 
                 complete_remedy(fault)
+            if fault.file:
+                from ptmtools.store.copies import url_of
+
+                fault.file = url_of(fault.file)
             return fault.exit_status, str(fault)
         case click.exceptions.NoArgsIsHelpError():
             return USAGE, fault.format_message()

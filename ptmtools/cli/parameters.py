@@ -360,20 +360,15 @@ json_option = option(
 )
 
 
-def readable_folder(db: str) -> str:
+def local_copy(context: click.Context, parameter: click.Parameter, value: str) -> str:
     """The folder of a database to read; of one at a URL that of its copy."""
     from ptmtools.store.objects import is_url, plain_path
 
-    if not is_url(plain_path(db)):
-        return os.fspath(plain_path(db))
+    if not is_url(plain_path(value)):
+        return os.fspath(plain_path(value))
     from ptmtools.store.remote import fetch_database
 
-    return os.fspath(fetch_database(db))
-
-
-def local_copy(context: click.Context, parameter: click.Parameter, value: str) -> str:
-    """`readable_folder` of an argument."""
-    return readable_folder(value)
+    return os.fspath(fetch_database(value))
 
 
 database_argument = click.argument("db", type=click.Path(), callback=local_copy)

@@ -72,7 +72,7 @@ def build_scene(
             from ptmtools.scene.ingestion import check_file
 
             check_file(file)
-        folder, remote = stack.enter_context(folder_to_build(db, force=force))
+        folder, remote = stack.enter_context(folder_to_build(db, new=True, force=force))
         writer = stack.enter_context(DatabaseWriter.open_for_model(folder, file.name, force=force))
         used = stack.enter_context(Workers(workers, scheduler))
         run = Run(

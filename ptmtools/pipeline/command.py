@@ -16,6 +16,7 @@ from pathlib import Path
 from ptmtools.errors import DatabaseError, Rebuild
 from ptmtools.options import arguments
 from ptmtools.pipeline.stages import STAGES
+from ptmtools.store.copies import url_of
 from ptmtools.store.folder import DatabaseFolder, last_manifest
 from ptmtools.store.manifest import Manifest
 
@@ -28,7 +29,14 @@ def build_command(db: str | PathLike[str]) -> str:
     for name, stage in STAGES.items():
         with suppress(KeyError, ValueError):
             options.append(stage.recorded(manifest.stages[name]))
-    parts = ["ptm", "build-scene", manifest.model or "MODEL", "-o", str(db), *arguments(options)]
+    parts = [
+        "ptm",
+        "build-scene",
+        manifest.model or "MODEL",
+        "-o",
+        url_of(Path(db)),
+        *arguments(options),
+    ]
     return shlex.join(parts)
 
 

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from ptmtools.errors import DatabaseError
 from ptmtools.pipeline.build import chosen_options
 from ptmtools.pipeline.command import naming_command
 from ptmtools.pipeline.records import reasons
@@ -82,27 +84,28 @@ def database_status(path: str | os.PathLike[str]) -> DatabaseStatus:
     DatabaseError: PTM-D001 no database there; PTM-D002 damaged manifest; PTM-D003 schema of
         another version.
     """
-    folder = Path(path)
-    with naming_command(path):
-        manifest = read_manifest(folder)
-    begun = (folder / STAGING).is_dir()
-    if manifest is None and not begun and not (folder / LOCK).exists():
-        DatabaseFolder.open(folder)  # raises
-    db = DatabaseFolder(folder, manifest or Manifest(""))
-    db.manifest = db.without_lost()
-    artifacts = Artifacts(db)
-    stages = tuple(_status(artifacts, stage) for stage in STAGES.values())
-    db.digests.save()
-    held = is_held(folder)
-    return DatabaseStatus(
-        database=os.fspath(path),
-        model=manifest.model if manifest else None,
-        stages=stages,
-        finished=all(stage.state == "done" for stage in stages),
-        writer=str(holder(folder) or "an unknown process") if held else None,
-        interrupted=begun and not held,
-        waiting=finished_tasks(folder),
-    )
+    with folder_to_build(path, new=True, force=True) as (folder, remote):
+        with naming_command(folder):
+            manifest = read_manifest(folder)
+        begun = (folder / STAGING).is_dir()
+        if manifest is None and not begun and not (folder / LOCK).exists():
+            DatabaseFolder.open(folder)  # raises
+        db = DatabaseFolder(folder, manifest or Manifest(""))
+        db.elsewhere = remote
+        db.manifest = db.without_lost()
+        artifacts = Artifacts(db)
+        stages = tuple(_status(artifacts, stage) for stage in STAGES.values())
+        db.digests.save()
+        held = is_held(folder)
+        return DatabaseStatus(
+            database=os.fspath(path),
+            model=manifest.model if manifest else None,
+            stages=stages,
+            finished=all(stage.state == "done" for stage in stages),
+            writer=str(holder(folder) or "an unknown process") if held else None,
+            interrupted=begun and not held,
+            waiting=finished_tasks(folder),
+        )
 
 
 def _status(artifacts: Artifacts, stage: Stage[Any]) -> StageStatus:
@@ -114,7 +117,10 @@ def _status(artifacts: Artifacts, stage: Stage[Any]) -> StageStatus:
         # Databases of earlier releases lack stages that change an artifact; they changed nothing.
         done = stage.changes is not None and stage.changes.name in db.manifest.stages
         return StageStatus(stage.name, "done" if done else "not run", "", {}, 0, 0)
-    files = [file for name in record.outputs if (file := db.path / name).is_file()]
+    sizes: list[int] = []
+    for name, digest in record.outputs.items():
+        with suppress(DatabaseError):
+            sizes.append(db.size(name, digest))
     state: State = "done"
     why = ""
     if lost := db.damaged(record.outputs):
@@ -126,8 +132,8 @@ def _status(artifacts: Artifacts, stage: Stage[Any]) -> StageStatus:
         state,
         why,
         record.counts,
-        len(files),
-        sum(file.stat().st_size for file in files),
+        len(sizes),
+        sum(sizes),
     )
 
 
@@ -167,7 +173,10 @@ def plan_build(
     from ptmtools.scene.ingestion import check_file
 
     chosen = chosen_options(options)
-    with model_file(model) as (file, _), folder_to_build(db, force=force) as (folder, remote):
+    with (
+        model_file(model) as (file, _),
+        folder_to_build(db, new=True, force=force) as (folder, remote),
+    ):
         check_file(file)
         database = DatabaseFolder(folder, admitted(folder, file.name, force=force))
         database.elsewhere = remote

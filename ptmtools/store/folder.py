@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from ptmtools.errors import DatabaseError, Rebuild
-from ptmtools.files import open_regular
+from ptmtools.files import open_regular, real_folder, write_bytes
 from ptmtools.store.digests import Digests
 from ptmtools.store.layout import MANIFEST, arrays_of, sha256
 from ptmtools.store.lists import ReadList, list_file, read_list
@@ -102,7 +102,7 @@ class DatabaseFolder:
     def source(self, name: str, digest: str) -> Path | Callable[[int, int], bytes]:
         """A file of the database, or a function ``read(offset, length)`` if it is elsewhere."""
         elsewhere, file = self.elsewhere, self.path / name
-        if elsewhere is None or self._is_here(name, digest):
+        if elsewhere is None or self.has(name, digest):
             return file
         return lambda offset, length: elsewhere.read(digest, offset, offset + length)
 
@@ -136,25 +136,39 @@ class DatabaseFolder:
         name = arrays_of(stage)
         return unpack_arrays(self.read_output(stage, name), file=self.path / name)
 
-    def without_lost(self) -> Manifest:
-        """The manifest without stages that lack one of their lists (`Manifest.lost`)."""
-        lists = {name: record.list_files() for name, record in self.manifest.stages.items()}
-        lost = {name: self.damaged(files) for name, files in lists.items()}
-        return self.manifest.without({name: file for name, file in lost.items() if file})
+    def bring(self, name: str, digest: str) -> None:
+        """Copies a file that is only elsewhere into the folder; raises as `read`."""
+        missing = self.elsewhere is None or self.elsewhere.size(digest) is None
+        if not missing and not self.has(name, digest):
+            folder, _, base = name.rpartition("/")
+            write_bytes(real_folder(self.path, folder) / base, self.read(name, digest), force=True)
+
+    def without_lost(self, *, thoroughly: bool = False) -> Manifest:
+        """The manifest without stages that lack one of their lists (`Manifest.lost`), or with
+        ``thoroughly`` have one that is no list of theirs."""
+        lost = {}
+        for name, record in self.manifest.stages.items():
+            files = record.list_files()
+            if file := next((f for f, digest in files.items() if not self.has(f, digest)), None):
+                lost[name] = file
+            elif thoroughly:
+                try:
+                    len(record.inputs), len(record.outputs)
+                except DatabaseError:
+                    lost[name] = next(iter(files))
+        return self.manifest.without(lost)
 
     def damaged(self, outputs: Mapping[str, str]) -> str | None:
         """The first file that is missing or has another hash, or None."""
         elsewhere = self.elsewhere
         for name, digest in outputs.items():
-            if not self._is_here(name, digest) and (
-                elsewhere is None or elsewhere.size(digest) is None
-            ):
+            if not self.has(name, digest) and (elsewhere is None or elsewhere.size(digest) is None):
                 return name
         return None
 
-    def _is_here(self, name: str, digest: str) -> bool:
-        """Whether the folder has a file."""
-        with suppress(OSError):
+    def has(self, name: str, digest: str) -> bool:
+        """Whether the folder itself has a file."""
+        with suppress(OSError, ValueError):  # a NUL in the name
             return self.digests.of(self.path / name) == digest
         return False
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 import zlib
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property
 from os import PathLike
 from typing import Any
@@ -48,12 +49,13 @@ class FileList(Mapping[str, str]):
     def _files(self) -> dict[str, str]:
         return self.without(())
 
-    def without(self, lists: Collection[str]) -> dict[str, str]:
-        """The files that are not in these lists, of which none is read."""
+    def without(self, lists: Collection[str], *, found: bool = False) -> dict[str, str]:
+        """The files that are not in these lists, of which none is read; with ``found``, those of
+        the lists that can be read."""
         files: dict[str, str] = {}
         for digest in self.lists:
-            if digest not in lists:
-                files |= self._read(digest)
+            with suppress(*(DatabaseError,) if found else ()):
+                files |= {} if digest in lists else self._read(digest)
         return files
 
     def __getitem__(self, name: str) -> str:

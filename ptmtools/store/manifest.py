@@ -121,15 +121,16 @@ class Manifest:
         """Every file of the database with its SHA-256, except the manifest itself."""
         return {**self.outputs(), **self.lists()}
 
-    def beyond(self, former: Manifest | None) -> dict[str, str]:
+    def beyond(self, former: Manifest | None, *, found: bool = False) -> dict[str, str]:
         """The outputs that are not in a list of the former manifest: all that it lacks or has with
-        other digests, and more."""
+        other digests, and more. With ``found``, those of the lists that can be read."""
         outputs: dict[str, str] = {}
         for stage, record in self.stages.items():
             own, before = record.outputs, former.stages.get(stage) if former else None
             known = before.outputs if before else None
             if isinstance(own, FileList):
-                own = own.without(set(known.lists) if isinstance(known, FileList) else ())
+                shared = set(known.lists) if isinstance(known, FileList) else ()
+                own = own.without(shared, found=found)
             outputs |= own
         return outputs
 
@@ -170,7 +171,8 @@ class Manifest:
         if document.get("schema") != SCHEMA:
             raise DatabaseError(
                 "PTM-D003",
-                f"schema version {document.get('schema')!r}, this ptmtools reads {SCHEMA}",
+                f"schema version {document.get('schema')!r}, "
+                f"this ptmtools reads {_EXTENDED} and {SCHEMA}",
                 file=file,
                 remedy=Rebuild("build it again with {}, or use the ptmtools that wrote it")
                 if listed_before(data)
@@ -183,7 +185,7 @@ class Manifest:
 
         def outputs(digest: str) -> Mapping[str, str]:
             files = lists(digest)
-            if not all(own and _is_output(name) for name, own in files.items()):
+            if not all_outputs(files):
                 raise damaged_manifest(file, f"{list_file(digest)} is no list of outputs")
             return files
 
@@ -201,6 +203,11 @@ def as_current(document: dict[str, Any]) -> dict[str, Any]:
     """A document of the schema that this one extends, as one of this schema; others unchanged."""
     extended = type(document.get("schema")) is int and document["schema"] == _EXTENDED
     return document | {"schema": SCHEMA} if extended else document
+
+
+def all_outputs(files: Mapping[str, str]) -> bool:
+    """Whether all files are ones that stages write."""
+    return all(digest and _is_output(name) for name, digest in files.items())
 
 
 def listed_before(data: bytes) -> Manifest | None:

@@ -185,6 +185,16 @@ class Objects:
             if name.startswith(begin) and not name.endswith("/")
         }
 
+    def held(self, name: str) -> Held | None:
+        """An object as a listing has it; None if there is none."""
+        if not self.kind:  # other properties than in a listing
+            return self.listing().get(name)
+        with self._asking("cannot be read", name):
+            try:
+                return self._held(self._system.info(self._path(name)))
+            except FileNotFoundError:
+                return None
+
     def _held(self, row: Mapping[str, Any]) -> Held:
         size = int(row["size"])
         if self.kind:

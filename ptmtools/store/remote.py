@@ -23,27 +23,37 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import replace
 from pathlib import Path
 
 from ptmtools.errors import DatabaseError, OutputError, PtmError, Rebuild
-from ptmtools.files import leads_inside, real_file, real_folder, write_bytes, writing
+from ptmtools.files import (
+    leads_inside,
+    open_regular,
+    real_file,
+    real_folder,
+    write_bytes,
+    writing,
+)
 from ptmtools.parallel import ordered
 from ptmtools.progress import announce
-from ptmtools.store.digests import Digests, cache_folder
+from ptmtools.store.copies import BUILDS, DATABASES, READERS, folder_for, note_url
+from ptmtools.store.digests import Digests
 from ptmtools.store.folder import damaged, last_manifest, lists_in, read_manifest, unreadable
 from ptmtools.store.layout import MANIFEST, sha256
 from ptmtools.store.lists import read_list
 from ptmtools.store.manifest import Manifest, listed_before
-from ptmtools.store.objects import Headers, Held, Objects, is_url, plain_path
+from ptmtools.store.objects import Headers, Objects, is_url, plain_path
 from ptmtools.store.transaction import recover, remove_former, remove_output
 from ptmtools.store.writer import acquire
 
 #: Objects that are sent or fetched at a time: each waits for the network.
 AT_ONCE = 8
 OBJECTS = "objects"
+#: The objects of a database in a folder below.
+_OF_DATABASE = re.compile(rf"/{OBJECTS}/[0-9a-f]{{64}}$")
 _DATA = Headers("application/octet-stream", "public, max-age=31536000, immutable")
 _STATE = Headers("application/json", "no-cache")
 
@@ -68,55 +78,57 @@ class RemoteDatabase:
     def __init__(self, url: str, *, reading: bool = False) -> None:
         self._objects = Objects(url)
         self.url, self.reading = self._objects.url, reading
-        self.folder = _cached("databases", self.url) / ("read" if reading else "db")
+        self.folder = folder_for(DATABASES, self.url) / (READERS if reading else BUILDS)
         self._base = self.folder.with_name(f"{self.folder.name}-version")
         self._version = ""
-        self._before: Manifest | None = None
+        #: The manifest as it was read.
+        self._before: tuple[Manifest, bytes] | None = None
+        #: Of all objects, once they were listed.
         self._sizes: dict[str, int] = {}
+        self._listed = False
 
-    def fetch(self, *, force: bool = False) -> None:
+    def fetch(self, *, new: bool = False, force: bool = False) -> None:
         """Brings the copy up to the state at the URL, unless it is that, or ahead of it: to read,
-        all files; to build, the manifest and its lists. A build replaces a manifest of an earlier
-        schema, which counts as none.
+        all files; to build, the manifest and its lists, as far as they can be read. With ``new``
+        there need be no database, and one of an earlier schema counts as none.
 
         Raises
         ------
         OutputError: PTM-O010 other objects are there, without ``force``.
-        DatabaseError: PTM-D001 to D003 there is no manifest to read, or a wrong one; PTM-D006 an
-            object is damaged; PTM-D007 another process is writing the copy.
+        DatabaseError: PTM-D001 to D003 there is no manifest, or a wrong one; PTM-D005, D006 an
+            object is missing or damaged; PTM-D007 another process is writing the copy.
         """
         announce(f"reading {self.url}")
-        real_folder(self.folder.parent)
+        note_url(self.folder.parent, self.url)
         held = self._objects.listing()
-        self._note(held)
-        foreign = [name for name in held if not name.startswith(f"{OBJECTS}/")]
-        if foreign and MANIFEST not in held and not (force or self.reading):
-            raise OutputError(
-                "PTM-O010",
-                "the URL has objects and is not a ptmtools database",
-                file=self.url,
-                remedy="specify another prefix, or use --force to write beside them",
-            )
+        self._version = held[MANIFEST].version if MANIFEST in held else ""
+        self._sizes = {n.partition("/")[2]: row.size for n, row in held.items() if n != MANIFEST}
+        self._listed = True
         if MANIFEST not in held:
-            if self.reading:
+            if not new:
                 raise DatabaseError("PTM-D001", "there is no such database", file=self.url)
+            if any(not name.startswith(f"{OBJECTS}/") for name in held) and not force:
+                raise OutputError(
+                    "PTM-O010",
+                    "the URL has objects and is not a ptmtools database",
+                    file=self.url,
+                    remedy="specify another prefix, or use --force to write beside them",
+                )
             return
         data = self._objects.read(MANIFEST)
         try:
             file = f"{self.url}/{MANIFEST}"
-            self._before = Manifest.from_bytes(data, file=file, lists=self._list)
+            manifest = Manifest.from_bytes(data, file=file, lists=self._list)
         except DatabaseError:
-            if self.reading or not (force or listed_before(data)):
+            if not new or not (force or listed_before(data)):
                 raise
             return
-        if self.reading:
-            wanted, current = self._before.files(), self._is_copied(self._before, data)
-        else:
-            wanted, current = self._before.lists(), self._version == self._last_version()
-        if not current:
+        self._before = manifest, data
+        copied = self._is_copied(manifest, data) if self.reading else self._is_current()
+        if not copied:
             with self._locked():
-                self._bring(wanted)
-                self._replace_manifest(self._before, data)
+                self._bring(manifest.files() if self.reading else manifest.lists())
+                self._replace_manifest(manifest, data)
                 self._remember()
 
     def size(self, digest: str) -> int | None:
@@ -124,14 +136,22 @@ class RemoteDatabase:
         return self._sizes.get(digest)
 
     def read(self, digest: str, start: int = 0, end: int | None = None) -> bytes:
-        """See `Elsewhere.read`; raises DatabaseError PTM-D006 if the bytes are others."""
+        """See `Elsewhere.read`; raises DatabaseError PTM-D005 if there is none, PTM-D006 if the
+        bytes are others."""
+        if self._listed and digest not in self._sizes:
+            raise DatabaseError(
+                "PTM-D005",
+                "is missing",
+                file=f"{self.url}/{object_of(digest)}",
+                remedy=Rebuild("run {} again to rebuild it"),
+            )
         data = self._objects.read(object_of(digest), start, end)
         if start == 0 and end is None and sha256(data) != digest:
             raise DatabaseError(
                 "PTM-D006",
                 "damaged: its SHA-256 is not its name",
                 file=f"{self.url}/{object_of(digest)}",
-                remedy="remove it and build again",
+                remedy=Rebuild("remove it, then run {} again"),
             )
         return data
 
@@ -167,30 +187,30 @@ class RemoteDatabase:
         manifest = read_manifest(self.folder)
         assert manifest
         now = manifest.files()
-        before = self._before.files() if self._before else {}
-        held = self._objects.listing()
-        if _version(held) != self._version:
+        if self._version_now() != self._version:
             raise self._overtaken()
-        self._note(held)
         missing = {d: name for name, d in now.items() if d not in self._sizes}
         for _ in ordered(self._send, missing.items(), AT_ONCE):
             pass
-        if self._before is None or data != self._before.to_bytes():
+        before, last = self._before or (None, b"")
+        if data != last:
             try:
                 self._objects.write(MANIFEST, data, _STATE, instead_of=self._version)
             except OutputError:
-                if _version(self._objects.listing()) != self._version:
+                if self._version_now() != self._version:
                     raise self._overtaken() from None
                 raise
-            self._version = _version(self._objects.listing())
+            self._version = self._version_now()
         self._remember()
-        old = set(before.values()).difference(now.values()) & self._sizes.keys()
-        for _ in ordered(self._objects.remove, map(object_of, sorted(old)), AT_ONCE):
-            pass
+        if before:
+            former = {*before.beyond(None, found=True).values(), *before.lists().values()}
+            old = former.difference(now.values()) & self._sizes.keys()
+            for _ in ordered(self._objects.remove, map(object_of, sorted(old)), AT_ONCE):
+                pass
 
-    def _note(self, held: dict[str, Held]) -> None:
-        self._version = _version(held)
-        self._sizes = {n.partition("/")[2]: row.size for n, row in held.items() if n != MANIFEST}
+    def _version_now(self) -> str:
+        held = self._objects.held(MANIFEST)
+        return held.version if held else ""
 
     def _send(self, item: tuple[str, str]) -> None:
         digest, name = item
@@ -203,6 +223,11 @@ class RemoteDatabase:
             raise damaged(file, "its SHA-256 is not the recorded one")
         self.write(digest, data)
 
+    def _is_current(self) -> bool:
+        """Whether the copy was made from this state of the URL."""
+        version = self._base.read_text() if self._base.is_file() else ""
+        return version == self._version and real_file(self.folder, MANIFEST) is not None
+
     def _is_copied(self, manifest: Manifest, data: bytes) -> bool:
         """Whether the copy has this manifest, and all its files."""
         file = real_file(self.folder, MANIFEST)
@@ -211,17 +236,19 @@ class RemoteDatabase:
         return all(real_file(self.folder, name) for name in manifest.files())
 
     def _bring(self, files: Mapping[str, str]) -> None:
-        """Fetches files that the copy lacks or has with other bytes."""
+        """Fetches files that the copy lacks or has with other bytes; those to be read all."""
         recover(self.folder)
-        digests = Digests(self.folder)
+        digests, builds = Digests(self.folder), self.folder.with_name(BUILDS)
 
         def bring(item: tuple[str, str]) -> None:
             name, digest = item
             file = real_file(self.folder, name)
-            if file is None or digests.of(file) != digest:
-                folder, _, base = name.rpartition("/")
-                place = real_folder(self.folder, folder) / base
-                write_bytes(place, self.read(digest), force=True)
+            if file is not None and digests.of(file) == digest:
+                return
+            folder, _, base = name.rpartition("/")
+            with suppress(*() if self.reading else (DatabaseError,)):
+                data = _held(builds / name, digest) or self.read(digest)
+                write_bytes(real_folder(self.folder, folder) / base, data, force=True)
 
         for _ in ordered(bring, files.items(), AT_ONCE):
             pass
@@ -242,9 +269,6 @@ class RemoteDatabase:
             yield
         finally:
             release()
-
-    def _last_version(self) -> str:
-        return self._base.read_text() if self._base.is_file() else ""
 
     def _remember(self) -> None:
         write_bytes(self._base, self._version.encode(), force=True)
@@ -277,16 +301,12 @@ def fetch_model(url: str) -> Path:
     objects = Objects(base, reading=True)
     announce(f"reading {base}")
     listing = objects.listing()
-    databases = {n.removesuffix(MANIFEST) for n in listing if n.endswith(f"/{MANIFEST}")}
-    databases &= {n.partition(f"{OBJECTS}/")[0] for n in listing if f"/{OBJECTS}/" in n}
-    held = {
-        own: row
-        for own, row in listing.items()
-        if leads_inside(own) and not own.startswith(tuple(databases))
-    }
+    of_databases = {name for name in listing if _OF_DATABASE.search(name)}
+    of_databases |= {_OF_DATABASE.sub(f"/{MANIFEST}", name) for name in of_databases}
+    held = {n: row for n, row in listing.items() if leads_inside(n) and n not in of_databases}
     if name not in held:
         raise objects.failure("there is no such model", url)
-    folder = real_folder(_cached("models", base))
+    folder = real_folder(folder_for("models", base))
     index = folder / "versions.json"
     known = json.loads(index.read_bytes()) if index.is_file() else {}
     copy = real_folder(folder, "files")
@@ -308,7 +328,7 @@ def fetch_model(url: str) -> Path:
 
 @contextmanager
 def folder_to_build(
-    db: str | os.PathLike[str], *, force: bool = False
+    db: str | os.PathLike[str], *, new: bool = False, force: bool = False
 ) -> Iterator[tuple[Path, RemoteDatabase | None]]:
     """The folder of a database to build; of one at a URL that of its copy, after `fetch`."""
     db = plain_path(db)
@@ -317,7 +337,7 @@ def folder_to_build(
         return
     remote = RemoteDatabase(str(db))
     with naming_url(remote.url, remote.folder):
-        remote.fetch(force=force)
+        remote.fetch(new=new, force=force)
         yield remote.folder, remote
 
 
@@ -342,21 +362,12 @@ def naming_url(url: str, copy: Path) -> Iterator[None]:
         if fault.file and Path(fault.file).is_relative_to(copy):
             name = Path(fault.file).relative_to(copy).as_posix()
             fault.file = url if name == "." else f"{url}/{name}"
-        if isinstance(fault.remedy, Rebuild):
-            command = fault.remedy.command.replace(os.fspath(copy), url)
-            fault.remedy = replace(fault.remedy, command=command)
         raise
 
 
-def _version(held: dict[str, Held]) -> str:
-    return held[MANIFEST].version if MANIFEST in held else ""
-
-
-def _cached(kind: str, url: str) -> Path:
-    """The folder for the copy of a URL."""
-    folder = cache_folder(kind)
-    if folder is None:
-        raise OutputError(
-            "PTM-O002", "there is no folder for copies", file=url, remedy="set XDG_CACHE_HOME"
-        )
-    return folder / sha256(url.encode())[:32]
+def _held(file: Path, digest: str) -> bytes | None:
+    """The bytes of a file, if they have the digest."""
+    with suppress(OSError), open_regular(file) as stream:
+        data = stream.read()
+        return data if sha256(data) == digest else None
+    return None

@@ -51,6 +51,8 @@ class Transaction:
         self._turn = turn
         self._relative = f"{STAGING}/{name}"
         self._pending: dict[str, str] = {}
+        #: Those of them whose files are in `folder`.
+        self._staged: set[str] = set()
         self._committed = db.manifest.outputs()
         self._finished = _read_journal(self.folder)
 
@@ -70,6 +72,7 @@ class Transaction:
         digest = digest or sha256(data)
         if not self.keep({name: digest}):
             write_bytes(self._place(name), data, force=True)
+            self._staged.add(name)
         self._pending[name] = digest
 
     def put_arrays(self, stage: str, arrays: Mapping[str, NDArray[np.generic]]) -> None:
@@ -87,23 +90,25 @@ class Transaction:
                 file.unlink()
             else:
                 file.replace(self._place(name))
+                self._staged.add(name)
         self._pending[name] = digest
 
     def leave(self, name: str, digest: str) -> None:
-        """Stages an output that is elsewhere (`DatabaseFolder.elsewhere`). Raises as `put`."""
-        with writing(self._db.path):
-            remove_output(self._db.path, name)  # an earlier one, for the new one's digest
+        """Stages an output that is elsewhere (`DatabaseFolder.elsewhere`)."""
+        self._staged.discard(name)
         self._pending[name] = digest
 
     def source(self, name: str) -> Path | Callable[[int, int], bytes]:
         """A staged output, see `DatabaseFolder.source`."""
-        staged = real_file(self.folder, name)
-        return staged or self._db.source(name, self._pending[name])
+        if name in self._staged:
+            return self.folder / name
+        return self._db.source(name, self._pending[name])
 
     def read(self, name: str) -> bytes:
         """The bytes of a staged output; raises as `DatabaseFolder.read`."""
-        staged = real_file(self.folder, name)
-        return staged.read_bytes() if staged else self._db.read(name, self._pending[name])
+        if name in self._staged:
+            return (self.folder / name).read_bytes()
+        return self._db.read(name, self._pending[name])
 
     def subfolder(self, name: str = "") -> Path:
         """A folder below `folder`, created where it is absent, removed with the transaction.
@@ -114,9 +119,12 @@ class Transaction:
 
     def keep(self, outputs: Mapping[str, str]) -> bool:
         """Keeps committed outputs; False if one is missing or different."""
-        same = all(self._committed.get(name) == digest for name, digest in outputs.items())
-        if not same or self._db.damaged(outputs):
+        # The names of many files are in lists, so they are looked up last.
+        if self._db.damaged(outputs):
             return False
+        if any(self._committed.get(name) != digest for name, digest in outputs.items()):
+            return False
+        self._staged.difference_update(outputs)
         self._pending.update(outputs)
         return True
 
@@ -126,9 +134,15 @@ class Transaction:
         outputs = self._finished.get(task)
         if outputs is None:
             return False
+        elsewhere, staged = self._db.elsewhere, set()
         for name, digest in outputs.items():
-            if not self._staged(name, digest) and not self.keep({name: digest}):
+            if self._is_staged(name, digest):
+                staged.add(name)
+            elif elsewhere and elsewhere.size(digest) is not None:
+                continue
+            elif not self.keep({name: digest}):
                 return False
+        self._staged = (self._staged - outputs.keys()) | staged
         self._pending.update(outputs)
         return True
 
@@ -139,12 +153,11 @@ class Transaction:
         with writing(folder), open(folder / _JOURNAL, "a", encoding="utf-8") as journal:
             journal.write(line + "\n")
 
-    def _staged(self, name: str, digest: str) -> bool:
+    def _is_staged(self, name: str, digest: str) -> bool:
         with suppress(OSError, OutputError):
             file = real_file(self.folder, name)
-            if file is not None:
-                return sha256(file.read_bytes()) == digest
-        return self._db.elsewhere is not None and self._db.elsewhere.size(digest) is not None
+            return file is not None and sha256(file.read_bytes()) == digest
+        return False
 
     def pending(self) -> dict[str, str]:
         """The outputs so far: name → SHA-256."""
@@ -157,17 +170,27 @@ class Transaction:
             stages = {**self._db.manifest.stages, **records}
             listed = {name: each.listed(read, self._put_list) for name, each in stages.items()}
             manifest = self._db.manifest.with_stages(listed)
+            self._remove_others()
             write_bytes(self.subfolder() / MANIFEST, manifest.to_bytes(), force=True)
             _complete(self._db.path, self._relative)
             self._db.manifest = manifest
-        for name, digest in self._pending.items():
-            self._db.digests.note(self._db.path / name, digest)
-        self._pending, self._finished = {}, {}
+        for name in self._staged:
+            if name in self._pending:
+                self._db.digests.note(self._db.path / name, self._pending[name])
+        self._pending, self._staged, self._finished = {}, set(), {}
         self._committed = manifest.outputs()
 
     def _put_list(self, name: str, data: bytes) -> None:
-        if self._db.damaged({name: sha256(data)}):
+        if not self._db.has(name, sha256(data)):
             write_bytes(self._place(name), data, force=True)
+            self._staged.add(name)
+
+    def _remove_others(self) -> None:
+        """Removes what an interrupted run has staged and this one has not taken over."""
+        folder = self.subfolder()
+        for name in _files_below(folder) - self._staged:
+            if file := real_file(folder, name):
+                file.unlink()
 
     def _place(self, name: str) -> Path:
         """The path of a staged output, whose folder is created."""
@@ -185,7 +208,12 @@ def recover(folder: Path) -> None:
             if entry.is_symlink() or not entry.is_dir():
                 entry.unlink()
             elif real_file(entry, MANIFEST):
-                _complete(folder, f"{STAGING}/{entry.name}")
+                try:
+                    _complete(folder, f"{STAGING}/{entry.name}")
+                except DatabaseError as fault:
+                    if fault.code not in ("PTM-D005", "PTM-D006"):
+                        raise
+                    shutil.rmtree(entry)  # a list is lost, and with it the commit
     discard(folder, also_finished=False)
 
 
@@ -257,10 +285,11 @@ def _move(staging: Path, name: str, folder: Path) -> None:
 
 
 def remove_former(folder: Path, before: Manifest, after: Manifest) -> None:
-    """Removes the files that a former manifest alone lists. Its lists are removed last: where one
-    is missing, an interrupted call has removed all other files."""
-    with suppress(DatabaseError):
-        for name in before.beyond(after).keys() - after.beyond(before).keys():
+    """Removes the files that a former manifest alone lists, its lists last: an interrupted call
+    needs them. Files stay that only a lost list names."""
+    with suppress(DatabaseError):  # a list of the later manifest is lost
+        kept = after.beyond(before)
+        for name in before.beyond(after, found=True).keys() - kept.keys():
             remove_output(folder, name)
     for name in before.lists().keys() - after.lists().keys():
         remove_output(folder, name)

@@ -37,14 +37,21 @@ class DatabaseWriter(DatabaseFolder):
     run. If nothing was committed or finished, it removes the folders that it has created.
     """
 
-    def __init__(self, path: Path, manifest: Callable[[], Manifest], created: list[Path]) -> None:
+    def __init__(
+        self,
+        path: Path,
+        manifest: Callable[[], Manifest],
+        created: list[Path],
+        *,
+        thoroughly: bool = False,
+    ) -> None:
         """``manifest`` is called with the lock held; ``created`` are the folders created for the
-        database, outermost first."""
+        database, outermost first; ``thoroughly`` is for `without_lost`."""
         self._release, self._created, self._turn = acquire(path), created, Lock()
         try:
             recover(path)
             super().__init__(path, manifest())
-            self.manifest = self.without_lost()
+            self.manifest = self.without_lost(thoroughly=thoroughly)
         except BaseException:
             self._release()
             raise
@@ -83,7 +90,9 @@ class DatabaseWriter(DatabaseFolder):
         try:
             with writing(folder):
                 folder.mkdir(parents=True, exist_ok=True)
-            return DatabaseWriter(folder, lambda: admitted(folder, model, force=force), created)
+            return DatabaseWriter(
+                folder, lambda: admitted(folder, model, force=force), created, thoroughly=force
+            )
         except BaseException as fault:
             _remove_empty(created)
             if isinstance(fault, OutputError) and fault.code == "PTM-O002":

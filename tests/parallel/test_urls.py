@@ -17,12 +17,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cluster import Cluster
 from ptmtools.coverage.options import AchOptions
 from ptmtools.errors import DatabaseError, InputError, OutputError
 from ptmtools.output import EmitOptions
 from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.encoding import TextureOptions
+from ptmtools.pipeline.stages import STAGES
 from ptmtools.store import lists
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import IMAGES, MANIFEST
@@ -256,6 +258,137 @@ def test_an_interrupted_build_leaves_the_former_database(
     assert MANIFEST in files_below(fetch_database(url))
 
 
+def painted(rooms: Path, name: str, color: int) -> None:
+    (rooms.parent / name).write_bytes(png_bytes(np.full((24, 24, 3), color, np.uint8)))
+
+
+def few_in_lists(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lists, "INLINE", 4)
+    monkeypatch.setattr(lists, "MEAN", 4)
+
+
+def test_two_machines_alternate(
+    store: Store,
+    bucket: str,
+    rooms: Path,
+    tmp_path: Path,
+    machine: Callable[[], Path],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The copy of one has older textures than the URL."""
+    few_in_lists(monkeypatch)
+    url, looks = f"s3://{bucket}/db", EmitOptions(first_look=16)
+    one, other = machine(), machine()
+
+    def build(at: Path, *options: Any) -> None:
+        monkeypatch.setenv("XDG_CACHE_HOME", str(at))
+        build_scene(rooms, url, EMBREE, FAST, *options, workers=1)
+
+    build(one)
+    painted(rooms, "floor.png", 80)
+    build(other)
+    painted(rooms, "room_a.png", 160)
+    build(one)
+    build(one, looks)
+    machine()
+    assert files_below(fetch_database(url)) == built_here(rooms, tmp_path / "here", FAST, looks)
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_a_refused_manifest_with_lists(
+    store: Store,
+    bucket: str,
+    rooms: Path,
+    tmp_path: Path,
+    machine: Callable[[], Path],
+    monkeypatch: pytest.MonkeyPatch,
+    first: bool,
+) -> None:
+    """The lists of the refused one are at the URL; the next manifest, or machine, needs them."""
+    few_in_lists(monkeypatch)
+    url = f"s3://{bucket}/db"
+    plain = (rooms.parent / "floor.png").read_bytes()
+
+    def refused(request: Any) -> bool:
+        return bool(request.method == "PUT" and MANIFEST in request.path)
+
+    if not first:
+        build_scene(rooms, url, EMBREE, FAST, workers=1)
+        painted(rooms, "floor.png", 80)
+    with monkeypatch.context() as patch:
+        patch.setattr(store, "refuse", refused)
+        with pytest.raises(OutputError, match="PTM-O012"):
+            build_scene(rooms, url, EMBREE, FAST, workers=1)
+    (rooms.parent / "floor.png").write_bytes(plain)
+    if first:
+        machine()
+    build_scene(rooms, url, EMBREE, FAST, workers=1)
+    machine()
+    assert files_below(fetch_database(url)) == built_here(rooms, tmp_path / "here", FAST)
+
+
+def test_local_processes_encode_images_of_the_url(
+    store: Store, bucket: str, tmp_path: Path, machine: Callable[[], Path]
+) -> None:
+    model, url = make_museum(tmp_path / "model", size=64), f"s3://{bucket}/db"
+    build_scene(model, url, EMBREE, FAST, workers=1)
+    machine()
+    other = TextureOptions(fallback=False, max_side=32)
+    build_scene(model, url, EMBREE, other, SubdivideOptions(wall_area=1.5), workers=3)
+    machine()
+    here = tmp_path / "here"
+    build_scene(model, here, EMBREE, other, SubdivideOptions(wall_area=1.5), workers=1)
+    assert files_below(fetch_database(url)) == files_below(here)
+
+
+@pytest.mark.parametrize("damage", ["lost", "damaged"])
+def test_a_list_that_is_lost_at_the_url(
+    store: Store,
+    bucket: str,
+    rooms: Path,
+    tmp_path: Path,
+    machine: Callable[[], Path],
+    monkeypatch: pytest.MonkeyPatch,
+    damage: str,
+) -> None:
+    few_in_lists(monkeypatch)
+    url = f"s3://{bucket}/db"
+    build_scene(rooms, url, EMBREE, FAST, workers=1)
+    lists_of = {n: r.list_files() for n, r in manifest_of(store, bucket, "db").stages.items()}
+    shared = {d for stage, own in lists_of.items() if stage != "emit" for d in own.values()}
+    digest = min(set(lists_of["emit"].values()) - shared)
+    key = {"Bucket": bucket, "Key": f"db/objects/{digest}"}
+    if damage == "lost":
+        store.client().delete_object(**key)
+    else:
+        store.client().put_object(**key, Body=b"{}")
+    machine()
+    with pytest.raises(DatabaseError, match=r"PTM-D00[56]") as raised:
+        fetch_database(url)
+    assert raised.value.file == f"{url}/objects/{digest}"
+    store.client().delete_object(**key)
+    report = build_scene(rooms, url, EMBREE, FAST, workers=1)
+    assert [stage.stage for stage in report.stages if stage.ran] == ["emit"]
+    machine()
+    assert files_below(fetch_database(url)) == built_here(rooms, tmp_path / "here", FAST)
+
+
+def test_a_model_with_folders_like_those_of_databases(
+    store: Store, bucket: str, machine: Callable[[], Path]
+) -> None:
+    """And beside an unfinished database."""
+    digest = "ab" * 32
+    names = {"m.obj", "tex/manifest.json", "tex/objects/wood.png", "3d-objects/a.png"}
+    others = {
+        f"m.db/objects/{digest}",
+        f"3d-objects/d/objects/{digest}",
+        "3d-objects/d/manifest.json",
+    }
+    for name in names | others:
+        store.client().put_object(Bucket=bucket, Key=f"m/{name}", Body=b"x")
+    assert set(files_below(fetch_model(f"s3://{bucket}/m/m.obj").parent)) == names
+
+
 def test_later_stages_read_what_they_need(
     store: Store, bucket: str, rooms: Path, tmp_path: Path, machine: Callable[[], Path]
 ) -> None:
@@ -288,20 +421,19 @@ def test_two_builds_at_a_time(
     """The later one refuses; by itself, or because the store does."""
     url = f"s3://{bucket}/db"
     slow = RemoteDatabase(url)
-    slow.fetch()
-    slow_listing = slow._objects.listing()
+    slow.fetch(new=True)
     build_scene(rooms, slow.folder, EMBREE, FAST, workers=1)
     machine()
     build_scene(rooms, url, EMBREE, TextureOptions(), workers=1)
     first = manifest_of(store, bucket, "db")
     if checked_by == "store":
-        listing = Objects.listing
-        stale = [slow_listing]
+        held = Objects.held
+        stale = [None]
 
-        def late(self: Objects) -> Any:
-            return stale.pop() if stale else listing(self)
+        def late(self: Objects, name: str) -> Any:
+            return stale.pop() if stale else held(self, name)
 
-        monkeypatch.setattr(Objects, "listing", late)
+        monkeypatch.setattr(Objects, "held", late)
     with pytest.raises(DatabaseError, match="PTM-D007"):
         slow.commit()
     assert manifest_of(store, bucket, "db") == first
@@ -423,13 +555,16 @@ def test_the_commands(
     done = ptm("pvs", url, "--report", "--json")
     assert (done.status, "cells" in json.loads(done.out)) == (0, True), done.err
     assert store.written(bucket) == []
+    done = ptm("status", url)
+    assert (done.status, done.out.count("done")) == (0, len(STAGES)), done.err
     done = ptm("emit", url, "--format", "gltf", "-j", "1")
     assert (done.status, f"ptm publish {url}" in done.out) == (0, True), done.err
     assert not any(n.endswith(".wrl") for n in manifest_of(store, bucket, "m/two_rooms.db").files())
     done = ptm("ach", url, "--samples", "8", "--backend", "embree", "-v")
     assert (done.status, "PTM" in done.err) == (0, False), done.err
     (fetch_database(url) / "manifest.json").unlink()
-    assert ptm("validate", url).status == 8  # emission is out of date
+    done = ptm("validate", url)  # emission is out of date
+    assert (done.status, f"-o {url}" in done.err) == (8, True), done.err
     done = ptm("publish", url, f"s3://{bucket}/site", "--no-pictures", "--json")
     assert done.status == 0, done.err
     assert "index.html" in json.loads(done.out)["written"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +15,8 @@ from ptmtools.pipeline.status import database_status, plan_build
 from ptmtools.pipeline.validation import validate
 from ptmtools.store import lists
 from ptmtools.store.folder import DatabaseFolder
-from ptmtools.store.layout import LISTS
+from ptmtools.store.layout import LISTS, sha256
+from ptmtools.store.lists import FileList, list_file
 from tests.conftest import files_below
 
 MODEL = Path(__file__).resolve().parents[2] / "sample_data/two_rooms/two_rooms.obj"
@@ -74,8 +76,24 @@ def test_a_damaged_list(db: Path, damage: Callable[[Path], object], code: str) -
     assert files_below(db) == before
 
 
+def test_a_list_of_impossible_outputs(db: Path) -> None:
+    """With the right digest, it is a finding, and no file outside is read."""
+    outputs = DatabaseFolder.open(db).record("emit").outputs
+    assert isinstance(outputs, FileList)
+    lost = db / list_file(outputs.lists[0])
+    document = json.loads(lost.read_text())
+    document["files"] = {"../../../etc/hostname": "ab" * 32}
+    text = json.dumps(document)
+    (lost.parent / f"{sha256(text.encode())}.json").write_text(text)
+    manifest = db / "manifest.json"
+    manifest.write_text(manifest.read_text().replace(lost.stem, sha256(text.encode())))
+    found = {(issue.code, issue.file) for issue in validate(db).issues}
+    assert ("PTM-D650", f"{LISTS}/{sha256(text.encode())}.json") in found
+    assert not any("hostname" in file for _, file in found)
+
+
 def test_a_database_without_lists_gets_them(db: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A stage that runs again writes lists; others keep their entries."""
+    """Of an earlier release, where one stage runs again."""
     monkeypatch.setattr(lists, "INLINE", 1024)
     build_scene(MODEL, db, QUICK, workers=1, rebuild=True)
     assert not (db / LISTS).exists()

@@ -10,7 +10,7 @@ from hypothesis import assume, given, strategies as st
 
 from ptmtools import schemas
 from ptmtools.errors import DatabaseError
-from ptmtools.store import lists
+from ptmtools.store import folder, lists
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import LISTS, MANIFEST, sha256
 from ptmtools.store.lists import FileList, list_file, lists_of, read_list
@@ -131,12 +131,66 @@ def test_a_commit_replaces_the_lists_that_changed(tmp_path: Path) -> None:
 def test_other_stages_read_no_list(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write(tmp_path, FILES)
     write(tmp_path, {"stages/x": b"x"}, "pvs")
-    monkeypatch.setattr(FileList, "without", lambda *_: pytest.fail("a list was read"))
-    monkeypatch.setattr("ptmtools.store.transaction.Manifest.beyond", lambda *_: {"stages/x": ""})
+    monkeypatch.setattr(folder, "read_list", lambda *_, **__: pytest.fail("a list was read"))
     with DatabaseWriter.open_for_model(tmp_path, "m.obj") as writer:
         staged = writer.begin("pvs")
-        staged.put("stages/x", b"x")
+        staged.put("stages/x", b"another")
         staged.commit({"pvs": StageRecord(1, {}, {}, staged.pending())})
+
+
+def test_a_staged_file_of_another_run_stays_out(tmp_path: Path) -> None:
+    """A task that has finished before the input changed back."""
+    write(tmp_path, {"www/a": b"old", "www/b": b"b"})
+
+    def stopped() -> None:
+        with DatabaseWriter.open_for_model(tmp_path, "m.obj") as writer:
+            staged = writer.begin("cells")
+            staged.put("www/a", b"new")
+            staged.finish("a", ["www/a"])
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stopped()
+    write(tmp_path, {"www/a": b"old", "www/b": b"c"})
+    db = DatabaseFolder.open(tmp_path)
+    assert (tmp_path / "www/a").read_bytes() == b"old"
+    assert db.damaged(db.record("cells").outputs) is None
+
+
+@pytest.mark.usefixtures("short")
+def test_a_commit_without_its_lists_is_dropped(tmp_path: Path) -> None:
+    write(tmp_path, FILES)
+    write(tmp_path, {**FILES, "www/00": b"2"})
+    after = files_below(tmp_path)
+    staged = tmp_path / ".ptm-new/cells"
+    staged.mkdir(parents=True)
+    (staged / MANIFEST).write_bytes(after[MANIFEST].replace(b'"cells"', b'"pvs"'))
+    for name in after:
+        if name.startswith(LISTS):
+            (tmp_path / name).unlink()
+    with DatabaseWriter.open_for_model(tmp_path, "m.obj") as writer:
+        assert list(writer.manifest.lost) == ["cells"]
+    assert not (tmp_path / ".ptm-new").exists()
+    write(tmp_path, FILES)
+
+
+@pytest.mark.usefixtures("short")
+def test_a_list_that_is_none_of_outputs(tmp_path: Path) -> None:
+    """With the right digest: --force drops its stage."""
+    write(tmp_path, FILES)
+    text = (tmp_path / MANIFEST).read_text()
+    bad = b'{"format": "ptmtools file list", "schema": 1, "files": {"../x": "' + b"ab" * 32 + b'"}}'
+    (tmp_path / list_file(sha256(bad))).write_bytes(bad)
+    first = json.loads(text)["stages"]["cells"]["outputs"][0]
+    (tmp_path / MANIFEST).write_text(text.replace(first, sha256(bad)))
+    with pytest.raises(DatabaseError, match="PTM-D002"):
+        write(tmp_path, FILES)
+    with DatabaseWriter.open_for_model(tmp_path, "m.obj", force=True) as writer:
+        assert list(writer.manifest.lost) == ["cells"]
+        staged = writer.begin("cells")
+        staged.put("www/00", b"1")
+        staged.commit({"cells": StageRecord(1, {}, {}, staged.pending())})
+    assert set(DatabaseFolder.open(tmp_path).manifest.files()) == {"www/00"}
 
 
 @pytest.mark.usefixtures("short")

@@ -38,7 +38,7 @@ from ptmtools.quantities import count
 from ptmtools.store.folder import lists_in
 from ptmtools.store.layout import MANIFEST, SERVED
 from ptmtools.store.lists import list_file
-from ptmtools.store.manifest import as_current
+from ptmtools.store.manifest import all_outputs, as_current
 from ptmtools.texture.model import Limits
 
 #: Foreign files listed by name in a note.
@@ -180,7 +180,7 @@ class _Check:
             self._manifest.add("PTM-D650", fault.message, fault.place)
         for record in self._stages.values():
             for field in ("inputs", "outputs"):
-                record[field] = self._files(record[field])
+                record[field] = self._listed(record[field], field == "outputs")
         for stage, record in self._stages.items():
             at = self._manifest.at(f"stages.{stage}")
             for name in sorted(self._outputs.keys() & record["outputs"].keys()):
@@ -192,20 +192,26 @@ class _Check:
                 if self._outputs.get(name, digest) != digest:
                     at.add("PTM-D656", f"computed from an earlier {name}")
 
-    def _files(self, listed: dict[str, str] | list[str]) -> dict[str, str]:
+    def _listed(self, files: dict[str, str] | list[str], outputs: bool) -> dict[str, str]:
         """Inputs or outputs of a stage, of the manifest or of lists."""
-        if isinstance(listed, dict):
-            return listed
-        self._outputs |= {list_file(digest): digest for digest in listed}
-        files: dict[str, str] = {}
-        for digest in listed:
+        if isinstance(files, dict):
+            return files
+        self._outputs |= {list_file(digest): digest for digest in files}
+        found: dict[str, str] = {}
+        for digest in files:
+            fault = ""
             try:
-                files |= lists_in(self._folder)(digest)
-            except DatabaseError as fault:  # the file is reported as all others
+                own = lists_in(self._folder)(digest)
+                if outputs and not all_outputs(own):
+                    own, fault = {}, "is no list of outputs"
+                found |= own
+            except DatabaseError as error:  # a file that is missing or another is reported as such
                 self._complete = False
-                if fault.code == "PTM-D006":
-                    self.findings.at(list_file(digest)).add("PTM-D650", fault.message)
-        return files
+                fault = error.message if error.code == "PTM-D006" else ""
+            if fault:
+                self._complete = False
+                self.findings.at(list_file(digest)).add("PTM-D650", fault)
+        return found
 
     def _extent(self) -> float:
         """The largest side of the model, metres; 0 if it is not recorded."""

@@ -119,7 +119,7 @@ def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
             levels=header.levels,
             sha256=db.output(TEXTURES.name, f"{SERVED}/{name}"),
             fallback_level=level,
-            fallback_bytes=db.size(served, outputs[served]) if fallback else 0,
+            fallback_bytes=db.size(served, db.output(TEXTURES.name, served)) if fallback else 0,
             detail=steps.detail,
             stored=source(f"{SERVED}/{name}"),
             errors=steps.errors,

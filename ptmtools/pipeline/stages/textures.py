@@ -321,9 +321,7 @@ class TexturesJob(Job):
                 sources = (ImageFile(images[i].name, images[i].load(), fewer[i]) for i in wanted)
                 results = executor.each(encoded_image, self.options, sources, releases_lock=True)
             else:
-                tasks = (
-                    ImageTask(images[i].name, images[i].sha256, str(i), fewer[i]) for i in wanted
-                )
+                tasks = map(self._on_disk, wanted)
                 results = executor.each(
                     encoded_on_disk, disk, tasks, releases_lock=True, chunk=chunk
                 )
@@ -333,6 +331,12 @@ class TexturesJob(Job):
                 transaction.finish(self._task(self._left.popleft()), names)
         self.run.progress(total - len(self._left), total, "textures")
         self._seconds += time.perf_counter() - start
+
+    def _on_disk(self, i: int) -> ImageTask:
+        """The task of an image, which is on the disk of the database then."""
+        image = images_of(self.run)[i]
+        self.run.db.bring(f"{IMAGES}/{image.sha256}", image.sha256)
+        return ImageTask(image.name, image.sha256, str(i), self._fewer[i])
 
     def _put(
         self,
@@ -405,11 +409,9 @@ def stored_texture(
 ) -> Stored:
     """The texture of a `.ptm`; ``source`` and ``read`` open files of the database."""
     ptm, steps = f"{SERVED}/{name}", steps_file(stem_of(name))
-    return Stored(
-        name,
-        artifacts.cached(ptm, lambda: header_of(source(ptm))),
-        artifacts.cached(steps, lambda: read_steps(read(steps))),
-    )
+    with naming(artifacts.db.path / ptm):
+        header = artifacts.cached(ptm, lambda: header_of(source(ptm)))
+    return Stored(name, header, artifacts.cached(steps, lambda: read_steps(read(steps))))
 
 
 def counts_of(textures: Iterable[Stored]) -> dict[str, int]:
@@ -447,8 +449,7 @@ def header_of(source: Source) -> PtmHeader:
     from ptmtools.texture.container import HEAD_MAX, read_header
     from ptmtools.texture.sources import first_bytes
 
-    with naming(str(source) if isinstance(source, Path) else None):
-        return read_header(first_bytes(source, HEAD_MAX))
+    return read_header(first_bytes(source, HEAD_MAX))
 
 
 def _summary(n: Mapping[str, Any]) -> str:
