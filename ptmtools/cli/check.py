@@ -35,6 +35,7 @@ from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS
 from ptmtools.pipeline.validation import kind_of, shoot_segments, validate as check
 from ptmtools.quantities import count, size
+from ptmtools.store.copies import url_of
 from ptmtools.texture.model import Limits
 from ptmtools.visibility import SegmentReport
 
@@ -148,7 +149,7 @@ def _document(
     return {
         "format": "ptmtools validation",
         "schema": 1,
-        "target": target,
+        "target": url_of(target),
         "ok": ok,
         "counts": {
             "files": report.files,
@@ -183,17 +184,17 @@ def _lines(
     for pair in shot.missed if shot else ():
         a, b = pair.cells
         lines.append(
-            f"{target}: error: an unobstructed segment connects cells {a} and {b}, which are not "
+            f"{url_of(target)}: error: an unobstructed segment connects cells {a} and {b}, which are not "
             "in each other's visible sets"
         )
     if shot:
         lines.append(
-            f"{target}: tested {count(shot.tried, 'random segment')}: {shot.unoccluded:,} "
+            f"{url_of(target)}: tested {count(shot.tried, 'random segment')}: {shot.unoccluded:,} "
             f"unobstructed; {shot.missed_segments:,} of these connect cells missing from each "
             f"other's visible sets; {shot.hairlines:,} undecided (too close to an edge)"
         )
     totals = (
-        f"{target}: {count(report.files, 'file')}, {size(report.bytes)}; "
+        f"{url_of(target)}: {count(report.files, 'file')}, {size(report.bytes)}; "
         f"{count(report.error_count, 'error')}, {count(report.warning_count, 'warning')}"
     )
     return [*lines, *(f"note: {note}" for note in report.notes), totals]

@@ -20,6 +20,7 @@ from ptmtools.errors import InputError, naming
 from ptmtools.pipeline.validation import kind_of
 from ptmtools.quantities import count, size
 from ptmtools.scene.options import SUFFIXES, IngestOptions
+from ptmtools.store.copies import url_of
 from ptmtools.texture.model import Description, PtmHeader, gpu_texel_bytes
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ def _info_database(console: Console, target: str) -> None:
     visitor = Visitor.of(db.manifest)
     old = [n for n, s in STAGES.items() if n in stages and stages[n].recipe != s.recipe]
     if old:
-        console.warn(f"{target}: {', '.join(old)}: {_OLD}; run `{build_command(target)}`")
+        console.warn(f"{url_of(target)}: {', '.join(old)}: {_OLD}; run `{build_command(target)}`")
     shown = "recipe", "parameters", "counts", "notes", "warnings"
     document = {
         "model": db.manifest.model,
@@ -82,7 +83,7 @@ def _info_database(console: Console, target: str) -> None:
         "outdated": old,
         "visitor": visitor and asdict(visitor),
     }
-    lines = [f"{target}: database of {db.manifest.model}"]
+    lines = [f"{url_of(target)}: database of {db.manifest.model}"]
     for name, stage in STAGES.items():
         if name not in stages:
             continue
