@@ -184,8 +184,8 @@ def _lines(
     for pair in shot.missed if shot else ():
         a, b = pair.cells
         lines.append(
-            f"{url_of(target)}: error: an unobstructed segment connects cells {a} and {b}, which are not "
-            "in each other's visible sets"
+            f"{url_of(target)}: error: an unobstructed segment connects cells {a} and {b}, which "
+            "are not in each other's visible sets"
         )
     if shot:
         lines.append(
