@@ -8,6 +8,7 @@ import threading
 import webbrowser
 from dataclasses import asdict
 from ipaddress import ip_address
+from pathlib import Path
 from typing import Any
 
 import click
@@ -24,8 +25,10 @@ from ptmtools.cli.parameters import (
     take,
     with_console,
 )
+from ptmtools.pipeline.validation import check_folder
 from ptmtools.quantities import count, size
-from ptmtools.site.content import SiteOptions, site_of
+from ptmtools.site.content import Site, SiteOptions, site_of
+from ptmtools.site.forms import form_of, form_site, form_weight
 from ptmtools.site.lookup import files_of
 from ptmtools.site.published import PublishOptions
 from ptmtools.site.publishing import COARSE, publish as write, weight_of
@@ -61,8 +64,8 @@ def _origin(context: click.Context, parameter: click.Parameter, value: str | Non
 def serve(console: Console, db: str, opened: bool, origin: str | None, **values: Any) -> None:
     """Serve DB to browsers on this machine until Ctrl-C, and print the URL of its page.
 
-    DB is a database, or a folder that `ptm publish` wrote. --bandwidth and --latency simulate a
-    slow connection.
+    DB is a database, or a folder that `ptm publish`, `ptm apo` or `ptm interlace` wrote.
+    --bandwidth and --latency simulate a slow connection.
     """
     options = take(ServeOptions, values)
     require()
@@ -131,26 +134,46 @@ def publish(
     console: Console, db: str, target: str | None, output: str | None, force: bool, **values: Any
 ) -> None:
     """Write DB as a web site: a folder that any web server can serve, or the objects below a URL
-    such as s3://bucket/prefix or gs://bucket/prefix.
+    such as s3://bucket/prefix or gs://bucket/prefix. DB is a database, or a folder that `ptm apo`
+    or `ptm interlace` wrote.
 
     A second run rewrites only the files that have changed.
     """
     target = _only_target(target, output)
     site_options, options = take(SiteOptions, values), take(PublishOptions, values)
+    form = form_of(Path(db))
     with console.progress() as progress:
-        site = site_of(db, site_options, progress)
+        if form:
+            check_folder(Path(db))
+            site = form_site(Path(db), form, site_options.title)
+        else:
+            site = site_of(db, site_options, progress)
         done = write(site, target, options, force=force, progress=progress)
-    weight = weight_of(site)
     changed = {name: list(names) for name, names in asdict(done).items()}
     for note in site.notes if not console.as_json else ():
         console.warn(note)
     removed = f", {count(len(done.removed), 'file')} removed" if done.removed else ""
-    lines = (
+    first = (
         f"{target}: {count(len(done.written), 'file')} written, "
-        f"{len(done.unchanged):,} unchanged{removed}",
+        f"{len(done.unchanged):,} unchanged{removed}"
+    )
+    weight, lines = _weight_of_form(site) if form else _weight_of_walk(site)
+    document = {**changed, "notes": list(site.notes), "bytes": weight}
+    console.result(document, (first, *lines))
+
+
+def _weight_of_form(site: Site) -> tuple[dict[str, int], tuple[str, ...]]:
+    """The bytes that a visitor downloads, and lines of text."""
+    page, whole = form_weight(site)
+    return {"page": page, "whole": whole}, (f"download: page {size(page)}, all {size(whole)}",)
+
+
+def _weight_of_walk(site: Site) -> tuple[dict[str, int], tuple[str, ...]]:
+    """As `_weight_of_form`, of a database."""
+    weight = weight_of(site)
+    return asdict(weight), (
         f"download: page {size(weight.page)}; with the first room {size(weight.first_room)} "
         f"(textures up to {COARSE} texels per side)",
         f"each further room {size(weight.mean_room)} on average, at most "
         f"{size(weight.worst_room)} (cell {weight.worst_cell}); everything {size(weight.whole)}",
     )
-    console.result({**changed, "notes": list(site.notes), "bytes": asdict(weight)}, lines)

@@ -152,6 +152,20 @@ def kind_of(folder: Path) -> FolderKind | None:
 _LIMITS = Limits()
 
 
+def check_folder(folder: Path) -> None:
+    """Raises DatabaseError PTM-D006 if a folder of `FOLDERS` has an error."""
+    kind = kind_of(folder)
+    errors = kind.check.load()(folder, _LIMITS).errors if kind else ()
+    if kind and errors:
+        first = errors[0]
+        raise DatabaseError(
+            "PTM-D006",
+            f"damaged: {first.message}",
+            file=folder / first.file,
+            remedy=f"write the folder again with `{kind.again}`",
+        )
+
+
 def validate(
     target: str | os.PathLike[str],
     progress: Progress = silent,

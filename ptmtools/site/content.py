@@ -42,7 +42,7 @@ JSON, JPEG = "application/json", "image/jpeg"
 GLB, PTM = "model/gltf-binary", "application/octet-stream"
 OPENING = "application/octet-stream"
 #: Fields of a database's index that a site's index lacks.
-_LEFT_OUT = ("record", "geometry", "textureSets", "statistics", "firstLook", "octrees")
+_LEFT_OUT = ("record", "geometry", "textureSets", "statistics", "firstLook")
 _IMAGE_MEDIA = {format.suffix: format.media for format in FORMATS.values()}
 _VRML_MEDIA = {".wrl": "model/vrml", ".png": "image/png"} | _IMAGE_MEDIA
 #: First bytes of pictures: pattern, media type, suffix.
@@ -151,6 +151,8 @@ class _Builder:
         index["cells"] = list(self._cells())
         if "meshes" in index:
             index["meshes"] = list(self._meshes())
+        if "octrees" in index:
+            index["octrees"] = list(self._octrees())
         index["textures"] = list(self._textures())
         index["viewpoints"], poster = self._pictures()
         openings = self._openings(index) if self._options.opening else ()
@@ -225,6 +227,11 @@ class _Builder:
             files = [self._data(url, f"{stem}-mesh", ".glb", GLB) for url in row["files"]]
             names, sizes = zip(*files, strict=True)
             yield row | {"files": names, "bytes": sizes}
+
+    def _octrees(self) -> Iterator[dict[str, Any]]:
+        for row in self._served.index["octrees"]:
+            file, digest = self._place(row["file"])
+            yield row | {"file": self._add(file.stem, ".bin", PTM, file, digest=digest)}
 
     def _data(self, url: str, stem: str, suffix: str, media: str) -> tuple[str, int]:
         """The name in the site, and the bytes on the link, of a document or a GLB."""

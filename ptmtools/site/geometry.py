@@ -16,23 +16,20 @@ from ptmtools.output.gltf import pack, unpack
 #: The members of a material, of its surface and of its extras that the page reads.
 _LOOK = ("alphaMode", "alphaCutoff", "doubleSided")
 _SURFACE = ("baseColorFactor",)
-_EXTRAS = ("texture", "wrapS", "wrapT", "mesh")
+_EXTRAS = ("texture", "wrapS", "wrapT", "mesh", "octree")
 
 
 def lean_glb(data: bytes) -> bytes:
     """A cell's GLB with nothing but what the page reads. Raises FileError as `unpack`."""
     document, binary = unpack(data)
     looks: list[Mapping[str, Any]] = []
-    look_of = []
-    for material in map(_look, document.get("materials", ())):
-        if material not in looks:
-            looks.append(material)
-        look_of.append(looks.index(material))
-    primitives = [
-        primitive | {"material": look_of[primitive["material"]]}
-        for mesh in document.get("meshes", ())
-        for primitive in mesh["primitives"]
-    ]
+    primitives = []
+    for node in document.get("nodes", ()):
+        for primitive in document["meshes"][node["mesh"]]["primitives"]:
+            look = _look(document["materials"][primitive["material"]], node.get("extras", {}))
+            if look not in looks:
+                looks.append(look)
+            primitives.append(primitive | {"material": looks.index(look)})
     accessors: list[dict[str, Any]] = document.get("accessors", [])
     # Equal arrays of plain cells share an accessor.
     merged = _merged(primitives, accessors) if "extensionsRequired" in document else primitives
@@ -56,10 +53,11 @@ def lean_glb(data: bytes) -> bytes:
     return pack(lean, binary)
 
 
-def _look(material: Mapping[str, Any]) -> dict[str, Any]:
+def _look(material: Mapping[str, Any], of_object: Mapping[str, Any]) -> dict[str, Any]:
+    """What the page reads of a material, and of the extras of the object that has it."""
     look = {name: material[name] for name in _LOOK if name in material}
     surface = material["pbrMetallicRoughness"]
-    extras = material.get("extras", {})
+    extras = {**of_object, **material.get("extras", {})}
     for name, members, source in (
         ("pbrMetallicRoughness", _SURFACE, surface),
         ("extras", _EXTRAS, extras),

@@ -18,6 +18,7 @@ from ptmtools.errors import DatabaseError, PtmError
 from ptmtools.files import leads_inside
 from ptmtools.site.content import SiteOptions, site_of
 from ptmtools.site.entry import Entry
+from ptmtools.site.forms import form_of, form_site
 from ptmtools.site.program import HTML, INDEX, JAVASCRIPT
 from ptmtools.store.layout import MANIFEST, SERVED
 
@@ -85,17 +86,20 @@ def below(folder: Path, *, hashed: bool = False) -> Lookup:
 
 
 def files_of(folder: str | PathLike[str]) -> Lookup:
-    """The files of a database: those of its site, without pictures, then those in its `www`; or
-    those of a folder that `ptm publish` wrote.
+    """The files of a database: those of its site, without pictures, then those in its `www`; those
+    of a folder that `ptm publish` wrote; or those of the site of a single object (`forms`).
 
     Raises
     ------
-    DatabaseError: PTM-D001 it is neither; PTM-D002, D003 a damaged database, or one of another
+    InputError: PTM-I122 as `form_site`.
+    DatabaseError: PTM-D001 it is none of them; PTM-D002, D003 a damaged database, or one of another
         schema; PTM-D004 one that is not finished; and as `site_of`.
     """
     path = Path(folder)
     if (path / INDEX).is_file() and not (path / MANIFEST).exists():
         return below(path, hashed=True)
+    if form := form_of(path):
+        return among(form_site(path, form).entries)
     return _Database(path)
 
 
@@ -140,5 +144,8 @@ class _Database:
             return among(site_of(self._path, SiteOptions(pictures=False)).entries)
         except DatabaseError as fault:
             if fault.code == "PTM-D001" and self._path.exists():
-                fault.message = "neither a database nor a folder that `ptm publish` wrote"
+                fault.message = (
+                    "neither a database, nor a folder that `ptm publish`, `ptm apo` or "
+                    "`ptm interlace` wrote"
+                )
             raise

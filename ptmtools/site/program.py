@@ -18,7 +18,7 @@ INDEX = "index.html"
 PAGE = Path(__file__).parent / "page"
 HTML, JAVASCRIPT = "text/html; charset=utf-8", "text/javascript; charset=utf-8"
 #: Scripts that few visits need.
-LATER = ("later.js", "compare.js")
+LATER = ("later.js", "compare.js", "statues.js")
 #: The media type of each file.
 PROGRAM = {
     "viewer.js": JAVASCRIPT,
@@ -26,6 +26,8 @@ PROGRAM = {
     "worker.js": JAVASCRIPT,
     "decoder.wasm": "application/wasm",
 }
+#: The page of single objects, and the scripts of their forms (`ptmtools.site.forms`).
+FORM_PAGE, FORM_SCRIPTS = "form.html", ("apo.js", "interlace.js")
 _FIELD = re.compile(r"\{\{(\w+)\}\}")
 
 
@@ -87,15 +89,38 @@ def page(
             f'<link id="opening" rel="next" as="fetch" href="{next(iter(openings))}" '
             f'data-views="{views}" crossorigin>'
         )
+    fields = {"poster": html.escape(str(settings.get("poster") or ""))}
+    return _filled(INDEX, settings, script, links, fields)
+
+
+def form_script(name: str) -> Entry:
+    """A script of `FORM_SCRIPTS`, in a folder named by its contents; raises as `program_files`."""
+    data = _built(name)
+    return Entry(f"viewer-{sha256(data)[:DIGITS]}/{name}", data, JAVASCRIPT, True, compressed=True)
+
+
+def form_page(settings: Mapping[str, Any], script: str) -> Entry:
+    """The page of a single object, filled in; raises as `page`."""
+    links = [f'<link rel="preload" as="fetch" href="{settings["index"]}" crossorigin>']
+    return _filled(FORM_PAGE, settings, script, links, {})
+
+
+def _filled(
+    template: str,
+    settings: Mapping[str, Any],
+    script: str,
+    links: Sequence[str],
+    fields: Mapping[str, str],
+) -> Entry:
+    """A page, filled in."""
     text = json.dumps(settings, ensure_ascii=False, separators=(",", ":"))
-    fields = {
+    values = {
         "title": html.escape(settings["title"]),
         # Nothing in it ends the element that holds it.
         "site": text.replace("<", "\\u003c"),
         "preload": "\n".join(links),
-        "poster": html.escape(str(settings.get("poster") or "")),
         "script": script,
+        **fields,
     }
-    template = _built(INDEX).decode()
-    filled = _FIELD.sub(lambda match: fields[match[1]], template)
+    filled = _FIELD.sub(lambda match: values[match[1]], _built(template).decode())
     return Entry(INDEX, filled.encode(), HTML, compressed=True)

@@ -47,7 +47,7 @@ COUNTING = """
     sizes.delete(texture);
   });
   wrap("texSubImage2D", (gl, ...given) => {
-    counted.stripe = Math.max(counted.stripe, given[8].byteLength);
+    counted.stripe = Math.max(counted.stripe, given[8]?.byteLength ?? 0);
   });
   for (const name of ["texImage2D", "texImage3D", "texStorage3D", "generateMipmap"]) {
     wrap(name, () => counted.others.push(name));

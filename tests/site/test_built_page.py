@@ -13,7 +13,7 @@ import pytest
 from benchmarks.web_rivals.packages import ESBUILD
 from ptmtools.errors import InputError
 from ptmtools.site import program
-from ptmtools.site.program import PAGE, program_files
+from ptmtools.site.program import FORM_SCRIPTS, PAGE, PROGRAM, program_files
 
 BUILD = Path(__file__).parents[2] / "web" / "page" / "build.py"
 
@@ -32,7 +32,9 @@ def test_the_sources_give_the_page(require: Callable[[str, str], None], tmp_path
 
 def test_scripts_import_nothing_at_once() -> None:
     """Each is one request: no other script is found only after it."""
-    for name in ("viewer.js", "later.js", "compare.js", "worker.js"):
+    for name in (*PROGRAM, *FORM_SCRIPTS):
+        if not name.endswith(".js"):
+            continue
         script = (PAGE / name).read_text()
         assert not re.search(r"""\bimport\s*["{*\w]""", script)
         assert not re.search(r"/\*\*|\n\s*//", script)

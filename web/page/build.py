@@ -22,9 +22,11 @@ sys.path.insert(0, str(ROOT))
 from benchmarks.web_rivals.packages import ESBUILD  # noqa: E402
 
 PTM = ROOT / "web" / "ptm" / "src"
+#: The page of single objects: octree textures and interlaced images.
+FORMS = HERE / "forms"
 OUTPUT = ROOT / "ptmtools" / "site" / "page"
 #: Scripts that the page loads when it needs them.
-LATER = ("later.js", "compare.js")
+LATER = ("later.js", "compare.js", "statues.js")
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _LINE_END = re.compile(r"\s*\n\s*")
 #: Template strings with shaders, and what esbuild leaves in them.
@@ -46,16 +48,27 @@ def plain_shader(shader: re.Match[str]) -> str:
     return re.sub(r" ?([-+*/=,?:{}()]) ?", r"\1", text)
 
 
+def script(source: Path) -> bytes:
+    """A bundle with plain shaders."""
+    return _SHADER.sub(plain_shader, minified(source).decode()).encode()
+
+
+def page(folder: Path) -> bytes:
+    """The template of a page with its style."""
+    template = _COMMENT.sub("", (folder / "index.html").read_text(encoding="utf-8"))
+    style = minified(folder / "style.css").decode().strip()
+    return _LINE_END.sub("\n", template).replace("{{style}}", style).encode()
+
+
 def build(folder: Path) -> None:
     """Writes the page to a folder. SystemExit without esbuild."""
     ESBUILD.require()
-    template = _COMMENT.sub("", (HERE / "index.html").read_text(encoding="utf-8"))
-    style = minified(HERE / "style.css").decode().strip()
-    html = _LINE_END.sub("\n", template).replace("{{style}}", style)
     files = {
-        "index.html": html.encode(),
-        "viewer.js": _SHADER.sub(plain_shader, minified(HERE / "main.js").decode()).encode(),
-        **{name: minified(HERE / name) for name in LATER},
+        "index.html": page(HERE),
+        "form.html": page(FORMS),
+        **{f"{name}.js": script(FORMS / f"{name}.js") for name in ("apo", "interlace")},
+        "viewer.js": script(HERE / "main.js"),
+        **{name: script(HERE / name) for name in LATER},
         "worker.js": minified(PTM / "worker.js"),
         "decoder.wasm": (PTM / "decoder.wasm").read_bytes(),
     }

@@ -11,7 +11,7 @@ import { Renderer } from "./gl/renderer.js";
 import { Reserve } from "./gl/reserve.js";
 import { Sharpness } from "./gl/sharpness.js";
 import { TextureMemory } from "./gl/texture-memory.js";
-import { loadComparison } from "./load-later.js";
+import { loadComparison, loadStatues } from "./load-later.js";
 import { clock, Fetcher } from "./net/fetcher.js";
 import { watchLink } from "./net/timings.js";
 import { catalogueOf } from "./policy/catalogue.js";
@@ -69,6 +69,8 @@ export class Walkthrough {
   #painted = -1;
   #looked = -1;
   #before = 0;
+  /** Whether the script of octree textures is on its way. */
+  #loading = false;
   /** Visible cells in view without geometry. @type {{cell: number, box: number[]}[]} */
   #missing = [];
   #scene = "";
@@ -174,7 +176,16 @@ export class Walkthrough {
   }
 
   #make() {
-    this.renderer = new Renderer(this.gl, this.memory, this.means);
+    const renderer = (this.renderer = new Renderer(this.gl, this.memory, this.means));
+    const { octrees } = this.index;
+    if (octrees) {
+      const report = (/** @type {import("./net/errors.js").PageError} */ error) => this.#report(error, "octree", 0);
+      this.#loading = true;
+      loadStatues().then(({ Statues }) => {
+        renderer.statues = new Statues(this.gl, octrees, this.site, this.fetcher, report, () => this.touch());
+      }, () => this.emit("notice", { message: "The details of statues could not be loaded." }))
+        .finally(() => (this.#loading = false));
+    }
     this.items = new ItemBuffer(this.gl);
     this.fence = new Fence(this.gl);
     this.#turn();
@@ -255,8 +266,10 @@ export class Walkthrough {
     if (this.memory.pump(now, late) || this.comparison?.memory.pump(now, late)) this.touch();
     if (this.stream.news || now - this.#looked >= LOOK_EVERY) this.#look(now, frustum, stillness.lasts(now));
     const camera = cameraOf(pose, this.tall, this.aspect, this.far);
-    const { fence, items } = this;
-    if (!this.begun) {
+    const { fence, items, renderer } = this;
+    if (this.begun) {
+      renderer?.statues?.advance(this.drawn, pose.eye, this.sharpness.lines / Math.tan(this.tall / 2));
+    } else {
       const { progress, over } = beginningOf(this);
       this.emit("progress", progress);
       this.begun = this.#ready && !fence?.busy;
@@ -479,6 +492,7 @@ export class Walkthrough {
     if (!present || this.#sightDrawn < this.#turned || this.#looked < this.#changed) return false;
     if (this.#ready && this.#painted < this.#changed) return false;
     if (this.visible.some((c) => renderer?.cells.get(c)?.shapes !== stream.shapes.get(c))) return false;
+    if (this.#loading || renderer?.statues?.lacks) return false;
     if (client.cell !== this.cell || client.missing(false, false, finer) > 0 || !this.sharpness.full) return false;
     for (let t = 0; t < T; t++) {
       const held = memory.held[t];

@@ -16,6 +16,7 @@
  * @property {number} cutoff texels of less alpha are not drawn, all others are opaque; 0 if it blends
  * @property {boolean} twoSided
  * @property {number} mesh the place of its object in the index, if that has finer meshes, or -1
+ * @property {number} octree the place of its octree texture in the index, or -1
  * @property {number[]} low corner of their box
  * @property {number[]} high
  */
@@ -160,7 +161,7 @@ export async function readGlb(buffer, textures, decoder) {
   for (const node of tree.nodes ?? []) {
     for (const { attributes, indices, material } of tree.meshes[node.mesh].primitives) {
       const look = tree.materials[material], base = look.pbrMetallicRoughness ?? {};
-      const { texture = -1, mesh = -1, wrapS, wrapT } = look.extras ?? {};
+      const { texture = -1, mesh = -1, octree = -1, wrapS, wrapT } = look.extras ?? {};
       const textured = texture >= 0 && attributes.TEXCOORD_0 !== undefined;
       const painted = attributes.COLOR_0 !== undefined;
       const positions = /** @type {Float32Array} */ (arrays.vertices(attributes.POSITION));
@@ -192,6 +193,7 @@ export async function readGlb(buffer, textures, decoder) {
         cutoff: look.alphaMode === "MASK" ? Number(look.alphaCutoff) || 0 : 0,
         twoSided: look.doubleSided === true,
         mesh,
+        octree,
         low,
         high,
       });

@@ -57,6 +57,7 @@ import { levelSizes } from "../../client/src/levels.js";
  * @property {TextureRow[]} textures
  * @property {CellRow[]} cells
  * @property {{cell: number, box: number[], errors: number[], files: string[], bytes: number[]}[]} [meshes]
+ * @property {import("../octree/statues.js").OctreeRow[]} [octrees]
  *
  * @typedef {object} Leaf
  * @property {number[][]} points

@@ -37,8 +37,8 @@ export function* pack(shapes) {
   /** @type {Map<string, Shape[]>} */
   const groups = new Map();
   for (const shape of shapes) {
-    const { texture, clampU, clampV, factor, blends, cutoff, twoSided } = shape;
-    const key = [texture, clampU, clampV, factor, blends, cutoff, twoSided].join();
+    const { texture, clampU, clampV, factor, blends, cutoff, twoSided, octree } = shape;
+    const key = [texture, clampU, clampV, factor, blends, cutoff, twoSided, octree].join();
     const group = groups.get(key);
     if (group) group.push(shape);
     else groups.set(key, [shape]);

@@ -10,13 +10,14 @@ import { SOURCES } from "./shaders.js";
 
 /**
  * @param {WebGL2RenderingContext} gl
- * @param {keyof typeof SOURCES} name
+ * @param {string} name
+ * @param {string[]} [sources] of the shaders, if they are not in `SOURCES`
  * @returns {Program}
  */
-export function programOf(gl, name) {
+export function programOf(gl, name, sources = SOURCES[name]) {
   const program = gl.createProgram();
   const kinds = [gl.VERTEX_SHADER, gl.FRAGMENT_SHADER];
-  SOURCES[name].forEach((source, k) => {
+  sources.forEach((source, k) => {
     const shader = /** @type {WebGLShader} */ (gl.createShader(kinds[k]));
     gl.shaderSource(shader, source);
     gl.compileShader(shader);

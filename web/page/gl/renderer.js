@@ -33,6 +33,8 @@ export class Renderer {
     this.memory = memory;
     this.means = means.map((color) => color.map((part) => part / 255));
     this.surface = programOf(gl, "surface");
+    /** Draws objects with octree textures, if the site has any. @type {import("../octree/statues.js").Statues | null} */
+    this.statues = null;
   }
 
   /**
@@ -95,16 +97,23 @@ export class Renderer {
     aim(gl, surface, camera);
     let fading = false;
     /** @type {{buffers: CellBuffers, batch: Batch, far: number}[]} */
-    const behind = [];
+    const behind = [], statues = [];
     for (const { buffers, batches } of drawn) {
       gl.bindVertexArray(buffers.vertexArray);
       for (const batch of batches) {
         if (batch.look.blends) {
           behind.push({ buffers, batch, far: distance(camera.eye, batch) });
+        } else if (this.statues?.has(batch.look.octree)) {
+          statues.push({ buffers, batch });
         } else {
           fading = this.#draw(buffers, batch, now) || fading;
         }
       }
+    }
+    if (statues.length) {
+      const paint = (/** @type {any} */ at, /** @type {Batch} */ batch) => this.#paint(at, batch, now);
+      fading = this.statues?.draw(camera, statues, paint) || fading;
+      gl.useProgram(surface.program);
     }
     if (behind.length) {
       gl.enable(gl.BLEND);
@@ -126,7 +135,19 @@ export class Renderer {
    * @param {number} now
    */
   #draw(buffers, batch, now) {
-    const { gl } = this, { at } = this.surface;
+    const fading = this.#paint(this.surface.at, batch, now);
+    buffers.draw(batch);
+    return fading;
+  }
+
+  /**
+   * Sets the uniforms of the look of a batch.
+   * @param {import("./program.js").Program["at"]} at
+   * @param {Batch} batch
+   * @param {number} now
+   */
+  #paint(at, batch, now) {
+    const { gl } = this;
     const { texture, clampU, clampV, cutoff, twoSided } = batch.look;
     (twoSided ? gl.disable : gl.enable).call(gl, gl.CULL_FACE);
     gl.uniform4fv(at.color, batch.color);
@@ -135,9 +156,7 @@ export class Renderer {
     const storage = texture < 0 ? null : this.memory.of(texture);
     gl.uniform1i(at.channels, storage?.channels ?? 0);
     if (texture >= 0) gl.uniform3fv(at.mean, this.means[texture]);
-    const fading = storage?.bind(clampU, clampV, now) ?? false;
-    buffers.draw(batch);
-    return fading;
+    return storage?.bind(clampU, clampV, now) ?? false;
   }
 }
 

@@ -1,7 +1,9 @@
 // The programs. Positions are taken relative to the eye before any multiplication, and the view only
 // rotates them, so that scenes far from the origin lose no digits.
 
-const CORNERS = `#version 300 es
+/** The vertex shader, with further declarations and statements. @param {string} [declared]
+ * @param {string} [stated] */
+export const corners = (declared = "", stated = "") => `#version 300 es
 precision highp float;
 uniform vec3 eye;
 uniform mat3 turn;
@@ -11,8 +13,9 @@ layout(location = 1) in vec2 place;
 layout(location = 2) in vec4 paint;
 out vec3 seen;
 out vec2 uv;
-out vec3 painted;
+out vec3 painted;${declared}
 void main() {
+  ${stated}
   painted = paint.rgb;
   seen = turn * (position - eye);
   uv = place;
@@ -20,7 +23,7 @@ void main() {
 }`;
 
 /** The texel of a surface; one or two channels are grey, the second is alpha. */
-const TEXEL = `
+export const TEXEL = `
 uniform sampler2D map;
 uniform int channels; // 0: no level is present
 uniform vec4 color;
@@ -98,8 +101,9 @@ layout(location = 1) out vec4 shown;
 ${BYTES}
 void main() { shown = vec4(bytes(item), 0.0, 1.0); }`;
 
+/** @type {Record<string, string[]>} */
 export const SOURCES = {
-  surface: [CORNERS, SURFACE],
-  item: [CORNERS, ITEM],
-  placeholder: [CORNERS, PLACEHOLDER],
+  surface: [corners(), SURFACE],
+  item: [corners(), ITEM],
+  placeholder: [corners(), PLACEHOLDER],
 };

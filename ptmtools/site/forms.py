@@ -1,0 +1,121 @@
+"""The site of a folder that holds one object: an octree texture (`ptm apo`) or an interlaced image
+(`ptm interlace`).
+
+Each form has a page with a script of its own (``web/page/forms``), which the page of databases does
+not load. A new form is a row of `FORMS`. All files are in ``data-HASH``, with a hash of the index,
+which has the checksums of the others.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from ptmtools import schemas
+from ptmtools.errors import InputError
+from ptmtools.files import open_regular
+from ptmtools.site.content import Site, title_of
+from ptmtools.site.entry import DIGITS, Entry, link_bytes, state_of
+from ptmtools.site.program import form_page, form_script
+from ptmtools.store.layout import sha256
+
+_MEDIA = {
+    ".json": "application/json",
+    ".glb": "model/gltf-binary",
+    ".png": "image/png",
+    ".jpg": "image/jpeg",
+    ".webp": "image/webp",
+}
+
+
+def _of_octree(index: Mapping[str, Any]) -> Iterator[str]:
+    for name in ("mesh", "normals", "colors"):
+        if name in index:
+            yield index[name]["file"]
+
+
+def _of_set(index: Mapping[str, Any]) -> Iterator[str]:
+    return (part["name"] for part in index["files"])
+
+
+@dataclass(frozen=True)
+class Form:
+    """A form of an object.
+
+    Attributes
+    ----------
+    index: the file that describes the others. schema: its name. script: of the page.
+    files: of an index: the other files that the page fetches.
+    """
+
+    index: str
+    schema: str
+    script: str
+    files: Callable[[Mapping[str, Any]], Iterator[str]]
+
+
+_LIST = (
+    Form("apo.json", schemas.APO, "apo.js", _of_octree),
+    Form("interlace.json", schemas.INTERLACE, "interlace.js", _of_set),
+)
+#: By the name of the index.
+FORMS = {form.index: form for form in _LIST}
+
+
+def form_of(folder: Path) -> Form | None:
+    """The form of a folder, or None."""
+    return next((form for form in FORMS.values() if (folder / form.index).is_file()), None)
+
+
+def form_site(folder: Path, form: Form, title: str = "") -> Site:
+    """The site of a folder. Checks its index alone: the page checks what it fetches.
+
+    Raises InputError PTM-I122: a file is missing or cannot be read, or the index is none.
+    """
+    data, _ = _read(folder / form.index)
+    try:
+        index = schemas.parse(data)
+        schemas.check(index, form.schema)
+    except schemas.ShapeError as fault:
+        raise InputError(
+            "PTM-I122",
+            f"describes no folder that ptmtools has written ({fault})",
+            file=folder / form.index,
+            remedy="write the folder again",
+        ) from fault
+    place = f"data-{sha256(data)[:DIGITS]}"
+    entries = [Entry(f"{place}/{form.index}", data, _MEDIA[".json"], True, compressed=True)]
+    for name in form.files(index):
+        file = folder / name
+        _, state = _read(file, 0)
+        media = _MEDIA.get(file.suffix, "application/octet-stream")
+        entries.append(Entry(f"{place}/{quote(name)}", file, media, True, state=state))
+    script = form_script(form.script)
+    settings = {"title": title or title_of(folder), "index": f"{place}/{form.index}"}
+    entries += [script, form_page(settings, script.name)]
+    return Site({entry.name: entry for entry in entries}, index)
+
+
+def form_weight(site: Site) -> tuple[int, int]:
+    """Bytes that a visitor downloads: of the page with its script, and of everything."""
+    sizes = {name: link_bytes(entry) for name, entry in site.entries.items()}
+    page = sum(size for name, size in sizes.items() if not name.startswith("data-"))
+    return page, sum(sizes.values())
+
+
+def _read(file: Path, length: int = -1) -> tuple[bytes, tuple[int, int, int]]:
+    """The first bytes of a file, and its state."""
+    try:
+        with open_regular(file) as stream:
+            return stream.read(length), state_of(os.fstat(stream.fileno()))
+    except OSError as fault:
+        raise InputError(
+            "PTM-I122",
+            f"cannot be read ({fault.strerror or fault})",
+            file=file,
+            remedy="write the folder again",
+        ) from fault

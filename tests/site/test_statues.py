@@ -1,0 +1,147 @@
+"""Objects with octree textures in the rooms of a walk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import PLAIN, Visiting
+
+from ptmtools.cli.main import main
+from ptmtools.output.served import read_served
+from ptmtools.rendering.drawing import ViewOptions, draw_view, eye_of
+from ptmtools.rendering.rays import Camera, Caster
+from ptmtools.site.content import Site, site_of
+from ptmtools.site.entry import Entry
+from tests.neighbours.apo.statues import write_rooms
+
+WIDTH, HEIGHT = 320, 240
+#: Levels of each octree that has been in view.
+LEVELS = "window.ptm.walk.renderer.statues?.levels ?? []"
+
+
+@pytest.fixture(scope="module")
+def database(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two rooms with a statue each, of which the second has no texture."""
+    folder = tmp_path_factory.mktemp("statues")
+    model = write_rooms(folder / "model", 5)
+    options = ["--apo", "statue*", "--apo-faces", "500", "--apo-error", "0.02", "--format", "gltf"]
+    command = [
+        "-q",
+        "build-scene",
+        str(model),
+        "-o",
+        str(folder / "db"),
+        "--no-fallback",
+        "-j",
+        "1",
+    ]
+    assert main([*command, *options, "--backend", "embree"]) == 0
+    return folder / "db"
+
+
+@pytest.fixture(scope="module")
+def site(database: Path) -> Site:
+    return site_of(database, PLAIN)
+
+
+def pose(database: Path, statue: int, away: float) -> tuple[np.ndarray, float]:
+    """An eye in front of a statue, level with its middle, and its yaw in degrees."""
+    row = read_served(database).index["octrees"][statue]
+    middle = np.array(row["cube"]["low"]) + row["cube"]["side"] / 2
+    inwards = 1.0 if middle[2] < 0 else -1.0
+    return middle + [0, 0, inwards * away], 0.0 if inwards > 0 else 180.0
+
+
+def address(eye: np.ndarray, yaw: float) -> str:
+    return "#" + ",".join(f"{x:.4f}" for x in (*eye, yaw))
+
+
+def test_they_are_drawn_as_by_render(visit: Visiting, site: Site, database: Path) -> None:
+    served = read_served(database)
+    eye, yaw = pose(database, 1, 0.9)
+    angle = float(np.degrees(served.index["viewpoints"][0]["fieldOfView"]))
+    options = ViewOptions(
+        eye=(*np.round(eye, 4), yaw), field_of_view=angle, width=WIDTH, height=HEIGHT, lit=True
+    )
+    expected = draw_view(served, options)
+    view = eye_of(served, options)
+    camera = Camera(WIDTH, HEIGHT, view.field_of_view, WIDTH / HEIGHT, HEIGHT)
+    sight = Caster(served.surfaces).look(camera, view.position, view.direction)
+    shown = np.where(sight.triangle < 0, -1, served.surfaces.octree[sight.triangle])
+    mask = inside = (shown == 1).reshape(HEIGHT, WIDTH)
+    for dy in range(-3, 4):
+        for dx in range(-3, 4):
+            inside = inside & np.roll(mask, (dy, dx), (0, 1))
+    assert inside.sum() > 0.1 * mask.size
+    with visit(site, query=address(eye, yaw), width=WIDTH, height=HEIGHT) as visitor:
+        visitor.until("s.complete")
+        assert visitor.page.evaluate(LEVELS)[1] >= 6
+        picture = visitor.picture()
+        assert visitor.messages == []
+    error = ((picture[inside].astype(float) - expected[inside]) ** 2).mean()
+    assert 10 * np.log10(255**2 / error) >= 38
+
+
+def test_levels_follow_the_distance(visit: Visiting, site: Site, database: Path) -> None:
+    far, yaw = pose(database, 0, 2.0)
+    (file,) = (e.name for e in site.entries.values() if "statue_01" in e.name)
+    with visit(site, query=address(far, yaw), width=80, height=60) as visitor:
+        visitor.until("s.complete")
+        asked = [v for v in visitor.visits if v.path.endswith(file)]
+        assert len(asked) == 1  # seven levels at once
+        assert asked[0].range
+        visitor.page.set_viewport_size({"width": 1280, "height": 960})
+        visitor.until(f"{LEVELS.replace('?? []', '')}[0] > 7")
+        visitor.until("s.complete")
+        assert len([v for v in visitor.visits if v.path.endswith(file)]) > 1
+
+
+def test_a_context_that_is_lost(visit: Visiting, site: Site, database: Path) -> None:
+    eye, yaw = pose(database, 1, 0.9)
+    statue = slice(80, 160), slice(120, 200)
+    with visit(site, query=address(eye, yaw), width=WIDTH, height=HEIGHT) as visitor:
+        visitor.until("s.complete")
+        before = visitor.picture()[statue]
+        assert np.ptp(before) > 10  # lit
+        visitor.lose_context()
+        visitor.restore_context()
+        visitor.until(f"({LEVELS}).length && s.complete")
+        assert (visitor.picture()[statue] == before).all()
+
+
+@pytest.mark.parametrize("damage", ["cut", "other", "missing", "empty"])
+def test_a_damaged_octree_leaves_the_walk(
+    visit: Visiting, site: Site, database: Path, tmp_path: Path, damage: str
+) -> None:
+    eye, yaw = pose(database, 0, 0.9)
+    (name,) = (n for n in site.entries if "statue_01" in n)
+    entries: dict[str, Entry] = dict(site.entries)
+    data = entries[name].read()
+    changed = {"cut": data[:99], "other": data[:50] + bytes(99) + data[149:], "empty": b""}
+    if damage == "missing":
+        del entries[name]
+    else:
+        entries[name] = Entry(name, changed[damage], entries[name].media)
+    with visit(Site(entries, site.index), query=address(eye, yaw)) as visitor:
+        visitor.page.wait_for_function("window.ptm?.errors.length > 0", timeout=90_000)
+        code = visitor.page.evaluate("window.ptm.errors[0].code")
+        assert code in ("PTM-V103", "PTM-V104", "PTM-V105")
+        visitor.until("s.complete")
+        assert not visitor.page.is_visible("#error")
+        assert not any(
+            "error: " in message and "Uncaught" in message for message in visitor.messages
+        )
+
+
+def test_other_sites_do_not_load_the_script(
+    visit: Visiting, site: Site, museum: Site, database: Path
+) -> None:
+    def loads(of: Site) -> bool:
+        with visit(of, width=64, height=48) as visitor:
+            visitor.until("s.complete")
+            return any(v.path.endswith("statues.js") for v in visitor.visits)
+
+    assert loads(site)
+    assert not loads(museum)

@@ -1,0 +1,69 @@
+// The page of a folder of `ptm apo`: a simplified mesh, and the normals of its source by levels.
+//
+//     ?update=steps&step=0.5   shows parts of levels every 0.5 s; else a level when it is complete
+//     ?levels=8                shows the first 8 levels at most; 0 shows the mesh's own normals
+//     ?normals                 shows normals as colours
+//     #azimuth,elevation,distance  degrees, degrees, diameters
+
+import { checkOctree, demand, isWhole, Octree } from "../octree/octree.js";
+import { find } from "../ui/elements.js";
+import { indexOf, runForm, sizeText } from "./form.js";
+import { meshOf, OctreeDrawing } from "./octree-drawing.js";
+import { Orbit } from "./orbit.js";
+
+/** What the page needs of `apo.json`, checked. @param {any} index */
+function checkedIndex(index) {
+  demand(index?.format === "ptmtools apo" && index.schema === 1, "not an index of an octree texture");
+  const { cube, levels, normals, colors, mesh } = index;
+  demand(normals?.file === "apo.bin" && (colors ?? { file: "color.bin" }).file === "color.bin", "other streams");
+  const octree = { cube, levels, streams: colors ? [normals, colors] : [normals] };
+  checkOctree(octree);
+  demand(mesh?.file === "mesh.glb" && isWhole(mesh.crc32, 0, 0xffffffff), "no mesh");
+  return { ...octree, mesh };
+}
+
+runForm(async (gl, config, fetcher, fail) => {
+  const query = new URLSearchParams(location.search);
+  const address = new URL(config.index, location.href).href;
+  const urlOf = (/** @type {string} */ file) => new URL(file, address).href;
+  const index = await indexOf(fetcher, address, checkedIndex);
+  const mesh = await fetcher.whole(urlOf(index.mesh.file), (body) => meshOf(body, index.mesh.crc32));
+  const step = query.get("update") === "steps" ? Math.max(0.05, Number(query.get("step")) || 0.5) : 0;
+  const octree = new Octree(gl, index, urlOf, fetcher, step);
+  const drawing = new OctreeDrawing(gl, mesh, index.cube);
+  const canvas = /** @type {HTMLCanvasElement} */ (gl.canvas);
+  const middle = mesh.low.map((x, k) => (x + mesh.high[k]) / 2);
+  const orbit = new Orbit(canvas, middle, Math.hypot(...mesh.high.map((x, k) => x - mesh.low[k])));
+  const levels = query.has("levels") ? Math.max(0, Number(query.get("levels")) || 0) : Infinity;
+  const bare = query.has("normals");
+  const total = index.streams.reduce((sum, { ends }) => sum + (ends.at(-1) ?? 0), 0);
+  let paused = false;
+  find(document, "#keys").textContent = "Drag or use the arrow keys to turn; wheel, two fingers, + and − to zoom";
+  return {
+    left: 0,
+    frame(dt) {
+      orbit.step(dt);
+      const { camera } = orbit;
+      // The levels that are shown end where their nodes are smaller than a pixel (section 4.2).
+      const wanted = (/** @type {number} */ there) =>
+        there < levels && (!there || drawing.pixels(there - 1, canvas.height, camera) > 1);
+      octree.advance(wanted, fail);
+      paused = !octree.complete && !wanted(octree.levels);
+      drawing.draw(octree, camera, { bare, levels });
+      const rest = octree.complete ? "" : paused ? "; finer ones when you come closer" : " …";
+      return `${octree.levels} of ${index.levels.length} levels, ${sizeText(octree.fetched)} of ${sizeText(total)}${rest}`;
+    },
+    state: () => ({
+      levels: octree.levels,
+      partial: octree.partial,
+      complete: octree.complete,
+      paused,
+      updates: octree.updates,
+      requests: fetcher.requests,
+      bytes: fetcher.bytes,
+      pending: fetcher.pending,
+      camera: orbit.camera,
+    }),
+    place: orbit.place.bind(orbit),
+  };
+});

@@ -1,0 +1,204 @@
+// Objects with octree textures, in the rooms of a walk: a script of its own, which sites with such objects
+// load. They are lit by a lamp, as `ptm simulate --lit` lights them; without levels they look as others.
+
+import { clock } from "../net/fetcher.js";
+import { PageError } from "../net/errors.js";
+import { aim, programOf } from "../gl/program.js";
+import { corners, TEXEL } from "../gl/shaders.js";
+import { distance } from "../space/frustum.js";
+import { LOOK_UP } from "./look-up.js";
+import { checkOctree, Octree } from "./octree.js";
+
+/** Bytes of octrees on the graphics card, at most. */
+const MOST = 128 << 20;
+/** Share of ambient light, and the direction of the lamp. */
+const AMBIENT = 0.3, LAMP = [0.5, 0.7, 0.6].map((x) => x / Math.hypot(0.5, 0.7, 0.6));
+/** Nearest distance of the eye that counts, m. */
+const NEAREST = 0.1;
+
+const VERTEX = corners(`
+uniform vec3 low;
+uniform float side;
+out vec3 q;`, "q = (position - low) / side;");
+
+const FRAGMENT = `#version 300 es
+precision highp float;
+precision highp int;
+precision highp usampler2D;
+in vec3 seen;
+in vec2 uv;
+in vec3 painted;
+in vec3 q;
+uniform float cutoff;
+out vec4 shown;
+${TEXEL}
+${LOOK_UP}
+void main() {
+  int stop = stopDepth(q);
+  vec4 sampled = textured ? texel() : vec4(1.0);
+  vec3 normal = normalize(vec3(texel(octree, addressAt(q, stop)).rgb) / 127.5 - 1.0);
+  float along = (1.0 + dot(normal, vec3(${LAMP.join()}))) / 2.0;
+  float light = ${AMBIENT} + ${1 - AMBIENT} * along * along;
+  shown = vec4(sampled.rgb * color.rgb * painted * light, sampled.a * color.a);
+  if (shown.a < max(cutoff, 0.004)) discard;
+  shown.a = 1.0;
+}`;
+
+/** @typedef {import("../gl/renderer.js").Drawn} Drawn */
+/** @typedef {{file: string, cube: {low: number[], side: number}, levels: number[], ends: number[],
+ *   crc32: number[]}} OctreeRow */
+
+export class Statues {
+  /** @type {(Octree | null)[]} those that are, or were, in view; null for one with an error */
+  #octrees = [];
+  /** Of those in view, the pixels of a node of depth 0. @type {Map<number, number>} */
+  #pixels = new Map();
+  #looked = false;
+  /** When each was last in view, s. @type {number[]} */
+  #seen = [];
+
+  /**
+   * @param {WebGL2RenderingContext} gl
+   * @param {OctreeRow[]} rows of the index
+   * @param {import("../data/site.js").Site} site
+   * @param {import("../net/fetcher.js").Fetcher} fetcher
+   * @param {(fault: PageError) => void} report
+   * @param {() => void} touch called when the picture changes
+   */
+  constructor(gl, rows, site, fetcher, report, touch) {
+    this.gl = gl;
+    this.rows = rows;
+    this.site = site;
+    this.fetcher = fetcher;
+    this.report = report;
+    this.touch = touch;
+    this.program = programOf(gl, "octree", [VERTEX, FRAGMENT]);
+  }
+
+  /** Whether the octree of a number has levels to show. @param {number} number */
+  has(number) {
+    return (this.#octrees[number]?.levels ?? 0) > 0;
+  }
+
+  /** Whether an octree in view has too few levels for the screen, as far as is known. */
+  get lacks() {
+    return !this.#looked || [...this.#pixels.keys()].some((number) => this.#wants(number));
+  }
+
+  /** Levels of each octree that was in view. */
+  get levels() {
+    return this.#octrees.map((octree) => octree?.levels ?? 0);
+  }
+
+  /** Bytes on the graphics card. */
+  get bytes() {
+    return this.#octrees.reduce((sum, octree) => sum + (octree?.bytes ?? 0), 0);
+  }
+
+  /**
+   * Fetches the next level of an octree in view, that with the largest nodes.
+   * @param {Drawn[]} drawn
+   * @param {ArrayLike<number>} eye
+   * @param {number} lines of a screen that sees an angle whose half has the tangent 1
+   */
+  advance(drawn, eye, lines) {
+    this.#pixels.clear();
+    this.#looked = true;
+    const now = clock();
+    for (const { batches } of drawn) {
+      for (const { look: { octree }, low, high } of batches) {
+        if (!this.rows[octree] || this.#octrees[octree] === null) continue;
+        const away = Math.max(NEAREST, distance(eye, low, high));
+        const pixels = (lines / 2 / away) * this.rows[octree].cube.side;
+        this.#pixels.set(octree, Math.max(pixels, this.#pixels.get(octree) ?? 0));
+        this.#seen[octree] = now;
+      }
+    }
+    if (this.#octrees.some((octree) => octree?.running)) return;
+    let next = -1, most = 0;
+    for (const number of this.#pixels.keys()) {
+      const size = this.#nodes(number);
+      if (size > most && this.#wants(number)) [next, most] = [number, size];
+    }
+    if (next >= 0) this.#load(next);
+  }
+
+  /** Pixels of the finest nodes of an octree in view. @param {number} number */
+  #nodes(number) {
+    const levels = this.#octrees[number]?.levels ?? 0;
+    return (this.#pixels.get(number) ?? 0) * 2 ** -Math.max(0, levels - 1);
+  }
+
+  /** @param {number} number */
+  #wants(number) {
+    const octree = this.#octrees[number];
+    return octree !== null && !octree?.complete && this.#nodes(number) > 1;
+  }
+
+  /** @param {number} number */
+  #load(number) {
+    const { cube, levels, file, ends, crc32 } = this.rows[number];
+    /** @param {unknown} fault */
+    const fail = (fault) => {
+      this.#octrees[number]?.delete();
+      this.#octrees[number] = null;
+      this.touch();
+      const damaged = `${file} is damaged: ${/** @type {Error} */ (fault).message}`;
+      this.report(fault instanceof PageError ? fault : new PageError("PTM-V105", damaged));
+    };
+    try {
+      let octree = this.#octrees[number];
+      if (!octree) {
+        const index = { cube, levels, streams: [{ file, ends, crc32 }] };
+        checkOctree(index);
+        this.#free(4 * levels.reduce((sum, count) => sum + count, 0));
+        octree = new Octree(this.gl, index, (name) => this.site.of(name), this.fetcher, 0);
+        this.#octrees[number] = octree;
+      }
+      octree.advance(() => true, fail, this.touch);
+    } catch (fault) {
+      fail(fault);
+    }
+  }
+
+  /** Removes octrees out of view, those first that were seen first, until there is room. @param {number} bytes */
+  #free(bytes) {
+    const hidden = [...this.#octrees.keys()].filter((n) => this.#octrees[n] && !this.#pixels.has(n));
+    for (const number of hidden.sort((a, b) => this.#seen[a] - this.#seen[b])) {
+      if (this.bytes + bytes <= MOST) return;
+      this.#octrees[number]?.delete();
+      delete this.#octrees[number];
+    }
+  }
+
+  /**
+   * Draws batches into the bound framebuffer; true as long as a level of a texture fades in.
+   * @param {import("../gl/camera.js").Camera} camera
+   * @param {{buffers: import("../gl/cell-buffers.js").CellBuffers,
+   *   batch: import("../gl/cell-buffers.js").Batch}[]} batches
+   * @param {(at: Record<string, WebGLUniformLocation | null>, batch: import("../gl/cell-buffers.js").Batch)
+   *   => boolean} paint sets the uniforms of a batch's look
+   */
+  draw(camera, batches, paint) {
+    const { gl, program } = this, { at } = program;
+    aim(gl, program, camera);
+    gl.uniform1i(at.octree, 1);
+    let fading = false;
+    for (const { buffers, batch } of batches) {
+      const octree = /** @type {Octree} */ (this.#octrees[batch.look.octree]);
+      const { cube: { low, side } } = octree.index;
+      gl.activeTexture(gl.TEXTURE1);
+      gl.bindTexture(gl.TEXTURE_2D, octree.texels[0].texture);
+      gl.activeTexture(gl.TEXTURE0);
+      gl.uniform3fv(at.low, low);
+      gl.uniform1f(at.side, side);
+      gl.uniform1i(at.texels, octree.count);
+      gl.uniform1i(at.deepest, octree.levels - 1);
+      gl.uniform1i(at.partial, 0);
+      gl.bindVertexArray(buffers.vertexArray);
+      fading = paint(at, batch) || fading;
+      buffers.draw(batch);
+    }
+    return fading;
+  }
+}

@@ -1,0 +1,3 @@
+// The script of sites with octree textures.
+
+export { Statues } from "./octree/statues.js";
