@@ -1,11 +1,12 @@
-"""Levels of detail of objects: bytes and seconds until a heavy hall is drawn, with and without.
+"""Forms of heavy objects: bytes and seconds until a hall of them is drawn.
 
     python benchmarks/mesh_levels.py [MODEL …] [--triangles 81920] [--links 512k,4M]
 
 Without models: a hall with six statues, and the cave of PTM_SHARED if it is at hand. Each is built
-with ``--lods none`` and ``auto``. Columns: seconds of the stage ``emit``; bytes of the site's files
-for the first viewpoint's cell; of each link, by the page in Chromium from an empty cache, seconds
-until the first picture and until the view is complete. The ratio is none / auto.
+as modelled, with levels of detail, and the statues also with octree textures (``--apo``). Columns:
+seconds of the build; bytes of the site's files for the first viewpoint's cell; of each link, by the
+page in Chromium from an empty cache, seconds until the first picture, until the view is complete,
+and bytes received until then.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import os
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -33,6 +35,12 @@ CAVE = Path(os.environ.get("PTM_SHARED", "")) / "scenes" / "cave" / "cave.glb"
 #: Width, height and depth of the hall, and the radius of a statue, metres.
 HALL, RADIUS = (14.0, 5.0, 9.0), 0.7
 LATENCY = 0.04
+#: Options of `ptm build-scene`.
+FORMS = {
+    "as modelled": ("--lods", "none"),
+    "levels of detail": ("--lods", "auto"),
+    "octrees": ("--lods", "none", "--apo", "statue*"),
+}
 
 
 def write_hall(file: Path, triangles: int) -> None:
@@ -54,14 +62,12 @@ def write_hall(file: Path, triangles: int) -> None:
     scene.export(file)
 
 
-def build(model: Path, database: Path, lods: str) -> float:
-    """Builds a database; returns the seconds of its last stage."""
+def build(model: Path, database: Path, options: Sequence[str]) -> float:
+    """Builds a database; returns the seconds."""
     ptm = Path(sys.executable).with_name("ptm")
     command = [ptm, "-q", "build-scene", model, "-o", database, "--format", "gltf", "--unit", "m"]
-    subprocess.run([str(w) for w in (*command, "--lods", "none")], check=True)
     begun = time.perf_counter()
-    options = ["--format", "gltf", "--lods", lods, "--title", lods]
-    subprocess.run([str(w) for w in (ptm, "-q", "emit", database, *options)], check=True)
+    subprocess.run([str(word) for word in (*command, *options)], check=True)
     return time.perf_counter() - begun
 
 
@@ -71,8 +77,8 @@ def first_bytes(site: Site) -> int:
     return int(row["recordBytes"] + row["geometryBytes"])
 
 
-def visit(browser: object, site: Site, bandwidth: float) -> tuple[float, float]:
-    """Seconds until the first picture, and until the view is complete."""
+def visit(browser: object, site: Site, bandwidth: float) -> tuple[float, float, float]:
+    """Seconds until the first picture, and until the view is complete; kilobytes until then."""
     with serving(site.entries, throttle=Throttle(bandwidth, LATENCY)) as url:
         page = browser.new_context(viewport={"width": 960, "height": 540}).new_page()  # type: ignore[attr-defined]
         begun = time.perf_counter()
@@ -81,8 +87,9 @@ def visit(browser: object, site: Site, bandwidth: float) -> tuple[float, float]:
         first = time.perf_counter() - begun
         page.wait_for_function("window.ptm.walk.complete", timeout=600_000, polling=50)
         whole = time.perf_counter() - begun
+        size = page.evaluate("window.ptm.walk.fetcher.bytes") / 1000
         page.context.close()
-    return first, whole
+    return first, whole, size
 
 
 def main() -> None:
@@ -103,33 +110,22 @@ def main() -> None:
         browser = playwright.chromium.launch(
             executable_path=os.environ.get("CHROMIUM", "/usr/bin/chromium"), args=["--no-sandbox"]
         )
-        heads = "".join(f"{f'{link} first':>14}{'complete':>10}" for link in links)
-        print(f"{'model':<12}{'lods':>6}{'emit':>9}{'first view':>14}{heads}")
+        heads = "".join(f" {link}, first | complete | kB |" for link in links)
+        print(f"| model | form | build, s | first view, kB |{heads}")
+        print("|---|---|---|---|" + "---|---|---|" * len(links))
         for model in models:
-            rows = []
-            for lods in ("none", "auto"):
-                seconds = build(model, Path(folder) / f"{model.stem}-{lods}.db", lods)
-                site = site_of(
-                    Path(folder) / f"{model.stem}-{lods}.db", SiteOptions(pictures=False)
-                )
-                times = [
-                    each
-                    for link in links
-                    for each in visit(browser, site, float(parse_bandwidth(link) or 1e12))
-                ]
-                rows.append([seconds, first_bytes(site) / 1000, *times])
-                print(line(model.stem, lods, rows[-1], ("s", "kB")), flush=True)
-            print(line("", "ratio", [a / b for a, b in zip(*rows, strict=True)], ("×", "×")))
+            for form, options in FORMS.items():
+                if form == "octrees" and (given.models or model == CAVE):
+                    continue  # no statues
+                database = Path(folder) / f"{model.stem}-{form}.db"
+                seconds = build(model, database, options)
+                site = site_of(database, SiteOptions(pictures=False))
+                cells = [f"{seconds:.1f}", f"{first_bytes(site) / 1000:.1f}"]
+                for link in links:
+                    first, whole, size = visit(browser, site, parse_bandwidth(link) or 1e12)
+                    cells += [f"{first:.1f}", f"{whole:.1f}", f"{size:.0f}"]
+                print(f"| {model.stem} | {form} | {' | '.join(cells)} |", flush=True)
         browser.close()
-
-
-def line(name: str, lods: str, row: list[float], units: tuple[str, str]) -> str:
-    """A line of the table; units of seconds and of bytes."""
-    seconds, size, *times = row
-    text = f"{name:<12}{lods:>6}{seconds:>7.1f} {units[0]}{size:>11.1f} {units[1]}"
-    for k, each in enumerate(times):
-        text += f"{each:>{8 if k % 2 else 12}.1f} {units[0]}"
-    return text
 
 
 if __name__ == "__main__":
