@@ -64,8 +64,12 @@ class Knob:
 
 KNOBS = (
     Knob(CELLS, "wall_area", (1.0, 4.0)),
+    Knob(CELLS, "wall_thickness", (0.2, 1.0)),
+    Knob(CELLS, "max_leaves", (50,)),
     Knob(CELLS, "cells", ("leaf", "room")),
+    Knob(CELLS, "gain", (0.0, 0.3)),
     Knob(PVS, "method", ("fast", "sampled", "full")),
+    Knob(PVS, "gain", (0.0, 0.1)),
     Knob(ACH, "samples", (8, 1, 64, 512), policy="ach", own="points"),
     Knob(TEXTURES, "profile", ("raw", "fast"), slow=("small",)),
     Knob(TEXTURES, "preview", (0, 50, 90)),
