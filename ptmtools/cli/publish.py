@@ -64,8 +64,8 @@ def _origin(context: click.Context, parameter: click.Parameter, value: str | Non
 def serve(console: Console, db: str, opened: bool, origin: str | None, **values: Any) -> None:
     """Serve DB to browsers on this machine until Ctrl-C, and print the URL of its page.
 
-    DB is a database, or a folder that `ptm publish`, `ptm apo` or `ptm interlace` wrote.
-    --bandwidth and --latency simulate a slow connection.
+    DB is a database, or a folder that `ptm publish`, `ptm apo`, `ptm interlace` or `ptm campus`
+    wrote. --bandwidth and --latency simulate a slow connection.
     """
     options = take(ServeOptions, values)
     require()
@@ -134,17 +134,21 @@ def publish(
     console: Console, db: str, target: str | None, output: str | None, force: bool, **values: Any
 ) -> None:
     """Write DB as a web site: a folder that any web server can serve, or the objects below a URL
-    such as s3://bucket/prefix or gs://bucket/prefix. DB is a database, or a folder that `ptm apo`
-    or `ptm interlace` wrote.
+    such as s3://bucket/prefix or gs://bucket/prefix. DB is a database, or a folder that `ptm apo`,
+    `ptm interlace` or `ptm campus` wrote.
 
     A second run rewrites only the files that have changed.
     """
     target = _only_target(target, output)
     site_options, options = take(SiteOptions, values), take(PublishOptions, values)
     form = form_of(Path(db))
+    if form and site_options != SiteOptions(title=site_options.title):
+        raise click.UsageError(
+            f"of the options of a site, a folder with {form.index} has --title only"
+        )
     with console.progress() as progress:
         if form:
-            check_folder(Path(db))
+            check_folder(Path(db), form.index)
             site = form_site(Path(db), form, site_options.title)
         else:
             site = site_of(db, site_options, progress)

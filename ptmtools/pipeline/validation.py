@@ -152,11 +152,11 @@ def kind_of(folder: Path) -> FolderKind | None:
 _LIMITS = Limits()
 
 
-def check_folder(folder: Path) -> None:
-    """Raises DatabaseError PTM-D006 if a folder of `FOLDERS` has an error."""
-    kind = kind_of(folder)
-    errors = kind.check.load()(folder, _LIMITS).errors if kind else ()
-    if kind and errors:
+def check_folder(folder: Path, index: str) -> None:
+    """Raises DatabaseError PTM-D006 if a folder of the kind with this index (`FOLDERS`) has an
+    error."""
+    kind = FOLDERS[index]
+    if errors := kind.check.load()(folder, _LIMITS).errors:
         first = errors[0]
         raise DatabaseError(
             "PTM-D006",

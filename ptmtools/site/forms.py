@@ -1,5 +1,5 @@
-"""The site of a folder that holds one object: an octree texture (`ptm apo`) or an interlaced image
-(`ptm interlace`).
+"""The site of a folder of another form than a database: an octree texture (`ptm apo`), an
+interlaced image (`ptm interlace`) or a campus (`ptm campus`).
 
 Each form has a page with a script of its own (``web/page/forms``), which the page of databases does
 not load. A new form is a row of `FORMS`. All files are in ``data-HASH``, with a hash of the index,
@@ -17,12 +17,14 @@ from urllib.parse import quote
 
 from ptmtools import schemas
 from ptmtools.errors import InputError
-from ptmtools.files import open_regular
+from ptmtools.files import open_below
 from ptmtools.site.content import Site, title_of
 from ptmtools.site.entry import DIGITS, Entry, link_bytes, state_of
 from ptmtools.site.program import form_page, form_script
 from ptmtools.store.layout import sha256
 
+#: Largest index, bytes.
+_LONGEST = 1 << 26
 _MEDIA = {
     ".json": "application/json",
     ".glb": "model/gltf-binary",
@@ -36,6 +38,12 @@ def _of_octree(index: Mapping[str, Any]) -> Iterator[str]:
     for name in ("mesh", "normals", "colors"):
         if name in index:
             yield index[name]["file"]
+
+
+def _of_campus(index: Mapping[str, Any]) -> Iterator[str]:
+    for each in index["objects"]:
+        yield from (mesh["file"] for mesh in each["meshes"])
+    yield from (texture["file"] for texture in index["textures"])
 
 
 def _of_set(index: Mapping[str, Any]) -> Iterator[str]:
@@ -61,6 +69,7 @@ class Form:
 _LIST = (
     Form("apo.json", schemas.APO, "apo.js", _of_octree),
     Form("interlace.json", schemas.INTERLACE, "interlace.js", _of_set),
+    Form("campus.json", schemas.CAMPUS, "campus.js", _of_campus),
 )
 #: By the name of the index.
 FORMS = {form.index: form for form in _LIST}
@@ -76,7 +85,7 @@ def form_site(folder: Path, form: Form, title: str = "") -> Site:
 
     Raises InputError PTM-I122: a file is missing or cannot be read, or the index is none.
     """
-    data, _ = _read(folder / form.index)
+    data, _ = _read(folder, form.index, _LONGEST)
     try:
         index = schemas.parse(data)
         schemas.check(index, form.schema)
@@ -91,9 +100,10 @@ def form_site(folder: Path, form: Form, title: str = "") -> Site:
     entries = [Entry(f"{place}/{form.index}", data, _MEDIA[".json"], True, compressed=True)]
     for name in form.files(index):
         file = folder / name
-        _, state = _read(file, 0)
+        _, state = _read(folder, name, 0)
         media = _MEDIA.get(file.suffix, "application/octet-stream")
-        entries.append(Entry(f"{place}/{quote(name)}", file, media, True, state=state))
+        packed = file.suffix == ".glb"
+        entries.append(Entry(f"{place}/{quote(name)}", file, media, True, packed, state))
     script = form_script(form.script)
     settings = {"title": title or title_of(folder), "index": f"{place}/{form.index}"}
     entries += [script, form_page(settings, script.name)]
@@ -107,11 +117,12 @@ def form_weight(site: Site) -> tuple[int, int]:
     return page, sum(sizes.values())
 
 
-def _read(file: Path, length: int = -1) -> tuple[bytes, tuple[int, int, int]]:
-    """The first bytes of a file, and its state."""
+def _read(folder: Path, name: str, length: int) -> tuple[bytes, tuple[int, int, int]]:
+    """The first bytes of a file, and its state; refuses links."""
+    file = folder / name
     try:
-        with open_regular(file) as stream:
-            return stream.read(length), state_of(os.fstat(stream.fileno()))
+        with open_below(folder, name) as stream:
+            data, state = stream.read(length + 1), state_of(os.fstat(stream.fileno()))
     except OSError as fault:
         raise InputError(
             "PTM-I122",
@@ -119,3 +130,6 @@ def _read(file: Path, length: int = -1) -> tuple[bytes, tuple[int, int, int]]:
             file=file,
             remedy="write the folder again",
         ) from fault
+    if length and len(data) > length:
+        raise InputError("PTM-I122", "is too long for an index", file=file)
+    return data, state

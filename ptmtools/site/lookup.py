@@ -87,7 +87,7 @@ def below(folder: Path, *, hashed: bool = False) -> Lookup:
 
 def files_of(folder: str | PathLike[str]) -> Lookup:
     """The files of a database: those of its site, without pictures, then those in its `www`; those
-    of a folder that `ptm publish` wrote; or those of the site of a single object (`forms`).
+    of a folder that `ptm publish` wrote; or those of the site of another form (`forms`).
 
     Raises
     ------
@@ -145,7 +145,7 @@ class _Database:
         except DatabaseError as fault:
             if fault.code == "PTM-D001" and self._path.exists():
                 fault.message = (
-                    "neither a database, nor a folder that `ptm publish`, `ptm apo` or "
-                    "`ptm interlace` wrote"
+                    "neither a database, nor a folder that `ptm publish`, `ptm apo`, "
+                    "`ptm interlace` or `ptm campus` wrote"
                 )
             raise

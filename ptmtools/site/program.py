@@ -26,8 +26,8 @@ PROGRAM = {
     "worker.js": JAVASCRIPT,
     "decoder.wasm": "application/wasm",
 }
-#: The page of single objects, and the scripts of their forms (`ptmtools.site.forms`).
-FORM_PAGE, FORM_SCRIPTS = "form.html", ("apo.js", "interlace.js")
+#: The page of other forms, and their scripts (`ptmtools.site.forms`).
+FORM_PAGE, FORM_SCRIPTS = "form.html", ("apo.js", "interlace.js", "campus.js")
 _FIELD = re.compile(r"\{\{(\w+)\}\}")
 
 

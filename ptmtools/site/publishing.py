@@ -214,7 +214,8 @@ def weight_of(site: Site) -> Weight:
         for number, row in enumerate(index["cells"])
         if row.get("standing", True)
     }
-    bytes_of = {name: link_bytes(entry) for name, entry in site.entries.items() if _walked(name)}
+    statues = "octrees" in index
+    bytes_of = {n: link_bytes(e) for n, e in site.entries.items() if _walked(n, statues)}
     begins = (f"{DATA}/index-", f"{DATA}/poster-")
     page = sum(size for name, size in bytes_of.items() if not name.startswith(f"{DATA}/"))
     before = sum(size for name, size in bytes_of.items() if name.startswith(begins))
@@ -230,9 +231,9 @@ def weight_of(site: Site) -> Weight:
     )
 
 
-def _walked(name: str) -> bool:
-    """Whether every walk may need a file."""
-    later = name.rpartition("/")[2] in LATER
+def _walked(name: str, statues: bool) -> bool:
+    """Whether every walk may need a file; the script of octrees where there are some."""
+    later = name.rpartition("/")[2] in LATER and not (statues and name.endswith("/statues.js"))
     return name == INDEX or (name.startswith(("viewer-", f"{DATA}/")) and not later)
 
 

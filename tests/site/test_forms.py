@@ -267,8 +267,9 @@ def test_damaged_files_give_a_message(
 
 def test_every_form_has_a_page(statue: Path, pictures: dict[str, Path]) -> None:
     folders = {"apo.json": statue, "interlace.json": pictures["rgb-png"]}
-    for name, form in FORMS.items():
-        site = form_site(folders[name], form, title="A <title>")
+    for name, folder in folders.items():
+        form = FORMS[name]
+        site = form_site(folder, form, title="A <title>")
         page = site.entries["index.html"].read().decode()
         assert "<title>A &lt;title&gt;</title>" in page
         assert form.script in page
@@ -294,6 +295,57 @@ def test_a_published_folder(
     assert main(["publish", str(damaged), "-o", str(tmp_path / "other")]) == 5
     assert "PTM-D006" in capsys.readouterr().err
     assert not (tmp_path / "other").exists()
+
+
+def test_links_are_refused(statue: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(statue, tmp_path / "folder"))
+    (tmp_path / "secret").write_bytes((folder / "apo.bin").read_bytes())
+    (folder / "apo.bin").unlink()
+    (folder / "apo.bin").symlink_to(tmp_path / "secret")
+    with pytest.raises(InputError, match="PTM-I122"):
+        form_site(folder, FORMS["apo.json"])
+
+
+def test_publishing_checks_the_form_that_it_writes(
+    statue: Path, pictures: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Also in a folder of two."""
+    folder = Path(shutil.copytree(statue, tmp_path / "both"))
+    shutil.copytree(pictures["rgb-png"], folder, dirs_exist_ok=True)
+    OCTREE_FAULTS["other"](folder)
+    assert main(["publish", str(folder), "-o", str(tmp_path / "site")]) == 5
+    assert main(["publish", str(statue), "-o", str(tmp_path / "site"), "--poster", "x.png"]) == 2
+    assert "--title" in capsys.readouterr().err
+
+
+def test_pictures_have_the_ratio_of_their_source(opened: Open, tmp_path: Path) -> None:
+    """Whose sides were scaled to powers of two."""
+    Image.fromarray(np.full((96, 128, 3), 255, np.uint8)).save(tmp_path / "b.png")
+    assert main(["-q", "interlace", str(tmp_path / "b.png"), "-o", str(tmp_path / "b")]) == 0
+    with opened(tmp_path / "b", "?all", width=400, height=400) as visitor:
+        visitor.until("s.complete")
+        white = (visitor.picture() > 250).all(axis=2)
+    rows, columns = np.flatnonzero(white.any(axis=1)), np.flatnonzero(white.any(axis=0))
+    assert len(columns) > 390  # but for the outline of the focus
+    assert 290 <= len(rows) <= 310  # 4 : 3
+
+
+def test_a_host_without_ranges(chromium: Any, statue: Path) -> None:
+    """Which sends the whole file: once."""
+    site = form_site(statue, FORMS["apo.json"])
+
+    def whole(route: Any) -> None:
+        headers = {k: v for k, v in route.request.headers.items() if k.lower() != "range"}
+        route.continue_(headers=headers)
+
+    def prepare(page: Any) -> None:
+        page.route("**/apo.bin", whole)
+
+    with visiting(
+        chromium, site.entries, query="#0,0,0.55", width=SIDE, height=SIDE, prepare=prepare
+    ) as visitor:
+        visitor.until("s.complete")
+        assert len([v for v in visitor.visits if v.path.endswith("apo.bin")]) == 1
 
 
 def test_a_missing_file(statue: Path, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,13 @@ from tests.neighbours.apo.statues import write_rooms
 WIDTH, HEIGHT = 320, 240
 #: Levels of each octree that has been in view.
 LEVELS = "window.ptm.walk.renderer.statues?.levels ?? []"
+
+
+def built(model: Path, db: Path) -> Path:
+    options = ["--apo", "statue*", "--apo-faces", "500", "--apo-error", "0.02", "--format", "gltf"]
+    options += ["--no-fallback", "-j", "1", "--backend", "embree"]
+    assert main(["-q", "build-scene", str(model), "-o", str(db), *options]) == 0
+    return db
 
 
 @pytest.fixture(scope="module")
@@ -111,9 +119,12 @@ def test_a_context_that_is_lost(visit: Visiting, site: Site, database: Path) -> 
         assert (visitor.picture()[statue] == before).all()
 
 
-@pytest.mark.parametrize("damage", ["cut", "other", "missing", "empty"])
+CODES = {"cut": "PTM-V104", "other": "PTM-V105", "missing": "PTM-V103", "empty": "PTM-V103"}
+
+
+@pytest.mark.parametrize("damage", CODES)
 def test_a_damaged_octree_leaves_the_walk(
-    visit: Visiting, site: Site, database: Path, tmp_path: Path, damage: str
+    visit: Visiting, site: Site, database: Path, damage: str
 ) -> None:
     eye, yaw = pose(database, 0, 0.9)
     (name,) = (n for n in site.entries if "statue_01" in n)
@@ -126,13 +137,75 @@ def test_a_damaged_octree_leaves_the_walk(
         entries[name] = Entry(name, changed[damage], entries[name].media)
     with visit(Site(entries, site.index), query=address(eye, yaw)) as visitor:
         visitor.page.wait_for_function("window.ptm?.errors.length > 0", timeout=90_000)
-        code = visitor.page.evaluate("window.ptm.errors[0].code")
-        assert code in ("PTM-V103", "PTM-V104", "PTM-V105")
+        assert visitor.page.evaluate("window.ptm.errors[0].code") == CODES[damage]
         visitor.until("s.complete")
         assert not visitor.page.is_visible("#error")
-        assert not any(
-            "error: " in message and "Uncaught" in message for message in visitor.messages
-        )
+        asked = len([v for v in visitor.visits if v.path.endswith(name)])
+        assert asked == {"missing": 1, "empty": 1, "other": 2, "cut": 6}[damage]
+
+
+def test_a_level_that_fails_later_leaves_those_before(
+    visit: Visiting, site: Site, database: Path
+) -> None:
+    eye, yaw = pose(database, 0, 0.9)
+    (name,) = (n for n in site.entries if "statue_01" in n)
+    row = site.index["octrees"][0]
+    data = site.entries[name].read()
+    end = row["ends"][6]
+    spoilt = data[:end] + bytes(len(data) - end)
+    entries = {**site.entries, name: Entry(name, spoilt, site.entries[name].media)}
+    with visit(Site(entries, site.index), query=address(eye, yaw)) as visitor:
+        visitor.page.wait_for_function("window.ptm?.errors.length > 0", timeout=90_000)
+        assert visitor.page.evaluate(LEVELS)[0] == 7
+        visitor.until("s.complete")
+
+
+def test_a_wrong_row_leaves_the_walk(visit: Visiting, site: Site, database: Path) -> None:
+    eye, yaw = pose(database, 0, 0.9)
+    (name,) = (n for n in site.entries if "/index-" in n)
+    document = json.loads(site.entries[name].read())
+    del document["octrees"][0]["cube"]
+    entries = {**site.entries, name: Entry(name, json.dumps(document).encode(), "application/json")}
+    with visit(Site(entries, site.index), query=address(eye, yaw)) as visitor:
+        visitor.until("s.complete")
+        assert visitor.page.evaluate("window.ptm.errors[0].code") == "PTM-V105"
+
+
+def test_it_begins_without_textures(visit: Visiting, tmp_path: Path) -> None:
+    model = write_rooms(tmp_path / "model", 4)
+    for file in model.parent.glob("*.mtl"):
+        lines = file.read_text().splitlines()
+        file.write_text("\n".join(line for line in lines if "map_" not in line))
+    built(model, tmp_path / "db")
+    eye, yaw = pose(tmp_path / "db", 1, 0.9)
+    plain = site_of(tmp_path / "db", PLAIN)
+    with visit(plain, query=address(eye, yaw), width=WIDTH, height=HEIGHT) as visitor:
+        visitor.until("s.complete", 60)
+        assert visitor.page.evaluate(LEVELS)[1] > 0
+        visitor.page.wait_for_timeout(200)
+        assert np.ptp(visitor.picture()[80:160, 120:200]) > 10
+        assert visitor.messages == []
+
+
+def test_freezing_and_comparing(visit: Visiting, site: Site, database: Path) -> None:
+    near, yaw = pose(database, 1, 0.9)
+    far, turned = pose(database, 0, 1.6)
+    (name,) = (n for n in site.entries if "statue_02" in n)
+    with visit(site, query=address(far, turned), width=WIDTH, height=HEIGHT) as visitor:
+        visitor.until("s.complete")
+        visitor.page.evaluate("window.ptm.freeze(true)")
+        go = f"window.ptm.goTo({{eye: {near.tolist()}, yaw: {np.radians(yaw)}, pitch: 0}})"
+        visitor.page.evaluate(go)
+        visitor.page.wait_for_timeout(1500)
+        assert not any(v.path.endswith(name) for v in visitor.visits)
+        visitor.page.evaluate("window.ptm.freeze(false)")
+        visitor.until(f"({LEVELS})[1] > 0 && s.complete")
+        visitor.page.evaluate("window.ptm.compare(true)")
+        visitor.page.wait_for_function("window.ptm.walk.comparison")
+        visitor.until("s.complete")
+        picture = visitor.picture()[100:140].astype(int)
+        halves = picture[:, 140:159], picture[:, 162:181]
+        assert abs(halves[0].mean() - halves[1].mean()) < 12  # both lit
 
 
 def test_other_sites_do_not_load_the_script(

@@ -22,7 +22,7 @@ sys.path.insert(0, str(ROOT))
 from benchmarks.web_rivals.packages import ESBUILD  # noqa: E402
 
 PTM = ROOT / "web" / "ptm" / "src"
-#: The page of single objects: octree textures and interlaced images.
+#: The page of octree textures, interlaced images and campuses.
 FORMS = HERE / "forms"
 OUTPUT = ROOT / "ptmtools" / "site" / "page"
 #: Scripts that the page loads when it needs them.
@@ -66,7 +66,7 @@ def build(folder: Path) -> None:
     files = {
         "index.html": page(HERE),
         "form.html": page(FORMS),
-        **{f"{name}.js": script(FORMS / f"{name}.js") for name in ("apo", "interlace")},
+        **{f"{name}.js": script(FORMS / f"{name}.js") for name in ("apo", "interlace", "campus")},
         "viewer.js": script(HERE / "main.js"),
         **{name: script(HERE / name) for name in LATER},
         "worker.js": minified(PTM / "worker.js"),

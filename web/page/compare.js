@@ -13,6 +13,7 @@ export class Comparison {
     this.memory = new TextureMemory(gl, rows, (t, levels) => stream.decode(t, levels));
     this.memory.fades = false;
     this.renderer = new Renderer(gl, this.memory, means);
+    this.renderer.statues = walk.renderer?.statues ?? null;
   }
 
   /** Requests the visible textures to the finest level that the view resolves; true once all are here. */

@@ -176,6 +176,7 @@ export class Walkthrough {
   }
 
   #make() {
+    this.renderer?.statues?.delete();
     const renderer = (this.renderer = new Renderer(this.gl, this.memory, this.means));
     const { octrees } = this.index;
     if (octrees) {
@@ -183,7 +184,7 @@ export class Walkthrough {
       this.#loading = true;
       loadStatues().then(({ Statues }) => {
         renderer.statues = new Statues(this.gl, octrees, this.site, this.fetcher, report, () => this.touch());
-      }, () => this.emit("notice", { message: "The details of statues could not be loaded." }))
+      }).catch(() => this.emit("notice", { message: "The details of statues could not be loaded." }))
         .finally(() => (this.#loading = false));
     }
     this.items = new ItemBuffer(this.gl);
@@ -268,7 +269,8 @@ export class Walkthrough {
     const camera = cameraOf(pose, this.tall, this.aspect, this.far);
     const { fence, items, renderer } = this;
     if (this.begun) {
-      renderer?.statues?.advance(this.drawn, pose.eye, this.sharpness.lines / Math.tan(this.tall / 2));
+      const lines = this.sharpness.lines / Math.tan(this.tall / 2);
+      renderer?.statues?.advance(this.drawn, pose.eye, lines, !this.frozen && !document.hidden);
     } else {
       const { progress, over } = beginningOf(this);
       this.emit("progress", progress);
@@ -486,13 +488,14 @@ export class Walkthrough {
     return this.has(true);
   }
 
-  /** Whether that is so, of objects with any mesh unless `finer`. @param {boolean} finer */
+  /** Whether that is so, of objects with any mesh and without octrees unless `finer`. @param {boolean} finer */
   has(finer) {
     const { client, memory, present, renderer, stream, catalogue: { T, K } } = this;
     if (!present || this.#sightDrawn < this.#turned || this.#looked < this.#changed) return false;
     if (this.#ready && this.#painted < this.#changed) return false;
     if (this.visible.some((c) => renderer?.cells.get(c)?.shapes !== stream.shapes.get(c))) return false;
-    if (this.#loading || renderer?.statues?.lacks) return false;
+    // The walk begins without octrees.
+    if (finer && (this.#loading || renderer?.statues?.lacks)) return false;
     if (client.cell !== this.cell || client.missing(false, false, finer) > 0 || !this.sharpness.full) return false;
     for (let t = 0; t < T; t++) {
       const held = memory.held[t];

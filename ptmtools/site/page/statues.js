@@ -1,4 +1,4 @@
-var u=class extends Error{constructor(e,t){super(t),this.code=e}};var S=()=>performance.now()/1e3;var y=(r="",e="")=>`#version 300 es
+var v=class extends Error{constructor(e,t){super(t),this.code=e}};var y=()=>performance.now()/1e3;var T=(o="",e="")=>`#version 300 es
 precision highp float;
 uniform vec3 eye;
 uniform mat3 turn;
@@ -8,14 +8,14 @@ layout(location=1)in vec2 place;
 layout(location=2)in vec4 paint;
 out vec3 seen;
 out vec2 uv;
-out vec3 painted;${r}
+out vec3 painted;${o}
 void main(){
 ${e}
 painted=paint.rgb;
 seen=turn*(position-eye);
 uv=place;
 gl_Position=vec4(seen.xy*lens.xy,seen.z*lens.z+lens.w,-seen.z);
-}`,$=`
+}`,k=`
 uniform sampler2D map;
 uniform int channels;
 uniform vec4 color;
@@ -26,14 +26,14 @@ vec4 sampled=texture(map,uv);
 if(channels==1)sampled=vec4(sampled.rrr,1.0);
 if(channels==2)sampled=sampled.rrrg;
 return channels==0?vec4(mean,1.0):sampled;
-}`,z=`#version 300 es
+}`,W=`#version 300 es
 precision highp float;
 in vec3 seen;
 in vec2 uv;
 in vec3 painted;
 uniform float cutoff;
 out vec4 shown;
-${$}
+${k}
 void main(){
 vec4 sampled=texel();
 float light=1.0;
@@ -46,11 +46,11 @@ sampled=vec4(1.0);
 shown=vec4(sampled.rgb*color.rgb*painted*light,sampled.a*color.a);
 if(shown.a < max(cutoff,0.004))discard;
 if(cutoff > 0.0)shown.a=1.0;
-}`,k=`
+}`,_=`
 vec2 bytes(float number) {
   float high = floor(number / 256.0);
   return vec2(number - 256.0 * high, high) / 255.0;
-}`,V=`#version 300 es
+}`,K=`#version 300 es
 precision highp float;
 in vec3 seen;
 in vec2 uv;
@@ -58,7 +58,7 @@ uniform float item;
 uniform vec2 size;
 uniform float pixels;
 out vec4 shown;
-${k}
+${_}
 void main(){
 float w=gl_FragCoord.w;
 vec2 texels=uv*size;
@@ -67,17 +67,17 @@ vec2 up=(dFdy(texels*w)-texels*dFdy(w))/w;
 float most=max(dot(across,across),dot(up,up));
 float detail=0.5*log2(max(most,1e-30))-log2(pixels);
 shown=vec4(bytes(item),bytes(floor(256.0*clamp(detail,0.0,31.0))));
-}`,H=`#version 300 es
+}`,j=`#version 300 es
 precision highp float;
 uniform float item;
 layout(location=1)out vec4 shown;
-${k}
-void main(){shown=vec4(bytes(item),0.0,1.0);}`,U={surface:[y(),z],item:[y(),V],placeholder:[y(),H]};function I(r,e,t=U[e]){let o=r.createProgram(),s=[r.VERTEX_SHADER,r.FRAGMENT_SHADER];if(t.forEach((c,a)=>{let h=r.createShader(s[a]);r.shaderSource(h,c),r.compileShader(h),r.attachShader(o,h),r.deleteShader(h)}),r.linkProgram(o),!r.getProgramParameter(o,r.LINK_STATUS)&&!r.isContextLost())throw new Error(`${e}: ${r.getProgramInfoLog(o)}`);let i={},n=r.isContextLost()?0:r.getProgramParameter(o,r.ACTIVE_UNIFORMS);for(let c=0;c<n;c++){let a=r.getActiveUniform(o,c)?.name??"";i[a]=r.getUniformLocation(o,a)}return{program:o,at:i}}function D(r,{program:e,at:t},o){r.useProgram(e),r.uniform3fv(t.eye,o.eye),r.uniformMatrix3fv(t.turn,!1,o.turn),r.uniform4fv(t.lens,o.lens)}function _(r,e,t,o=0,s=o){let i=0;for(let n=0;n<3;n++){let c=Math.max(e[o+n]-r[n],r[n]-t[s+n],0);i+=c*c}return Math.sqrt(i)}function O(r){let e=-1;for(let t of r){e^=t;for(let o=0;o<8;o++)e=e&1?e>>>1^3988292384:e>>>1}return~e>>>0}var m=4096,F=2**24,B=7,G=65536,W=new Uint8Array([3,0]),L=2,j=4;function d(r,e){if(!r)throw new Error(e)}var R=(r,e,t)=>Number.isInteger(r)&&e<=r&&r<=t;function X({cube:r,levels:e,streams:t}){let o=s=>typeof s=="number"&&Math.abs(s)<=1e15;d(Array.isArray(r?.low)&&r.low.length===3&&r.low.every(o),"no cube"),d(o(r.side)&&r.side>=1e-15,"no cube"),d(Array.isArray(e)&&R(e.length,1,21),"no levels"),d(e.every(s=>R(s,1,F)),"a level without texels"),d(e.reduce((s,i)=>s+i,0)<=F,"too many texels");for(let s of t){for(let i of[s?.ends,s?.crc32])d(Array.isArray(i)&&i.length===e.length,"lists of other lengths"),d(i.every(n=>R(n,0,4294967295)),"a list without numbers");d(s.ends.every((i,n)=>i>(n?s.ends[n-1]:L)),"ends that do not ascend")}}var A=class{#e=0;constructor(e,t){this.gl=e;let o=Math.max(1,Math.ceil(t/m));this.bytes=new Uint8Array(4*m*o),this.texture=e.createTexture(),e.bindTexture(e.TEXTURE_2D,this.texture),e.texStorage2D(e.TEXTURE_2D,1,e.RGBA8UI,m,o);for(let s of[e.TEXTURE_MIN_FILTER,e.TEXTURE_MAG_FILTER])e.texParameteri(e.TEXTURE_2D,s,e.NEAREST)}upload(e){let{gl:t}=this,o=Math.ceil(e/m);t.bindTexture(t.TEXTURE_2D,this.texture),t.texSubImage2D(t.TEXTURE_2D,0,0,this.#e,m,o-this.#e,t.RGBA_INTEGER,t.UNSIGNED_BYTE,this.bytes,4*m*this.#e),this.#e=Math.floor(e/m)}},T=class{#e=[0,0];constructor(e,t,o,s,i){this.gl=e,this.index=t,this.urlOf=o,this.fetcher=s,this.step=i,this.starts=[0];for(let n of t.levels)this.starts.push((this.starts.at(-1)??0)+n);if(this.count=this.starts.at(-1),e.getParameter(e.MAX_TEXTURE_SIZE)<m)throw new u("PTM-V101","This graphics card has no textures of 4,096 texels.");this.streams=t.streams,this.texels=this.streams.map(()=>new A(e,this.count)),this.levels=0,this.partial=!1,this.updates=0,this.running=!1}get complete(){return this.levels===this.index.levels.length}delete(){for(let{texture:e}of this.texels)this.gl.deleteTexture(e)}get bytes(){return this.texels.reduce((e,{bytes:t})=>e+t.length,0)}get fetched(){return this.levels?this.streams.reduce((e,{ends:t})=>e+t[this.levels-1],0):0}advance(e,t,o){this.running||this.complete||!e(this.levels)||(this.running=!0,this.#t().then(()=>{this.running=!1,o?.()},t))}async#t(){let e=this.index.levels.length,t=this.levels?this.levels+1:Math.min(B,e);this.#e=[0,0];let o=this.step&&this.levels?setInterval(()=>this.#o(),1e3*this.step):0;try{await Promise.all(this.streams.map((s,i)=>this.#s(s,i,this.levels,t)))}finally{clearInterval(o)}for(let s of this.texels)s.upload(this.starts[t]);this.updates++,this.levels=t,this.partial=!1}#o(){let e=Math.min(...this.#e.slice(0,this.streams.length));if(!(e<=this.starts[this.levels])){for(let t of this.texels)t.upload(e);this.updates++,this.partial=!0}}async#s(e,t,o,s){let i=e.ends.at(-1),n=o?e.ends[o-1]:L,c=e.ends[s-1]-(s===e.ends.length?j:0),a=this.urlOf(e.file),{bytes:h}=this.texels[t],f=async p=>{let x=new DecompressionStream("deflate-raw"),E=x.writable.getWriter(),g=4*this.starts[o],b=(async()=>{for(let l=x.readable.getReader();;){let{done:v,value:w}=await l.read();if(v)return;d(g+w.length<=4*this.starts[s],"more texels than the index says"),h.set(w,g),g+=w.length,this.#e[t]=Math.floor(g/4)}})();b.catch(()=>{});let M=this.step&&o?G:c-n;for(let l=n;l<c;l+=M){let v=await this.fetcher.range(a,l,Math.min(l+M,c),i,void 0,p),w=l-v.begin,q=v.body.subarray(w,w+Math.min(M,c-l));await Promise.race([E.write(q),b])}s<e.ends.length&&await Promise.race([E.write(W),b]),await Promise.all([E.close(),b]),d(g===4*this.starts[s],"fewer texels than the index says");for(let l=o;l<s;l++){let v=h.subarray(4*this.starts[l],4*this.starts[l+1]);d(O(v)===e.crc32[l],`level ${l} has another checksum`)}};try{await f("default")}catch(p){if(p instanceof u)throw p;await f("no-store").catch(x=>{throw x instanceof u?x:new u("PTM-V105",`${e.file} is damaged: ${x.message}`)})}}};var N=`
+${_}
+void main(){shown=vec4(bytes(item),0.0,1.0);}`,O={surface:[T(),W],item:[T(),K],placeholder:[T(),j]};function F(o,e,t=O[e]){let s=o.createProgram(),r=[o.VERTEX_SHADER,o.FRAGMENT_SHADER];if(t.forEach((h,c)=>{let a=o.createShader(r[c]);o.shaderSource(a,h),o.compileShader(a),o.attachShader(s,a),o.deleteShader(a)}),o.linkProgram(s),!o.getProgramParameter(s,o.LINK_STATUS)&&!o.isContextLost())throw new Error(`${e}: ${o.getProgramInfoLog(s)}`);let n={},i=o.isContextLost()?0:o.getProgramParameter(s,o.ACTIVE_UNIFORMS);for(let h=0;h<i;h++){let c=o.getActiveUniform(s,h)?.name??"";n[c]=o.getUniformLocation(s,c)}return{program:s,at:n}}function L(o,{program:e,at:t},s){o.useProgram(e),o.uniform3fv(t.eye,s.eye),o.uniformMatrix3fv(t.turn,!1,s.turn),o.uniform4fv(t.lens,s.lens)}function X(o,e,t,s=0,r=s){let n=0;for(let i=0;i<3;i++){let h=Math.max(e[s+i]-o[i],o[i]-t[r+i],0);n+=h*h}return Math.sqrt(n)}var Y=Uint32Array.from({length:256},(o,e)=>{for(let t=0;t<8;t++)e=e&1?e>>>1^3988292384:e>>>1;return e});function N(o,e=0){let t=~e;for(let s=0;s<o.length;s++)t=Y[(t^o[s])&255]^t>>>8;return~t>>>0}var f=4096,C=2**24,Z=7,J=65536,Q=new Uint8Array([3,0]),V=2,ee=4;function d(o,e){if(!o)throw new Error(e)}var P=(o,e,t)=>Number.isInteger(o)&&e<=o&&o<=t;function q({cube:o,levels:e,streams:t}){let s=r=>typeof r=="number"&&Math.abs(r)<=1e15;d(Array.isArray(o?.low)&&o.low.length===3&&o.low.every(s),"no cube"),d(s(o.side)&&o.side>=1e-15,"no cube"),d(Array.isArray(e)&&P(e.length,1,21),"no levels"),d(e.every(r=>P(r,1,C)),"a level without texels"),d(e.reduce((r,n)=>r+n,0)<=C,"too many texels");for(let r of t){for(let n of[r?.ends,r?.crc32])d(Array.isArray(n)&&n.length===e.length,"lists of other lengths"),d(n.every(i=>P(i,0,4294967295)),"a list without numbers");d(r.ends.every((n,i)=>n>(i?r.ends[i-1]:V)),"ends that do not ascend")}}var te=64,se=10,z=o=>typeof o?.code=="string"&&o.code.startsWith("PTM-V"),U=class{rows=0;constructor(e,t){this.gl=e;let s=Math.max(1,Math.ceil(t/f));this.size=4*f*s,this.bytes=new Uint8Array(this.size),this.texture=e.createTexture(),this.#e(()=>{e.texStorage2D(e.TEXTURE_2D,1,e.RGBA8UI,f,s);for(let r of[e.TEXTURE_MIN_FILTER,e.TEXTURE_MAG_FILTER])e.texParameteri(e.TEXTURE_2D,r,e.NEAREST)})}#e(e){let{gl:t}=this;t.activeTexture(t.TEXTURE1),t.bindTexture(t.TEXTURE_2D,this.texture),e(),t.activeTexture(t.TEXTURE0)}upload(e){let{gl:t,bytes:s,rows:r}=this;if(!s)return!0;let n=Math.ceil(e/f),i=Math.min(n,r+te);return this.#e(()=>t.texSubImage2D(t.TEXTURE_2D,0,0,r,f,i-r,t.RGBA_INTEGER,t.UNSIGNED_BYTE,s,4*f*r)),this.rows=Math.min(i,Math.floor(e/f)),i===n}},$=class{#e=[0,0];#t=0;#s=!1;#r=[];constructor(e,t,s,r,n){this.gl=e,this.index=t,this.urlOf=s,this.fetcher=r,this.step=n,this.starts=[0];for(let i of t.levels)this.starts.push((this.starts.at(-1)??0)+i);if(this.count=this.starts.at(-1),e.getParameter(e.MAX_TEXTURE_SIZE)<f)throw new v("PTM-V101","This graphics card has no textures of 4,096 texels.");this.streams=t.streams,this.texels=this.streams.map(()=>new U(e,this.count)),this.levels=0,this.partial=!1,this.updates=0,this.running=!1,this.restsUntil=0}get complete(){return this.levels===this.index.levels.length}delete(){this.#s=!0;for(let{texture:e}of this.texels)this.gl.deleteTexture(e)}get bytes(){return this.texels.reduce((e,{size:t})=>e+t,0)}get rests(){return y()<this.restsUntil}get fetched(){return this.levels?this.streams.reduce((e,{ends:t})=>e+t[this.levels-1],0):0}advance(e,t,s){this.running||this.complete||this.rests||!e(this.levels)||(this.running=!0,this.#o().then(()=>s?.(),r=>{this.restsUntil=r.code==="PTM-V104"?y()+se:1/0,this.#s||t(r)}).finally(()=>this.running=!1))}async#o(){let e=this.index.levels.length,t=this.levels?this.levels+1:Math.min(Z,e),s=this.step&&this.levels?setInterval(()=>this.#i(),1e3*this.step):0;try{await Promise.all(this.streams.map((r,n)=>this.#n(n,this.levels,t)))}finally{clearInterval(s),this.partial=!1}for(let r of this.texels)for(;!this.#s&&!r.upload(this.starts[t]);)await new Promise(n=>setTimeout(n,16));if(!this.#s&&(this.updates++,this.levels=t,this.complete))for(let r of this.texels)r.bytes=null}#i(){let e=Math.min(...this.#e.slice(0,this.streams.length));if(!(this.#s||e<=Math.max(this.#t,this.starts[this.levels]))){for(let t of this.texels)for(;!t.upload(e););this.#t=e,this.updates++,this.partial=!0}}async#n(e,t,s){try{await this.#a(e,t,s,"default")}catch(r){if(z(r))throw r;this.#r[e]=null,await this.#a(e,t,s,"no-store").catch(n=>{throw z(n)?n:new v("PTM-V105",`${this.streams[e].file} is damaged: ${n.message}`)})}}async#a(e,t,s,r){let n=this.streams[e],i=this.texels[e],h=i.bytes,c=t?n.ends[t-1]:V,a=n.ends[s-1]-(s===n.ends.length?ee:0),u=new DecompressionStream("deflate-raw"),m=u.writable.getWriter(),w=4*this.starts[s],p=new Map,x=4*this.starts[t],g=t;i.rows=Math.min(i.rows,Math.floor(this.starts[t]/f)),this.#e[e]=this.#t=this.starts[t];let E=(async()=>{for(let l=u.readable.getReader();;){let{done:A,value:b}=await l.read();if(A)return;d(x+b.length<=w,"more texels than the index says"),h.set(b,x);for(let M=0;M<b.length;){let D=4*this.starts[g+1]-x,R=b.subarray(M,M+D);p.set(g,N(R,p.get(g))),M+=R.length,x+=R.length,R.length===D&&g++}this.#e[e]=Math.floor(x/4)}})();E.catch(()=>{});let I=this.step&&t?J:a-c;for(let l=c;l<a;l+=I){let A=await this.#c(e,l,Math.min(l+I,a),r);await Promise.race([m.write(A),E])}s<n.ends.length&&await Promise.race([m.write(Q),E]),await Promise.all([m.close(),E]),d(x===w,"fewer texels than the index says");for(let l=t;l<s;l++)d(p.get(l)===n.crc32[l],`level ${l} has another checksum`)}async#c(e,t,s,r){let{file:n,ends:i}=this.streams[e],h=i.at(-1),c=this.#r[e];if(!c){let a=await this.fetcher.range(this.urlOf(n),t,s,h,void 0,r);if(a.begin===t&&a.body.length===s-t)return a.body;c=this.#r[e]=a.body}return c.subarray(t,s)}};var B=`
 uniform usampler2D octree;
 uniform int texels,deepest;
 uniform bool partial;
 uvec4 texel(usampler2D of,int address){
-return texelFetch(of,ivec2(address % ${m},address/${m}),0);
+return texelFetch(of,ivec2(address % ${f},address/${f}),0);
 }
 int ones(uint mask){
 mask-=mask >> 1u & 0x55u;
@@ -109,10 +109,10 @@ return address;
 int stopDepth(vec3 at){
 vec3 dx=dFdx(at),dy=dFdy(at);
 return-((floatBitsToInt(min(dot(dx,dx),dot(dy,dy)))>> 23)-127 >> 1);
-}`;var K=128<<20,C=.3,Y=[.5,.7,.6].map(r=>r/Math.hypot(.5,.7,.6)),Z=.1,J=y(`
+}`;var H=128<<20,G=.3,re=[.5,.7,.6].map(o=>o/Math.hypot(.5,.7,.6)),oe=.1,ne=T(`
 uniform vec3 low;
 uniform float side;
-out vec3 q;`,"q = (position - low) / side;"),Q=`#version 300 es
+out vec3 q;`,"q = (position - low) / side;"),ie=`#version 300 es
 precision highp float;
 precision highp int;
 precision highp usampler2D;
@@ -122,15 +122,15 @@ in vec3 painted;
 in vec3 q;
 uniform float cutoff;
 out vec4 shown;
-${$}
-${N}
+${k}
+${B}
 void main(){
 int stop=stopDepth(q);
 vec4 sampled=textured?texel():vec4(1.0);
 vec3 normal=normalize(vec3(texel(octree,addressAt(q,stop)).rgb)/127.5-1.0);
-float along=(1.0+dot(normal,vec3(${Y.join()})))/2.0;
-float light=${C}+${1-C}*along*along;
+float along=(1.0+dot(normal,vec3(${re.join()})))/2.0;
+float light=${G}+${1-G}*along*along;
 shown=vec4(sampled.rgb*color.rgb*painted*light,sampled.a*color.a);
 if(shown.a < max(cutoff,0.004))discard;
 shown.a=1.0;
-}`,P=class{#e=[];#t=new Map;#o=!1;#s=[];constructor(e,t,o,s,i,n){this.gl=e,this.rows=t,this.site=o,this.fetcher=s,this.report=i,this.touch=n,this.program=I(e,"octree",[J,Q])}has(e){return(this.#e[e]?.levels??0)>0}get lacks(){return!this.#o||[...this.#t.keys()].some(e=>this.#n(e))}get levels(){return this.#e.map(e=>e?.levels??0)}get bytes(){return this.#e.reduce((e,t)=>e+(t?.bytes??0),0)}advance(e,t,o){this.#t.clear(),this.#o=!0;let s=S();for(let{batches:c}of e)for(let{look:{octree:a},low:h,high:f}of c){if(!this.rows[a]||this.#e[a]===null)continue;let p=Math.max(Z,_(t,h,f)),x=o/2/p*this.rows[a].cube.side;this.#t.set(a,Math.max(x,this.#t.get(a)??0)),this.#s[a]=s}if(this.#e.some(c=>c?.running))return;let i=-1,n=0;for(let c of this.#t.keys()){let a=this.#r(c);a>n&&this.#n(c)&&([i,n]=[c,a])}i>=0&&this.#i(i)}#r(e){let t=this.#e[e]?.levels??0;return(this.#t.get(e)??0)*2**-Math.max(0,t-1)}#n(e){let t=this.#e[e];return t!==null&&!t?.complete&&this.#r(e)>1}#i(e){let{cube:t,levels:o,file:s,ends:i,crc32:n}=this.rows[e],c=a=>{this.#e[e]?.delete(),this.#e[e]=null,this.touch();let h=`${s} is damaged: ${a.message}`;this.report(a instanceof u?a:new u("PTM-V105",h))};try{let a=this.#e[e];if(!a){let h={cube:t,levels:o,streams:[{file:s,ends:i,crc32:n}]};X(h),this.#a(4*o.reduce((f,p)=>f+p,0)),a=new T(this.gl,h,f=>this.site.of(f),this.fetcher,0),this.#e[e]=a}a.advance(()=>!0,c,this.touch)}catch(a){c(a)}}#a(e){let t=[...this.#e.keys()].filter(o=>this.#e[o]&&!this.#t.has(o));for(let o of t.sort((s,i)=>this.#s[s]-this.#s[i])){if(this.bytes+e<=K)return;this.#e[o]?.delete(),delete this.#e[o]}}draw(e,t,o){let{gl:s,program:i}=this,{at:n}=i;D(s,i,e),s.uniform1i(n.octree,1);let c=!1;for(let{buffers:a,batch:h}of t){let f=this.#e[h.look.octree],{cube:{low:p,side:x}}=f.index;s.activeTexture(s.TEXTURE1),s.bindTexture(s.TEXTURE_2D,f.texels[0].texture),s.activeTexture(s.TEXTURE0),s.uniform3fv(n.low,p),s.uniform1f(n.side,x),s.uniform1i(n.texels,f.count),s.uniform1i(n.deepest,f.levels-1),s.uniform1i(n.partial,0),s.bindVertexArray(a.vertexArray),c=o(n,h)||c,a.draw(h)}return c}};export{P as Statues};
+}`,S=class{#e=[];#t=new Map;#s=!1;#r=[];constructor(e,t,s,r,n,i){this.gl=e,this.site=s,this.fetcher=r,this.report=n,this.touch=i,this.indices=t.map(h=>{try{let{cube:c,levels:a,file:u,ends:m,crc32:w}=h,p={cube:c,levels:a,streams:[{file:u,ends:m,crc32:w}]};return q(p),p}catch(c){return n(new v("PTM-V105",`The index has a wrong octree: ${c.message}`)),null}}),this.program=F(e,"octree",[ne,ie])}delete(){for(let e of this.#e)e?.delete();this.#e=[]}has(e){return(this.#e[e]?.levels??0)>0}get lacks(){return!this.#s||[...this.#t.keys()].some(e=>this.#i(e))}get levels(){return Array.from(this.#e,e=>e?.levels??0)}get bytes(){return this.#e.reduce((e,t)=>e+(t?.bytes??0),0)}advance(e,t,s,r){this.#t.clear(),this.#s=!0;let n=y();for(let{batches:c}of e)for(let{look:{octree:a,blends:u},low:m,high:w}of c){let p=this.indices[a];if(!p||u)continue;let x=Math.max(oe,X(t,m,w)),g=s/2/x*p.cube.side;this.#t.set(a,Math.max(g,this.#t.get(a)??0)),this.#r[a]=n}if(!r||this.#e.some(c=>c?.running))return;let i=-1,h=0;for(let c of this.#t.keys()){let a=this.#o(c);a>h&&this.#i(c)&&([i,h]=[c,a])}i>=0&&this.#c(i)}#o(e){let t=this.#e[e]?.levels??0;return(this.#t.get(e)??0)*2**-Math.max(0,t-1)}#i(e){let t=this.#e[e];return t?!t.complete&&!t.rests&&this.#o(e)>1:this.#o(e)>1&&this.#a(e)}#n(e){return 4*(this.indices[e]?.levels.reduce((t,s)=>t+s,0)??0)}#a(e){return[...this.#t.keys()].filter(s=>s!==e&&this.#e[s]).reduce((s,r)=>s+this.#n(r),this.#n(e))<=H}#c(e){let t=this.#e[e],s=this.indices[e];s&&(t||(this.#h(this.#n(e)),t=new $(this.gl,s,r=>this.site.of(r),this.fetcher,0),this.#e[e]=t),t.advance(()=>!0,this.report,this.touch))}#h(e){let t=[...this.#e.keys()].filter(s=>this.#e[s]&&!this.#t.has(s));for(let s of t.sort((r,n)=>this.#r[r]-this.#r[n])){if(this.bytes+e<=H)return;this.#e[s]?.delete(),delete this.#e[s]}}draw(e,t,s){let{gl:r,program:n}=this,{at:i}=n;L(r,n,e),r.uniform1i(i.octree,1);let h=!1;for(let{buffers:c,batch:a}of t){let u=this.#e[a.look.octree],{cube:{low:m,side:w}}=u.index;r.activeTexture(r.TEXTURE1),r.bindTexture(r.TEXTURE_2D,u.texels[0].texture),r.activeTexture(r.TEXTURE0),r.uniform3fv(i.low,m),r.uniform1f(i.side,w),r.uniform1i(i.texels,u.count),r.uniform1i(i.deepest,u.levels-1),r.uniform1i(i.partial,0),r.bindVertexArray(c.vertexArray),h=s(i,a)||h,c.draw(a)}return h}};export{S as Statues};

@@ -126,13 +126,11 @@ class Arrays {
 }
 
 /**
- * The cell and the shapes of a GLB. Rejects with an Error if it is damaged, and as `decoder`.
+ * The JSON and the arrays of a GLB. Rejects with an Error if it is damaged, and as `decoder`.
  * @param {ArrayBuffer} buffer
- * @param {number} textures in the index
  * @param {() => Promise<ViewDecoder>} decoder called for a compressed GLB
- * @returns {Promise<{cell: number, shapes: Shape[]}>}
  */
-export async function readGlb(buffer, textures, decoder) {
+export async function openGlb(buffer, decoder) {
   const view = new DataView(buffer);
   if (buffer.byteLength < 20 || view.getUint32(0, true) !== GLTF) throw new Error("is not a GLB");
   if (view.getUint32(8, true) !== buffer.byteLength) throw new Error("is cut short");
@@ -146,8 +144,18 @@ export async function readGlb(buffer, textures, decoder) {
     binary = next + 8;
   }
   const compressed = tree.extensionsRequired !== undefined;
-  const arrays = new Arrays(tree, new Uint8Array(buffer, binary), compressed ? await decoder() : null);
+  return { tree, arrays: new Arrays(tree, new Uint8Array(buffer, binary), compressed ? await decoder() : null) };
+}
 
+/**
+ * The cell and the shapes of a GLB. Rejects as `openGlb`.
+ * @param {ArrayBuffer} buffer
+ * @param {number} textures in the index
+ * @param {() => Promise<ViewDecoder>} decoder
+ * @returns {Promise<{cell: number, shapes: Shape[]}>}
+ */
+export async function readGlb(buffer, textures, decoder) {
+  const { tree, arrays } = await openGlb(buffer, decoder);
   let begun = performance.now();
   // A quarter of a million triangles take several frames.
   const pause = async () => {

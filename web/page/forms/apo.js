@@ -7,6 +7,7 @@
 
 import { checkOctree, demand, isWhole, Octree } from "../octree/octree.js";
 import { find } from "../ui/elements.js";
+import { showNotice } from "../ui/errors.js";
 import { indexOf, runForm, sizeText } from "./form.js";
 import { meshOf, OctreeDrawing } from "./octree-drawing.js";
 import { Orbit } from "./orbit.js";
@@ -37,20 +38,24 @@ runForm(async (gl, config, fetcher, fail) => {
   const levels = query.has("levels") ? Math.max(0, Number(query.get("levels")) || 0) : Infinity;
   const bare = query.has("normals");
   const total = index.streams.reduce((sum, { ends }) => sum + (ends.at(-1) ?? 0), 0);
-  let paused = false;
+  let paused = false, drawn = "";
+  // What is there stays when a finer level cannot be fetched.
+  const report = (/** @type {import("../net/errors.js").PageError} */ fault) =>
+    octree.levels ? showNotice(document, fault.message) : fail(fault);
   find(document, "#keys").textContent = "Drag or use the arrow keys to turn; wheel, two fingers, + and − to zoom";
   return {
-    left: 0,
     frame(dt) {
       orbit.step(dt);
       const { camera } = orbit;
       // The levels that are shown end where their nodes are smaller than a pixel (section 4.2).
       const wanted = (/** @type {number} */ there) =>
         there < levels && (!there || drawing.pixels(there - 1, canvas.height, camera) > 1);
-      octree.advance(wanted, fail);
+      octree.advance(wanted, report);
       paused = !octree.complete && !wanted(octree.levels);
-      drawing.draw(octree, camera, { bare, levels });
-      const rest = octree.complete ? "" : paused ? "; finer ones when you come closer" : " …";
+      const picture = [canvas.width, canvas.height, ...camera.eye, octree.updates, octree.partial].join();
+      if (picture !== drawn) drawing.draw(octree, camera, { bare, levels });
+      drawn = picture;
+      const rest = octree.complete || octree.levels >= levels ? "" : paused ? "; finer ones when you come closer" : " …";
       return `${octree.levels} of ${index.levels.length} levels, ${sizeText(octree.fetched)} of ${sizeText(total)}${rest}`;
     },
     state: () => ({

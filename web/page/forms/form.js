@@ -13,7 +13,6 @@ import { showError, showNotice } from "../ui/errors.js";
  * @typedef {object} View
  * @property {(dt: number) => string} frame draws, and returns the status line
  * @property {() => object} state for tests and users of the console
- * @property {number} left bytes to come until the first picture, or 0
  */
 
 /**

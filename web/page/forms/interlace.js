@@ -41,37 +41,42 @@ runForm(async (gl, config, fetcher, fail) => {
   const urlOf = (/** @type {string} */ file) => new URL(file, address).href;
   const index = await indexOf(fetcher, address, checkedSet);
   const joining = new Joining(gl, index, urlOf, fetcher);
-  const { width, height } = index, canvas = /** @type {HTMLCanvasElement} */ (gl.canvas);
+  // Sides are powers of two; the picture has the ratio of its source.
+  const { width, height } = index.original, canvas = /** @type {HTMLCanvasElement} */ (gl.canvas);
   const panning = new Panning(canvas, width, height), all = new URLSearchParams(location.search).has("all");
   const { program, at } = linked(gl, VERTEX, FRAGMENT), array = gl.createVertexArray();
   const total = index.files.reduce((sum, { bytes }) => sum + bytes, 0);
   find(document, "#keys").textContent = "Drag or use the arrow keys to move; wheel, two fingers, + and − to zoom";
-  let needed = true;
+  let needed = true, drawn = "";
+  const draw = () => {
+    gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
+    gl.clearColor(0.086, 0.09, 0.106, 1);
+    gl.clear(gl.COLOR_BUFFER_BIT);
+    if (joining.texture) {
+      gl.useProgram(program);
+      gl.bindVertexArray(array);
+      gl.activeTexture(gl.TEXTURE0);
+      gl.bindTexture(gl.TEXTURE_2D, joining.texture);
+      gl.uniform1i(at("image"), 0);
+      gl.uniform4fv(at("box"), panning.box);
+      gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+    }
+  };
   return {
-    left: 0,
     frame(dt) {
       panning.step(dt);
       // A further file is needed while a texel is larger than a pixel.
       const { size } = joining;
       needed = all || !joining.steps || size.width < panning.pixels * width || size.height < panning.pixels * height;
       if (needed) joining.advance(fail);
-      gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
-      gl.clearColor(0.086, 0.09, 0.106, 1);
-      gl.clear(gl.COLOR_BUFFER_BIT);
-      if (joining.texture) {
-        gl.useProgram(program);
-        gl.bindVertexArray(array);
-        gl.activeTexture(gl.TEXTURE0);
-        gl.bindTexture(gl.TEXTURE_2D, joining.texture);
-        gl.uniform1i(at("image"), 0);
-        gl.uniform4fv(at("box"), panning.box);
-        gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
-      }
+      const picture = [canvas.width, canvas.height, ...panning.box, joining.steps].join();
+      if (picture !== drawn) draw();
+      drawn = picture;
       const there = index.files.slice(0, joining.steps).reduce((sum, { bytes }) => sum + bytes, 0);
       const end = joining.steps === index.files.length ? "" :
         joining.steps === joining.most ? "; more than this graphics card can hold" :
         needed ? " …" : "; finer ones when you zoom in";
-      const part = `${joining.steps} of ${index.files.length} files, ${size.width} × ${size.height} of ${width} × ${height}`;
+      const part = `${joining.steps} of ${index.files.length} files, ${size.width} × ${size.height} of ${index.width} × ${index.height}`;
       const depth = index.kind === "uint16" ? "; shown in 8 bits" : "";
       return `${part}, ${sizeText(there)} of ${sizeText(total)}${end}${depth}`;
     },

@@ -1,8 +1,8 @@
 // Joins the files of an interlaced image on the graphics card, step by step, by drawing alternately into
 // two textures (docs/formats/interlace.md; Englert et al., section 3.2).
 
-import { crc32 } from "../../ptm/src/crc32.js";
 import { PageError } from "../net/errors.js";
+import { checksum } from "../octree/checksum.js";
 import { demand, isWhole } from "../octree/octree.js";
 import { linked } from "./form.js";
 
@@ -115,7 +115,7 @@ export class Joining {
   async #next() {
     const { gl } = this, part = this.index.files[this.steps];
     const image = await this.fetcher.whole(this.urlOf(part.name), async (body) => {
-      demand(body.length === part.bytes && crc32(body) === part.crc32, "another checksum");
+      demand(body.length === part.bytes && checksum(body) === part.crc32, "another checksum");
       const blob = new Blob([body], { type: MEDIA[this.index.container] });
       const bitmap = await createImageBitmap(blob, { premultiplyAlpha: "none", colorSpaceConversion: "none" });
       demand(bitmap.width === part.width && bitmap.height === part.height, "an image of another size");

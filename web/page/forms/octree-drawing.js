@@ -1,8 +1,8 @@
 // Draws a simplified mesh with the normals of its octree: the traversal in the fragment shader
 // (docs/formats/apo.md, "Looking a normal up"; Lacoste et al., section 3.2), lit as by `ptm render`.
 
-import { crc32 } from "../../ptm/src/crc32.js";
 import { LOOK_UP } from "../octree/look-up.js";
+import { checksum } from "../octree/checksum.js";
 import { demand, isWhole } from "../octree/octree.js";
 import { linked } from "./form.js";
 
@@ -60,11 +60,11 @@ void main() {
 /**
  * The mesh of a GLB that `ptm apo` wrote: positions, normals, indices, in this order.
  * @param {Uint8Array<ArrayBuffer>} body
- * @param {number} checksum
+ * @param {number} crc its CRC-32
  * @returns {Mesh}
  */
-export function meshOf(body, checksum) {
-  demand(crc32(body) === checksum, "another checksum");
+export function meshOf(body, crc) {
+  demand(checksum(body) === crc, "another checksum");
   const view = new DataView(body.buffer, body.byteOffset, body.length);
   demand(body.length >= 28 && view.getUint32(0, true) === 0x46546c67, "not a GLB");
   const length = view.getUint32(12, true), from = 20 + length + 8;

@@ -10,7 +10,7 @@ const NEAREST = 0.05, FARTHEST = 20;
 /** Keys → change of azimuth, elevation (degrees/s) and of the logarithm of the distance (1/s). */
 const KEYS = /** @type {Record<string, number[]>} */ ({
   ArrowLeft: [-KEY, 0, 0], ArrowRight: [KEY, 0, 0], ArrowUp: [0, KEY, 0], ArrowDown: [0, -KEY, 0],
-  "+": [0, 0, -1], "=": [0, 0, -1], "-": [0, 0, 1],
+  Equal: [0, 0, -1], NumpadAdd: [0, 0, -1], Minus: [0, 0, 1], NumpadSubtract: [0, 0, 1],
 });
 
 export class Orbit {
@@ -34,7 +34,9 @@ export class Orbit {
     this.distance = 0;
     const [azimuth, elevation, distance = 0] = location.hash.slice(1).split(",").map(Number);
     if ([azimuth, elevation, distance].every(Number.isFinite)) this.place(azimuth, elevation, distance);
+    canvas.focus({ preventScroll: true });
     canvas.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0) return;
       canvas.setPointerCapture(event.pointerId);
       this.#fingers.set(event.pointerId, { x: event.clientX, y: event.clientY });
     });
@@ -48,11 +50,13 @@ export class Orbit {
       this.#zoom(Math.exp(event.deltaY * WHEEL));
     }, { passive: false });
     canvas.addEventListener("keydown", (event) => {
-      if (!(event.key in KEYS) || event.ctrlKey || event.metaKey || event.altKey) return;
+      // The release of a key that is held together with these is not reported.
+      if (event.ctrlKey || event.metaKey || event.altKey) return this.#held.clear();
+      if (!(event.code in KEYS)) return;
       event.preventDefault();
-      this.#held.add(event.key);
+      this.#held.add(event.code);
     });
-    canvas.addEventListener("keyup", (event) => this.#held.delete(event.key));
+    canvas.addEventListener("keyup", (event) => this.#held.delete(event.code));
     canvas.addEventListener("blur", () => this.#held.clear());
   }
 

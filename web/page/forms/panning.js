@@ -2,12 +2,12 @@
 
 /** Pixels per second of a key; growth for a wheel's pixel, and per second of a key. */
 const KEY = 600, WHEEL = 0.0015, GROW = 1.2;
-/** Screen pixels of a texel of the whole image, at most. */
-const LARGEST = 32;
+/** Screen pixels of a texel, at most; and the least size, as a share of what shows the whole image. */
+const LARGEST = 32, SMALLEST = 0.25;
 
 const KEYS = /** @type {Record<string, number[]>} */ ({
   ArrowLeft: [1, 0, 0], ArrowRight: [-1, 0, 0], ArrowUp: [0, 1, 0], ArrowDown: [0, -1, 0],
-  "+": [0, 0, 1], "=": [0, 0, 1], "-": [0, 0, -1],
+  Equal: [0, 0, 1], NumpadAdd: [0, 0, 1], Minus: [0, 0, -1], NumpadSubtract: [0, 0, -1],
 });
 
 export class Panning {
@@ -25,7 +25,9 @@ export class Panning {
      * that of the canvas. */
     this.scale = 0;
     this.shift = [0, 0];
+    canvas.focus({ preventScroll: true });
     canvas.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0) return;
       canvas.setPointerCapture(event.pointerId);
       this.#fingers.set(event.pointerId, this.#at(event));
     });
@@ -39,23 +41,29 @@ export class Panning {
       this.#grow(Math.exp(-event.deltaY * WHEEL), this.#at(event));
     }, { passive: false });
     canvas.addEventListener("keydown", (event) => {
-      if (!(event.key in KEYS) || event.ctrlKey || event.metaKey || event.altKey) return;
+      // The release of a key that is held together with these is not reported.
+      if (event.ctrlKey || event.metaKey || event.altKey) return this.#held.clear();
+      if (!(event.code in KEYS)) return;
       event.preventDefault();
-      this.#held.add(event.key);
+      this.#held.add(event.code);
     });
-    canvas.addEventListener("keyup", (event) => this.#held.delete(event.key));
+    canvas.addEventListener("keyup", (event) => this.#held.delete(event.code));
     canvas.addEventListener("blur", () => this.#held.clear());
+  }
+
+  /** Pixels of a texel that show the whole image. */
+  get #fitting() {
+    return Math.min(this.canvas.width / this.width, this.canvas.height / this.height);
   }
 
   /** Pixels of a texel of the whole image. */
   get pixels() {
-    const { width, height } = this.canvas;
-    return this.scale || Math.min(width / this.width, height / this.height);
+    return this.scale || this.#fitting;
   }
 
   /** @param {number} scale pixels of a texel, 0 for the whole image @param {number[]} [shift] pixels */
   place(scale, shift = [0, 0]) {
-    this.scale = scale > 0 ? Math.min(LARGEST, scale) : 0;
+    this.scale = scale > 0 ? this.#bounded(scale) : 0;
     // Some of the image stays on the canvas.
     const sides = [this.width, this.height].map((side) => side * this.pixels);
     const whole = [this.canvas.width, this.canvas.height];
@@ -79,9 +87,15 @@ export class Panning {
     return [right - across, -below - down, right + across, -below + down];
   }
 
+  /** @param {number} scale */
+  #bounded(scale) {
+    const fitting = this.#fitting;
+    return Math.max(SMALLEST * Math.min(1, fitting), Math.min(Math.max(LARGEST, 2 * fitting), scale));
+  }
+
   /** Enlarges around a place. @param {number} factor @param {number[]} place pixels from the middle */
   #grow(factor, place) {
-    const before = this.pixels, scale = Math.min(LARGEST, before * factor);
+    const before = this.pixels, scale = this.#bounded(before * factor);
     this.place(scale, this.shift.map((x, k) => place[k] + (x - place[k]) * (scale / before)));
   }
 
@@ -95,15 +109,17 @@ export class Panning {
   #drag(event) {
     const before = this.#fingers.get(event.pointerId);
     if (!before) return;
-    const spread = this.#spread(), now = this.#at(event), share = this.#fingers.size;
-    this.#fingers.set(event.pointerId, now);
-    this.place(this.scale, this.shift.map((x, k) => x + (now[k] - before[k]) / share));
-    if (spread > 0 && this.#spread() > 0) this.#grow(this.#spread() / spread, now);
+    const { spread, middle } = this.#hand();
+    this.#fingers.set(event.pointerId, this.#at(event));
+    const after = this.#hand();
+    this.place(this.scale, this.shift.map((x, k) => x + after.middle[k] - middle[k]));
+    if (spread > 0 && after.spread > 0) this.#grow(after.spread / spread, after.middle);
   }
 
-  /** Distance of two fingers, pixels. */
-  #spread() {
-    const [one, other] = this.#fingers.values();
-    return one && other ? Math.hypot(one[0] - other[0], one[1] - other[1]) : 0;
+  /** Distance of two fingers, pixels, or 0; and the middle of all. */
+  #hand() {
+    const places = [...this.#fingers.values()], [one, other] = places;
+    const middle = [0, 1].map((k) => places.reduce((sum, place) => sum + place[k], 0) / places.length);
+    return { middle, spread: other ? Math.hypot(one[0] - other[0], one[1] - other[1]) : 0 };
   }
 }

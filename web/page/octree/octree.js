@@ -1,8 +1,9 @@
 // An octree texture that comes by levels: its stream, and its texels on the graphics card
 // (docs/formats/apo.md; Lacoste et al., sections 4.1 and 4.2).
 
-import { crc32 } from "../../ptm/src/crc32.js";
 import { PageError } from "../net/errors.js";
+import { clock } from "../net/fetcher.js";
+import { checksum } from "./checksum.js";
 
 /** Texels in a row of the texture, and the most in all. */
 export const WIDTH = 4096, MOST = 2 ** 24;
@@ -51,37 +52,65 @@ export function checkOctree({ cube, levels, streams }) {
   }
 }
 
-/** The texels of one stream on the graphics card. */
+/** Rows that are uploaded at a time: a megabyte. */
+const STRIPE = 64;
+/** Seconds until levels that could not be downloaded are requested again. */
+const REST = 10;
+
+/** Whether an error has a code and a message for visitors; scripts have classes of their own.
+ * @param {any} fault */
+const isKnown = (fault) => typeof fault?.code === "string" && fault.code.startsWith("PTM-V");
+
+/** The texels of one stream, and on the graphics card. */
 class Texels {
-  /** Rows that were uploaded. */
-  #rows = 0;
+  /** Whole rows that were uploaded. */
+  rows = 0;
 
   /** @param {WebGL2RenderingContext} gl @param {number} count */
   constructor(gl, count) {
     this.gl = gl;
     const height = Math.max(1, Math.ceil(count / WIDTH));
-    this.bytes = new Uint8Array(4 * WIDTH * height);
+    this.size = 4 * WIDTH * height;
+    /** In main memory, until all are on the graphics card. @type {Uint8Array | null} */
+    this.bytes = new Uint8Array(this.size);
     this.texture = gl.createTexture();
-    gl.bindTexture(gl.TEXTURE_2D, this.texture);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA8UI, WIDTH, height);
-    for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) {
-      gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
-    }
+    this.#bound(() => {
+      gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA8UI, WIDTH, height);
+      for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) {
+        gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
+      }
+    });
   }
 
-  /** Uploads the rows up to a texel, the last of which is uploaded again as it fills. @param {number} end */
-  upload(end) {
-    const { gl } = this, rows = Math.ceil(end / WIDTH);
+  /** Other programs look floats up in unit 0. @param {() => void} call */
+  #bound(call) {
+    const { gl } = this;
+    gl.activeTexture(gl.TEXTURE1);
     gl.bindTexture(gl.TEXTURE_2D, this.texture);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, this.#rows, WIDTH, rows - this.#rows, gl.RGBA_INTEGER,
-      gl.UNSIGNED_BYTE, this.bytes, 4 * WIDTH * this.#rows);
-    this.#rows = Math.floor(end / WIDTH);
+    call();
+    gl.activeTexture(gl.TEXTURE0);
+  }
+
+  /** Uploads rows up to a texel, the last of which again as it fills; whether it was one stripe at most.
+   * @param {number} end */
+  upload(end) {
+    const { gl, bytes, rows } = this;
+    if (!bytes) return true;
+    const last = Math.ceil(end / WIDTH), to = Math.min(last, rows + STRIPE);
+    this.#bound(() => gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, rows, WIDTH, to - rows, gl.RGBA_INTEGER,
+      gl.UNSIGNED_BYTE, bytes, 4 * WIDTH * rows));
+    this.rows = Math.min(to, Math.floor(end / WIDTH));
+    return to === last;
   }
 }
 
 export class Octree {
-  /** Texels of `#streams` that are there, of the level on its way. */
+  /** Texels of each stream that are there, of the level on its way, and that are shown. */
   #arrived = [0, 0];
+  #shown = 0;
+  #deleted = false;
+  /** Whole files, from a host that ignores ranges. @type {(Uint8Array | null)[]} */
+  #whole = [];
 
   /**
    * @param {WebGL2RenderingContext} gl
@@ -110,6 +139,7 @@ export class Octree {
     this.partial = false;
     this.updates = 0;
     this.running = false;
+    this.restsUntil = 0;
   }
 
   /** Whether all levels are there. */
@@ -118,12 +148,18 @@ export class Octree {
   }
 
   delete() {
+    this.#deleted = true;
     for (const { texture } of this.texels) this.gl.deleteTexture(texture);
   }
 
   /** Bytes on the graphics card. */
   get bytes() {
-    return this.texels.reduce((sum, { bytes }) => sum + bytes.length, 0);
+    return this.texels.reduce((sum, { size }) => sum + size, 0);
+  }
+
+  /** Whether it waits after an error, or for ever after one that stays. */
+  get rests() {
+    return clock() < this.restsUntil;
   }
 
   /** Bytes of the file up to the last complete level. */
@@ -132,92 +168,120 @@ export class Octree {
   }
 
   /**
-   * Fetches the next levels, if none is on its way and they are wanted.
+   * Fetches the next levels, if none is on its way and they are wanted. After an error the levels before
+   * stay.
    * @param {(levels: number) => boolean} wanted whether more than these levels are
-   * @param {(fault: unknown) => void} fail
+   * @param {(fault: PageError) => void} fail
    * @param {() => void} [done] called when they are there
    */
   advance(wanted, fail, done) {
-    if (this.running || this.complete || !wanted(this.levels)) return;
+    if (this.running || this.complete || this.rests || !wanted(this.levels)) return;
     this.running = true;
-    this.#next().then(() => {
-      this.running = false;
-      done?.();
-    }, fail);
+    this.#next().then(() => done?.(), (fault) => {
+      this.restsUntil = fault.code === "PTM-V104" ? clock() + REST : Infinity;
+      if (!this.#deleted) fail(fault);
+    }).finally(() => (this.running = false));
   }
 
   async #next() {
     const total = this.index.levels.length;
     const end = this.levels ? this.levels + 1 : Math.min(FIRST, total);
-    this.#arrived = [0, 0];
     const timer = this.step && this.levels ? setInterval(() => this.#show(), 1000 * this.step) : 0;
     try {
-      await Promise.all(this.streams.map((stream, k) => this.#fetch(stream, k, this.levels, end)));
+      await Promise.all(this.streams.map((_, k) => this.#fetch(k, this.levels, end)));
     } finally {
       clearInterval(timer);
+      this.partial = false;
     }
-    for (const texels of this.texels) texels.upload(this.starts[end]);
+    for (const texels of this.texels) {
+      // A frame for each megabyte.
+      while (!this.#deleted && !texels.upload(this.starts[end])) {
+        await new Promise((resolve) => setTimeout(resolve, 16));
+      }
+    }
+    if (this.#deleted) return;
     this.updates++;
     this.levels = end;
-    this.partial = false;
+    if (this.complete) for (const texels of this.texels) texels.bytes = null;
   }
 
-  /** Uploads what is there of a level. */
+  /** Uploads what has come of a level since the last time. */
   #show() {
     const there = Math.min(...this.#arrived.slice(0, this.streams.length));
-    if (there <= this.starts[this.levels]) return;
-    for (const texels of this.texels) texels.upload(there);
+    if (this.#deleted || there <= Math.max(this.#shown, this.starts[this.levels])) return;
+    for (const texels of this.texels) while (!texels.upload(there));
+    this.#shown = there;
     this.updates++;
     this.partial = true;
   }
 
   /**
-   * Fetches and inflates levels `from` to before `to` of a stream.
-   * @param {Stream} stream @param {number} number of it @param {number} from @param {number} to
+   * Fetches and inflates levels `from` to before `to` of a stream; once more if they are damaged.
+   * @param {number} number of the stream @param {number} from @param {number} to
    */
-  async #fetch(stream, number, from, to) {
-    const size = /** @type {number} */ (stream.ends.at(-1));
-    const begin = from ? stream.ends[from - 1] : HEAD;
-    const end = stream.ends[to - 1] - (to === stream.ends.length ? CHECK : 0);
-    const url = this.urlOf(stream.file), { bytes } = this.texels[number];
-    /** @param {RequestCache} cache */
-    const attempt = async (cache) => {
-      const inflating = new DecompressionStream("deflate-raw"), writer = inflating.writable.getWriter();
-      let at = 4 * this.starts[from];
-      const reading = (async () => {
-        for (const reader = inflating.readable.getReader(); ; ) {
-          const { done, value } = await reader.read();
-          if (done) return;
-          demand(at + value.length <= 4 * this.starts[to], "more texels than the index says");
-          bytes.set(value, at);
-          at += value.length;
-          this.#arrived[number] = Math.floor(at / 4);
-        }
-      })();
-      reading.catch(() => {}); // awaited below
-      const piece = this.step && from ? PIECE : end - begin;
-      for (let place = begin; place < end; place += piece) {
-        const answer = await this.fetcher.range(url, place, Math.min(place + piece, end), size, undefined, cache);
-        const skipped = place - answer.begin;
-        const body = answer.body.subarray(skipped, skipped + Math.min(piece, end - place));
-        await Promise.race([writer.write(body), reading]);
-      }
-      if (to < stream.ends.length) await Promise.race([writer.write(END), reading]);
-      await Promise.all([writer.close(), reading]);
-      demand(at === 4 * this.starts[to], "fewer texels than the index says");
-      for (let level = from; level < to; level++) {
-        const texels = bytes.subarray(4 * this.starts[level], 4 * this.starts[level + 1]);
-        demand(crc32(texels) === stream.crc32[level], `level ${level} has another checksum`);
-      }
-    };
+  async #fetch(number, from, to) {
     try {
-      await attempt("default");
+      await this.#attempt(number, from, to, "default");
     } catch (fault) {
-      if (fault instanceof PageError) throw fault;
-      await attempt("no-store").catch((again) => {
-        if (again instanceof PageError) throw again;
-        throw new PageError("PTM-V105", `${stream.file} is damaged: ${again.message}`);
+      if (isKnown(fault)) throw fault;
+      this.#whole[number] = null;
+      await this.#attempt(number, from, to, "no-store").catch((again) => {
+        if (isKnown(again)) throw again;
+        throw new PageError("PTM-V105", `${this.streams[number].file} is damaged: ${again.message}`);
       });
     }
+  }
+
+  /** @param {number} number @param {number} from @param {number} to @param {RequestCache} cache */
+  async #attempt(number, from, to, cache) {
+    const stream = this.streams[number], texels = this.texels[number];
+    const bytes = /** @type {Uint8Array} */ (texels.bytes);
+    const begin = from ? stream.ends[from - 1] : HEAD;
+    const end = stream.ends[to - 1] - (to === stream.ends.length ? CHECK : 0);
+    const inflating = new DecompressionStream("deflate-raw"), writer = inflating.writable.getWriter();
+    const last = 4 * this.starts[to], crcs = new Map();
+    let at = 4 * this.starts[from], level = from;
+    // What an earlier attempt has uploaded is uploaded again.
+    texels.rows = Math.min(texels.rows, Math.floor(this.starts[from] / WIDTH));
+    this.#arrived[number] = this.#shown = this.starts[from];
+    const reading = (async () => {
+      for (const reader = inflating.readable.getReader(); ; ) {
+        const { done, value } = await reader.read();
+        if (done) return;
+        demand(at + value.length <= last, "more texels than the index says");
+        bytes.set(value, at);
+        for (let place = 0; place < value.length; ) {
+          const rest = 4 * this.starts[level + 1] - at, part = value.subarray(place, place + rest);
+          crcs.set(level, checksum(part, crcs.get(level)));
+          place += part.length;
+          at += part.length;
+          if (part.length === rest) level++;
+        }
+        this.#arrived[number] = Math.floor(at / 4);
+      }
+    })();
+    reading.catch(() => {}); // awaited below
+    const piece = this.step && from ? PIECE : end - begin;
+    for (let place = begin; place < end; place += piece) {
+      const body = await this.#range(number, place, Math.min(place + piece, end), cache);
+      await Promise.race([writer.write(/** @type {any} */ (body)), reading]);
+    }
+    if (to < stream.ends.length) await Promise.race([writer.write(END), reading]);
+    await Promise.all([writer.close(), reading]);
+    demand(at === last, "fewer texels than the index says");
+    for (let k = from; k < to; k++) demand(crcs.get(k) === stream.crc32[k], `level ${k} has another checksum`);
+  }
+
+  /** Bytes of a stream's file. @param {number} number @param {number} begin @param {number} end
+   * @param {RequestCache} cache */
+  async #range(number, begin, end, cache) {
+    const { file, ends } = this.streams[number], size = /** @type {number} */ (ends.at(-1));
+    let whole = this.#whole[number];
+    if (!whole) {
+      const answer = await this.fetcher.range(this.urlOf(file), begin, end, size, undefined, cache);
+      if (answer.begin === begin && answer.body.length === end - begin) return answer.body;
+      whole = this.#whole[number] = answer.body;
+    }
+    return whole.subarray(begin, end);
   }
 }

@@ -49,7 +49,7 @@ void main() {
  *   crc32: number[]}} OctreeRow */
 
 export class Statues {
-  /** @type {(Octree | null)[]} those that are, or were, in view; null for one with an error */
+  /** Those that are, or were, in view. @type {(Octree | undefined)[]} */
   #octrees = [];
   /** Of those in view, the pixels of a node of depth 0. @type {Map<number, number>} */
   #pixels = new Map();
@@ -59,7 +59,7 @@ export class Statues {
 
   /**
    * @param {WebGL2RenderingContext} gl
-   * @param {OctreeRow[]} rows of the index
+   * @param {OctreeRow[]} rows of the index; objects of wrong ones look like others
    * @param {import("../data/site.js").Site} site
    * @param {import("../net/fetcher.js").Fetcher} fetcher
    * @param {(fault: PageError) => void} report
@@ -67,12 +67,26 @@ export class Statues {
    */
   constructor(gl, rows, site, fetcher, report, touch) {
     this.gl = gl;
-    this.rows = rows;
     this.site = site;
     this.fetcher = fetcher;
     this.report = report;
     this.touch = touch;
+    this.indices = rows.map((row) => {
+      try {
+        const { cube, levels, file, ends, crc32 } = row, index = { cube, levels, streams: [{ file, ends, crc32 }] };
+        checkOctree(index);
+        return index;
+      } catch (fault) {
+        report(new PageError("PTM-V105", `The index has a wrong octree: ${/** @type {Error} */ (fault).message}`));
+        return null;
+      }
+    });
     this.program = programOf(gl, "octree", [VERTEX, FRAGMENT]);
+  }
+
+  delete() {
+    for (const octree of this.#octrees) octree?.delete();
+    this.#octrees = [];
   }
 
   /** Whether the octree of a number has levels to show. @param {number} number */
@@ -87,7 +101,7 @@ export class Statues {
 
   /** Levels of each octree that was in view. */
   get levels() {
-    return this.#octrees.map((octree) => octree?.levels ?? 0);
+    return Array.from(this.#octrees, (octree) => octree?.levels ?? 0);
   }
 
   /** Bytes on the graphics card. */
@@ -100,21 +114,23 @@ export class Statues {
    * @param {Drawn[]} drawn
    * @param {ArrayLike<number>} eye
    * @param {number} lines of a screen that sees an angle whose half has the tangent 1
+   * @param {boolean} loads whether anything may be fetched
    */
-  advance(drawn, eye, lines) {
+  advance(drawn, eye, lines, loads) {
     this.#pixels.clear();
     this.#looked = true;
     const now = clock();
     for (const { batches } of drawn) {
-      for (const { look: { octree }, low, high } of batches) {
-        if (!this.rows[octree] || this.#octrees[octree] === null) continue;
+      for (const { look: { octree, blends }, low, high } of batches) {
+        const index = this.indices[octree];
+        if (!index || blends) continue;
         const away = Math.max(NEAREST, distance(eye, low, high));
-        const pixels = (lines / 2 / away) * this.rows[octree].cube.side;
+        const pixels = (lines / 2 / away) * index.cube.side;
         this.#pixels.set(octree, Math.max(pixels, this.#pixels.get(octree) ?? 0));
         this.#seen[octree] = now;
       }
     }
-    if (this.#octrees.some((octree) => octree?.running)) return;
+    if (!loads || this.#octrees.some((octree) => octree?.running)) return;
     let next = -1, most = 0;
     for (const number of this.#pixels.keys()) {
       const size = this.#nodes(number);
@@ -132,33 +148,32 @@ export class Statues {
   /** @param {number} number */
   #wants(number) {
     const octree = this.#octrees[number];
-    return octree !== null && !octree?.complete && this.#nodes(number) > 1;
+    if (!octree) return this.#nodes(number) > 1 && this.#fits(number);
+    return !octree.complete && !octree.rests && this.#nodes(number) > 1;
+  }
+
+  /** Bytes that an octree takes on the graphics card. @param {number} number */
+  #size(number) {
+    return 4 * (this.indices[number]?.levels.reduce((sum, count) => sum + count, 0) ?? 0);
+  }
+
+  /** Whether there is room for an octree beside the others in view. @param {number} number */
+  #fits(number) {
+    const others = [...this.#pixels.keys()].filter((other) => other !== number && this.#octrees[other]);
+    return others.reduce((sum, other) => sum + this.#size(other), this.#size(number)) <= MOST;
   }
 
   /** @param {number} number */
   #load(number) {
-    const { cube, levels, file, ends, crc32 } = this.rows[number];
-    /** @param {unknown} fault */
-    const fail = (fault) => {
-      this.#octrees[number]?.delete();
-      this.#octrees[number] = null;
-      this.touch();
-      const damaged = `${file} is damaged: ${/** @type {Error} */ (fault).message}`;
-      this.report(fault instanceof PageError ? fault : new PageError("PTM-V105", damaged));
-    };
-    try {
-      let octree = this.#octrees[number];
-      if (!octree) {
-        const index = { cube, levels, streams: [{ file, ends, crc32 }] };
-        checkOctree(index);
-        this.#free(4 * levels.reduce((sum, count) => sum + count, 0));
-        octree = new Octree(this.gl, index, (name) => this.site.of(name), this.fetcher, 0);
-        this.#octrees[number] = octree;
-      }
-      octree.advance(() => true, fail, this.touch);
-    } catch (fault) {
-      fail(fault);
+    let octree = this.#octrees[number];
+    const index = this.indices[number];
+    if (!index) return;
+    if (!octree) {
+      this.#free(this.#size(number));
+      octree = new Octree(this.gl, index, (name) => this.site.of(name), this.fetcher, 0);
+      this.#octrees[number] = octree;
     }
+    octree.advance(() => true, this.report, this.touch);
   }
 
   /** Removes octrees out of view, those first that were seen first, until there is room. @param {number} bytes */

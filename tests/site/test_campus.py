@@ -1,0 +1,179 @@
+"""The page of a campus in a browser."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from browser import Visitor, visiting
+
+from ptmtools.errors import InputError
+from ptmtools.lab.campus.stock import read_stock
+from ptmtools.neighbours.campus import CampusOptions, make_campus
+from ptmtools.neighbours.campus.model import PRESETS, distances
+from ptmtools.scene.options import IngestOptions
+from ptmtools.site.forms import FORMS, form_site
+
+ROOT = Path(__file__).resolve().parents[2]
+Open = Callable[..., AbstractContextManager[Visitor]]
+#: `near` of the client.
+NEAREST = 8
+
+
+@pytest.fixture(scope="module")
+def campus(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A short street with two buildings, trees and lamps."""
+    folder = tmp_path_factory.mktemp("campus")
+    script = ROOT / "sample_data" / "make_campus.py"
+    words = ["-o", folder / "model", "--buildings", 2, "--length", 60, "--texture", 32]
+    subprocess.run([sys.executable, *map(str, (script, *words))], check=True, capture_output=True)
+    options = CampusOptions(samples=1, faces=50)
+    make_campus(folder / "model/campus.obj", folder / "campus", options, IngestOptions(unit="m"))
+    return folder / "campus"
+
+
+@pytest.fixture
+def opened(chromium: Any) -> Open:
+    def of(folder: Path, query: str = "", **options: Any) -> AbstractContextManager[Visitor]:
+        site = form_site(folder, FORMS["campus.json"])
+        sizes = {"width": 320, "height": 240, **options}
+        return visiting(chromium, site.entries, query=query, **sizes)
+
+    return of
+
+
+def fetched(visitor: Visitor) -> list[str]:
+    """The files of the campus that were requested, in order."""
+    parts = [v.path.split("/", 2)[-1] for v in visitor.visits if "/data-" in v.path]
+    return [part for part in parts if part.startswith(("meshes/", "textures/"))]
+
+
+def test_files_come_as_for_the_simulated_client(opened: Open, campus: Path) -> None:
+    """Low detail of all objects, then high detail of the nearest."""
+    stock, medium = read_stock(campus), PRESETS[1]
+    eye = np.array([-5.0, 1.6, 3.0])
+    order = np.argsort(distances(eye, stock.boxes, stock.barycentres), kind="stable").tolist()
+    low = [stock.names[f] for k in order for f in stock.low(k)]
+    high = [stock.names[f] for k in order[:NEAREST] for f in stock.high(k, medium, True)]
+    with opened(campus, "?preset=Medium#-5,1.6,3,0") as visitor:
+        state = visitor.until("s.complete")
+        assert state["order"] == order
+        assert state["near"] == state["full"] == order[:NEAREST]
+        assert (state["preset"], state["sorts"]) == ("Medium", 1)
+        assert visitor.messages == []
+        files = fetched(visitor)
+    masks = {name for name in (*low, *high) if name.endswith("_m.jpg")}
+    assert set(files) == {*low, *high} - masks
+    assert len(files) == len(set(files))
+    first = len({*low} - masks)
+    # Threads that run out of low detail begin with high detail.
+    assert set(files[: first - 4]) <= set(low)
+    assert set(files[first + 4 :]) <= {*high} - {*low}
+
+
+def test_a_walk_refines_what_is_near(opened: Open, campus: Path) -> None:
+    with opened(campus, "#-5,1.6,3,0") as visitor:
+        state = visitor.until("s.complete")
+        memory, files = state["memory"], len(fetched(visitor))
+        visitor.page.evaluate("window.ptm.place([1e4, 1.6, 0], 0)")
+        away = visitor.until("s.sorts > 1 && s.complete")
+        assert len(fetched(visitor)) >= files
+        # Out of view and far: the nearest of all are others, or hidden for a while.
+        visitor.until(f"s.memory < {memory}")
+        assert away["order"] != state["order"]
+        visitor.page.evaluate("window.ptm.place([-5, 1.6, 3], 0)")
+        back = visitor.until("s.sorts > 2 && s.complete")
+        assert back["near"] == state["near"]
+        before = len(fetched(visitor))
+        visitor.page.wait_for_timeout(300)
+        assert len(fetched(visitor)) == before  # files are kept
+
+
+def test_it_is_drawn_and_walked_on(opened: Open, campus: Path) -> None:
+    with opened(campus) as visitor:
+        visitor.until("s.complete")
+        picture = visitor.picture()
+        sky = picture[2, 2]
+        assert (np.abs(picture.astype(int) - sky).sum(axis=2) > 30).mean() > 0.2
+        eye = visitor.state()["pose"]["eye"]
+        visitor.page.focus("canvas")
+        visitor.page.keyboard.down("w")
+        visitor.until(f"Math.hypot(s.pose.eye[0] - {eye[0]}, s.pose.eye[2] - {eye[2]}) > 1")
+        visitor.page.keyboard.up("w")
+        assert abs(visitor.state()["pose"]["eye"][1] - eye[1]) < 2
+
+
+def test_places_and_presets(opened: Open, campus: Path) -> None:
+    index = json.loads((campus / "campus.json").read_text())
+    with opened(campus, width=800, height=600) as visitor:
+        visitor.until("s.begun")
+        page = visitor.page
+        page.click("nav button")
+        name = page.text_content("#places li button >> nth=0")
+        label = name.replace(" ", "_").lower()
+        (target,) = (o for o in index["objects"] if o["label"].lower() == label)
+        page.click("#places li button >> nth=0")
+        assert page.is_hidden("#places")
+        expected = target["viewpoint"]["position"]
+        visitor.until(f"Math.abs(s.pose.eye[0] - {expected[0]}) < 0.01")
+        assert page.locator("#labels button:visible").count() > 0
+        page.select_option("select", "Ultra")
+        visitor.until("s.preset === 'Ultra' && s.complete")
+        assert any(file.endswith("_512_d.jpg") for file in fetched(visitor))
+        assert "preset=Ultra" in page.url
+
+
+def edited(change: Callable[[dict[str, Any]], object]) -> Callable[[Path], None]:
+    def edit(folder: Path) -> None:
+        document = json.loads((folder / "campus.json").read_text())
+        change(document)
+        (folder / "campus.json").write_text(json.dumps(document))
+
+    return edit
+
+
+def spoilt(pattern: str, change: Callable[[bytes], bytes]) -> Callable[[Path], None]:
+    def spoil(folder: Path) -> None:
+        for file in folder.glob(pattern):
+            file.write_bytes(change(file.read_bytes()))
+
+    return spoil
+
+
+#: Whether `ptm serve` refuses them.
+FAULTS: dict[str, tuple[bool, Callable[[Path], None]]] = {
+    "mesh cut": (False, spoilt("meshes/*_0.glb", lambda d: d[:99])),
+    "mesh other": (False, spoilt("meshes/*_0.glb", lambda d: d[:200] + bytes(40) + d[240:])),
+    "image cut": (False, spoilt("textures/*_128_d.jpg", lambda d: d[:50])),
+    "image other": (False, spoilt("textures/*_128_d.jpg", lambda d: b"GIF89a" + d[6:])),
+    "checksum": (False, edited(lambda d: d["textures"][0].update(crc32=7))),
+    "no texture": (False, edited(lambda d: d["textures"].clear())),
+    "material": (False, edited(lambda d: d["objects"][0].update(materials=[999]))),
+    "no presets": (True, edited(lambda d: d["presets"].clear())),
+    "leading out": (True, edited(lambda d: d["objects"][0]["meshes"][0].update(file="../x.glb"))),
+    "box": (True, edited(lambda d: d["objects"][0].update(box=[0, 0]))),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_damaged_files_give_a_message(
+    opened: Open, campus: Path, tmp_path: Path, fault: str
+) -> None:
+    folder = Path(shutil.copytree(campus, tmp_path / "folder"))
+    refused, damage = FAULTS[fault]
+    damage(folder)
+    if refused:
+        with pytest.raises(InputError, match="PTM-I122"):
+            opened(folder)
+        return
+    with opened(folder) as visitor:
+        visitor.page.wait_for_selector("#error:not([hidden])", timeout=60_000)
+        assert visitor.page.text_content("#error-code") == "PTM-V105"

@@ -1,0 +1,171 @@
+// The page of a campus: a visitor walks on open ground between objects with levels of detail.
+//
+//     ?preset=Medium         sizes of textures near the visitor
+//     #x,y,z,yaw             metres and degrees
+
+import { CampusClient } from "../campus/client.js";
+import { CampusDrawing, finest } from "../campus/drawing.js";
+import { CampusFiles } from "../campus/files.js";
+import { CampusIndex, LEAST, textureFile } from "../campus/index.js";
+import { Labels } from "../campus/labels.js";
+import { cameraOf } from "../gl/camera.js";
+import { frustumOf, meetsBox } from "../space/frustum.js";
+import { attachControls } from "../ui/controls.js";
+import { find, make } from "../ui/elements.js";
+import { poseOf } from "../ui/address.js";
+import { Solids } from "../walk/solids.js";
+import { Walker } from "../walk/walker.js";
+import { indexOf, runForm, sizeText } from "./form.js";
+
+/** Vertical field of view, radians; radius, height of the eye and highest step of the visitor, m. */
+const ANGLE = Math.PI / 3, BODY = [0.25, 1.6, 0.5];
+/** Objects nearer than this can be collided with, m. */
+const SOLID = 40;
+/** Height of the lowest object with a name, m. */
+const LOWEST = 3;
+/** Seconds out of view after which an object shows less detail. */
+const HIDDEN = 5;
+/** Seconds of a frame for collision geometry. */
+const TIME = 0.004;
+
+runForm(async (gl, config, fetcher, fail) => {
+  const canvas = /** @type {HTMLCanvasElement} */ (gl.canvas), query = new URLSearchParams(location.search);
+  const address = new URL(config.index, location.href).href;
+  const index = await indexOf(fetcher, address, (document) => new CampusIndex(document));
+  const preset = index.presets.find(({ name }) => name === query.get("preset")) ?? index.presets[0];
+  const client = new CampusClient(index, preset);
+  const files = new CampusFiles(gl, index, (file) => new URL(file, address).href, fetcher);
+  const drawing = new CampusDrawing(gl, index, files);
+  const solids = new Solids();
+  const walker = new Walker({ solids, locate: () => 0, avatar: BODY });
+  const { wishes } = attachControls(document, { canvas });
+  const low = [0, 1, 2].map((k) => Math.min(...index.objects.map(({ box }) => box[k])));
+  const far = 2 * Math.hypot(...[0, 1, 2].map((k) => Math.max(...index.objects.map(({ box }) => box[k + 3])) - low[k])) + 100;
+  /** Seconds since each object was in view. */
+  const hidden = new Float64Array(index.objects.length);
+  const sizes = [...new Set([...index.files.values()].map(({ size }) => size ?? 0))].sort((a, b) => b - a);
+
+  /** @param {import("../campus/index.js").CampusObject} object */
+  const visit = ({ viewpoint: { position, direction: [x, y, z] } }) => {
+    walker.place({ eye: [...position], yaw: Math.atan2(-x, -z), pitch: Math.asin(Math.max(-1, Math.min(1, y))) });
+  };
+  visit(index.objects.reduce((best, one) => (heightOf(one) > heightOf(best) ? one : best)));
+  const linked = poseOf(location.hash);
+  if (linked) walker.place(linked);
+  const named = index.objects.filter((one) => one.parts.length === 1 && heightOf(one) >= LOWEST);
+  const labels = new Labels(document, named, (object) => {
+    visit(object);
+    find(document, "#places").hidden = true;
+    canvas.focus();
+  });
+  attachPanels(client, index);
+  find(document, "#keys").textContent = "WASD or the arrow keys to walk, drag to look around, Shift to run";
+
+  /** One of the threads. @param {string} first @param {string[]} thread */
+  const run = async (first, thread) => {
+    for (let file = /** @type {string | null} */ (first); file; file = client.after(thread)) {
+      await files.load(file);
+      client.loaded.add(file);
+    }
+  };
+
+  /** The objects in view with the detail that they are shown in. @param {ReturnType<typeof frustumOf>} frustum
+   * @param {number} dt */
+  const shownOf = (frustum, dt) => {
+    const shown = [], kept = new Set();
+    const near = new Set(client.near);
+    for (const k of client.order) {
+      const { box, meshes, lightmap } = index.objects[k];
+      const inView = meetsBox(frustum, box, box, 0, 3);
+      hidden[k] = inView ? 0 : hidden[k] + dt;
+      const last = meshes[meshes.length - 1].file, light = lightmap && textureFile(lightmap, client.preset.light, "l");
+      // High detail of what is near, unless it has been out of view for a while.
+      const high = near.has(k) && hidden[k] < HIDDEN && client.loaded.has(last);
+      const mesh = high ? last : meshes[0].file;
+      if (!client.loaded.has(mesh)) continue;
+      const lit = high && light && client.loaded.has(light) ? light : null;
+      kept.add(mesh).add(meshes[0].file);
+      if (lit) kept.add(lit);
+      if (inView) shown.push({ object: k, mesh, lightmap: lit, far: client.order.indexOf(k) });
+    }
+    return { shown, kept };
+  };
+
+  /** @param {string} base @param {string} channel */
+  const textureOf = (base, channel) => {
+    const most = sizes.filter((size) => size <= Math.max(client.preset.diffuse, LEAST));
+    return finest(client.loaded, base, channel, most);
+  };
+
+  let memory = 0;
+  return {
+    frame(dt) {
+      const until = performance.now() + 1000 * TIME;
+      for (const k of client.order) {
+        const { box, meshes } = index.objects[k], parts = files.parts(meshes[0].file);
+        if (!parts || outside(walker.pose.eye, box) > SOLID || solids.has(k)) continue;
+        if (!solids.add(k, /** @type {any} */ (parts), /** @type {any} */ ({ portals: [] }), () => performance.now() > until)) break;
+      }
+      walker.step(dt, client.begun ? wishes() : { forward: 0, right: 0, turn: 0, look: 0, run: false });
+      const { pose } = walker;
+      client.look(pose.eye);
+      for (let job = client.next(); job; job = client.next()) run(job.file, job.thread).catch(fail);
+      const aspect = canvas.width / canvas.height, camera = cameraOf(pose, ANGLE, aspect, far);
+      const { shown, kept } = shownOf(frustumOf(pose, ANGLE, aspect), dt);
+      for (const { base, channels } of index.materials) {
+        for (const channel of base ? channels : []) {
+          const file = textureOf(/** @type {string} */ (base), channel);
+          if (file) kept.add(file);
+        }
+      }
+      files.keep(kept);
+      drawing.draw(camera, shown, textureOf);
+      labels.place(camera, canvas.clientWidth, canvas.clientHeight);
+      memory = files.bytes;
+      const full = client.near.filter((k) => client.full(k)).length;
+      const loading = client.begun ? `${full} of ${client.near.length} near objects complete` : "loading";
+      return `${loading}; ${sizeText(fetcher.bytes)} received, ${sizeText(memory)} of graphics memory`;
+    },
+    state: () => ({
+      begun: client.begun,
+      complete: client.complete,
+      near: client.near,
+      full: client.near.filter((k) => client.full(k)),
+      order: client.order,
+      sorts: client.sorts,
+      preset: client.preset.name,
+      memory,
+      requests: fetcher.requests,
+      bytes: fetcher.bytes,
+      pending: fetcher.pending,
+      pose: walker.pose,
+    }),
+    place: (/** @type {number[]} */ eye, /** @type {number} */ yaw, pitch = 0) => walker.place({ eye, yaw, pitch }),
+    files,
+  };
+});
+
+/** @param {import("../campus/index.js").CampusObject} object */
+const heightOf = ({ box }) => box[4] - box[1];
+
+/** Metres on the ground to a box. @param {number[]} eye @param {number[]} box */
+const outside = (eye, box) =>
+  Math.hypot(...[0, 2].map((k) => Math.max(box[k] - eye[k], eye[k] - box[k + 3], 0)));
+
+/** The menus of places and presets. @param {CampusClient} client @param {CampusIndex} index */
+function attachPanels(client, index) {
+  const nav = find(document, "nav"), places = find(document, "#places");
+  const toggle = make("button", { textContent: "Places", onclick: () => (places.hidden = !places.hidden) });
+  const select = make("select", { ariaLabel: "Detail of near objects" },
+    ...index.presets.map(({ name }) => make("option", { textContent: name, selected: name === client.preset.name })));
+  select.onchange = () => {
+    client.choose(index.presets[select.selectedIndex]);
+    history.replaceState(null, "", `?preset=${encodeURIComponent(select.value)}${location.hash}`);
+    find(document, "canvas").focus();
+  };
+  nav.append(toggle, select);
+  nav.hidden = false;
+  addEventListener("keydown", ({ key }) => {
+    if (key === "Escape") places.hidden = true;
+  });
+}
