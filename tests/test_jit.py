@@ -55,7 +55,13 @@ def run(program: str, folder: Path, **environment: str) -> list[str]:
     done = subprocess.run(
         [sys.executable, "-c", program],
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(folder), **environment},
+        # Files that keep their size change within a second here, which bytecode does not notice.
+        env={
+            **os.environ,
+            "PYTHONPATH": str(folder),
+            "PYTHONDONTWRITEBYTECODE": "1",
+            **environment,
+        },
         check=True,
         capture_output=True,
     )

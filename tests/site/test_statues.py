@@ -116,7 +116,8 @@ def test_a_context_that_is_lost(visit: Visiting, site: Site, database: Path) -> 
         visitor.lose_context()
         visitor.restore_context()
         visitor.until(f"({LEVELS}).length && s.complete")
-        assert (visitor.picture()[statue] == before).all()
+        after = visitor.picture()[statue]
+        assert np.abs(after.astype(int) - before).max() <= 2
 
 
 CODES = {"cut": "PTM-V104", "other": "PTM-V105", "missing": "PTM-V103", "empty": "PTM-V103"}
