@@ -24,9 +24,10 @@ from benchmarks.fuzz.mutation import NAMES, NUMBERS, Case, damaged, dumped, garb
 from ptmtools.cli.main import main
 from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS, STAGES
+from ptmtools.store import lists
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.store.folder import DatabaseFolder
-from ptmtools.store.layout import IMAGE_LIST, arrays_of, sha256
+from ptmtools.store.layout import IMAGE_LIST, LISTS, arrays_of, sha256
 from ptmtools.store.manifest import Manifest, StageRecord
 from ptmtools.store.writer import DatabaseWriter
 
@@ -258,6 +259,55 @@ class ManifestText:
         built(folder)
         os.symlink(outside, self._db / "away")
         os.mkfifo(self._db / "stages/fifo")
+
+
+class ListText:
+    """A list of the files of a stage, in a database that has lists of few files."""
+
+    limit = 1 << 26
+
+    def __init__(self, folder: Path, outside: Path) -> None:
+        before = lists.INLINE, lists.MEAN
+        lists.INLINE = lists.MEAN = 6
+        try:
+            self._whole = built(folder).rename(folder / "whole")
+        finally:
+            lists.INLINE, lists.MEAN = before
+        self._db = folder / "db"
+        self._files = {f.stem: f.read_bytes() for f in sorted((self._whole / LISTS).iterdir())}
+        (outside / "secret.png").write_bytes(b"secret")
+
+    def make(self, rng: Random) -> Case:
+        """Other values, names or bytes; most of the time under their own digest."""
+        digest = rng.choice(list(self._files))
+        if rng.random() < 0.3:
+            data = damaged(rng, self._files[digest])
+        else:
+            tree = twisted(rng, json.loads(self._files[digest]), OUTPUTS)
+            if isinstance(tree, dict) and isinstance(files := tree.get("files"), dict):
+                files[rng.choice((*OUTPUTS, *files))] = rng.choice(("ab" * 32, "", digest))
+            data = dumped(rng, tree)
+        return Case(data, (digest, rng.random() < 0.8, rng.randrange(8)))
+
+    def read(self, case: Case) -> str:
+        """Asks the commands; one that repairs leaves a sound database."""
+        digest, agreed, number = case.facts
+        shutil.rmtree(self._db, ignore_errors=True)
+        shutil.copytree(self._whole, self._db)
+        name = sha256(case.data) if agreed else digest
+        (self._db / LISTS / f"{digest}.json").unlink()
+        (self._db / LISTS / f"{name}.json").write_bytes(case.data)
+        manifest = self._db / "manifest.json"
+        manifest.write_text(manifest.read_text().replace(digest, name))
+        commands = ("info", "status", "validate -q", *WRITING)
+        if number < len(commands):
+            command, *options = commands[number].split()
+            return f"{command} ended with {commanded(command, str(self._db), *options)[0]}"
+        model = self._whole.parent / "model/two_rooms.obj"
+        build = ("build-scene", str(model), "-o", str(self._db), "-j", "1", "-q")
+        status, printed = commanded(*build, "--samples", "16", "--backend", "embree", "--force")
+        assert status == 0, printed
+        return "repaired"
 
 
 class Interrupted:

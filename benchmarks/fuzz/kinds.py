@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from benchmarks.fuzz.databases import Interrupted, ManifestText, Npz, Served, Vrml
+from benchmarks.fuzz.databases import Interrupted, ListText, ManifestText, Npz, Served, Vrml
 from benchmarks.fuzz.folders import ApoFolder, CampusFolder, Interlaced
 from benchmarks.fuzz.models import Gltf, Mesh, Meshopt, Messages, Mtl, Obj
 from benchmarks.fuzz.textures import Images, Ptm
@@ -24,6 +24,7 @@ KINDS: dict[str, Kind] = {
     "ptm": Kind(Ptm, 20),
     "npz": Kind(Npz, 15),
     "manifest": Kind(ManifestText, 12),
+    "list": Kind(ListText, 1),
     "mtl": Kind(Mtl, 12),
     "obj": Kind(Obj, 14),
     "gltf": Kind(Gltf, 8),
