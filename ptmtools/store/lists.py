@@ -49,12 +49,12 @@ class FileList(Mapping[str, str]):
     def _files(self) -> dict[str, str]:
         return self.without(())
 
-    def without(self, lists: Collection[str], *, found: bool = False) -> dict[str, str]:
-        """The files that are not in these lists, of which none is read; with ``found``, those of
+    def without(self, lists: Collection[str], *, readable: bool = False) -> dict[str, str]:
+        """The files that are not in these lists, of which none is read; with ``readable``, those of
         the lists that can be read."""
         files: dict[str, str] = {}
         for digest in self.lists:
-            with suppress(*(DatabaseError,) if found else ()):
+            with suppress(*(DatabaseError,) if readable else ()):
                 files |= {} if digest in lists else self._read(digest)
         return files
 

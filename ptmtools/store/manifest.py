@@ -121,16 +121,16 @@ class Manifest:
         """Every file of the database with its SHA-256, except the manifest itself."""
         return {**self.outputs(), **self.lists()}
 
-    def beyond(self, former: Manifest | None, *, found: bool = False) -> dict[str, str]:
+    def beyond(self, former: Manifest | None, *, readable: bool = False) -> dict[str, str]:
         """The outputs that are not in a list of the former manifest: all that it lacks or has with
-        other digests, and more. With ``found``, those of the lists that can be read."""
+        other digests, and more. With ``readable``, those of the lists that can be read."""
         outputs: dict[str, str] = {}
         for stage, record in self.stages.items():
             own, before = record.outputs, former.stages.get(stage) if former else None
             known = before.outputs if before else None
             if isinstance(own, FileList):
                 shared = set(known.lists) if isinstance(known, FileList) else ()
-                own = own.without(shared, found=found)
+                own = own.without(shared, readable=readable)
             outputs |= own
         return outputs
 

@@ -203,7 +203,7 @@ class RemoteDatabase:
             self._version = self._version_now()
         self._remember()
         if before:
-            former = {*before.beyond(None, found=True).values(), *before.lists().values()}
+            former = {*before.beyond(None, readable=True).values(), *before.lists().values()}
             old = former.difference(now.values()) & self._sizes.keys()
             for _ in ordered(self._objects.remove, map(object_of, sorted(old)), AT_ONCE):
                 pass

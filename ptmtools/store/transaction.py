@@ -289,7 +289,7 @@ def remove_former(folder: Path, before: Manifest, after: Manifest) -> None:
     needs them. Files stay that only a lost list names."""
     with suppress(DatabaseError):  # a list of the later manifest is lost
         kept = after.beyond(before)
-        for name in before.beyond(after, found=True).keys() - kept.keys():
+        for name in before.beyond(after, readable=True).keys() - kept.keys():
             remove_output(folder, name)
     for name in before.lists().keys() - after.lists().keys():
         remove_output(folder, name)

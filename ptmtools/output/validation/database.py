@@ -197,21 +197,21 @@ class _Check:
         if isinstance(files, dict):
             return files
         self._outputs |= {list_file(digest): digest for digest in files}
-        found: dict[str, str] = {}
+        listed: dict[str, str] = {}
         for digest in files:
             fault = ""
             try:
                 own = lists_in(self._folder)(digest)
                 if outputs and not all_outputs(own):
                     own, fault = {}, "is no list of outputs"
-                found |= own
+                listed |= own
             except DatabaseError as error:  # a file that is missing or another is reported as such
                 self._complete = False
                 fault = error.message if error.code == "PTM-D006" else ""
             if fault:
                 self._complete = False
                 self.findings.at(list_file(digest)).add("PTM-D650", fault)
-        return found
+        return listed
 
     def _extent(self) -> float:
         """The largest side of the model, metres; 0 if it is not recorded."""
