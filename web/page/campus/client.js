@@ -31,6 +31,9 @@ export class CampusClient {
   asked = new Set();
   /** @type {Set<string>} */
   loaded = new Set();
+  /** Files that cannot be had. @type {Set<string>} */
+  failed = new Set();
+  #begun = false;
   /** Files of each thread that are still to be requested. @type {string[][]} */
   #threads = [];
   /** @type {number[] | null} */
@@ -47,25 +50,28 @@ export class CampusClient {
     this.preset = preset;
   }
 
-  /** The visitor is somewhere. @param {number[]} eye */
+  /** The visitor is somewhere; whether objects were sorted. @param {number[]} eye */
   look(eye) {
     const before = this.#sortedAt;
-    if (before && Math.hypot(...eye.map((x, k) => x - before[k])) < MOVE) return;
+    if (before && Math.hypot(...eye.map((x, k) => x - before[k])) < MOVE) return false;
     this.#sortedAt = [...eye];
     this.sorts++;
     const far = this.index.objects.map(({ box, barycentre }) => distanceTo(eye, box, barycentre));
     this.order = [...far.keys()].sort((a, b) => far[a] - far[b] || a - b);
     this.near = this.order.slice(0, NEAREST);
+    return true;
   }
 
   /** Whether all low detail is there. */
   get begun() {
-    return this.order.length > 0 && this.order.every((k) => this.index.low(k).every((file) => this.loaded.has(file)));
+    this.#begun ||= this.order.length > 0
+      && this.order.every((k) => this.index.low(k).every((file) => this.loaded.has(file)));
+    return this.#begun;
   }
 
   /** Whether an object has the detail of the preset. @param {number} k */
   full(k) {
-    return this.index.high(k, this.preset).every((file) => this.loaded.has(file));
+    return this.index.high(k, this.preset).every((file) => this.loaded.has(file) || this.failed.has(file));
   }
 
   /** Whether nothing is missing for this place. */
@@ -76,7 +82,7 @@ export class CampusClient {
   /** The next file for a free thread, or null: low detail of all objects comes before high detail of any. */
   next() {
     if (this.#threads.length >= THREADS) return null;
-    for (const [objects, high] of /** @type {[number[], boolean][]} */ ([[this.order, false], [this.near, true]])) {
+    for (const [objects, high] of /** @type {[number[], boolean][]} */ ([[this.begun ? [] : this.order, false], [this.near, true]])) {
       for (const k of objects) {
         const files = high ? this.index.high(k, this.preset) : this.index.low(k);
         const lacking = files.filter((file) => !this.asked.has(file));

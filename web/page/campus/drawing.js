@@ -94,7 +94,8 @@ export class CampusDrawing {
         if (material.channels.includes(channel)) files[channel] = textureOf(base, channel);
       }
     }
-    const present = Object.keys(files).filter((channel) => files[channel]), key = present.join("");
+    const present = Object.keys(files).filter((channel) => files[channel] && this.files.texture(/** @type {string} */ (files[channel])));
+    const key = present.join("");
     let program = this.#programs.get(key);
     if (!program) {
       program = programOf(gl, `campus ${key}`, [VERTEX, fragment(present)]);

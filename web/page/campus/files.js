@@ -118,9 +118,9 @@ class Image {
 }
 
 export class CampusFiles {
-  /** In main memory. @type {Map<string, Part[] | ImageBitmap>} */
+  /** In main memory, images as they came. @type {Map<string, Part[] | Blob>} */
   #kept = new Map();
-  /** On the graphics card. @type {Map<string, Buffers | Image>} */
+  /** On the graphics card; null while an image is decoded again. @type {Map<string, Buffers | Image | null>} */
   #shown = new Map();
 
   /** @param {WebGL2RenderingContext} gl @param {import("./index.js").CampusIndex} index
@@ -141,9 +141,17 @@ export class CampusFiles {
       const blob = new Blob([body], { type: "image/jpeg" });
       const bitmap = await createImageBitmap(blob, { colorSpaceConversion: "none" });
       demand(bitmap.width === row.size && bitmap.height === row.size, "an image of another size");
-      return bitmap;
+      this.#upload(name, bitmap);
+      return blob;
     });
     this.#kept.set(name, content);
+  }
+
+  /** @param {string} name @param {ImageBitmap} bitmap */
+  #upload(name, bitmap) {
+    this.#shown.get(name)?.delete();
+    this.#shown.set(name, new Image(this.gl, bitmap, this.index.files.get(name)?.channel === "a"));
+    bitmap.close();
   }
 
   /** The parts of a mesh in main memory. @param {string} name @returns {Part[] | null} */
@@ -151,33 +159,34 @@ export class CampusFiles {
     return /** @type {Part[] | undefined} */ (this.#kept.get(name)) ?? null;
   }
 
-  /** A mesh on the graphics card, or null if it was not downloaded. @param {string} name @returns {Buffers | null} */
+  /** A mesh on the graphics card, or null if it was not downloaded. @param {string} name */
   mesh(name) {
-    return /** @type {Buffers | null} */ (this.#show(name, (kept) => new Buffers(this.gl, /** @type {Part[]} */ (kept))));
+    const shown = this.#shown.get(name), parts = this.parts(name);
+    if (shown || !parts) return /** @type {Buffers | undefined} */ (shown) ?? null;
+    const buffers = new Buffers(this.gl, parts);
+    this.#shown.set(name, buffers);
+    return buffers;
   }
 
-  /** A texture on the graphics card, likewise. @param {string} name @returns {Image | null} */
+  /** A texture on the graphics card; null if it was not downloaded, or while it is decoded again.
+   * @param {string} name */
   texture(name) {
-    const linear = this.index.files.get(name)?.channel === "a";
-    return /** @type {Image | null} */ (this.#show(name, (kept) => new Image(this.gl, /** @type {ImageBitmap} */ (kept), linear)));
-  }
-
-  /** @param {string} name @param {(kept: Part[] | ImageBitmap) => Buffers | Image} make */
-  #show(name, make) {
-    const shown = this.#shown.get(name);
-    if (shown) return shown;
-    const kept = this.#kept.get(name);
-    if (!kept) return null;
-    const made = make(kept);
-    this.#shown.set(name, made);
-    return made;
+    const shown = this.#shown.get(name), blob = this.#kept.get(name);
+    if (shown === undefined && blob) {
+      this.#shown.set(name, null);
+      createImageBitmap(/** @type {Blob} */ (blob), { colorSpaceConversion: "none" }).then((bitmap) => {
+        if (this.#shown.has(name)) this.#upload(name, bitmap);
+        else bitmap.close();
+      }, () => {});
+    }
+    return /** @type {Image | null | undefined} */ (shown) ?? null;
   }
 
   /** Frees the graphics memory of all files but these. @param {Set<string>} names */
   keep(names) {
     for (const [name, shown] of this.#shown) {
       if (names.has(name)) continue;
-      shown.delete();
+      shown?.delete();
       this.#shown.delete(name);
     }
   }
@@ -185,7 +194,7 @@ export class CampusFiles {
   /** Bytes on the graphics card. */
   get bytes() {
     let sum = 0;
-    for (const { bytes } of this.#shown.values()) sum += bytes;
+    for (const shown of this.#shown.values()) sum += shown?.bytes ?? 0;
     return sum;
   }
 }

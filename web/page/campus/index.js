@@ -40,6 +40,9 @@ const isVector = (value, length) =>
   Array.isArray(value) && value.length === length && value.every((x) => Number.isFinite(x) && Math.abs(x) <= 1e9);
 
 export class CampusIndex {
+  /** @type {Map<string, string[]>} */
+  #lists = new Map();
+
   /** @param {any} document `campus.json`; throws an Error if it is damaged */
   constructor(document) {
     demand(document?.format === "ptmtools campus" && document.schema === 1, "not an index of a campus");
@@ -104,15 +107,22 @@ export class CampusIndex {
 
   /** The files of an object in low detail: its coarsest mesh, and textures of the least size. @param {number} k */
   low(k) {
-    return [this.objects[k].meshes[0].file, ...this.#textures(k, LEAST)];
+    return this.#once(`${k}`, () => [this.objects[k].meshes[0].file, ...this.#textures(k, LEAST)]);
+  }
+
+  /** Lists of files, which every frame asks for. @param {string} key @param {() => string[]} make */
+  #once(key, make) {
+    const known = this.#lists.get(key) ?? make();
+    this.#lists.set(key, known);
+    return known;
   }
 
   /** Its files in the detail of a preset: the finest mesh, textures, lightmap. @param {number} k
    * @param {Preset} preset */
   high(k, { diffuse, light }) {
-    const { meshes, lightmap } = this.objects[k];
-    const last = meshes[meshes.length - 1].file, files = [last, ...this.#textures(k, diffuse)];
-    return lightmap === null ? files : [...files, textureFile(lightmap, light, "l")];
+    const { meshes, lightmap } = this.objects[k], last = meshes[meshes.length - 1].file;
+    return this.#once(`${k} ${diffuse} ${light}`, () => [last, ...this.#textures(k, diffuse),
+      ...(lightmap === null ? [] : [textureFile(lightmap, light, "l")])]);
   }
 
   /** @param {number} k @param {number} size */

@@ -6,21 +6,22 @@
 import { CampusClient } from "../campus/client.js";
 import { CampusDrawing, finest } from "../campus/drawing.js";
 import { CampusFiles } from "../campus/files.js";
-import { CampusIndex, LEAST, textureFile } from "../campus/index.js";
+import { CampusIndex, LEAST } from "../campus/index.js";
 import { Labels } from "../campus/labels.js";
 import { cameraOf } from "../gl/camera.js";
 import { frustumOf, meetsBox } from "../space/frustum.js";
 import { attachControls } from "../ui/controls.js";
 import { find, make } from "../ui/elements.js";
-import { poseOf } from "../ui/address.js";
+import { showNotice } from "../ui/errors.js";
+import { fragmentOf, poseOf } from "../ui/address.js";
 import { Solids } from "../walk/solids.js";
 import { Walker } from "../walk/walker.js";
 import { indexOf, runForm, sizeText } from "./form.js";
 
 /** Vertical field of view, radians; radius, height of the eye and highest step of the visitor, m. */
 const ANGLE = Math.PI / 3, BODY = [0.25, 1.6, 0.5];
-/** Objects nearer than this can be collided with, m. */
-const SOLID = 40;
+/** Objects nearer than this become solid, and those nearer than that must be before a step, m. */
+const SOLID = 40, REACH = 2;
 /** Height of the lowest object with a name, m. */
 const LOWEST = 3;
 /** Seconds out of view after which an object shows less detail. */
@@ -37,7 +38,10 @@ runForm(async (gl, config, fetcher, fail) => {
   const files = new CampusFiles(gl, index, (file) => new URL(file, address).href, fetcher);
   const drawing = new CampusDrawing(gl, index, files);
   const solids = new Solids();
-  const walker = new Walker({ solids, locate: () => 0, avatar: BODY });
+  // A visitor stands still until the ground and the walls around are known.
+  const ready = () => client.begun && index.objects.every(({ box }, k) => outside(walker.pose.eye, box) > REACH || solids.has(k));
+  const near = solids.near.bind(solids);
+  const walker = new Walker({ solids: /** @type {any} */ ({ near, has: ready }), locate: () => 0, avatar: BODY });
   const { wishes } = attachControls(document, { canvas });
   const low = [0, 1, 2].map((k) => Math.min(...index.objects.map(({ box }) => box[k])));
   const far = 2 * Math.hypot(...[0, 1, 2].map((k) => Math.max(...index.objects.map(({ box }) => box[k + 3])) - low[k])) + 100;
@@ -58,14 +62,21 @@ runForm(async (gl, config, fetcher, fail) => {
     find(document, "#places").hidden = true;
     canvas.focus();
   });
-  attachPanels(client, index);
+  attachPanels(client, index, () => fragmentOf(walker.pose));
   find(document, "#keys").textContent = "WASD or the arrow keys to walk, drag to look around, Shift to run";
 
   /** One of the threads. @param {string} first @param {string[]} thread */
   const run = async (first, thread) => {
     for (let file = /** @type {string | null} */ (first); file; file = client.after(thread)) {
-      await files.load(file);
-      client.loaded.add(file);
+      try {
+        await files.load(file);
+        client.loaded.add(file);
+      } catch (fault) {
+        // Coarse detail of everything stays; what was asked for is not asked for again.
+        if (!client.begun) throw fault;
+        showNotice(document, /** @type {Error} */ (fault).message);
+        client.failed.add(file);
+      }
     }
   };
 
@@ -74,28 +85,33 @@ runForm(async (gl, config, fetcher, fail) => {
   const shownOf = (frustum, dt) => {
     const shown = [], kept = new Set();
     const near = new Set(client.near);
-    for (const k of client.order) {
+    for (const [far, k] of client.order.entries()) {
       const { box, meshes, lightmap } = index.objects[k];
       const inView = meetsBox(frustum, box, box, 0, 3);
       hidden[k] = inView ? 0 : hidden[k] + dt;
-      const last = meshes[meshes.length - 1].file, light = lightmap && textureFile(lightmap, client.preset.light, "l");
+      const last = meshes[meshes.length - 1].file;
+      // The preset's lightmap, or another until it is there.
+      const light = lightmap && (finest(client.loaded, lightmap, "l", fitting(client.preset.light))
+        ?? finest(client.loaded, lightmap, "l", sizes));
       // High detail of what is near, unless it has been out of view for a while.
       const high = near.has(k) && hidden[k] < HIDDEN && client.loaded.has(last);
       const mesh = high ? last : meshes[0].file;
       if (!client.loaded.has(mesh)) continue;
-      const lit = high && light && client.loaded.has(light) ? light : null;
+      const lit = high ? light : null;
       kept.add(mesh).add(meshes[0].file);
       if (lit) kept.add(lit);
-      if (inView) shown.push({ object: k, mesh, lightmap: lit, far: client.order.indexOf(k) });
+      if (inView) shown.push({ object: k, mesh, lightmap: lit, far });
     }
     return { shown, kept };
   };
 
+  /** Bases of what is near, which alone have more than the least size. @type {Set<string | null>} */
+  let bases = new Set();
   /** @param {string} base @param {string} channel */
-  const textureOf = (base, channel) => {
-    const most = sizes.filter((size) => size <= Math.max(client.preset.diffuse, LEAST));
-    return finest(client.loaded, base, channel, most);
-  };
+  const textureOf = (base, channel) =>
+    finest(client.loaded, base, channel, bases.has(base) ? fitting(client.preset.diffuse) : [LEAST]);
+  /** Sizes up to one, the largest first. @param {number} most */
+  const fitting = (most) => sizes.filter((size) => size <= Math.max(most, LEAST));
 
   let memory = 0;
   return {
@@ -106,9 +122,11 @@ runForm(async (gl, config, fetcher, fail) => {
         if (!parts || outside(walker.pose.eye, box) > SOLID || solids.has(k)) continue;
         if (!solids.add(k, /** @type {any} */ (parts), /** @type {any} */ ({ portals: [] }), () => performance.now() > until)) break;
       }
-      walker.step(dt, client.begun ? wishes() : { forward: 0, right: 0, turn: 0, look: 0, run: false });
+      walker.step(dt, wishes());
       const { pose } = walker;
-      client.look(pose.eye);
+      if (client.look(pose.eye)) {
+        bases = new Set(client.near.flatMap((k) => index.objects[k].materials.map((m) => index.materials[m].base)));
+      }
       for (let job = client.next(); job; job = client.next()) run(job.file, job.thread).catch(fail);
       const aspect = canvas.width / canvas.height, camera = cameraOf(pose, ANGLE, aspect, far);
       const { shown, kept } = shownOf(frustumOf(pose, ANGLE, aspect), dt);
@@ -152,15 +170,19 @@ const heightOf = ({ box }) => box[4] - box[1];
 const outside = (eye, box) =>
   Math.hypot(...[0, 2].map((k) => Math.max(box[k] - eye[k], eye[k] - box[k + 3], 0)));
 
-/** The menus of places and presets. @param {CampusClient} client @param {CampusIndex} index */
-function attachPanels(client, index) {
+/** The menus of places and presets. @param {CampusClient} client @param {CampusIndex} index
+ * @param {() => string} here the fragment of the visitor's place */
+function attachPanels(client, index, here) {
+  // "Ultra cached" differs from "Ultra" in simulations alone.
+  const presets = index.presets.filter(({ diffuse, light }, k) =>
+    index.presets.findIndex((one) => one.diffuse === diffuse && one.light === light) === k);
   const nav = find(document, "nav"), places = find(document, "#places");
   const toggle = make("button", { textContent: "Places", onclick: () => (places.hidden = !places.hidden) });
   const select = make("select", { ariaLabel: "Detail of near objects" },
-    ...index.presets.map(({ name }) => make("option", { textContent: name, selected: name === client.preset.name })));
+    ...presets.map(({ name }) => make("option", { textContent: name, selected: name === client.preset.name })));
   select.onchange = () => {
-    client.choose(index.presets[select.selectedIndex]);
-    history.replaceState(null, "", `?preset=${encodeURIComponent(select.value)}${location.hash}`);
+    client.choose(presets[select.selectedIndex]);
+    history.replaceState(null, "", `?preset=${encodeURIComponent(select.value)}${here()}`);
     find(document, "canvas").focus();
   };
   nav.append(toggle, select);
