@@ -182,6 +182,9 @@ def test_the_keyboard_is_enough(desk: Any) -> None:
     """Tab leads to every control, and the focus is seen on each."""
     for name in ("Places", "Map", "Details", "Help"):
         desk.get_by_role("button", name=name, exact=True).press("Enter")
+    # Their script is loaded with the first of them.
+    for place in ("#places ol button", "#details input", "#map canvas"):
+        desk.locator(place).first.wait_for(state="visible")
     desk.locator("#view").focus()
     reached: list[str] = []
     while (focus := desk.evaluate(FOCUS))["name"] not in ["BODY", *reached]:
