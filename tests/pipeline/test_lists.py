@@ -63,9 +63,9 @@ def test_a_damaged_list(db: Path, damage: Callable[[Path], object], code: str) -
     lost = list_of(db, "emit")
     name = lost.relative_to(db).as_posix()
     damage(lost)
-    found = [(issue.code, issue.file) for issue in validate(db).issues]
-    assert (code, name) in found
-    assert {file for _, file in found} == {name}
+    issues = [(issue.code, issue.file) for issue in validate(db).issues]
+    assert (code, name) in issues
+    assert {file for _, file in issues} == {name}
     states = {stage.stage: (stage.state, stage.why) for stage in database_status(db).stages}
     assert states["emit"] == ("damaged", f"{name} is missing or damaged")
     assert {state for stage, (state, _) in states.items() if stage != "emit"} == {"done"}
@@ -87,9 +87,9 @@ def test_a_list_of_impossible_outputs(db: Path) -> None:
     (lost.parent / f"{sha256(text.encode())}.json").write_text(text)
     manifest = db / "manifest.json"
     manifest.write_text(manifest.read_text().replace(lost.stem, sha256(text.encode())))
-    found = {(issue.code, issue.file) for issue in validate(db).issues}
-    assert ("PTM-D650", f"{LISTS}/{sha256(text.encode())}.json") in found
-    assert not any("hostname" in file for _, file in found)
+    issues = {(issue.code, issue.file) for issue in validate(db).issues}
+    assert ("PTM-D650", f"{LISTS}/{sha256(text.encode())}.json") in issues
+    assert not any("hostname" in file for _, file in issues)
 
 
 def test_a_database_without_lists_gets_them(db: Path, monkeypatch: pytest.MonkeyPatch) -> None:

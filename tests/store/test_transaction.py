@@ -55,8 +55,8 @@ def stamp(file: Path) -> tuple[int, int]:
     return actual.st_ino, actual.st_ctime_ns
 
 
-def without(found: dict[str, bytes]) -> dict[str, bytes]:
-    return {n: data for n, data in found.items() if n != MANIFEST and not n.startswith(LISTS)}
+def without(files: dict[str, bytes]) -> dict[str, bytes]:
+    return {n: data for n, data in files.items() if n != MANIFEST and not n.startswith(LISTS)}
 
 
 @pytest.mark.parametrize("limits", [(lists.INLINE, lists.MEAN), (0, 2), (2, 1)])

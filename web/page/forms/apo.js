@@ -6,9 +6,9 @@
 //     #azimuth,elevation,distance  degrees, degrees, diameters
 
 import { checkOctree, demand, isWhole, Octree } from "../octree/octree.js";
-import { find } from "../ui/elements.js";
+import { find, inBytes } from "../ui/elements.js";
 import { showNotice } from "../ui/errors.js";
-import { indexOf, runForm, sizeText } from "./form.js";
+import { indexOf, runForm } from "./form.js";
 import { meshOf, OctreeDrawing } from "./octree-drawing.js";
 import { Orbit } from "./orbit.js";
 
@@ -38,7 +38,7 @@ runForm(async (gl, config, fetcher, fail) => {
   const levels = query.has("levels") ? Math.max(0, Number(query.get("levels")) || 0) : Infinity;
   const bare = query.has("normals");
   const total = index.streams.reduce((sum, { ends }) => sum + (ends.at(-1) ?? 0), 0);
-  let paused = false, drawn = "";
+  let paused = false, drawn = "", shown = 0;
   // What is there stays when a finer level cannot be fetched.
   const report = (/** @type {import("../net/errors.js").PageError} */ fault) =>
     octree.levels ? showNotice(document, fault.message) : fail(fault);
@@ -55,13 +55,14 @@ runForm(async (gl, config, fetcher, fail) => {
       const picture = [canvas.width, canvas.height, ...camera.eye, octree.updates, octree.partial].join();
       if (picture !== drawn) drawing.draw(octree, camera, { bare, levels });
       drawn = picture;
+      shown = octree.levels;
       const rest = octree.complete || octree.levels >= levels ? "" : paused ? "; finer ones when you come closer" : " …";
-      return `${octree.levels} of ${index.levels.length} levels, ${sizeText(octree.fetched)} of ${sizeText(total)}${rest}`;
+      return `${octree.levels} of ${index.levels.length} levels, ${inBytes(octree.fetched)} of ${inBytes(total)}${rest}`;
     },
     state: () => ({
       levels: octree.levels,
       partial: octree.partial,
-      complete: octree.complete,
+      complete: octree.complete && shown === octree.levels,
       paused,
       updates: octree.updates,
       requests: fetcher.requests,

@@ -11,12 +11,12 @@ import { Labels } from "../campus/labels.js";
 import { cameraOf } from "../gl/camera.js";
 import { frustumOf, meetsBox } from "../space/frustum.js";
 import { attachControls } from "../ui/controls.js";
-import { find, make } from "../ui/elements.js";
+import { find, inBytes, make } from "../ui/elements.js";
 import { showNotice } from "../ui/errors.js";
 import { fragmentOf, poseOf } from "../ui/address.js";
 import { Solids } from "../walk/solids.js";
 import { Walker } from "../walk/walker.js";
-import { indexOf, runForm, sizeText } from "./form.js";
+import { indexOf, runForm } from "./form.js";
 
 /** Vertical field of view, radians; radius, height of the eye and highest step of the visitor, m. */
 const ANGLE = Math.PI / 3, BODY = [0.25, 1.6, 0.5];
@@ -142,7 +142,7 @@ runForm(async (gl, config, fetcher, fail) => {
       memory = files.bytes;
       const full = client.near.filter((k) => client.full(k)).length;
       const loading = client.begun ? `${full} of ${client.near.length} near objects complete` : "loading";
-      return `${loading}; ${sizeText(fetcher.bytes)} received, ${sizeText(memory)} of graphics memory`;
+      return `${loading}; ${inBytes(fetcher.bytes)} received, ${inBytes(memory)} of graphics memory`;
     },
     state: () => ({
       begun: client.begun,

@@ -80,33 +80,3 @@ function fit(canvas) {
 export function indexOf(fetcher, url, check) {
   return fetcher.whole(url, (body) => check(JSON.parse(new TextDecoder("utf-8", { fatal: true }).decode(body))));
 }
-
-/** Bytes for people. @param {number} bytes */
-export function sizeText(bytes) {
-  if (bytes < 1e3) return `${bytes} B`;
-  return bytes < 1e6 ? `${(bytes / 1e3).toFixed(1)} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
-}
-
-/**
- * A program, and its uniforms.
- * @param {WebGL2RenderingContext} gl
- * @param {string} vertex
- * @param {string} fragment
- */
-export function linked(gl, vertex, fragment) {
-  const program = gl.createProgram();
-  for (const [kind, source] of /** @type {[number, string][]} */ ([[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]])) {
-    const shader = /** @type {WebGLShader} */ (gl.createShader(kind));
-    gl.shaderSource(shader, source);
-    gl.compileShader(shader);
-    gl.attachShader(program, shader);
-    gl.deleteShader(shader);
-  }
-  gl.linkProgram(program);
-  if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
-    throw new Error(`a shader: ${gl.getProgramInfoLog(program)}`);
-  }
-  /** @param {string} name */
-  const at = (name) => gl.getUniformLocation(program, name);
-  return { program, at };
-}

@@ -2,8 +2,9 @@
 //
 //     ?all    joins all files, whatever the view needs
 
-import { find } from "../ui/elements.js";
-import { indexOf, linked, runForm, sizeText } from "./form.js";
+import { programOf } from "../gl/program.js";
+import { find, inBytes } from "../ui/elements.js";
+import { indexOf, runForm } from "./form.js";
 import { checkedSet, Joining } from "./joining.js";
 import { Panning } from "./panning.js";
 
@@ -44,7 +45,7 @@ runForm(async (gl, config, fetcher, fail) => {
   // Sides are powers of two; the picture has the ratio of its source.
   const { width, height } = index.original, canvas = /** @type {HTMLCanvasElement} */ (gl.canvas);
   const panning = new Panning(canvas, width, height), all = new URLSearchParams(location.search).has("all");
-  const { program, at } = linked(gl, VERTEX, FRAGMENT), array = gl.createVertexArray();
+  const { program, at } = programOf(gl, "picture", [VERTEX, FRAGMENT]), array = gl.createVertexArray();
   const total = index.files.reduce((sum, { bytes }) => sum + bytes, 0);
   find(document, "#keys").textContent = "Drag or use the arrow keys to move; wheel, two fingers, + and − to zoom";
   let needed = true, drawn = "";
@@ -57,8 +58,8 @@ runForm(async (gl, config, fetcher, fail) => {
       gl.bindVertexArray(array);
       gl.activeTexture(gl.TEXTURE0);
       gl.bindTexture(gl.TEXTURE_2D, joining.texture);
-      gl.uniform1i(at("image"), 0);
-      gl.uniform4fv(at("box"), panning.box);
+      gl.uniform1i(at.image, 0);
+      gl.uniform4fv(at.box, panning.box);
       gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
     }
   };
@@ -78,7 +79,7 @@ runForm(async (gl, config, fetcher, fail) => {
         needed ? " …" : "; finer ones when you zoom in";
       const part = `${joining.steps} of ${index.files.length} files, ${size.width} × ${size.height} of ${index.width} × ${index.height}`;
       const depth = index.kind === "uint16" ? "; shown in 8 bits" : "";
-      return `${part}, ${sizeText(there)} of ${sizeText(total)}${end}${depth}`;
+      return `${part}, ${inBytes(there)} of ${inBytes(total)}${end}${depth}`;
     },
     state: () => ({
       steps: joining.steps,

@@ -1,10 +1,10 @@
 // Joins the files of an interlaced image on the graphics card, step by step, by drawing alternately into
 // two textures (docs/formats/interlace.md; Englert et al., section 3.2).
 
+import { programOf } from "../gl/program.js";
 import { PageError } from "../net/errors.js";
 import { checksum } from "../octree/checksum.js";
 import { demand, isWhole } from "../octree/octree.js";
-import { linked } from "./form.js";
 
 const MEDIA = /** @type {Record<string, string>} */ ({ png: "image/png", jpg: "image/jpeg", webp: "image/webp" });
 const WIDEST = 1 << 16;
@@ -81,7 +81,7 @@ export class Joining {
     this.index = index;
     this.urlOf = urlOf;
     this.fetcher = fetcher;
-    this.use = linked(gl, QUAD, JOIN);
+    this.use = programOf(gl, "join", [QUAD, JOIN]);
     this.buffer = gl.createFramebuffer();
     this.patterns = Object.fromEntries(Object.entries(PATTERNS).map(([axis, texels]) => {
       const texture = this.#texture(2, 2, gl.R8, gl.REPEAT);
@@ -150,9 +150,9 @@ export class Joining {
     Object.entries(inputs).forEach(([name, texture], unit) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D, texture);
-      gl.uniform1i(at(name), unit);
+      gl.uniform1i(at[name], unit);
     });
-    gl.uniform2f(at("size"), width, height);
+    gl.uniform2f(at.size, width, height);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     return result;

@@ -1,10 +1,10 @@
 // Draws a simplified mesh with the normals of its octree: the traversal in the fragment shader
 // (docs/formats/apo.md, "Looking a normal up"; Lacoste et al., section 3.2), lit as by `ptm render`.
 
+import { programOf } from "../gl/program.js";
 import { LOOK_UP } from "../octree/look-up.js";
 import { checksum } from "../octree/checksum.js";
 import { demand, isWhole } from "../octree/octree.js";
-import { linked } from "./form.js";
 
 /** Shares of white light: ambient, from the upper left, and from the lower right. */
 const AMBIENT = 0.2, KEY = 0.7, FILL = 0.2;
@@ -103,7 +103,7 @@ export class OctreeDrawing {
    */
   constructor(gl, { positions, normals, indices, low, high }, { low: corner, side }) {
     this.gl = gl;
-    this.use = linked(gl, VERTEX, FRAGMENT);
+    this.use = programOf(gl, "octree", [VERTEX, FRAGMENT]);
     this.cube = { corner, side };
     this.radius = Math.hypot(...high.map((x, k) => x - low[k])) / side / 2;
     this.count = indices.length;
@@ -142,22 +142,22 @@ export class OctreeDrawing {
       gl.bindTexture(gl.TEXTURE_2D, texture);
     });
     const deepest = Math.min(octree.levels, levels) - 1, colored = octree.texels.length > 1;
-    gl.uniform1i(at("octree"), 0);
-    gl.uniform1i(at("colors"), colored ? 1 : 0);
-    gl.uniform1i(at("texels"), octree.count);
-    gl.uniform1i(at("deepest"), deepest);
-    gl.uniform1i(at("partial"), Number(octree.partial && octree.levels < levels));
-    gl.uniform1i(at("colored"), Number(colored));
-    gl.uniform1i(at("bare"), Number(bare));
-    gl.uniform3fv(at("eye"), camera.eye.map((x, k) => (x - corner[k]) / side));
-    for (const [name, axis] of Object.entries({ right, up, ahead })) gl.uniform3fv(at(name), axis);
-    gl.uniform2fv(at("lens"), half);
-    gl.uniform1f(at("near"), Math.max(away - this.radius, away / 64) / 2);
+    gl.uniform1i(at.octree, 0);
+    gl.uniform1i(at.colors, colored ? 1 : 0);
+    gl.uniform1i(at.texels, octree.count);
+    gl.uniform1i(at.deepest, deepest);
+    gl.uniform1i(at.partial, Number(octree.partial && octree.levels < levels));
+    gl.uniform1i(at.colored, Number(colored));
+    gl.uniform1i(at.bare, Number(bare));
+    gl.uniform3fv(at.eye, camera.eye.map((x, k) => (x - corner[k]) / side));
+    for (const [name, axis] of Object.entries({ right, up, ahead })) gl.uniform3fv(at[name], axis);
+    gl.uniform2fv(at.lens, half);
+    gl.uniform1f(at.near, Math.max(away - this.radius, away / 64) / 2);
     for (const [name, from] of Object.entries({ key: KEY_FROM, fill: FILL_FROM })) {
       const light = right.map((_, k) => from[0] * right[k] + from[1] * up[k] - from[2] * ahead[k]);
-      gl.uniform3fv(at(name), light.map((x) => x / Math.hypot(...light)));
+      gl.uniform3fv(at[name], light.map((x) => x / Math.hypot(...light)));
     }
-    gl.uniform3fv(at("stone"), STONE);
+    gl.uniform3fv(at.stone, STONE);
     gl.drawElements(gl.TRIANGLES, this.count, this.type, 0);
   }
 
