@@ -134,7 +134,8 @@ def test_parts_of_levels_are_shown_at_time_steps(opened: Open, statue: Path) -> 
     with opened(statue, "?update=steps&step=0.1#0,0,0.55", throttle=slow) as visitor:
         visitor.until("s.partial")
         partial = visitor.picture()
-        state = visitor.until("s.complete && !s.partial")
+        visitor.until("s.complete && !s.partial")
+        state = visitor.complete()  # two frames later: it is on the screen
         whole = visitor.picture()
         levels = len(json.loads((statue / "apo.json").read_text())["levels"])
         assert state["updates"] > levels - 6
@@ -142,6 +143,7 @@ def test_parts_of_levels_are_shown_at_time_steps(opened: Open, statue: Path) -> 
         assert visitor.messages == []
     with opened(statue, "#0,0,0.55") as visitor:
         visitor.until("s.complete")
+        visitor.complete()
         assert (visitor.picture() == whole).all()
 
 
