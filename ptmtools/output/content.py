@@ -10,6 +10,7 @@ they are dropped and counted.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -20,16 +21,18 @@ from numpy.typing import NDArray
 from ptmtools.arrays import areas, summed
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
+from ptmtools.errors import DatabaseError
 from ptmtools.output.emitter import Emitter
 from ptmtools.output.model import OctreeRecord, TextureRecord, Viewpoint, WriterOptions
 from ptmtools.output.numbers import shares_of, single
 from ptmtools.progress import Progress, silent
-from ptmtools.scene.colors import gradients
+from ptmtools.scene.colors import gradients, to_linear, to_srgb
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
 
 if TYPE_CHECKING:
     from ptmtools.coverage.required_levels import Need
+    from ptmtools.light.model import Light
     from ptmtools.output.mesh_levels import MeshLevels
 
 
@@ -44,6 +47,8 @@ class Shape:
     point, uv: (n,), (k,) rows of `Geometry.point` and `Geometry.uv`.
     triangle, uv_triangle: (m, 3) indices into `point` and `uv`.
     color: (m, 3, 3) uint8 sRGB of the corners, None where all are white.
+    light: (m, 3, 2) float32 coordinates of the corners in the lightmap of the cell, origin at the
+        lower left; None where it does not light the shape.
     """
 
     object: int
@@ -54,6 +59,7 @@ class Shape:
     triangle: NDArray[np.int64]
     uv_triangle: NDArray[np.int64]
     color: NDArray[np.uint8] | None = None
+    light: NDArray[np.float32] | None = None
 
 
 class Geometry:
@@ -73,7 +79,10 @@ class Geometry:
     shape_uv, uv_start: the same for `uv`.
     color: (M, 3, 3) uint8 sRGB of the corners of triangles; None if the scene has no colours.
     collapsed: pieces dropped by the rounding, over all cells.
+    light: the light of the cells, or None.
     """
+
+    light: Light | None = None
 
     def __init__(self, scene: Scene, cells: Cells) -> None:
         piece, cell = cells.emitted(scene.two_sided)
@@ -108,6 +117,26 @@ class Geometry:
             uv_corner, shape, len(first), len(self.uv)
         )
 
+    def lit_by(self, light: Light) -> Geometry:
+        """The same geometry with a light: lightmaps, and colours where that is at vertices.
+
+        Raises DatabaseError PTM-D008 if it is that of other geometry.
+        """
+        if len(light.uv) != len(self.triangle) or len(light.mapped) != len(self.object):
+            raise DatabaseError(
+                "PTM-D008",
+                "the stages do not belong together: the light is that of other geometry",
+                remedy="run the stage `light` again",
+            )
+        result = copy(self)
+        result.light = light
+        if (light.vertex < 255).any():
+            color = np.full((*light.vertex.shape, 3), 255, np.uint8)
+            color = color if self.color is None else self.color
+            linear = to_linear(color / 255) * (light.vertex[..., None] / 255)
+            result.color = np.rint(255 * to_srgb(linear)).astype(np.uint8)
+        return result
+
     def areas(self) -> NDArray[np.float64]:
         """(S,) m² of each shape."""
         count = np.diff(self.triangle_start)
@@ -130,6 +159,7 @@ class Geometry:
             self.triangle[rows],
             self.uv_triangle[rows],
             None if self.color is None or (self.color[rows] == 255).all() else self.color[rows],
+            self.light.uv[rows] if self.light is not None and self.light.mapped[s] else None,
         )
 
     def shapes(self, cell: int) -> Iterator[Shape]:
@@ -183,13 +213,15 @@ class Content:
     """
     Attributes
     ----------
-    textures: in the order of the hints; one for every image that a material in use names.
+    textures: in the order of the hints; one for every image that a material in use names, and then
+        the lightmaps of cells.
     viewpoints: where a walk may start.
     progress: called for every cell.
     need: the required levels of textures, if measured.
     octrees: the octree textures of objects.
     workers: number of threads.
     emitters: the forms that are written, in the order of writing.
+    light: the light of the cells, if baked.
     """
 
     scene: Scene
@@ -204,11 +236,17 @@ class Content:
     octrees: tuple[OctreeRecord, ...] = ()
     workers: int = 1
     emitters: tuple[Emitter, ...] = ()
+    light: Light | None = None
 
     @cached_property
     def geometry(self) -> Geometry:
         """The shapes of all cells; raises PTM-D601 if a number is not finite in float32."""
         return Geometry(self.scene, self.cells)
+
+    @cached_property
+    def lit(self) -> Geometry:
+        """`geometry` with the light, if there is any."""
+        return self.geometry.lit_by(self.light) if self.light else self.geometry
 
     @cached_property
     def position_exponent(self) -> int:
@@ -240,7 +278,12 @@ class Content:
     @cached_property
     def records(self) -> Mapping[int, tuple[int, TextureRecord]]:
         """Image of the scene → its index in `textures`, and its record."""
-        return {record.image: (place, record) for place, record in enumerate(self.textures)}
+        return {r.image: (place, r) for place, r in enumerate(self.textures) if r.image >= 0}
+
+    @cached_property
+    def lightmap_of(self) -> Mapping[int, tuple[int, TextureRecord]]:
+        """Cell → the index of its lightmap in `textures`, and the record of that."""
+        return {r.cell: (place, r) for place, r in enumerate(self.textures) if r.cell >= 0}
 
     @cached_property
     def octree_of(self) -> Mapping[int, int]:
@@ -258,7 +301,9 @@ class Content:
     def painted(self) -> list[NDArray[np.int64]]:
         """For each cell the indices of its textures in `textures`, ascending."""
         cells = np.split(self.paint, self.geometry.cell_start[1:-1])
-        return [np.unique(used[used >= 0]) for used in cells]
+        light = [self.lightmap_of[c][0] if c in self.lightmap_of else -1 for c in range(len(cells))]
+        used = (np.append(*both) for both in zip(cells, light, strict=True))
+        return [np.unique(own[own >= 0]) for own in used]
 
     @cached_property
     def shares(self) -> list[list[float]]:

@@ -48,6 +48,7 @@ from ptmtools.visibility.model import Pvs, over_places
 
 if TYPE_CHECKING:
     from ptmtools.coverage.required_levels import Need
+    from ptmtools.light.model import Light
 
 
 #: Files written at a time.
@@ -212,6 +213,7 @@ def emit(
     force: bool = False,
     need: Need | None = None,
     octrees: tuple[OctreeRecord, ...] = (),
+    light: Light | None = None,
     workers: int = 1,
 ) -> EmitReport:
     """Writes the files of every emitter that ``options.format`` names into the folder ``out``. The
@@ -219,10 +221,11 @@ def emit(
 
     Parameters
     ----------
-    textures: one record for every image that a material in use names.
+    textures: one record for every image that a material in use names, and those of lightmaps.
     force: overwrite files of these names, gzip copies included.
     need: the levels that each cell requires, for the records; None leaves them out.
     octrees: the octree textures of objects, already written.
+    light: the light of the cells, if baked.
     workers: threads that may be used.
 
     Raises
@@ -256,6 +259,7 @@ def emit(
         octrees,
         workers,
         emitters,
+        light,
     )
     written = [emitter.writer.load()(content) for emitter in emitters]
     for name in owned:

@@ -6,8 +6,8 @@ as materials are all that the GLBs of a site keep of objects.
 
 The shapes are those of the VRML file, in its order. Triangles are indexed; a vertex is a position
 with, where the material has an image, its texture coordinates, whose origin is the upper left in
-glTF, and with its colour where the shape has several. There are no normals: the scene has none, and
-surfaces without are flat (glTF 2.0, section 3.7.2.1).
+glTF, its colour where the shape has several, and its coordinates in the lightmap of the cell. There
+are no normals: the scene has none, and surfaces without are flat (glTF 2.0, section 3.7.2.1).
 
 The buffer is compressed (`ptmtools.output.gltf_compressed`) or plain
 (`ptmtools.output.gltf_shapes`). docs/formats/gltf.md lists the members of a material by the
@@ -98,25 +98,39 @@ class MaterialWriter:
         materials: tuple[Material, ...],
         textures: Mapping[int, tuple[int, TextureRecord]],
         fallback: bool,
+        lightmap: tuple[int, TextureRecord] | None,
     ) -> None:
-        """``textures``: for every image its index in the hints' list, and its record."""
+        """``textures``: for every image its index in the hints' list, and its record; ``lightmap``:
+        the same for the lightmap of the cell."""
         self._scene = materials
         self._records = textures
+        self._lightmap = lightmap
         self._fallback = fallback
-        self._known: dict[tuple[int, bool, int | None], int] = {}
+        self._known: dict[tuple[int, bool, int | None, bool], int] = {}
         self._materials: list[dict[str, Any]] = []
         self._textures: dict[tuple[int, int], int] = {}
         self._images: dict[str, int] = {}
         self._samplers: dict[tuple[Wrap, Wrap], int] = {}
 
-    def take(self, material: int, two_sided: bool, mesh: int | None) -> int:
+    def take(self, material: int, two_sided: bool, mesh: int | None, *, lit: bool) -> int:
         """The index of a scene's material, seen from one side or from both; of a coarsest mesh with
-        finer ones, its row in the hints is ``mesh``."""
-        key = material, two_sided, mesh
+        finer ones, its row in the hints is ``mesh``. ``lit``: whether the lightmap lights it."""
+        key = material, two_sided, mesh, lit
         place = self._known.setdefault(key, len(self._materials))
         if place == len(self._materials):
-            self._materials.append(self._material(self._scene[material], two_sided, mesh))
+            row = self._material(self._scene[material], two_sided, mesh)
+            self._materials.append(self._lit(row) if lit else row)
         return place
+
+    def _lit(self, row: dict[str, Any]) -> dict[str, Any]:
+        """A material with the lightmap."""
+        assert self._lightmap
+        place, record = self._lightmap
+        row["extras"] = row.get("extras", {}) | {"light": place}
+        if self._fallback and record.fallback is not None:
+            index = self._texture(UP + quote(record.fallback), "clamp", "clamp")
+            row["occlusionTexture"] = {"index": index, "texCoord": 1}
+        return row
 
     def members(self) -> dict[str, Any]:
         """The document's "materials", "textures", "images" and "samplers"."""
@@ -154,7 +168,7 @@ class MaterialWriter:
             extras = {"ptm": UP + quote(record.file), "texture": place}
             extras |= _wrap(material.wrap_s, material.wrap_t)
             if self._fallback and record.fallback is not None:
-                index = self._texture(UP + quote(record.fallback), material)
+                index = self._texture(UP + quote(record.fallback), material.wrap_s, material.wrap_t)
                 surface["baseColorTexture"] = {"index": index}
         if mesh is not None:
             extras["mesh"] = mesh
@@ -168,11 +182,10 @@ class MaterialWriter:
             row["doubleSided"] = True
         return row | ({"extras": extras} if extras else {})
 
-    def _texture(self, uri: str, material: Material) -> int:
-        wraps = (material.wrap_s, material.wrap_t)
+    def _texture(self, uri: str, *wraps: Wrap) -> int:
         sampler = -1
         if wraps != ("repeat", "repeat"):
-            sampler = self._samplers.setdefault(wraps, len(self._samplers))
+            sampler = self._samplers.setdefault((wraps[0], wraps[1]), len(self._samplers))
         image = self._images.setdefault(uri, len(self._images))
         return self._textures.setdefault((image, sampler), len(self._textures))
 
@@ -193,11 +206,9 @@ def gltf_files(content: Content) -> Iterator[tuple[str, bytes]]:
         yield path_of(cell, GLTF_FILES), _glb(content, cell, cell_name(cell), _drawn(content, cell))
     content.progress(count, count, "glTF")
     for mesh in content.meshes:
-        own = [s for s in content.geometry.shapes(mesh.cell) if s.object == mesh.object]
+        own = [s for s in content.lit.shapes(mesh.cell) if s.object == mesh.object]
         finer: list[tuple[Tables, Iterable[Shape]]] = [(m, m.shapes) for m in mesh.levels[1:]]
-        for number, (tables, shapes) in zip(
-            mesh.files, [*finer, (content.geometry, own)], strict=True
-        ):
+        for number, (tables, shapes) in zip(mesh.files, [*finer, (content.lit, own)], strict=True):
             drawn = ((tables, shape, None) for shape in shapes)
             yield mesh_path(number), _glb(content, mesh.cell, mesh_name(number), drawn)
 
@@ -210,10 +221,10 @@ _Drawn = tuple[Tables, Shape, int | None]
 def _drawn(content: Content, cell: int) -> Iterator[_Drawn]:
     """The shapes of a cell, of objects with levels those of the coarsest mesh."""
     done = set()
-    for shape in content.geometry.shapes(cell):
+    for shape in content.lit.shapes(cell):
         place = content.mesh_of.get((cell, shape.object))
         if place is None:
-            yield content.geometry, shape, None
+            yield content.lit, shape, None
         elif place not in done:
             done.add(place)
             level = content.meshes[place].levels[0]
@@ -223,7 +234,8 @@ def _drawn(content: Content, cell: int) -> Iterator[_Drawn]:
 def _glb(content: Content, cell: int, name: str, shapes: Iterable[_Drawn]) -> bytes:
     scene, options = content.scene, content.options
     buffer = PlainBuffer() if options.plain_gltf else CompressedBuffer(content.position_exponent)
-    materials = MaterialWriter(scene.materials, content.records, options.fallback)
+    lightmap = content.lightmap_of.get(cell)
+    materials = MaterialWriter(scene.materials, content.records, options.fallback, lightmap)
     nodes: list[dict[str, Any]] = []
     meshes: list[dict[str, Any]] = []
     last = -1
@@ -231,9 +243,14 @@ def _glb(content: Content, cell: int, name: str, shapes: Iterable[_Drawn]) -> by
         image = scene.materials[shape.material].image
         record = content.records[image][1] if image >= 0 else None
         vertices = vertices_of(tables, shape, textured=record is not None)
-        material = materials.take(shape.material, shape.two_sided, place)
-        size = None if record is None else record.finest
-        primitive = buffer.take(vertices, material, size)
+        material = materials.take(
+            shape.material, shape.two_sided, place, lit=shape.light is not None
+        )
+        sizes = (
+            None if record is None else record.finest,
+            None if lightmap is None else lightmap[1].finest,
+        )
+        primitive = buffer.take(vertices, material, sizes)
         if primitive is None:
             continue
         if shape.object != last:

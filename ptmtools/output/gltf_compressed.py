@@ -1,8 +1,9 @@
 """The buffer of a cell compressed with meshopt (EXT_meshopt_compression).
 
 All shapes of a cell share one array of vertices and one of indices; those with colours have two of
-their own. A vertex is a position and texture coordinates, float32 on the grids of
-`ptmtools.output.grid`, stored as 24 bits and an exponent (filter EXPONENTIAL). Shapes lie in the
+their own, and so have those with a lightmap. A vertex is a position, texture coordinates and
+coordinates in the lightmap, float32 on the grids of `ptmtools.output.grid`, stored as 24 bits and
+an exponent (filter EXPONENTIAL). Shapes lie in the
 order of their materials, the vertices and triangles of each in that of
 `ptmtools.meshopt.encoding.reordered`. Buffer 1 is the fallback of the extension: it has no data,
 and the extension is required.
@@ -35,13 +36,15 @@ from ptmtools.meshopt.encoding import (
     exponential,
     reordered,
 )
-from ptmtools.output.gltf_shapes import Vertices, shortest
+from ptmtools.output.gltf_shapes import Sizes, Vertices, shortest
 from ptmtools.output.grid import texture_exponents
 
 MESHOPT = "EXT_meshopt_compression"
 EXTENSIONS = {"extensionsUsed": [MESHOPT], "extensionsRequired": [MESHOPT]}
 #: Bytes of a position, of texture coordinates, of a colour.
 _POSITION, _COORDINATES, _COLOR = 12, 8, 8
+#: Columns of positions, of these and texture coordinates, and of these and light.
+_PLACED, _TEXTURED, _LIT = 3, 5, 7
 _WHOLE_BYTES = 0
 
 
@@ -53,9 +56,9 @@ class _Part:
     ----------
     primitive: its object in the document, to be completed.
     material: its index, by which parts are sorted.
-    step: (n, 5) coordinates in steps; those of a texture are 0 without one.
-    exponent: (5,) of the steps.
-    textured: whether it has texture coordinates.
+    step: (n, 7) coordinates in steps; those of a texture and of a lightmap are 0 without one.
+    exponent: (7,) of the steps.
+    textured, lit: whether it has texture coordinates, and coordinates in the lightmap.
     color: (n, 4) or None.
     triangle: (m, 3)
     """
@@ -65,6 +68,7 @@ class _Part:
     step: NDArray[np.int64]
     exponent: NDArray[np.int64]
     textured: bool
+    lit: bool
     color: NDArray[np.uint16] | None
     triangle: NDArray[np.int64]
 
@@ -81,18 +85,18 @@ class CompressedBuffer:
         self._streams: list[bytes] = []
         self._size = self._decoded = 0
 
-    def take(
-        self, vertices: Vertices, material: int, texture_size: tuple[int, int] | None
-    ) -> dict[str, Any] | None:
+    def take(self, vertices: Vertices, material: int, sizes: Sizes) -> dict[str, Any] | None:
         """The primitive of a shape, complete after `finish`; None if none of its triangles has
-        three corners on the grid. ``texture_size``: width and height of its texture."""
-        step = np.zeros((len(vertices.point), 5), dtype=np.int64)
-        exponent = np.array([self._exponent] * 3 + [0, 0])
-        step[:, :3] = _steps(vertices.point, exponent[:3])
-        uv = vertices.uv
-        if uv is not None:
-            exponent[3:] = texture_exponents(uv, *(texture_size or (1, 1)))
-            step[:, 3:] = _steps(uv, exponent[3:])
+        three corners on the grid."""
+        step = np.zeros((len(vertices.point), _LIT), dtype=np.int64)
+        exponent = np.array([self._exponent] * _PLACED + [0] * (_LIT - _PLACED))
+        step[:, :_PLACED] = _steps(vertices.point, exponent[:_PLACED])
+        both = vertices.uv, vertices.light
+        for first, coordinates, size in zip((_PLACED, _TEXTURED), both, sizes, strict=True):
+            if coordinates is not None:
+                own = slice(first, first + 2)
+                exponent[own] = texture_exponents(coordinates, *(size or (1, 1)))
+                step[:, own] = _steps(coordinates, exponent[own])
         columns = step if vertices.color is None else np.hstack([step, vertices.color])
         _, first, place = np.unique(columns, axis=0, return_index=True, return_inverse=True)
         corner = step[vertices.triangle, :3]
@@ -103,22 +107,24 @@ class CompressedBuffer:
         rows = first[used]
         color = None if vertices.color is None else vertices.color[rows]
         primitive = {"attributes": {}, "indices": 0, "material": material}
-        part = _Part(primitive, material, step[rows], exponent, uv is not None, color, triangle)
+        textured, lit = (coordinates is not None for coordinates in both)
+        part = _Part(primitive, material, step[rows], exponent, textured, lit, color, triangle)
         self._parts.append(part)
         return primitive
 
     def finish(self) -> None:
         """Encodes the arrays and completes the primitives."""
-        for painted in (False, True):
-            parts = [p for p in self._parts if (p.color is not None) == painted]
-            if parts:
-                self._encode(sorted(parts, key=lambda p: p.material), painted)
+        for lit in (False, True):
+            for painted in (False, True):
+                parts = [p for p in self._parts if (p.lit, p.color is not None) == (lit, painted)]
+                if parts:
+                    self._encode(sorted(parts, key=lambda p: p.material), lit, painted)
 
-    def _encode(self, parts: list[_Part], painted: bool) -> None:
+    def _encode(self, parts: list[_Part], lit: bool, painted: bool) -> None:
         step = np.concatenate([part.step for part in parts])
         exponent = np.repeat([p.exponent for p in parts], [len(p.step) for p in parts], axis=0)
         textured = any(part.textured for part in parts)
-        width = 5 if textured else 3
+        width = _LIT if lit else _TEXTURED if textured else _PLACED
         element = exponential(step[:, :width], exponent[:, :width])
         form = {"mode": "ATTRIBUTES", "filter": "EXPONENTIAL"}
         view = self._view(encode_attributes(element, _WHOLE_BYTES), element, form)
@@ -127,6 +133,9 @@ class CompressedBuffer:
         ends = {"min": position.min(axis=0), "max": position.max(axis=0)}
         bounds = {name: shortest(end.astype(np.float32)) for name, end in ends.items()}
         attributes = {"POSITION": self._accessor(view, 0, FLOAT, count, "VEC3", bounds)}
+        if lit:
+            place = self._accessor(view, _POSITION + _COORDINATES, FLOAT, count, "VEC2")
+            attributes |= {"TEXCOORD_1": place}
         both = attributes
         if textured:
             place = self._accessor(view, _POSITION, FLOAT, count, "VEC2")

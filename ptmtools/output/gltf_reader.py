@@ -36,6 +36,8 @@ class ReadMaterial:
     ptm, texture: URI of the `.ptm` and its index in the hints, or None.
     wrap: numbers of the sampler for s and t.
     mesh: its object's row in the hints if this mesh is the coarsest of several, or None.
+    light, lightmap: index in the hints of the lightmap of the cell, and URI of that as an image, or
+        None.
     """
 
     factor: tuple[float, ...]
@@ -47,6 +49,8 @@ class ReadMaterial:
     texture: int | None
     wrap: tuple[int, int]
     mesh: int | None
+    light: int | None = None
+    lightmap: str | None = None
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,7 @@ class ReadPrimitive:
     uv: (n, 2) float32, origin at the upper left, or None.
     color: (n, 3) linear light, or None.
     triangle: (m, 3) int64 indices into `point` and `uv`.
+    light: (n, 2) float32 coordinates in the lightmap, origin at the upper left, or None.
     """
 
     place: str
@@ -72,6 +77,7 @@ class ReadPrimitive:
     color: NDArray[np.float64] | None
     triangle: NDArray[np.int64]
     material: ReadMaterial
+    light: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True)
@@ -148,11 +154,9 @@ class _Reader:
         attributes = primitive["attributes"]
         point = self._vertices(attributes["POSITION"], "VEC3")
         self._check_bounds(attributes["POSITION"], point)
-        uv = None
-        if "TEXCOORD_0" in attributes:
-            uv = self._vertices(attributes["TEXCOORD_0"], "VEC2")
-            if len(uv) != len(point):
-                _foreign(place, f"{len(uv)} texture coordinates for {len(point)} positions")
+        uv, light = (
+            self._coordinates(attributes, f"TEXCOORD_{n}", len(point), place) for n in (0, 1)
+        )
         color = self._colors(attributes, len(point), place)
         index = self._elements(primitive["indices"], "SCALAR", (5123, 5125), _INDICES).ravel()
         if len(index) % 3 or int(index.max()) >= len(point):
@@ -164,10 +168,25 @@ class _Reader:
             triangle -= own.start
             point = point[own]
             uv = None if uv is None else uv[own]
+            light = None if light is None else light[own]
             color = None if color is None else color[own]
         material = self._material(primitive["material"])
+        if (material.light is None) != (light is None):
+            _foreign(place, "has only one of a lightmap and its coordinates")
         octree = node.get("extras", {}).get("octree")
-        return ReadPrimitive(place, node["name"], octree, point, uv, color, triangle, material)
+        return ReadPrimitive(
+            place, node["name"], octree, point, uv, color, triangle, material, light
+        )
+
+    def _coordinates(
+        self, attributes: dict[str, int], name: str, count: int, place: str
+    ) -> NDArray[np.float32] | None:
+        if name not in attributes:
+            return None
+        rows = self._vertices(attributes[name], "VEC2")
+        if len(rows) != count:
+            _foreign(place, f"{len(rows)} texture coordinates for {count} positions")
+        return rows
 
     def _colors(
         self, attributes: dict[str, int], count: int, place: str
@@ -257,21 +276,17 @@ class _Reader:
         material = self._row("materials", index)
         surface, extras = material["pbrMetallicRoughness"], material.get("extras", {})
         factor = surface.get("baseColorFactor", WHITE)
-        if extras.keys() not in ({"mesh"}, set()) and not {"ptm", "texture"} <= extras.keys():
+        if extras.keys() - {"mesh", "light"} and not {"ptm", "texture"} <= extras.keys():
             _foreign(
                 f"materials[{index}].extras",
                 "has members of a texture, but not its .ptm and its place",
             )
-        wrap, image = _wrap(extras), None
-        if "baseColorTexture" in surface:
-            texture = self._row("textures", surface["baseColorTexture"]["index"])
-            sources = list(texture.get("extensions", {"": texture}).values())
-            if len(sources) != 1 or "source" not in sources[0]:
-                _foreign(f"materials[{index}]", "its texture has not one source")
-            image = self._row("images", sources[0]["source"])["uri"]
-            sampler = self._row("samplers", texture["sampler"]) if "sampler" in texture else {}
-            if _wrap(sampler) != wrap:
-                _foreign(f"materials[{index}]", "its sampler and its extras wrap differently")
+        wrap, clamp = _wrap(extras), WRAPS["clamp"]
+        place = f"materials[{index}]"
+        image = self._image(surface.get("baseColorTexture"), wrap, place)
+        lightmap = self._image(material.get("occlusionTexture"), (clamp, clamp), place)
+        if lightmap is not None and "light" not in extras:
+            _foreign(place, "has a lightmap, but not its place in the hints")
         return ReadMaterial(
             factor=tuple(factor),
             two_sided=material.get("doubleSided", False),
@@ -284,7 +299,22 @@ class _Reader:
             texture=extras.get("texture"),
             wrap=wrap,
             mesh=extras.get("mesh"),
+            light=extras.get("light"),
+            lightmap=lightmap,
         )
+
+    def _image(self, use: dict[str, int] | None, wrap: tuple[int, int], place: str) -> str | None:
+        """The URI of the image of a texture, which must wrap like this; None without a texture."""
+        if use is None:
+            return None
+        texture = self._row("textures", use["index"])
+        sources = list(texture.get("extensions", {"": texture}).values())
+        if len(sources) != 1 or "source" not in sources[0]:
+            _foreign(place, "its texture has not one source")
+        sampler = self._row("samplers", texture["sampler"]) if "sampler" in texture else {}
+        if _wrap(sampler) != wrap:
+            _foreign(place, "its sampler and its extras wrap differently")
+        return str(self._row("images", sources[0]["source"])["uri"])
 
 
 def _wrap(sampler: dict[str, Any]) -> tuple[int, int]:

@@ -34,7 +34,7 @@ class Tables(Protocol):
 
 @dataclass(frozen=True)
 class Vertices:
-    """A shape as glTF has it; vertices differ in position, texture coordinates or colour.
+    """A shape as glTF has it; vertices differ in position, coordinates or colour.
 
     Attributes
     ----------
@@ -42,30 +42,38 @@ class Vertices:
     uv: (n, 2) float32, origin at the upper left; None without a texture.
     color: (n, 4) uint16, linear light and an alpha of 1, of 65535; None where all are white.
     triangle: (m, 3)
+    light: (n, 2) float32 coordinates in the lightmap, origin at the upper left; None without one.
     """
 
     point: NDArray[np.float32]
     uv: NDArray[np.float32] | None
     color: NDArray[np.uint16] | None
     triangle: NDArray[np.int64]
+    light: NDArray[np.float32] | None = None
 
 
 def vertices_of(tables: Tables, shape: Shape, *, textured: bool) -> Vertices:
     """The vertices of a shape in the order of their first use."""
-    # A vertex for each that differs in position, texture coordinates or colour.
+    # A vertex for each that differs in position, texture coordinates, colour or light.
     width = len(shape.uv) if textured else 1
     corner = shape.triangle * width + (shape.uv_triangle if textured else 0)
     vertex, triangle = by_first_use(corner)
+    light, lit = None, shape.light
+    if lit is not None:
+        table, place = np.unique(lit.reshape(-1, 2), axis=0, return_inverse=True)
+        both, triangle = by_first_use(triangle * len(table) + place.reshape(-1, 3))
+        vertex, light = vertex[both // len(table)], flipped(table[both % len(table)])
     rgba = None
     if shape.color is not None:
         both, triangle = by_first_use(triangle << 24 | packed(shape.color))
         vertex, color = vertex[both >> 24], unpacked(both & 0xFFFFFF)
+        light = None if light is None else light[both >> 24]
         # 8 bits of linear light would be too few in the dark.
         rgba = np.full((len(color), 4), 65535, np.uint16)
         rgba[:, :3] = np.rint(65535 * to_linear(color / 255))
     point = tables.point[shape.point[vertex // width]]
     uv = flipped(tables.uv[shape.uv[vertex % width]]) if textured else None
-    return Vertices(point, uv, rgba, triangle)
+    return Vertices(point, uv, rgba, triangle, light)
 
 
 def flipped(uv: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -81,6 +89,8 @@ def shortest(values: NDArray[np.float32]) -> list[float]:
     return [int(v) if v.is_integer() and abs(v) < _WHOLE else v for v in numbers]
 
 
+#: Width and height of the texture and of the lightmap of a shape, texels; None without one.
+Sizes = tuple[tuple[int, int] | None, tuple[int, int] | None]
 #: In the order of the views: component type and type.
 _KINDS = ((FLOAT, "VEC3"), (FLOAT, "VEC2"), (SHORT, "VEC4"), (INT, "SCALAR"), (SHORT, "SCALAR"))
 
@@ -102,11 +112,12 @@ class PlainBuffer(BufferWriter):
         self._sizes = [0] * len(_KINDS)
         self._targets = [0] * len(_KINDS)
 
-    def take(self, vertices: Vertices, material: int, _: tuple[int, int] | None) -> dict[str, Any]:
+    def take(self, vertices: Vertices, material: int, _: Sizes) -> dict[str, Any]:
         """The primitive of a shape."""
         attributes = {"POSITION": self.positions(vertices.point)}
-        if vertices.uv is not None:
-            attributes["TEXCOORD_0"] = self.vectors(vertices.uv)
+        for name, coordinates in (("TEXCOORD_0", vertices.uv), ("TEXCOORD_1", vertices.light)):
+            if coordinates is not None:
+                attributes[name] = self.vectors(coordinates)
         if vertices.color is not None:
             attributes["COLOR_0"] = self.shares(vertices.color)
         indices = self.indices(vertices.triangle, len(vertices.point))

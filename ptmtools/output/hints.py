@@ -132,6 +132,8 @@ def _texture(record: TextureRecord, fallback: bool) -> Mapping[str, Any]:
             row["offsets"] = list(record.detail.offsets)
     if record.previews:
         row["previews"] = [_preview(each) for each in record.previews]
+    if record.cell >= 0:
+        row["light"] = record.cell
     return row
 
 
@@ -251,7 +253,17 @@ class RecordWriter:
             shares = need.share[slice(*need.share_start[entry : entry + 2].tolist())]
             if place in visible:
                 rows.append([place, int(need.first[entry]), *significant(shares, NEED_DIGITS)])
-        return sorted(rows)
+        return sorted([*rows, *self._lightmap_need(cell)])
+
+    def _lightmap_need(self, cell: int) -> Iterator[list[Any]]:
+        """The need of the lightmaps of visible cells. A texel of one is so large that every view
+        requires the finest level."""
+        content = self._content
+        shares = significant(content.ach.value[content.ach.entries(cell)], NEED_DIGITS)
+        for other, share in zip(content.pvs.row(cell).tolist(), shares, strict=True):
+            if share and other in content.lightmap_of:
+                place, record = content.lightmap_of[other]
+                yield [place, record.level_count - 1, share]
 
     def _texture_shares(self, entry: int) -> list[list[Any]]:
         """The pairs of a texture, None for untextured surfaces, and its share of an ACH entry."""

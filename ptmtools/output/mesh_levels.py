@@ -88,7 +88,7 @@ class MeshLevels:
 def mesh_levels(content: Content) -> tuple[MeshLevels, ...]:
     """The levels of all objects that have some, by cell and object."""
     meshes: list[MeshLevels] = []
-    geometry, first = content.geometry, 0
+    geometry, first = content.lit, 0
     heavy = list(_heavy(geometry, content.octree_of.keys()))
     for done, (cell, rows) in enumerate(heavy):
         content.progress(done, len(heavy), "simplifying objects")

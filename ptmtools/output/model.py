@@ -41,11 +41,11 @@ class PreviewRecord:
 
 @dataclass(frozen=True)
 class TextureRecord:
-    """The texture of one image of the scene, for the emitted files.
+    """The texture of one image of the scene, or the lightmap of a cell, for the emitted files.
 
     Attributes
     ----------
-    image: index into `Scene.images`.
+    image: index into `Scene.images`; -1 of a lightmap.
     file: the `.ptm`, relative to the served folder, "textures/NAME.ptm".
     fallback: the fallback image, a PNG or a preview, relative to the served folder, or None.
     width, height, components: of the finest level in the `.ptm`.
@@ -58,6 +58,7 @@ class TextureRecord:
     stored: the `.ptm` to read; None if it was not encoded.
     errors: root mean square of each level from the finest, 0 to 255; empty if unknown.
     previews: by ascending level; the finest may be of levels that the `.ptm` lacks.
+    cell: the cell whose lightmap it is, or -1.
     """
 
     image: int
@@ -74,6 +75,7 @@ class TextureRecord:
     stored: Source | None = field(default=None, compare=False)
     errors: tuple[float, ...] = ()
     previews: tuple[PreviewRecord, ...] = ()
+    cell: int = -1
 
     @property
     def level_count(self) -> int:

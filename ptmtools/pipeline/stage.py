@@ -9,7 +9,7 @@ Build, plan, status, info, validate, tradeoff and the command line loop over tha
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
@@ -74,6 +74,8 @@ class Stage(Generic[A]):
     fits: for stages whose artifacts this one refers to: a function of both artifacts that returns
         the fault, or "".
     job: the class that runs it.
+    optional: it may have nothing to write. Then it is not reported; databases of earlier releases
+        lack its record.
     joined: it has no command of its own, and its outputs are committed with those of the next
         stage: a model that cannot be cut into cells leaves no database behind.
     from_model: its command takes a model, and runs the stages before it too.
@@ -96,6 +98,7 @@ class Stage(Generic[A]):
     summary: Callable[[Counts], str] = field(default=lambda counts: "")
     fits: Mapping[Stage[Any], Callable[[A, Any], str]] = field(default_factory=dict)
     job: type[Job] = field(default_factory=lambda: Job)
+    optional: bool = False
     joined: bool = False
     from_model: bool = False
     one_thread: bool = False
@@ -203,16 +206,16 @@ class Artifacts:
     def outputs(self, stage: Stage[Any]) -> Mapping[str, str]:
         """The outputs of a stage: name → SHA-256; raises PTM-D004 if it has not run.
 
-        Databases of earlier releases lack stages that change an artifact; they changed nothing.
+        Databases of earlier releases lack optional stages, which wrote nothing.
         """
-        if self._last(stage) is None and (stage.changes or self._planned):
+        if self._last(stage) is None and (stage.optional or self._planned):
             return {}
         return self.record(stage).outputs
 
     def is_stored(self, stage: Stage[Any]) -> bool:
-        """Whether a stage has stored an artifact, or left the one unchanged that it `changes`;
-        raises as `outputs`."""
-        return not stage.changes or arrays_of(stage.name) in self.outputs(stage)
+        """Whether a stage has stored an artifact, which optional ones may not; raises as
+        `outputs`."""
+        return not stage.optional or arrays_of(stage.name) in self.outputs(stage)
 
     def recorded(self, stage: Stage[Any]) -> Options:
         """The options of a stage's last run; raises PTM-D002 if they are impossible."""
@@ -229,20 +232,27 @@ class Artifacts:
         PTM-D002."""
         if stage.inputs:
             return dict(stage.inputs(self, options))
+        return self.files_of(stage.sources(options), stage.files)
+
+    def files_of(
+        self, stages: Iterable[Stage[Any]], files: Collection[Stage[Any]] = ()
+    ) -> dict[str, str]:
+        """Name → SHA-256 of the arrays of some stages; of those without arrays, and of those in
+        ``files``, of all outputs. Raises PTM-D004."""
         inputs: dict[str, str] = {}
-        for read in stage.sources(options):
+        for read in stages:
             outputs, arrays = self.outputs(read), arrays_of(read.name)
-            if read.artifact is None or read in stage.files:
+            if read.artifact is None or read in files:
                 inputs |= outputs
             elif arrays in outputs:
                 inputs[arrays] = outputs[arrays]
-            elif not read.changes:
+            elif not read.optional:
                 inputs[arrays] = "" if self._planned else self.db.output(read.name, arrays)
         return inputs
 
     def outdated(self, stage: Stage[Any]) -> str:
         """The input of a stage's last run that has changed since; "" if there is none."""
-        if stage.changes and self._last(stage) is None:
+        if stage.optional and self._last(stage) is None:
             return ""
         record = self.record(stage)
         if record.recipe != stage.recipe:
@@ -332,7 +342,7 @@ class Run(Artifacts):
     ) -> None:
         """Ends the turn of a stage: commits, unless it is `Stage.joined` to the next, and reports.
 
-        A stage that could change an artifact, and neither did nor had, is not reported.
+        An optional stage that has written nothing, and had not, is not reported.
         """
         record = self.record(stage)
         committed = self.db.manifest.stages.get(stage.name)
@@ -340,7 +350,7 @@ class Run(Artifacts):
             self._joint.commit(self._uncommitted)
             self._joint, self._uncommitted = None, {}
         idle = not record.outputs and not record.notes and not (committed and committed.outputs)
-        if not (stage.changes and idle):
+        if not (stage.optional and idle):
             notes, warnings = tuple(record.notes), tuple(record.warnings)
             self.reports.append(
                 StageReport(

@@ -114,8 +114,9 @@ def _status(artifacts: Artifacts, stage: Stage[Any]) -> StageStatus:
     if lost := db.manifest.lost.get(stage.name):
         return StageStatus(stage.name, "damaged", f"{lost} is missing or damaged", {}, 0, 0)
     if record is None:
-        # Databases of earlier releases lack stages that change an artifact; they changed nothing.
-        done = stage.changes is not None and stage.changes.name in db.manifest.stages
+        # Databases of earlier releases lack optional stages, which wrote nothing.
+        later = list(STAGES)[list(STAGES).index(stage.name) + 1 :]
+        done = stage.optional and any(name in db.manifest.stages for name in later)
         return StageStatus(stage.name, "done" if done else "not run", "", {}, 0, 0)
     sizes: list[int] = []
     for name, digest in record.outputs.items():

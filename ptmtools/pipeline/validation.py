@@ -46,7 +46,7 @@ def check_stages(db: DatabaseFolder, faulty: Collection[str] = ()) -> tuple[Issu
     for stage in STAGES.values():
         if stage.name in db.manifest.stages:
             _check_stage(stage, together, faulty, findings)
-        if not together.is_stored(stage):
+        if stage.changes and not together.is_stored(stage):
             with suppress(DatabaseError):  # reported for the stage that it could have changed
                 together[stage]
     return findings.issues()

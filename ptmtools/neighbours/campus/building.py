@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ptmtools.executor import Executor
 from ptmtools.lazy import component
+from ptmtools.light.occlusion import Surroundings
 from ptmtools.neighbours.campus.making import Work, make_object
 from ptmtools.neighbours.campus.model import (
     ALPHA,
@@ -28,7 +29,6 @@ from ptmtools.neighbours.campus.model import (
     Names,
 )
 from ptmtools.neighbours.campus.objects import notes_on, parts_of
-from ptmtools.neighbours.campus.occlusion import Surroundings
 from ptmtools.neighbours.campus.options import CampusOptions
 from ptmtools.neighbours.campus.second_set import model_light, model_masks
 from ptmtools.neighbours.campus.textures import BaseImage, Mask, texture_files

@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.neighbours.campus.atlas import unwrap
-from ptmtools.neighbours.campus.lightmap import bake, vertex_light
-from ptmtools.neighbours.campus.lights import Painted, Rays, open_sides
+from ptmtools.light.atlas import unwrap
+from ptmtools.light.lightmap import bake, vertex_light
+from ptmtools.light.looks import Painted, Rays, open_sides
+from ptmtools.light.occlusion import Surroundings, normals
 from ptmtools.neighbours.campus.meshes import Corners, mesh_bytes
 from ptmtools.neighbours.campus.model import (
     LIGHT_SIZES,
@@ -28,7 +29,6 @@ from ptmtools.neighbours.campus.model import (
     mesh_file,
 )
 from ptmtools.neighbours.campus.objects import Part
-from ptmtools.neighbours.campus.occlusion import Surroundings, normals
 from ptmtools.neighbours.campus.options import CampusOptions
 from ptmtools.neighbours.campus.second_set import ModelLight
 from ptmtools.neighbours.campus.textures import Written, light_files
@@ -119,12 +119,12 @@ def make_object(work: Work, task: tuple[str, Part]) -> ObjectMade:
     lightmaps, notes = [], []
     covered = computed = 0
     if lit:
-        atlas = unwrap(mesh.points, mesh.triangles)
+        atlas = unwrap(mesh.points, mesh.triangles, LIGHT_SIZES)
         if work.painted is None:  # a painted face has its light on both sides
             reach = options.reach
             side = open_sides(work.around, finest, work.two_sided[faces], reach)
         look = _look(work, faces, finest, lods[-1], side)
-        maps = bake(look, finest, atlas, look.grain)
+        maps = bake(look, finest, atlas, look.grain, LIGHT_SIZES)
         source = _light_source(work, faces)
         texels = [(len(m.value), encoded(m.value.astype(np.float64)), source) for m in maps]
         lightmaps = light_files(name, texels, options.quality)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError, LimitError, PtmError
-from ptmtools.neighbours.campus.lights import LightImage
+from ptmtools.light.looks import LightImage
 from ptmtools.neighbours.campus.textures import Mask, decoded_lightmap
 from ptmtools.scene.faces import keep_faces
 from ptmtools.scene.model import Scene

@@ -14,8 +14,8 @@ import math
 import numpy as np
 
 from ptmtools.arrays import Floats, areas
+from ptmtools.light.occlusion import Surroundings, points_on, spread_over
 from ptmtools.neighbours.campus.model import Vector
-from ptmtools.neighbours.campus.occlusion import Surroundings, points_on, spread_over
 
 #: Height of eyes, and least and greatest distance from a box, metres.
 EYE, NEAREST, FARTHEST = 1.6, 3.0, 150.0

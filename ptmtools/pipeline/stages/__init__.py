@@ -9,11 +9,12 @@ from ptmtools.pipeline.stages.ach import ACH
 from ptmtools.pipeline.stages.apo import APO
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.emit import EMIT
+from ptmtools.pipeline.stages.light import LIGHT
 from ptmtools.pipeline.stages.pvs import PVS
 from ptmtools.pipeline.stages.scene import SCENE
 from ptmtools.pipeline.stages.textures import TEXTURES
 
-__all__ = ["ACH", "APO", "CELLS", "EMIT", "PVS", "SCENE", "STAGES", "TEXTURES"]
+__all__ = ["ACH", "APO", "CELLS", "EMIT", "LIGHT", "PVS", "SCENE", "STAGES", "TEXTURES"]
 
 STAGES: dict[str, Stage[Any]] = {
     stage.name: stage
@@ -24,6 +25,7 @@ STAGES: dict[str, Stage[Any]] = {
         PVS,
         ACH,
         TEXTURES,
+        LIGHT,
         EMIT,
     )
 }

@@ -192,5 +192,6 @@ APO: Stage[Scene] = Stage(
     counts=lambda scene: {"triangles": len(scene.triangles)},
     summary=_summary,
     job=ReplacingJob,
+    optional=True,
     joined=True,
 )

@@ -17,6 +17,7 @@ from ptmtools.pipeline.stage import Artifacts, Job, Stage, described
 from ptmtools.pipeline.stages.ach import ACH
 from ptmtools.pipeline.stages.apo import APO, octree_records
 from ptmtools.pipeline.stages.cells import CELLS
+from ptmtools.pipeline.stages.light import LIGHT, light_of, lightmap_files
 from ptmtools.pipeline.stages.pvs import PVS
 from ptmtools.pipeline.stages.scene import image_digests
 from ptmtools.pipeline.stages.textures import (
@@ -30,6 +31,7 @@ from ptmtools.store.layout import SERVED
 
 if TYPE_CHECKING:
     from ptmtools.coverage.required_levels import Need
+    from ptmtools.light.model import Light
     from ptmtools.output.model import TextureRecord
     from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
@@ -43,7 +45,9 @@ class EmissionJob(Job):
         """See `Job.make`."""
         from ptmtools.output import emit
 
-        run, textures = self.run, texture_records(self.run)
+        run, light = self.run, light_of(self.run)
+        images = texture_records(run)
+        textures = (*images, *lightmap_records(run, light))
         report = emit(
             run[APO],
             run[CELLS],
@@ -54,8 +58,9 @@ class EmissionJob(Job):
             self.options,
             run.progress,
             force=True,
-            need=self._need(textures),
+            need=self._need(images),
             octrees=octree_records(run),
+            light=light,
             workers=run.workers.executor.workers,
         )
         for name in report.files:
@@ -86,21 +91,35 @@ class EmissionJob(Job):
 
 
 def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
-    """The textures of a database, for the served files."""
+    """The textures of the scene's images, for the served files."""
+    files = texture_files(image_digests(run))
+    return _records(run, TEXTURES, ((name, image, -1) for image, name in enumerate(files)))
+
+
+def lightmap_records(run: Artifacts, light: Light | None) -> tuple[TextureRecord, ...]:
+    """The lightmaps of the cells, for the served files."""
+    files = lightmap_files(light)
+    return _records(run, LIGHT, ((name, -1, cell) for cell, name in files.items()))
+
+
+def _records(
+    run: Artifacts, stage: Stage[Any], files: Iterable[tuple[str, int, int]]
+) -> tuple[TextureRecord, ...]:
+    """The textures that a stage has encoded: `.ptm`, image and cell of each."""
     from ptmtools.output import TextureRecord
     from ptmtools.output.model import PreviewRecord
     from ptmtools.parallel import ordered
 
-    db, outputs, options = run.db, run.record(TEXTURES).outputs, run.recorded(TEXTURES)
+    db, outputs, options = run.db, run.outputs(stage), run.recorded(TEXTURES)
 
     def read(name: str) -> bytes:
-        return db.read_output(TEXTURES.name, name)
+        return db.read_output(stage.name, name)
 
     def source(name: str) -> Source:
-        return db.source(name, db.output(TEXTURES.name, name))
+        return db.source(name, db.output(stage.name, name))
 
-    def one(numbered: tuple[int, str]) -> TextureRecord:
-        image, name = numbered
+    def one(file: tuple[str, int, int]) -> TextureRecord:
+        name, image, cell = file
         texture = stored_texture(run, name, source, read)
         header, steps, stem = texture.header, texture.steps, stem_of(name)
         png, fallback, level = f"{name.removesuffix('ptm')}png", None, None
@@ -117,9 +136,9 @@ def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
             height=header.levels[-1].height,
             components=header.components,
             levels=header.levels,
-            sha256=db.output(TEXTURES.name, f"{SERVED}/{name}"),
+            sha256=db.output(stage.name, f"{SERVED}/{name}"),
             fallback_level=level,
-            fallback_bytes=db.size(served, db.output(TEXTURES.name, served)) if fallback else 0,
+            fallback_bytes=db.size(served, db.output(stage.name, served)) if fallback else 0,
             detail=steps.detail,
             stored=source(f"{SERVED}/{name}"),
             errors=steps.errors,
@@ -128,9 +147,10 @@ def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
                 for preview in steps.previews
                 for file in (preview_file(stem, preview),)
             ),
+            cell=cell,
         )
 
-    return tuple(ordered(one, enumerate(texture_files(image_digests(run))), OBJECTS_AHEAD))
+    return tuple(ordered(one, files, OBJECTS_AHEAD))
 
 
 def _summary(n: Mapping[str, Any]) -> str:
@@ -159,8 +179,8 @@ EMIT: Stage[None] = Stage(
     "pictures; hulls with slivers and portals with short edges are convex in float32 and float64; "
     "objects with thousands of triangles have levels of detail",
     options=EmitOptions,
-    reads=(APO, CELLS, PVS, ACH, TEXTURES),
-    files=(APO,),
+    reads=(APO, CELLS, PVS, ACH, TEXTURES, LIGHT),
+    files=(APO, LIGHT),
     summary=_summary,
     job=EmissionJob,
 )

@@ -12,8 +12,8 @@ import pytest
 from PIL import Image
 
 from ptmtools.errors import InputError
+from ptmtools.light.looks import LightImage
 from ptmtools.neighbours.campus import CampusOptions, make_campus
-from ptmtools.neighbours.campus.lights import LightImage
 from ptmtools.neighbours.campus.making import _light_source
 from ptmtools.neighbours.campus.second_set import ModelLight, model_light, model_masks
 from ptmtools.scene import IngestOptions, ingest

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from ptmtools.arrays import Floats
+from ptmtools.light.occlusion import Surroundings
 from ptmtools.neighbours.campus.objects import parts_of
-from ptmtools.neighbours.campus.occlusion import Surroundings
 from ptmtools.neighbours.campus.viewpoints import EYE, STEP, viewpoint
 from ptmtools.scene import IngestOptions, Scene, ingest
+from tests.light.shapes import prism, surroundings, triangles_of
 from tests.neighbours.campus.models import level
-from tests.neighbours.campus.shapes import prism, surroundings, triangles_of
 
 SCRIPT = Path(__file__).resolve().parents[3] / "sample_data" / "make_campus.py"
 METRES = IngestOptions(unit="m", up="y")

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles, areas
 from ptmtools.cells.search import connected
-from ptmtools.neighbours.campus.occlusion import (
+from ptmtools.light.occlusion import (
     Surroundings,
     escaping,
     light,
@@ -46,7 +46,7 @@ class Rays:
     """The light by rays of (T, 3, 3) faces, on their (T,) sides: 1 for the front, -1 for the back;
     see `light`.
 
-    Faces up to ``error`` metres off the model's surface have its light.
+    Faces up to ``error`` metres off the model's surface have its light; ``above``: see `light`.
     """
 
     around: Surroundings
@@ -55,6 +55,7 @@ class Rays:
     reach: float
     error: float = 0.0
     side: Floats | float = 1.0
+    above: float = 0.0
 
     @cached_property
     def _normal(self) -> Floats:
@@ -69,7 +70,7 @@ class Rays:
     def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
         normal = self._normal[face]
         place = outermost(self.around, point, normal, self.error)
-        return light(self.around, place, normal, turn, self.samples, self.reach)
+        return light(self.around, place, normal, turn, self.samples, self.reach, self.above)
 
 
 @dataclass(frozen=True)
@@ -164,10 +165,13 @@ _SURE = 3.0
 _AT_AN_EDGE = 4
 
 
-def open_sides(around: Surroundings, corner: Floats, both: Bools, reach: float) -> Floats:
+def open_sides(
+    around: Surroundings, corner: Floats, both: Bools, reach: float, *, indoors: bool = False
+) -> Floats:
     """(T,) -1 for faces of which the back counts, and 1 for all others.
 
-    ``corner``: (T, 3, 3); ``both``: (T,) which have two sides; ``reach``: as in `CampusOptions`.
+    ``corner``: (T, 3, 3); ``both``: (T,) which have two sides; ``reach``: as of `light`.
+    ``indoors``: the sky does not count, the lighter side is the one.
     """
     normal = normals(corner)
     area = areas(corner)
@@ -193,7 +197,8 @@ def open_sides(around: Surroundings, corner: Floats, both: Bools, reach: float) 
             counts[chosen] = seen.reshape(len(chosen), points).sum(axis=1)
 
     chosen = np.unique(plane[wanted])
-    for points, sky in ((_POINTS, True), (_MORE, True), (_MORE, False)):
+    rounds = ((_POINTS, True), (_MORE, True), (_MORE, False))
+    for points, sky in ((_POINTS, False),) if indoors else rounds:
         look(chosen, points, sky=sky)
         close = np.abs(front - back) <= _SURE * np.sqrt(front + back)
         chosen = chosen[close[chosen]]

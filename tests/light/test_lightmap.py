@@ -7,13 +7,12 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ptmtools.arrays import Floats, Ints, Singles
-from ptmtools.neighbours.campus.atlas import cover, unwrap
-from ptmtools.neighbours.campus.lightmap import AGREE, bake, fill, vertex_light
-from ptmtools.neighbours.campus.lights import LightImage, Painted, Rays
-from ptmtools.neighbours.campus.occlusion import normals
+from ptmtools.light.atlas import cover, unwrap
+from ptmtools.light.lightmap import AGREE, bake, fill, vertex_light
+from ptmtools.light.looks import LightImage, Painted, Rays
+from ptmtools.light.occlusion import normals
 from ptmtools.scene.source import SourceWrap
-from tests.neighbours.campus.models import level
-from tests.neighbours.campus.shapes import (
+from tests.light.shapes import (
     GROUND,
     HOUSE,
     bilinear,
@@ -23,30 +22,33 @@ from tests.neighbours.campus.shapes import (
     surroundings,
     triangles_of,
 )
+from tests.neighbours.campus.models import level
 
-pytest.importorskip("xatlas", reason="pip install 'ptmtools[campus]'")
+pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
+
+SIZES = (512, 1024, 2048)
 
 
 def test_thin_faces_show_their_own_light() -> None:
     """The undersides of shelves are dark, their tops are light."""
     corner = ledges(40)
-    atlas = unwrap(*indexed(corner))
+    atlas = unwrap(*indexed(corner), SIZES)
     where = surroundings(corner, GROUND)
     face, point, at = samples(corner, atlas.uv, 4000)
     light = Rays(where, corner, 256, 0.2)
     wanted = light(face, point, np.zeros(len(face)))
     assert np.ptp(wanted) > 0.5
-    maps = bake(light, corner, atlas, light.grain)
+    maps = bake(light, corner, atlas, light.grain, SIZES)
     for actual, most in zip(maps, (0.08, 0.04, 0.03), strict=True):
         assert (np.abs(bilinear(actual.value, at)[0] - wanted) > 0.1)[face >= 2].mean() < most
 
 
 def test_a_lightmap_of_a_house_on_the_ground() -> None:
     points, triangles = indexed(HOUSE)
-    atlas = unwrap(points, triangles)
+    atlas = unwrap(points, triangles, SIZES)
     where = surroundings(HOUSE, GROUND)
     look = Rays(where, HOUSE, 64, 20.0)
-    maps = bake(look, HOUSE, atlas, look.grain)
+    maps = bake(look, HOUSE, atlas, look.grain, SIZES)
     assert [len(m.value) for m in maps] == [512, 1024, 2048]
     normal = normals(HOUSE)
     owner = cover(atlas.uv, 512)
@@ -64,7 +66,7 @@ def test_larger_lightmaps_are_nearly_what_rays_say_everywhere(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     points, triangles = indexed(HOUSE)
-    atlas = unwrap(points, triangles)
+    atlas = unwrap(points, triangles, SIZES)
     where = surroundings(HOUSE, GROUND)
     look = Rays(where, HOUSE, 64, 20.0)
     (taken,) = bake(look, HOUSE, atlas, look.grain, (512,))
@@ -74,7 +76,7 @@ def test_larger_lightmaps_are_nearly_what_rays_say_everywhere(
     ) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(larger.shape, np.float32), np.zeros(larger.shape, np.bool_)
 
-    monkeypatch.setattr("ptmtools.neighbours.campus.lightmap._enlarged", nothing)
+    monkeypatch.setattr("ptmtools.light.lightmap._enlarged", nothing)
     (whole,) = bake(look, HOUSE, atlas, look.grain, (512,))
     assert whole.computed == whole.covered
     assert taken.computed < 0.05 * whole.computed
@@ -86,7 +88,7 @@ def test_larger_lightmaps_are_nearly_what_rays_say_everywhere(
 def test_no_row_of_texels_lies_in_the_ground() -> None:
     """The lower edge of a wall that stands on it."""
     points, triangles = indexed(HOUSE)
-    atlas = unwrap(points, triangles)
+    atlas = unwrap(points, triangles, SIZES)
     where = surroundings(HOUSE, GROUND)
     look = Rays(where, HOUSE, 64, 20.0)
     (actual,) = bake(look, HOUSE, atlas, look.grain, (512,))
@@ -94,7 +96,7 @@ def test_no_row_of_texels_lies_in_the_ground() -> None:
 
 
 def test_grain_is_smoothed_and_edges_of_light_stay() -> None:
-    atlas = unwrap(*indexed(GROUND))
+    atlas = unwrap(*indexed(GROUND), SIZES)
     middle = GROUND[..., 0].mean()
 
     def look(face: Ints, point: Floats, turn: Floats) -> Singles:

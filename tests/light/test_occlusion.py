@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from ptmtools.arrays import Floats
-from ptmtools.neighbours.campus.lights import Rays, open_sides, planes
-from ptmtools.neighbours.campus.occlusion import Surroundings, hemisphere, light, normals, turns
-from tests.neighbours.campus.shapes import prism, quad
+from ptmtools.light.looks import Rays, open_sides, planes
+from ptmtools.light.occlusion import Surroundings, hemisphere, light, normals, turns
+from tests.light.shapes import prism, quad
 
 UP = np.array([[0.0, 1, 0]])
 #: So far away that it counts as infinite, metres.

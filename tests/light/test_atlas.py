@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ptmtools.arrays import Floats
-from ptmtools.neighbours.campus.atlas import claim, cover, nearest, unwrap
-from tests.neighbours.campus.models import level
-from tests.neighbours.campus.shapes import (
+from ptmtools.light.atlas import claim, cover, nearest, unwrap
+from tests.light.shapes import (
     HOUSE,
     bilinear,
     indexed,
@@ -18,8 +17,11 @@ from tests.neighbours.campus.shapes import (
     samples,
     triangles_of,
 )
+from tests.neighbours.campus.models import level
 
-pytest.importorskip("xatlas", reason="pip install 'ptmtools[campus]'")
+pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
+
+SIZES = (512, 1024, 2048)
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 12))
@@ -42,7 +44,7 @@ def test_cover_is_a_test_of_every_texel(seed: int, faces: int) -> None:
 
 def test_an_atlas_gives_each_face_a_place_of_its_own() -> None:
     points, triangles = indexed(HOUSE)
-    atlas = unwrap(points, triangles)
+    atlas = unwrap(points, triangles, SIZES)
     assert atlas.side == 512
     assert atlas.uv.shape == (len(triangles), 3, 2)
     assert ((atlas.uv >= 0) & (atlas.uv <= 1)).all()
@@ -56,7 +58,7 @@ def test_an_atlas_gives_each_face_a_place_of_its_own() -> None:
 
 def test_texels_are_as_large_as_the_surface_everywhere() -> None:
     points, triangles = indexed(HOUSE)
-    uv = unwrap(points, triangles).uv
+    uv = unwrap(points, triangles, SIZES).uv
     lengths = np.linalg.norm(HOUSE - np.roll(HOUSE, 1, axis=1), axis=2)
     drawn = np.linalg.norm(uv - np.roll(uv, 1, axis=1), axis=2)
     ratio = drawn / lengths
@@ -69,7 +71,7 @@ def test_texels_are_as_large_as_the_surface_everywhere() -> None:
 )
 def test_every_face_reads_its_own_chart_alone(corner: Floats, size: int) -> None:
     """However thin it is."""
-    atlas = unwrap(*indexed(corner))
+    atlas = unwrap(*indexed(corner), SIZES)
     assert atlas.side == 512
     owner = claim(atlas.uv, cover(atlas.uv, size)).ravel()
     face, _, at = samples(corner, atlas.uv, 20_000)
@@ -113,13 +115,12 @@ def test_the_nearest_point_of_a_triangle(seed: int) -> None:
     assert far <= np.linalg.norm(others @ uv[0] - at, axis=1).min() + 1e-9
 
 
-def test_too_many_charts_for_the_least_lightmap(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_many_charts_for_the_least_lightmap() -> None:
     """Thousands of loose faces, in small lightmaps."""
-    monkeypatch.setattr("ptmtools.neighbours.campus.atlas.LIGHT_SIZES", (64, 128))
-    assert unwrap(*indexed(loose(3000))).side != 64
+    assert unwrap(*indexed(loose(3000)), (64, 128)).side != 64
 
 
 def test_a_long_object_is_packed_for_the_least_lightmap() -> None:
     quads = [level((5 * i, 0), (5 * i + 5, 3), 0) for i in range(40)]
     points, triangles = indexed(triangles_of(np.concatenate(quads)))
-    assert unwrap(points, triangles).side == 512
+    assert unwrap(points, triangles, SIZES).side == 512

@@ -125,17 +125,22 @@ def light(
     turn: Floats,
     samples: int,
     reach: float,
+    above: float = 0.0,
 ) -> Singles:
     """(n,) light from 0 to 1 at (n, 3) points with (n, 3) unit normals.
 
     Parameters
     ----------
     turn: (n,) rotation of the directions about the normals, in turns from 0 to 1.
-    samples, reach: as in `CampusOptions`.
+    samples, reach: number of rays for each point; metres, beyond which surfaces do not occlude.
+    above: by how much less light comes from straight below than from straight above, in [0, 1]. Of
+        a level surface in the open, the light stays 1.
     """
     result = np.empty(len(point), np.float32)
     for part, origin, along in _fans(around, point, normal, turn, samples):
         share = _escaping(around, origin.astype(np.float32), along, reach)
+        if above:
+            share *= (1 - above * (1 - along[:, 1]) / 2) / (1 - above / 6)
         result[part] = share.reshape(-1, samples).mean(axis=1)
     return result
 

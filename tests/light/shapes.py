@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ptmtools.arrays import Floats
-from ptmtools.neighbours.campus.occlusion import Surroundings
+from ptmtools.light.occlusion import Surroundings
 from tests.neighbours.campus.models import house, level
 
 

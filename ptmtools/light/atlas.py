@@ -2,14 +2,15 @@
 
 No texel that a bilinear look-up on one chart reads is read on another, in any size; all sizes have
 the same layout. xatlas packs with fewer and fewer texels to the metre until all charts fit into the
-least lightmap. If the edges of charts would take nearly all of it, the next larger one is packed,
-and neighbours run into each other in the smaller ones. (With two more texels between charts, a
+least size. If the edges of charts would take nearly all of it, the next larger one is packed, and
+neighbours run into each other in the smaller ones. (With two more texels between charts, a
 building with 5,700 charts had texels of 1.3 m instead of 0.2 m in the least size.)
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,13 +21,14 @@ from ptmtools.arrays import Floats, Ints, Singles
 from ptmtools.cells.search import connected
 from ptmtools.jit import kernel
 from ptmtools.lazy import component
-from ptmtools.neighbours.campus.model import LIGHT_SIZES
 
 #: Half the size of an unwrapped mesh, in a unit of its own. (With 64 xatlas takes faces of some
 #: centimetres in a kilometre for empty.)
 _LARGE = 1024.0
-#: Most packings, and the share of the square that the first one aims at.
-_TRIES, _FIRST = 8, 0.6
+#: The share of a lightmap that the first packing aims at.
+FILLED = 0.6
+#: Most packings.
+_TRIES = 8
 #: An atlas with less than this share of the intended density is mostly edges,
 _WORTH = 0.4
 #: unless a chart, such as a street, is as long as this share of the side.
@@ -41,7 +43,7 @@ class Atlas:
     ----------
     uv: (T, 3, 2) in [0, 1] per corner, origin at the lower left.
     chart: (T,) numbers; faces of one chart are connected.
-    side: side of the least lightmap in which no two charts read the same texel; None without one.
+    side: the least size in which no two charts read the same texel; None without one.
     """
 
     uv: Floats
@@ -49,12 +51,13 @@ class Atlas:
     side: int | None
 
 
-def unwrap(points: Floats, triangles: NDArray[np.integer[Any]]) -> Atlas:
-    """An atlas of (T, 3) triangles over (V, 3) points.
+def unwrap(points: Floats, triangles: NDArray[np.integer[Any]], sizes: Sequence[int]) -> Atlas:
+    """An atlas of (T, 3) triangles over (V, 3) points, for square lightmaps of ascending ``sizes``,
+    texels.
 
     Raises MissingComponentError: PTM-M100 xatlas is not installed.
     """
-    xatlas = component("xatlas", "PTM-M100", "baking lightmaps needs xatlas", "campus")
+    xatlas = component("xatlas", "PTM-M100", "baking lightmaps needs xatlas", "light")
     # Far from the origin float32 has no texels, and xatlas drops faces that it takes for empty.
     near = points - points.mean(axis=0)
     largest = float(np.abs(near).max(initial=0.0))
@@ -63,8 +66,8 @@ def unwrap(points: Floats, triangles: NDArray[np.integer[Any]]) -> Atlas:
     corner = moved[triangles].astype(np.float64)
     across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     area = max(np.linalg.norm(across, axis=1).sum() / 2, np.finfo(np.float32).tiny)
-    for side in LIGHT_SIZES:
-        wanted = side * math.sqrt(_FIRST / area)
+    for side in sizes:
+        wanted = side * math.sqrt(FILLED / area)
         atlas, density = _packed(xatlas, moved, triangles, side, wanted)
         if density >= _WORTH * wanted or _longest(atlas) >= _LONG * side:
             break

@@ -1,4 +1,4 @@
-"""The lightmaps of an object, in three sizes, and the light of its coarse meshes.
+"""The lightmaps of a mesh, in one or several sizes, and light at vertices.
 
 A texel has the light of the nearest point of its face, also where a look-up on a face reads it but
 no face holds its centre, as of sills thinner than a texel. The map of half the least size is
@@ -21,10 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles, areas
-from ptmtools.neighbours.campus.atlas import Atlas, claim, cover, nearest
-from ptmtools.neighbours.campus.lights import Look
-from ptmtools.neighbours.campus.model import LIGHT_SIZES
-from ptmtools.neighbours.campus.occlusion import SPREAD, hemisphere, turns
+from ptmtools.light.atlas import Atlas, claim, cover, nearest
+from ptmtools.light.looks import Look
+from ptmtools.light.occlusion import SPREAD, hemisphere, turns
 from ptmtools.tolerance import INWARD_SHARE, TIE_SHARE
 
 #: Largest difference between four texels that agree.
@@ -49,12 +48,13 @@ def bake(
     corner: Floats,
     atlas: Atlas,
     grain: float,
-    sizes: tuple[int, ...] = LIGHT_SIZES,
+    sizes: tuple[int, ...],
+    least: float = 0.0,
 ) -> list[Lit]:
     """The lightmaps of (T, 3, 3) faces, whose light is ``look``.
 
     Neighbours that differ by more than ``grain`` stay apart; ``sizes`` ascend, each twice the one
-    before.
+    before; texels with less light than ``least`` take that of others nearby.
     """
     sizes = (sizes[0] // 2, *sizes)
     result: list[Lit] = []
@@ -75,7 +75,9 @@ def bake(
         value[row, column] = _smoothed(value, chart, row, column, grain)
         below = value, chart, centre >= 0
         if size > sizes[0]:
-            result.append(Lit(fill(value, owner >= 0), len(row), int((owner >= 0).sum())))
+            result.append(
+                Lit(fill(value, (owner >= 0) & (value >= least)), len(row), int((owner >= 0).sum()))
+            )
     return result
 
 

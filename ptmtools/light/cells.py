@@ -1,0 +1,194 @@
+"""Bakes the light of the cells: one task for each cell.
+
+The surfaces of a cell share one lightmap of linear light. Objects with levels of detail have their
+light at vertices, as colours: their triangles are smaller than a texel, an atlas has a chart for
+each few of them, and their coarser meshes take over colours, but no charts.
+
+The light is ambient obscurance (`light.occlusion`): indoors, a ray that meets nothing within reach
+counts whole. More of it comes from above than from below, so that forms show where nothing is near:
+a white statue in a white room. Light of 1 is that of a level surface in the open.
+
+A piece that shows both sides has the light of the side on which its cell lies. If that is either,
+as of a screen within a room, the more open side counts.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Bools, Floats, Ints, Singles, areas
+from ptmtools.light.atlas import FILLED, unwrap
+from ptmtools.light.lightmap import bake, vertex_light
+from ptmtools.light.looks import Rays, open_sides
+from ptmtools.light.occlusion import Surroundings, normals
+from ptmtools.output.mesh_levels import MANY
+
+if TYPE_CHECKING:
+    from ptmtools.cells.model import Cells
+    from ptmtools.light.options import LightOptions
+    from ptmtools.output.content import Geometry
+
+#: Share of the light from straight above that comes from straight below is 1 less this.
+ABOVE = 0.5
+#: Texels with less light are covered, as a wall by a picture, and take that of their neighbours: a
+#: texel is wider than the gap that it would darken.
+COVERED = 0.03
+#: The side of a lightmap is a multiple of this, so that four of its levels halve exactly,
+_MULTIPLE = 16
+#: and at most this, texels.
+_LARGEST = 2048
+#: The sides of a piece are examined this far off it, in units of the tolerance of planes.
+_OFF = 4.0
+
+
+@dataclass(frozen=True)
+class Piece:
+    """The surfaces of one cell.
+
+    Attributes
+    ----------
+    corner: (n, 3, 3) float32 metres.
+    object, shape: (n,) of the scene; of the cell, ascending.
+    glass: (n,) whether the surface is seen through, and has no light.
+    side: (n,) 1 where the front of a face counts, -1 the back, 0 the more open of the two.
+    """
+
+    corner: NDArray[np.float32]
+    object: Ints
+    shape: Ints
+    glass: Bools
+    side: NDArray[np.int8]
+
+
+@dataclass(frozen=True)
+class CellLight:
+    """The light of one cell: see `Light`.
+
+    Attributes
+    ----------
+    texels: (side, side) uint8 linear light, of 255; None without a lightmap.
+    crowded: whether neighbours in the lightmap run into each other.
+    """
+
+    mapped: Bools
+    uv: NDArray[np.float32]
+    vertex: NDArray[np.uint8]
+    texels: NDArray[np.uint8] | None
+    crowded: bool
+
+
+@dataclass(frozen=True)
+class Baking:
+    """The shared input of all tasks."""
+
+    around: Surroundings
+    options: LightOptions
+
+    def light(self, piece: Piece) -> CellLight:
+        """The light of a cell. Raises MissingComponentError PTM-M100: xatlas is not installed."""
+        count = int(piece.shape[-1]) + 1 if len(piece.shape) else 0
+        dense = _dense(piece.object) & ~piece.glass
+        flat = ~dense & ~piece.glass
+        corner = piece.corner.astype(np.float64)
+        mapped = np.zeros(count, np.bool_)
+        mapped[piece.shape[flat]] = True
+        uv = np.zeros((len(corner), 3, 2), np.float32)
+        vertex = np.full((len(corner), 3), 255, np.uint8)
+        side = self._sides(corner, piece.side)
+        for own in _objects(piece.object, dense):
+            light = vertex_light(
+                self._look(corner[own], side[own]), corner[own], normals(corner[own])
+            )
+            vertex[own] = encoded(light)
+        if not flat.any():
+            return CellLight(mapped, uv, vertex, None, False)
+        own = np.flatnonzero(flat)
+        points, triangles = np.unique(piece.corner[own].reshape(-1, 3), axis=0, return_inverse=True)
+        sizes = _sizes(float(areas(corner[own]).sum()), self.options.light_density)
+        atlas = unwrap(points.astype(np.float64), triangles.reshape(-1, 3).astype(np.int32), sizes)
+        look = self._look(corner[own], side[own])
+        size = atlas.side or sizes[-1]
+        (lit,) = bake(look, corner[own], atlas, look.grain, (size,), least=COVERED)
+        uv[own] = atlas.uv
+        return CellLight(mapped, uv, vertex, encoded(lit.value), atlas.side is None)
+
+    def _sides(self, corner: Floats, side: NDArray[np.int8]) -> Floats:
+        either = side == 0
+        result = np.where(side < 0, -1.0, 1.0)
+        if either.any():
+            reach = self.options.light_reach
+            result[either] = open_sides(
+                self.around, corner[either], either[either], reach, indoors=True
+            )
+        return result
+
+    def _look(self, corner: Floats, side: Floats) -> Rays:
+        samples, reach = self.options.light_samples, self.options.light_reach
+        return Rays(self.around, corner, samples, reach, side=side, above=ABOVE)
+
+
+def light_of_cell(baking: Baking, piece: Piece) -> CellLight:
+    """`Baking.light` as a task."""
+    return baking.light(piece)
+
+
+def encoded(light: Floats | Singles) -> NDArray[np.uint8]:
+    """Linear light in 255ths."""
+    return np.clip(np.rint(255 * light), 0, 255).astype(np.uint8)
+
+
+def pieces_of(geometry: Geometry, cells: Cells, glass: Bools) -> list[Piece]:
+    """The surfaces of each cell; ``glass``: (materials,) whether a material is seen through."""
+    count = np.diff(geometry.triangle_start)
+    shape = np.repeat(np.arange(len(count)), count)
+    first = geometry.point_start[:-1][shape]
+    corner = geometry.point[geometry.shape_point[first[:, None] + geometry.triangle]]
+    cell = np.repeat(np.arange(cells.cell_count), np.diff(geometry.cell_start))[shape]
+    side = _facing(corner.astype(np.float64), cell, geometry.two_sided[shape], cells)
+    starts = geometry.triangle_start[geometry.cell_start]
+    return [
+        Piece(
+            corner[a:b],
+            geometry.object[shape[a:b]].astype(np.int64),
+            shape[a:b] - geometry.cell_start[c],
+            glass[geometry.material[shape[a:b]]],
+            side[a:b],
+        )
+        for c, (a, b) in enumerate(pairwise(starts.tolist()))
+    ]
+
+
+def _facing(corner: Floats, cell: Ints, two_sided: Bools, cells: Cells) -> NDArray[np.int8]:
+    """(n,) the side of each piece on which its cell lies, see `Piece.side`."""
+    side = np.ones(len(corner), np.int8)
+    rows = np.flatnonzero(two_sided)
+    middle = corner[rows].mean(axis=1)
+    off = _OFF * cells.tolerance.plane * normals(corner[rows])
+    front, back = (cells.locate(middle + way) == cell[rows] for way in (off, -off))
+    side[rows[back & ~front]] = -1
+    side[rows[back & front]] = 0
+    return side
+
+
+def _dense(number: Ints) -> Bools:
+    """(n,) whether each piece belongs to an object with many pieces here."""
+    _, place, count = np.unique(number, return_inverse=True, return_counts=True)
+    return np.asarray(count[place] >= MANY)
+
+
+def _objects(number: Ints, chosen: Bools) -> list[Ints]:
+    """The chosen pieces of each object."""
+    return [np.flatnonzero(chosen & (number == one)) for one in np.unique(number[chosen]).tolist()]
+
+
+def _sizes(area: float, density: float) -> tuple[int, ...]:
+    """The sides of lightmaps to try for an area, m², with ``density`` texels to the metre."""
+    texels = math.sqrt(area / FILLED) * density
+    side = min(_LARGEST, _MULTIPLE * max(1, math.ceil(texels / _MULTIPLE)))
+    return tuple(dict.fromkeys(min(_LARGEST, side * k) for k in (1, 2, 4)))

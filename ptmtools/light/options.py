@@ -1,0 +1,53 @@
+"""Options of the light stage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from ptmtools.errors import InputError
+from ptmtools.options import option
+
+#: Option → (least, most).
+RANGES: dict[str, tuple[float, float]] = {
+    "density": (0.1, 1000.0),
+    "samples": (1, 4096),
+    "reach": (1e-3, 1e6),
+}
+
+
+@dataclass(frozen=True)
+class LightOptions:
+    """The light of a building. Raises InputError PTM-I111 for values out of range."""
+
+    heading: ClassVar[str] = "Light"
+
+    light: Literal["bake", "none"] = option(
+        "none",
+        "Light of the surfaces: bake (ambient light, darker in corners and below things, in one "
+        "lightmap for each cell) or none (colours as in the model).",
+        basic=True,
+    )
+    light_density: float = option(
+        10.0, "Texels of a lightmap for each metre of surface.", metavar="TEXELS"
+    )
+    light_samples: int = option(64, "Number of rays for each texel of a lightmap.")
+    light_reach: float = option(
+        3.0, "Distance beyond which surfaces cast no shadow.", metavar="METRES"
+    )
+
+    def __post_init__(self) -> None:
+        for name, (least, most) in RANGES.items():
+            field, value = f"light_{name}", getattr(self, f"light_{name}")
+            if not least <= value <= most:
+                raise InputError(
+                    "PTM-I111",
+                    f"--light-{name} {value:g} is not possible",
+                    remedy=f"use {least:g} to {most:g}",
+                )
+            if self.light == "none" and value != getattr(type(self), field):
+                raise InputError(
+                    "PTM-I111",
+                    f"--light-{name} does nothing without --light",
+                    remedy="add --light bake",
+                )
