@@ -23,7 +23,7 @@ from ptmtools.arrays import Bools, Floats, Ints, normals
 from ptmtools.lab.meshes import Meshes, meshes_of
 from ptmtools.lab.previews import LEAST, Previews, no_previews, previews_of
 from ptmtools.output.model import sizes_of
-from ptmtools.output.served import Document, Served
+from ptmtools.output.served import Document, Served, Surfaces
 from ptmtools.scene.colors import gradients
 from ptmtools.texture.model import gpu_texel_bytes
 from ptmtools.walk import Browser
@@ -309,7 +309,7 @@ def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalog
         high=high,
         records=served.records,
         statistics=served.statistics["cells"],
-        shapes=_shapes(served),
+        shapes=_shapes(served.surfaces),
         previews=previews_of(textures),
         meshes=meshes_of(served.index.get("meshes", ()), served.mesh_bytes),
     )
@@ -322,8 +322,17 @@ def _existing(columns: Columns) -> Bools:
     return result
 
 
-def _shapes(served: Served) -> Shapes:
-    surfaces = served.surfaces
+def _shapes(surfaces: Surfaces) -> Shapes:
+    """The shapes, and once more those with a lightmap, as if that was their texture."""
+    shapes, light = _textured(surfaces), surfaces.light
+    if light is None:
+        return shapes
+    lit = vars(_textured(light))
+    kept = lit["texture"] >= 0
+    return shapes.joined_with(Shapes(**{name: rows[kept] for name, rows in lit.items()}))
+
+
+def _textured(surfaces: Surfaces) -> Shapes:
     low, high = surfaces.boxes()
     count = len(low)
     cell, texture = (np.zeros(count, np.int64) for _ in range(2))

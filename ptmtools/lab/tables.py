@@ -42,7 +42,7 @@ class Views:
     ----------
     start: (F + 1,) first row of each frame.
     cell, texture: (R,) int32 of each row; the texture is -1 for surfaces without. Octrees come
-        after the textures, see `ptmtools.lab.relief`.
+        after the textures, see `ptmtools.lab.relief`. A surface with a lightmap is in two rows.
     error, square: (R, S + 1) part of the frame's mean error, and mean squared error, with these as
         the finest data: nothing, the mean colour, then the states from 1 on (`Lossy`), which begin
         with level 0, level 1, …; in other forms their columns in place of states.
@@ -95,6 +95,12 @@ def look(
     lossy = no_previews(len(pyramids.levels)) if lossy is None else lossy
     shown: list[Pyramids | Shows] = [pyramids, *forms]
     tallies = [_Tally(triangles, textures, lossy, full, seen) for textures in shown]
+    light = surfaces.light
+    lights = (
+        []
+        if light is None
+        else [_Tally(triangles_of(light), textures, lossy, full, seen) for textures in shown]
+    )
     relief_tally = ReliefTally(relief, surfaces, triangles, pyramids, seen) if relief else None
     owner = np.empty((len(eye), int(seen.sum())), np.int32)
     depth = np.empty(owner.shape, np.float32)
@@ -104,10 +110,24 @@ def look(
         plain = relief_tally.add(sight) if relief_tally else sight
         for tally in tallies:
             tally.add(plain)
+        for tally in lights:
+            tally.add(sight)
         owner[k], depth[k] = _item_buffer(sight, triangles, seen)
     progress(len(eye), len(eye), "looking along the walk")
     more = [relief_tally.rows()] if relief_tally else []
-    return [_views([tally.rows(), *more], owner, depth) for tally in tallies]
+    parts = [[tally.rows(), *more] for tally in tallies]
+    for own, tally in zip(parts, lights, strict=False):
+        own.append(_of_lightmaps(tally.rows()))
+    return [_views(own, owner, depth) for own in parts]
+
+
+def _of_lightmaps(rows: Rows) -> Rows:
+    """Rows of surfaces with a lightmap as their texture, without those of other surfaces. The error
+    of a missing cell is in the rows of its textures."""
+    lit = rows.texture >= 0
+    kept = {name: table[lit] for name, table in rows._asdict().items()}
+    kept["error"][:, 0] = kept["square"][:, 0] = 0.0
+    return Rows(**kept)
 
 
 class _Tally:

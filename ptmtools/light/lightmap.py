@@ -75,9 +75,10 @@ def bake(
         value[row, column] = _smoothed(value, chart, row, column, grain)
         below = value, chart, centre >= 0
         if size > sizes[0]:
-            result.append(
-                Lit(fill(value, (owner >= 0) & (value >= least)), len(row), int((owner >= 0).sum()))
-            )
+            read = owner >= 0
+            light = read & (value >= least)
+            filled = fill(value, light if light.any() else read)
+            result.append(Lit(filled, len(row), int(read.sum())))
     return result
 
 

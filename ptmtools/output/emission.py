@@ -245,7 +245,8 @@ def emit(
         if not force:
             remedy = "specify another folder, or use --force to overwrite it"
             refuse_existing(folder / name, remedy)
-    viewpoints, notes = place_viewpoints(scene, cells, options, textures)
+    images = tuple(record for record in textures if record.image >= 0)
+    viewpoints, notes = place_viewpoints(scene, cells, options, images)
     content = Content(
         scene,
         cells,

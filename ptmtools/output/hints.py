@@ -259,6 +259,8 @@ class RecordWriter:
         """The need of the lightmaps of visible cells. A texel of one is so large that every view
         requires the finest level."""
         content = self._content
+        if not content.lightmap_of:
+            return
         shares = significant(content.ach.value[content.ach.entries(cell)], NEED_DIGITS)
         for other, share in zip(content.pvs.row(cell).tolist(), shares, strict=True):
             if share and other in content.lightmap_of:

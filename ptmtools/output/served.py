@@ -154,6 +154,8 @@ class Surfaces:
     seen: (n, 2) of each the one that is seen in its place from where its normal points to, and from
         behind it, see `sides`.
     octree: (n,) int32, the octree texture of its object in the hints, -1 without.
+    lightmap, spot: (n,) int32, the lightmap in the hints' textures, -1 without; (n, 3, 2) float64
+        coordinates in it, origin at the upper left. None if there are no lightmaps.
     """
 
     corner: Floats
@@ -167,6 +169,23 @@ class Surfaces:
     clamped: Bools
     seen: Ints
     octree: NDArray[np.int32]
+    lightmap: NDArray[np.int32] | None = None
+    spot: Floats | None = None
+
+    @property
+    def light(self) -> Surfaces | None:
+        """The same surfaces with their lightmaps, linear light, as textures; None if there are no
+        lightmaps."""
+        if self.lightmap is None or self.spot is None:
+            return None
+        count = len(self.corner)
+        return replace(
+            self,
+            uv=self.spot,
+            texture=self.lightmap,
+            color=np.ones((count, 3)),
+            clamped=np.ones((count, 2), np.bool_),
+        )
 
     def boxes(self) -> tuple[Floats, Floats]:
         """(s, 3) corners of the boxes of the shapes, metres; infinite of one without triangles."""
@@ -399,6 +418,8 @@ def _surfaces(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
     texture = [
         -1 if p.uv is None or p.material.texture is None else p.material.texture for _, p in shapes
     ]
+    lightmap = [-1 if m.light is None else m.light for m in materials]
+    spot = joined([_corners(p.light, p.triangle) for _, p in shapes], 2)
     clamp = WRAPS["clamp"]
     corner = joined([p.point.astype(np.float64)[p.triangle] for _, p in shapes], 3)
     cell = spread([cell for cell, _ in shapes], np.int32)
@@ -406,7 +427,7 @@ def _surfaces(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
     mean = joined([_colors(p) for _, p in shapes], 3).mean(axis=1)
     return Surfaces(
         corner=corner,
-        uv=joined([_texture_points(p) for _, p in shapes], 2),
+        uv=joined([_corners(p.uv, p.triangle) for _, p in shapes], 2),
         cell=cell,
         shape=np.repeat(np.arange(len(shapes), dtype=np.int32), count),
         texture=spread(texture, np.int32),
@@ -418,13 +439,14 @@ def _surfaces(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
         clamped=spread([[w == clamp for w in m.wrap] for m in materials], np.bool_, 2),
         seen=sides(corner, cell, two_sided, locator),
         octree=spread([-1 if p.octree is None else p.octree for _, p in shapes], np.int32),
+        lightmap=spread(lightmap, np.int32) if max(lightmap, default=-1) >= 0 else None,
+        spot=spot if max(lightmap, default=-1) >= 0 else None,
     )
 
 
-def _texture_points(primitive: ReadPrimitive) -> Floats:
-    if primitive.uv is None:
-        return np.zeros((len(primitive.triangle), 3, 2))
-    return primitive.uv.astype(np.float64)[primitive.triangle]
+def _corners(uv: NDArray[np.float32] | None, triangle: Ints) -> Floats:
+    """(m, 3, 2) coordinates of the corners of triangles; 0 without."""
+    return np.zeros((len(triangle), 3, 2)) if uv is None else uv.astype(np.float64)[triangle]
 
 
 def _colors(primitive: ReadPrimitive) -> Floats:

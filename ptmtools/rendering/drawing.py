@@ -1,8 +1,9 @@
 """Draws a view of a served database with the finest levels of its textures.
 
 Embree finds the surface of each ray, and the kernels of the simulator sample the textures. A lit
-picture has the lamp of `ptmtools.rendering.light` and the relief of octree textures; an unlit one
-shades surfaces without texture by the angle to the viewer, like the web page.
+picture has the lamp of `ptmtools.rendering.light` and the relief of octree textures. Others have
+lightmaps, and shade surfaces with neither texture nor lightmap by the angle to the viewer, like the
+web page.
 """
 
 from __future__ import annotations
@@ -17,11 +18,12 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats
 from ptmtools.errors import InputError
 from ptmtools.options import option
-from ptmtools.output.served import Served
+from ptmtools.output.served import Served, Surfaces
 from ptmtools.progress import Progress, silent
 from ptmtools.rendering.light import as_bytes
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.rendering.records import Sight, Triangles, own_levels, triangles_of
+from ptmtools.scene.colors import to_srgb
 
 #: Maximum side of a picture, pixels.
 MAX_SIDE = 4096
@@ -157,7 +159,10 @@ def draw_view(
     triangles = triangles_of(surfaces)
     sight = Caster(surfaces).look(camera, eye.position, eye.direction)
     hit = sight.triangle[sight.triangle >= 0]
-    pyramids = read_pyramids(served, progress, only=set(surfaces.texture[hit].tolist()))
+    light = None if options.lit else surfaces.light
+    visible = set(surfaces.texture[hit].tolist())
+    visible |= set() if light is None else set(light.texture[hit].tolist())
+    pyramids = read_pyramids(served, progress, only=visible)
     column = pyramids.levels
     if options.max_side:
         within = (pyramids.size.max(axis=2) <= options.max_side) & (pyramids.size[:, :, 0] > 0)
@@ -171,7 +176,13 @@ def draw_view(
         octrees = read_octrees(served)
         relieve(sight, triangles, lamps(surfaces.corner), octrees, loaded, octrees.levels, shown)
     else:
-        _shade_plain(sight, triangles, shown)
+        _shade_plain(sight, triangles, light, shown)
+    if light is not None:
+        linear = np.empty_like(shown)
+        shade(sight, triangles_of(light), own_levels(pyramids), loaded, column, linear)
+        mapped = np.flatnonzero(sight.triangle >= 0)
+        mapped = mapped[light.texture[sight.triangle[mapped]] >= 0]
+        shown[mapped] *= to_srgb(linear[mapped] / 255)
     shown[sight.triangle < 0] = _SKY
     each = (options.height, samples, options.width, samples, 3)
     return as_bytes(shown.reshape(each).mean(axis=(1, 3)))
@@ -185,10 +196,14 @@ def _vertical(degrees: float, options: ViewOptions) -> float:
     return 2 * math.degrees(math.atan(half))
 
 
-def _shade_plain(sight: Sight, triangles: Triangles, shown: Floats) -> None:
-    """Multiplies the colours of surfaces without texture by the cosine to the viewer."""
+def _shade_plain(sight: Sight, triangles: Triangles, light: Surfaces | None, shown: Floats) -> None:
+    """Multiplies the colours of surfaces without texture and lightmap by the cosine to the
+    viewer."""
     plain = np.flatnonzero(sight.triangle >= 0)
-    plain = plain[triangles.texture[sight.triangle[plain]] < 0]
+    bare = triangles.texture < 0
+    if light is not None:
+        bare &= light.texture < 0
+    plain = plain[bare[sight.triangle[plain]]]
     normal, ray = triangles.normal[sight.triangle[plain]], sight.ray[plain]
     length = np.linalg.norm(normal, axis=1) * np.linalg.norm(ray, axis=1)
     along = np.abs(np.einsum("ij,ij->i", normal, ray))

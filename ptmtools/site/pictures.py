@@ -26,6 +26,7 @@ from ptmtools.rendering.footprints import detail_of_pixels, footprints
 from ptmtools.rendering.previews import read_preview
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.rendering.records import Sight, Triangles, triangles_of
+from ptmtools.scene.colors import to_srgb
 from ptmtools.texture.detail import with_offset
 from ptmtools.texture.model import Limits
 from ptmtools.texture.samples import in_eight_bits
@@ -60,25 +61,30 @@ def pictures(served: Served) -> tuple[bytes, list[bytes]]:
     """
     viewpoints = served.index["viewpoints"][:MOST]
     caster, triangles = Caster(served.surfaces), triangles_of(served.surfaces)
+    light = None if served.surfaces.light is None else triangles_of(served.surfaces.light)
     wanted = [(POSTER, viewpoints[0]), *((SMALL, each) for each in viewpoints)]
     sights = [_look(caster, size, viewpoint) for size, viewpoint in wanted]
     shown = np.unique(np.concatenate([np.unique(sight.triangle) for sight in sights]))
-    used = set(triangles.texture[shown[shown >= 0]].tolist()) - {-1}
+    seen = (each.texture[shown[shown >= 0]].tolist() for each in (triangles, light) if each)
+    used = {texture for textures in seen for texture in textures} - {-1}
     textures = sorted(used)
     # The lock of the interpreter is free while levels are decoded and numpy is at work.
     levels = ordered(partial(_levels, served), textures, _THREADS)
-    draw = partial(_jpeg_of, triangles, dict(zip(textures, levels, strict=True)))
+    draw = partial(_jpeg_of, triangles, light, dict(zip(textures, levels, strict=True)))
     sizes = [size for size, _ in wanted]
     poster, *small = ordered(draw, zip(sights, sizes, strict=True), _THREADS)
     return poster, small
 
 
 def _jpeg_of(
-    triangles: Triangles, textures: Mapping[int, Levels], shown: tuple[Sight, tuple[int, int]]
+    triangles: Triangles,
+    light: Triangles | None,
+    textures: Mapping[int, Levels],
+    shown: tuple[Sight, tuple[int, int]],
 ) -> bytes:
     sight, size = shown
     most = POSTER_BYTES if size == POSTER else SMALL_BYTES
-    return jpeg(_colors(sight, triangles, textures), size, most)
+    return jpeg(_colors(sight, triangles, light, textures), size, most)
 
 
 def jpeg(colors: Floats, size: tuple[int, int], most: int) -> bytes:
@@ -133,8 +139,10 @@ def _shown(row: Mapping[str, Any], levels: Levels) -> Levels:
     return [with_offset(*each) for each in zip(levels, offsets_of(row), strict=False)]
 
 
-def _colors(sight: Sight, triangles: Triangles, textures: Mapping[int, Levels]) -> Floats:
-    """(n, 3) colours of the rays, 0 to 255."""
+def _colors(
+    sight: Sight, triangles: Triangles, light: Triangles | None, textures: Mapping[int, Levels]
+) -> Floats:
+    """(n, 3) colours of the rays, 0 to 255; ``light``: the triangles with lightmaps as textures."""
     shown = np.empty((len(sight.ray), 3))
     shown[:] = np.multiply(_SKY, 255)
     hit = np.flatnonzero(sight.triangle >= 0)
@@ -142,15 +150,28 @@ def _colors(sight: Sight, triangles: Triangles, textures: Mapping[int, Levels]) 
     normal = triangles.normal[triangle]
     facing = np.einsum("ij,ij->i", normal, ray)
     length = np.linalg.norm(normal, axis=1) * np.linalg.norm(ray, axis=1)
-    light = _AMBIENT + (1 - _AMBIENT) * np.abs(facing) / np.maximum(length, 1e-300)
-    lit = np.repeat(255.0 * light[:, None], 3, axis=1)
-    texture = triangles.texture[triangle]
+    glow = _AMBIENT + (1 - _AMBIENT) * np.abs(facing) / np.maximum(length, 1e-300)
+    lit = np.repeat(255.0 * glow[:, None], 3, axis=1)
+    if light is not None:
+        lit[light.texture[triangle] >= 0] = 255.0
+    _paint(lit, sight, hit, triangles, textures)
+    if light is not None:
+        each = np.full_like(lit, 255.0)
+        _paint(each, sight, hit, light, textures)
+        lit *= to_srgb(each / 255)
+    shown[hit] = lit * triangles.color[triangle]
+    return shown
+
+
+def _paint(
+    colors: Floats, sight: Sight, hit: Ints, triangles: Triangles, textures: Mapping[int, Levels]
+) -> None:
+    """Writes the colours of the ``hit`` pixels that show a texture."""
+    texture = triangles.texture[sight.triangle[hit]]
     for number, levels in textures.items():
         rows = np.flatnonzero(texture == number)
         if len(rows):
-            lit[rows] = _sampled(sight, hit[rows], triangles, levels)
-    shown[hit] = lit * triangles.color[triangle]
-    return shown
+            colors[rows] = _sampled(sight, hit[rows], triangles, levels)
 
 
 def _sampled(sight: Sight, pixel: Ints, triangles: Triangles, levels: Levels) -> Floats:

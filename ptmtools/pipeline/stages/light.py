@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from ptmtools.errors import DatabaseError
 from ptmtools.lazy import Lazy
 from ptmtools.light.options import LightOptions
 from ptmtools.output.names import cell_name
@@ -130,10 +132,10 @@ def _inputs(artifacts: Artifacts, options: LightOptions) -> dict[str, str]:
     if options.light == "none":
         return {}
     inputs = artifacts.files_of(LIGHT.sources(options))
-    coding = artifacts.before(TEXTURES)
-    if coding is None:
-        return inputs
-    return inputs | {_CODING: sha256(json.dumps(coding.parameters, sort_keys=True).encode())}
+    with suppress(DatabaseError):  # in a plan, of textures that have not been encoded
+        coding = artifacts.record(TEXTURES).parameters
+        inputs[_CODING] = sha256(json.dumps(coding, sort_keys=True).encode())
+    return inputs
 
 
 def _counts(light: Light) -> Mapping[str, Any]:

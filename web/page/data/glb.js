@@ -17,6 +17,8 @@
  * @property {boolean} twoSided
  * @property {number} mesh the place of its object in the index, if that has finer meshes, or -1
  * @property {number} octree the place of its octree texture in the index, or -1
+ * @property {number} light the lightmap of its cell in the index, or -1
+ * @property {Float32Array | null} spots u, v of each vertex in the lightmap, from the top left
  * @property {number[]} low corner of their box
  * @property {number[]} high
  */
@@ -169,26 +171,29 @@ export async function readGlb(buffer, textures, decoder) {
   for (const node of tree.nodes ?? []) {
     for (const { attributes, indices, material } of tree.meshes[node.mesh].primitives) {
       const look = tree.materials[material], base = look.pbrMetallicRoughness ?? {};
-      const { texture = -1, mesh = -1, octree = -1, wrapS, wrapT } = look.extras ?? {};
+      const { texture = -1, mesh = -1, octree = -1, light = -1, wrapS, wrapT } = look.extras ?? {};
       const textured = texture >= 0 && attributes.TEXCOORD_0 !== undefined;
       const painted = attributes.COLOR_0 !== undefined;
       const positions = /** @type {Float32Array} */ (arrays.vertices(attributes.POSITION));
       await pause();
       const uvs = textured ? /** @type {Float32Array} */ (arrays.vertices(attributes.TEXCOORD_0)) : null;
       const colors = painted ? /** @type {Uint16Array} */ (arrays.vertices(attributes.COLOR_0)) : null;
-      if (!Number.isInteger(texture) || texture >= textures) {
+      const spots = light < 0 ? null : /** @type {Float32Array} */ (arrays.vertices(attributes.TEXCOORD_1));
+      if (![texture, light].every((number) => Number.isInteger(number) && number < textures)) {
         throw new Error("has a texture that is not in the index");
       }
       const factor = base.baseColorFactor ?? [1, 1, 1, 1];
       if (!Array.isArray(factor) || factor.length !== 4 || !factor.every(Number.isFinite)) {
         throw new Error("has an invalid colour");
       }
-      if (uvs && 3 * uvs.length !== 2 * positions.length) throw new Error("has too few coordinates");
+      for (const each of [uvs, spots]) {
+        if (each && 3 * each.length !== 2 * positions.length) throw new Error("has too few coordinates");
+      }
       if (colors && 3 * colors.length !== 4 * positions.length) throw new Error("has too few colours");
       await pause();
       const index = arrays.indices(indices, positions.length / 3);
       await pause();
-      const own = ownOf(index, { positions, uvs, colors });
+      const own = ownOf(index, { positions, uvs, colors, spots });
       const { low, high } = boxOf(own.positions);
       shapes.push({
         name: node.name ?? "",
@@ -202,6 +207,7 @@ export async function readGlb(buffer, textures, decoder) {
         twoSided: look.doubleSided === true,
         mesh,
         octree,
+        light,
         low,
         high,
       });
@@ -213,9 +219,10 @@ export async function readGlb(buffer, textures, decoder) {
 /**
  * The vertices of one shape, of an array that it may share with others.
  * @param {Uint16Array | Uint32Array} index
- * @param {{positions: Float32Array, uvs: Float32Array | null, colors: Uint16Array | null}} shared
+ * @param {{positions: Float32Array, uvs: Float32Array | null, colors: Uint16Array | null,
+ *   spots: Float32Array | null}} shared
  */
-function ownOf(index, { positions, uvs, colors }) {
+function ownOf(index, { positions, uvs, colors, spots }) {
   let first = Infinity, last = -1;
   for (let k = 0; k < index.length; k++) {
     if (index[k] < first) first = index[k];
@@ -228,6 +235,7 @@ function ownOf(index, { positions, uvs, colors }) {
     positions: positions.subarray(3 * first, 3 * end),
     uvs: uvs && uvs.subarray(2 * first, 2 * end),
     colors: colors && colors.subarray(4 * first, 4 * end),
+    spots: spots && spots.subarray(2 * first, 2 * end),
     indices,
   };
 }

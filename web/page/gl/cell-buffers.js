@@ -16,9 +16,10 @@
 
 /**
  * @typedef {object} Packed
- * @property {Float32Array} data x, y, z, u, v of each vertex, and its colour if any has one: r, g, b, 1
- *   as sRGB encodes them, in the bytes of one number
- * @property {boolean} painted whether they have
+ * @property {Float32Array} data x, y, z, u, v of each vertex; its place u, v in the lightmap, if any has one;
+ *   and its colour, if any has one: r, g, b, 1 as sRGB encodes them, in the bytes of one number
+ * @property {boolean} lit whether they have a place in the lightmap
+ * @property {boolean} painted whether they have a colour
  * @property {Uint16Array | Uint32Array} index
  * @property {Batch[]} batches
  */
@@ -37,15 +38,16 @@ export function* pack(shapes) {
   /** @type {Map<string, Shape[]>} */
   const groups = new Map();
   for (const shape of shapes) {
-    const { texture, clampU, clampV, factor, blends, cutoff, twoSided, octree } = shape;
-    const key = [texture, clampU, clampV, factor, blends, cutoff, twoSided, octree].join();
+    const { texture, clampU, clampV, factor, blends, cutoff, twoSided, octree, light } = shape;
+    const key = [texture, clampU, clampV, factor, blends, cutoff, twoSided, octree, light].join();
     const group = groups.get(key);
     if (group) group.push(shape);
     else groups.set(key, [shape]);
   }
   const vertices = shapes.reduce((sum, { positions }) => sum + positions.length / 3, 0);
   const count = shapes.reduce((sum, { indices }) => sum + indices.length, 0);
-  const painted = shapes.some(({ colors }) => colors), width = painted ? 6 : 5;
+  const lit = shapes.some(({ spots }) => spots), painted = shapes.some(({ colors }) => colors);
+  const width = 5 + 2 * +lit + +painted;
   const data = new Float32Array(width * vertices), bytes = new Uint8Array(data.buffer);
   // 65535 begins another strip.
   const index = vertices > 65535 ? new Uint32Array(count) : new Uint16Array(count);
@@ -54,7 +56,7 @@ export function* pack(shapes) {
   let vertex = 0, at = 0;
   for (const group of groups.values()) {
     const first = at;
-    for (const { positions, uvs, colors, indices } of group) {
+    for (const { positions, uvs, colors, spots, indices } of group) {
       yield;
       for (let k = 0; k < indices.length; k++) {
         if (k % AT_ONCE === AT_ONCE - 1) yield;
@@ -64,11 +66,12 @@ export function* pack(shapes) {
         if (k % AT_ONCE === AT_ONCE - 1) yield;
         for (let n = 0; n < 3; n++) data[width * vertex + n] = positions[3 * k + n];
         for (let n = 0; painted && n < 4; n++) {
-          bytes[24 * vertex + 20 + n] = colors ? 255 * encoded(colors[4 * k + n] / 65535) + 0.5 : 255;
+          bytes[4 * (width * (vertex + 1) - 1) + n] = colors ? 255 * encoded(colors[4 * k + n] / 65535) + 0.5 : 255;
         }
-        if (!uvs) continue;
-        data[width * vertex + 3] = uvs[2 * k];
-        data[width * vertex + 4] = uvs[2 * k + 1];
+        for (let n = 0; n < 2; n++) {
+          if (uvs) data[width * vertex + 3 + n] = uvs[2 * k + n];
+          if (spots) data[width * vertex + 5 + n] = spots[2 * k + n];
+        }
       }
     }
     const [look] = group, color = [...look.factor.slice(0, 3).map(encoded), look.factor[3]];
@@ -79,7 +82,7 @@ export function* pack(shapes) {
       yield;
     }
   }
-  return { data, painted, index, batches };
+  return { data, lit, painted, index, batches };
 }
 
 /**
@@ -105,7 +108,7 @@ export class CellBuffers {
    * @param {Packed} packed
    * @param {Shape[]} shapes those that were packed
    */
-  constructor(gl, { data, painted, index, batches }, shapes) {
+  constructor(gl, { data, lit, painted, index, batches }, shapes) {
     this.gl = gl;
     this.shapes = shapes;
     this.batches = batches;
@@ -118,16 +121,16 @@ export class CellBuffers {
     gl.bufferData(gl.ARRAY_BUFFER, data, gl.STATIC_DRAW);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.buffers[1]);
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, index, gl.STATIC_DRAW);
-    const stride = painted ? 24 : 20;
-    gl.enableVertexAttribArray(0);
-    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, stride, 0);
-    gl.enableVertexAttribArray(1);
-    gl.vertexAttribPointer(1, 2, gl.FLOAT, false, stride, 12);
+    const end = lit ? 28 : 20, stride = end + 4 * +painted;
+    const attribute = (/** @type {number} */ place, /** @type {number} */ count, /** @type {number} */ from) => {
+      gl.enableVertexAttribArray(place);
+      gl.vertexAttribPointer(place, count, count < 4 ? gl.FLOAT : gl.UNSIGNED_BYTE, count > 3, stride, from);
+    };
+    attribute(0, 3, 0);
+    attribute(1, 2, 12);
     gl.vertexAttrib4f(2, 1, 1, 1, 1);
-    if (painted) {
-      gl.enableVertexAttribArray(2);
-      gl.vertexAttribPointer(2, 4, gl.UNSIGNED_BYTE, true, stride, 20);
-    }
+    if (painted) attribute(2, 4, end);
+    if (lit) attribute(3, 2, 20);
     gl.bindVertexArray(null);
   }
 

@@ -1,4 +1,4 @@
-// The item buffer: a small picture of the visible textures and their levels of detail, read back
+// The item buffer: a small picture of the visible textures, lightmaps and levels of detail, read back
 // without waiting, and a second one of placeholders for missing cells.
 
 import { Fence } from "./fence.js";
@@ -12,7 +12,8 @@ const PIXELS = 3600;
 /**
  * @typedef {object} Reading
  * @property {number} pixels
- * @property {Uint16Array} items two numbers a pixel: texture + 1, level of detail · 256
+ * @property {Uint16Array} items two numbers a pixel: pair + 1, level of detail · 256
+ * @property {number[][]} pairs textures and lightmaps that are seen together, -1 for none
  * @property {Uint16Array | null} placeholders the first is the cell + 1; null if none were drawn
  * @property {number} drawn when, s
  */
@@ -21,6 +22,8 @@ export class ItemBuffer {
   /** Whether placeholders were drawn, and when it was drawn, s. */
   #second = false;
   #drawn = 0;
+  /** @type {number[][]} */
+  #pairs = [];
 
   /** @param {WebGL2RenderingContext} gl */
   constructor(gl) {
@@ -96,13 +99,17 @@ export class ItemBuffer {
     gl.clearBufferfv(gl.DEPTH, 0, [1]);
     aim(gl, item, camera);
     gl.uniform1f(item.at.pixels, lines / this.height);
+    /** @type {Map<string, number>} */
+    const items = new Map();
+    this.#pairs = [];
     for (const { buffers, batches } of drawn) {
       gl.bindVertexArray(buffers.vertexArray);
       for (const batch of batches) {
-        const { texture, blends, twoSided } = batch.look;
+        const { texture, light, blends, twoSided } = batch.look, pair = [texture, light], key = pair.join();
         if (blends && texture < 0) continue;
         (twoSided ? gl.disable : gl.enable).call(gl, gl.CULL_FACE);
-        gl.uniform1f(item.at.item, texture + 1);
+        if (!items.has(key)) items.set(key, this.#pairs.push(pair));
+        gl.uniform1f(item.at.item, /** @type {number} */ (items.get(key)));
         gl.uniform2fv(item.at.size, texture < 0 ? [1, 1] : sizeOf(texture));
         buffers.draw(batch);
       }
@@ -165,7 +172,7 @@ export class ItemBuffer {
       return numbers;
     });
     gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
-    return { pixels, items: read[0], placeholders: read[1] ?? null, drawn: this.#drawn };
+    return { pixels, items: read[0], pairs: this.#pairs, placeholders: read[1] ?? null, drawn: this.#drawn };
   }
 }
 

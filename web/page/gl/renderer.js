@@ -148,7 +148,7 @@ export class Renderer {
    */
   #paint(at, batch, now) {
     const { gl } = this;
-    const { texture, clampU, clampV, cutoff, twoSided } = batch.look;
+    const { texture, light, clampU, clampV, cutoff, twoSided } = batch.look;
     (twoSided ? gl.disable : gl.enable).call(gl, gl.CULL_FACE);
     gl.uniform4fv(at.color, batch.color);
     gl.uniform1f(at.cutoff, cutoff);
@@ -156,7 +156,16 @@ export class Renderer {
     const storage = texture < 0 ? null : this.memory.of(texture);
     gl.uniform1i(at.channels, storage?.channels ?? 0);
     if (texture >= 0) gl.uniform3fv(at.mean, this.means[texture]);
-    return storage?.bind(clampU, clampV, now) ?? false;
+    let fading = false;
+    if (light >= 0) {
+      const map = this.memory.of(light);
+      gl.activeTexture(gl.TEXTURE1);
+      fading = map?.bind(true, true, now) ?? false;
+      gl.activeTexture(gl.TEXTURE0);
+      gl.uniform1i(at.lightmap, 1);
+      gl.uniform1f(at.lit, map ? -1 : this.means[light][0]);
+    } else gl.uniform1f(at.lit, 0);
+    return storage?.bind(clampU, clampV, now) || fading;
   }
 }
 

@@ -37,25 +37,30 @@ vec4 texel() {
 }`;
 
 /**
- * Textured surfaces are unlit, as in VRML browsers; the others glow a little and are lit from the eye.
- * Colours multiply as they are encoded.
+ * Surfaces with a lightmap have its light; of the others those with a texture are unlit, as in VRML browsers,
+ * and the rest glow a little and are lit from the eye. Colours multiply as they are encoded.
  */
 const SURFACE = `#version 300 es
 precision highp float;
 in vec3 seen;
 in vec2 uv;
+in vec2 spot;
 in vec3 painted;
 uniform float cutoff;
+uniform sampler2D lightmap;
+uniform float lit; // linear light, until the lightmap arrives; -1 with it, 0 without one
 out vec4 shown;
 ${TEXEL}
 void main() {
   vec4 sampled = texel();
   float light = 1.0;
-  if (!textured) {
+  if (!textured) sampled = vec4(1.0);
+  if (lit != 0.0) {
+    light = 1.055 * pow(lit < 0.0 ? texture(lightmap, spot).r : lit, 1.0 / 2.4) - 0.055;
+  } else if (!textured) {
     vec3 normal = cross(dFdx(seen), dFdy(seen));
     float size = length(normal);
     light = 0.25 + 0.75 * (size > 0.0 ? abs(dot(normal, normalize(seen))) / size : 1.0);
-    sampled = vec4(1.0);
   }
   shown = vec4(sampled.rgb * color.rgb * painted * light, sampled.a * color.a);
   if (shown.a < max(cutoff, 0.004)) discard;
@@ -70,7 +75,7 @@ vec2 bytes(float number) {
 }`;
 
 /**
- * The item buffer: texture + 1, and the level of detail in 1/256, where the finest level has 0.
+ * The item buffer: pair + 1, and the level of detail in 1/256, where the finest level has 0.
  * u / w and 1 / w are linear across the screen, so their differences give exact derivatives however
  * large a pixel is.
  */
@@ -103,7 +108,9 @@ void main() { shown = vec4(bytes(item), 0.0, 1.0); }`;
 
 /** @type {Record<string, string[]>} */
 export const SOURCES = {
-  surface: [corners(), SURFACE],
+  surface: [corners(`
+layout(location = 3) in vec2 place2;
+out vec2 spot;`, "spot = place2;"), SURFACE],
   item: [corners(), ITEM],
   placeholder: [corners(), PLACEHOLDER],
 };

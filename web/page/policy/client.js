@@ -100,7 +100,7 @@ export class Client {
 
   /**
    * @param {number} cell
-   * @param {{texture: number, low: number[], high: number[]}[]} shapes
+   * @param {{texture: number, light?: number, low: number[], high: number[]}[]} shapes
    */
   learnGeometry(cell, shapes) {
     this.shapes[cell] = shapesOf(shapes);

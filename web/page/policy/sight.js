@@ -12,11 +12,14 @@
  * @param {{T: number, C: number, K: number, levels: Int32Array}} catalogue
  * @returns {Sight}
  */
-export function sightOf({ pixels, items, placeholders }, { T, C, K, levels }) {
+export function sightOf({ pixels, items, pairs, placeholders }, { T, C, K, levels }) {
   const present = new Float64Array(T * K), hidden = new Float64Array(C);
   const each = 1 / pixels;
   for (let at = 0; at < 2 * pixels; at += 2) {
-    const texture = items[at] - 1;
+    if (!items[at]) continue;
+    const [texture, light] = pairs[items[at] - 1];
+    // A texel of a lightmap is so large that every pixel wants the finest level.
+    for (let k = 0; light >= 0 && k < levels[light]; k++) present[light * K + 1 + k] += each;
     if (texture < 0) continue;
     const count = levels[texture], first = texture * K + 1;
     const wanted = count - Math.min(items[at + 1] / 256, count - 1);

@@ -1,5 +1,5 @@
 // Cells from their GLBs, as docs/formats/gltf.md describes them: in unlit materials, with the textures
-// of this adapter.
+// and lightmaps of this adapter.
 
 import { ClampToEdgeWrapping, Mesh, MeshBasicMaterial, RepeatWrapping, Texture } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
@@ -73,12 +73,13 @@ export class CellLoader {
 
   /** @param {import("three").Material} material the loader's, with the extras as `userData` */
   #look({ color, opacity, transparent, alphaTest, vertexColors, side, userData }) {
-    const { texture, wrapS, wrapT, mesh } = userData;
+    const { texture, wrapS, wrapT, mesh, light } = userData;
     const wrap = (/** @type {number | undefined} */ n) => (n === CLAMP ? ClampToEdgeWrapping : RepeatWrapping);
     const map = texture === undefined ? null : this.#textureOf(texture, wrap(wrapS), wrap(wrapT));
+    const aoMap = light === undefined ? null : this.#textureOf(light, ClampToEdgeWrapping, ClampToEdgeWrapping);
     const depthWrite = !transparent;
     const drawn = { opacity, transparent, alphaTest, vertexColors, side, depthWrite };
-    return Object.assign(new MeshBasicMaterial({ color, map, ...drawn }), { userData: { mesh } });
+    return Object.assign(new MeshBasicMaterial({ color, map, aoMap, ...drawn }), { userData: { mesh } });
   }
 }
 

@@ -20,7 +20,7 @@ import { RangeFile } from "./range-file.js";
  *   description: string}[]} viewpoints
  * @property {{file: string, width: number, height: number, ends: number[], color?: number[],
  *   components?: number, offsets?: number[], previews?: {file: string, level: number, width: number,
- *   height: number, bytes: number, exact?: boolean}[]}[]} textures
+ *   height: number, bytes: number, exact?: boolean}[], light?: number}[]} textures
  * @property {{name: string, box: number[], record?: string, geometry?: string}[]} cells
  * @property {{cell: number, files: string[]}[]} [meshes] objects with levels of detail
  */
@@ -294,6 +294,7 @@ export class Walk {
    */
   #texture(number, wrapS, wrapT) {
     const row = this.index.textures[number], { file, ends, color, components, offsets } = row;
+    const light = row.light !== undefined;
     const slot = this.#textures.get(number) ?? {
       file: new RangeFile(new URL(file, this.#url)),
       copies: new Map(),
@@ -302,7 +303,7 @@ export class Walk {
     const workers = this.#options.workers ?? this.#ownWorkers;
     const previews = row.previews?.map((one) => ({ ...one, file: new URL(one.file, this.#url) }));
     const sizes = levelSizes(row);
-    const options = { workers, ends, color, components, offsets, previews, sizes, wrapS, wrapT };
+    const options = { workers, ends, color, components, offsets, previews, sizes, wrapS, wrapT, light };
     const texture =
       slot.copies.get(`${wrapS} ${wrapT}`) ?? new PtmTexture(this.#renderer, slot.file, options);
     slot.copies.set(`${wrapS} ${wrapT}`, texture);

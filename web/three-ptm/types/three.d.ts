@@ -45,6 +45,7 @@ export class Texture extends EventDispatcher {
   minFilter: number;
   anisotropy: number;
   colorSpace: string;
+  channel: number;
   set needsUpdate(value: boolean);
   clone(): this;
   dispose(): void;
@@ -60,7 +61,7 @@ export class Material {
   alphaTest: number;
   vertexColors: boolean;
   side: number;
-  userData: { texture?: number; wrapS?: number; wrapT?: number; mesh?: number };
+  userData: { texture?: number; wrapS?: number; wrapT?: number; mesh?: number; light?: number };
   dispose(): void;
 }
 export class MeshBasicMaterial extends Material {
@@ -73,6 +74,7 @@ export class MeshBasicMaterial extends Material {
     side?: number;
     depthWrite?: boolean;
     map?: Texture | null;
+    aoMap?: Texture | null;
   });
 }
 export class Object3D {
@@ -119,5 +121,6 @@ export const ClampToEdgeWrapping: number;
 export const RepeatWrapping: number;
 export const LinearFilter: number;
 export const LinearMipmapLinearFilter: number;
+export const NoColorSpace: string;
 export const SRGBColorSpace: string;
 export const MathUtils: { radToDeg(angle: number): number };

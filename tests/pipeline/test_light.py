@@ -1,0 +1,208 @@
+"""The light of a database: what it adds, when it is baked again, what is refused."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ptmtools.cli.main import main
+from ptmtools.coverage.options import AchOptions
+from ptmtools.errors import DatabaseError, InputError
+from ptmtools.light.options import LightOptions
+from ptmtools.output.gltf_reader import read_glb
+from ptmtools.output.options import EmitOptions
+from ptmtools.output.served import read_served
+from ptmtools.pipeline.build import build_scene, run_stage
+from ptmtools.pipeline.encoding import TextureOptions
+from ptmtools.pipeline.stage import Artifacts
+from ptmtools.pipeline.stages import LIGHT
+from ptmtools.pipeline.stages.light import light_of
+from ptmtools.pipeline.status import database_status, plan_build
+from ptmtools.pipeline.validation import validate
+from ptmtools.store.archive import pack_arrays, unpack_arrays
+from ptmtools.store.folder import DatabaseFolder
+from ptmtools.store.layout import arrays_of, sha256
+from ptmtools.texture import decode
+from tests.neighbours.apo.statues import write_rooms
+from tests.output.agreement import disagreements
+
+pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
+
+QUICK = AchOptions(samples=4, backend="embree")
+BAKE = LightOptions("bake", light_samples=16)
+
+
+def built(model: Path, db: Path, *options: Any, workers: int = 1) -> list[str]:
+    """The stages that a build runs."""
+    report = build_scene(model, db, QUICK, *options, workers=workers)
+    return [stage.stage for stage in report.stages if stage.ran]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the model, a database without light, and one with it."""
+    folder = tmp_path_factory.mktemp("light")
+    model = write_rooms(folder / "model", 5)
+    assert LIGHT.name not in built(model, folder / "plain.db")
+    assert LIGHT.name in built(model, folder / "lit.db", BAKE)
+    return folder
+
+
+@pytest.fixture
+def folder(made: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(made, tmp_path / "made"))
+
+
+def contents(db: Path) -> dict[str, bytes]:
+    return {p.relative_to(db).as_posix(): p.read_bytes() for p in db.rglob("*") if p.is_file()}
+
+
+def test_the_rest_of_the_database_stays(made: Path) -> None:
+    plain, lit = (contents(made / name) for name in ("plain.db", "lit.db"))
+    vrml = {name for name in plain if name.endswith(".wrl")}
+    textures = {name for name in plain if "/textures/" in name or "/previews/" in name}
+    assert vrml
+    assert textures
+    assert {name for name in vrml | textures if lit[name] != plain[name]} == set()
+    assert not any("light" in name for name in plain if not name.endswith(".json"))
+    assert validate(made / "lit.db").issues == ()
+    assert list(disagreements(made / "lit.db")) == []
+
+
+def test_each_cell_has_a_lightmap(made: Path) -> None:
+    db = made / "lit.db"
+    light = light_of(Artifacts(DatabaseFolder.open(db)))
+    assert light is not None
+    served = read_served(db)
+    rows = {row["light"]: row for row in served.index["textures"] if "light" in row}
+    assert list(rows) == np.flatnonzero(light.side).tolist()
+    for cell, row in rows.items():
+        texels = decode(served.file(row["file"]))
+        assert texels.shape == (light.side[cell], light.side[cell], 1)
+        assert (row["width"], row["components"]) == (light.side[cell], 1)
+    place = {cell: served.index["textures"].index(row) for cell, row in rows.items()}
+    for record in served.records:
+        for other, textures in zip(record["visible"], record["textures"], strict=True):
+            assert place[other] in textures
+        needs = {texture: (level, share) for texture, level, share, *_ in record["need"]}
+        for other, share in zip(record["visible"], record["ach"], strict=True):
+            if share:
+                finest = len(rows[other]["ends"]) - 1
+                assert needs[place[other]] == (finest, pytest.approx(share, rel=0.01))
+
+
+def test_dense_objects_have_colours_and_the_others_coordinates(made: Path) -> None:
+    glb = read_glb((made / "lit.db/www/gltf/c0000.glb").read_bytes())
+    statues = [p for p in glb.primitives if p.object.startswith("statue")]
+    others = [p for p in glb.primitives if not p.object.startswith("statue")]
+    assert statues
+    assert all(p.light is None and p.color is not None for p in statues)
+    assert all(p.light is not None and p.color is None for p in others)
+    assert {p.material.lightmap for p in others} == {"../textures/light~c0000.png"}
+    shade = np.concatenate([p.color for p in statues if p.color is not None])
+    assert shade.max() > 3 * shade.min()
+
+
+def test_any_number_of_workers_gives_the_same_bytes(made: Path, tmp_path: Path) -> None:
+    built(made / "model/two_rooms.obj", tmp_path / "two.db", BAKE, workers=2)
+    assert contents(tmp_path / "two.db") == contents(made / "lit.db")
+
+
+def test_baked_again_only_when_something_has_changed(folder: Path) -> None:
+    model, db = folder / "model/two_rooms.obj", folder / "lit.db"
+    assert built(model, db, BAKE) == []
+    (plan,) = (p for p in plan_build(model, db, QUICK, BAKE) if p.stage == LIGHT.name)
+    assert plan.plan == "current"
+    assert built(model, db, BAKE, TextureOptions(fallback=False)) == ["textures", "light", "emit"]
+    assert not any("light~" in name for name in contents(db) if name.endswith(".png"))
+    assert built(model, db, BAKE) == ["textures", "light", "emit"]
+    assert contents(db) == contents_of_made(folder, "lit.db")
+
+
+def contents_of_made(folder: Path, name: str) -> dict[str, bytes]:
+    """Another build of the same database, from nothing."""
+    built(folder / "model/two_rooms.obj", folder / "again.db", BAKE)
+    return contents(folder / "again.db")
+
+
+def test_light_comes_and_goes(folder: Path) -> None:
+    model, db = folder / "model/two_rooms.obj", folder / "lit.db"
+    assert built(model, db) == ["light", "emit"]
+    assert contents(db) == contents(folder / "plain.db")
+    run_stage(db, BAKE, workers=1)
+    assert {s.stage: s.state for s in database_status(db).stages}["emit"] == "stale"
+    assert built(model, db, BAKE) == ["emit"]
+    assert validate(db).issues == ()
+
+
+def test_a_database_of_an_earlier_release(folder: Path) -> None:
+    db = folder / "plain.db"
+    manifest = json.loads((db / "manifest.json").read_text())
+    del manifest["stages"][LIGHT.name]
+    (db / "manifest.json").write_text(json.dumps(manifest))
+    assert {s.state for s in database_status(db).stages} == {"done"}
+    assert validate(db).issues == ()
+    assert built(folder / "model/two_rooms.obj", db) == []
+
+
+@pytest.mark.parametrize("options", [{"light_density": 0.0}, {"light_samples": 0}])
+def test_impossible_options(options: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match="is not possible") as refused:
+        LightOptions("bake", **options)
+    assert refused.value.code == "PTM-I111"
+
+
+def test_options_without_light(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["build-scene", "x.obj", "--light-samples", "9"]) == 3
+    assert "--light-samples does nothing without --light" in capsys.readouterr().err
+
+
+def replaced(db: Path, **arrays: Any) -> None:
+    """Changes arrays of the light, and their hash in the manifest."""
+    file = db / arrays_of(LIGHT.name)
+    held = unpack_arrays(file.read_bytes(), file=file)
+    data = pack_arrays({**held, **{n: change(held[n]) for n, change in arrays.items()}})
+    text = (db / "manifest.json").read_text()
+    (db / "manifest.json").write_text(text.replace(sha256(file.read_bytes()), sha256(data)))
+    file.write_bytes(data)
+
+
+@pytest.mark.parametrize(
+    ("array", "change"),
+    [
+        ("uv", lambda uv: uv + 1),
+        ("uv", lambda uv: uv * np.nan),
+        ("side", lambda side: -side),
+        ("side", lambda side: side[1:]),
+        ("vertex", lambda vertex: vertex[1:]),
+        ("mapped", lambda mapped: mapped.astype(np.int8)),
+    ],
+)
+def test_damaged_arrays(folder: Path, array: str, change: Any) -> None:
+    db = folder / "lit.db"
+    replaced(db, **{array: change})
+    assert "PTM-D720" in {issue.code for issue in validate(db).issues}
+
+
+def test_the_light_of_other_geometry(folder: Path) -> None:
+    db = folder / "lit.db"
+    replaced(db, uv=lambda uv: uv[1:], vertex=lambda vertex: vertex[1:])
+    with pytest.raises(DatabaseError, match="light is that of other geometry") as refused:
+        run_stage(db, EmitOptions(), workers=1, rebuild=True)
+    assert refused.value.code == "PTM-D008"
+
+
+def test_a_lightmap_of_another_cell(folder: Path) -> None:
+    db = folder / "lit.db"
+    text = (db / "www/hints.json").read_text()
+    swapped = text.replace('"light":0', '"light":9').replace('"light":1', '"light":0')
+    changed = swapped.replace('"light":9', '"light":1')
+    assert changed != text
+    (db / "www/hints.json").write_text(changed)
+    messages = [issue.message for issue in validate(db).issues]
+    assert sum("is not the lightmap of this cell" in message for message in messages) >= 2
