@@ -20,6 +20,8 @@ from likeness import likeness, outline  # noqa: E402
 from render import Look, View, load, render  # noqa: E402
 
 from ptmtools.cli.main import main  # noqa: E402
+from ptmtools.output.served import read_served  # noqa: E402
+from ptmtools.rendering.drawing import ViewOptions, draw_view  # noqa: E402
 from tests.e2e.conftest import make_museum  # noqa: E402
 from tests.neighbours.apo.statues import write_rooms  # noqa: E402
 
@@ -266,3 +268,25 @@ def test_three_js_shows_objects_as_modelled(
     for stay in walked.stays:
         assert stay["groups"] == len(cells) + len(own)
     assert walked.left["bytes"] == walked.left["geometries"] == 0
+
+
+def test_three_js_shows_lightmaps(three: Any, tmp_path: Path) -> None:
+    """As `ptm render` draws them."""
+    pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
+    model = write_rooms(tmp_path / "model", 3)
+    build = ["-q", "build-scene", str(model), "-j", "1", "--backend", "embree"]
+    width, height = 320, 240
+    for name, more in (("lit", ["--light", "bake"]), ("plain", [])):
+        assert main([*build, "-o", str(tmp_path / name), *more]) == 0
+    walked = three.walk(tmp_path / "lit/www", width=width, height=height)
+    assert walked.messages == ()
+    assert any("light~" in file for file in walked.files)
+    with Image.open(io.BytesIO(walked.png)) as image:
+        shown = np.asarray(image.convert("RGB")).astype(float)
+    lit, plain = (
+        draw_view(read_served(tmp_path / name), ViewOptions(width=width, height=height))
+        for name in ("lit", "plain")
+    )
+    error = [((shown - each.astype(float)) ** 2).mean() for each in (lit, plain)]
+    assert 10 * np.log10(255**2 / error[0]) > LIKE
+    assert error[1] > 5 * error[0]

@@ -1,0 +1,115 @@
+"""Lightmaps on the page: pictures as by `ptm render`, requests, damaged files, a lost context."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import PLAIN, Visiting
+from PIL import Image
+
+from ptmtools.arrays import Floats
+from ptmtools.cli.main import main
+from ptmtools.output.served import read_served
+from ptmtools.rendering.drawing import ViewOptions, draw_view
+from ptmtools.site.content import Site, site_of
+from ptmtools.site.entry import Entry
+from ptmtools.site.pictures import pictures
+from tests.neighbours.apo.statues import write_rooms
+
+pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
+
+WIDTH, HEIGHT = 320, 240
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A database with light, and the same one without; the second statue has no texture."""
+    folder = tmp_path_factory.mktemp("light")
+    model = write_rooms(folder / "model", 5)
+    options = ["--format", "gltf", "--no-fallback", "-j", "1", "--backend", "embree"]
+    for name, more in (("lit", ["--light", "bake"]), ("plain", [])):
+        command = ["-q", "build-scene", str(model), "-o", str(folder / name), *options, *more]
+        assert main(command) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def site(folder: Path) -> Site:
+    return site_of(folder / "lit", PLAIN)
+
+
+def psnr(one: Floats, other: Floats) -> float:
+    return float(10 * np.log10(255**2 / max(((one - other) ** 2).mean(), 1e-9)))
+
+
+def lightmaps(site: Site) -> set[str]:
+    return {row["file"] for row in site.index["textures"] if "light" in row}
+
+
+@pytest.mark.parametrize("viewpoint", [0, 1])
+def test_the_page_shows_what_render_draws(
+    visit: Visiting, site: Site, folder: Path, viewpoint: int
+) -> None:
+    served, plain = (read_served(folder / name) for name in ("lit", "plain"))
+    view = ViewOptions(viewpoint=viewpoint, width=WIDTH, height=HEIGHT)
+    expected, unlit = (draw_view(each, view).astype(float) for each in (served, plain))
+    with visit(site, width=WIDTH, height=HEIGHT) as visitor:
+        visitor.complete()
+        visitor.go(viewpoint)
+        visitor.complete()
+        shown = visitor.picture().astype(float)
+        assert visitor.messages == []
+        asked = {v.path.rpartition("/")[2] for v in visitor.visits}
+        assert asked & lightmaps(site)
+    assert psnr(shown, expected) > 34
+    assert psnr(shown, expected) > psnr(shown, unlit) + 8
+
+
+def test_a_lightmap_is_in_view_with_its_cell(visit: Visiting, site: Site) -> None:
+    """With all levels, for all pixels of surfaces that it lights."""
+    rows = site.index["textures"]
+    with visit(site, width=WIDTH, height=HEIGHT) as visitor:
+        visitor.complete()
+        cell, wide, present = visitor.page.evaluate(
+            "[ptm.walk.cell, ptm.walk.catalogue.K, [...ptm.walk.present]]"
+        )
+    (number,) = (n for n, row in enumerate(rows) if row.get("light") == cell)
+    shares = present[number * wide + 1 : number * wide + 1 + len(rows[number]["ends"])]
+    assert min(shares) == pytest.approx(max(shares))
+    assert 0.3 < shares[0] <= 1
+
+
+def test_a_lightmap_that_is_damaged_or_missing(visit: Visiting, site: Site) -> None:
+    """The walk goes on with the mean light."""
+    entries: dict[str, Entry] = dict(site.entries)
+    names = [name for name in entries if name.rpartition("/")[2] in lightmaps(site)]
+    first, *others = sorted(names)
+    entries[first] = Entry(first, entries[first].read()[:40], entries[first].media)
+    for name in others:
+        del entries[name]
+    with visit(Site(entries, site.index), width=WIDTH, height=HEIGHT) as visitor:
+        visitor.page.wait_for_function("window.ptm?.errors.length > 0", timeout=90_000)
+        visitor.page.wait_for_function("ptm.walk.begun", timeout=90_000)
+        assert visitor.picture().std() > 10
+
+
+def test_a_context_that_is_lost(visit: Visiting, site: Site) -> None:
+    with visit(site, width=WIDTH, height=HEIGHT) as visitor:
+        visitor.complete()
+        before = visitor.picture().astype(int)
+        visitor.lose_context()
+        visitor.restore_context()
+        visitor.complete()
+        assert np.abs(visitor.picture().astype(int) - before).max() <= 2
+
+
+def test_posters_are_lit(folder: Path) -> None:
+    lit, plain = (
+        np.asarray(Image.open(io.BytesIO(pictures(read_served(folder / name))[0]))).astype(float)
+        for name in ("lit", "plain")
+    )
+    expected = draw_view(read_served(folder / "lit"), ViewOptions(width=640, height=360))
+    assert psnr(lit, expected.astype(float)) > psnr(plain, expected.astype(float)) + 5
