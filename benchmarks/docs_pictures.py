@@ -11,6 +11,7 @@ walk.jpg     the page of `ptm serve` in Chromium, with the map and the details o
 door-*.png   two rooms with a door leaf in the doorway; a closed door makes one unreachable
 interlace.jpg  two paintings at an eighth and a quarter of their sides: means of texels (a level of
              the `.ptm`) beside the texels of the first interlaced files, with bytes and PSNR
+light.jpg    the same view without light and with `--light bake`, as `ptm render` draws it
 apo.jpg      a bust as modelled, simplified, and with some levels of its octree
 """
 
@@ -39,7 +40,9 @@ from ptmtools.cli.main import main as command  # noqa: E402
 from ptmtools.neighbours.apo.making import make_apo, smooth, welded  # noqa: E402
 from ptmtools.neighbours.apo.model import ApoOptions  # noqa: E402
 from ptmtools.neighbours.apo.picture import RenderOptions, render as draw_octree  # noqa: E402
+from ptmtools.output.served import read_served  # noqa: E402
 from ptmtools.parallel import open_executor  # noqa: E402
+from ptmtools.rendering.drawing import ViewOptions, draw_view  # noqa: E402
 from ptmtools.scene.model import Material, Scene  # noqa: E402
 from ptmtools.scene.orientation import tolerance_of  # noqa: E402
 from ptmtools.texture import read_image  # noqa: E402
@@ -49,6 +52,8 @@ TWO_ROOMS = ROOT / "sample_data/two_rooms"
 #: The room whose visible set is shaded, and the viewpoint that is shown.
 CELL, VIEWPOINT = 9, 5
 PAINTING, LEVELS, SIDE = "painting_09", (4, 6, 8, 10), 240
+#: The viewpoint without and with light.
+LIT = 0
 #: The coarse picture has textures of 2⁵ texels a side.
 COARSE, WIDTH, HEIGHT = 5, 480, 340
 #: A door leaf that fills the doorway of the two rooms, as a line to add to the OBJ file.
@@ -210,6 +215,24 @@ def octree_levels() -> Image.Image:
     return sheet
 
 
+def lit(database: Path) -> Image.Image:
+    """A viewpoint of the museum without and with light."""
+    with tempfile.TemporaryDirectory() as folder:
+        baked = Path(folder, "baked.db")
+        shutil.copytree(database, baked)
+        ptm(
+            "build-scene",
+            str(ROOT / "build/museum/museum.obj"),
+            "-o",
+            str(baked),
+            "--light",
+            "bake",
+        )
+        view = ViewOptions(viewpoint=LIT, width=WIDTH, height=HEIGHT)
+        pictures = [draw_view(read_served(each), view) for each in (database, baked)]
+    return Image.fromarray(np.concatenate(pictures, axis=1))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("database", type=Path, help="of the sample museum")
@@ -220,6 +243,7 @@ def main() -> None:
     levels(database / f"www/textures/{PAINTING}.ptm").save(PICTURES / "levels.jpg", quality=85)
     views(database).save(PICTURES / "view.jpg", quality=85)
     walk(database).save(PICTURES / "walk.jpg", quality=85)
+    lit(database).save(PICTURES / "light.jpg", quality=85)
     interlaced(ROOT / "build/museum/textures").save(PICTURES / "interlace.jpg", quality=80)
     octree_levels().save(PICTURES / "apo.jpg", quality=88)
     with tempfile.TemporaryDirectory() as folder:

@@ -6,7 +6,8 @@ each few of them, and their coarser meshes take over colours, but no charts.
 
 The light is ambient obscurance (`light.occlusion`): indoors, a ray that meets nothing within reach
 counts whole. More of it comes from above than from below, so that forms show where nothing is near:
-a white statue in a white room. Light of 1 is that of a level surface in the open.
+a white statue in a white room. Indoors, all surfaces have something within reach in many
+directions; so that pictures keep about their colours, all light is brightened by `EXPOSURE`.
 
 A piece that shows both sides has the light of the side on which its cell lies. If that is either,
 as of a screen within a room, the more open side counts.
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
 
 #: Share of the light from straight above that comes from straight below is 1 less this.
 ABOVE = 0.5
+#: All light is multiplied by this, and cut off at 1.
+EXPOSURE = 1.2
 #: Texels with less light are covered, as a wall by a picture, and take that of their neighbours: a
 #: texel is wider than the gap that it would darken.
 COVERED = 0.03
@@ -139,8 +142,8 @@ def light_of_cell(baking: Baking, piece: Piece) -> CellLight:
 
 
 def encoded(light: Floats | Singles) -> NDArray[np.uint8]:
-    """Linear light in 255ths."""
-    return np.clip(np.rint(255 * light), 0, 255).astype(np.uint8)
+    """Linear light, brightened, in 255ths."""
+    return np.clip(np.rint(255 * EXPOSURE * light), 0, 255).astype(np.uint8)
 
 
 def pieces_of(geometry: Geometry, cells: Cells, glass: Bools) -> list[Piece]:

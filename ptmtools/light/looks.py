@@ -129,11 +129,11 @@ class Painted:
         result = np.ones(len(point), np.float32)
         for index, image in enumerate(self.images):
             these = self.image[of] == index
-            result[these] = 1 - image.strength * (1 - _bilinear(image, at[these]))
+            result[these] = 1 - image.strength * (1 - lookup(image, at[these]))
         return result
 
 
-def _bilinear(image: LightImage, at: Floats) -> Singles:
+def lookup(image: LightImage, at: Floats) -> Singles:
     """(n,) light of an image at (n, 2) coordinates from its lower left."""
     texels, (across, up) = image.texels, image.wrap
     left, right, s = _between(at[:, 0], texels.shape[1], across)
