@@ -1,7 +1,8 @@
-// The panels, the policies besides the default, and decoding of previews for browsers whose workers cannot: a script
-// of its own, loaded when one of them is first needed.
+// The panels, the policies besides the default, the measurement of texture memory, and decoding of previews
+// for browsers whose workers cannot: a script of its own, loaded when one of them is first needed.
 
 export { WholeMemory } from "./gl/whole-memory.js";
+export { measureBudget } from "./measuring.js";
 export { Paper } from "./policy/paper.js";
 export { Whole } from "./policy/whole.js";
 export { attachMenu } from "./ui/menu.js";
