@@ -11,7 +11,7 @@ leaves; one that is larger than the budget has its mean colour. `best` and `pape
 budget by levels of detail.
 
 Folders of `ptm apo` (Lacoste et al., Table 1): one turn around the object, with all levels that the
-screen can show. Folders of `ptm campus` (Cremona & Thorn, Chart 4): the walk `--walk` by each
+screen can show. Folders of `ptm campus` (Chart 4 of their paper): the walk `--walk` by each
 preset.
 
 Prints of each row the median and the 5th percentile of the frames per second, over windows of a
@@ -58,15 +58,17 @@ WINDOW, STEP, STALL = 1.0, 0.1, 0.05
 SWING, PERIOD = np.radians(100), 5.0
 #: s of a stop before a picture: the way is to lead through many rooms.
 BRIEF = 0.5
-#: s without a request after which nothing more is on its way, and for which this is waited for.
-IDLE, PATIENCE = 1.0, 300.0
+#: s without a request after which nothing more is on its way; the longest waits for this, and for
+#: the beginning.
+IDLE, PATIENCE, BEGINNING = 1.0, 300.0, 120.0
 #: Degrees of the turn around an object, and of its elevation.
 TURN, ELEVATION = 360.0, 15.0
 UNSHOWN = """\
 Not shown: the card of the paper had 64 MB and read other textures over its AGP bus. Here the budget
-of the page stands for the memory of the card, and an upload for a transfer over the bus. A card whose
-memory holds the scene is never short of it, and its bus is faster. With software rendering texture
-memory is main memory: an upload is a copy, and drawing takes most of the time of a large picture."""
+of the page stands for the memory of the card, and an upload for a transfer over the bus. A card
+whose memory holds the scene is never short of it, and its bus is faster. With software rendering
+texture memory is main memory: an upload is a copy, and drawing takes most of the time of a large
+picture."""
 
 
 class Pace(NamedTuple):
@@ -172,15 +174,22 @@ def pages_of_campus(way: Floats, presets: Sequence[str]) -> list[Page]:
 def played(browser: Any, site: Site, page: Page, *, size: tuple[int, int]) -> tuple[Floats, str]:
     """(n, 3) frames of a page the second time that its way is played, and what drew them.
 
-    Raises RuntimeError with what the page says if it never becomes ready.
+    Raises RuntimeError with the text of the page if it never becomes ready.
     """
+    from playwright.sync_api import TimeoutError as TooLong
+
     context = browser.new_context(viewport={"width": size[0], "height": size[1]})
     try:
         tab = context.new_page()
         tab.add_init_script(path=SCRIPT)
         with serving(site.entries) as url:
             tab.goto(url + page.query)
-            tab.wait_for_function(page.ready, timeout=1000 * PATIENCE)
+            try:
+                tab.wait_for_function(page.ready, timeout=1000 * BEGINNING)
+            except TooLong as fault:
+                raise RuntimeError(
+                    f"{page.name} does not begin: {tab.inner_text('body')}"
+                ) from fault
             tab.evaluate(page.prepare)
             play = f"(way) => play(way, {page.place})"
             tab.evaluate(play, page.way.tolist())
@@ -282,13 +291,12 @@ def opened(given: str, options: argparse.Namespace) -> tuple[Site, list[Page]]:
     if given in (*SCENES, *SAMPLES):
         make_scene(given)
         database = database_of(given)
-    walk = options.walk
+    site, walk = site_of(database, SiteOptions(pictures=False)), options.walk
     if not walk:
         walk = options.output / f"{folder.stem}.json"
         words = ("--duration", options.seconds, "--stop", BRIEF, "--force")
         ptm("path", database, "-o", walk, *words)
     way = way_of(read_walk(walk), options.seconds, swing=0.0 if options.walk else SWING)
-    site = site_of(database, SiteOptions(pictures=False))
     return site, pages_of_database(way, options.budgets, options.policies)
 
 
@@ -314,6 +322,12 @@ def lines_of(
     yield f"\nDrawn by {', '.join(sorted(names))}; plot: {file}\n"
 
 
+def sides(text: str) -> tuple[int, int]:
+    """Width and height, pixels. Raises ValueError if the text names none."""
+    width, height = (int(side) for side in text.split("x"))
+    return width, height
+
+
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description="Frames per second in a browser.")
     add = parser.add_argument
@@ -322,14 +336,16 @@ def main(arguments: list[str] | None = None) -> int:
     add("--policies", nargs="+", default=POLICIES, choices=POLICIES)
     add("--seconds", type=float, default=60.0, help="of the walk (default 60)")
     add("--walk", type=Path, help="walk of `ptm path`, or a recording of the page; played as it is")
-    add("--size", default="1280x1024", help="WIDTHxHEIGHT of the window (default 1280x1024)")
+    add("--size", type=sides, default="1280x1024", metavar="WIDTHxHEIGHT",
+        help="of the window (default 1280x1024)")  # fmt: skip
     add("--headed", action="store_true", help="show the window")
     add("--angle", default=SOFTWARE, metavar="NAME",
         help="what draws: swiftshader (default), gl, gl-egl, vulkan, metal, d3d11")  # fmt: skip
     add("--uncapped", action="store_true", help="more frames than the screen shows")
     add("-o", "--output", type=Path, default=ROOT / "build/bench/frame_rate", metavar="DIR")
     options = parser.parse_args(arguments)
-    width, height = (int(n) for n in options.size.split("x"))
+    if web.chromium() is None:
+        parser.exit(1, "frame_rate: apt install chromium\n")
     options.output.mkdir(parents=True, exist_ok=True)
     with chromium(options) as browser:
         for given in options.given:
@@ -337,11 +353,14 @@ def main(arguments: list[str] | None = None) -> int:
                 site, pages = opened(given, options)
             except PtmError as error:
                 parser.exit(error.exit_status, f"frame_rate: {error}\n")
-            title = f"{Path(given).stem}, {options.size}"
+            title = f"{Path(given).stem}, {options.size[0]} × {options.size[1]}"
             file = options.output / f"{Path(given).stem}.png"
-            play = partial(played, browser, site, size=(width, height))
-            for line in lines_of(title, pages, play, file):
-                print(line, flush=True)
+            play = partial(played, browser, site, size=options.size)
+            try:
+                for line in lines_of(title, pages, play, file):
+                    print(line, flush=True)
+            except RuntimeError as error:
+                parser.exit(1, f"frame_rate: {error}\n")
             if not form_of(Path(given)):
                 print(UNSHOWN, end="\n\n", flush=True)
     return 0
