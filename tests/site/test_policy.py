@@ -37,7 +37,7 @@ from tests.web.node import missing, run
 
 __all__ = ["two_rooms", "walk_file", "world"]
 
-EACH = pytest.mark.parametrize("policy", ["best", "paper"])
+EACH = pytest.mark.parametrize("policy", ["best", "paper", "whole"])
 #: Cases that one process answers.
 CASES = 200
 

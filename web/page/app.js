@@ -1,5 +1,6 @@
 // The application: what the interface, tests and users of the console (`window.ptm`) call.
 
+import { loadLater } from "./load-later.js";
 import { clock } from "./net/fetcher.js";
 import { loadPolicy } from "./policy/policies.js";
 import { Recorder } from "./recorder.js";
@@ -26,6 +27,8 @@ const LONGEST = 0.1;
 export class App {
   /** @type {Map<string, ((detail: any) => void)[]>} */
   #listeners = new Map();
+  /** What `?memory=auto` measured. @type {import("./measuring.js").Measured | null} */
+  measured = null;
   /** The policy that was chosen last; it may be on its way. */
   #wanted = "";
 
@@ -57,6 +60,7 @@ export class App {
     const { connection } = /** @type {{connection?: {saveData?: boolean}}} */ (navigator);
     walk.saving = connection?.saveData === true;
     walk.memory.fades = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+    if (query.get("memory") === "auto") this.on("first-picture", () => this.#measure());
     this.solids = new Solids();
     /** @param {number[]} eye */
     const locate = (eye) => walk.locator.locate(eye, walk.cell);
@@ -123,6 +127,12 @@ export class App {
   /** @param {number} bytes of texture memory */
   setBudget(bytes) {
     this.walk.budget = bytes;
+  }
+
+  /** Measures the budget of texture memory. */
+  #measure() {
+    loadLater().then(async ({ measureBudget }) => (this.measured = await measureBudget(this)))
+      .catch(() => this.emit("notice", { message: "Texture memory could not be measured." }));
   }
 
   /** @param {number} seconds that a level may take while one moves: §6.2's δt */

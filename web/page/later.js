@@ -1,7 +1,10 @@
-// The panels, the policy of the paper, and decoding of previews for browsers whose workers cannot: a script
-// of its own, loaded when one of them is first needed.
+// The panels, the policies besides the default, the measurement of texture memory, and decoding of previews
+// for browsers whose workers cannot: a script of its own, loaded when one of them is first needed.
 
+export { WholeMemory } from "./gl/whole-memory.js";
+export { measureBudget } from "./measuring.js";
 export { Paper } from "./policy/paper.js";
+export { Whole } from "./policy/whole.js";
 export { attachMenu } from "./ui/menu.js";
 export { attachMinimap } from "./ui/minimap.js";
 export { attachOverlay } from "./ui/overlay.js";

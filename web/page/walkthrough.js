@@ -140,7 +140,7 @@ export class Walkthrough {
       report: (error, kind, number) => this.#report(error, kind, number),
     });
     this.rows = index.textures.map(levelsOf);
-    this.memory = new TextureMemory(gl, this.rows, (t, levels) => this.stream.decode(t, levels));
+    this.memory = this.#memoryOf();
     this.means = index.textures.map(({ color }) => color);
     const low = [0, 1, 2].map((k) => Math.min(...index.cells.map(({ box }) => box[k])));
     const high = [0, 1, 2].map((k) => Math.max(...index.cells.map(({ box }) => box[k + 3])));
@@ -349,6 +349,22 @@ export class Walkthrough {
   choose(policy) {
     this.policy = policy;
     this.client.policy = POLICIES[policy];
+    this.memory = this.#memoryOf(this.memory);
+    if (this.renderer) this.renderer.memory = this.memory;
+    this.touch();
+  }
+
+  /**
+   * Texture memory of the kind that the policy draws from: the present one, or another in its place.
+   * @param {import("./gl/renderer.js").Textures} [before]
+   * @returns {import("./gl/renderer.js").Textures}
+   */
+  #memoryOf(before) {
+    const { Memory = TextureMemory } = POLICIES[this.policy];
+    if (before instanceof Memory) return before;
+    before?.delete();
+    const memory = new Memory(this.gl, this.rows, (t, levels) => this.stream.decode(t, levels));
+    return Object.assign(memory, { fades: before?.fades ?? true });
   }
 
   /** The levels of each texture that the view wants, or null before the first item buffer. */

@@ -21,7 +21,7 @@ from ptmtools.lab.policies.engine import EngineClient, Policy
 from ptmtools.lab.policies.oracle import Oracle
 from ptmtools.lab.policies.paper import PaperClient, PaperOptions
 from ptmtools.lab.policies.shares import BEST, Screen, Weighted
-from ptmtools.lab.policies.whole_files import GpuiiClient, LruClient
+from ptmtools.lab.policies.whole_files import GpuiiClient, LruClient, WholeClient
 from ptmtools.lab.world import World
 
 
@@ -81,6 +81,7 @@ _LIST = (
         "paper", "client of Marvie & Bouatouch, §6.1 and §6.2", PaperClient, options=PaperOptions()
     ),
     PolicyEntry("lru", "whole files in order of use, with a cache", LruClient),
+    PolicyEntry("whole", "as lru, without levels: textures whole or not at all", WholeClient),
     PolicyEntry(
         "gpuii",
         "client of Englert et al., §3.3: interlaced images, in rings around the camera",

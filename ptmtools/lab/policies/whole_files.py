@@ -4,6 +4,11 @@
 removes the least recently seen. It is what files and a cache achieve, without any hint but the
 visible sets.
 
+`whole` requests the same, of the visible set of the cell alone, and holds a texture whole or not at
+all: what a program without levels of detail draws. The last look decides which are the least
+recently seen ones. The page with this policy also uploads what does not fit, in each picture again
+(`web/page/gl/whole-memory.js`), to show what that costs. Here it has its mean colour.
+
 `gpuii` fetches interlaced images as Englert et al. do ("Efficient Image Distribution on the Web",
 2014, §3.3). The next file is the most important one, by four criteria:
 
@@ -104,6 +109,56 @@ class LruClient(WholeFileClient):
             return
         while self._queue and len(self.waiting) < CONNECTIONS:
             self.request(Kind.TEXTURE, self._queue.pop(0))
+
+
+class WholeClient(WholeFileClient):
+    """The client `whole` of the module."""
+
+    def __init__(self, world: World, link: Link, budget: int) -> None:
+        super().__init__(world, link, budget)
+        stock = world.catalogue
+        self._size = stock.memory[np.arange(stock.texture_count), stock.stored]
+        #: Textures by their first sight; and those in memory, the least recently seen first.
+        self._order: dict[int, None] = {}
+        self._held: dict[int, None] = {}
+
+    def settle(self) -> None:
+        """See `Client.settle`: textures that are here are used in the order of their shapes."""
+        stock = self.world.catalogue
+        met, visible = self.shapes_ahead(), stock.visible[self.cell] if self.cell >= 0 else ()
+        met = met[np.isin(stock.shapes.cell[met], visible)]
+        seen = dict.fromkeys(stock.shapes.texture[met].tolist())
+        self._order |= seen
+        whole = self.have >= stock.stored
+        for t in seen:
+            if whole[t] and self._size[t] <= self.budget:
+                self._held.pop(t, None)
+                self._shrink(self.budget - int(self._size[t]))
+                self._held[t] = None
+        self.column[:] = 0
+        held = [*self._held]
+        self.column[held] = stock.stored[held]
+
+    def fetch(self) -> None:
+        """See `Client.fetch`: one after the other, whole."""
+        if not self.documents():
+            return
+        for t in self._order:
+            if len(self.waiting) >= CONNECTIONS:
+                break
+            self.request(Kind.TEXTURE, t)
+
+    def modelled(self, cells: Ints) -> list[int]:
+        """See `Client.modelled`: after the geometry of their cells."""
+        return super().modelled(cells[self.geometry.whole[cells]])
+
+    def _shrink(self, budget: int) -> None:
+        """The least recently seen textures leave until the others fit."""
+        used = int(self._size[[*self._held]].sum())
+        while used > budget:
+            t = next(iter(self._held))
+            del self._held[t]
+            used -= int(self._size[t])
 
 
 #: Width of a ring around the camera, metres. Narrower rings make worse pictures, wider ones are not

@@ -14,6 +14,9 @@ import { aim, programOf } from "./program.js";
  * @property {Batch[]} batches
  */
 
+/** @typedef {Pick<TextureMemory, keyof TextureMemory>} Textures a texture memory of any kind */
+/** @typedef {import("./texture-memory.js").TextureMemory} TextureMemory */
+
 /** The background. */
 const SKY = [0.16, 0.17, 0.19, 1];
 
@@ -25,7 +28,7 @@ export class Renderer {
 
   /**
    * @param {WebGL2RenderingContext} gl
-   * @param {import("./texture-memory.js").TextureMemory} memory
+   * @param {Textures} memory
    * @param {number[][]} means the mean colour of each texture, 0 to 255
    */
   constructor(gl, memory, means) {

@@ -5,6 +5,7 @@
 // only for levels finer than those of the `.ptm`, the coarsest first.
 
 import { duration } from "./estimate.js";
+import { boxed, lacking, modelled } from "./files.js";
 import { refresh, shareOut } from "./sharing.js";
 import { meetsBox, meetsHull } from "../space/frustum.js";
 import { nextCell } from "../space/portals.js";
@@ -69,7 +70,7 @@ export class Paper {
     for (const [i, c] of here.visible.entries()) {
       const some = shapes[c], hull = known[c]?.hull;
       if (!some || !downloads.has("geometry", c)) continue;
-      if (c !== cell && !(hull ? meetsHull(frustum, hull) : this.#boxed(c))) continue;
+      if (c !== cell && !(hull ? meetsHull(frustum, hull) : boxed(this.#client, c))) continue;
       const { textures, boxes } = some;
       const ahead = textures.filter((_, s) => meetsBox(frustum, boxes, boxes, 6 * s, 6 * s + 3));
       cells.push({ weight: here.coverage[i], textures: ahead });
@@ -77,31 +78,10 @@ export class Paper {
     return cells.sort((a, b) => b.weight - a.weight);
   }
 
-  /** Whether the box of a cell, whose hull is not known, meets the frustum. @param {number} c */
-  #boxed(c) {
-    const { catalogue, frustum } = this.#client;
-    return !!frustum && meetsBox(frustum, catalogue.low, catalogue.high, 3 * c);
-  }
-
   /** @param {(kind: Kind, number: number) => boolean} counts */
   missing(counts) {
-    const { cell, here, known, downloads } = this.#client;
-    let count = downloads.has("record", here) || !counts("record", here) ? 0 : 1;
-    for (const c of known[cell]?.visible ?? []) {
-      const seen = c === cell || this.#boxed(c);
-      if (seen && !downloads.has("geometry", c) && counts("geometry", c)) count++;
-    }
-    for (const k of this.#modelled()) {
-      if (!downloads.has("mesh", k) && counts("mesh", k)) count++;
-    }
-    return count + this.#asks.filter((t) => counts(...this.#nextOf(t))).length;
-  }
-
-  /** The files that have objects of visible cells with geometry as modelled: the paper has no others. */
-  #modelled() {
-    const { catalogue: { meshes }, cell, known, downloads } = this.#client;
-    return [...meshes.keys()].filter((k) => meshes[k + 1]?.mesh !== meshes[k].mesh
-      && known[cell]?.visible.includes(meshes[k].cell) && downloads.has("geometry", meshes[k].cell));
+    const levels = this.#asks.filter((t) => counts(...this.#nextOf(t)));
+    return lacking(this.#client, counts) + levels.length;
   }
 
   /**
@@ -126,7 +106,7 @@ export class Paper {
     if (own) {
       for (const c of own.visible) files.push(["geometry", c, VISIBLE]);
       const following = this.#following();
-      for (const k of this.#modelled()) files.push(["mesh", k, VISIBLE]);
+      for (const k of modelled(this.#client)) files.push(["mesh", k, VISIBLE]);
       if (following >= 0) files.push(["record", following, NEXT], ["geometry", following, NEXT]);
     }
     return this.#first(files) ?? this.#level(estimate);

@@ -18,6 +18,7 @@ import { attachLoading } from "./loading.js";
  * @property {(pose: import("../walk/walker.js").Pose) => void} follow a link
  * @property {() => State} state
  * @property {() => Plan} plan
+ * @property {{bytes: number} | null} measured budget of texture memory; 0 if none was fit
  * @property {(bytes: number) => void} setBudget of texture memory
  * @property {(seconds: number) => void} setPatience
  * @property {(name: string) => Promise<void>} setPolicy

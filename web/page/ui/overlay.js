@@ -35,7 +35,8 @@ export function attachOverlay(root, app) {
   let timer = 0;
   const show = () => {
     const state = app.state(), { residentBytes, budgetBytes, levels } = state;
-    memory.textContent = `Texture memory: ${inMemory(residentBytes)} of ${inMemory(budgetBytes)}`;
+    const how = app.measured?.bytes === budgetBytes ? ", measured" : "";
+    memory.textContent = `Texture memory: ${inMemory(residentBytes)} of ${inMemory(budgetBytes)}${how}`;
     fill.max = budgetBytes;
     fill.value = residentBytes;
     ROWS.forEach(([, textOf], k) => {

@@ -4,34 +4,39 @@ import { find, inMemory, make } from "./elements.js";
 
 /** @typedef {import("./all.js").App} App */
 
-const MIB = 2 ** 20, POLICIES = ["best", "paper"];
+const MIB = 2 ** 20, POLICIES = ["best", "paper", "whole"];
 
 /**
  * A slider that is moved by factors of the square root of two.
- * @param {string} name @param {number[]} range least and greatest @param {number} now
+ * @param {HTMLElement} root the panel: the slider is up to date when it opens
+ * @param {string} name @param {number[]} range least and greatest @param {() => number} now
  * @param {(value: number) => string} textOf @param {(value: number) => void} choose
  */
-function slider(name, [least, greatest], now, textOf, choose) {
-  const shown = make("span", { ariaHidden: "true" }, textOf(now));
+function slider(root, name, [least, greatest], now, textOf, choose) {
+  const shown = make("span", { ariaHidden: "true" });
   const at = (/** @type {number} */ value) => Math.round(2 * Math.log2(value / least));
-  const input = make("input", { type: "range", min: 0, max: at(greatest), value: at(now) });
+  const input = make("input", { type: "range", min: 0, max: at(greatest) });
   const value = () => least * 2 ** (input.value / 2);
-  const show = () => (shown.textContent = input.ariaValueText = textOf(value()));
-  input.oninput = show;
+  const show = (/** @type {number} */ value) => (shown.textContent = input.ariaValueText = textOf(value));
+  input.oninput = () => show(value());
   input.onchange = () => choose(value());
-  input.ariaValueText = textOf(now);
+  root.addEventListener("open", () => {
+    input.value = at(now());
+    show(now());
+  });
   return make("label", {}, name, shown, input);
 }
 
 /** @param {HTMLElement} root the panel @param {App} app */
 export function attachSettings(root, app) {
-  const { budgetBytes, patience = 0.5, policy, dataSaver = false } = app.state();
+  const { policy, dataSaver = false } = app.state();
   const saver = make("input", { type: "checkbox", role: "switch", checked: dataSaver });
   saver.onchange = () => app.setDataSaver(saver.checked);
   const policies = POLICIES.map((one) => make("option", { selected: one === policy }, one));
   const choice = make("select", {}, ...policies);
   const seconds = (/** @type {number} */ value) => `${value.toPrecision(2)} s`;
-  const waiting = slider("Patience, δt", [0.0625, 4], patience, seconds, (s) => app.setPatience(s));
+  const waiting = slider(root, "Patience, δt", [0.0625, 4], () => app.state().patience ?? 0.5, seconds,
+    (s) => app.setPatience(s));
   // Only the paper's policy uses it.
   waiting.hidden = policy !== "paper";
   choice.onchange = async () => {
@@ -58,7 +63,8 @@ export function attachSettings(root, app) {
   root.append(
     make("h3", {}, "Settings"),
     make("label", { className: "switch" }, "Data saver: only what is in view", saver),
-    slider("Texture memory", [4 * MIB, 4096 * MIB], budgetBytes, inMemory, (bytes) => app.setBudget(bytes)),
+    slider(root, "Texture memory", [4 * MIB, 4096 * MIB], () => app.state().budgetBytes, inMemory,
+      (bytes) => app.setBudget(bytes)),
     make("label", {}, "Policy", choice),
     waiting,
     make("p", { className: "row" }, freeze, compare),
