@@ -12,12 +12,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, Ints, Singles
+from ptmtools.arrays import Floats, Ints, Singles, areas
 from ptmtools.cells.search import connected
 from ptmtools.jit import kernel
 from ptmtools.lazy import component
@@ -51,9 +51,18 @@ class Atlas:
     side: int | None
 
 
-def unwrap(points: Floats, triangles: NDArray[np.integer[Any]], sizes: Sequence[int]) -> Atlas:
+def unwrap(
+    points: Floats,
+    triangles: NDArray[np.integer[Any]],
+    sizes: Sequence[int],
+    padding: int = 0,
+    group: Ints | None = None,
+) -> Atlas:
     """An atlas of (T, 3) triangles over (V, 3) points, for square lightmaps of ascending ``sizes``,
     texels.
+
+    ``padding``: texels between charts beyond those that are read. ``group``: (T,) numbers; faces of
+    different groups share no chart.
 
     Raises MissingComponentError: PTM-M100 xatlas is not installed.
     """
@@ -63,49 +72,76 @@ def unwrap(points: Floats, triangles: NDArray[np.integer[Any]], sizes: Sequence[
     largest = float(np.abs(near).max(initial=0.0))
     unit = _LARGE / largest if largest else 1.0
     moved = (near * unit).astype(np.float32)
-    corner = moved[triangles].astype(np.float64)
-    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    area = max(np.linalg.norm(across, axis=1).sum() / 2, np.finfo(np.float32).tiny)
+    parts = _parts(np.zeros(len(triangles), np.int64) if group is None else group)
+    area = max(areas(moved[triangles].astype(np.float64)).sum(), np.finfo(np.float32).tiny)
     for side in sizes:
         wanted = side * math.sqrt(FILLED / area)
-        atlas, density = _packed(xatlas, moved, triangles, side, wanted)
-        if density >= _WORTH * wanted or _longest(atlas) >= _LONG * side:
+        packed, density = _packed(xatlas, moved, triangles, parts, side, wanted, padding)
+        if density >= _WORTH * wanted or _longest(packed) >= _LONG * side:
             break
-    got = max(atlas.width, atlas.height)
-    _, index, uv = atlas.get_mesh(0)
-    scale = np.array([atlas.width, atlas.height]) / max(got, side)
-    placed = uv.astype(np.float64)[index.astype(np.int64)] * scale
+    placed = packed.texel / max(packed.size, side)
     placed[..., 1] = 1 - placed[..., 1]
-    chart = connected(len(uv), index)
-    return Atlas(np.clip(placed, 0.0, 1.0), chart[index[:, 0]], side if got <= side else None)
+    fits = packed.size <= side
+    return Atlas(np.clip(placed, 0.0, 1.0), packed.chart, side if fits else None)
+
+
+def _parts(group: Ints) -> list[Ints]:
+    """The faces of each group."""
+    order = np.argsort(group, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(group[order])) + 1)
+
+
+class _Packed(NamedTuple):
+    """(T, 3, 2) the corners of faces, texels from the upper left; (T,) the chart of each; the
+    larger side of the atlas."""
+
+    texel: Floats
+    chart: Ints
+    size: int
 
 
 def _packed(
-    xatlas: Any, points: Singles, triangles: NDArray[np.integer[Any]], side: int, density: float
-) -> tuple[Any, float]:
-    """An atlas for a lightmap of that side, and its texels to the metre, ``density`` at most."""
+    xatlas: Any,
+    points: Singles,
+    triangles: NDArray[np.integer[Any]],
+    parts: list[Ints],
+    side: int,
+    density: float,
+    padding: int,
+) -> tuple[_Packed, float]:
+    """An atlas for a lightmap of that side, a mesh for each part, and its texels to the metre,
+    ``density`` at most."""
     for _ in range(_TRIES):
         atlas = xatlas.Atlas()
-        atlas.add_mesh(points, triangles.astype(np.uint32))
+        for faces in parts:
+            used, index = np.unique(triangles[faces], return_inverse=True)
+            atlas.add_mesh(points[used], index.reshape(-1, 3).astype(np.uint32))
         packing = xatlas.PackOptions()
-        packing.padding, packing.bilinear, packing.texels_per_unit = 0, True, density
+        packing.padding, packing.bilinear = padding, True
+        packing.texels_per_unit = density
         atlas.generate(xatlas.ChartOptions(), packing)
         got = max(atlas.width, atlas.height)
         if got <= side:
             break
         density *= 0.97 * side / got
-    return atlas, density
+    texel, chart = np.zeros((len(triangles), 3, 2)), np.zeros(len(triangles), np.int64)
+    charts = 0
+    for k, faces in enumerate(parts):
+        _, index, uv = atlas.get_mesh(k)
+        index = index.astype(np.int64)
+        texel[faces] = uv.astype(np.float64)[index] * [atlas.width, atlas.height]
+        chart[faces] = charts + connected(len(uv), index)[index[:, 0]]
+        charts += len(uv)
+    return _Packed(texel, chart, got), density
 
 
-def _longest(atlas: Any) -> float:
+def _longest(packed: _Packed) -> float:
     """The longest side of the box of a chart, texels."""
-    _, index, uv = atlas.get_mesh(0)
-    chart = connected(len(uv), index)
-    low, high = np.full((len(uv), 2), np.inf), np.full((len(uv), 2), -np.inf)
-    np.minimum.at(low, chart, uv)
-    np.maximum.at(high, chart, uv)
-    size = np.array([atlas.width, atlas.height])
-    return float(((high - low)[np.unique(chart)] * size).max())
+    _, chart = np.unique(packed.chart, return_inverse=True)
+    low, high = (np.full((int(chart.max()) + 1, 2), end) for end in (np.inf, -np.inf))
+    np.minimum.at(low, chart, packed.texel.min(axis=1))
+    np.maximum.at(high, chart, packed.texel.max(axis=1))
+    return float((high - low).max())
 
 
 @kernel

@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles, areas
 from ptmtools.light.atlas import FILLED, unwrap
-from ptmtools.light.lightmap import bake, vertex_light
-from ptmtools.light.looks import Rays, open_sides
+from ptmtools.light.lightmap import SMOOTH, bake, vertex_light
+from ptmtools.light.looks import Rays, open_sides, planes
 from ptmtools.light.occlusion import Surroundings, normals
 from ptmtools.output.mesh_levels import MANY
 
@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     from ptmtools.output.content import Geometry
 
 #: Share of the light from straight above that comes from straight below is 1 less this.
-ABOVE = 0.5
+ABOVE = 0.4
 #: All light is multiplied by this, and cut off at 1.
-EXPOSURE = 1.2
+EXPOSURE = 1.1
 #: Texels with less light are covered, as a wall by a picture, and take that of their neighbours: a
 #: texel is wider than the gap that it would darken.
 COVERED = 0.03
@@ -46,6 +46,9 @@ COVERED = 0.03
 _MULTIPLE = 16
 #: and at most this, texels.
 _LARGEST = 2048
+#: Texels between charts: coordinates are rounded by up to a tenth of a texel in GLBs, and would
+#: read the edge of another chart, a thin dark line.
+_PADDING = 1
 #: The sides of a piece are examined this far off it, in units of the tolerance of planes.
 _OFF = 4.0
 
@@ -114,7 +117,13 @@ class Baking:
         own = np.flatnonzero(flat)
         points, triangles = np.unique(piece.corner[own].reshape(-1, 3), axis=0, return_inverse=True)
         sizes = _sizes(float(areas(corner[own]).sum()), self.options.light_density)
-        atlas = unwrap(points.astype(np.float64), triangles.reshape(-1, 3).astype(np.int32), sizes)
+        atlas = unwrap(
+            points.astype(np.float64),
+            triangles.reshape(-1, 3).astype(np.int32),
+            sizes,
+            _PADDING,
+            _groups(corner[own], side[own]),
+        )
         look = self._look(corner[own], side[own])
         size = atlas.side or sizes[-1]
         (lit,) = bake(look, corner[own], atlas, look.grain, (size,), least=COVERED)
@@ -188,6 +197,15 @@ def _dense(number: Ints) -> Bools:
 def _objects(number: Ints, chosen: Bools) -> list[Ints]:
     """The chosen pieces of each object."""
     return [np.flatnonzero(chosen & (number == one)) for one in np.unique(number[chosen]).tolist()]
+
+
+def _groups(corner: Floats, side: Floats) -> Ints:
+    """(n,) numbers, equal for faces that one chart may have: light differs on the two sides of an
+    edge, and of a wall."""
+    normal = normals(corner)
+    smooth = planes(corner, normal, np.ones(len(corner), np.bool_), SMOOTH)
+    along = np.einsum("nx,nx->n", normal, normal[smooth])
+    return np.asarray(2 * smooth + (side * along > 0))
 
 
 def _sizes(area: float, density: float) -> tuple[int, ...]:

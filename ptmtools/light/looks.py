@@ -205,9 +205,10 @@ def open_sides(
     return np.where(wanted, np.where((back > front)[plane], -sign, sign), 1.0)
 
 
-def planes(corner: Floats, normal: Floats, of: Bools) -> Ints:
+def planes(corner: Floats, normal: Floats, of: Bools, cosine: float = PARALLEL_COSINE) -> Ints:
     """(T,) for each of (T, 3, 3) faces the first face in its plane that edges connect with it, by
-    way of the faces ``of``, (T,)."""
+    way of the faces ``of``, (T,). Faces whose (T, 3) normals have this dot product, of either sign,
+    count as of one plane."""
     count = len(corner)
     vertex = np.unique(corner.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(-1, 3)
     edge = np.sort(np.stack([vertex, np.roll(vertex, -1, axis=1)], axis=2), axis=2).reshape(-1, 2)
@@ -217,7 +218,7 @@ def planes(corner: Floats, normal: Floats, of: Bools) -> Ints:
     for step in range(1, _AT_AN_EDGE):
         one, other = face[:-step], face[step:]
         alike = (edge[:-step] == edge[step:]).all(axis=1) & of[one] & of[other]
-        alike &= np.abs(np.einsum("nx,nx->n", normal[one], normal[other])) >= PARALLEL_COSINE
+        alike &= np.abs(np.einsum("nx,nx->n", normal[one], normal[other])) >= cosine
         pairs.append(np.stack([one[alike], other[alike]], axis=1))
     joined = np.concatenate(pairs)
     return connected(count, joined)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -124,3 +126,17 @@ def test_a_cell_without_surfaces() -> None:
     result = Baking(surroundings(room()), LightOptions("bake")).light(piece(np.zeros((0, 3, 3))))
     assert result.texels is None
     assert not len(result.mapped)
+
+
+def test_light_does_not_lead_over_edges_or_to_the_other_side() -> None:
+    """A wall, the lower half of which shows its front, and the upper half its dark back."""
+    low = quad((0, 0, 0), (6, 0, 0), (6, 3, 0), (0, 3, 0))
+    high = quad((0, 3, 0), (6, 3, 0), (6, 6, 0), (0, 6, 0))
+    behind = quad((-9, -9, -0.3), (15, -9, -0.3), (15, 15, -0.3), (-9, 15, -0.3))
+    corner = np.concatenate([low, high])
+    faces = replace(piece(corner), side=np.array([1, 1, -1, -1], np.int8))
+    baking = Baking(surroundings(corner, behind), LightOptions("bake", light_samples=256))
+    result = baking.light(faces)
+    assert at(result, 2, MIDDLE) < 0.3
+    for share in ((0.05, 0.05, 0.9), (0.2, 0.001, 0.799)):  # up to the edge between them
+        assert at(result, 0, share) > 0.7
