@@ -10,7 +10,7 @@ import io
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import groupby
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,13 +41,18 @@ def require() -> None:
     component("matplotlib.figure", "PTM-M100", "matplotlib is missing", "plot")
 
 
-def plot(size: tuple[float, float], drawings: Sequence[Callable[[Any], None]]) -> bytes:
-    """A PNG of panels, one below the other, of this ``size`` in inches each; every drawing gets the
-    axes of its panel.
+def plot(
+    size: tuple[float, float],
+    drawings: Sequence[Callable[[Any], None]],
+    form: Literal["png", "svg"] = "png",
+) -> bytes:
+    """A PNG or SVG of panels, one below the other, of this ``size`` in inches each; every drawing
+    gets the axes of its panel.
 
     Raises `MissingComponentError` PTM-M100 without matplotlib.
     """
     require()
+    import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -57,7 +62,10 @@ def plot(size: tuple[float, float], drawings: Sequence[Callable[[Any], None]]) -
     for number, draw in enumerate(drawings):
         draw(figure.add_subplot(many, 1, number + 1))
     out = io.BytesIO()
-    figure.savefig(out, format="png", metadata={"Software": None})
+    # The same figures give the same bytes.
+    free = {"Software": None} if form == "png" else {"Date": None, "Creator": None}
+    with matplotlib.rc_context({"svg.hashsalt": "ptmtools"}):
+        figure.savefig(out, format=form, metadata=free)
     return out.getvalue()
 
 
