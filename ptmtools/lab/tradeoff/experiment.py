@@ -161,6 +161,11 @@ def rates(trials: Sequence[Trial], above: float) -> dict[str, float]:
     }
 
 
+def decibels(error: float) -> float:
+    """The peak signal-to-noise ratio of an RMS error, of 255; infinite for 0."""
+    return 20 * math.log10(255 / error) if error else math.inf
+
+
 def timed(work: Callable[[], Any]) -> tuple[Any, float]:
     """The result of ``work``, and the processor seconds of this process for it."""
     start = time.process_time()
