@@ -241,7 +241,7 @@ def walk_campus(
 @file_option(
     "strip",
     "Also write one PNG with the view from the start of the walk after 10, 35 and 80 s of "
-    "loading, and fully loaded, for the same run as --frames.",
+    "loading, after 3 s from a local server, and fully loaded, for the same run as --frames.",
 )
 @force_option()
 @json_option

@@ -110,7 +110,7 @@ def octree_experiment(scene: Scene) -> Experiment:
         if name != "faces" or value >= 4
     ]
     error = "mean angle of normals to those of the model, degrees"
-    return Experiment("bytes of mesh and octree", error, settings, measure)
+    return Experiment("bytes of mesh and octree", error, settings, measure, by_work=True)
 
 
 def prepare_interlaced(subject: Subject) -> Experiment:
@@ -147,7 +147,8 @@ def interlaced_experiment(images: Sequence[NDArray[np.uint8]]) -> Experiment:
 
     settings = [Setting(f"--min {side}", {"min": side}, "min") for side in (256, 128, 64, 32, 16)]
     error = "RMS error of the first file's picture, of 255"
-    return Experiment("bytes of the first file", error, settings if images else [], measure)
+    settings = settings if images else []
+    return Experiment("bytes of the first file", error, settings, measure, by_work=True)
 
 
 def prepare_coarse(subject: Subject) -> Experiment:
@@ -193,7 +194,7 @@ def coarse_experiment(scene: Scene, parts: Sequence[Part]) -> Experiment:
         for value in values
     ]
     error = "mean distance along rays to the model's own surface, m"
-    return Experiment("triangles of the coarse meshes", error, settings, measure)
+    return Experiment("triangles of the coarse meshes", error, settings, measure, by_work=True)
 
 
 def prepare_light(subject: Subject) -> Experiment:
@@ -239,7 +240,7 @@ def light_experiment(scene: Scene, parts: Sequence[Part], most: int = MAX_SAMPLE
     ]
     noise = float(np.sqrt(np.square(255 * (truth - again)).mean() / 2))
     error = "RMS error of linear light, of 255"
-    return Experiment("rays", error, settings, measure, noise)
+    return Experiment("rays", error, settings, measure, noise, by_work=True)
 
 
 def prepare_jpeg(subject: Subject) -> Experiment:
@@ -271,7 +272,8 @@ def jpeg_experiment(images: Sequence[NDArray[np.uint8]]) -> Experiment:
 
     settings = [Setting(f"--quality {q}", {"quality": q}, "quality") for q in (30, 50, 70, 85, 95)]
     error = f"RMS error of textures of {JPEG_SIDE}², of 255"
-    return Experiment("bytes", error, settings if images else [], measure)
+    settings = settings if images else []
+    return Experiment("bytes", error, settings, measure, by_work=True)
 
 
 def _colors(texels: NDArray[np.uint8]) -> Image.Image:

@@ -56,4 +56,4 @@ def client_experiment(world: World) -> Experiment:
         for value in values
     ]
     error = f"e of a walk of {world.time[-1]:.0f} s at {BANDWIDTH}bit/s, memory {MEMORY}"
-    return Experiment("bytes received", error, settings, measure)
+    return Experiment("bytes received", error, settings, measure, by_work=True)
