@@ -161,6 +161,7 @@ runForm(async (gl, config, fetcher, fail) => {
       pending: fetcher.pending,
       pose: walker.pose,
     }),
+    address: () => fragmentOf(walker.pose),
     place: (/** @type {number[]} */ eye, /** @type {number} */ yaw, pitch = 0) => walker.place({ eye, yaw, pitch }),
     files,
   };
