@@ -340,6 +340,12 @@ def saved_by_view(these: list[Texels]) -> Iterator[str]:
         saved = [1 - sum(end[shown] for end in ends) / plain for ends in (files, levels)]
         parts.append(f"at {shown}² {saved[0]:.1%} (`.ptm` {saved[1]:.1%})")
     yield f"Saved over one PNG each where {side}² is shown smaller: {'; '.join(parts)}\n"
+    many = [
+        f"at {shown}² {plain / sum(end[shown] for end in files):.1f} (`.ptm` "
+        f"{plain / sum(end[shown] for end in levels):.1f})"
+        for shown in (s for s in SIDES if s < side)
+    ]
+    yield f"Images shown smaller in the bytes of one whole PNG: {'; '.join(many)}\n"
 
 
 def first_previews(these: list[Texels]) -> Iterator[str]:

@@ -131,6 +131,8 @@ def path_command(console: Console, db: str, output: str, force: bool, **values: 
     help="Keep only objects with these names; * and ? are wildcards.",
 )
 @trace_option
+@file_option("plot", "Also plot charts 1 to 5 of the campus paper, as a PNG or an SVG.")
+@force_option()
 @json_option
 @with_console
 def walk_campus(
@@ -141,6 +143,8 @@ def walk_campus(
     every: int,
     only: str,
     trace_file: str | None,
+    plot_file: str | None,
+    force: bool,
     **values: Any,
 ) -> None:
     """Simulate a walk through CAMPUS, which `ptm campus` wrote, with each preset, and report
@@ -149,15 +153,21 @@ def walk_campus(
     The output is Markdown: a row for each measure, and the MB received per half minute.
     """
     options = take(CampusWalkOptions, values)
-    from ptmtools.lab.campus import report
+    from ptmtools.lab.campus import charts, report
     from ptmtools.lab.campus.simulation import simulate_campus
 
+    if plot_file is not None:
+        charts.form_of(plot_file)
+        check_writable(plot_file, force=force)
+        figures.require()
     walk = read_walk(walk_file)
     trace = read_trace(trace_file) if trace_file else None
     served = read_served(db) if db else None
     with console.progress() as progress:
         world = prepare_campus(campus, walk, served, every=every, only=only, progress=progress)
     runs = [simulate_campus(world, quality, options, trace) for quality in options.qualities]
+    if plot_file is not None:
+        write_bytes(plot_file, charts.picture(runs, charts.form_of(plot_file)), force=force)
     head = (
         f"{walk.length:.0f} m in {walk.duration:.0f} s, {world.stock.objects:,} objects, "
         f"{options.bandwidth}bit/s, {options.latency}\n"
@@ -231,7 +241,7 @@ def walk_campus(
 @file_option(
     "strip",
     "Also write one PNG with the view from the start of the walk after 10, 35 and 80 s of "
-    "loading, and fully loaded, for the same run as --frames.",
+    "loading, after 3 s from a local server, and fully loaded, for the same run as --frames.",
 )
 @force_option()
 @json_option

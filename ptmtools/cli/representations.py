@@ -13,6 +13,7 @@ from ptmtools.cli.batch import no_name
 from ptmtools.cli.console import Console
 from ptmtools.cli.parameters import (
     Command,
+    file_option,
     force_option,
     given_options,
     jobs_option,
@@ -120,6 +121,13 @@ def _convert(
 @click.command("campus", cls=Command)
 @click.argument("model", type=click.Path())
 @output_option("Folder of the campus to write.", "folder", required=True)
+@file_option(
+    "records",
+    "Folder with an HTML file for each object that a visitor can read about, named after the "
+    "object: Library.html.",
+    CampusOptions.heading,
+    metavar="DIR",
+)
 @options_of(CampusOptions, IngestOptions)
 @force_option("Replace a folder that ptm campus wrote.")
 @jobs_option
@@ -129,6 +137,7 @@ def campus(
     console: Console,
     model: str,
     folder: str,
+    records_file: str | None,
     force: bool,
     workers: int,
     **values: Any,
@@ -138,7 +147,7 @@ def campus(
 
     A client loads the coarsest meshes first, and refines the nearest objects.
     """
-    if not model or not folder:
+    if not model or not folder or records_file == "":
         raise click.UsageError("a name is empty")
     options, reading = take(CampusOptions, values), take(IngestOptions, values)
     from ptmtools.neighbours.campus.building import make_campus
@@ -147,7 +156,14 @@ def campus(
 
     with console.progress() as progress, open_executor(workers) as executor:
         result = make_campus(
-            model, folder, options, reading, executor, force=force, progress=progress
+            model,
+            folder,
+            options,
+            reading,
+            executor,
+            force=force,
+            progress=progress,
+            records=records_file,
         )
     scene_notes = exterior_notes(result.scene.notes)
     if not console.as_json:

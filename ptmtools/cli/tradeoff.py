@@ -27,7 +27,7 @@ from ptmtools.files import write_bytes
 from ptmtools.lab.figures import require
 from ptmtools.lab.path.making import path_through
 from ptmtools.lab.path.options import PathOptions
-from ptmtools.lab.tradeoff import EXPERIMENTS, report as sentences
+from ptmtools.lab.tradeoff import EXPERIMENTS, FURTHER, report as sentences
 from ptmtools.lab.tradeoff.experiment import Subject, Trade, run
 from ptmtools.lab.tradeoff.knobs import KNOBS
 from ptmtools.lab.tradeoff.report import as_csv, picture, table
@@ -51,10 +51,11 @@ DURATION, QUICK = 60.0, 30.0
 @experiment(
     "--stage",
     "stages",
-    type=click.Choice([WALK, *EXPERIMENTS]),
+    type=click.Choice([WALK, *EXPERIMENTS, *FURTHER]),
     multiple=True,
-    help=f"Run only this experiment: the effect of settings on a walk ({WALK}), or the accuracy of "
-    "one stage. Repeatable. Default: all.",
+    help=f"Run only this experiment: the effect of settings on a walk ({WALK}), the accuracy of "
+    "one stage, that of a client's options (client), or that of another form of the model. "
+    f"Repeatable. Default: {', '.join((WALK, *EXPERIMENTS))}.",
 )
 @file_option(
     "walk",
@@ -147,7 +148,7 @@ def tradeoff(
                     )
                 )  # fmt: skip
             else:
-                experiment = EXPERIMENTS[stage].load()(subject)
+                experiment = {**EXPERIMENTS, **FURTHER}[stage].load()(subject)
                 trades.append(run(stage, experiment, progress))
     every = [trade for walk in walked for trade in sentences.trades(walk)] + trades
     if csv_file:

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import groupby
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,13 +42,18 @@ def require() -> None:
     component("matplotlib.figure", "PTM-M100", "matplotlib is missing", "plot")
 
 
-def plot(size: tuple[float, float], drawings: Sequence[Callable[[Any], None]]) -> bytes:
-    """A PNG of panels, one below the other, of this ``size`` in inches each; every drawing gets the
-    axes of its panel.
+def plot(
+    size: tuple[float, float],
+    drawings: Sequence[Callable[[Any], None]],
+    form: Literal["png", "svg"] = "png",
+) -> bytes:
+    """A PNG or SVG of panels, one below the other, of this ``size`` in inches each; every drawing
+    gets the axes of its panel.
 
     Raises `MissingComponentError` PTM-M100 without matplotlib.
     """
     require()
+    import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -57,7 +63,10 @@ def plot(size: tuple[float, float], drawings: Sequence[Callable[[Any], None]]) -
     for number, draw in enumerate(drawings):
         draw(figure.add_subplot(many, 1, number + 1))
     out = io.BytesIO()
-    figure.savefig(out, format="png", metadata={"Software": None})
+    # The same figures give the same bytes.
+    free = {"Software": None} if form == "png" else {"Date": None, "Creator": None}
+    with matplotlib.rc_context({"svg.hashsalt": "ptmtools"}):
+        figure.savefig(out, format=form, metadata=free)
     return out.getvalue()
 
 
@@ -91,8 +100,8 @@ def _draw(block: list[RunResult], measure: str, axes: Any) -> None:
 
 #: Lines of a picture.
 LINES = 540
-#: The instants of Figure 3, s.
-INSTANTS = (10.0, 35.0, 80.0)
+#: The instants of Figure 3, s, and that with a local server.
+INSTANTS, LOCAL = (10.0, 35.0, 80.0), 3.0
 #: Lines of a picture of the strip, of its labels, and of the gap between pictures.
 _STRIP_LINES, _LABEL, _GAP = 360, 26, 6
 
@@ -110,20 +119,24 @@ def frames(world: World, run: Run, every: float) -> Iterator[tuple[str, bytes]]:
 
 def strip(world: World, played: RunResult, paper: PaperOptions | None = None) -> bytes:
     """A PNG of Figure 3: the picture of a run's client at `INSTANTS`, from the start of the walk
-    without moving, and the full picture."""
+    without moving; at `LOCAL` on a link without limit or latency, the paper's local server; and the
+    full picture."""
     finished = played.run
     policy = POLICIES[finished.policy].configured(paper or PaperOptions())
     world = policy.in_world(world)
-    standing = world.standing(INSTANTS[-1])
-    run = simulate(standing, policy, finished.conditions, finished.budget)
     renderer = Renderer(world, _STRIP_LINES, samples=3)
-    sight = renderer.look(standing.eye[0], standing.direction[0])
+    sight = renderer.look(world.eye[0], world.direction[0])
+    link = finished.conditions
+    local = replace(link, bandwidth=None, latency=0.0, trace=None)
     frames = []
-    for instant in INSTANTS:
-        f = int(np.searchsorted(standing.time, instant - 0.5 / standing.rate))
-        colors = renderer.colors(sight, run.loaded[f], run.state[f])
-        label = f"{instant:g} s, {run.fetched[f] / 1e6:.2f} MB, e {run.error[f]:.2f}"
-        frames.append((label, as_bytes(colors)))
+    for conditions, instants, where in ((link, INSTANTS, ""), (local, (LOCAL,), ", local server")):
+        standing = world.standing(instants[-1])
+        run = simulate(standing, policy, conditions, finished.budget)
+        for instant in instants:
+            f = int(np.searchsorted(standing.time, instant - 0.5 / standing.rate))
+            colors = renderer.colors(sight, run.loaded[f], run.state[f])
+            label = f"{instant:g} s{where}, {run.fetched[f] / 1e6:.2f} MB, e {run.error[f]:.2f}"
+            frames.append((label, as_bytes(colors)))
     frames.append(("full", as_bytes(renderer.full(sight))))
     title = f"{finished.policy}, {link_text(finished.conditions)}, texture memory {played.memory}"
     return png(_side_by_side(frames, title))

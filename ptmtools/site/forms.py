@@ -31,6 +31,7 @@ _MEDIA = {
     ".png": "image/png",
     ".jpg": "image/jpeg",
     ".webp": "image/webp",
+    ".txt": "text/plain; charset=utf-8",
 }
 
 
@@ -43,6 +44,8 @@ def _of_octree(index: Mapping[str, Any]) -> Iterator[str]:
 def _of_campus(index: Mapping[str, Any]) -> Iterator[str]:
     for each in index["objects"]:
         yield from (mesh["file"] for mesh in each["meshes"])
+        if "record" in each:
+            yield each["record"]["file"]
     yield from (texture["file"] for texture in index["textures"])
 
 
@@ -102,7 +105,7 @@ def form_site(folder: Path, form: Form, title: str = "") -> Site:
         file = folder / name
         _, state = _read(folder, name, 0)
         media = _MEDIA.get(file.suffix, "application/octet-stream")
-        packed = file.suffix == ".glb"
+        packed = file.suffix in (".glb", ".txt")
         entries.append(Entry(f"{place}/{quote(name)}", file, media, True, packed, state))
     script = form_script(form.script)
     settings = {"title": title or title_of(folder), "index": f"{place}/{form.index}"}

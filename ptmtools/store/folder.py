@@ -126,7 +126,9 @@ class DatabaseFolder:
         PTM-D002 if it has no such output."""
         digest = self.record(stage).outputs.get(name)
         if digest is None:
-            raise damaged_manifest(self.path / MANIFEST, f"the {stage} stage lists no {name}")
+            # The stage counts as current, so only a build of everything runs it again.
+            what = f"the {stage} stage lists no {name}"
+            raise damaged_manifest(self.path / MANIFEST, what, "--force --rebuild")
         return digest
 
     def read_arrays(self, stage: str) -> dict[str, NDArray[np.generic]]:

@@ -247,11 +247,14 @@ def _is_output(path: object) -> bool:
     return folder in WRITTEN and name != "" and leads_inside(path)
 
 
-def damaged_manifest(file: str | PathLike[str], what: str) -> DatabaseError:
-    """The error for a damaged manifest, PTM-D002."""
+def damaged_manifest(
+    file: str | PathLike[str], what: str, repair: str = "--force"
+) -> DatabaseError:
+    """The error for a damaged manifest, PTM-D002; ``repair``: the options of a build that repairs
+    it."""
     return DatabaseError(
         "PTM-D002",
         f"damaged manifest: {what}",
         file=file,
-        remedy="restore it, or build the database again with --force",
+        remedy=f"restore it, or build the database again with {repair}",
     )

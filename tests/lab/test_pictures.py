@@ -137,11 +137,23 @@ def test_frames_and_strip(world: World) -> None:
     assert first == strip(world, played)
     with Image.open(io.BytesIO(first)) as picture:
         shown = np.asarray(picture)
-    width = (shown.shape[1] - 5 * 6) // 4
-    parts = [shown[52:-6, 6 + k * (width + 6) :][:, :width] for k in range(4)]
-    # After 80 s everything is there.
-    assert np.array_equal(parts[2], parts[3])
-    assert parts[3].std() > 10
+    width = (shown.shape[1] - 6 * 6) // 5
+    parts = [shown[52:-6, 6 + k * (width + 6) :][:, :width] for k in range(5)]
+    # After 80 s everything is there, and after 3 s from a local server.
+    assert np.array_equal(parts[2], parts[4])
+    assert np.array_equal(parts[3], parts[4])
+    assert parts[4].std() > 10
+
+
+def test_a_local_server_is_faster_than_a_thin_link(world: World) -> None:
+    options = SimulateOptions(policy="paper", bandwidth="4k", memory="inf")
+    (played,) = play({"walk": world}, options)
+    with Image.open(io.BytesIO(strip(world, played))) as picture:
+        shown = np.asarray(picture).astype(int)
+    width = (shown.shape[1] - 6 * 6) // 5
+    parts = [shown[52:-6, 6 + k * (width + 6) :][:, :width] for k in range(5)]
+    slow, local = (np.abs(parts[k] - parts[4]).mean() for k in (0, 3))
+    assert local < slow / 2
 
 
 def test_flip(world: World, require: Callable[[str, str], None]) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
 from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.status import database_status, plan_build
@@ -102,3 +103,21 @@ def test_a_database_without_lists_gets_them(db: Path, monkeypatch: pytest.Monkey
     build_scene(MODEL, db, QUICK, workers=1)
     assert (db / LISTS).is_dir()
     assert validate(db).issues == ()
+
+
+def test_an_output_that_the_manifest_lacks(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its stage counts as current; the message names the options that repair it."""
+    build = ["build-scene", str(MODEL), "-o", str(tmp_path / "db"), "-q", "-j", "1"]
+    build += ["--samples", "16", "--backend", "embree"]
+    assert main(build) == 0
+    file = tmp_path / "db/manifest.json"
+    manifest = json.loads(file.read_text())
+    whole = manifest["stages"]["textures"]["outputs"]
+    manifest["stages"]["textures"]["outputs"] = {n: d for n, d in whole.items() if "-64" not in n}
+    file.write_text(json.dumps(manifest))
+    assert main([*build, "--force"]) == 5
+    assert "with --force --rebuild [PTM-D002]" in capsys.readouterr().err
+    assert main([*build, "--force", "--rebuild"]) == 0
+    assert json.loads(file.read_text())["stages"]["textures"]["outputs"] == whole

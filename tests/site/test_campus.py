@@ -26,17 +26,37 @@ ROOT = Path(__file__).resolve().parents[2]
 Open = Callable[..., AbstractContextManager[Visitor]]
 #: `near` of the client.
 NEAREST = 8
+PIXEL = "data:image/gif;base64,R0lGODlhAQABAIAAAP8AAP///yH5BAAAAAAALAAAAAABAAEAAAICRAEAOw=="
+#: A record that tries to run scripts, to send requests and to leave.
+HOSTILE = f"""</iframe></header><script>top.broken = 1; parent.broken = 1</script>
+<!doctype html><html onclick="top.broken = 1"><head>
+<meta http-equiv="refresh" content="0; url=/refreshed"></head><body onload="top.broken = 1">
+<h1>Medicine</h1><p id="kept" style="color: red">12 laboratories</p><img id="inline" src="{PIXEL}">
+<img src="x" onerror="parent.broken = 1"><img src="/image.png">
+<link rel="stylesheet" href="/style.css">
+<svg onload="parent.broken = 1"><script>parent.broken = 1</script></svg>
+<iframe src="/frame" srcdoc="<script>top.broken = 1</script>"></iframe>
+<object data="/object"></object><embed src="/embed"><video src="/video.mp4" autoplay></video>
+<form action="/form" target="_top"><button id="send">Send</button></form>
+<a id="script" href="javascript:top.broken=1" target="_top">run</a>
+<a id="leave" href="/left" target="_top">leave</a>
+<a id="open" href="/popped" target="_blank">open</a>
+"""
 
 
 @pytest.fixture(scope="module")
 def campus(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A short street with two buildings, trees and lamps."""
+    """A short street with two buildings, trees and lamps; the buildings have records."""
     folder = tmp_path_factory.mktemp("campus")
     script = ROOT / "sample_data" / "make_campus.py"
     words = ["-o", folder / "model", "--buildings", 2, "--length", 60, "--texture", 32]
     subprocess.run([sys.executable, *map(str, (script, *words))], check=True, capture_output=True)
+    (folder / "records").mkdir()
+    (folder / "records/building_01_rectorate.html").write_text("<p>Built in 1903</p>")
+    (folder / "records/building_02_medicine.html").write_text(HOSTILE)
     options = CampusOptions(samples=1, faces=50)
-    make_campus(folder / "model/campus.obj", folder / "campus", options, IngestOptions(unit="m"))
+    reading, records = IngestOptions(unit="m"), folder / "records"
+    make_campus(folder / "model/campus.obj", folder / "campus", options, reading, records=records)
     return folder / "campus"
 
 
@@ -131,6 +151,106 @@ def test_places_and_presets(opened: Open, campus: Path) -> None:
         assert "preset=Ultra" in page.url
 
 
+def test_a_record_is_beside_its_object(opened: Open, campus: Path) -> None:
+    with opened(campus, width=800, height=600) as visitor:
+        visitor.until("s.begun")
+        page = visitor.page
+        page.click("nav button")
+        page.click("#places button:text('Building 01 rectorate')")
+        frame = page.frame_locator("#record iframe")
+        assert frame.locator("p").text_content() == "Built in 1903"
+        assert page.text_content("#record h2") == "Building 01 rectorate"
+        page.click("nav button")
+        page.click("#places summary >> nth=0")
+        page.click("#places details button >> nth=0")  # a tree, without a record
+        assert page.is_hidden("#record")
+        page.click("nav button")
+        page.click("#places button:text('Building 01 rectorate')")
+        page.wait_for_selector("#record iframe")
+        page.keyboard.press("Escape")
+        assert page.locator("#record iframe").count() == 0
+
+
+def test_a_hostile_record_does_nothing(opened: Open, campus: Path) -> None:
+    with opened(campus, width=800, height=600) as visitor:
+        visitor.until("s.complete")
+        page = visitor.page
+        before, seen = page.url.partition("#")[0], len(visitor.visits)
+        pages, dialogs = [], []
+        page.context.on("page", lambda other: pages.append(other))
+        page.on("dialog", lambda dialog: dialogs.append(dialog))
+        page.click("nav button")
+        page.click("#places button:text('Building 02 medicine')")
+        frame = page.frame_locator("#record iframe")
+        assert frame.locator("#kept").text_content() == "12 laboratories"
+        assert (
+            frame.locator("#kept").evaluate("(e) => getComputedStyle(e).color") == "rgb(255, 0, 0)"
+        )
+        assert frame.locator("#inline").evaluate("(e) => e.naturalWidth") == 1
+        for target in ("#kept", "#send", "#script", "#leave", "#open"):
+            frame.locator(target).click()
+        page.wait_for_timeout(500)
+        assert page.evaluate("window.broken") is None
+        assert page.url.partition("#")[0] == before
+        assert (pages, dialogs) == ([], [])
+        paths = [visit.path for visit in list(visitor.visits)[seen:]]
+        assert [path for path in paths if not path.startswith("/data-")] == []
+        assert page.is_visible("#record")
+        visitor.until("s.complete")
+
+
+def test_a_damaged_record_is_a_notice(opened: Open, campus: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(campus, tmp_path / "folder"))
+    (folder / "records/building_01_rectorate.txt").write_text("<p>Built in 1904</p>")
+    with opened(folder, width=800, height=600) as visitor:
+        visitor.until("s.begun")
+        page = visitor.page
+        page.click("nav button")
+        page.click("#places button:text('Building 01 rectorate')")
+        page.wait_for_selector("#notices p:has-text('building_01_rectorate.txt is damaged')")
+        assert page.is_hidden("#record")
+        assert page.is_hidden("#error")
+
+
+def test_a_name_is_pressed_or_dragged(opened: Open, campus: Path) -> None:
+    """A drag that begins on a name turns the visitor; a click leads to the object."""
+    with opened(campus, width=800, height=600) as visitor:
+        visitor.until("s.begun")
+        page = visitor.page
+        label = page.locator("#labels button:visible").first
+        box = label.bounding_box()
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        pose = visitor.state()["pose"]
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x + 60, y, steps=4)
+        turned = visitor.until(f"Math.abs(s.pose.yaw - {pose['yaw']}) > 0.05")
+        page.mouse.up()
+        assert turned["pose"]["eye"] == pose["eye"]
+        assert page.locator("#record iframe").count() == 0
+        page.wait_for_timeout(200)
+        label = page.locator("#labels button:has-text('Building'):visible").first
+        name = label.text_content()
+        index = json.loads((campus / "campus.json").read_text())
+        (target,) = (o for o in index["objects"] if o["label"] == name.replace(" ", "_").lower())
+        visitor.page.evaluate("window.ptm.place([-5, 1.6, 3], 0)")
+        page.wait_for_timeout(200)
+        label = page.locator(f"#labels button:text('{name}')")
+        label.dispatch_event("click")  # of a screen reader
+        place = target["viewpoint"]["position"]
+        visitor.until(f"Math.abs(s.pose.eye[0] - {place[0]}) < 0.01")
+        box = label.bounding_box()
+        page.keyboard.press("Escape")
+        visitor.page.evaluate(
+            "([x, y, z, a]) => window.ptm.place([x, y, z + 0.5], a)",
+            [*place, visitor.state()["pose"]["yaw"]],
+        )
+        visitor.until(f"Math.abs(s.pose.eye[2] - {place[2]}) > 0.3")
+        page.locator(f"#labels button:text('{name}')").click()
+        visitor.until(f"Math.abs(s.pose.eye[2] - {place[2]}) < 0.01")
+        page.wait_for_selector("#record iframe")
+
+
 def edited(change: Callable[[dict[str, Any]], object]) -> Callable[[Path], None]:
     def edit(folder: Path) -> None:
         document = json.loads((folder / "campus.json").read_text())
@@ -159,6 +279,7 @@ FAULTS: dict[str, tuple[bool, Callable[[Path], None]]] = {
     "material": (False, edited(lambda d: d["objects"][0].update(materials=[999]))),
     "no presets": (True, edited(lambda d: d["presets"].clear())),
     "leading out": (True, edited(lambda d: d["objects"][0]["meshes"][0].update(file="../x.glb"))),
+    "record": (True, edited(lambda d: d["objects"][6]["record"].update(bytes=2**21))),
     "box": (True, edited(lambda d: d["objects"][0].update(box=[0, 0]))),
 }
 

@@ -147,6 +147,37 @@ def test_parts_of_levels_are_shown_at_time_steps(opened: Open, statue: Path) -> 
         assert (visitor.picture() == whole).all()
 
 
+LOSE = """(() => {
+  const gl = document.querySelector("canvas").getContext("webgl2");
+  const card = (window.card = gl.getExtension("WEBGL_lose_context"));
+  window.before = true;
+  card.loseContext();
+  setTimeout(() => card.restoreContext(), 300);
+})()"""
+
+
+def test_a_lost_context_comes_back(opened: Open, statue: Path) -> None:
+    with opened(statue, "#40,10,2") as visitor:
+        visitor.until("s.levels > 3")
+        visitor.page.wait_for_timeout(5500)  # an early loss is an error, see the next test
+        visitor.page.evaluate("window.ptm.place(80, 20, 1.5)")
+        visitor.page.evaluate(LOSE)
+        visitor.until("s.levels > 3 && !window.before")
+        assert visitor.page.url.endswith("#80,20,1.5")
+        assert visitor.page.is_hidden("#error")
+        assert visitor.picture().std() > 5
+
+
+def test_a_context_that_is_lost_at_once_is_an_error(opened: Open, statue: Path) -> None:
+    with opened(statue) as visitor:
+        visitor.until("s.levels !== undefined")
+        visitor.page.evaluate(LOSE)
+        visitor.page.wait_for_selector("#error:not([hidden])")
+        assert visitor.page.text_content("#error-code") == "PTM-V107"
+        visitor.page.wait_for_timeout(600)
+        assert visitor.page.evaluate("window.before")  # it was not loaded again
+
+
 def test_keys_and_the_wheel(opened: Open, statue: Path) -> None:
     with opened(statue) as visitor:
         before = visitor.until("s.camera")["camera"]
@@ -223,7 +254,12 @@ OCTREE_FAULTS: dict[str, Callable[[Path], object]] = {
     "ends": lambda f: edited(f, "apo.json", lambda d: d["normals"]["ends"].reverse()),
     "cube": lambda f: edited(f, "apo.json", lambda d: d["cube"].update(low=[0, 0, 1e300])),
 }
+
+
 SET_FAULTS: dict[str, Callable[[Path], object]] = {
+    "too many bytes": lambda f: edited(
+        f, "interlace.json", lambda d: d["files"][-1].update(bytes=2**30)
+    ),
     "cut": lambda f: changed(f, "1.png", lambda d: d[: len(d) // 2]),
     "other": lambda f: changed(f, "1.png", lambda d: b"GIF89a" + d[6:]),
     "swapped": lambda f: shutil.copyfile(f / "2.png", f / "1.png"),

@@ -33,6 +33,22 @@ PAUSE = 1.0
 
 
 @dataclass(frozen=True)
+class Meeting:
+    """An object becomes one of the nearest for the first time.
+
+    Attributes
+    ----------
+    label: of the object. time: s.
+    textures: number of its textures in the preset's size. reused: number of those already loaded.
+    """
+
+    label: str
+    time: float
+    textures: int
+    reused: int
+
+
+@dataclass(frozen=True)
 class CampusRun:
     """Result of a run; F frames.
 
@@ -43,14 +59,14 @@ class CampusRun:
     error: (F,) e, the mean over the pixels of the root mean square over R, G and B, 0 to 255; NaN
         in frames without tables.
     memory: (F,) bytes of graphics memory in use. fetched: (F,) bytes of bodies received so far.
+    triangles: (F,) of the meshes that are shown, of objects in view.
     lacking: (F,) number of objects wanted in high detail and not shown in it; all of them before
         the client has the index.
     begun: s until all coarsest meshes and least textures had arrived, or None.
     floor: bytes of graphics memory of these.
     delays: s from becoming one of the nearest objects to being shown in full, of each time this
         happened. never: how often the object was far again, or the walk over, before.
-    reused: share of the preset's textures that were loaded when an object that uses them first
-        became one of the nearest; 0 without textures.
+    meetings: of each object that became one of the nearest, in their order.
     idle: (p, 2) intervals, s, without a pending request.
     body, overhead: bytes received of bodies and headers. requests: number of requests. sorts:
         number of sorts of the objects.
@@ -63,12 +79,13 @@ class CampusRun:
     error: Floats
     memory: Ints
     fetched: Floats
+    triangles: Ints
     lacking: Ints
     begun: float | None
     floor: int
     delays: tuple[float, ...]
     never: int
-    reused: float
+    meetings: tuple[Meeting, ...]
     idle: Floats
     body: float
     overhead: float
@@ -90,6 +107,13 @@ class CampusRun:
     def delay(self) -> float:
         """Mean of the delays, s; NaN without any."""
         return float(np.mean(self.delays)) if self.delays else float("nan")
+
+    @property
+    def reused(self) -> float:
+        """Share of the preset's textures that were loaded when an object that uses them first
+        became one of the nearest; 0 without textures."""
+        textures = sum(each.textures for each in self.meetings)
+        return sum(each.reused for each in self.meetings) / max(textures, 1)
 
     @property
     def idle_share(self) -> float:
@@ -118,7 +142,7 @@ def simulate_campus(
     wanted = min(max(options.nearest, 1), world.stock.objects)
     error = np.full(frames, np.nan)
     fetched = np.zeros(frames)
-    memory, lacking = np.zeros(frames, np.int64), np.zeros(frames, np.int64)
+    memory, lacking, triangles = (np.zeros(frames, np.int64) for _ in range(3))
     waits, begun = _Waits(client), None
     for f in range(frames):
         now = float(world.time[f])
@@ -133,9 +157,10 @@ def simulate_campus(
         memory[f] = client.memory
         fetched[f] = link.bytes + sum(r.received for r in client.waiting)
         lacking[f] = waits.lacking if client.order.size else wanted
-        view = int(world.view[f])
+        view, (mesh, column) = int(world.view[f]), columns.of(client)
+        triangles[f] = columns.faces[world.seen[f], mesh[world.seen[f]]].sum()
         if world.tables is not None and view >= 0:
-            error[f] = world.tables.wrong(view, *columns.of(client))
+            error[f] = world.tables.wrong(view, mesh, column)
     idle = [[*span, float(world.time[-1])][:2] for span in client.idle]
     low = np.unique([f for files in client.low for f in files]).astype(np.int64)
     return CampusRun(
@@ -146,12 +171,13 @@ def simulate_campus(
         error=error,
         memory=memory,
         fetched=fetched,
+        triangles=triangles,
         lacking=lacking,
         begun=begun,
         floor=int(world.stock.memory[low].sum()),
         delays=tuple(waits.delays),
         never=waits.never + len(waits.since),
-        reused=waits.reused / waits.wanted if waits.wanted else 0.0,
+        meetings=tuple(waits.meetings),
         idle=np.array(idle, dtype=np.float64).reshape(-1, 2),
         body=float(fetched[-1]),
         overhead=link.overhead_bytes,
@@ -161,13 +187,20 @@ def simulate_campus(
 
 
 class _Columns:
-    """Display state of objects and textures, by the files in graphics memory."""
+    """Display state of objects and textures, by the files in graphics memory.
+
+    Attributes
+    ----------
+    faces: (m, 3) triangles of each object in each state.
+    """
 
     def __init__(self, stock: Stock) -> None:
         lods = [stock.meshes(number) for number in range(stock.objects)]
         self._coarse, self._fine = (
             np.array([each[i] for each in lods], dtype=np.int64) for i in (0, -1)
         )
+        meshes = [each.meshes for each in stock.campus.objects]
+        self.faces = np.array([[0, m[0].faces, m[-1].faces] for m in meshes], dtype=np.int64)
         bases = range(len(stock.bases))
         self._file = np.array(
             [[stock.diffuse(base, size) for size in SIZES] for base in bases], dtype=np.int64
@@ -190,8 +223,7 @@ class _Waits:
     ----------
     since: when each waiting object became one of the nearest, s.
     lacking: number of the nearest objects not shown in full.
-    wanted, reused: number of textures of objects that became near for the first time, and of those
-        already loaded.
+    meetings: see `CampusRun`.
     """
 
     client: CampusClient
@@ -199,8 +231,7 @@ class _Waits:
     delays: list[float] = field(default_factory=list)
     never: int = 0
     lacking: int = 0
-    wanted: int = 0
-    reused: int = 0
+    meetings: list[Meeting] = field(default_factory=list)
     _near: frozenset[int] = frozenset()
     _met: set[int] = field(default_factory=set)
 
@@ -209,7 +240,8 @@ class _Waits:
         near = frozenset(self.client.near)
         for number in near - self._near:
             self.since[number] = now
-            self._meet(number)
+        for number in self.client.near:
+            self._meet(number, now)
         for number in self._near - near:
             self.never += self.since.pop(number, None) is not None
         self._near = near
@@ -219,13 +251,16 @@ class _Waits:
                 self.delays.append(now - self.since.pop(number))
         self.lacking = sum(not shown for shown in full.values())
 
-    def _meet(self, number: int) -> None:
+    def _meet(self, number: int, now: float) -> None:
         if number not in self._met:
             self._met.add(number)
             client = self.client
             files = list(client.stock.textures(number, client.quality.diffuse))
-            self.wanted += len(files)
-            self.reused += int(client.loaded[files].sum())
+            label, reused = (
+                client.stock.campus.objects[number].label,
+                int(client.loaded[files].sum()),
+            )
+            self.meetings.append(Meeting(label, now, len(files), reused))
 
 
 @dataclass(frozen=True)

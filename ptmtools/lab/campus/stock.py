@@ -35,6 +35,7 @@ from ptmtools.neighbours.campus.model import (
     INDEX,
     LIGHT,
     PRESETS,
+    RECORDS,
     SIZES,
     Campus,
     Quality,
@@ -142,7 +143,10 @@ def read_stock(folder: str | os.PathLike[str], only: str = "*") -> Stock:
     index = _bytes(folder, INDEX, LONGEST)
     rows = [(on_link(index), len(index), 0, 0)]
     sizes = {texture.file: texture.size for texture in campus.textures}
-    files = campus.files()
+    # A visitor asks for the records of objects.
+    files = {
+        name: each for name, each in campus.files().items() if not name.startswith(f"{RECORDS}/")
+    }
     for name in files:
         data = file_bytes(folder, name, files[name])
         if name in sizes:

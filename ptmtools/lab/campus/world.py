@@ -26,7 +26,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, Ints, Singles
+from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.errors import InputError
 from ptmtools.lab.campus.stock import Stock, read_stock, read_surfaces, read_textures
 from ptmtools.lab.world import PIXELS, RATE, frame_times
@@ -34,7 +34,7 @@ from ptmtools.neighbours.campus.model import SIZES
 from ptmtools.output.served import Served, Surfaces
 from ptmtools.progress import Progress, silent
 from ptmtools.rendering.pyramids import full_colors, read_pyramids
-from ptmtools.rendering.rays import Camera, Caster
+from ptmtools.rendering.rays import Camera, Caster, Frustum
 from ptmtools.rendering.records import Pyramids, triangles_of
 from ptmtools.walk import Walk
 
@@ -153,7 +153,7 @@ class CampusWorld:
     ----------
     stock: the files of the campus.
     tables: errors, or None if not requested. view: (F,) table of each frame, -1 for none.
-    time: (F,) s. eye: (F, 3) metres.
+    time: (F,) s. eye: (F, 3) metres. seen: (F, m) whether the box of each object is in view.
     rate: frames a second.
     """
 
@@ -162,6 +162,7 @@ class CampusWorld:
     view: Ints
     time: Floats
     eye: Floats
+    seen: Bools
     rate: float
 
     @property
@@ -180,7 +181,9 @@ class CampusWorld:
         count = int(np.ceil(seconds * self.rate)) + 1
         held = np.zeros(count, np.int64)
         time = np.arange(count) / self.rate
-        return replace(self, view=self.view[held], time=time, eye=self.eye[held])
+        return replace(
+            self, view=self.view[held], time=time, eye=self.eye[held], seen=self.seen[held]
+        )
 
 
 def prepare_campus(
@@ -239,4 +242,9 @@ def prepare_campus(
         camera = Camera(*pixels, walk.field_of_view, walk.aspect)
         sizes = small, middle, large
         tables = look(full, finest, coarsest, sizes, camera, seen[:, :3], seen[:, 3:], progress)
-    return CampusWorld(stock, tables, view, time, eye, rate)
+    low, high = stock.boxes[:, :3], stock.boxes[:, 3:]
+    seen_at = [
+        Frustum(at, ahead, walk.field_of_view, walk.aspect).meets_boxes(low, high)
+        for at, ahead in zip(eye, direction, strict=True)
+    ]
+    return CampusWorld(stock, tables, view, time, eye, np.array(seen_at), rate)

@@ -22,3 +22,13 @@ EXPERIMENTS: dict[str, Lazy[Callable[[Subject], Experiment]]] = {
     ACH.name: Lazy("ptmtools.lab.tradeoff.stages:prepare_coverage"),
     TEXTURES.name: Lazy("ptmtools.lab.tradeoff.stages:prepare_textures"),
 }
+#: Experiments beside those of the stages, which are only run if they are named: the client of the
+#: paper, octree textures, interlaced images and campuses.
+FURTHER: dict[str, Lazy[Callable[[Subject], Experiment]]] = {
+    "client": Lazy("ptmtools.lab.tradeoff.visitor:prepare_client"),
+    "apo": Lazy("ptmtools.lab.tradeoff.forms:prepare_octree"),
+    "interlace": Lazy("ptmtools.lab.tradeoff.forms:prepare_interlaced"),
+    "campus-meshes": Lazy("ptmtools.lab.tradeoff.forms:prepare_coarse"),
+    "campus-light": Lazy("ptmtools.lab.tradeoff.forms:prepare_light"),
+    "campus-jpeg": Lazy("ptmtools.lab.tradeoff.forms:prepare_jpeg"),
+}

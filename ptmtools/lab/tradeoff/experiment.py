@@ -72,6 +72,7 @@ class Experiment:
     settings: to try, cheap ones first.
     measure: runs the stage with a setting.
     reference_error: the standard error of the reference itself, 0 where it is exact.
+    by_work: whether the work is the cost, such as bytes, and not the seconds.
     """
 
     work: str
@@ -79,6 +80,7 @@ class Experiment:
     settings: Sequence[Setting]
     measure: Callable[[Setting], Measurement]
     reference_error: float = 0.0
+    by_work: bool = False
 
 
 @dataclass(frozen=True)
@@ -127,14 +129,20 @@ def run(stage: str, experiment: Experiment, progress: Progress = silent) -> Trad
         experiment.work,
         experiment.error,
         experiment.reference_error,
-        pareto(trials),
+        pareto(trials, by_work=experiment.by_work),
         rates(trials, 2 * experiment.reference_error),
     )
 
 
-def pareto(trials: Sequence[Trial]) -> tuple[Trial, ...]:
-    """The trials by cost; sound ones with a smaller error than all cheaper ones are marked."""
-    ordered = sorted(trials, key=lambda t: (t.measured.seconds, t.measured.error))
+def pareto(trials: Sequence[Trial], *, by_work: bool = False) -> tuple[Trial, ...]:
+    """The trials by cost, seconds or work; sound ones with a smaller error than all cheaper ones
+    are marked."""
+
+    def cost(trial: Trial) -> tuple[float, float]:
+        m = trial.measured
+        return (m.work if by_work else m.seconds), m.error
+
+    ordered = sorted(trials, key=cost)
     least = math.inf
     marked = []
     for trial in ordered:
@@ -159,6 +167,11 @@ def rates(trials: Sequence[Trial], above: float) -> dict[str, float]:
         for name, (work, error) in families.items()
         if len(set(work)) >= 3
     }
+
+
+def decibels(error: float) -> float:
+    """The peak signal-to-noise ratio of an RMS error, of 255; infinite for 0."""
+    return 20 * math.log10(255 / error) if error else math.inf
 
 
 def timed(work: Callable[[], Any]) -> tuple[Any, float]:

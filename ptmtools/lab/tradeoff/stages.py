@@ -9,8 +9,8 @@ of a reference: more points than any setting, of an independent scramble, with r
 stand for all.
 
 Textures: all profiles return the pixels within the requested error (the profile raw always
-exactly), so few bytes are the aim. The error of a setting is the bytes of all levels over those of
-the uncompressed finest level.
+exactly), so the question is what a visitor has before the file is complete. The error of a setting
+is that of the picture in the first eighth of the uncompressed bytes, beside the image itself.
 
 Visibility: the reference is the full search with a budget that hardly any portal exhausts. The
 error of a setting is its number of wrong pairs of cells over that of the right ones: extra pairs,
@@ -19,9 +19,11 @@ or with sampled lines also missing ones, which are worse: a client with such a s
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,10 +35,24 @@ from ptmtools.coverage.item_buffer import VIEWS
 from ptmtools.coverage.options import MAX_SAMPLES, PRESETS, AchOptions
 from ptmtools.coverage.sampling import CellHints, Sampler
 from ptmtools.errors import MissingComponentError
-from ptmtools.lab.tradeoff.experiment import Experiment, Measurement, Setting, Subject, timed
+from ptmtools.lab.tradeoff.experiment import (
+    Experiment,
+    Measurement,
+    Setting,
+    Subject,
+    decibels,
+    timed,
+)
 from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS, SCENE, TEXTURES
 from ptmtools.scene.model import Scene, SourceImage
-from ptmtools.texture import EncodeOptions, encode, read_image
+from ptmtools.texture import (
+    EncodeOptions,
+    decode,
+    encode,
+    read_header,
+    read_image,
+    whole_levels,
+)
 from ptmtools.texture.profiles import PROFILES
 from ptmtools.visibility.model import Pvs
 from ptmtools.visibility.options import PvsOptions
@@ -215,6 +231,8 @@ class CoverageTrade:
 
 #: Number of images that stand for all, and texels a side of the corner used of each.
 TRIED, CORNER = 4, 512
+#: The share of an image's uncompressed bytes after which its picture is compared, 1 / this.
+PREFIX = 8
 
 
 def prepare_textures(subject: Subject) -> Experiment:
@@ -241,17 +259,53 @@ def textures_experiment(images: Sequence[SourceImage], own: EncodeOptions) -> Ex
     def measure(setting: Setting) -> Measurement:
         options = replace(own, **setting.knobs)
         files, seconds = timed(lambda: [encode(pixels, options) for pixels in corners])
-        raw = np.array([pixels.nbytes for pixels in corners])
-        stored = np.array([len(data) for data in files])
+        pairs = list(zip(files, corners, strict=True))
+        square = np.array([_square_error(_at_prefix(*pair), pair[1]) for pair in pairs])
+        size = np.array([pixels.size for pixels in corners])
+        error = math.sqrt((square * size).sum() / max(size.sum(), 1))
+        other = sum(int((decode(data) != pixels).sum()) for data, pixels in pairs)
+        raw = sum(pixels.nbytes for pixels in corners)
         return Measurement(
             seconds=seconds * times,
-            work=float(sum(pixels.shape[0] * pixels.shape[1] for pixels in corners)),
-            error=float(stored.sum() / max(raw.sum(), 1)),
-            worst=float((stored / raw).max(initial=0.0)),
+            work=float(sum(map(len, files))),
+            error=error,
+            worst=math.sqrt(square.max(initial=0.0)),
+            more={
+                "dB": decibels(error),
+                "ratio": sum(map(len, files)) / max(raw, 1),
+                "inexact": other / max(size.sum(), 1),
+            },
         )
 
-    error = "ratio of the bytes of all levels to the uncompressed finest level"
-    return Experiment("texels", error, settings, measure)
+    error = f"RMS error of the picture in 1/{PREFIX} of the uncompressed bytes, of 255"
+    return Experiment("bytes of all levels", error, settings, measure)
+
+
+def _at_prefix(data: bytes, pixels: NDArray[Any]) -> NDArray[np.float64]:
+    """The picture of the whole levels in the first bytes of a file, each texel as large as those
+    that it stands for; the mean of the image's range before the first level."""
+    levels = whole_levels(read_header(data), pixels.nbytes // PREFIX)
+    if not levels:
+        return np.full(pixels.shape, _top(pixels) / 2)
+    shown = decode(data, levels - 1).astype(np.float64)
+    rows, columns = (
+        np.minimum(np.arange(side) * have // side, have - 1)
+        for side, have in zip(pixels.shape[:2], shown.shape[:2], strict=True)
+    )
+    return np.asarray(shown[rows][:, columns].reshape(pixels.shape))
+
+
+def _square_error(shown: NDArray[np.float64], pixels: NDArray[Any]) -> float:
+    """The mean square of the differences, of 255."""
+    off = (shown - pixels.astype(np.float64)) * (255 / _top(pixels))
+    return float(np.square(np.nan_to_num(off, posinf=0.0, neginf=0.0)).mean())
+
+
+def _top(pixels: NDArray[Any]) -> float:
+    """White: the largest integer, or the largest sample of an image of floats."""
+    if pixels.dtype.kind == "u":
+        return float(np.iinfo(pixels.dtype).max)
+    return float(np.abs(pixels).max(initial=0.0)) or 1.0
 
 
 #: The budget of the reference, which hardly any portal exhausts.

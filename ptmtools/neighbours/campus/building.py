@@ -9,7 +9,7 @@ import json
 import os
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +30,7 @@ from ptmtools.neighbours.campus.model import (
 )
 from ptmtools.neighbours.campus.objects import notes_on, parts_of
 from ptmtools.neighbours.campus.options import CampusOptions
+from ptmtools.neighbours.campus.records import files_of, read_records
 from ptmtools.neighbours.campus.second_set import model_light, model_masks
 from ptmtools.neighbours.campus.textures import BaseImage, Mask, texture_files
 from ptmtools.progress import Progress, silent
@@ -68,6 +69,7 @@ def make_campus(
     *,
     force: bool = False,
     progress: Progress = silent,
+    records: str | os.PathLike[str] | None = None,
 ) -> Made:
     """Write the campus of a model.
 
@@ -76,11 +78,12 @@ def make_campus(
     model: as for `ptmtools.scene.ingest`, with ``reading`` its options.
     folder: new, or with ``force`` one that holds a campus.
     executor: does the objects and textures; one after the other without.
+    records: folder with HTML files named after objects (`read_records`).
 
     Raises
     ------
-    InputError: as ingest; PTM-I701 no lightmaps in the model.
-    LimitError: PTM-L400 too many objects.
+    InputError: as ingest and `read_records`; PTM-I701 no lightmaps in the model.
+    LimitError: PTM-L400 too many objects; as `read_records`.
     OutputError: PTM-O001, O002, O003, O010 of the folder.
     MissingComponentError: PTM-M100 lightmaps are to be baked, and xatlas is not installed.
     """
@@ -102,6 +105,11 @@ def make_campus(
     names = Names()
     bases, of_image = _bases(scene, masks, names)
     materials, material = _materials(scene, of_image, bases)
+    tasks = [(names.take(part.label, "object"), part) for part in parts]
+    rows = {}
+    if records is not None:
+        pages, more = read_records(records, [(name, part.label) for name, part in tasks])
+        rows, notes = files_of(pages), [*notes, *more]
     work = Work(
         scene.points,
         scene.triangles,
@@ -126,7 +134,6 @@ def make_campus(
         end("textures")
         objects: list[CampusObject] = []
         covered = computed = 0
-        tasks = [(names.take(part.label, "object"), part) for part in parts]
         for done, each in enumerate(executor.each(make_object, work, tasks)):
             progress(done, len(tasks), "objects")
             for file, data in each.meshes:
@@ -134,7 +141,10 @@ def make_campus(
             for record, data in each.lightmaps:
                 put(record.file, data)
                 textures.append(record)
-            objects.append(each.record)
+            row, page = rows.get(each.record.name, (None, b""))
+            if row is not None:
+                put(row.file, page)
+            objects.append(replace(each.record, record=row))
             notes += each.notes
             covered, computed = covered + each.covered, computed + each.computed
         progress(len(tasks), len(tasks), "objects")

@@ -17,7 +17,7 @@ from ptmtools.whole_folder import FolderForm
 
 INDEX = "campus.json"
 FORMAT, SCHEMA = "ptmtools campus", 1
-MESHES, TEXTURES = "meshes", "textures"
+MESHES, TEXTURES, RECORDS = "meshes", "textures", "records"
 #: Sides of textures and of lightmaps, texels (the paper's table 1).
 SIZES = (128, 256, 512)
 LIGHT_SIZES = (512, 1024, 2048)
@@ -61,6 +61,15 @@ class MeshFile:
 
 
 @dataclass(frozen=True)
+class RecordFile:
+    """The HTML of an object's record (`ptmtools.neighbours.campus.records`)."""
+
+    file: str
+    bytes: int
+    crc32: int
+
+
+@dataclass(frozen=True)
 class CampusObject:
     """A building, or another element.
 
@@ -75,6 +84,7 @@ class CampusObject:
     materials: indices of the materials of its meshes.
     lightmap: base name of its lightmaps, or None.
     meshes: from the coarsest to the finest.
+    record: further information for visitors, or None.
     """
 
     name: str
@@ -86,6 +96,7 @@ class CampusObject:
     materials: tuple[int, ...]
     lightmap: str | None
     meshes: tuple[MeshFile, ...]
+    record: RecordFile | None = None
 
 
 @dataclass(frozen=True)
@@ -182,6 +193,8 @@ class Campus:
         result = {t.file: (t.bytes, t.crc32) for t in self.textures}
         for each in self.objects:
             result |= {mesh.file: (mesh.bytes, mesh.crc32) for mesh in each.meshes}
+            if each.record is not None:
+                result[each.record.file] = each.record.bytes, each.record.crc32
         return result
 
     def to_document(self) -> dict[str, Any]:
@@ -196,14 +209,7 @@ class Campus:
             "lightmaps": self.lightmaps,
             "start": self.start,
             "presets": [vars(preset) for preset in self.presets],
-            "objects": [
-                {
-                    **vars(o),
-                    "viewpoint": dict(zip(("position", "direction"), o.viewpoint, strict=True)),
-                    "meshes": [vars(mesh) for mesh in o.meshes],
-                }
-                for o in self.objects
-            ],
+            "objects": [_object_document(each) for each in self.objects],
             "materials": [_material_document(material) for material in self.materials],
             "textures": [vars(texture) for texture in self.textures],
         }
@@ -224,6 +230,19 @@ class Campus:
                 for row in document["textures"]
             ),
         )
+
+
+def _object_document(each: CampusObject) -> dict[str, Any]:
+    result = {
+        **vars(each),
+        "viewpoint": dict(zip(("position", "direction"), each.viewpoint, strict=True)),
+        "meshes": [vars(mesh) for mesh in each.meshes],
+    }
+    if each.record is None:
+        del result["record"]
+    else:
+        result["record"] = vars(each.record)
+    return result
 
 
 def _material_document(material: CampusMaterial) -> dict[str, Any]:
@@ -251,6 +270,8 @@ def _object(row: Mapping[str, Any]) -> CampusObject:
     viewpoint = row["viewpoint"]
     fields["viewpoint"] = tuple(viewpoint["position"]), tuple(viewpoint["direction"])
     fields["meshes"] = tuple(MeshFile(**_fields(MeshFile, mesh)) for mesh in row["meshes"])
+    if "record" in row:
+        fields["record"] = RecordFile(**_fields(RecordFile, row["record"]))
     return CampusObject(**fields)
 
 
@@ -260,7 +281,7 @@ _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)$", re.IGNORECASE)
 _LONGEST = 60
 #: Files of a campus folder besides its index.
 _OURS = re.compile(
-    rf"({MESHES}/[A-Za-z0-9_-]+_\d+\.glb|"
+    rf"({MESHES}/[A-Za-z0-9_-]+_\d+\.glb|{RECORDS}/[A-Za-z0-9_-]+\.txt|"
     rf"{TEXTURES}/[A-Za-z0-9_-]+_\d+_[{DIFFUSE}{ALPHA}{MASK}{LIGHT}]\.jpg)"
 )
 FORM = FolderForm(
@@ -294,6 +315,11 @@ class Names:
 def mesh_file(name: str, lod: int) -> str:
     """``meshes/library_0.glb``; 0 is the coarsest."""
     return f"{MESHES}/{name}_{lod}.glb"
+
+
+def record_file(name: str) -> str:
+    """``records/library.txt``."""
+    return f"{RECORDS}/{name}.txt"
 
 
 def texture_file(base: str, size: int, channel: str) -> str:

@@ -20,10 +20,12 @@ from ptmtools.neighbours.campus.model import (
     Campus,
     CampusObject,
     MeshFile,
+    RecordFile,
     TextureFile,
     texture_file,
 )
 from ptmtools.neighbours.campus.reading import LONGEST, read_campus
+from ptmtools.neighbours.campus.records import fault_of
 from ptmtools.texture.model import Limits
 
 
@@ -67,6 +69,8 @@ class _Check:
         for each in campus.objects:
             for lod, mesh in enumerate(each.meshes):
                 self._mesh(campus, each, mesh, finest=lod == len(each.meshes) - 1)
+            if each.record is not None:
+                self._record(each.record)
         for texture in campus.textures:
             self._image(texture)
         known = {INDEX, *campus.files()}
@@ -81,6 +85,7 @@ class _Check:
         two files have one name."""
         at = self.findings.at(INDEX)
         files = [file.file for each in campus.objects for file in each.meshes]
+        files += [each.record.file for each in campus.objects if each.record is not None]
         seen: set[str] = set()
         for name in (*files, *(texture.file for texture in campus.textures)):
             if name.lower() in seen:
@@ -108,7 +113,7 @@ class _Check:
         for texture in sorted(present - used.keys()):
             at.add("PTM-D806", f"{texture_file(*texture)} is not used", "textures")
 
-    def _recorded(self, file: MeshFile | TextureFile) -> bytes | None:
+    def _recorded(self, file: MeshFile | TextureFile | RecordFile) -> bytes | None:
         """The bytes of a listed file; None, with an issue, if it has other bytes than recorded."""
         data = self.bytes_of(file.file, "PTM-D803", file.bytes)
         if data is None:
@@ -121,6 +126,11 @@ class _Check:
             self.findings.add("PTM-D804", file.file, "", "the CRC-32 is not the recorded one")
             return None
         return data
+
+    def _record(self, record: RecordFile) -> None:
+        data = self._recorded(record)
+        if data is not None and (wrong := fault_of(data)) is not None:
+            self.findings.add("PTM-D804", record.file, "", wrong)
 
     def _mesh(self, campus: Campus, each: CampusObject, mesh: MeshFile, *, finest: bool) -> None:
         """A client draws the mesh with the materials and the lightmap of its object, and culls it

@@ -100,7 +100,8 @@ def world(made: Stock, x: Floats) -> CampusWorld:
     """Who is at (F,) places along the row, a few metres beside it."""
     eye = np.stack([x, np.full(len(x), 1.6), np.full(len(x), -5.0)], axis=1)
     time = np.arange(len(x)) / RATE
-    return CampusWorld(made, None, np.arange(len(x)), time, eye, RATE)
+    seen = np.ones((len(x), made.objects), np.bool_)
+    return CampusWorld(made, None, np.arange(len(x)), time, eye, seen, RATE)
 
 
 SEEDS = st.integers(0, 2**32 - 1)

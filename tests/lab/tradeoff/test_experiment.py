@@ -52,6 +52,20 @@ def test_an_experiment():
     assert trade.cheapest(0.001) is None
 
 
+def test_the_cost_may_be_the_work():
+    trade = run("made", replace(MADE, by_work=True))
+    costs = [t.measured.work for t in trade.trials]
+    assert costs == sorted(costs)
+    # It takes a thousand times the seconds of the other setting of four steps, and no more work.
+    assert trade.trials[0].measured.work == trade.trials[1].measured.work == 4
+    assert trade.cheapest(0.1).setting.name == "--steps 100"
+    swift = Trial(Setting("swift", {}), Measurement(1, 9, 0.1, 0.1))
+    small = Trial(Setting("small", {}), Measurement(9, 1, 0.2, 0.2))
+    assert [t.setting.name for t in pareto([swift, small]) if t.best] == ["swift"]
+    both = [t.setting.name for t in pareto([swift, small], by_work=True) if t.best]
+    assert both == ["small", "swift"]
+
+
 def test_errors_below_twice_that_of_the_reference_fit_no_rate():
     blurred = replace(MADE, reference_error=0.06)  # 100, 400 and 1600 steps are below twice that
     assert run("made", blurred).rates == {}

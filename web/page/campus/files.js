@@ -147,6 +147,14 @@ export class CampusFiles {
     this.#kept.set(name, content);
   }
 
+  /** The HTML of a record. @param {{file: string, bytes: number, crc32: number}} row */
+  record({ file, bytes, crc32 }) {
+    return this.fetcher.whole(this.urlOf(file), (body) => {
+      demand(body.length === bytes && checksum(body) === crc32, "another checksum");
+      return new TextDecoder("utf-8", { fatal: true }).decode(body);
+    });
+  }
+
   /** @param {string} name @param {ImageBitmap} bitmap */
   #upload(name, bitmap) {
     this.#shown.get(name)?.delete();

@@ -7,7 +7,10 @@ const NAME = /^[A-Za-z0-9_-]{1,80}$/, MESH = /^meshes\/[A-Za-z0-9_-]{1,80}\.glb$
 const CHANNELS = ["d", "a"];
 /** Side of the least textures. */
 export const LEAST = 128;
+const RECORD = /^records\/[A-Za-z0-9_-]{1,80}\.txt$/;
 const WIDEST = 65536, MOST = 2 ** 32 - 1;
+/** Bytes of the longest record. */
+const LONGEST = 2 ** 20;
 
 /**
  * @typedef {object} Material
@@ -30,6 +33,7 @@ const WIDEST = 65536, MOST = 2 ** 32 - 1;
  * @property {number[]} materials
  * @property {string | null} lightmap
  * @property {{file: string, bytes: number, crc32: number}[]} meshes
+ * @property {{file: string, bytes: number, crc32: number}} [record]
  *
  * @typedef {{name: string, diffuse: number, light: number}} Preset
  * @typedef {{file: string, bytes: number, crc32: number, base?: string, size?: number, channel?: string}} CampusFile
@@ -92,7 +96,7 @@ export class CampusIndex {
   }
 
   /** @param {CampusObject} one */
-  #checkObject({ name, label, parts, box, barycentre, viewpoint, materials, lightmap, meshes }) {
+  #checkObject({ name, label, parts, box, barycentre, viewpoint, materials, lightmap, meshes, record }) {
     demand(NAME.test(name) && typeof label === "string" && Array.isArray(parts), "an object without name");
     demand(isVector(box, 6) && isVector(barycentre, 3), "an object without place");
     demand(isVector(viewpoint?.position, 3) && isVector(viewpoint?.direction, 3), "an object without viewpoint");
@@ -103,6 +107,9 @@ export class CampusIndex {
       demand(MESH.test(mesh.file), "a mesh of another name");
       this.#add(mesh);
     }
+    if (record === undefined) return;
+    demand(RECORD.test(record?.file), "a record of another name");
+    demand(isWhole(record.bytes, 0, LONGEST) && isWhole(record.crc32, 0, MOST), "a record without size");
   }
 
   /** The files of an object in low detail: its coarsest mesh, and textures of the least size. @param {number} k */

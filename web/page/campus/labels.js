@@ -7,10 +7,13 @@ const MOST = 12, FARTHEST = 200;
 /** Pixels of a name: the least, the largest, and the product of pixels and metres between them. */
 const SMALL = 11, LARGE = 24, NEAR = 400;
 
+/** Pixels that a pointer may move while it presses a name. */
+const SLIP = 5;
+
 /** @typedef {import("./index.js").CampusObject} CampusObject */
 
 /** A name for visitors: "building_02_hall" is "Building 02 hall". @param {CampusObject} object */
-const nameOf = ({ label }) => {
+export const nameOf = ({ label }) => {
   const words = label.replace(/[\s_]+/g, " ").trim();
   return words.charAt(0).toUpperCase() + words.slice(1);
 };
@@ -24,12 +27,32 @@ export class Labels {
 
   /** @param {Document} root @param {CampusObject[]} objects @param {(object: CampusObject) => void} visit */
   constructor(root, objects, visit) {
-    const layer = find(root, "#labels");
+    const layer = find(root, "#labels"), canvas = find(root, "canvas");
     this.#labels = objects.map((object) => {
-      const button = make("button", { textContent: nameOf(object), hidden: true, tabIndex: -1, onclick: () => visit(object) });
+      const button = make("button", { textContent: nameOf(object), hidden: true, tabIndex: -1 });
+      // Clicks of a pointer are the canvas's, see below.
+      button.onclick = (/** @type {MouseEvent} */ { detail }) => detail || visit(object);
       layer.append(button);
       return { object, button };
     });
+    /** Where the pointer pressed a name. @type {{object: CampusObject, id: number, x: number, y: number} | null} */
+    let pressed = null;
+    // A press of a name may be the begin of a drag, which the canvas captures.
+    layer.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
+      const one = this.#labels.find(({ button }) => button === event.target);
+      if (!one || event.button !== 0) return;
+      event.preventDefault();
+      pressed = { object: one.object, id: event.pointerId, x: event.clientX, y: event.clientY };
+      canvas.dispatchEvent(new PointerEvent(event.type, event));
+    });
+    canvas.addEventListener("pointermove", (/** @type {PointerEvent} */ { pointerId, clientX, clientY }) => {
+      if (pressed?.id === pointerId && Math.hypot(clientX - pressed.x, clientY - pressed.y) > SLIP) pressed = null;
+    });
+    canvas.addEventListener("pointerup", (/** @type {PointerEvent} */ { pointerId }) => {
+      if (pressed?.id === pointerId) visit(pressed.object);
+      pressed = null;
+    });
+    canvas.addEventListener("pointercancel", () => (pressed = null));
     this.#menu(find(root, "#places"), objects, visit);
   }
 

@@ -70,6 +70,7 @@ runForm(async (gl, config, fetcher, fail) => {
       pending: fetcher.pending,
       camera: orbit.camera,
     }),
+    address: () => `#${[orbit.azimuth, orbit.elevation, orbit.distance].map((part) => Number(part.toFixed(3))).join()}`,
     place: orbit.place.bind(orbit),
   };
 });

@@ -8,6 +8,7 @@ import { CampusDrawing, finest } from "../campus/drawing.js";
 import { CampusFiles } from "../campus/files.js";
 import { CampusIndex, LEAST } from "../campus/index.js";
 import { Labels } from "../campus/labels.js";
+import { Records } from "../campus/records.js";
 import { cameraOf } from "../gl/camera.js";
 import { frustumOf, meetsBox } from "../space/frustum.js";
 import { attachControls } from "../ui/controls.js";
@@ -57,8 +58,10 @@ runForm(async (gl, config, fetcher, fail) => {
   const linked = poseOf(location.hash);
   if (linked) walker.place(linked);
   const named = index.objects.filter((one) => one.parts.length === 1 && heightOf(one) >= LOWEST);
+  const records = new Records(document, files);
   const labels = new Labels(document, named, (object) => {
     visit(object);
+    records.show(object);
     find(document, "#places").hidden = true;
     canvas.focus();
   });
@@ -158,6 +161,7 @@ runForm(async (gl, config, fetcher, fail) => {
       pending: fetcher.pending,
       pose: walker.pose,
     }),
+    address: () => fragmentOf(walker.pose),
     place: (/** @type {number[]} */ eye, /** @type {number} */ yaw, pitch = 0) => walker.place({ eye, yaw, pitch }),
     files,
   };

@@ -5,6 +5,9 @@ import { clock, Fetcher } from "../net/fetcher.js";
 import { find } from "../ui/elements.js";
 import { showError, showNotice } from "../ui/errors.js";
 
+/** Seconds until a lost context must be back, and that a page shows before it is loaded anew for another loss. */
+const BACK = 15, STEADY = 5;
+
 /**
  * @typedef {object} FormConfig
  * @property {string} title
@@ -13,6 +16,7 @@ import { showError, showNotice } from "../ui/errors.js";
  * @typedef {object} View
  * @property {(dt: number) => string} frame draws, and returns the status line
  * @property {() => object} state for tests and users of the console
+ * @property {() => string} [address] the fragment that leads back to the present view
  */
 
 /**
@@ -21,7 +25,7 @@ import { showError, showNotice } from "../ui/errors.js";
  *   => Promise<View>} create
  */
 export async function runForm(create) {
-  let failed = false;
+  let failed = false, lost = false;
   /** @param {unknown} fault */
   const fail = (fault) => {
     failed = true;
@@ -33,21 +37,38 @@ export async function runForm(create) {
     const config = JSON.parse(find(document, "#site").textContent ?? "");
     const gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: false });
     if (!gl) throw new PageError("PTM-V101", "This browser cannot draw with WebGL 2.");
+    /** @type {View | null} */
+    let view = null;
+    const begun = clock();
     canvas.addEventListener("webglcontextlost", (event) => {
       event.preventDefault();
-      fail(new PageError("PTM-V107", "The graphics card has reset the page."));
+      lost = true;
+      const end = () => fail(new PageError("PTM-V107", "The graphics card has reset the page."));
+      // A card that cannot hold the view would lose it again and again.
+      if (clock() - begun < STEADY) end();
+      else setTimeout(end, 1000 * BACK);
+    });
+    // Files are in the browser's cache, so loading anew restores the view soon.
+    canvas.addEventListener("webglcontextrestored", () => {
+      if (failed) return;
+      if (view?.address) history.replaceState(null, "", view.address());
+      location.reload();
     });
     const fetcher = new Fetcher((message) => showNotice(document, message));
-    const view = await create(gl, config, fetcher, fail);
+    // What fails without a context is no fault.
+    view = await create(gl, config, fetcher, (fault) => {
+      if (!lost) fail(fault);
+    });
+    const shown = view;
     Object.assign(window, { ptm: view });
     const status = find(document, "#status");
     let before = clock();
     const frame = () => {
-      if (failed) return;
+      if (failed || lost) return;
       const now = clock();
       try {
         fit(canvas);
-        const line = view.frame(Math.min(now - before, 0.1));
+        const line = shown.frame(Math.min(now - before, 0.1));
         if (status.textContent !== line) status.textContent = line;
       } catch (fault) {
         fail(fault);

@@ -8,6 +8,8 @@ import { demand, isWhole } from "../octree/octree.js";
 
 const MEDIA = /** @type {Record<string, string>} */ ({ png: "image/png", jpg: "image/jpeg", webp: "image/webp" });
 const WIDEST = 1 << 16;
+/** Bytes of the largest image, as a texture of four bytes a texel: a step needs it twice at most, and the file. */
+const LARGEST = 2 ** 30;
 
 /**
  * @typedef {object} Part a file
@@ -41,7 +43,9 @@ export function checkedSet(index) {
   /** @type {Part[]} */ (files).forEach((part, k) => {
     const { axis, joined } = part;
     demand(part.name === `${k + 1}.${container}`, "a file of another name");
-    demand(isSide(part.width) && isSide(part.height) && isWhole(part.bytes, 1, 2 ** 31), "a file without size");
+    demand(isSide(part.width) && isSide(part.height), "a file without size");
+    // An incompressible file of 16 bits has eight bytes a texel, and heads.
+    demand(isWhole(part.bytes, 1, 9 * part.width * part.height + 2 ** 20), "a file of too many bytes");
     demand(isWhole(part.crc32, 0, 0xffffffff) && (k ? axis === "columns" || axis === "rows" : axis === null), "no axis");
     const [across, down] = !k ? [1, 1] : axis === "columns" ? [2, 1] : [1, 2];
     if (!k) before = { width: part.width, height: part.height };
@@ -94,7 +98,8 @@ export class Joining {
     this.steps = 0;
     this.running = false;
     const widest = gl.getParameter(gl.MAX_TEXTURE_SIZE);
-    const fitting = index.files.findIndex(({ joined }) => Math.max(joined.width, joined.height) > widest);
+    const fitting = index.files.findIndex(({ joined: { width, height } }) =>
+      Math.max(width, height) > widest || 4 * width * height > LARGEST);
     /** Steps that the graphics card can hold. */
     this.most = fitting < 0 ? index.files.length : fitting;
     if (!this.most) throw new PageError("PTM-V101", "The image is larger than this graphics card's textures.");
