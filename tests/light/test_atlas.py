@@ -14,6 +14,7 @@ from tests.light.shapes import (
     indexed,
     ledges,
     loose,
+    quad,
     samples,
     triangles_of,
 )
@@ -113,6 +114,24 @@ def test_the_nearest_point_of_a_triangle(seed: int) -> None:
     others = random.dirichlet([0.5, 0.5, 0.5], 500)
     far = np.linalg.norm(share @ uv[0] - at)
     assert far <= np.linalg.norm(others @ uv[0] - at, axis=1).min() + 1e-9
+
+
+def test_groups_share_no_chart_and_no_texel() -> None:
+    """The two halves of a wall, which is one chart otherwise."""
+    halves = [quad((0, y, 0), (6, y, 0), (6, y + 3, 0), (0, y + 3, 0)) for y in (0, 3)]
+    points, triangles = indexed(np.concatenate(halves))
+    group = np.array([0, 0, 7, 7])
+    assert len(set(unwrap(points, triangles, (64,)).chart.tolist())) == 1
+    atlas = unwrap(points, triangles, (64,), 1, group)
+    assert (atlas.chart[:2] != atlas.chart[2:]).all()
+    share = np.random.default_rng(1).dirichlet([0.2, 0.2, 0.2], 500)
+    at = np.einsum("nk,tkx->tnx", share, atlas.uv)
+    at[..., 1] = 1 - at[..., 1]
+    read = []
+    for half in (at[:2], at[2:]):
+        _, index, weight = bilinear(np.zeros((64, 64)), half.reshape(-1, 2))
+        read.append(set(index[weight > 0].tolist()))
+    assert read[0].isdisjoint(read[1])
 
 
 def test_too_many_charts_for_the_least_lightmap() -> None:
