@@ -51,13 +51,20 @@ class Atlas:
     side: int | None
 
 
-def unwrap(points: Floats, triangles: NDArray[np.integer[Any]], sizes: Sequence[int]) -> Atlas:
+def unwrap(
+    points: Floats,
+    triangles: NDArray[np.integer[Any]],
+    sizes: Sequence[int],
+    *,
+    padding: int = 0,
+    purpose: str = "baking lightmaps",
+) -> Atlas:
     """An atlas of (T, 3) triangles over (V, 3) points, for square lightmaps of ascending ``sizes``,
-    texels.
+    texels; ``padding`` more texels lie between charts.
 
     Raises MissingComponentError: PTM-M100 xatlas is not installed.
     """
-    xatlas = component("xatlas", "PTM-M100", "baking lightmaps needs xatlas", "light")
+    xatlas = component("xatlas", "PTM-M100", f"{purpose} needs xatlas", "light")
     # Far from the origin float32 has no texels, and xatlas drops faces that it takes for empty.
     near = points - points.mean(axis=0)
     largest = float(np.abs(near).max(initial=0.0))
@@ -68,7 +75,7 @@ def unwrap(points: Floats, triangles: NDArray[np.integer[Any]], sizes: Sequence[
     area = max(np.linalg.norm(across, axis=1).sum() / 2, np.finfo(np.float32).tiny)
     for side in sizes:
         wanted = side * math.sqrt(FILLED / area)
-        atlas, density = _packed(xatlas, moved, triangles, side, wanted)
+        atlas, density = _packed(xatlas, moved, triangles, side, padding, wanted)
         if density >= _WORTH * wanted or _longest(atlas) >= _LONG * side:
             break
     got = max(atlas.width, atlas.height)
@@ -81,14 +88,19 @@ def unwrap(points: Floats, triangles: NDArray[np.integer[Any]], sizes: Sequence[
 
 
 def _packed(
-    xatlas: Any, points: Singles, triangles: NDArray[np.integer[Any]], side: int, density: float
+    xatlas: Any,
+    points: Singles,
+    triangles: NDArray[np.integer[Any]],
+    side: int,
+    padding: int,
+    density: float,
 ) -> tuple[Any, float]:
     """An atlas for a lightmap of that side, and its texels to the metre, ``density`` at most."""
     for _ in range(_TRIES):
         atlas = xatlas.Atlas()
         atlas.add_mesh(points, triangles.astype(np.uint32))
         packing = xatlas.PackOptions()
-        packing.padding, packing.bilinear, packing.texels_per_unit = 0, True, density
+        packing.padding, packing.bilinear, packing.texels_per_unit = padding, True, density
         atlas.generate(xatlas.ChartOptions(), packing)
         got = max(atlas.width, atlas.height)
         if got <= side:

@@ -2,7 +2,8 @@
 
 The surfaces of a cell share one lightmap of linear light. Objects with levels of detail have their
 light at vertices, as colours: their triangles are smaller than a texel, an atlas has a chart for
-each few of them, and their coarser meshes take over colours, but no charts.
+each few of them, and their coarser meshes take over colours, but no charts. So have objects that
+``--apo`` replaces: their second coordinates are those of their relief.
 
 The light is ambient obscurance (`light.occlusion`): indoors, a ray that meets nothing within reach
 counts whole. More of it comes from above than from below, so that forms show where nothing is near:
@@ -56,6 +57,7 @@ class Piece:
     corner: (n, 3, 3) float32 metres.
     object, shape: (n,) of the scene; of the cell, ascending.
     glass: (n,) whether the surface is seen through, and has no light.
+    relieved: (n,) whether its object has a relief.
     side: (n,) 1 where the front of a face counts, -1 the back, 0 the more open of the two.
     """
 
@@ -63,6 +65,7 @@ class Piece:
     object: Ints
     shape: Ints
     glass: Bools
+    relieved: Bools
     side: NDArray[np.int8]
 
 
@@ -93,7 +96,7 @@ class Baking:
     def light(self, piece: Piece) -> CellLight:
         """The light of a cell. Raises MissingComponentError PTM-M100: xatlas is not installed."""
         count = int(piece.shape[-1]) + 1 if len(piece.shape) else 0
-        dense = _dense(piece.object) & ~piece.glass
+        dense = (_dense(piece.object) | piece.relieved) & ~piece.glass
         flat = ~dense & ~piece.glass
         corner = piece.corner.astype(np.float64)
         mapped = np.zeros(count, np.bool_)
@@ -143,14 +146,18 @@ def encoded(light: Floats | Singles) -> NDArray[np.uint8]:
     return np.clip(np.rint(255 * light), 0, 255).astype(np.uint8)
 
 
-def pieces_of(geometry: Geometry, cells: Cells, glass: Bools) -> list[Piece]:
-    """The surfaces of each cell; ``glass``: (materials,) whether a material is seen through."""
+def pieces_of(
+    geometry: Geometry, cells: Cells, glass: Bools, replaced: NDArray[np.integer]
+) -> list[Piece]:
+    """The surfaces of each cell; ``glass``: (materials,) whether a material is seen through;
+    ``replaced``: the objects with a relief."""
     count = np.diff(geometry.triangle_start)
     shape = np.repeat(np.arange(len(count)), count)
     first = geometry.point_start[:-1][shape]
     corner = geometry.point[geometry.shape_point[first[:, None] + geometry.triangle]]
     cell = np.repeat(np.arange(cells.cell_count), np.diff(geometry.cell_start))[shape]
     side = _facing(corner.astype(np.float64), cell, geometry.two_sided[shape], cells)
+    relieved = np.isin(geometry.object, replaced)[shape]
     starts = geometry.triangle_start[geometry.cell_start]
     return [
         Piece(
@@ -158,6 +165,7 @@ def pieces_of(geometry: Geometry, cells: Cells, glass: Bools) -> list[Piece]:
             geometry.object[shape[a:b]].astype(np.int64),
             shape[a:b] - geometry.cell_start[c],
             glass[geometry.material[shape[a:b]]],
+            relieved[a:b],
             side[a:b],
         )
         for c, (a, b) in enumerate(pairwise(starts.tolist()))

@@ -369,8 +369,8 @@ def _glb(file: Path, data: bytes, cell: int, textures: int, octrees: int) -> Rea
         raise DatabaseError(
             "PTM-D006", fault.message, file=file, place=fault.place, remedy=BUILD
         ) from None
-    both = ((p.material.texture, p.material.light) for p in read.primitives)
-    used = [number for pair in both for number in pair if number is not None]
+    named = ((p.material.texture, p.material.light, p.material.normal) for p in read.primitives)
+    used = [number for each in named for number in each if number is not None]
     octree = [p.octree for p in read.primitives if p.octree is not None]
     out_of_range = max(used, default=-1) >= textures or max(octree, default=-1) >= octrees
     if read.cell != cell or out_of_range:
