@@ -140,6 +140,22 @@ Document = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
+class MappedRelief:
+    """The normal maps of triangles.
+
+    Attributes
+    ----------
+    number: (n,) int32, the normal map of its object in the hints, -1 without.
+    uv: (n, 3, 2) float64 coordinates in it, origin at the upper left; 0 without one.
+    frame: (n, 7) float32, see `ptmtools.neighbours.apo.normal_map`; 0 without one.
+    """
+
+    number: NDArray[np.int32]
+    uv: Floats
+    frame: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
 class Surfaces:
     """All triangles that are drawn, in the order of their cells.
 
@@ -154,6 +170,7 @@ class Surfaces:
     seen: (n, 2) of each the one that is seen in its place from where its normal points to, and from
         behind it, see `sides`.
     octree: (n,) int32, the octree texture of its object in the hints, -1 without.
+    relief: the normal maps of objects, if there are any.
     """
 
     corner: Floats
@@ -167,6 +184,7 @@ class Surfaces:
     clamped: Bools
     seen: Ints
     octree: NDArray[np.int32]
+    relief: MappedRelief | None = None
 
     def boxes(self) -> tuple[Floats, Floats]:
         """(s, 3) corners of the boxes of the shapes, metres; infinite of one without triangles."""
@@ -418,6 +436,7 @@ def _surfaces(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
         clamped=spread([[w == clamp for w in m.wrap] for m in materials], np.bool_, 2),
         seen=sides(corner, cell, two_sided, locator),
         octree=spread([-1 if p.octree is None else p.octree for _, p in shapes], np.int32),
+        relief=_relief([p for _, p in shapes]),
     )
 
 
@@ -425,6 +444,21 @@ def _texture_points(primitive: ReadPrimitive) -> Floats:
     if primitive.uv is None:
         return np.zeros((len(primitive.triangle), 3, 2))
     return primitive.uv.astype(np.float64)[primitive.triangle]
+
+
+def _relief(shapes: list[ReadPrimitive]) -> MappedRelief | None:
+    if all(p.frame is None for p in shapes):
+        return None
+    count = sum(len(p.triangle) for p in shapes)
+    number, uv = np.full(count, -1, np.int32), np.zeros((count, 3, 2))
+    frame = np.zeros((count, 7), np.float32)
+    end = 0
+    for p in shapes:
+        own = slice(end, end := end + len(p.triangle))
+        if p.frame is not None and p.light is not None:
+            number[own], uv[own] = p.material.normal or 0, p.light[p.triangle]
+            frame[own] = p.frame[p.triangle[:, 0]]  # the corners have the same
+    return MappedRelief(number, uv, frame)
 
 
 def _colors(primitive: ReadPrimitive) -> Floats:

@@ -17,6 +17,8 @@
  * @property {boolean} twoSided
  * @property {number} mesh the place of its object in the index, if that has finer meshes, or -1
  * @property {number} octree the place of its octree texture in the index, or -1
+ * @property {number} relief the place of the normal map of its object in the index, or -1
+ * @property {Float32Array[] | null} frames of the vertices in the normal map, as `Reliefs` checks them
  * @property {number[]} low corner of their box
  * @property {number[]} high
  */
@@ -169,13 +171,15 @@ export async function readGlb(buffer, textures, decoder) {
   for (const node of tree.nodes ?? []) {
     for (const { attributes, indices, material } of tree.meshes[node.mesh].primitives) {
       const look = tree.materials[material], base = look.pbrMetallicRoughness ?? {};
-      const { texture = -1, mesh = -1, octree = -1, wrapS, wrapT } = look.extras ?? {};
+      const { texture = -1, mesh = -1, octree = -1, normal = -1, wrapS, wrapT } = look.extras ?? {};
       const textured = texture >= 0 && attributes.TEXCOORD_0 !== undefined;
       const painted = attributes.COLOR_0 !== undefined;
       const positions = /** @type {Float32Array} */ (arrays.vertices(attributes.POSITION));
       await pause();
       const uvs = textured ? /** @type {Float32Array} */ (arrays.vertices(attributes.TEXCOORD_0)) : null;
       const colors = painted ? /** @type {Uint16Array} */ (arrays.vertices(attributes.COLOR_0)) : null;
+      const frames = normal < 0 ? null : ["TEXCOORD_1", "NORMAL", "TANGENT"].map((name) =>
+        /** @type {Float32Array} */ (arrays.vertices(attributes[name])));
       if (!Number.isInteger(texture) || texture >= textures) {
         throw new Error("has a texture that is not in the index");
       }
@@ -188,7 +192,7 @@ export async function readGlb(buffer, textures, decoder) {
       await pause();
       const index = arrays.indices(indices, positions.length / 3);
       await pause();
-      const own = ownOf(index, { positions, uvs, colors });
+      const own = ownOf(index, { positions, uvs, colors, frames });
       const { low, high } = boxOf(own.positions);
       shapes.push({
         name: node.name ?? "",
@@ -202,6 +206,7 @@ export async function readGlb(buffer, textures, decoder) {
         twoSided: look.doubleSided === true,
         mesh,
         octree,
+        relief: normal,
         low,
         high,
       });
@@ -213,9 +218,10 @@ export async function readGlb(buffer, textures, decoder) {
 /**
  * The vertices of one shape, of an array that it may share with others.
  * @param {Uint16Array | Uint32Array} index
- * @param {{positions: Float32Array, uvs: Float32Array | null, colors: Uint16Array | null}} shared
+ * @param {{positions: Float32Array, uvs: Float32Array | null, colors: Uint16Array | null,
+ *   frames: Float32Array[] | null}} shared
  */
-function ownOf(index, { positions, uvs, colors }) {
+function ownOf(index, { positions, uvs, colors, frames }) {
   let first = Infinity, last = -1;
   for (let k = 0; k < index.length; k++) {
     if (index[k] < first) first = index[k];
@@ -228,6 +234,7 @@ function ownOf(index, { positions, uvs, colors }) {
     positions: positions.subarray(3 * first, 3 * end),
     uvs: uvs && uvs.subarray(2 * first, 2 * end),
     colors: colors && colors.subarray(4 * first, 4 * end),
+    frames: frames && frames.map((rows, k) => rows.subarray((k + 2) * first, (k + 2) * end)),
     indices,
   };
 }
