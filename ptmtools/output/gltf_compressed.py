@@ -145,7 +145,8 @@ class CompressedBuffer:
         attributes = {"POSITION": self._accessor(vertices, 0, FLOAT, count, "VEC3", bounds)}
         if lit:
             place = self._accessor(vertices, _POSITION + _COORDINATES, FLOAT, count, "VEC2")
-            attributes |= {"TEXCOORD_1": place}
+            # glTF has no second coordinates without first ones.
+            attributes |= {"TEXCOORD_0": place, "TEXCOORD_1": place}
         if framed:
             frame = np.concatenate([p.frame for p in parts if p.frame is not None])
             element = exponential(frame, np.broadcast_to(_FRAME, frame.shape))

@@ -179,6 +179,8 @@ class _Reader:
             frame = None if frame is None else frame[own]
             color = None if color is None else color[own]
         material = self._material(primitive["material"])
+        if light is not None and material.texture is None:
+            uv = None  # the second coordinates once more
         if (material.normal is None) != (frame is None):
             _foreign(place, "has only one of a normal map and its frames")
         if (material.light is None and frame is None) != (light is None):

@@ -126,11 +126,14 @@ class PlainBuffer(BufferWriter):
         self._targets = [0] * len(_KINDS)
 
     def take(self, vertices: Vertices, material: int, _: Sizes) -> dict[str, Any]:
-        """The primitive of a shape."""
+        """The primitive of a shape. Where it has second coordinates but no first ones, glTF demands
+        these, and the second ones take their place."""
         attributes = {"POSITION": self.positions(vertices.point)}
         for name, coordinates in (("TEXCOORD_0", vertices.uv), ("TEXCOORD_1", vertices.light)):
             if coordinates is not None:
                 attributes[name] = self.vectors(coordinates)
+        if vertices.light is not None and vertices.uv is None:
+            attributes["TEXCOORD_0"] = attributes["TEXCOORD_1"]
         if vertices.frame is not None:
             attributes["NORMAL"] = self.vectors(vertices.frame[:, :3])
             attributes["TANGENT"] = self.vectors(vertices.frame[:, 3:])

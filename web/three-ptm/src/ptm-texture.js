@@ -19,6 +19,7 @@ import {
   DataTexture,
   LinearFilter,
   LinearMipmapLinearFilter,
+  NoColorSpace,
   RepeatWrapping,
   SRGBColorSpace,
   Vector2,
@@ -52,6 +53,7 @@ import { RangeFile } from "./range-file.js";
  * @property {number[]} [color] red, green, blue, 0 to 255: shown before the first level
  * @property {number} [wrapS] `RepeatWrapping` by default
  * @property {number} [wrapT]
+ * @property {boolean} [linear] whether its numbers are no colours
  */
 
 /** Bytes of the first request where the ends of the levels are unknown. */
@@ -106,7 +108,7 @@ export class PtmTexture extends DataTexture {
     this.file = file instanceof RangeFile ? file : new RangeFile(file);
     /** The finest level present, -1 for none. */
     this.level = -1;
-    this.colorSpace = SRGBColorSpace;
+    this.colorSpace = options.linear ? NoColorSpace : SRGBColorSpace;
     this.magFilter = LinearFilter;
     this.minFilter = LinearMipmapLinearFilter;
     this.wrapS = options.wrapS ?? RepeatWrapping;

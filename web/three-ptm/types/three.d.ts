@@ -60,7 +60,7 @@ export class Material {
   alphaTest: number;
   vertexColors: boolean;
   side: number;
-  userData: { texture?: number; wrapS?: number; wrapT?: number; mesh?: number };
+  userData: { texture?: number; wrapS?: number; wrapT?: number; mesh?: number; normal?: number };
   dispose(): void;
 }
 export class MeshBasicMaterial extends Material {
@@ -74,6 +74,11 @@ export class MeshBasicMaterial extends Material {
     depthWrite?: boolean;
     map?: Texture | null;
   });
+  onBeforeCompile: (shader: {
+    uniforms: Record<string, { value: unknown }>;
+    vertexShader: string;
+    fragmentShader: string;
+  }) => void;
 }
 export class Object3D {
   children: Object3D[];
@@ -119,5 +124,6 @@ export const ClampToEdgeWrapping: number;
 export const RepeatWrapping: number;
 export const LinearFilter: number;
 export const LinearMipmapLinearFilter: number;
+export const NoColorSpace: string;
 export const SRGBColorSpace: string;
 export const MathUtils: { radToDeg(angle: number): number };
