@@ -108,7 +108,7 @@ def test_other_viewers_show_the_same_normals(three: Any, database: Path) -> None
     )
     assert visit.messages == []
     shown = pixels(base64.b64decode(url.partition(",")[2]))[inside] / 127.5 - 1
-    assert np.degrees(angles(shown, normals_of(served, sight, inside.ravel()))).mean() < 1.5
+    assert np.degrees(angles(shown, normals_of(served, sight, inside.ravel()))).mean() < 0.5
 
 
 def angles(one: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -25,7 +25,7 @@ from ptmtools.light.lightmap import fill
 from ptmtools.neighbours.apo.making import Simple
 from ptmtools.neighbours.apo.model import ApoOptions
 from ptmtools.neighbours.apo.normals import corner_normals
-from ptmtools.neighbours.apo.octree import cube_around
+from ptmtools.neighbours.apo.octree import Cube, cube_around
 from ptmtools.neighbours.apo.sampling import Points, Source, at, nearest, spacing_for, spread
 
 #: Least and greatest side of a map, texels.
@@ -74,17 +74,7 @@ def normal_map(
 
     Raises MissingComponentError PTM-M100: xatlas is not installed.
     """
-    cube = cube_around(np.concatenate([points, mesh.points]))
-    source = Source(
-        cube.inside(points).astype(np.float32),
-        triangles,
-        corner_normals(points, triangles).astype(np.float32),
-    )
-    baking = _Baking(
-        source,
-        cube.inside(mesh.points)[mesh.triangles],
-        mesh.normals[mesh.triangles].astype(np.float64),
-    )
+    baking, _ = Baking.of(mesh, points, triangles)
     most = min(LARGEST, 2**options.depth, math.sqrt(options.density * len(triangles)))
     compared = baking.compared(min(_COMPARED, options.density * len(triangles)))
     side = LEAST
@@ -135,12 +125,24 @@ def _units(vectors: Floats | Singles, axis: int) -> Floats:
 
 
 @dataclass(frozen=True)
-class _Baking:
+class Baking:
     """The source, and the corners and normals (T, 3, 3) of the simplified mesh, in the cube."""
 
     source: Source
     corner: Floats
     normal: Floats
+
+    @staticmethod
+    def of(mesh: Simple, points: Floats, triangles: NDArray[np.int32]) -> tuple[Baking, Cube]:
+        """As the arguments of `normal_map`; and the cube."""
+        cube = cube_around(np.concatenate([points, mesh.points]))
+        source = Source(
+            cube.inside(points).astype(np.float32),
+            triangles,
+            corner_normals(points, triangles).astype(np.float32),
+        )
+        normal = mesh.normals[mesh.triangles].astype(np.float64)
+        return Baking(source, cube.inside(mesh.points)[mesh.triangles], normal), cube
 
     def texels(
         self, atlas: Atlas, frame: NDArray[np.float32], side: int
@@ -159,11 +161,11 @@ class _Baking:
         full = np.stack([fill(value[..., k], owner >= 0) for k in range(3)], axis=2)
         return _encoded(_units(full, 2)), 1 - float(met.mean())
 
-    def compared(self, count: float) -> _Compared:
+    def compared(self, count: float) -> Compared:
         """About so many points of the mesh, with the normals of the source."""
         points = spread(self.corner, spacing_for(self.corner, count))
         normal, met = self._normals(points)
-        return _Compared(Points(points.triangle[met], points.weight[met]), normal[met])
+        return Compared(Points(points.triangle[met], points.weight[met]), normal[met])
 
     def _normals(self, points: Points) -> tuple[Floats, NDArray[np.bool_]]:
         """(n, 3) unit normals of the source at points of the mesh, the mesh's own where it has
@@ -182,7 +184,7 @@ class _Baking:
 
 
 @dataclass(frozen=True)
-class _Compared:
+class Compared:
     """Points of the mesh, and (n, 3) unit normals of the source there."""
 
     points: Points
