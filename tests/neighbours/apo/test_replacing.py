@@ -178,7 +178,7 @@ def test_objects_of_one_name_are_two(rooms: Scene) -> None:
     names = tuple("statue" if name in STATUES else name for name in rooms.objects)
     actual = replaced(replace(rooms, objects=names), replace(OPTIONS, apo=("statue",)), Executor())
     assert [each.name for each in actual.objects] == ["statue", "statue"]
-    assert actual.objects[0].object != actual.octrees[1].object
+    assert actual.objects[0].object != actual.objects[1].object
     for each in actual.objects:
         corner = actual.scene.corners[actual.scene.triangle_object == each.object]
         q = (corner - each.octree.low) / each.octree.side
@@ -199,7 +199,7 @@ def test_workers_and_the_way_through_a_file_change_nothing(rooms: Scene, made: R
         other = replaced(rooms, OPTIONS, executor)
     for name, array in made.scene.to_arrays().items():
         assert np.array_equal(array, other.scene.to_arrays()[name]), name
-    for one, two in zip(made.objects, other.octrees, strict=True):
+    for one, two in zip(made.objects, other.objects, strict=True):
         assert np.array_equal(one.octree.texels, two.octree.texels)
 
 
