@@ -22,11 +22,12 @@ import numpy as np
 from scenes import model_file
 
 from ptmtools.arrays import Floats, areas
-from ptmtools.light.cells import ABOVE, COVERED, EXPOSURE, Baking, pieces_of
+from ptmtools.light.cells import ABOVE, COVERED, EXPOSURE, Baking
 from ptmtools.light.looks import LightImage, lookup
 from ptmtools.light.occlusion import Surroundings, light, normals, points_on, spread_over, turns
 from ptmtools.light.options import LightOptions
 from ptmtools.output.content import Geometry
+from ptmtools.output.pieces import pieces_of
 from ptmtools.output.served import on_link
 from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.command import open_database

@@ -3,7 +3,8 @@
     python benchmarks/mesh_levels.py [MODEL …] [--triangles 81920] [--links 512k,4M]
 
 Without models: a hall with six statues, and the cave of PTM_SHARED if it is at hand. Each is built
-as modelled, with levels of detail, and the statues also with octree textures (``--apo``). Columns:
+as modelled, with levels of detail, and the statues also with octree textures and with normal maps
+(``--apo``, ``--relief``). Columns:
 seconds of the build; bytes of the site's files for the first viewpoint's cell; of each link, by the
 page in Chromium from an empty cache, seconds until the first picture, until the view is complete,
 and bytes received until then.
@@ -40,6 +41,7 @@ FORMS = {
     "as modelled": ("--lods", "none"),
     "levels of detail": ("--lods", "auto"),
     "octrees": ("--lods", "none", "--apo", "statue*"),
+    "normal maps": ("--lods", "none", "--apo", "statue*", "--relief", "normal-map"),
 }
 
 
@@ -115,7 +117,7 @@ def main() -> None:
         print("|---|---|---|---|" + "---|---|---|" * len(links))
         for model in models:
             for form, options in FORMS.items():
-                if form == "octrees" and (given.models or model == CAVE):
+                if "--apo" in options and (given.models or model == CAVE):
                     continue  # no statues
                 database = Path(folder) / f"{model.stem}-{form}.db"
                 seconds = build(model, database, options)

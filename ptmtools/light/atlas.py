@@ -55,18 +55,20 @@ def unwrap(
     points: Floats,
     triangles: NDArray[np.integer[Any]],
     sizes: Sequence[int],
+    *,
     padding: int = 0,
     group: Ints | None = None,
+    purpose: str = "baking lightmaps",
 ) -> Atlas:
     """An atlas of (T, 3) triangles over (V, 3) points, for square lightmaps of ascending ``sizes``,
-    texels.
+    texels; ``padding`` more texels lie between charts.
 
     ``padding``: texels between charts beyond those that are read. ``group``: (T,) numbers; faces of
     different groups share no chart.
 
     Raises MissingComponentError: PTM-M100 xatlas is not installed.
     """
-    xatlas = component("xatlas", "PTM-M100", "baking lightmaps needs xatlas", "light")
+    xatlas = component("xatlas", "PTM-M100", f"{purpose} needs xatlas", "light")
     # Far from the origin float32 has no texels, and xatlas drops faces that it takes for empty.
     near = points - points.mean(axis=0)
     largest = float(np.abs(near).max(initial=0.0))

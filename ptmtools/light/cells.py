@@ -2,7 +2,8 @@
 
 The surfaces of a cell share one lightmap of linear light. Objects with levels of detail have their
 light at vertices, as colours: their triangles are smaller than a texel, an atlas has a chart for
-each few of them, and their coarser meshes take over colours, but no charts.
+each few of them, and their coarser meshes take over colours, but no charts. So have objects that
+``--apo`` replaces: their second coordinates are those of their relief.
 
 The light is ambient obscurance (`light.occlusion`): indoors, a ray that meets nothing within reach
 counts whole. More of it comes from above than from below, so that forms show where nothing is near:
@@ -17,7 +18,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,12 +28,9 @@ from ptmtools.light.atlas import FILLED, unwrap
 from ptmtools.light.lightmap import SMOOTH, bake, vertex_light
 from ptmtools.light.looks import Rays, open_sides, planes
 from ptmtools.light.occlusion import Surroundings, normals
-from ptmtools.output.mesh_levels import MANY
 
 if TYPE_CHECKING:
-    from ptmtools.cells.model import Cells
     from ptmtools.light.options import LightOptions
-    from ptmtools.output.content import Geometry
 
 #: Share of the light from straight above that comes from straight below is 1 less this.
 ABOVE = 0.4
@@ -49,8 +46,6 @@ _LARGEST = 2048
 #: Texels between charts: coordinates are rounded by up to a tenth of a texel in GLBs, and would
 #: read the edge of another chart, a thin dark line.
 _PADDING = 1
-#: The sides of a piece are examined this far off it, in units of the tolerance of planes.
-_OFF = 4.0
 
 
 @dataclass(frozen=True)
@@ -62,6 +57,7 @@ class Piece:
     corner: (n, 3, 3) float32 metres.
     object, shape: (n,) of the scene; of the cell, ascending.
     glass: (n,) whether the surface is seen through, and has no light.
+    dense: (n,) whether its light is at vertices.
     side: (n,) 1 where the front of a face counts, -1 the back, 0 the more open of the two.
     """
 
@@ -69,6 +65,7 @@ class Piece:
     object: Ints
     shape: Ints
     glass: Bools
+    dense: Bools
     side: NDArray[np.int8]
 
 
@@ -99,8 +96,7 @@ class Baking:
     def light(self, piece: Piece) -> CellLight:
         """The light of a cell. Raises MissingComponentError PTM-M100: xatlas is not installed."""
         count = int(piece.shape[-1]) + 1 if len(piece.shape) else 0
-        dense = _dense(piece.object) & ~piece.glass
-        flat = ~dense & ~piece.glass
+        dense, flat = piece.dense & ~piece.glass, ~piece.dense & ~piece.glass
         corner = piece.corner.astype(np.float64)
         mapped = np.zeros(count, np.bool_)
         mapped[piece.shape[flat]] = True
@@ -121,8 +117,8 @@ class Baking:
             points.astype(np.float64),
             triangles.reshape(-1, 3).astype(np.int32),
             sizes,
-            _PADDING,
-            _groups(corner[own], side[own]),
+            padding=_PADDING,
+            group=_groups(corner[own], side[own]),
         )
         look = self._look(corner[own], side[own])
         size = atlas.side or sizes[-1]
@@ -153,45 +149,6 @@ def light_of_cell(baking: Baking, piece: Piece) -> CellLight:
 def encoded(light: Floats | Singles) -> NDArray[np.uint8]:
     """Linear light, brightened, in 255ths."""
     return np.clip(np.rint(255 * EXPOSURE * light), 0, 255).astype(np.uint8)
-
-
-def pieces_of(geometry: Geometry, cells: Cells, glass: Bools) -> list[Piece]:
-    """The surfaces of each cell; ``glass``: (materials,) whether a material is seen through."""
-    count = np.diff(geometry.triangle_start)
-    shape = np.repeat(np.arange(len(count)), count)
-    first = geometry.point_start[:-1][shape]
-    corner = geometry.point[geometry.shape_point[first[:, None] + geometry.triangle]]
-    cell = np.repeat(np.arange(cells.cell_count), np.diff(geometry.cell_start))[shape]
-    side = _facing(corner.astype(np.float64), cell, geometry.two_sided[shape], cells)
-    starts = geometry.triangle_start[geometry.cell_start]
-    return [
-        Piece(
-            corner[a:b],
-            geometry.object[shape[a:b]].astype(np.int64),
-            shape[a:b] - geometry.cell_start[c],
-            glass[geometry.material[shape[a:b]]],
-            side[a:b],
-        )
-        for c, (a, b) in enumerate(pairwise(starts.tolist()))
-    ]
-
-
-def _facing(corner: Floats, cell: Ints, two_sided: Bools, cells: Cells) -> NDArray[np.int8]:
-    """(n,) the side of each piece on which its cell lies, see `Piece.side`."""
-    side = np.ones(len(corner), np.int8)
-    rows = np.flatnonzero(two_sided)
-    middle = corner[rows].mean(axis=1)
-    off = _OFF * cells.tolerance.plane * normals(corner[rows])
-    front, back = (cells.locate(middle + way) == cell[rows] for way in (off, -off))
-    side[rows[back & ~front]] = -1
-    side[rows[back & front]] = 0
-    return side
-
-
-def _dense(number: Ints) -> Bools:
-    """(n,) whether each piece belongs to an object with many pieces here."""
-    _, place, count = np.unique(number, return_inverse=True, return_counts=True)
-    return np.asarray(count[place] >= MANY)
 
 
 def _objects(number: Ints, chosen: Bools) -> list[Ints]:

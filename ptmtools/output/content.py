@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,12 @@ from ptmtools.visibility.model import Pvs
 if TYPE_CHECKING:
     from ptmtools.coverage.required_levels import Need
     from ptmtools.light.model import Light
+    from ptmtools.neighbours.apo.reliefs import Reliefs
     from ptmtools.output.mesh_levels import MeshLevels
+
+
+#: The step of coordinates in normal maps, far below a texel.
+_RELIEF_STEP = 2.0**-20
 
 
 @dataclass(frozen=True)
@@ -49,6 +54,8 @@ class Shape:
     color: (m, 3, 3) uint8 sRGB of the corners, None where all are white.
     light: (m, 3, 2) float32 coordinates of the corners in the lightmap of the cell, origin at the
         lower left; None where it does not light the shape.
+    relief: (m, 3, 9) float32 coordinates of the corners in the normal map of the object, likewise,
+        and the frames there, see `NormalMap`; None without one.
     """
 
     object: int
@@ -60,6 +67,7 @@ class Shape:
     uv_triangle: NDArray[np.int64]
     color: NDArray[np.uint8] | None = None
     light: NDArray[np.float32] | None = None
+    relief: NDArray[np.float32] | None = None
 
 
 class Geometry:
@@ -78,11 +86,16 @@ class Geometry:
     shape_point, point_start: (P,) rows of `point`, ascending; (S + 1,) those of each shape.
     shape_uv, uv_start: the same for `uv`.
     color: (M, 3, 3) uint8 sRGB of the corners of triangles; None if the scene has no colours.
+    piece: (M,) the piece of `Cells` that each triangle is.
     collapsed: pieces dropped by the rounding, over all cells.
     light: the light of the cells, or None.
+    relief: (M, 3, 9) as in `Shape`, 0 of objects without a normal map; relieved: (S,) whether a
+        shape has one.
     """
 
     light: Light | None = None
+    relief: NDArray[np.float32] | None = None
+    relieved: NDArray[np.bool_]
 
     def __init__(self, scene: Scene, cells: Cells) -> None:
         piece, cell = cells.emitted(scene.two_sided)
@@ -111,8 +124,9 @@ class Geometry:
         self.shape_point, self.point_start, self.triangle = _indexed(
             corner[order], shape, len(first), len(self.point)
         )
-        self.color = _corner_colors(scene, cells, piece[order])
-        uv_corner = uv_of[cells.triangle[piece[order]]].reshape(-1, 3)
+        self.piece = piece[order]
+        self.color = _corner_colors(scene, cells, self.piece)
+        uv_corner = uv_of[cells.triangle[self.piece]].reshape(-1, 3)
         self.shape_uv, self.uv_start, self.uv_triangle = _indexed(
             uv_corner, shape, len(first), len(self.uv)
         )
@@ -135,6 +149,23 @@ class Geometry:
             color = color if self.color is None else self.color
             linear = to_linear(color / 255) * (light.vertex[..., None] / 255)
             result.color = np.rint(255 * to_srgb(linear)).astype(np.uint8)
+        return result
+
+    def relieved_by(self, reliefs: Reliefs, scene: Scene, cells: Cells) -> Geometry:
+        """The same geometry with the normal maps of objects."""
+        result = copy(self)
+        result.relieved = np.isin(self.object, reliefs.objects)
+        row = np.full(len(scene.triangles), -1)
+        row[np.isin(scene.triangle_object, reliefs.objects)] = np.arange(len(reliefs.uv))
+        own = np.repeat(result.relieved, np.diff(self.triangle_start))
+        source = row[cells.triangle_source[self.piece[own]]]
+        uv = np.zeros((len(scene.triangles), 3, 2))
+        uv[row >= 0] = reliefs.uv
+        uv = np.clip(_carried(scene, cells, self.piece[own], uv), 0, 1)
+        result.relief = np.zeros((len(self.triangle), 3, 9), np.float32)
+        # Pieces of one triangle, and neighbours, have the same numbers at a corner.
+        result.relief[own, :, :2] = np.rint(uv / _RELIEF_STEP) * _RELIEF_STEP
+        result.relief[own, :, 2:] = reliefs.frame[source][:, None]
         return result
 
     def areas(self) -> NDArray[np.float64]:
@@ -160,6 +191,7 @@ class Geometry:
             self.uv_triangle[rows],
             None if self.color is None or (self.color[rows] == 255).all() else self.color[rows],
             self.light.uv[rows] if self.light is not None and self.light.mapped[s] else None,
+            self.relief[rows] if self.relief is not None and self.relieved[s] else None,
         )
 
     def shapes(self, cell: int) -> Iterator[Shape]:
@@ -174,11 +206,19 @@ def _corner_colors(
     the scene has none."""
     if scene.colors is None:
         return None
-    source = cells.triangle_source[piece]
-    corners, colors = scene.corners[source], scene.colors[source].astype(np.float64)
-    away = cells.vertex[cells.triangle[piece]] - corners[:, :1]
-    interpolated = colors[:, :1] + np.einsum("mkx,mcx->mck", gradients(corners, colors), away)
+    interpolated = _carried(scene, cells, piece, scene.colors)
     return np.asarray(np.clip(np.rint(interpolated), 0, 255).astype(np.uint8))
+
+
+def _carried(
+    scene: Scene, cells: Cells, piece: NDArray[np.integer], values: NDArray[Any]
+) -> NDArray[np.float64]:
+    """(M, 3, k) at the corners of pieces, interpolated between the (T, 3, k) values of the corners
+    of the scene's triangles."""
+    source = cells.triangle_source[piece]
+    corners, own = scene.corners[source], values[source].astype(np.float64)
+    away = cells.vertex[cells.triangle[piece]] - corners[:, :1]
+    return np.asarray(own[:, :1] + np.einsum("mkx,mcx->mck", gradients(corners, own), away))
 
 
 def _indexed(
@@ -214,7 +254,7 @@ class Content:
     Attributes
     ----------
     textures: in the order of the hints; one for every image that a material in use names, and then
-        the lightmaps of cells.
+        the lightmaps of cells, and the normal maps of objects.
     viewpoints: where a walk may start.
     progress: called for every cell.
     need: the required levels of textures, if measured.
@@ -222,6 +262,8 @@ class Content:
     workers: number of threads.
     emitters: the forms that are written, in the order of writing.
     light: the light of the cells, if baked.
+    reliefs: the places of objects in their normal maps, if there are any; relief_need: the required
+        levels of these, if measured.
     """
 
     scene: Scene
@@ -237,6 +279,8 @@ class Content:
     workers: int = 1
     emitters: tuple[Emitter, ...] = ()
     light: Light | None = None
+    reliefs: Reliefs | None = None
+    relief_need: Need | None = None
 
     @cached_property
     def geometry(self) -> Geometry:
@@ -245,8 +289,9 @@ class Content:
 
     @cached_property
     def lit(self) -> Geometry:
-        """`geometry` with the light, if there is any."""
-        return self.geometry.lit_by(self.light) if self.light else self.geometry
+        """`geometry` with the light and the relief, if there is any."""
+        lit = self.geometry.lit_by(self.light) if self.light else self.geometry
+        return lit.relieved_by(self.reliefs, self.scene, self.cells) if self.reliefs else lit
 
     @cached_property
     def position_exponent(self) -> int:
@@ -286,6 +331,11 @@ class Content:
         return {r.cell: (place, r) for place, r in enumerate(self.textures) if r.cell >= 0}
 
     @cached_property
+    def relief_of(self) -> Mapping[int, tuple[int, TextureRecord]]:
+        """Object → the index of its normal map in `textures`, and the record of that."""
+        return {r.object: (place, r) for place, r in enumerate(self.textures) if r.object >= 0}
+
+    @cached_property
     def octree_of(self) -> Mapping[int, int]:
         """Object of the scene → the place of its octree in `octrees`."""
         return {record.number: place for place, record in enumerate(self.octrees)}
@@ -300,9 +350,14 @@ class Content:
     @cached_property
     def painted(self) -> list[NDArray[np.int64]]:
         """For each cell the indices of its textures in `textures`, ascending."""
-        cells = np.split(self.paint, self.geometry.cell_start[1:-1])
+        start = self.geometry.cell_start[1:-1]
+        cells = np.split(self.paint, start)
         light = [self.lightmap_of[c][0] if c in self.lightmap_of else -1 for c in range(len(cells))]
-        used = (np.append(*both) for both in zip(cells, light, strict=True))
+        relief = np.full(len(self.scene.objects) + 1, -1)
+        for number, (place, _) in self.relief_of.items():
+            relief[number] = place
+        maps = np.split(relief[self.geometry.object], start)
+        used = (np.concatenate([own, [c], m]) for own, c, m in zip(cells, light, maps, strict=True))
         return [np.unique(own[own >= 0]) for own in used]
 
     @cached_property

@@ -49,6 +49,7 @@ from ptmtools.visibility.model import Pvs, over_places
 if TYPE_CHECKING:
     from ptmtools.coverage.required_levels import Need
     from ptmtools.light.model import Light
+    from ptmtools.neighbours.apo.reliefs import Reliefs
 
 
 #: Files written at a time.
@@ -214,6 +215,8 @@ def emit(
     need: Need | None = None,
     octrees: tuple[OctreeRecord, ...] = (),
     light: Light | None = None,
+    reliefs: Reliefs | None = None,
+    relief_need: Need | None = None,
     workers: int = 1,
 ) -> EmitReport:
     """Writes the files of every emitter that ``options.format`` names into the folder ``out``. The
@@ -221,11 +224,14 @@ def emit(
 
     Parameters
     ----------
-    textures: one record for every image that a material in use names, and those of lightmaps.
+    textures: one record for every image that a material in use names, those of lightmaps, and
+        those of normal maps.
     force: overwrite files of these names, gzip copies included.
     need: the levels that each cell requires, for the records; None leaves them out.
     octrees: the octree textures of objects, already written.
     light: the light of the cells, if baked.
+    reliefs: the places of objects in their normal maps, if there are any; relief_need: the levels
+        of these that each cell requires.
     workers: threads that may be used.
 
     Raises
@@ -261,6 +267,8 @@ def emit(
         workers,
         emitters,
         light,
+        reliefs,
+        relief_need,
     )
     written = [emitter.writer.load()(content) for emitter in emitters]
     for name in owned:

@@ -6,8 +6,9 @@ as materials are all that the GLBs of a site keep of objects.
 
 The shapes are those of the VRML file, in its order. Triangles are indexed; a vertex is a position
 with, where the material has an image, its texture coordinates, whose origin is the upper left in
-glTF, its colour where the shape has several, and its coordinates in the lightmap of the cell. There
-are no normals: the scene has none, and surfaces without are flat (glTF 2.0, section 3.7.2.1).
+glTF, its colour where the shape has several, and its coordinates in the lightmap of the cell, or
+in the normal map of the object with normal and tangent of the frame there. Other shapes have no
+normals: the scene has none, and surfaces without are flat (glTF 2.0, section 3.7.2.1).
 
 The buffer is compressed (`ptmtools.output.gltf_compressed`) or plain
 (`ptmtools.output.gltf_shapes`). docs/formats/gltf.md lists the members of a material by the
@@ -99,38 +100,54 @@ class MaterialWriter:
         textures: Mapping[int, tuple[int, TextureRecord]],
         fallback: bool,
         lightmap: tuple[int, TextureRecord] | None,
+        reliefs: Mapping[int, tuple[int, TextureRecord]],
     ) -> None:
-        """``textures``: for every image its index in the hints' list, and its record; ``lightmap``:
-        the same for the lightmap of the cell."""
+        """``textures``: for every image its index in the hints' list, and its record; ``lightmap``
+        and ``reliefs``: the same for the lightmap of the cell, and for the normal maps of
+        objects."""
         self._scene = materials
         self._records = textures
         self._lightmap = lightmap
+        self._reliefs = reliefs
         self._fallback = fallback
-        self._known: dict[tuple[int, bool, int | None, bool], int] = {}
+        self._known: dict[tuple[int, bool, int | None, bool, int | None], int] = {}
         self._materials: list[dict[str, Any]] = []
         self._textures: dict[tuple[int, int], int] = {}
         self._images: dict[str, int] = {}
         self._samplers: dict[tuple[Wrap, Wrap], int] = {}
 
-    def take(self, material: int, two_sided: bool, mesh: int | None, *, lit: bool) -> int:
+    def take(
+        self,
+        material: int,
+        two_sided: bool,
+        mesh: int | None,
+        *,
+        lit: bool,
+        relief: int | None = None,
+    ) -> int:
         """The index of a scene's material, seen from one side or from both; of a coarsest mesh with
-        finer ones, its row in the hints is ``mesh``. ``lit``: whether the lightmap lights it."""
-        key = material, two_sided, mesh, lit
+        finer ones, its row in the hints is ``mesh``. ``lit``: whether the lightmap lights it;
+        ``relief``: the object whose normal map it has."""
+        key = material, two_sided, mesh, lit, relief
         place = self._known.setdefault(key, len(self._materials))
         if place == len(self._materials):
             row = self._material(self._scene[material], two_sided, mesh)
-            self._materials.append(self._lit(row) if lit else row)
+            if lit:
+                assert self._lightmap
+                self._add(row, "light", "occlusionTexture", *self._lightmap)
+            if relief is not None:
+                self._add(row, "normal", "normalTexture", *self._reliefs[relief])
+            self._materials.append(row)
         return place
 
-    def _lit(self, row: dict[str, Any]) -> dict[str, Any]:
-        """A material with the lightmap."""
-        assert self._lightmap
-        place, record = self._lightmap
-        row["extras"] = row.get("extras", {}) | {"light": place}
+    def _add(
+        self, row: dict[str, Any], extra: str, member: str, place: int, record: TextureRecord
+    ) -> None:
+        """Gives a material a texture that is no image of the scene."""
+        row["extras"] = row.get("extras", {}) | {extra: place}
         if self._fallback and record.fallback is not None:
             index = self._texture(UP + quote(record.fallback), "clamp", "clamp")
-            row["occlusionTexture"] = {"index": index, "texCoord": 1}
-        return row
+            row[member] = {"index": index, "texCoord": 1}
 
     def members(self) -> dict[str, Any]:
         """The document's "materials", "textures", "images" and "samplers"."""
@@ -235,7 +252,9 @@ def _glb(content: Content, cell: int, name: str, shapes: Iterable[_Drawn]) -> by
     scene, options = content.scene, content.options
     buffer = PlainBuffer() if options.plain_gltf else CompressedBuffer(content.position_exponent)
     lightmap = content.lightmap_of.get(cell)
-    materials = MaterialWriter(scene.materials, content.records, options.fallback, lightmap)
+    materials = MaterialWriter(
+        scene.materials, content.records, options.fallback, lightmap, content.relief_of
+    )
     nodes: list[dict[str, Any]] = []
     meshes: list[dict[str, Any]] = []
     last = -1
@@ -243,12 +262,14 @@ def _glb(content: Content, cell: int, name: str, shapes: Iterable[_Drawn]) -> by
         image = scene.materials[shape.material].image
         record = content.records[image][1] if image >= 0 else None
         vertices = vertices_of(tables, shape, textured=record is not None)
+        relief = None if shape.relief is None else shape.object
         material = materials.take(
-            shape.material, shape.two_sided, place, lit=shape.light is not None
+            shape.material, shape.two_sided, place, lit=shape.light is not None, relief=relief
         )
+        second = lightmap if relief is None else content.relief_of[relief]
         sizes = (
             None if record is None else record.finest,
-            None if lightmap is None else lightmap[1].finest,
+            None if second is None else second[1].finest,
         )
         primitive = buffer.take(vertices, material, sizes)
         if primitive is None:

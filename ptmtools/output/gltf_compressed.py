@@ -1,9 +1,10 @@
 """The buffer of a cell compressed with meshopt (EXT_meshopt_compression).
 
 All shapes of a cell share one array of vertices and one of indices; those with colours have two of
-their own, and so have those with a lightmap. A vertex is a position, texture coordinates and
-coordinates in the lightmap, float32 on the grids of `ptmtools.output.grid`, stored as 24 bits and
-an exponent (filter EXPONENTIAL). Shapes lie in the
+their own, and so have those with a lightmap, and those with a normal map. A vertex is a position,
+texture coordinates and coordinates in the lightmap or the normal map, float32 on the grids of
+`ptmtools.output.grid`, stored as 24 bits and an exponent (filter EXPONENTIAL). Normals and tangents
+are a view of their own: they are those of charts, and take next to no bytes. Shapes lie in the
 order of their materials, the vertices and triangles of each in that of
 `ptmtools.meshopt.encoding.reordered`. Buffer 1 is the fallback of the extension: it has no data,
 and the extension is required.
@@ -45,6 +46,8 @@ EXTENSIONS = {"extensionsUsed": [MESHOPT], "extensionsRequired": [MESHOPT]}
 _POSITION, _COORDINATES, _COLOR = 12, 8, 8
 #: Columns of positions, of these and texture coordinates, and of these and light.
 _PLACED, _TEXTURED, _LIT = 3, 5, 7
+#: Exponents of the steps of normal, tangent and sign, see `apo.normal_map`; bytes of a normal.
+_FRAME, _NORMAL = np.array([-9] * 6 + [0]), 12
 _WHOLE_BYTES = 0
 
 
@@ -58,7 +61,8 @@ class _Part:
     material: its index, by which parts are sorted.
     step: (n, 7) coordinates in steps; those of a texture and of a lightmap are 0 without one.
     exponent: (7,) of the steps.
-    textured, lit: whether it has texture coordinates, and coordinates in the lightmap.
+    textured, lit: whether it has texture coordinates, and those in a lightmap or normal map.
+    frame: (n, 7) in steps, or None.
     color: (n, 4) or None.
     triangle: (m, 3)
     """
@@ -69,8 +73,14 @@ class _Part:
     exponent: NDArray[np.int64]
     textured: bool
     lit: bool
+    frame: NDArray[np.int64] | None
     color: NDArray[np.uint16] | None
     triangle: NDArray[np.int64]
+
+    @property
+    def kind(self) -> tuple[bool, bool, bool]:
+        """Parts of one kind share their arrays."""
+        return self.lit, self.frame is not None, self.color is not None
 
 
 class CompressedBuffer:
@@ -106,39 +116,48 @@ class CompressedBuffer:
         used, triangle = reordered(place.ravel()[vertices.triangle[~flat]])
         rows = first[used]
         color = None if vertices.color is None else vertices.color[rows]
+        frame = None if vertices.frame is None else _steps(vertices.frame[rows], _FRAME)
         primitive = {"attributes": {}, "indices": 0, "material": material}
         textured, lit = (coordinates is not None for coordinates in both)
-        part = _Part(primitive, material, step[rows], exponent, textured, lit, color, triangle)
-        self._parts.append(part)
+        self._parts.append(
+            _Part(primitive, material, step[rows], exponent, textured, lit, frame, color, triangle)
+        )
         return primitive
 
     def finish(self) -> None:
         """Encodes the arrays and completes the primitives."""
-        for lit in (False, True):
-            for painted in (False, True):
-                parts = [p for p in self._parts if (p.lit, p.color is not None) == (lit, painted)]
-                if parts:
-                    self._encode(sorted(parts, key=lambda p: p.material), lit, painted)
+        for kind in sorted({part.kind for part in self._parts}):
+            parts = [part for part in self._parts if part.kind == kind]
+            self._encode(sorted(parts, key=lambda p: p.material), *kind)
 
-    def _encode(self, parts: list[_Part], lit: bool, painted: bool) -> None:
+    def _encode(self, parts: list[_Part], lit: bool, framed: bool, painted: bool) -> None:
         step = np.concatenate([part.step for part in parts])
         exponent = np.repeat([p.exponent for p in parts], [len(p.step) for p in parts], axis=0)
         textured = any(part.textured for part in parts)
         width = _LIT if lit else _TEXTURED if textured else _PLACED
         element = exponential(step[:, :width], exponent[:, :width])
         form = {"mode": "ATTRIBUTES", "filter": "EXPONENTIAL"}
-        view = self._view(encode_attributes(element, _WHOLE_BYTES), element, form)
+        vertices = self._view(encode_attributes(element, _WHOLE_BYTES), element, form)
         count = len(step)
         position = step[:, :3] * 2.0**self._exponent
         ends = {"min": position.min(axis=0), "max": position.max(axis=0)}
         bounds = {name: shortest(end.astype(np.float32)) for name, end in ends.items()}
-        attributes = {"POSITION": self._accessor(view, 0, FLOAT, count, "VEC3", bounds)}
+        attributes = {"POSITION": self._accessor(vertices, 0, FLOAT, count, "VEC3", bounds)}
         if lit:
-            place = self._accessor(view, _POSITION + _COORDINATES, FLOAT, count, "VEC2")
-            attributes |= {"TEXCOORD_1": place}
+            place = self._accessor(vertices, _POSITION + _COORDINATES, FLOAT, count, "VEC2")
+            # glTF has no second coordinates without first ones.
+            attributes |= {"TEXCOORD_0": place, "TEXCOORD_1": place}
+        if framed:
+            frame = np.concatenate([p.frame for p in parts if p.frame is not None])
+            element = exponential(frame, np.broadcast_to(_FRAME, frame.shape))
+            view = self._view(encode_attributes(element, _WHOLE_BYTES), element, form)
+            attributes |= {
+                "NORMAL": self._accessor(view, 0, FLOAT, count, "VEC3"),
+                "TANGENT": self._accessor(view, _NORMAL, FLOAT, count, "VEC4"),
+            }
         both = attributes
         if textured:
-            place = self._accessor(view, _POSITION, FLOAT, count, "VEC2")
+            place = self._accessor(vertices, _POSITION, FLOAT, count, "VEC2")
             both = attributes | {"TEXCOORD_0": place}
         if painted:
             colors = np.concatenate([p.color for p in parts if p.color is not None]).astype("<u2")

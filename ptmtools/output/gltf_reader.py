@@ -38,6 +38,7 @@ class ReadMaterial:
     mesh: its object's row in the hints if this mesh is the coarsest of several, or None.
     light, lightmap: index in the hints of the lightmap of the cell, and URI of that as an image, or
         None.
+    normal, normal_map: the same for the normal map of the object.
     """
 
     factor: tuple[float, ...]
@@ -51,6 +52,8 @@ class ReadMaterial:
     mesh: int | None
     light: int | None = None
     lightmap: str | None = None
+    normal: int | None = None
+    normal_map: str | None = None
 
 
 @dataclass(frozen=True)
@@ -66,7 +69,9 @@ class ReadPrimitive:
     uv: (n, 2) float32, origin at the upper left, or None.
     color: (n, 3) linear light, or None.
     triangle: (m, 3) int64 indices into `point` and `uv`.
-    light: (n, 2) float32 coordinates in the lightmap, origin at the upper left, or None.
+    light: (n, 2) float32 coordinates in the lightmap or in the normal map, origin at the upper
+        left, or None.
+    frame: (n, 7) float32 normal, tangent and sign of the bitangent, or None.
     """
 
     place: str
@@ -78,6 +83,7 @@ class ReadPrimitive:
     triangle: NDArray[np.int64]
     material: ReadMaterial
     light: NDArray[np.float32] | None = None
+    frame: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True)
@@ -155,8 +161,9 @@ class _Reader:
         point = self._vertices(attributes["POSITION"], "VEC3")
         self._check_bounds(attributes["POSITION"], point)
         uv, light = (
-            self._coordinates(attributes, f"TEXCOORD_{n}", len(point), place) for n in (0, 1)
+            self._rows(attributes, f"TEXCOORD_{n}", "VEC2", len(point), place) for n in (0, 1)
         )
+        frame = self._frames(attributes, len(point), place)
         color = self._colors(attributes, len(point), place)
         index = self._elements(primitive["indices"], "SCALAR", (5123, 5125), _INDICES).ravel()
         if len(index) % 3 or int(index.max()) >= len(point):
@@ -169,24 +176,42 @@ class _Reader:
             point = point[own]
             uv = None if uv is None else uv[own]
             light = None if light is None else light[own]
+            frame = None if frame is None else frame[own]
             color = None if color is None else color[own]
         material = self._material(primitive["material"])
-        if (material.light is None) != (light is None):
-            _foreign(place, "has only one of a lightmap and its coordinates")
+        if light is not None and material.texture is None:
+            uv = None  # the second coordinates once more
+        if (material.normal is None) != (frame is None):
+            _foreign(place, "has only one of a normal map and its frames")
+        if (material.light is None and frame is None) != (light is None):
+            _foreign(place, "has only one of a lightmap, or normal map, and its coordinates")
         octree = node.get("extras", {}).get("octree")
         return ReadPrimitive(
-            place, node["name"], octree, point, uv, color, triangle, material, light
+            place, node["name"], octree, point, uv, color, triangle, material, light, frame
         )
 
-    def _coordinates(
-        self, attributes: dict[str, int], name: str, count: int, place: str
+    def _rows(
+        self, attributes: dict[str, int], name: str, form: str, count: int, place: str
     ) -> NDArray[np.float32] | None:
         if name not in attributes:
             return None
-        rows = self._vertices(attributes[name], "VEC2")
+        rows = self._vertices(attributes[name], form)
         if len(rows) != count:
-            _foreign(place, f"{len(rows)} texture coordinates for {count} positions")
+            _foreign(place, f"{len(rows)} rows of {name} for {count} positions")
         return rows
+
+    def _frames(
+        self, attributes: dict[str, int], count: int, place: str
+    ) -> NDArray[np.float32] | None:
+        normal = self._rows(attributes, "NORMAL", "VEC3", count, place)
+        tangent = self._rows(attributes, "TANGENT", "VEC4", count, place)
+        if normal is None or tangent is None:
+            if normal is not tangent:
+                _foreign(place, "has only one of normals and tangents")
+            return None
+        if (np.abs(tangent[:, 3]) != 1).any():
+            _foreign(place, "a bitangent has no sign")
+        return np.hstack([normal, tangent])
 
     def _colors(
         self, attributes: dict[str, int], count: int, place: str
@@ -276,7 +301,7 @@ class _Reader:
         material = self._row("materials", index)
         surface, extras = material["pbrMetallicRoughness"], material.get("extras", {})
         factor = surface.get("baseColorFactor", WHITE)
-        if extras.keys() - {"mesh", "light"} and not {"ptm", "texture"} <= extras.keys():
+        if extras.keys() - {"mesh", "light", "normal"} and not {"ptm", "texture"} <= extras.keys():
             _foreign(
                 f"materials[{index}].extras",
                 "has members of a texture, but not its .ptm and its place",
@@ -285,8 +310,12 @@ class _Reader:
         place = f"materials[{index}]"
         image = self._image(surface.get("baseColorTexture"), wrap, place)
         lightmap = self._image(material.get("occlusionTexture"), (clamp, clamp), place)
-        if lightmap is not None and "light" not in extras:
-            _foreign(place, "has a lightmap, but not its place in the hints")
+        normal_map = self._image(material.get("normalTexture"), (clamp, clamp), place)
+        for image_of, name in ((lightmap, "light"), (normal_map, "normal")):
+            if image_of is not None and name not in extras:
+                _foreign(place, f"has an image of {name}, but not its place in the hints")
+        if "light" in extras and "normal" in extras:
+            _foreign(place, "has both a lightmap and a normal map")
         return ReadMaterial(
             factor=tuple(factor),
             two_sided=material.get("doubleSided", False),
@@ -301,6 +330,8 @@ class _Reader:
             mesh=extras.get("mesh"),
             light=extras.get("light"),
             lightmap=lightmap,
+            normal=extras.get("normal"),
+            normal_map=normal_map,
         )
 
     def _image(self, use: dict[str, int] | None, wrap: tuple[int, int], place: str) -> str | None:

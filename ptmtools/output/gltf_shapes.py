@@ -42,7 +42,9 @@ class Vertices:
     uv: (n, 2) float32, origin at the upper left; None without a texture.
     color: (n, 4) uint16, linear light and an alpha of 1, of 65535; None where all are white.
     triangle: (m, 3)
-    light: (n, 2) float32 coordinates in the lightmap, origin at the upper left; None without one.
+    light: (n, 2) float32 coordinates in the lightmap, or in the normal map, origin at the upper
+        left; None without one.
+    frame: (n, 7) float32 normal, tangent and sign of the bitangent; None without a normal map.
     """
 
     point: NDArray[np.float32]
@@ -50,6 +52,7 @@ class Vertices:
     color: NDArray[np.uint16] | None
     triangle: NDArray[np.int64]
     light: NDArray[np.float32] | None = None
+    frame: NDArray[np.float32] | None = None
 
 
 def vertices_of(tables: Tables, shape: Shape, *, textured: bool) -> Vertices:
@@ -58,22 +61,24 @@ def vertices_of(tables: Tables, shape: Shape, *, textured: bool) -> Vertices:
     width = len(shape.uv) if textured else 1
     corner = shape.triangle * width + (shape.uv_triangle if textured else 0)
     vertex, triangle = by_first_use(corner)
-    light, lit = None, shape.light
-    if lit is not None:
-        table, place = np.unique(lit.reshape(-1, 2), axis=0, return_inverse=True)
+    second = None
+    if (rows := shape.light if shape.relief is None else shape.relief) is not None:
+        table, place = np.unique(rows.reshape(-1, rows.shape[2]), axis=0, return_inverse=True)
         both, triangle = by_first_use(triangle * len(table) + place.reshape(-1, 3))
-        vertex, light = vertex[both // len(table)], flipped(table[both % len(table)])
+        vertex, second = vertex[both // len(table)], table[both % len(table)]
     rgba = None
     if shape.color is not None:
         both, triangle = by_first_use(triangle << 24 | packed(shape.color))
         vertex, color = vertex[both >> 24], unpacked(both & 0xFFFFFF)
-        light = None if light is None else light[both >> 24]
+        second = None if second is None else second[both >> 24]
         # 8 bits of linear light would be too few in the dark.
         rgba = np.full((len(color), 4), 65535, np.uint16)
         rgba[:, :3] = np.rint(65535 * to_linear(color / 255))
     point = tables.point[shape.point[vertex // width]]
     uv = flipped(tables.uv[shape.uv[vertex % width]]) if textured else None
-    return Vertices(point, uv, rgba, triangle, light)
+    light = None if second is None else flipped(second[:, :2])
+    frame = None if second is None or shape.relief is None else second[:, 2:]
+    return Vertices(point, uv, rgba, triangle, light, frame)
 
 
 def flipped(uv: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -89,10 +94,18 @@ def shortest(values: NDArray[np.float32]) -> list[float]:
     return [int(v) if v.is_integer() and abs(v) < _WHOLE else v for v in numbers]
 
 
-#: Width and height of the texture and of the lightmap of a shape, texels; None without one.
+#: Width and height of the texture, and of the lightmap or normal map of a shape, texels; None
+#: without one.
 Sizes = tuple[tuple[int, int] | None, tuple[int, int] | None]
 #: In the order of the views: component type and type.
-_KINDS = ((FLOAT, "VEC3"), (FLOAT, "VEC2"), (SHORT, "VEC4"), (INT, "SCALAR"), (SHORT, "SCALAR"))
+_KINDS = (
+    (FLOAT, "VEC3"),
+    (FLOAT, "VEC2"),
+    (FLOAT, "VEC4"),
+    (SHORT, "VEC4"),
+    (INT, "SCALAR"),
+    (SHORT, "SCALAR"),
+)
 
 
 class PlainBuffer(BufferWriter):
@@ -113,11 +126,17 @@ class PlainBuffer(BufferWriter):
         self._targets = [0] * len(_KINDS)
 
     def take(self, vertices: Vertices, material: int, _: Sizes) -> dict[str, Any]:
-        """The primitive of a shape."""
+        """The primitive of a shape. Where it has second coordinates but no first ones, glTF demands
+        these, and the second ones take their place."""
         attributes = {"POSITION": self.positions(vertices.point)}
         for name, coordinates in (("TEXCOORD_0", vertices.uv), ("TEXCOORD_1", vertices.light)):
             if coordinates is not None:
                 attributes[name] = self.vectors(coordinates)
+        if vertices.light is not None and vertices.uv is None:
+            attributes["TEXCOORD_0"] = attributes["TEXCOORD_1"]
+        if vertices.frame is not None:
+            attributes["NORMAL"] = self.vectors(vertices.frame[:, :3])
+            attributes["TANGENT"] = self.vectors(vertices.frame[:, 3:])
         if vertices.color is not None:
             attributes["COLOR_0"] = self.shares(vertices.color)
         indices = self.indices(vertices.triangle, len(vertices.point))

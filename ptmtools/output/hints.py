@@ -76,7 +76,9 @@ def index_text(content: Content) -> str:
         head["firstLook"] = FIRST_LOOK_FILES
     lists: dict[str, list[Any]] = {
         "viewpoints": [_viewpoint(v) for v in content.viewpoints],
-        "textures": [_texture(r, content.options.fallback) for r in content.textures],
+        "textures": [
+            _texture(r, content.scene.objects, content.options.fallback) for r in content.textures
+        ],
         "octrees": [_octree(r) for r in content.octrees],
         "cells": [
             {"name": cell_name(c), "box": box}
@@ -110,7 +112,7 @@ def _viewpoint(viewpoint: Viewpoint) -> dict[str, Any]:
     }
 
 
-def _texture(record: TextureRecord, fallback: bool) -> Mapping[str, Any]:
+def _texture(record: TextureRecord, objects: Sequence[str], fallback: bool) -> Mapping[str, Any]:
     png = record.fallback if fallback else None
     level = len(record.levels) - 1 if record.fallback_level is None else record.fallback_level
     texel = texel_bytes(record.levels[0]) if record.levels else record.components
@@ -134,6 +136,8 @@ def _texture(record: TextureRecord, fallback: bool) -> Mapping[str, Any]:
         row["previews"] = [_preview(each) for each in record.previews]
     if record.cell >= 0:
         row["light"] = record.cell
+    if record.object >= 0:
+        row["relief"] = objects[record.object]
     return row
 
 
@@ -245,14 +249,20 @@ class RecordWriter:
 
     def _need(self, need: Need, cell: int) -> list[list[Any]]:
         """For each visible texture its index, the coarsest required level, and shares."""
-        records, cells = self._content.records, self._content.pvs.row(cell).tolist()
-        visible = {place for other in cells for place in self._content.painted[other].tolist()}
+        content, cells = self._content, self._content.pvs.row(cell).tolist()
+        visible = {place for other in cells for place in content.painted[other].tolist()}
+        images = {image: place for image, (place, _) in content.records.items()}
+        maps = dict(enumerate(place for place, _ in content.relief_of.values()))
         rows = []
-        for entry in range(*need.start[cell : cell + 2].tolist()):
-            place = records[int(need.image[entry])][0]
-            shares = need.share[slice(*need.share_start[entry : entry + 2].tolist())]
-            if place in visible:
-                rows.append([place, int(need.first[entry]), *significant(shares, NEED_DIGITS)])
+        for measured, places in ((need, images), (content.relief_need, maps)):
+            if measured is None:
+                continue
+            for entry in range(*measured.start[cell : cell + 2].tolist()):
+                place = places[int(measured.image[entry])]
+                shares = measured.share[slice(*measured.share_start[entry : entry + 2].tolist())]
+                if place in visible:
+                    first = int(measured.first[entry])
+                    rows.append([place, first, *significant(shares, NEED_DIGITS)])
         return sorted([*rows, *self._lightmap_need(cell)])
 
     def _lightmap_need(self, cell: int) -> Iterator[list[Any]]:

@@ -89,7 +89,7 @@ def mesh_levels(content: Content) -> tuple[MeshLevels, ...]:
     """The levels of all objects that have some, by cell and object."""
     meshes: list[MeshLevels] = []
     geometry, first = content.lit, 0
-    heavy = list(_heavy(geometry, content.octree_of.keys()))
+    heavy = list(_heavy(geometry, content.octree_of.keys() | content.relief_of.keys()))
     for done, (cell, rows) in enumerate(heavy):
         content.progress(done, len(heavy), "simplifying objects")
         shapes = [geometry.shape(s) for s in rows]

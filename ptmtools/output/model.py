@@ -41,11 +41,12 @@ class PreviewRecord:
 
 @dataclass(frozen=True)
 class TextureRecord:
-    """The texture of one image of the scene, or the lightmap of a cell, for the emitted files.
+    """The texture of one image of the scene, the lightmap of a cell, or the normal map of an
+    object, for the emitted files.
 
     Attributes
     ----------
-    image: index into `Scene.images`; -1 of a lightmap.
+    image: index into `Scene.images`, or -1.
     file: the `.ptm`, relative to the served folder, "textures/NAME.ptm".
     fallback: the fallback image, a PNG or a preview, relative to the served folder, or None.
     width, height, components: of the finest level in the `.ptm`.
@@ -58,7 +59,7 @@ class TextureRecord:
     stored: the `.ptm` to read; None if it was not encoded.
     errors: root mean square of each level from the finest, 0 to 255; empty if unknown.
     previews: by ascending level; the finest may be of levels that the `.ptm` lacks.
-    cell: the cell whose lightmap it is, or -1.
+    cell, object: the cell whose lightmap it is, or -1; the object whose normal map, or -1.
     """
 
     image: int
@@ -76,6 +77,7 @@ class TextureRecord:
     errors: tuple[float, ...] = ()
     previews: tuple[PreviewRecord, ...] = ()
     cell: int = -1
+    object: int = -1
 
     @property
     def level_count(self) -> int:

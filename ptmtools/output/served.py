@@ -140,6 +140,22 @@ Document = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
+class MappedRelief:
+    """The normal maps of triangles.
+
+    Attributes
+    ----------
+    number: (n,) int32, the normal map of its object in the hints, -1 without.
+    uv: (n, 3, 2) float64 coordinates in it, origin at the upper left; 0 without one.
+    frame: (n, 7) float32, see `ptmtools.neighbours.apo.normal_map`; 0 without one.
+    """
+
+    number: NDArray[np.int32]
+    uv: Floats
+    frame: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
 class Surfaces:
     """All triangles that are drawn, in the order of their cells.
 
@@ -156,6 +172,7 @@ class Surfaces:
     octree: (n,) int32, the octree texture of its object in the hints, -1 without.
     lightmap, spot: (n,) int32, the lightmap in the hints' textures, -1 without; (n, 3, 2) float64
         coordinates in it, origin at the upper left. None if there are no lightmaps.
+    relief: the normal maps of objects, if there are any.
     """
 
     corner: Floats
@@ -171,6 +188,7 @@ class Surfaces:
     octree: NDArray[np.int32]
     lightmap: NDArray[np.int32] | None = None
     spot: Floats | None = None
+    relief: MappedRelief | None = None
 
     @property
     def light(self) -> Surfaces | None:
@@ -388,8 +406,8 @@ def _glb(file: Path, data: bytes, cell: int, textures: int, octrees: int) -> Rea
         raise DatabaseError(
             "PTM-D006", fault.message, file=file, place=fault.place, remedy=BUILD
         ) from None
-    both = ((p.material.texture, p.material.light) for p in read.primitives)
-    used = [number for pair in both for number in pair if number is not None]
+    named = ((p.material.texture, p.material.light, p.material.normal) for p in read.primitives)
+    used = [number for each in named for number in each if number is not None]
     octree = [p.octree for p in read.primitives if p.octree is not None]
     out_of_range = max(used, default=-1) >= textures or max(octree, default=-1) >= octrees
     if read.cell != cell or out_of_range:
@@ -441,12 +459,28 @@ def _surfaces(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
         octree=spread([-1 if p.octree is None else p.octree for _, p in shapes], np.int32),
         lightmap=spread(lightmap, np.int32) if max(lightmap, default=-1) >= 0 else None,
         spot=spot if max(lightmap, default=-1) >= 0 else None,
+        relief=_relief([p for _, p in shapes]),
     )
 
 
 def _corners(uv: NDArray[np.float32] | None, triangle: Ints) -> Floats:
     """(m, 3, 2) coordinates of the corners of triangles; 0 without."""
     return np.zeros((len(triangle), 3, 2)) if uv is None else uv.astype(np.float64)[triangle]
+
+
+def _relief(shapes: list[ReadPrimitive]) -> MappedRelief | None:
+    if all(p.frame is None for p in shapes):
+        return None
+    count = sum(len(p.triangle) for p in shapes)
+    number, uv = np.full(count, -1, np.int32), np.zeros((count, 3, 2))
+    frame = np.zeros((count, 7), np.float32)
+    end = 0
+    for p in shapes:
+        own = slice(end, end := end + len(p.triangle))
+        if p.frame is not None and p.light is not None:
+            number[own], uv[own] = p.material.normal or 0, p.light[p.triangle]
+            frame[own] = p.frame[p.triangle[:, 0]]  # the corners have the same
+    return MappedRelief(number, uv, frame)
 
 
 def _colors(primitive: ReadPrimitive) -> Floats:

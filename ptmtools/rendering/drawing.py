@@ -1,9 +1,9 @@
 """Draws a view of a served database with the finest levels of its textures.
 
 Embree finds the surface of each ray, and the kernels of the simulator sample the textures. A lit
-picture has the lamp of `ptmtools.rendering.light` and the relief of octree textures. Others have
-lightmaps, and shade surfaces with neither texture nor lightmap by the angle to the viewer, like the
-web page.
+picture has the lamp of `ptmtools.rendering.light`, and the relief of octree textures and normal
+maps. Others have lightmaps, and shade surfaces with neither texture nor lightmap by the angle to
+the viewer, like the web page.
 """
 
 from __future__ import annotations
@@ -67,7 +67,8 @@ class ViewOptions:
         0, "Maximum width and height of the texture levels; 0 uses the finest.", metavar="TEXELS"
     )
     lit: bool = option(
-        False, "Light the scene with a lamp, and draw the relief of octree textures."
+        False,
+        "Light the scene with a lamp, and draw the relief of octree textures and normal maps.",
     )
 
     def __post_init__(self) -> None:
@@ -160,9 +161,12 @@ def draw_view(
     sight = Caster(surfaces).look(camera, eye.position, eye.direction)
     hit = sight.triangle[sight.triangle >= 0]
     light = None if options.lit else surfaces.light
-    visible = set(surfaces.texture[hit].tolist())
-    visible |= set() if light is None else set(light.texture[hit].tolist())
-    pyramids = read_pyramids(served, progress, only=visible)
+    used = set(surfaces.texture[hit].tolist())
+    if light is not None:
+        used |= set(light.texture[hit].tolist())
+    if options.lit and surfaces.relief:
+        used |= set(surfaces.relief.number[hit].tolist())
+    pyramids = read_pyramids(served, progress, only=used)
     column = pyramids.levels
     if options.max_side:
         within = (pyramids.size.max(axis=2) <= options.max_side) & (pyramids.size[:, :, 0] > 0)
@@ -171,10 +175,12 @@ def draw_view(
     loaded = np.ones(served.cell_count, dtype=np.bool_)
     shade(sight, triangles, own_levels(pyramids), loaded, column, shown)
     if options.lit:
+        from ptmtools.rendering.normal_maps import show_relief
         from ptmtools.rendering.relief import relieve
 
-        octrees = read_octrees(served)
-        relieve(sight, triangles, lamps(surfaces.corner), octrees, loaded, octrees.levels, shown)
+        octrees, lamp = read_octrees(served), lamps(surfaces.corner)
+        relieve(sight, triangles, lamp, octrees, loaded, octrees.levels, shown)
+        show_relief(sight, surfaces, pyramids, column, lamp, shown)
     else:
         _shade_plain(sight, triangles, light, shown)
     if light is not None:

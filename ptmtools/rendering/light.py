@@ -21,9 +21,13 @@ LAMP = tuple(float(v) for v in np.array([0.5, 0.7, 0.6]) / np.linalg.norm([0.5, 
 
 def lamps(corner: Floats) -> Floats:
     """(n,) light on triangles (n, 3, 3) with flat shading, `AMBIENT` to 1."""
-    normal = normals(corner)
+    return light_on(normals(corner))
+
+
+def light_on(normal: Floats) -> Floats:
+    """(n,) light on normals (n, 3) of any length, `AMBIENT` to 1."""
     length = np.linalg.norm(normal, axis=1)
-    along = np.divide(normal @ LAMP, length, out=np.zeros(len(corner)), where=length > 0)
+    along = np.divide(normal @ LAMP, length, out=np.zeros(len(normal)), where=length > 0)
     result: Floats = AMBIENT + (1 - AMBIENT) * ((1 + along) / 2) ** 2
     return result
 

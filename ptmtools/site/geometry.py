@@ -16,7 +16,7 @@ from ptmtools.output.gltf import pack, unpack
 #: The members of a material, of its surface and of its extras that the page reads.
 _LOOK = ("alphaMode", "alphaCutoff", "doubleSided")
 _SURFACE = ("baseColorFactor",)
-_EXTRAS = ("texture", "wrapS", "wrapT", "mesh", "octree", "light")
+_EXTRAS = ("texture", "wrapS", "wrapT", "mesh", "octree", "light", "normal")
 
 
 def lean_glb(data: bytes) -> bytes:

@@ -12,7 +12,7 @@ import hashlib
 import json
 import os
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -214,8 +214,9 @@ def weight_of(site: Site) -> Weight:
         for number, row in enumerate(index["cells"])
         if row.get("standing", True)
     }
-    statues = "octrees" in index
-    bytes_of = {n: link_bytes(e) for n, e in site.entries.items() if _walked(n, statues)}
+    used = {"statues.js"} if "octrees" in index else set()
+    used |= {"reliefs.js" for row in index["textures"] if "relief" in row}
+    bytes_of = {n: link_bytes(e) for n, e in site.entries.items() if _walked(n, used)}
     begins = (f"{DATA}/index-", f"{DATA}/poster-")
     page = sum(size for name, size in bytes_of.items() if not name.startswith(f"{DATA}/"))
     before = sum(size for name, size in bytes_of.items() if name.startswith(begins))
@@ -231,9 +232,10 @@ def weight_of(site: Site) -> Weight:
     )
 
 
-def _walked(name: str, statues: bool) -> bool:
-    """Whether every walk may need a file; the script of octrees where there are some."""
-    later = name.rpartition("/")[2] in LATER and not (statues and name.endswith("/statues.js"))
+def _walked(name: str, used: Collection[str]) -> bool:
+    """Whether every walk may need a file; of scripts that are loaded later those ``used``."""
+    script = name.rpartition("/")[2]
+    later = script in LATER and script not in used
     return name == INDEX or (name.startswith(("viewer-", f"{DATA}/")) and not later)
 
 

@@ -122,7 +122,7 @@ def test_groups_share_no_chart_and_no_texel() -> None:
     points, triangles = indexed(np.concatenate(halves))
     group = np.array([0, 0, 7, 7])
     assert len(set(unwrap(points, triangles, (64,)).chart.tolist())) == 1
-    atlas = unwrap(points, triangles, (64,), 1, group)
+    atlas = unwrap(points, triangles, (64,), padding=1, group=group)
     assert (atlas.chart[:2] != atlas.chart[2:]).all()
     share = np.random.default_rng(1).dirichlet([0.2, 0.2, 0.2], 500)
     at = np.einsum("nk,tkx->tnx", share, atlas.uv)

@@ -138,7 +138,11 @@ def _cells(
 ) -> Iterator[str]:
     with suppress(KeyError, TypeError):
         known = [cell["name"] for cell in index["cells"]]
-        images = [{row["file"], row["fallback"]} - {None} for row in index["textures"]]
+        # VRML shows neither light nor relief.
+        images = [
+            set() if row.keys() & {"light", "relief"} else {row["file"], row["fallback"]} - {None}
+            for row in index["textures"]
+        ]
         for name in known:
             record, document = records.get(name), documents.get(name)
             nodes = document.of_type("PTMCell") if document else []
@@ -164,7 +168,7 @@ def _differences(
         "visible": [f"{known[c]}.wrl" for c in record["visible"]] == list(cell["visibleUrl"]),
         "ach": _equal_single(record["ach"], cell["ach"]),
         "leaves": _same_leaves(record["leaves"], leaves, cell["hullPoint"]),
-        "textures": {frozenset(images[t]) for t in record["textures"][0]} == shown,
+        "textures": {frozenset(images[t]) for t in record["textures"][0] if images[t]} == shown,
     }
     return [field for field, same in equal.items() if not same]
 

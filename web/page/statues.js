@@ -1,3 +1,10 @@
 // The script of sites with octree textures.
 
-export { Statues } from "./octree/statues.js";
+import { Statues } from "./octree/statues.js";
+
+/**
+ * @param {import("./walkthrough.js").Walkthrough} walk
+ * @param {(fault: import("./net/errors.js").PageError) => void} report
+ */
+export const statuesOf = (walk, report) =>
+  new Statues(walk.gl, walk.index.octrees ?? [], walk.site, walk.fetcher, report, () => walk.touch());

@@ -11,7 +11,7 @@ import { Renderer } from "./gl/renderer.js";
 import { Reserve } from "./gl/reserve.js";
 import { Sharpness } from "./gl/sharpness.js";
 import { TextureMemory } from "./gl/texture-memory.js";
-import { loadComparison, loadStatues } from "./load-later.js";
+import { loadComparison, loadReliefs, loadStatues } from "./load-later.js";
 import { clock, Fetcher } from "./net/fetcher.js";
 import { watchLink } from "./net/timings.js";
 import { catalogueOf } from "./policy/catalogue.js";
@@ -69,7 +69,7 @@ export class Walkthrough {
   #painted = -1;
   #looked = -1;
   #before = 0;
-  /** Whether the script of octree textures is on its way. */
+  /** Whether the script of relief is on its way. */
   #loading = false;
   /** Visible cells in view without geometry. @type {{cell: number, box: number[]}[]} */
   #missing = [];
@@ -178,12 +178,12 @@ export class Walkthrough {
   #make() {
     this.renderer?.statues?.delete();
     const renderer = (this.renderer = new Renderer(this.gl, this.memory, this.means));
-    const { octrees } = this.index;
-    if (octrees) {
+    const relieved = this.index.textures.some((row) => "relief" in row);
+    if (relieved || this.index.octrees) {
       const report = (/** @type {import("./net/errors.js").PageError} */ error) => this.#report(error, "octree", 0);
       this.#loading = true;
-      loadStatues().then(({ Statues }) => {
-        renderer.statues = new Statues(this.gl, octrees, this.site, this.fetcher, report, () => this.touch());
+      (relieved ? loadReliefs() : loadStatues()).then(({ statuesOf }) => {
+        renderer.statues = statuesOf(this, report);
       }).catch(() => this.emit("notice", { message: "The details of statues could not be loaded." }))
         .finally(() => (this.#loading = false));
     }
@@ -504,13 +504,13 @@ export class Walkthrough {
     return this.has(true);
   }
 
-  /** Whether that is so, of objects with any mesh and without octrees unless `finer`. @param {boolean} finer */
+  /** Whether that is so, of objects with any mesh and without relief unless `finer`. @param {boolean} finer */
   has(finer) {
     const { client, memory, present, renderer, stream, catalogue: { T, K } } = this;
     if (!present || this.#sightDrawn < this.#turned || this.#looked < this.#changed) return false;
     if (this.#ready && this.#painted < this.#changed) return false;
     if (this.visible.some((c) => renderer?.cells.get(c)?.shapes !== stream.shapes.get(c))) return false;
-    // The walk begins without octrees.
+    // The walk begins without relief.
     if (finer && (this.#loading || renderer?.statues?.lacks)) return false;
     if (client.cell !== this.cell || client.missing(false, false, finer) > 0 || !this.sharpness.full) return false;
     for (let t = 0; t < T; t++) {

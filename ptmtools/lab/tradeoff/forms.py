@@ -29,15 +29,15 @@ from ptmtools.lab.tradeoff.experiment import (
     timed,
 )
 from ptmtools.lab.tradeoff.looks import Rays, apart, look, outline
+from ptmtools.light.looks import Rays as Light
+from ptmtools.light.occlusion import Surroundings, points_on
 from ptmtools.neighbours.apo.files import glb_of, streamed
 from ptmtools.neighbours.apo.making import distinct, make_apo, welded
 from ptmtools.neighbours.apo.model import ApoOptions
 from ptmtools.neighbours.apo.normals import corner_normals
 from ptmtools.neighbours.apo.traversal import look_up
-from ptmtools.neighbours.campus.lights import Rays as Light
 from ptmtools.neighbours.campus.making import levels
 from ptmtools.neighbours.campus.objects import Part, parts_of
-from ptmtools.neighbours.campus.occlusion import Surroundings, points_on
 from ptmtools.neighbours.campus.options import MAX_SAMPLES, CampusOptions
 from ptmtools.neighbours.campus.textures import jpeg, squared
 from ptmtools.neighbours.interlace.model import InterlaceOptions

@@ -1,9 +1,9 @@
-"""Options for replacing objects by octree textures; see `ptmtools.neighbours.apo.replacing`."""
+"""Options for replacing objects; see `ptmtools.neighbours.apo.replacing`."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from ptmtools.errors import InputError
 from ptmtools.options import option
@@ -34,18 +34,23 @@ def check_range(name: str, value: float, prefix: str = "") -> None:
 
 @dataclass(frozen=True)
 class ReplaceOptions:
-    """Objects to replace by a simplified mesh and an octree texture, and their accuracy.
+    """Objects to replace by a simplified mesh with their relief, and its accuracy.
 
     Raises InputError PTM-I111 for values out of range, or without an object.
     """
 
-    heading: ClassVar[str] = "Octree textures"
+    heading: ClassVar[str] = "Relief"
 
     apo: tuple[str, ...] = option(
         (),
-        "Names of objects, such as scanned statues, to replace with a simplified mesh and an "
-        "octree of normals; * and ? are wildcards. Repeatable.",
+        "Names of objects, such as scanned statues, to replace with a simplified mesh and their "
+        "relief; * and ? are wildcards. Repeatable.",
         metavar="NAME",
+    )
+    relief: Literal["octree", "normal-map"] = option(
+        "octree",
+        "Form of the relief: octree (of normals) or normal-map (fewer bytes; other viewers show "
+        "it too).",
     )
     apo_faces: int = option(
         2_000,
@@ -54,15 +59,20 @@ class ReplaceOptions:
     )
     apo_error: float = option(
         0.05,
-        "Maximum deviation of the normals in a leaf of the octree from their mean, as a root mean "
-        "square from 0 to 2. Leaves that exceed it are divided.",
+        "Maximum deviation of the normals in a leaf of the octree from their mean, or of a normal "
+        "map from the object, as a root mean square from 0 to 2. Leaves that exceed it are "
+        "divided, and maps enlarged.",
     )
     apo_depth: int = option(
         11,
         "Maximum depth of the octree. A leaf at depth 11 has 1/2048 of the width of the "
-        "object's bounding cube.",
+        "object's bounding cube. A normal map has at most 2048 texels a side then.",
     )
-    apo_density: float = option(8.0, "Samples per triangle of an object, on average.")
+    apo_density: float = option(
+        8.0,
+        "Samples of an octree per triangle of an object, on average, or most texels of a normal "
+        "map.",
+    )
 
     def __post_init__(self) -> None:
         for name in ("faces", "error", "depth", "density"):
@@ -73,3 +83,9 @@ class ReplaceOptions:
                     f"--apo-{name} does nothing without --apo",
                     remedy="specify the objects with --apo",
                 )
+        if not self.apo and self.relief != type(self).relief:
+            raise InputError(
+                "PTM-I111",
+                "--relief does nothing without --apo",
+                remedy="specify the objects with --apo",
+            )

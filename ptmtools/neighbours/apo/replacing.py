@@ -1,4 +1,4 @@
-"""Replaces objects of a building by simplified meshes and octrees of their original normals.
+"""Replaces objects of a building by simplified meshes, and makes octrees of their normals.
 
 The mesh is simplified with its materials, sides, texture coordinates and colours, whose borders
 stay. Points that leave the box of the object are moved back into it. Each new triangle stands for
@@ -139,20 +139,20 @@ _FAR_OFF = 0.02
 
 @dataclass(frozen=True)
 class ReplacedObject:
-    """An object with a simplified mesh and an octree texture.
+    """An object with a simplified mesh.
 
     Attributes
     ----------
     object: index into `Scene.objects`. name: its name there.
-    octree: its cube is in world metres.
+    octree: of its normals; its cube is in world metres. None if its relief is a normal map.
     source, faces: numbers of triangles before and after.
     deviation: estimate by the quadrics of the simplified mesh's distance, metres.
-    missed: share of samples whose rays do not hit the original.
+    missed: share of samples of the octree whose rays do not hit the original.
     """
 
     object: int
     name: str
-    octree: Octree
+    octree: Octree | None
     source: int
     faces: int
     deviation: float
@@ -167,13 +167,13 @@ class Replaced:
     ----------
     scene: the scene with the simplified meshes; the same object if nothing is replaced.
     replacement: the new triangles; None if nothing is replaced.
-    octrees: those of the replaced objects, in the order of the objects.
+    objects: the replaced ones, ascending.
     notes: messages, one line each.
     """
 
     scene: Scene
     replacement: Replacement | None
-    octrees: tuple[ReplacedObject, ...]
+    objects: tuple[ReplacedObject, ...]
     notes: tuple[str, ...]
 
 
@@ -194,7 +194,7 @@ def replaced(
     triangles = _by_object(scene, named)
     chosen = [i for i in named if len(triangles[i])]
     light = [i for i in chosen if len(triangles[i]) <= options.apo_faces]
-    parts, octrees = [], []
+    parts, objects = [], []
     for i in (i for i in chosen if i not in set(light)):
         simplified, part = _simplified(scene, i, triangles[i], options.apo_faces, progress)
         notes += [f"{scene.objects[i]}: {note}" for note in simplified.notes]
@@ -210,20 +210,20 @@ def replaced(
                 )
             )
         parts.append(part)
-        octrees.append(_octree(scene, triangles[i], simplified, part, options, executor, progress))
+        objects.append(_object(scene, triangles[i], simplified, part, options, executor, progress))
     if light:
         stay = _unchanged_note([scene.objects[i] for i in light], options.apo_faces)
         notes.append(stay if parts else Warned(stay))
     notes += [
         f"{each.name}: from {each.missed:.1%} of the samples nothing of the original was found; "
         "there the octree has the normals of the simplified mesh"
-        for each in octrees
+        for each in objects
         if each.missed > _MISSED
     ]
     if not parts:
         return Replaced(scene, None, (), tuple(notes))
     replacement = joined(parts)
-    return Replaced(replacement.of(scene), replacement, tuple(octrees), tuple(notes))
+    return Replaced(replacement.of(scene), replacement, tuple(objects), tuple(notes))
 
 
 def _by_object(scene: Scene, chosen: Sequence[int]) -> dict[int, Ints]:
@@ -276,7 +276,25 @@ def _simplified(
     )
 
 
-def _octree(
+def apo_options(options: ReplaceOptions) -> ApoOptions:
+    """The options of the relief of one object."""
+    return ApoOptions(
+        faces=options.apo_faces,
+        error=options.apo_error,
+        depth=options.apo_depth,
+        density=options.apo_density,
+    )
+
+
+def mesh_of(scene: Scene, own: Ints) -> tuple[Floats, NDArray[np.int32]]:
+    """Distinct points, and the triangles ``own`` of a scene between them, of which those in one
+    place count once."""
+    used, corners = np.unique(scene.triangles[own], return_inverse=True)
+    points, triangles = welded(scene.points[used], corners.reshape(-1, 3).astype(np.int32))
+    return points, distinct(triangles)[0]
+
+
+def _object(
     scene: Scene,
     own: Ints,
     simplified: Simplified,
@@ -285,25 +303,23 @@ def _octree(
     executor: Executor,
     progress: Progress,
 ) -> ReplacedObject:
-    """The octree of the normals of an object around its replacement."""
-    number = int(part.objects[0])
+    """An object, with the octree of its normals around its replacement if the options ask for
+    one."""
+    number, faces = int(part.objects[0]), len(part.triangles)
     name = scene.objects[number]
-    wanted = ApoOptions(
-        faces=options.apo_faces,
-        error=options.apo_error,
-        depth=options.apo_depth,
-        density=options.apo_density,
-    )
-    used, corners = np.unique(scene.triangles[own], return_inverse=True)
-    points, triangles = welded(scene.points[used], corners.reshape(-1, 3).astype(np.int32))
-    triangles, _ = distinct(triangles)
+    if options.relief != "octree":
+        return ReplacedObject(number, name, None, len(own), faces, simplified.error, 0.0)
     try:
         octree, missed = octree_around(
-            smooth(part.points, part.triangles), points, triangles, wanted, None, executor, progress
+            smooth(part.points, part.triangles),
+            *mesh_of(scene, own),
+            apo_options(options),
+            None,
+            executor,
+            progress,
         )
     except LimitError as fault:
         fault.place = name
         fault.remedy = "use a greater --apo-error, a smaller --apo-depth or --apo-density"
         raise
-    faces = len(part.triangles)
     return ReplacedObject(number, name, octree, len(own), faces, simplified.error, missed)

@@ -36,7 +36,7 @@ def check_files(database: ServedDatabase) -> None:
             database.at(path, "scene").add("PTM-D731", f"is named {glb.name!r}, cell {glb.cell}")
         materials = dict.fromkeys(primitive.material for primitive in glb.primitives)
         for material in materials:
-            for url in (material.image, material.ptm, material.lightmap):
+            for url in (material.image, material.ptm, material.lightmap, material.normal_map):
                 if url is not None:
                     database.resolve(path, url)
         if hints is None:
@@ -45,11 +45,14 @@ def check_files(database: ServedDatabase) -> None:
         numbers += [("octree texture", p.octree, p.place) for p in glb.primitives]
         numbers += [("mesh", m.mesh, "materials") for m in materials]
         numbers += [("lightmap", m.light, "materials") for m in materials]
+        numbers += [("normal map", p.material.normal, p.place) for p in glb.primitives]
+        objects = {primitive.place: primitive.object for primitive in glb.primitives}
         lists = {
             "texture": hints.index["textures"],
             "octree texture": hints.index.get("octrees", ()),
             "mesh": hints.index.get("meshes", ()),
             "lightmap": hints.index["textures"],
+            "normal map": hints.index["textures"],
         }
         for noun, number, place in numbers:
             if number is not None and not 0 <= number < len(lists[noun]):
@@ -57,6 +60,10 @@ def check_files(database: ServedDatabase) -> None:
             elif noun == "lightmap" and number is not None:
                 if lists[noun][number].get("light") != glb.cell:
                     message = f"texture {number} of the hints is not the lightmap of this cell"
+                    database.at(path, place).add("PTM-D731", message)
+            elif noun == "normal map" and number is not None:
+                if lists[noun][number].get("relief") != objects[place]:
+                    message = f"texture {number} of the hints is not the normal map of the object"
                     database.at(path, place).add("PTM-D731", message)
             elif noun == "mesh" and number is not None:
                 row = lists[noun][number]

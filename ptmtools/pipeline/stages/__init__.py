@@ -11,10 +11,11 @@ from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.emit import EMIT
 from ptmtools.pipeline.stages.light import LIGHT
 from ptmtools.pipeline.stages.pvs import PVS
+from ptmtools.pipeline.stages.relief import RELIEF
 from ptmtools.pipeline.stages.scene import SCENE
 from ptmtools.pipeline.stages.textures import TEXTURES
 
-__all__ = ["ACH", "APO", "CELLS", "EMIT", "LIGHT", "PVS", "SCENE", "STAGES", "TEXTURES"]
+__all__ = ["ACH", "APO", "CELLS", "EMIT", "LIGHT", "PVS", "RELIEF", "SCENE", "STAGES", "TEXTURES"]
 
 STAGES: dict[str, Stage[Any]] = {
     stage.name: stage
@@ -25,6 +26,7 @@ STAGES: dict[str, Stage[Any]] = {
         PVS,
         ACH,
         TEXTURES,
+        RELIEF,
         LIGHT,
         EMIT,
     )

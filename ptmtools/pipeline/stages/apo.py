@@ -1,4 +1,5 @@
-"""Replaces objects of the scene by simplified meshes with octree textures (paper 2).
+"""Replaces objects of the scene by simplified meshes with octree textures (paper 2), or without:
+the stage `relief` then bakes normal maps.
 
 Only the new arrays of the scene are stored. The octrees are served files, listed in a file of
 their own, so that a finer octree changes neither the cells nor the stages after them.
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from ptmtools.neighbours.apo.model import Octree
     from ptmtools.neighbours.apo.replacing import ReplacedObject
     from ptmtools.output.model import OctreeRecord
     from ptmtools.scene.model import Scene
@@ -49,7 +51,8 @@ class ReplacingJob(Job):
 
         replacement = Replacement.from_arrays(arrays)
         numbers = [record.number for record in octree_records(artifacts)]
-        if numbers != replacement.objects.tolist():
+        has_list = OCTREE_LIST in artifacts.outputs(APO)
+        if has_list and numbers != replacement.objects.tolist():
             raise ValueError(f"{arrays_of(APO.name)} and {OCTREE_LIST} are of other objects")
         return replacement.of(artifacts[SCENE])
 
@@ -76,34 +79,41 @@ class ReplacingJob(Job):
         run = self.run
         result = replaced(run[SCENE], self.options, run.workers.executor, run.progress)
         rows = []
-        files = octree_files(octree.name for octree in result.octrees)
-        for file, octree in zip(files, result.octrees, strict=True):
-            row, data = _row(file, octree)
-            rows.append(row)
-            transaction.put(f"{SERVED}/{file}", data)
+        files = octree_files(each.name for each in result.objects)
+        for file, each in zip(files, result.objects, strict=True):
+            if each.octree is not None:
+                row, data = _row(file, each, each.octree)
+                rows.append(row)
+                transaction.put(f"{SERVED}/{file}", data)
         if result.replacement:
             transaction.put_arrays(APO.name, result.replacement.to_arrays())
+        if rows:
             text = json.dumps({"octrees": rows}, indent=1, ensure_ascii=False) + "\n"
             transaction.put(OCTREE_LIST, text.encode())
             run.cache(OCTREE_LIST, tuple(map(_record, rows)))
         run.keep(APO, result.scene)
         counts = {
             "octrees": len(rows),
-            "source": sum(row["source"] for row in rows),
-            "faces": sum(row["faces"] for row in rows),
+            "objects": len(result.objects),
+            "source": sum(each.source for each in result.objects),
+            "faces": sum(each.faces for each in result.objects),
             "texels": sum(sum(row["levels"]) for row in rows),
             "bytes": sum(row["ends"][-1] for row in rows),
             "triangles": len(result.scene.triangles),
-            "deviation": max((row["deviation"] for row in rows), default=0.0),
+            "deviation": max((each.deviation for each in result.objects), default=0.0),
         }
         return described(work, counts, result.notes)
 
 
 def octree_files(objects: Iterable[str]) -> list[str]:
-    """The file of each object's octree, relative to the served folder, unique without regard to
-    case."""
+    """The file of each object's octree, relative to the served folder."""
+    return [f"{OCTREE_FOLDER}/{stem}.bin" for stem in object_stems(objects)]
+
+
+def object_stems(objects: Iterable[str]) -> list[str]:
+    """A stem for the files of each object, unique without regard to case."""
     taken: set[str] = set()
-    files = []
+    stems = []
     for name in objects:
         stem = unique = plain_name(name, "object")
         number = 1
@@ -111,24 +121,38 @@ def octree_files(objects: Iterable[str]) -> list[str]:
             number += 1
             unique = f"{stem}_{number}"
         taken.add(unique.casefold())
-        files.append(f"{OCTREE_FOLDER}/{unique}.bin")
-    return files
+        stems.append(unique)
+    return stems
 
 
-def _row(file: str, replaced: ReplacedObject) -> tuple[dict[str, Any], bytes]:
+def replaced_objects(artifacts: Artifacts) -> NDArray[np.int32]:
+    """The numbers of the objects that were replaced, ascending; raises PTM-D004 to PTM-D006."""
+    import numpy as np
+
+    from ptmtools.neighbours.apo.replacing import Replacement
+
+    name = arrays_of(APO.name)
+    if name not in artifacts.outputs(APO):
+        return np.zeros(0, np.int32)
+    arrays = artifacts.db.read_arrays(APO.name)
+    with artifacts.reading(name):
+        return Replacement.from_arrays(arrays).objects
+
+
+def _row(file: str, replaced: ReplacedObject, octree: Octree) -> tuple[dict[str, Any], bytes]:
     """The row of an octree in the list, and its stream."""
     import numpy as np
 
     from ptmtools.neighbours.apo.files import streamed
 
-    data, levels = streamed(replaced.octree.texels, replaced.octree)
+    data, levels = streamed(octree.texels, octree)
     row = {
         "object": replaced.name,
         "number": replaced.object,
         "file": file,
-        "low": replaced.octree.low.tolist(),
-        "side": replaced.octree.side,
-        "levels": np.diff(replaced.octree.start).tolist(),
+        "low": octree.low.tolist(),
+        "side": octree.side,
+        "levels": np.diff(octree.start).tolist(),
         **levels,
         "source": replaced.source,
         "faces": replaced.faces,
@@ -171,18 +195,19 @@ def _reads(options: ReplaceOptions) -> tuple[Stage[Any], ...]:
 
 
 def _summary(n: Mapping[str, Any]) -> str:
-    if not n["octrees"]:
+    objects = n.get("objects", n["octrees"])  # missing in databases of earlier releases
+    if not objects:
         return "no object replaced"
+    octrees = f"; {count(n['texels'], 'texel')} of octrees, {size(n['bytes'])}"
     return (
-        f"{count(n['octrees'], 'object')} of {count(n['source'], 'triangle')} → {n['faces']:,}, "
-        f"error about {n['deviation']:.2g} m; "
-        f"{count(n['texels'], 'texel')} of octrees, {size(n['bytes'])}"
+        f"{count(objects, 'object')} of {count(n['source'], 'triangle')} → {n['faces']:,}, "
+        f"error about {n['deviation']:.2g} m{octrees if n['octrees'] else ''}"
     )
 
 
 APO: Stage[Scene] = Stage(
     name="apo",
-    about="Replace objects with simplified meshes and octree textures.",
+    about="Replace objects with simplified meshes and their relief.",
     recipe=3,
     options=ReplaceOptions,
     changed="meshes with many small holes, handles or parts are simplified as far as others",

@@ -19,6 +19,7 @@ from ptmtools.pipeline.stages.apo import APO, octree_records
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.light import LIGHT, light_of, lightmap_files
 from ptmtools.pipeline.stages.pvs import PVS
+from ptmtools.pipeline.stages.relief import RELIEF, relief_files, reliefs_in
 from ptmtools.pipeline.stages.scene import image_digests
 from ptmtools.pipeline.stages.textures import (
     OBJECTS_AHEAD,
@@ -32,7 +33,9 @@ from ptmtools.store.layout import SERVED
 if TYPE_CHECKING:
     from ptmtools.coverage.required_levels import Need
     from ptmtools.light.model import Light
+    from ptmtools.neighbours.apo.reliefs import Reliefs
     from ptmtools.output.model import TextureRecord
+    from ptmtools.scene.model import Scene
     from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
     from ptmtools.texture.sources import Source
@@ -45,9 +48,10 @@ class EmissionJob(Job):
         """See `Job.make`."""
         from ptmtools.output import emit
 
-        run, light = self.run, light_of(self.run)
+        run, light, reliefs = self.run, light_of(self.run), reliefs_in(self.run)
         images = texture_records(run)
-        textures = (*images, *lightmap_records(run, light))
+        maps = relief_records(run, reliefs)
+        textures = (*images, *lightmap_records(run, light), *maps)
         report = emit(
             run[APO],
             run[CELLS],
@@ -58,9 +62,13 @@ class EmissionJob(Job):
             self.options,
             run.progress,
             force=True,
-            need=self._need(images),
+            need=self._need(run[APO], {record.image: record for record in images}),
             octrees=octree_records(run),
             light=light,
+            reliefs=reliefs,
+            relief_need=(
+                self._need(reliefs.painted(run[APO]), dict(enumerate(maps))) if reliefs else None
+            ),
             workers=run.workers.executor.workers,
         )
         for name in report.files:
@@ -79,33 +87,42 @@ class EmissionJob(Job):
         }
         return described(work, counts, report.notes)
 
-    def _need(self, textures: Iterable[TextureRecord]) -> Need | None:
-        """The required levels of the textures, if the options ask for them."""
+    def _need(self, scene: Scene, textures: Mapping[int, TextureRecord]) -> Need | None:
+        """The required levels of the textures of a scene's images, if the options ask for them."""
         if not self.options.need:
             return None
         from ptmtools.coverage.required_levels import TextureSize, compute_need
 
         run = self.run
-        sizes = {t.image: TextureSize(*t.finest, t.level_count) for t in textures}
-        return compute_need(run[APO], run[CELLS], run[PVS], sizes, self.options.need, run.progress)
+        sizes = {image: TextureSize(*t.finest, t.level_count) for image, t in textures.items()}
+        return compute_need(scene, run[CELLS], run[PVS], sizes, self.options.need, run.progress)
 
 
 def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
     """The textures of the scene's images, for the served files."""
     files = texture_files(image_digests(run))
-    return _records(run, TEXTURES, ((name, image, -1) for image, name in enumerate(files)))
+    return _records(run, TEXTURES, ((name, {"image": i}) for i, name in enumerate(files)))
 
 
 def lightmap_records(run: Artifacts, light: Light | None) -> tuple[TextureRecord, ...]:
     """The lightmaps of the cells, for the served files."""
     files = lightmap_files(light)
-    return _records(run, LIGHT, ((name, -1, cell) for cell, name in files.items()))
+    return _records(
+        run, LIGHT, ((name, {"image": -1, "cell": cell}) for cell, name in files.items())
+    )
+
+
+def relief_records(run: Artifacts, reliefs: Reliefs | None) -> tuple[TextureRecord, ...]:
+    """The normal maps of objects, for the served files."""
+    files = relief_files(run, reliefs)
+    owners = ((name, {"image": -1, "object": number}) for number, name in files.items())
+    return _records(run, RELIEF, owners)
 
 
 def _records(
-    run: Artifacts, stage: Stage[Any], files: Iterable[tuple[str, int, int]]
+    run: Artifacts, stage: Stage[Any], files: Iterable[tuple[str, Mapping[str, int]]]
 ) -> tuple[TextureRecord, ...]:
-    """The textures that a stage has encoded: `.ptm`, image and cell of each."""
+    """The textures that a stage has encoded: the `.ptm` of each, and its image, cell or object."""
     from ptmtools.output import TextureRecord
     from ptmtools.output.model import PreviewRecord
     from ptmtools.parallel import ordered
@@ -118,8 +135,8 @@ def _records(
     def source(name: str) -> Source:
         return db.source(name, db.output(stage.name, name))
 
-    def one(file: tuple[str, int, int]) -> TextureRecord:
-        name, image, cell = file
+    def one(file: tuple[str, Mapping[str, int]]) -> TextureRecord:
+        name, owner = file
         texture = stored_texture(run, name, source, read)
         header, steps, stem = texture.header, texture.steps, stem_of(name)
         png, fallback, level = f"{name.removesuffix('ptm')}png", None, None
@@ -129,7 +146,6 @@ def _records(
             fallback, level = preview_file(stem, preview), preview.level
         served = f"{SERVED}/{fallback}"
         return TextureRecord(
-            image=image,
             file=name,
             fallback=fallback,
             width=header.levels[-1].width,
@@ -147,7 +163,7 @@ def _records(
                 for preview in steps.previews
                 for file in (preview_file(stem, preview),)
             ),
-            cell=cell,
+            **owner,
         )
 
     return tuple(ordered(one, files, OBJECTS_AHEAD))
@@ -179,8 +195,8 @@ EMIT: Stage[None] = Stage(
     "pictures; hulls with slivers and portals with short edges are convex in float32 and float64; "
     "objects with thousands of triangles have levels of detail",
     options=EmitOptions,
-    reads=(APO, CELLS, PVS, ACH, TEXTURES, LIGHT),
-    files=(APO, LIGHT),
+    reads=(APO, CELLS, PVS, ACH, TEXTURES, RELIEF, LIGHT),
+    files=(APO, RELIEF, LIGHT),
     summary=_summary,
     job=EmissionJob,
 )

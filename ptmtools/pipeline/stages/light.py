@@ -18,7 +18,7 @@ from ptmtools.light.options import LightOptions
 from ptmtools.output.names import cell_name
 from ptmtools.pipeline.encoding import ImageFile, TextureOptions, encoded_image, ptm_file
 from ptmtools.pipeline.stage import Artifacts, Job, Stage, described
-from ptmtools.pipeline.stages.apo import APO
+from ptmtools.pipeline.stages.apo import APO, replaced_objects
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.textures import TEXTURES
 from ptmtools.quantities import count, size
@@ -71,15 +71,16 @@ class LightJob(Job):
             return described(work, {"lightmaps": 0}, ())
         import numpy as np
 
-        from ptmtools.light.cells import Baking, pieces_of
+        from ptmtools.light.cells import Baking
         from ptmtools.light.model import Light
         from ptmtools.light.occlusion import Surroundings
         from ptmtools.output.content import Geometry
+        from ptmtools.output.pieces import pieces_of
 
         run = self.run
         scene, cells = run[APO], run[CELLS]
         glass = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials], np.bool_)
-        pieces = pieces_of(Geometry(scene, cells), cells, glass)
+        pieces = pieces_of(Geometry(scene, cells), cells, glass, replaced_objects(run))
         shared = LitCells(Baking(Surroundings.of(scene), self.options), run.recorded(TEXTURES))
         lights: list[CellLight] = []
         total = 0

@@ -48,12 +48,12 @@ def of_object(scene: Scene, name: str) -> np.ndarray:
 def test_statues_are_light_and_all_else_is_as_it_was(rooms: Scene, made: Replaced) -> None:
     scene = made.scene
     assert made.notes == ()
-    assert [o.name for o in made.octrees] == list(STATUES)
-    for each in made.octrees:
+    assert [o.name for o in made.objects] == list(STATUES)
+    for each in made.objects:
         assert each.source == len(of_object(rooms, each.name)) == 5120
         assert each.faces == len(of_object(scene, each.name)) <= OPTIONS.apo_faces
         assert each.faces > OPTIONS.apo_faces / 2
-    old, new = (~np.isin(s.triangle_object, [o.object for o in made.octrees])
+    old, new = (~np.isin(s.triangle_object, [o.object for o in made.objects])
                 for s in (rooms, scene))  # fmt: skip
     assert np.array_equal(rooms.corners[old], scene.corners[new])
     for name in ("uv", "triangle_object", "triangle_material", "two_sided"):
@@ -68,7 +68,7 @@ def test_a_simplified_statue_stays_in_its_box_and_near_its_surface(
 ) -> None:
     import trimesh
 
-    for each in made.octrees:
+    for each in made.objects:
         before, after = (s.corners[of_object(s, each.name)] for s in (rooms, made.scene))
         low, high = before.min(axis=(0, 1)), before.max(axis=(0, 1))
         assert (after >= low).all()
@@ -106,7 +106,7 @@ def test_what_is_painted_stays_where_it_was(rooms: Scene, made: Replaced) -> Non
 def test_the_normals_are_those_of_the_statue(rooms: Scene) -> None:
     rng = np.random.default_rng(2)
     made = replaced(rooms, replace(OPTIONS, apo_error=0.03, apo_density=60), Executor())
-    for each in made.octrees:
+    for each in made.objects:
         assert fault_of(each.octree) is None
         own = of_object(rooms, each.name)
         points, triangles = np.unique(
@@ -152,14 +152,14 @@ def test_borders_of_sides_and_of_colours_stay(rooms: Scene) -> None:
 def test_light_objects_and_unknown_names(rooms: Scene) -> None:
     actual = replaced(rooms, ReplaceOptions(apo=("*", "bust"), apo_faces=5120), Executor())
     assert actual.scene is rooms
-    assert (actual.replacement, actual.octrees) == (None, ())
+    assert (actual.replacement, actual.objects) == (None, ())
     unknown, light = actual.notes
     assert unknown == "--apo: no object is called 'bust'"
     assert light.startswith("15 objects of --apo have no more triangles than --apo-faces 5,120")
     assert all(isinstance(note, Warned) for note in actual.notes)
     some = replaced(rooms, replace(OPTIONS, apo=("*",)), Executor())
     assert [isinstance(note, Warned) for note in some.notes] == [False]
-    assert len(some.octrees) == 2
+    assert len(some.objects) == 2
 
 
 def test_what_cannot_be_lighter_stays(rooms: Scene) -> None:
@@ -177,9 +177,9 @@ def test_what_cannot_be_lighter_stays(rooms: Scene) -> None:
 def test_objects_of_one_name_are_two(rooms: Scene) -> None:
     names = tuple("statue" if name in STATUES else name for name in rooms.objects)
     actual = replaced(replace(rooms, objects=names), replace(OPTIONS, apo=("statue",)), Executor())
-    assert [each.name for each in actual.octrees] == ["statue", "statue"]
-    assert actual.octrees[0].object != actual.octrees[1].object
-    for each in actual.octrees:
+    assert [each.name for each in actual.objects] == ["statue", "statue"]
+    assert actual.objects[0].object != actual.objects[1].object
+    for each in actual.objects:
         corner = actual.scene.corners[actual.scene.triangle_object == each.object]
         q = (corner - each.octree.low) / each.octree.side
         assert ((q >= 0) & (q < 1)).all()
@@ -199,7 +199,7 @@ def test_workers_and_the_way_through_a_file_change_nothing(rooms: Scene, made: R
         other = replaced(rooms, OPTIONS, executor)
     for name, array in made.scene.to_arrays().items():
         assert np.array_equal(array, other.scene.to_arrays()[name]), name
-    for one, two in zip(made.octrees, other.octrees, strict=True):
+    for one, two in zip(made.objects, other.objects, strict=True):
         assert np.array_equal(one.octree.texels, two.octree.texels)
 
 

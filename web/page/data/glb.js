@@ -19,6 +19,8 @@
  * @property {number} octree the place of its octree texture in the index, or -1
  * @property {number} light the lightmap of its cell in the index, or -1
  * @property {Float32Array | null} spots u, v of each vertex in the lightmap, from the top left
+ * @property {number} relief the place of the normal map of its object in the index, or -1
+ * @property {Float32Array[] | null} frames of the vertices in the normal map, as `Reliefs` checks them
  * @property {number[]} low corner of their box
  * @property {number[]} high
  */
@@ -171,7 +173,7 @@ export async function readGlb(buffer, textures, decoder) {
   for (const node of tree.nodes ?? []) {
     for (const { attributes, indices, material } of tree.meshes[node.mesh].primitives) {
       const look = tree.materials[material], base = look.pbrMetallicRoughness ?? {};
-      const { texture = -1, mesh = -1, octree = -1, light = -1, wrapS, wrapT } = look.extras ?? {};
+      const { texture = -1, mesh = -1, octree = -1, light = -1, normal = -1, wrapS, wrapT } = look.extras ?? {};
       const textured = texture >= 0 && attributes.TEXCOORD_0 !== undefined;
       const painted = attributes.COLOR_0 !== undefined;
       const positions = /** @type {Float32Array} */ (arrays.vertices(attributes.POSITION));
@@ -179,6 +181,8 @@ export async function readGlb(buffer, textures, decoder) {
       const uvs = textured ? /** @type {Float32Array} */ (arrays.vertices(attributes.TEXCOORD_0)) : null;
       const colors = painted ? /** @type {Uint16Array} */ (arrays.vertices(attributes.COLOR_0)) : null;
       const spots = light < 0 ? null : /** @type {Float32Array} */ (arrays.vertices(attributes.TEXCOORD_1));
+      const frames = normal < 0 ? null : ["TEXCOORD_1", "NORMAL", "TANGENT"].map((name) =>
+        /** @type {Float32Array} */ (arrays.vertices(attributes[name])));
       if (![texture, light].every((number) => Number.isInteger(number) && number < textures)) {
         throw new Error("has a texture that is not in the index");
       }
@@ -193,7 +197,7 @@ export async function readGlb(buffer, textures, decoder) {
       await pause();
       const index = arrays.indices(indices, positions.length / 3);
       await pause();
-      const own = ownOf(index, { positions, uvs, colors, spots });
+      const own = ownOf(index, { positions, uvs, colors, spots, frames });
       const { low, high } = boxOf(own.positions);
       shapes.push({
         name: node.name ?? "",
@@ -208,6 +212,7 @@ export async function readGlb(buffer, textures, decoder) {
         mesh,
         octree,
         light,
+        relief: normal,
         low,
         high,
       });
@@ -220,9 +225,9 @@ export async function readGlb(buffer, textures, decoder) {
  * The vertices of one shape, of an array that it may share with others.
  * @param {Uint16Array | Uint32Array} index
  * @param {{positions: Float32Array, uvs: Float32Array | null, colors: Uint16Array | null,
- *   spots: Float32Array | null}} shared
+ *   spots: Float32Array | null, frames: Float32Array[] | null}} shared
  */
-function ownOf(index, { positions, uvs, colors, spots }) {
+function ownOf(index, { positions, uvs, colors, spots, frames }) {
   let first = Infinity, last = -1;
   for (let k = 0; k < index.length; k++) {
     if (index[k] < first) first = index[k];
@@ -236,6 +241,7 @@ function ownOf(index, { positions, uvs, colors, spots }) {
     uvs: uvs && uvs.subarray(2 * first, 2 * end),
     colors: colors && colors.subarray(4 * first, 4 * end),
     spots: spots && spots.subarray(2 * first, 2 * end),
+    frames: frames && frames.map((rows, k) => rows.subarray((k + 2) * first, (k + 2) * end)),
     indices,
   };
 }

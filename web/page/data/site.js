@@ -31,6 +31,7 @@ import { levelSizes } from "../../client/src/levels.js";
  * @property {number[]} [offsets]
  * @property {Preview[]} [previews]
  * @property {number[]} color
+ * @property {string} [relief]
  *
  * @typedef {object} CellRow
  * @property {string} name

@@ -29,6 +29,11 @@ const AT_ONCE = 1 << 14;
 /** The most indices of a batch: what lies outside of the view is not drawn, in one large hall, too. */
 const MOST = 3 << 11;
 
+/** What shapes of one look have in common. @param {Shape} shape */
+export function lookOf({ texture, clampU, clampV, factor, blends, cutoff, twoSided, octree, light, relief }) {
+  return [texture, clampU, clampV, factor, blends, cutoff, twoSided, octree, light, relief].join();
+}
+
 /**
  * Packs shapes by their looks, step by step: a million triangles take longer than a frame.
  * @param {Shape[]} shapes
@@ -38,8 +43,7 @@ export function* pack(shapes) {
   /** @type {Map<string, Shape[]>} */
   const groups = new Map();
   for (const shape of shapes) {
-    const { texture, clampU, clampV, factor, blends, cutoff, twoSided, octree, light } = shape;
-    const key = [texture, clampU, clampV, factor, blends, cutoff, twoSided, octree, light].join();
+    const key = lookOf(shape);
     const group = groups.get(key);
     if (group) group.push(shape);
     else groups.set(key, [shape]);
@@ -149,6 +153,6 @@ export class CellBuffers {
  * A component of linear light as sRGB encodes it (IEC 61966-2-1).
  * @param {number} light
  */
-function encoded(light) {
+export function encoded(light) {
   return light <= 0.0031308 ? 12.92 * light : 1.055 * light ** (1 / 2.4) - 0.055;
 }

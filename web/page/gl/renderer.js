@@ -36,7 +36,8 @@ export class Renderer {
     this.memory = memory;
     this.means = means.map((color) => color.map((part) => part / 255));
     this.surface = programOf(gl, "surface");
-    /** Draws objects with octree textures, if the site has any. @type {import("../octree/statues.js").Statues | null} */
+    /** Draws objects with relief, if the site has any.
+     * @type {import("../octree/statues.js").Statues | import("../relief/reliefs.js").Reliefs | null} */
     this.statues = null;
   }
 
@@ -106,7 +107,7 @@ export class Renderer {
       for (const batch of batches) {
         if (batch.look.blends) {
           behind.push({ buffers, batch, far: distance(camera.eye, batch) });
-        } else if (this.statues?.has(batch.look.octree)) {
+        } else if (this.statues?.has(batch.look)) {
           statues.push({ buffers, batch });
         } else {
           fading = this.#draw(buffers, batch, now) || fading;
@@ -115,7 +116,7 @@ export class Renderer {
     }
     if (statues.length) {
       const paint = (/** @type {any} */ at, /** @type {Batch} */ batch) => this.#paint(at, batch, now);
-      fading = this.statues?.draw(camera, statues, paint) || fading;
+      fading = this.statues?.draw(camera, statues, paint, now) || fading;
       gl.useProgram(surface.program);
     }
     if (behind.length) {

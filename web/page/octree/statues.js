@@ -6,13 +6,12 @@ import { PageError } from "../net/errors.js";
 import { aim, programOf } from "../gl/program.js";
 import { corners, TEXEL } from "../gl/shaders.js";
 import { distance } from "../space/frustum.js";
+import { LIT } from "./lamp.js";
 import { LOOK_UP } from "./look-up.js";
 import { checkOctree, Octree } from "./octree.js";
 
 /** Bytes of octrees on the graphics card, at most. */
 const MOST = 128 << 20;
-/** Share of ambient light, and the direction of the lamp. */
-const AMBIENT = 0.3, LAMP = [0.5, 0.7, 0.6].map((x) => x / Math.hypot(0.5, 0.7, 0.6));
 /** Nearest distance of the eye that counts, m. */
 const NEAREST = 0.1;
 
@@ -33,13 +32,12 @@ uniform float cutoff;
 out vec4 shown;
 ${TEXEL}
 ${LOOK_UP}
+${LIT}
 void main() {
   int stop = stopDepth(q);
   vec4 sampled = textured ? texel() : vec4(1.0);
   vec3 normal = normalize(vec3(texel(octree, addressAt(q, stop)).rgb) / 127.5 - 1.0);
-  float along = (1.0 + dot(normal, vec3(${LAMP.join()}))) / 2.0;
-  float light = ${AMBIENT} + ${1 - AMBIENT} * along * along;
-  shown = vec4(sampled.rgb * color.rgb * painted * light, sampled.a * color.a);
+  shown = vec4(sampled.rgb * color.rgb * painted * lit(normal), sampled.a * color.a);
   if (shown.a < max(cutoff, 0.004)) discard;
   shown.a = 1.0;
 }`;
@@ -89,9 +87,9 @@ export class Statues {
     this.#octrees = [];
   }
 
-  /** Whether the octree of a number has levels to show. @param {number} number */
-  has(number) {
-    return (this.#octrees[number]?.levels ?? 0) > 0;
+  /** Whether the octree of a look has levels to show. @param {import("../data/glb.js").Shape} look */
+  has({ octree }) {
+    return (this.#octrees[octree]?.levels ?? 0) > 0;
   }
 
   /** Whether an octree in view has too few levels for the screen, as far as is known. */

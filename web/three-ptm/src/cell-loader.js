@@ -1,10 +1,11 @@
 // Cells from their GLBs, as docs/formats/gltf.md describes them: in unlit materials, with the textures
-// and lightmaps of this adapter.
+// and lightmaps of this adapter. Only objects with normal maps are lit by a lamp.
 
 import { ClampToEdgeWrapping, Mesh, MeshBasicMaterial, RepeatWrapping, Texture } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 
 import { loadViewDecoder } from "ptm-decoder";
+import { relieve } from "./relief.js";
 
 /** @typedef {import("three").Group} Group */
 /**
@@ -73,13 +74,17 @@ export class CellLoader {
 
   /** @param {import("three").Material} material the loader's, with the extras as `userData` */
   #look({ color, opacity, transparent, alphaTest, vertexColors, side, userData }) {
-    const { texture, wrapS, wrapT, mesh, light } = userData;
+    const { texture, wrapS, wrapT, mesh, light, normal } = userData;
     const wrap = (/** @type {number | undefined} */ n) => (n === CLAMP ? ClampToEdgeWrapping : RepeatWrapping);
     const map = texture === undefined ? null : this.#textureOf(texture, wrap(wrapS), wrap(wrapT));
     const aoMap = light === undefined ? null : this.#textureOf(light, ClampToEdgeWrapping, ClampToEdgeWrapping);
     const depthWrite = !transparent;
     const drawn = { opacity, transparent, alphaTest, vertexColors, side, depthWrite };
-    return Object.assign(new MeshBasicMaterial({ color, map, aoMap, ...drawn }), { userData: { mesh } });
+    const look = Object.assign(new MeshBasicMaterial({ color, map, aoMap, ...drawn }), { userData: { mesh } });
+    if (normal !== undefined) {
+      relieve(look, this.#textureOf(normal, ClampToEdgeWrapping, ClampToEdgeWrapping));
+    }
+    return look;
   }
 }
 

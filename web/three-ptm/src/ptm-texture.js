@@ -53,7 +53,8 @@ import { RangeFile } from "./range-file.js";
  * @property {number[]} [color] red, green, blue, 0 to 255: shown before the first level
  * @property {number} [wrapS] `RepeatWrapping` by default
  * @property {number} [wrapT]
- * @property {boolean} [light] whether it is a lightmap: linear light, by the second coordinates
+ * @property {boolean} [linear] whether its numbers are no colours
+ * @property {number} [channel] number of the coordinates that it uses; 0 by default
  */
 
 /** Bytes of the first request where the ends of the levels are unknown. */
@@ -108,8 +109,8 @@ export class PtmTexture extends DataTexture {
     this.file = file instanceof RangeFile ? file : new RangeFile(file);
     /** The finest level present, -1 for none. */
     this.level = -1;
-    this.colorSpace = options.light ? NoColorSpace : SRGBColorSpace;
-    if (options.light) this.channel = 1;
+    this.colorSpace = options.linear ? NoColorSpace : SRGBColorSpace;
+    this.channel = options.channel ?? 0;
     this.magFilter = LinearFilter;
     this.minFilter = LinearMipmapLinearFilter;
     this.wrapS = options.wrapS ?? RepeatWrapping;

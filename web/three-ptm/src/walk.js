@@ -20,7 +20,7 @@ import { RangeFile } from "./range-file.js";
  *   description: string}[]} viewpoints
  * @property {{file: string, width: number, height: number, ends: number[], color?: number[],
  *   components?: number, offsets?: number[], previews?: {file: string, level: number, width: number,
- *   height: number, bytes: number, exact?: boolean}[], light?: number}[]} textures
+ *   height: number, bytes: number, exact?: boolean}[], light?: number, relief?: string}[]} textures
  * @property {{name: string, box: number[], record?: string, geometry?: string}[]} cells
  * @property {{cell: number, files: string[]}[]} [meshes] objects with levels of detail
  */
@@ -303,7 +303,8 @@ export class Walk {
     const workers = this.#options.workers ?? this.#ownWorkers;
     const previews = row.previews?.map((one) => ({ ...one, file: new URL(one.file, this.#url) }));
     const sizes = levelSizes(row);
-    const options = { workers, ends, color, components, offsets, previews, sizes, wrapS, wrapT, light };
+    const linear = light || row.relief !== undefined, channel = +light;
+    const options = { workers, ends, color, components, offsets, previews, sizes, wrapS, wrapT, linear, channel };
     const texture =
       slot.copies.get(`${wrapS} ${wrapT}`) ?? new PtmTexture(this.#renderer, slot.file, options);
     slot.copies.set(`${wrapS} ${wrapT}`, texture);

@@ -61,7 +61,14 @@ export class Material {
   alphaTest: number;
   vertexColors: boolean;
   side: number;
-  userData: { texture?: number; wrapS?: number; wrapT?: number; mesh?: number; light?: number };
+  userData: {
+    texture?: number;
+    wrapS?: number;
+    wrapT?: number;
+    mesh?: number;
+    light?: number;
+    normal?: number;
+  };
   dispose(): void;
 }
 export class MeshBasicMaterial extends Material {
@@ -76,6 +83,11 @@ export class MeshBasicMaterial extends Material {
     map?: Texture | null;
     aoMap?: Texture | null;
   });
+  onBeforeCompile: (shader: {
+    uniforms: Record<string, { value: unknown }>;
+    vertexShader: string;
+    fragmentShader: string;
+  }) => void;
 }
 export class Object3D {
   children: Object3D[];

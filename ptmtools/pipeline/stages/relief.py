@@ -1,0 +1,171 @@
+"""Bakes the relief of replaced objects: a normal map for each, encoded as a texture.
+
+Without ``--relief normal-map`` this stage writes nothing. Normal maps are encoded with the options
+of the textures, and clients fetch them like textures.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from ptmtools.lazy import Lazy
+from ptmtools.pipeline.encoding import ImageFile, TextureOptions, encoded_image, ptm_file
+from ptmtools.pipeline.stage import Artifacts, Job, Stage, described
+from ptmtools.pipeline.stages.apo import APO, object_stems, replaced_objects
+from ptmtools.pipeline.stages.scene import SCENE
+from ptmtools.pipeline.stages.textures import TEXTURES
+from ptmtools.quantities import count, size
+from ptmtools.store.layout import sha256
+
+if TYPE_CHECKING:
+    from ptmtools.neighbours.apo.normal_map import NormalMap
+    from ptmtools.neighbours.apo.reliefs import Reliefs, Replacing
+    from ptmtools.scene.model import Scene
+    from ptmtools.store.manifest import StageRecord
+    from ptmtools.store.transaction import Transaction
+
+#: A greater share of texels whose rays miss the original is reported.
+_MISSED = 0.01
+
+
+@dataclass(frozen=True)
+class ReliefOptions:
+    """Options of the relief stage: none of its own, see `ReplaceOptions`."""
+
+    heading: ClassVar[str] = "Relief"
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """The shared input of all tasks."""
+
+    replacing: Replacing
+    options: TextureOptions
+
+
+def mapped(shared: Mapped, task: tuple[int, str]) -> tuple[NormalMap, list[tuple[str, bytes]]]:
+    """The normal map of an object, and its files as `encoded_image` returns them."""
+    from ptmtools.texture.images import png_bytes
+
+    number, stem = task
+    relief = shared.replacing.normal_map(number)
+    image = ImageFile(f"{stem}.png", png_bytes(relief.texels))
+    return relief, encoded_image(shared.options, image)
+
+
+class ReliefJob(Job):
+    """Bakes the normal maps of all replaced objects."""
+
+    def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
+        """Raises MissingComponentError: PTM-M100 xatlas is not installed."""
+        run = self.run
+        objects = replaced_objects(run)
+        if not len(objects) or run.recorded(APO).relief != "normal-map":
+            return described(work, {"maps": 0}, ())
+        from ptmtools.neighbours.apo.reliefs import Replacing, reliefs_of
+        from ptmtools.neighbours.apo.replacing import apo_options
+
+        scene, shown = run[SCENE], run[APO]
+        replacing = Replacing(scene, shown, apo_options(run.recorded(APO)))
+        names = [shown.objects[number] for number in objects.tolist()]
+        tasks = list(zip(objects.tolist(), relief_stems(names), strict=True))
+        shared = Mapped(replacing, run.recorded(TEXTURES))
+        maps: list[NormalMap] = []
+        notes: list[str] = []
+        total = 0
+        for name, (relief, files) in zip(
+            names, run.workers.executor.each(mapped, shared, tasks), strict=True
+        ):
+            run.progress(len(maps), len(tasks), "normal maps")
+            maps.append(relief)
+            notes += _notes(name, relief)
+            for file, data in files:
+                transaction.put(file, data)
+            total += len(files[0][1])
+        run.progress(len(tasks), len(tasks), "normal maps")
+        reliefs = reliefs_of(shown, objects, maps)
+        run.keep(RELIEF, reliefs)
+        transaction.put_arrays(RELIEF.name, reliefs.to_arrays())
+        error = max(relief.error for relief in maps)
+        return described(work, {**_counts(reliefs), "error": error, "ptm_bytes": total}, notes)
+
+
+def _notes(name: str, relief: NormalMap) -> Iterator[str]:
+    if relief.missed > _MISSED:
+        yield (
+            f"{name}: from {relief.missed:.1%} of the texels nothing of the original was found; "
+            "there the map has the normals of the simplified mesh"
+        )
+
+
+def relief_stems(objects: list[str]) -> list[str]:
+    """The stem of the files of each normal map; no image of a model has such a name."""
+    return [f"relief~{stem}" for stem in object_stems(objects)]
+
+
+def reliefs_in(artifacts: Artifacts) -> Reliefs | None:
+    """The reliefs of a database, None without any; raises PTM-D004 to PTM-D006."""
+    reliefs: Reliefs | None = artifacts[RELIEF] if artifacts.is_stored(RELIEF) else None
+    return reliefs
+
+
+def relief_files(artifacts: Artifacts, reliefs: Reliefs | None) -> dict[int, str]:
+    """Replaced object → `.ptm` of its normal map, relative to the served folder."""
+    numbers = [] if reliefs is None else reliefs.objects.tolist()
+    names = [artifacts[APO].objects[number] for number in numbers]
+    return dict(zip(numbers, map(ptm_file, relief_stems(names)), strict=True))
+
+
+def _inputs(artifacts: Artifacts, options: ReliefOptions) -> dict[str, str]:
+    """See `Stage.inputs`: the arrays that it reads, and the options of replacing and of the
+    textures."""
+    replacing, coding = artifacts.before(APO), artifacts.before(TEXTURES)
+    if replacing is None or artifacts.recorded(APO).relief != "normal-map":
+        return {}
+    inputs = artifacts.files_of(RELIEF.sources(options))
+    for record, name in ((replacing, "options of apo"), (coding, "options of textures")):
+        if record:
+            inputs[name] = sha256(json.dumps(record.parameters, sort_keys=True).encode())
+    return inputs
+
+
+def _counts(reliefs: Reliefs) -> Mapping[str, Any]:
+    return {
+        "maps": len(reliefs.objects),
+        "texels": int((reliefs.side.astype("int64") ** 2).sum()),
+    }
+
+
+def _summary(n: Mapping[str, Any]) -> str:
+    if not n["maps"]:
+        return "no normal maps"
+    return (
+        f"{count(n['maps'], 'normal map')} of {count(n['texels'], 'texel')}, "
+        f"{size(n['ptm_bytes'])}, normals off by {n['error']:.2g} at most"
+    )
+
+
+def _fits_scene(reliefs: Reliefs, scene: Scene) -> str:
+    import numpy as np
+
+    own = np.isin(scene.triangle_object, reliefs.objects).sum()
+    return "" if own == len(reliefs.uv) else "the normal maps are those of other objects"
+
+
+RELIEF: Stage[Reliefs] = Stage(
+    name="relief",
+    about="Bake the normals of replaced objects into normal maps.",
+    recipe=1,
+    options=ReliefOptions,
+    reads=(SCENE, APO),
+    inputs=_inputs,
+    artifact=Lazy("ptmtools.neighbours.apo.reliefs:Reliefs"),
+    counts=_counts,
+    summary=_summary,
+    fits={APO: _fits_scene},
+    job=ReliefJob,
+    optional=True,
+)

@@ -1,0 +1,251 @@
+// Objects with normal maps, in the rooms of a walk: a script of its own, which sites with such objects load.
+// The maps are textures, so the policies fetch them and texture memory holds them; the item buffer does not
+// show them, and their part of the view follows from their boxes. They are lit as octree textures are.
+
+import { encoded, lookOf } from "../gl/cell-buffers.js";
+import { aim, programOf } from "../gl/program.js";
+import { corners, TEXEL } from "../gl/shaders.js";
+import { PageError } from "../net/errors.js";
+import { LIT } from "../octree/lamp.js";
+import { distance } from "../space/frustum.js";
+
+/** What a shape has for each vertex: u, v in the normal map, from the top left; a normal; a tangent with the sign
+ * of the bitangent. */
+const SIZES = [2, 3, 4];
+/** Nearest distance of the eye that counts, m. */
+const NEAREST = 0.1;
+
+const VERTEX = corners(`
+layout(location = 3) in vec2 second;
+layout(location = 4) in vec3 up;
+layout(location = 5) in vec4 right;
+out vec2 at;
+out mat3 axes;`, "at = second; axes = mat3(right.xyz, right.w * cross(up, right.xyz), up);");
+
+const FRAGMENT = `#version 300 es
+precision highp float;
+in vec3 seen;
+in vec2 uv;
+in vec3 painted;
+in vec2 at;
+in mat3 axes;
+uniform sampler2D relief;
+uniform float cutoff;
+out vec4 shown;
+${TEXEL}
+${LIT}
+void main() {
+  vec4 sampled = textured ? texel() : vec4(1.0);
+  vec3 normal = normalize(axes * (texture(relief, at).rgb * 2.0 - 1.0));
+  shown = vec4(sampled.rgb * color.rgb * painted * lit(normal), sampled.a * color.a);
+  if (shown.a < max(cutoff, 0.004)) discard;
+  shown.a = 1.0;
+}`;
+
+/** @typedef {import("../gl/cell-buffers.js").Batch} Batch */
+/** @typedef {import("../gl/cell-buffers.js").CellBuffers} CellBuffers */
+/** @typedef {import("../data/glb.js").Shape} Shape */
+/** @typedef {{array: WebGLVertexArrayObject, buffers: WebGLBuffer[], count: number}} Part */
+
+export class Reliefs {
+  /** Of the shapes with a normal map. @type {Map<Shape, Part>} */
+  #parts = new Map();
+  /** Texels of the finest level to a metre, by shape. @type {WeakMap<Shape, number>} */
+  #density = new WeakMap();
+  /** Shapes that do not fit the index. @type {WeakSet<Shape>} */
+  #wrong = new WeakSet();
+  #looked = false;
+
+  /**
+   * @param {WebGL2RenderingContext} gl
+   * @param {import("../walkthrough.js").Walkthrough} walk
+   * @param {(fault: PageError) => void} report
+   */
+  constructor(gl, walk, report) {
+    this.gl = gl;
+    this.report = report;
+    this.walk = walk;
+    this.program = programOf(gl, "relief", [VERTEX, FRAGMENT]);
+  }
+
+  delete() {
+    for (const shape of this.#parts.keys()) this.#drop(shape);
+  }
+
+  /** Whether a look has a normal map to show. @param {Shape} look */
+  has(look) {
+    return this.walk.memory.held[look.relief] > 0 && this.#isSound(look);
+  }
+
+  /** Whether a shape has a normal map, and a frame for each vertex. @param {Shape} shape */
+  #isSound(shape) {
+    const { relief, frames, positions } = shape;
+    if (relief < 0 || this.#wrong.has(shape)) return false;
+    const count = positions.length / 3;
+    const aligned = frames?.every((rows, k) => rows.length === SIZES[k] * count);
+    if (aligned && this.walk.index.textures[relief]?.relief !== undefined) return true;
+    this.#wrong.add(shape);
+    this.report(new PageError("PTM-V105", `The relief of ${shape.name || "an object"} does not fit the index.`));
+    return false;
+  }
+
+  /** Whether the shares of the view are still unknown. */
+  get lacks() {
+    return !this.#looked;
+  }
+
+  /** Levels of each normal map. */
+  get levels() {
+    return this.walk.index.textures.flatMap(({ relief }, t) => (relief === undefined ? [] : [this.walk.memory.held[t]]));
+  }
+
+  /**
+   * Adds the share of the view of each normal map to those of the item buffer, at the level of its nearest
+   * point.
+   * @param {import("../gl/renderer.js").Drawn[]} drawn
+   * @param {ArrayLike<number>} eye
+   * @param {number} lines of a screen that sees an angle whose half has the tangent 1
+   */
+  advance(drawn, eye, lines) {
+    this.#clean();
+    const { gl, walk: { catalogue: { K, levels }, client, present } } = this;
+    if (!present) return;
+    const screen = gl.drawingBufferWidth * gl.drawingBufferHeight;
+    let news = false;
+    for (const { batches } of drawn) {
+      for (const { look, low, high } of batches) {
+        const { relief, blends } = look;
+        if (blends || !this.#isSound(look)) continue;
+        // Pixels of a metre.
+        const metre = lines / 2 / Math.max(NEAREST, distance(eye, low, high));
+        const [x, y, z] = low.map((from, k) => high[k] - from);
+        const share = Math.min(1, metre * metre * y * Math.max(x, z) / screen);
+        const spare = Math.max(0, Math.floor(Math.log2(this.#densityOf(look) / metre)));
+        for (let k = 1, at = relief * K + 1; k <= Math.max(1, levels[relief] - spare); k++, at++) {
+          if (present[at] >= share) continue;
+          present[at] = share;
+          news = true;
+        }
+      }
+    }
+    if (news) client.sees(present, client.hidden);
+    this.#looked = true;
+  }
+
+  /** Frees what the cells no longer have. */
+  #clean() {
+    if (!this.#parts.size) return;
+    const { renderer } = this.walk;
+    const here = new Set([...(renderer?.cells.values() ?? [])].flatMap(({ shapes }) => shapes));
+    for (const shape of this.#parts.keys()) if (!here.has(shape)) this.#drop(shape);
+  }
+
+  /** @param {Shape} shape */
+  #densityOf(shape) {
+    const known = this.#density.get(shape);
+    if (known) return known;
+    const { positions, indices, relief, frames } = shape, [places] = /** @type {Float32Array[]} */ (frames);
+    const { width, height } = this.walk.index.textures[relief];
+    let area = 0, texels = 0;
+    for (let k = 0; k < indices.length; k += 3) {
+      const [a, b, c] = indices.subarray(k, k + 3);
+      area += areaOf(positions, 3, a, b, c);
+      texels += areaOf(places, 2, a, b, c);
+    }
+    const density = area > 0 ? Math.sqrt(texels * width * height / area) : 1;
+    this.#density.set(shape, density);
+    return density;
+  }
+
+  /**
+   * Draws batches into the bound framebuffer; true as long as a level of a texture fades in.
+   * @param {import("../gl/camera.js").Camera} camera
+   * @param {{buffers: CellBuffers, batch: Batch}[]} batches
+   * @param {(at: Record<string, WebGLUniformLocation | null>, batch: Batch) => boolean} paint sets the uniforms
+   *   of a batch's look
+   * @param {number} now s
+   */
+  draw(camera, batches, paint, now) {
+    const { gl, program, walk } = this;
+    aim(gl, program, camera);
+    gl.uniform1i(program.at.relief, 1);
+    let fading = false;
+    /** @type {Set<Shape>} */
+    const done = new Set();
+    for (const { buffers, batch } of batches) {
+      if (done.has(batch.look)) continue;
+      done.add(batch.look);
+      gl.activeTexture(gl.TEXTURE1);
+      fading = walk.memory.of(batch.look.relief)?.bind(true, true, now) || fading;
+      gl.activeTexture(gl.TEXTURE0);
+      fading = paint(program.at, batch) || fading;
+      const alike = lookOf(batch.look);
+      for (const shape of buffers.shapes) {
+        if (lookOf(shape) !== alike) continue;
+        const { array, count } = this.#part(shape);
+        gl.bindVertexArray(array);
+        gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, 0);
+      }
+    }
+    return fading;
+  }
+
+  /** @param {Shape} shape */
+  #part(shape) {
+    const known = this.#parts.get(shape);
+    if (known) return known;
+    const { gl } = this, { positions, uvs, colors, indices, frames } = shape;
+    const array = gl.createVertexArray(), count = indices.length;
+    gl.bindVertexArray(array);
+    /** @type {WebGLBuffer[]} */
+    const buffers = [];
+    const [places, normals, tangents] = /** @type {Float32Array[]} */ (frames);
+    const painted = colors && Float32Array.from(colors, (light) => encoded(light / 65535));
+    /** @type {[number, Float32Array | null, number][]} */
+    const rows = [[0, positions, 3], [1, uvs, 2], [2, painted, 4], [3, places, 2], [4, normals, 3], [5, tangents, 4]];
+    for (const [location, data, size] of rows) {
+      if (!data) continue;
+      buffers.push(this.#buffer(gl.ARRAY_BUFFER, data));
+      gl.enableVertexAttribArray(location);
+      gl.vertexAttribPointer(location, size, gl.FLOAT, false, 0, 0);
+    }
+    gl.vertexAttrib4f(2, 1, 1, 1, 1);
+    buffers.push(this.#buffer(gl.ELEMENT_ARRAY_BUFFER, Uint32Array.from(indices)));
+    gl.bindVertexArray(null);
+    const part = { array, buffers, count };
+    this.#parts.set(shape, part);
+    return part;
+  }
+
+  /** @param {number} target @param {Float32Array | Uint32Array} data */
+  #buffer(target, data) {
+    const { gl } = this, buffer = gl.createBuffer();
+    gl.bindBuffer(target, buffer);
+    gl.bufferData(target, data, gl.STATIC_DRAW);
+    return buffer;
+  }
+
+  /** @param {Shape} shape */
+  #drop(shape) {
+    const part = this.#parts.get(shape);
+    if (!part) return;
+    this.gl.deleteVertexArray(part.array);
+    for (const buffer of part.buffers) this.gl.deleteBuffer(buffer);
+    this.#parts.delete(shape);
+  }
+}
+
+/**
+ * Twice the area of a triangle.
+ * @param {Float32Array} rows of coordinates
+ * @param {number} size of each
+ * @param {number} a
+ * @param {number} b
+ * @param {number} c
+ */
+function areaOf(rows, size, a, b, c) {
+  const edge = (/** @type {number} */ end) =>
+    [0, 1, 2].map((k) => (k < size ? rows[size * end + k] - rows[size * a + k] : 0));
+  const [x, y, z] = edge(b), [u, v, w] = edge(c);
+  return Math.hypot(y * w - z * v, z * u - x * w, x * v - y * u);
+}
