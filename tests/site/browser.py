@@ -54,6 +54,8 @@ COUNTING = """
   }
 })();
 """
+#: Of all but the canvas.
+HIDING = "body > *:not(canvas) { visibility: hidden !important }"
 
 
 @dataclass
@@ -83,7 +85,7 @@ class Visitor:
         actual: dict[str, Any] = self.page.evaluate("window.ptm?.state() ?? {}")
         return actual
 
-    def until(self, condition: str, seconds: float = 120) -> dict[str, Any]:
+    def until(self, condition: str, seconds: float = 15) -> dict[str, Any]:
         """Waits for a condition, an expression of ``s``, the state; TimeoutError if it never is."""
         late = time.monotonic() + seconds
         while True:
@@ -112,8 +114,7 @@ class Visitor:
     def lose_context(self) -> None:
         """The graphics context goes, as when a driver is restarted."""
         self.page.evaluate(
-            "window.lost = window.ptm.walk.gl.getExtension('WEBGL_lose_context');"
-            "window.lost.loseContext()"
+            "(window.lost = window.ptm.walk.gl.getExtension('WEBGL_lose_context')).loseContext()"
         )
         self.until("s.residentBytes === 0")
 
@@ -124,11 +125,13 @@ class Visitor:
 
     def picture(self) -> NDArray[np.uint8]:
         """(height, width, 3) of the canvas alone, as it is drawn next."""
-        png = self.page.locator("canvas").first.screenshot(
-            style="body > *:not(canvas) { visibility: hidden !important }"
-        )
-        with Image.open(io.BytesIO(png)) as image:
-            return np.asarray(image.convert("RGB"))
+        return image_of(self.page.locator("canvas").first.screenshot(style=HIDING))
+
+
+def image_of(png: bytes) -> NDArray[np.uint8]:
+    """(height, width, 3)."""
+    with Image.open(io.BytesIO(png)) as image:
+        return np.asarray(image.convert("RGB"))
 
 
 @contextmanager

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -17,27 +15,12 @@ from browser import Visitor, visiting
 
 from ptmtools.errors import InputError
 from ptmtools.lab.campus.stock import read_stock
-from ptmtools.neighbours.campus import CampusOptions, make_campus
 from ptmtools.neighbours.campus.model import PRESETS, distances
-from ptmtools.scene.options import IngestOptions
 from ptmtools.site.forms import FORMS, form_site
 
-ROOT = Path(__file__).resolve().parents[2]
 Open = Callable[..., AbstractContextManager[Visitor]]
 #: `near` of the client.
 NEAREST = 8
-
-
-@pytest.fixture(scope="module")
-def campus(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A short street with two buildings, trees and lamps."""
-    folder = tmp_path_factory.mktemp("campus")
-    script = ROOT / "sample_data" / "make_campus.py"
-    words = ["-o", folder / "model", "--buildings", 2, "--length", 60, "--texture", 32]
-    subprocess.run([sys.executable, *map(str, (script, *words))], check=True, capture_output=True)
-    options = CampusOptions(samples=1, faces=50)
-    make_campus(folder / "model/campus.obj", folder / "campus", options, IngestOptions(unit="m"))
-    return folder / "campus"
 
 
 @pytest.fixture
