@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -54,8 +54,14 @@ COUNTING = """
   }
 })();
 """
-#: Of all but the canvas.
-HIDING = "body > *:not(canvas) { visibility: hidden !important }"
+FRAMES = """
+async (count) => { while (count--) await new Promise(requestAnimationFrame); }
+"""
+#: Of all but the canvas, and the outline that it has with the focus.
+HIDING = """
+body > *:not(canvas) { visibility: hidden !important }
+canvas { outline: none !important }
+"""
 
 
 @dataclass
@@ -85,7 +91,7 @@ class Visitor:
         actual: dict[str, Any] = self.page.evaluate("window.ptm?.state() ?? {}")
         return actual
 
-    def until(self, condition: str, seconds: float = 15) -> dict[str, Any]:
+    def until(self, condition: str, seconds: float = 120) -> dict[str, Any]:
         """Waits for a condition, an expression of ``s``, the state; TimeoutError if it never is."""
         late = time.monotonic() + seconds
         while True:
@@ -100,10 +106,20 @@ class Visitor:
     def complete(self) -> dict[str, Any]:
         """Waits until nothing is missing for the present view."""
         # What was asked for a moment ago is not complete because of the moment before.
-        self.page.evaluate(
-            "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
-        )
+        self.frames(2)
         return self.until("s.complete")
+
+    def frames(self, count: int) -> None:
+        """Waits until the page has had so many frames, in which it does what it ever does."""
+        self.page.evaluate(FRAMES, count)
+
+    def walk_to_a_wall(self) -> None:
+        """Waits until keys that are held lead no further."""
+        eye = "window.ptm.state().pose.eye"
+        before, after = [], self.page.evaluate(eye)
+        while not np.allclose(before or np.inf, after, rtol=0, atol=1e-3):
+            self.frames(10)
+            before, after = after, self.page.evaluate(eye)
 
     def go(self, viewpoint: int) -> dict[str, Any]:
         """To a viewpoint; the state once everything is there."""
@@ -122,6 +138,15 @@ class Visitor:
         """It comes back; textures are on their way."""
         self.page.evaluate("window.lost.restoreContext()")
         self.until("s.residentBytes > 0")
+
+    def picture_of(
+        self, shows: Callable[[NDArray[np.uint8]], bool], seconds: float = 60
+    ) -> NDArray[np.uint8]:
+        """The first picture that shows something; the last one, if none does in time."""
+        late = time.monotonic() + seconds
+        while not shows(picture := self.picture()) and time.monotonic() < late:
+            self.frames(2)
+        return picture
 
     def picture(self) -> NDArray[np.uint8]:
         """(height, width, 3) of the canvas alone, as it is drawn next."""

@@ -242,7 +242,7 @@ def _firefox(folder: Path, environment: dict[str, str]) -> Iterator[tuple[str, C
 
 
 class _Marionette:
-    """Messages are JSON behind their length: [0, number, name, words]; [1, number, error, result]."""
+    """Messages: a length, :, and JSON of [0, number, name, words] or [1, number, error, result]."""
 
     def __init__(self, connection: socket.socket) -> None:
         self._connection, self._stream, self._number = connection, connection.makefile("rb"), 0

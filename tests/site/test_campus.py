@@ -76,7 +76,7 @@ def test_a_walk_refines_what_is_near(opened: Open, campus: Path) -> None:
         back = visitor.until("s.sorts > 2 && s.complete")
         assert back["near"] == state["near"]
         before = len(fetched(visitor))
-        visitor.page.wait_for_timeout(300)
+        visitor.frames(20)
         assert len(fetched(visitor)) == before  # files are kept
 
 
