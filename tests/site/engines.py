@@ -145,6 +145,10 @@ class Engine:
     def release(self, key: str) -> None:
         self._key("keyUp", key)
 
+    def release_all(self) -> None:
+        """Lets go of the keys that are still held."""
+        self._command("WebDriver:ReleaseActions", {})
+
     def _key(self, kind: str, key: str) -> None:
         actions = [{"type": kind, "value": KEYS.get(key, key)}]
         source = {"type": "key", "id": "keyboard", "actions": actions}
@@ -344,5 +348,5 @@ def visiting_by(
         try:
             yield visitor
         finally:
+            engine.release_all()
             visitor.messages += engine.evaluate("window.said")
-            engine.goto("about:blank")

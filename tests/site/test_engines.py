@@ -268,7 +268,7 @@ def test_forms(
         if form in EFFECTS:
             key, moved = EFFECTS[form]
             engine.evaluate("document.querySelector('#view').focus()")
-            engine.evaluate("window.before = ptm.state()")
+            engine.evaluate("window.before = structuredClone(ptm.state())")
             engine.hold(key)
             visitor.until(moved)
             engine.release(key)

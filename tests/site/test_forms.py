@@ -23,6 +23,8 @@ from ptmtools.site.forms import FORMS, form_of, form_site
 from ptmtools.site.lookup import files_of
 from ptmtools.site.throttle import Throttle
 
+from .test_page_faults import strict
+
 SIDE = 320
 Open = Callable[..., AbstractContextManager[Visitor]]
 
@@ -152,6 +154,12 @@ def check_texels(texels: np.ndarray, expected: np.ndarray) -> None:
     seen = full[..., 3] > 0
     assert (actual[..., 3] == full[..., 3]).all()
     assert (actual[seen] == full[seen]).all()
+
+
+def test_alpha_under_the_policy_of_the_docs(opened: Open, pictures: dict[str, Path]) -> None:
+    with opened(pictures["rgba-webp"], "?all", prepare=strict) as visitor:
+        visitor.until("s.complete")
+    assert visitor.messages == []
 
 
 def test_files_come_as_far_as_they_are_needed(opened: Open, pictures: dict[str, Path]) -> None:
