@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -54,6 +54,14 @@ COUNTING = """
   }
 })();
 """
+FRAMES = """
+async (count) => { while (count--) await new Promise(requestAnimationFrame); }
+"""
+#: Of all but the canvas, and the outline that it has with the focus.
+HIDING = """
+body > *:not(canvas) { visibility: hidden !important }
+canvas { outline: none !important }
+"""
 
 
 @dataclass
@@ -98,10 +106,20 @@ class Visitor:
     def complete(self) -> dict[str, Any]:
         """Waits until nothing is missing for the present view."""
         # What was asked for a moment ago is not complete because of the moment before.
-        self.page.evaluate(
-            "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
-        )
+        self.frames(2)
         return self.until("s.complete")
+
+    def frames(self, count: int) -> None:
+        """Waits until the page has had so many frames, in which it does what it ever does."""
+        self.page.evaluate(FRAMES, count)
+
+    def walk_to_a_wall(self) -> None:
+        """Waits until keys that are held lead no further."""
+        eye = "window.ptm.state().pose.eye"
+        before, after = [], self.page.evaluate(eye)
+        while not np.allclose(before or np.inf, after, rtol=0, atol=1e-3):
+            self.frames(10)
+            before, after = after, self.page.evaluate(eye)
 
     def go(self, viewpoint: int) -> dict[str, Any]:
         """To a viewpoint; the state once everything is there."""
@@ -112,8 +130,7 @@ class Visitor:
     def lose_context(self) -> None:
         """The graphics context goes, as when a driver is restarted."""
         self.page.evaluate(
-            "window.lost = window.ptm.walk.gl.getExtension('WEBGL_lose_context');"
-            "window.lost.loseContext()"
+            "(window.lost = window.ptm.walk.gl.getExtension('WEBGL_lose_context')).loseContext()"
         )
         self.until("s.residentBytes === 0")
 
@@ -122,13 +139,24 @@ class Visitor:
         self.page.evaluate("window.lost.restoreContext()")
         self.until("s.residentBytes > 0")
 
+    def picture_of(
+        self, shows: Callable[[NDArray[np.uint8]], bool], seconds: float = 60
+    ) -> NDArray[np.uint8]:
+        """The first picture that shows something; the last one, if none does in time."""
+        late = time.monotonic() + seconds
+        while not shows(picture := self.picture()) and time.monotonic() < late:
+            self.frames(2)
+        return picture
+
     def picture(self) -> NDArray[np.uint8]:
         """(height, width, 3) of the canvas alone, as it is drawn next."""
-        png = self.page.locator("canvas").first.screenshot(
-            style="body > *:not(canvas) { visibility: hidden !important }"
-        )
-        with Image.open(io.BytesIO(png)) as image:
-            return np.asarray(image.convert("RGB"))
+        return image_of(self.page.locator("canvas").first.screenshot(style=HIDING))
+
+
+def image_of(png: bytes) -> NDArray[np.uint8]:
+    """(height, width, 3)."""
+    with Image.open(io.BytesIO(png)) as image:
+        return np.asarray(image.convert("RGB"))
 
 
 @contextmanager

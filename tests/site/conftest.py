@@ -18,10 +18,11 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 sys.path[:0] = [str(HERE), str(ROOT / "benchmarks")]
 from browser import Visitor, visiting  # noqa: E402
+from samples import campus, pictures, statue  # noqa: E402
 
 from tests.lab.conftest import Ptm, ptm, two_rooms  # noqa: E402
 
-__all__ = ["Ptm", "ptm", "two_rooms"]
+__all__ = ["Ptm", "campus", "pictures", "ptm", "statue", "two_rooms"]
 
 #: Each file by itself, to be damaged, left out and counted; `test_opening_page.py` has openings.
 PLAIN = SiteOptions(pictures=False, opening=False)

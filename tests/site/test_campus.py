@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -17,47 +15,12 @@ from browser import Visitor, visiting
 
 from ptmtools.errors import InputError
 from ptmtools.lab.campus.stock import read_stock
-from ptmtools.neighbours.campus import CampusOptions, make_campus
 from ptmtools.neighbours.campus.model import PRESETS, distances
-from ptmtools.scene.options import IngestOptions
 from ptmtools.site.forms import FORMS, form_site
 
-ROOT = Path(__file__).resolve().parents[2]
 Open = Callable[..., AbstractContextManager[Visitor]]
 #: `near` of the client.
 NEAREST = 8
-PIXEL = "data:image/gif;base64,R0lGODlhAQABAIAAAP8AAP///yH5BAAAAAAALAAAAAABAAEAAAICRAEAOw=="
-#: A record that tries to run scripts, to send requests and to leave.
-HOSTILE = f"""</iframe></header><script>top.broken = 1; parent.broken = 1</script>
-<!doctype html><html onclick="top.broken = 1"><head>
-<meta http-equiv="refresh" content="0; url=/refreshed"></head><body onload="top.broken = 1">
-<h1>Medicine</h1><p id="kept" style="color: red">12 laboratories</p><img id="inline" src="{PIXEL}">
-<img src="x" onerror="parent.broken = 1"><img src="/image.png">
-<link rel="stylesheet" href="/style.css">
-<svg onload="parent.broken = 1"><script>parent.broken = 1</script></svg>
-<iframe src="/frame" srcdoc="<script>top.broken = 1</script>"></iframe>
-<object data="/object"></object><embed src="/embed"><video src="/video.mp4" autoplay></video>
-<form action="/form" target="_top"><button id="send">Send</button></form>
-<a id="script" href="javascript:top.broken=1" target="_top">run</a>
-<a id="leave" href="/left" target="_top">leave</a>
-<a id="open" href="/popped" target="_blank">open</a>
-"""
-
-
-@pytest.fixture(scope="module")
-def campus(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A short street with two buildings, trees and lamps; the buildings have records."""
-    folder = tmp_path_factory.mktemp("campus")
-    script = ROOT / "sample_data" / "make_campus.py"
-    words = ["-o", folder / "model", "--buildings", 2, "--length", 60, "--texture", 32]
-    subprocess.run([sys.executable, *map(str, (script, *words))], check=True, capture_output=True)
-    (folder / "records").mkdir()
-    (folder / "records/building_01_rectorate.html").write_text("<p>Built in 1903</p>")
-    (folder / "records/building_02_medicine.html").write_text(HOSTILE)
-    options = CampusOptions(samples=1, faces=50)
-    reading, records = IngestOptions(unit="m"), folder / "records"
-    make_campus(folder / "model/campus.obj", folder / "campus", options, reading, records=records)
-    return folder / "campus"
 
 
 @pytest.fixture
@@ -113,7 +76,7 @@ def test_a_walk_refines_what_is_near(opened: Open, campus: Path) -> None:
         back = visitor.until("s.sorts > 2 && s.complete")
         assert back["near"] == state["near"]
         before = len(fetched(visitor))
-        visitor.page.wait_for_timeout(300)
+        visitor.frames(20)
         assert len(fetched(visitor)) == before  # files are kept
 
 

@@ -22,43 +22,11 @@ from ptmtools.neighbours.interlace import deinterlace
 from ptmtools.site.forms import FORMS, form_of, form_site
 from ptmtools.site.lookup import files_of
 from ptmtools.site.throttle import Throttle
-from tests.neighbours.apo.meshes import ply, sphere
+
+from .test_page_faults import strict
 
 SIDE = 320
 Open = Callable[..., AbstractContextManager[Visitor]]
-
-
-@pytest.fixture(scope="module")
-def statue(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A ball with relief, of nine levels."""
-    folder = tmp_path_factory.mktemp("statue")
-    mesh = ply(folder / "ball.ply", *sphere(6, 0.1))
-    options = ["--faces", "800", "--depth", "9", "--error", "0.01"]
-    assert main(["-q", "apo", str(mesh), "-o", str(folder / "ball.apo"), *options]) == 0
-    return folder / "ball.apo"
-
-
-@pytest.fixture(scope="module")
-def pictures(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Interlaced images of every container and kind, by their names."""
-    folder = tmp_path_factory.mktemp("sets")
-    random = np.random.default_rng(7)
-    waves = np.sin(np.arange(256) / 9)
-    smooth = (waves[:, None, None] * waves[None, :, None] * [90, 70, 50] + 120).astype(np.uint8)
-    images = {
-        "grey": random.integers(0, 256, (128, 256), np.uint8),
-        "rgb": smooth,
-        "rgba": random.integers(0, 256, (256, 128, 4), np.uint8),
-        "deep": random.integers(0, 65536, (64, 64), np.uint16),
-    }
-    sets = {}
-    for name, texels in images.items():
-        Image.fromarray(texels).save(folder / f"{name}.png")
-        for container in ("png", "webp") if name != "deep" else ("png",):
-            sets[f"{name}-{container}"] = target = folder / f"{name}-{container}"
-            command = ["interlace", str(folder / f"{name}.png"), "-o", str(target), "--min", "32"]
-            assert main(["-q", *command, "--format", container]) == 0
-    return sets
 
 
 @pytest.fixture
@@ -201,6 +169,11 @@ def test_interlaced_files_are_joined_exactly(
         visitor.until("s.complete")
         texels = np.array(visitor.page.evaluate("[...window.ptm.texels()]"), np.uint8)
         assert visitor.messages == []
+    check_texels(texels, expected)
+
+
+def check_texels(texels: np.ndarray, expected: np.ndarray) -> None:
+    """That texels (4hw) of the page are those of an image (h, w[, c])."""
     shape = (*expected.shape[:2], 4)
     actual = texels.reshape(shape)
     full = np.full(shape, 255, np.uint8)
@@ -212,6 +185,12 @@ def test_interlaced_files_are_joined_exactly(
     seen = full[..., 3] > 0
     assert (actual[..., 3] == full[..., 3]).all()
     assert (actual[seen] == full[seen]).all()
+
+
+def test_alpha_under_the_policy_of_the_docs(opened: Open, pictures: dict[str, Path]) -> None:
+    with opened(pictures["rgba-webp"], "?all", prepare=strict) as visitor:
+        visitor.until("s.complete")
+    assert visitor.messages == []
 
 
 def test_files_come_as_far_as_they_are_needed(opened: Open, pictures: dict[str, Path]) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from tests.site.browser import FRAMES
 from tests.site.interface import visit
 
 DESKTOP, PHONE = (1280, 720), (390, 844)
@@ -36,17 +37,16 @@ def pose(page: Any) -> Pose:
     return actual
 
 
-def held(page: Any, *keys: str, milliseconds: int = 300) -> tuple[Pose, Pose]:
-    """The poses before and after keys are held."""
+def held(page: Any, *keys: str, frames: int = 20) -> tuple[Pose, Pose]:
+    """The poses before and after keys are held; the visitor stands at both times."""
     before = pose(page)
     for key in keys:
         page.keyboard.down(key)
-    page.wait_for_timeout(milliseconds)
-    # Of a busy machine, too, a few frames have seen them.
-    page.evaluate("async () => { for (let k = 5; k--;) await new Promise(requestAnimationFrame); }")
+    page.evaluate(FRAMES, frames)
     for key in reversed(keys):
         page.keyboard.up(key)
-    page.wait_for_timeout(150)
+    page.evaluate(FRAMES, 2)
+    page.wait_for_function("fake.walker.still")
     return before, pose(page)
 
 
@@ -73,7 +73,7 @@ def ahead(before: Pose, after: Pose) -> tuple[float, float]:
 def test_keys_walk(desk: Any, keys: list[str], forward: int, right: int) -> None:
     before, after = held(desk, *keys)
     there = ahead(before, after)
-    assert [0 if abs(way) < 1e-6 else math.copysign(1, way) for way in there] == [forward, right]
+    assert [0 if abs(way) < 1e-4 else math.copysign(1, way) for way in there] == [forward, right]
     assert after["yaw"] == before["yaw"]
 
 
@@ -86,20 +86,41 @@ def test_keys_turn_and_look(desk: Any) -> None:
         ("PageUp", "pitch", 1),
         ("PageDown", "pitch", -1),
     ]:
-        before, after = held(desk, key, milliseconds=150)
+        before, after = held(desk, key)
         assert (after[name] - before[name]) * sign > 0.05
         assert after["eye"] == before["eye"]
 
 
+#: Metres per second, of a visitor who has walked for a while.
+SPEED = """
+async () => {
+  const frame = () => new Promise(requestAnimationFrame);
+  for (let k = 20; k--;) await frame();
+  const begun = await frame(), [x, , z] = fake.walker.pose.eye;
+  for (let k = 10; k--;) await frame();
+  const [u, , w] = fake.walker.pose.eye;
+  return Math.hypot(u - x, w - z) / ((await frame()) - begun);
+}
+"""
+
+
 def test_running_is_faster_and_letting_go_stops(desk: Any) -> None:
-    walked, ran = (math.hypot(*ahead(*held(desk, *keys))) for keys in (["w"], ["Shift", "w"]))
-    assert ran > 1.5 * walked
-    desk.wait_for_timeout(300)
+    speeds = []
+    for keys in (["s"], ["Shift", "w"]):
+        for key in keys:
+            desk.keyboard.down(key)
+        speeds.append(desk.evaluate(SPEED))
+        for key in keys[::-1]:
+            desk.keyboard.up(key)
+        desk.evaluate(FRAMES, 2)
+        desk.wait_for_function("fake.walker.still")
+    assert speeds[1] > 1.5 * speeds[0]
     desk.keyboard.down("w")
+    desk.evaluate(FRAMES, 10)
     desk.evaluate("dispatchEvent(new Event('blur'))")
-    desk.wait_for_timeout(1200)
+    desk.wait_for_function("fake.walker.still")
     before = pose(desk)
-    desk.wait_for_timeout(200)
+    desk.evaluate(FRAMES, 10)
     assert pose(desk) == before
     desk.keyboard.up("w")
 
@@ -117,7 +138,7 @@ def test_the_picture_is_dragged(desk: Any) -> None:
     desk.mouse.move(700, 340, steps=5)
     desk.mouse.up()
     desk.mouse.move(200, 200)
-    desk.wait_for_timeout(100)
+    desk.evaluate(FRAMES, 5)
     after = pose(desk)
     assert after["yaw"] - before["yaw"] == pytest.approx(100 / 720 * math.pi / 3)
     assert after["pitch"] - before["pitch"] == pytest.approx(40 / 720 * math.pi / 3)
@@ -142,7 +163,10 @@ def test_a_thumb_walks(phone: Any) -> None:
     fingers("Start", (200, 500))
     assert stick.is_visible()
     fingers("Move", (200, 420))
-    phone.wait_for_timeout(400)
+    eye = "fake.walker.pose.eye"
+    phone.wait_for_function(
+        f"([x, , z]) => Math.hypot({eye}[0] - x, {eye}[2] - z) > 0.4", arg=before["eye"]
+    )
     fingers("End")
     forward, right = ahead(before, pose(phone))
     assert forward > 0.3
@@ -152,9 +176,8 @@ def test_a_thumb_walks(phone: Any) -> None:
     before = pose(phone)
     fingers("Start", (200, 500))
     fingers("Move", (140, 503))
-    phone.wait_for_timeout(300)
+    phone.wait_for_function("(yaw) => fake.walker.pose.yaw > yaw + 0.2", arg=before["yaw"])
     fingers("End")
-    assert pose(phone)["yaw"] > before["yaw"] + 0.2
 
 
 def test_two_fingers_look(phone: Any) -> None:
@@ -163,7 +186,7 @@ def test_two_fingers_look(phone: Any) -> None:
     fingers("Start", (150, 500))
     fingers("Start", (150, 500), (250, 500))
     fingers("Move", (150, 560), (250, 560))
-    phone.wait_for_timeout(100)
+    phone.evaluate(FRAMES, 5)
     fingers("End")
     after = pose(phone)
     assert after["pitch"] - before["pitch"] == pytest.approx(60 / 844 * math.pi / 3, rel=0.02)
@@ -242,11 +265,9 @@ def test_arrows_on_a_slider_do_not_walk(desk: Any) -> None:
 def test_places(desk: Any) -> None:
     desk.get_by_role("button", name="Places").press("Enter")
     desk.get_by_role("button", name="Gallery").press("Enter")
-    desk.wait_for_timeout(400)
-    assert pose(desk)["eye"] == [-2, 1.6, -8]
+    desk.wait_for_function("fake.walker.pose.eye.join() === '-2,1.6,-8'")
     assert desk.locator("#places img").count() == 3
-    desk.wait_for_timeout(700)
-    assert desk.evaluate("location.hash") == "#-2,1.6,-8,22.9"
+    desk.wait_for_function("location.hash === '#-2,1.6,-8,22.9'")
 
 
 def test_one_panel_at_a_time_on_a_phone(phone: Any) -> None:
@@ -262,6 +283,15 @@ def test_one_panel_at_a_time_on_a_phone(phone: Any) -> None:
         assert 0 <= box["x"] <= 390 - box["width"]
 
 
+#: Gives the page another fragment, and waits until it knows.
+FOLLOWED = """
+(fragment) => new Promise((done) => {
+  addEventListener("hashchange", done, { once: true });
+  location.hash = fragment;
+})
+"""
+
+
 def test_a_link_leads_to_its_place(chromium: Any) -> None:
     with visit(chromium, "/#9,1.6,0.5,90,-10", size=DESKTOP) as page:
         page.wait_for_function("window.fake")
@@ -269,14 +299,11 @@ def test_a_link_leads_to_its_place(chromium: Any) -> None:
         assert there["eye"] == [9, 1.6, 0.5]
         assert there["yaw"] == pytest.approx(math.pi / 2)
         assert there["pitch"] == pytest.approx(math.radians(-10))
-        page.wait_for_timeout(700)
+        page.evaluate(FRAMES, 60)
         assert page.evaluate("location.hash") == "#9,1.6,0.5,90,-10"
-        page.evaluate("location.hash = '#1,1.6,2,180'")
-        page.wait_for_timeout(100)
-        assert pose(page)["eye"] == [1, 1.6, 2]
-        page.evaluate("location.hash = '#nowhere'")
-        page.wait_for_timeout(100)
-        assert pose(page)["eye"] == [1, 1.6, 2]
+        for fragment in ("#1,1.6,2,180", "#nowhere"):
+            page.evaluate(FOLLOWED, fragment)
+            assert pose(page)["eye"] == [1, 1.6, 2]
 
 
 def test_the_address_follows_seldom(desk: Any) -> None:
@@ -287,8 +314,10 @@ def test_the_address_follows_seldom(desk: Any) -> None:
       history.replaceState = (...what) => { replaced.push(performance.now()); replace(...what); };
     }""")
     for _ in range(12):
-        held(desk, "a", milliseconds=60)
-    desk.wait_for_timeout(1300)
+        held(desk, "a", frames=4)
+    turned = "(fake.walker.pose.yaw * 180 / Math.PI) % 360 - Number(location.hash.split(',')[3])"
+    desk.wait_for_function(f"Math.abs({turned}) < 0.1")
+    desk.evaluate(FRAMES, 60)
     times = desk.evaluate("replaced")
     assert times
     assert len(times) <= 1 + (times[-1] - times[0]) / 450
@@ -357,9 +386,8 @@ def test_calm(chromium: Any, motion: str) -> None:
 
 def test_the_map_shows_here_and_what_may_be_seen(desk: Any) -> None:
     desk.get_by_role("button", name="Map").click()
-    desk.wait_for_timeout(300)
-    plan = desk.locator("#map canvas")
-    assert plan.get_attribute("aria-label") == "Plan of storey 1, you are in cell 0"
+    plan = desk.get_by_label("Plan of storey 1, you are in cell 0")
+    plan.wait_for()
     box = plan.evaluate("e => [e.clientWidth, e.clientHeight]")
     scale = (box[0] - 20) / 18
 
@@ -380,5 +408,4 @@ def test_the_map_shows_here_and_what_may_be_seen(desk: Any) -> None:
     assert cabinet[2] > cabinet[0] + 20
     assert abs(store[0] - store[2]) < 3
     desk.evaluate("fake.app.goTo(3)")
-    desk.wait_for_timeout(300)
-    assert "storey 2 of 2" in desk.locator("#map").inner_text()
+    desk.locator("#map").get_by_text("storey 2 of 2").wait_for()

@@ -214,7 +214,7 @@ def test_keys_walk(visit: Callable[..., Any], museum: Site) -> None:
         visitor.page.keyboard.down("KeyW")
         visitor.until(f"Math.hypot(s.pose.eye[0] - {begun['pose']['eye'][0]}, "
                       f"s.pose.eye[2] - {begun['pose']['eye'][2]}) > 1")  # fmt: skip
-        visitor.page.wait_for_timeout(5000)
+        visitor.walk_to_a_wall()
         visitor.page.keyboard.up("KeyW")
         state = visitor.complete()
         place = museum.index["cells"][state["cell"]]["box"]
@@ -252,9 +252,9 @@ def test_both_halves(visit: Callable[..., Any], museum: Site) -> None:
         visitor.complete()
         visitor.page.evaluate("window.ptm.compare(true)")
         visitor.page.wait_for_function("window.ptm.walk.comparison?.settle()", polling=200)
-        visitor.page.wait_for_timeout(500)
-        both = visitor.picture()
-    half = both.shape[1] // 2
-    np.testing.assert_array_equal(both[:, half + 1 :], full[:, half + 1 :])
+        half = full.shape[1] // 2
+        right = full[:, half + 1 :]
+        both = visitor.picture_of(lambda shown: bool((shown[:, half + 1 :] == right).all()))
+    np.testing.assert_array_equal(both[:, half + 1 :], right)
     assert np.abs(both[:, :half].astype(int) - full[:, :half]).mean() > 0.5
     assert visitor.messages == []

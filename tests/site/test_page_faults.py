@@ -8,9 +8,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
+from browser import FRAMES
 
 from ptmtools.site.content import Site
 from ptmtools.site.throttle import Throttle
@@ -166,7 +168,7 @@ def test_a_frozen_walk(visit: Callable[..., Any], museum: Site) -> None:
         visitor.lose_context()
         visitor.restore_context()
         visitor.until(f"JSON.stringify(s.held) === '{json.dumps(held, separators=(',', ':'))}'")
-        visitor.page.wait_for_timeout(500)
+        visitor.frames(30)
         assert visitor.state()["held"] == held
         assert visitor.state()["requests"] - requests <= 6
         visitor.page.evaluate("window.ptm.freeze(false)")
@@ -212,7 +214,9 @@ def test_a_frozen_tab(visit: Callable[..., Any], museum: Site) -> None:
         pose = visitor.state()["pose"]
         session = visitor.page.context.new_cdp_session(visitor.page)
         session.send("Page.setWebLifecycleState", {"state": "frozen"})
-        visitor.page.wait_for_timeout(1500)
+        other = visitor.page.context.new_page()
+        other.evaluate(FRAMES, 90)
+        other.close()
         session.send("Page.setWebLifecycleState", {"state": "active"})
         visitor.complete()
         assert visitor.state()["pose"] == pose
@@ -301,19 +305,21 @@ def test_links_and_questions_that_mean_nothing(visit: Callable[..., Any], museum
     assert visitor.messages == []
 
 
-def test_the_policy_of_the_docs(visit: Callable[..., Any], museum: Site) -> None:
-    """With the Content-Security-Policy of docs/guide/publish.md nothing is refused."""
+def strict(page: Any) -> None:
+    """The page comes with the Content-Security-Policy of docs/guide/publish.md."""
     reported = re.search(r"^ *Content-Security-Policy: (.+)$", DOCS.read_text(), re.MULTILINE)
     assert reported
 
-    def strict(page: Any) -> None:
-        def handle(route: Any) -> None:
-            answer = route.fetch()
-            headers = {**answer.headers, "content-security-policy": reported[1]}
-            route.fulfill(response=answer, headers=headers)
+    def handle(route: Any) -> None:
+        answer = route.fetch()
+        headers = {**answer.headers, "content-security-policy": reported[1]}
+        route.fulfill(response=answer, headers=headers)
 
-        page.route(lambda url: url.endswith("/"), handle)
+    page.route(lambda url: urlsplit(url).path == "/", handle)
 
+
+def test_the_policy_of_the_docs(visit: Callable[..., Any], museum: Site) -> None:
+    """With it nothing is refused."""
     with visit(museum, prepare=strict) as visitor:
         visitor.complete()
     assert visitor.messages == []
@@ -325,7 +331,8 @@ def test_a_missing_first_room(visit: Callable[..., Any], museum: Site) -> None:
     entries = {name: e for name, e in museum.entries.items() if not name.endswith(first)}
     with visit(Site(entries, museum.index)) as visitor:
         visitor.page.locator("#error").wait_for()
-        visitor.page.wait_for_timeout(3000)
+        visitor.until("s.pending === 0")
+        visitor.frames(60)
         assert visitor.page.locator("#error-code").inner_text() == "PTM-V103"
         assert visitor.page.locator("#error").is_visible()
 

@@ -254,7 +254,7 @@ def test_a_damaged_preview_is_left_out(
         held.release()
         visitor.until("s.held[0] === 8")
         state = visitor.complete()
-        visitor.page.wait_for_timeout(1000)
+        visitor.frames(60)
         assert visitor.page.evaluate(LEVELS, 0) == digests(texture, levels_of(texture.texels))
         errors = visitor.page.evaluate("ptm.errors.map(({ code }) => code)")
         asked = [v.path for v in visitor.visits]
@@ -311,7 +311,7 @@ def test_the_data_saver(visit: Callable[..., Any], room: Site) -> None:
         state = visitor.until("s.exact")
         assert state["dataSaver"]
         asked = state["requests"]
-        visitor.page.wait_for_timeout(1500)
+        visitor.frames(60)
         assert visitor.state()["requests"] == asked
 
 
@@ -348,10 +348,10 @@ def test_comparing_with_levels_that_are_images(visit: Callable[..., Any], kinds:
         visitor.until("s.residentBytes <= 20000")
         visitor.page.evaluate("ptm.compare(true)")
         visitor.page.wait_for_function("ptm.walk.comparison?.settle()", polling=200)
-        visitor.page.wait_for_timeout(500)
-        both = visitor.picture()
-    half = both.shape[1] // 2
-    np.testing.assert_array_equal(both[:, half + 1 :], full[:, half + 1 :])
+        half = full.shape[1] // 2
+        right = full[:, half + 1 :]
+        both = visitor.picture_of(lambda shown: bool((shown[:, half + 1 :] == right).all()))
+    np.testing.assert_array_equal(both[:, half + 1 :], right)
 
 
 def test_the_papers_client(visit: Callable[..., Any], kinds: Site) -> None:

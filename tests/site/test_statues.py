@@ -183,7 +183,7 @@ def test_it_begins_without_textures(visit: Visiting, tmp_path: Path) -> None:
     with visit(plain, query=address(eye, yaw), width=WIDTH, height=HEIGHT) as visitor:
         visitor.until("s.complete", 60)
         assert visitor.page.evaluate(LEVELS)[1] > 0
-        visitor.page.wait_for_timeout(200)
+        visitor.complete()
         assert np.ptp(visitor.picture()[80:160, 120:200]) > 10
         assert visitor.messages == []
 
@@ -197,7 +197,7 @@ def test_freezing_and_comparing(visit: Visiting, site: Site, database: Path) -> 
         visitor.page.evaluate("window.ptm.freeze(true)")
         go = f"window.ptm.goTo({{eye: {near.tolist()}, yaw: {np.radians(yaw)}, pitch: 0}})"
         visitor.page.evaluate(go)
-        visitor.page.wait_for_timeout(1500)
+        visitor.frames(60)
         assert not any(v.path.endswith(name) for v in visitor.visits)
         visitor.page.evaluate("window.ptm.freeze(false)")
         visitor.until(f"({LEVELS})[1] > 0 && s.complete")

@@ -103,16 +103,15 @@ class Witness:
             self.budget,
         )
 
+    def document(self) -> dict[str, Any]:
+        """What `replay.mjs` takes."""
+        own = {"policy": self.policy, "budget": self.budget, "events": self.events}
+        return {**documents(self.world), **own}
+
     def in_javascript(self, folder: Path) -> list[Any]:
         """What the viewer's client answers to the same events."""
-        document = {
-            **documents(self.world),
-            "policy": self.policy,
-            "budget": self.budget,
-            "events": self.events,
-        }
         file = folder / "walk.json"
-        write(file, document)
+        write(file, self.document())
         answers: list[Any] = json.loads(run(HERE / "policy_walk.mjs", file))
         return answers
 

@@ -41,7 +41,7 @@ told.alone = (await ptm.image(0, { workers: alone })).width;
 const useless = new DecoderWorkers({ count: 2, wasm: new Uint8Array(8) });
 told.error = await ptm.image(0, { workers: useless }).catch(({ name }) => name);
 useless.decoder(ptm.header);
-await new Promise((resolve) => setTimeout(resolve, 500));
+while (!useless.failed) await new Promise((resolve) => setTimeout(resolve, 20));
 told.failed = useless.failed;
 post("/done", JSON.stringify(told));
 </script>

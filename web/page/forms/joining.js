@@ -27,6 +27,7 @@ const LARGEST = 2 ** 30;
  * @property {{width: number, height: number}} original
  * @property {string} container
  * @property {boolean} lossless
+ * @property {number} components the last of 2 or 4 is alpha
  * @property {string} kind of its components
  * @property {Part[]} files
  */
@@ -77,6 +78,18 @@ void main() {
 /** Texels that decide between the image so far and the next file; 2 × 2, repeated. */
 const PATTERNS = { columns: [0, 255, 0, 255], rows: [0, 0, 255, 255] };
 
+/**
+ * An image whose colours alpha does not multiply: in WebKitGTK it always multiplies those of an ImageBitmap.
+ * @param {Blob} blob
+ * @param {boolean} alpha
+ */
+async function decoded(blob, alpha) {
+  if (!alpha) return createImageBitmap(blob, { colorSpaceConversion: "none" });
+  const src = URL.createObjectURL(blob), image = Object.assign(new Image(), { src });
+  await image.decode().finally(() => URL.revokeObjectURL(src));
+  return image;
+}
+
 export class Joining {
   /** @param {WebGL2RenderingContext} gl @param {SetIndex} index
    * @param {(file: string) => string} urlOf @param {import("../net/fetcher.js").Fetcher} fetcher */
@@ -122,15 +135,15 @@ export class Joining {
     const image = await this.fetcher.whole(this.urlOf(part.name), async (body) => {
       demand(body.length === part.bytes && checksum(body) === part.crc32, "another checksum");
       const blob = new Blob([body], { type: MEDIA[this.index.container] });
-      const bitmap = await createImageBitmap(blob, { premultiplyAlpha: "none", colorSpaceConversion: "none" });
-      demand(bitmap.width === part.width && bitmap.height === part.height, "an image of another size");
-      return bitmap;
+      const image = await decoded(blob, this.index.components % 2 === 0);
+      demand(image.width === part.width && image.height === part.height, "an image of another size");
+      return image;
     });
     const next = this.#texture(part.width, part.height, gl.RGBA8, gl.CLAMP_TO_EDGE);
     gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, false);
     gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, gl.RGBA, gl.UNSIGNED_BYTE, image);
-    image.close();
+    if ("close" in image) image.close();
     if (part.axis) {
       const joined = this.#joined(part, next);
       gl.deleteTexture(this.texture);
