@@ -143,6 +143,7 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/simplification.py --faces 100000
 	$(BIN)/python benchmarks/apo.py --triangles 50000
 	$(BIN)/python benchmarks/interlace.py --quick
+	$(BIN)/python benchmarks/light.py $(CURDIR)/sample_data/two_rooms/two_rooms.obj
 	$(BIN)/python benchmarks/manifests.py --most 10000
 	$(BIN)/python benchmarks/objects.py --textures 500
 	@[ ! -f build/museum/museum.obj ] || { set -x; $(BIN)/python benchmarks/rounded.py; { set +x; } 2>/dev/null; }

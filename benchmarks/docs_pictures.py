@@ -53,7 +53,7 @@ TWO_ROOMS = ROOT / "sample_data/two_rooms"
 CELL, VIEWPOINT = 9, 5
 PAINTING, LEVELS, SIDE = "painting_09", (4, 6, 8, 10), 240
 #: The viewpoint without and with light.
-LIT = 0
+LIT = 2
 #: The coarse picture has textures of 2⁵ texels a side.
 COARSE, WIDTH, HEIGHT = 5, 480, 340
 #: A door leaf that fills the doorway of the two rooms, as a line to add to the OBJ file.
