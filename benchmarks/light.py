@@ -22,7 +22,7 @@ import numpy as np
 from scenes import model_file
 
 from ptmtools.arrays import Floats, areas
-from ptmtools.light.cells import ABOVE, COVERED, EXPOSURE, Baking
+from ptmtools.light.cells import ABOVE, COVERED, Baking, exposed
 from ptmtools.light.looks import LightImage, lookup
 from ptmtools.light.occlusion import Surroundings, light, normals, points_on, spread_over, turns
 from ptmtools.light.options import LightOptions
@@ -133,7 +133,7 @@ def errors(around: Surroundings, corner: Floats, result: Any, options: LightOpti
     at = np.einsum("nk,nkx->nx", share, result.uv[face].astype(np.float64))
     seen = lookup(LightImage(result.texels, ("clamp", "clamp")), at)
     # The side that was baked is the nearer one.
-    off = np.abs(np.minimum(EXPOSURE * np.stack(both), 1) - seen)
+    off = np.abs(exposed(np.stack(both)) - seen)
     fair = np.max(both, axis=0) > COVERED
     return np.asarray(off.min(axis=0)[fair])
 

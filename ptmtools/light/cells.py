@@ -8,7 +8,7 @@ each few of them, and their coarser meshes take over colours, but no charts. So 
 The light is ambient obscurance (`light.occlusion`): indoors, a ray that meets nothing within reach
 counts whole. More of it comes from above than from below, so that forms show where nothing is near:
 a white statue in a white room. Indoors, all surfaces have something within reach in many
-directions; so that pictures keep about their colours, all light is brightened by `EXPOSURE`.
+directions; so that pictures keep about their colours, all light is brightened (`exposed`).
 
 A piece that shows both sides has the light of the side on which its cell lies. If that is either,
 as of a screen within a room, the more open side counts.
@@ -34,8 +34,9 @@ if TYPE_CHECKING:
 
 #: Share of the light from straight above that comes from straight below is 1 less this.
 ABOVE = 0.4
-#: All light is multiplied by this, and cut off at 1.
-EXPOSURE = 1.1
+#: Share of the light that comes everywhere, by reflection, and the factor of all light, which is
+#: then cut off at 1.
+REFLECTED, EXPOSURE = 0.15, 1.05
 #: Texels with less light are covered, as a wall by a picture, and take that of their neighbours: a
 #: texel is wider than the gap that it would darken.
 COVERED = 0.03
@@ -146,9 +147,14 @@ def light_of_cell(baking: Baking, piece: Piece) -> CellLight:
     return baking.light(piece)
 
 
+def exposed(light: Floats | Singles) -> Floats:
+    """Light with that by reflection, brightened, from 0 to 1."""
+    return np.clip(EXPOSURE * (REFLECTED + (1 - REFLECTED) * light), 0.0, 1.0).astype(np.float64)
+
+
 def encoded(light: Floats | Singles) -> NDArray[np.uint8]:
-    """Linear light, brightened, in 255ths."""
-    return np.clip(np.rint(255 * EXPOSURE * light), 0, 255).astype(np.uint8)
+    """Light as exposed, in 255ths."""
+    return np.rint(255 * exposed(light)).astype(np.uint8)
 
 
 def _objects(number: Ints, chosen: Bools) -> list[Ints]:

@@ -2,8 +2,8 @@
 
 Embree finds the surface of each ray, and the kernels of the simulator sample the textures. A lit
 picture has the lamp of `ptmtools.rendering.light`, and the relief of octree textures and normal
-maps. Others have lightmaps, and shade surfaces with neither texture nor lightmap by the angle to
-the viewer, like the web page.
+maps. Others have lightmaps, and shade surfaces without texture by the angle to the viewer, like the
+web page.
 """
 
 from __future__ import annotations
@@ -32,8 +32,10 @@ FIELD_OF_VIEW = 60.0
 #: Rays per pixel along each axis, and the largest picture, in pixels, that has several; larger
 #: pictures have one.
 _SAMPLES, _MANY_PIXELS = 2, 1 << 22
-#: Colour of the sky, 0 to 255, and minimum light on surfaces without texture, as on the web page.
-_SKY, _AMBIENT = (0.16 * 255, 0.17 * 255, 0.19 * 255), 0.25
+#: Colour of the sky, 0 to 255, as on the web page.
+_SKY = (0.16 * 255, 0.17 * 255, 0.19 * 255)
+#: Least share of their colour that surfaces without texture have, and such with a lightmap.
+GLOW, LIT_GLOW = 0.25, 0.7
 
 
 @dataclass(frozen=True)
@@ -203,18 +205,18 @@ def _vertical(degrees: float, options: ViewOptions) -> float:
 
 
 def _shade_plain(sight: Sight, triangles: Triangles, light: Surfaces | None, shown: Floats) -> None:
-    """Multiplies the colours of surfaces without texture and lightmap by the cosine to the
-    viewer."""
+    """Multiplies the colours of surfaces without texture by the cosine to the viewer, less of those
+    with a lightmap."""
     plain = np.flatnonzero(sight.triangle >= 0)
-    bare = triangles.texture < 0
+    plain = plain[triangles.texture[sight.triangle[plain]] < 0]
+    glow = np.full(len(plain), GLOW)
     if light is not None:
-        bare &= light.texture < 0
-    plain = plain[bare[sight.triangle[plain]]]
+        glow[light.texture[sight.triangle[plain]] >= 0] = LIT_GLOW
     normal, ray = triangles.normal[sight.triangle[plain]], sight.ray[plain]
     length = np.linalg.norm(normal, axis=1) * np.linalg.norm(ray, axis=1)
     along = np.abs(np.einsum("ij,ij->i", normal, ray))
     facing = np.divide(along, length, out=np.zeros(len(along)), where=length > 0)
-    shown[plain] *= (_AMBIENT + (1 - _AMBIENT) * facing)[:, None]
+    shown[plain] *= (glow + (1 - glow) * facing)[:, None]
 
 
 def _refused(problem: str, remedy: str | None = None) -> InputError:

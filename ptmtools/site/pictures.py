@@ -22,6 +22,7 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.output.model import offsets_of, sizes_of
 from ptmtools.output.served import Served
 from ptmtools.parallel import ordered
+from ptmtools.rendering.drawing import GLOW, LIT_GLOW
 from ptmtools.rendering.footprints import detail_of_pixels, footprints
 from ptmtools.rendering.previews import read_preview
 from ptmtools.rendering.rays import Camera, Caster
@@ -40,9 +41,8 @@ _FINER = 1.5
 MOST = 32
 #: Texels of the longer side of the finest level that is sampled.
 FINEST = 256
-#: The background, 0 to 1, and the light on surfaces without texture: as in the page.
+#: The background, 0 to 1, as in the page.
 _SKY = (0.16, 0.17, 0.19)
-_AMBIENT = 0.25
 _LIMITS = Limits(decoded_bytes=1 << 33)
 _THREADS = 4
 _QUALITIES = (80, 72, 64, 56, 48, 40, 32, 24, 16, 8)
@@ -150,10 +150,11 @@ def _colors(
     normal = triangles.normal[triangle]
     facing = np.einsum("ij,ij->i", normal, ray)
     length = np.linalg.norm(normal, axis=1) * np.linalg.norm(ray, axis=1)
-    glow = _AMBIENT + (1 - _AMBIENT) * np.abs(facing) / np.maximum(length, 1e-300)
-    lit = np.repeat(255.0 * glow[:, None], 3, axis=1)
+    glow = np.full(len(hit), GLOW)
     if light is not None:
-        lit[light.texture[triangle] >= 0] = 255.0
+        glow[light.texture[triangle] >= 0] = LIT_GLOW
+    glow += (1 - glow) * np.abs(facing) / np.maximum(length, 1e-300)
+    lit = np.repeat(255.0 * glow[:, None], 3, axis=1)
     _paint(lit, sight, hit, triangles, textures)
     if light is not None:
         each = np.full_like(lit, 255.0)

@@ -271,7 +271,7 @@ def test_three_js_shows_objects_as_modelled(
 
 
 def test_three_js_shows_lightmaps(three: Any, tmp_path: Path) -> None:
-    """As `ptm render` draws them."""
+    """As `ptm render` draws them, which also shades surfaces without texture."""
     pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
     model = write_rooms(tmp_path / "model", 3)
     build = ["-q", "build-scene", str(model), "-j", "1", "--backend", "embree"]
@@ -288,5 +288,5 @@ def test_three_js_shows_lightmaps(three: Any, tmp_path: Path) -> None:
         for name in ("lit", "plain")
     )
     error = [((shown - each.astype(float)) ** 2).mean() for each in (lit, plain)]
-    assert 10 * np.log10(255**2 / error[0]) > LIKE
-    assert error[1] > 5 * error[0]
+    assert 10 * np.log10(255**2 / error[0]) > LIKE - 3
+    assert error[1] > 3 * error[0]

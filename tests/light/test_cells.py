@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ptmtools.arrays import Floats
-from ptmtools.light.cells import ABOVE, EXPOSURE, Baking, CellLight, Piece
+from ptmtools.light.cells import ABOVE, Baking, CellLight, Piece, exposed
 from ptmtools.light.occlusion import light, normals, turns
 from ptmtools.light.options import LightOptions
 from tests.light.shapes import bilinear, quad, surroundings
@@ -80,7 +80,7 @@ def test_a_texel_has_the_light_of_its_place() -> None:
     around = surroundings(corner)
     expected = light(around, point, normals(corner)[face], turns(300), 4096, 3.0, ABOVE)
     actual = [at(result, int(f), tuple(s)) for f, s in zip(face, share, strict=True)]
-    assert np.abs(np.minimum(EXPOSURE * expected, 1) - actual).mean() < 0.02
+    assert np.abs(exposed(expected) - actual).mean() < 0.02
 
 
 def test_the_front_the_back_or_the_more_open_side() -> None:
@@ -137,6 +137,6 @@ def test_light_does_not_lead_over_edges_or_to_the_other_side() -> None:
     faces = replace(piece(corner), side=np.array([1, 1, -1, -1], np.int8))
     baking = Baking(surroundings(corner, behind), LightOptions("bake", light_samples=256))
     result = baking.light(faces)
-    assert at(result, 2, MIDDLE) < 0.3
+    assert at(result, 2, MIDDLE) < 0.4
     for share in ((0, 0.5, 0.5), (0, 0.1, 0.9), (0.01, 0.495, 0.495)):  # at the edge between them
         assert at(result, 1, share) > 0.7

@@ -103,7 +103,8 @@ def test_a_context_that_is_lost(visit: Visiting, site: Site) -> None:
         visitor.lose_context()
         visitor.restore_context()
         visitor.complete()
-        assert np.abs(visitor.picture().astype(int) - before).max() <= 2
+        # A preview may be on the screen in place of exact levels.
+        assert np.abs(visitor.picture().astype(int) - before).max() <= 8
 
 
 def test_posters_are_lit(folder: Path) -> None:

@@ -37,8 +37,8 @@ vec4 texel() {
 }`;
 
 /**
- * Surfaces with a lightmap have its light; of the others those with a texture are unlit, as in VRML browsers,
- * and the rest glow a little and are lit from the eye. Colours multiply as they are encoded.
+ * Surfaces with a texture are unlit, as in VRML browsers; the rest glow a little and are lit from the eye. A
+ * lightmap multiplies this, and surfaces without texture then glow more. Colours multiply as they are encoded.
  */
 const SURFACE = `#version 300 es
 precision highp float;
@@ -54,14 +54,14 @@ ${TEXEL}
 void main() {
   vec4 sampled = texel();
   float light = 1.0;
-  if (!textured) sampled = vec4(1.0);
-  if (lit != 0.0) {
-    light = 1.055 * pow(lit < 0.0 ? texture(lightmap, spot).r : lit, 1.0 / 2.4) - 0.055;
-  } else if (!textured) {
+  if (!textured) {
+    sampled = vec4(1.0);
+    float glow = lit != 0.0 ? 0.7 : 0.25;
     vec3 normal = cross(dFdx(seen), dFdy(seen));
     float size = length(normal);
-    light = 0.25 + 0.75 * (size > 0.0 ? abs(dot(normal, normalize(seen))) / size : 1.0);
+    light = glow + (1.0 - glow) * (size > 0.0 ? abs(dot(normal, normalize(seen))) / size : 1.0);
   }
+  if (lit != 0.0) light *= 1.055 * pow(lit < 0.0 ? texture(lightmap, spot).r : lit, 1.0 / 2.4) - 0.055;
   shown = vec4(sampled.rgb * color.rgb * painted * light, sampled.a * color.a);
   if (shown.a < max(cutoff, 0.004)) discard;
   if (cutoff > 0.0) shown.a = 1.0;
