@@ -90,7 +90,7 @@ def accuracy(model: Path) -> None:
         artifacts = Artifacts(open_database(folder))
         scene, cells = artifacts[APO], artifacts[CELLS]
     glass = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials])
-    pieces = pieces_of(Geometry(scene, cells), cells, glass)
+    pieces = pieces_of(Geometry(scene, cells), cells, glass, 1 / LightOptions().light_density)
     around = Surroundings.of(scene)
     print(f"| {model.stem}: texels per metre | rays | s, one processor | texels | error |")
     print("|--:|--:|--:|--:|--:|")

@@ -89,7 +89,8 @@ def look(
 ) -> list[Views]:
     """The tables of (F, 3) eyes and unit directions of view: of ``pyramids`` and their ``lossy``
     previews, and of the same textures in other ``forms``; with octrees and other relief, if any.
-    The reference is ``full``, which holds the same textures in other quality, or ``pyramids``."""
+    The reference is ``full``, which holds the same textures in other quality, or ``pyramids``; of
+    lightmaps it is always that."""
     triangles, caster, seen = triangles_of(surfaces), Caster(surfaces), camera.sparse
     full = pyramids if full is None else full
     lossy = no_previews(len(pyramids.levels)) if lossy is None else lossy
@@ -99,7 +100,7 @@ def look(
     lights = (
         []
         if light is None
-        else [_Tally(triangles_of(light), textures, lossy, full, seen) for textures in shown]
+        else [_Tally(triangles_of(light), textures, lossy, pyramids, seen) for textures in shown]
     )
     relief_tally = ReliefTally(relief, surfaces, triangles, pyramids, seen) if relief else None
     owner = np.empty((len(eye), int(seen.sum())), np.int32)

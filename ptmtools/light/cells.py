@@ -1,8 +1,8 @@
 """Bakes the light of the cells: one task for each cell.
 
-The surfaces of a cell share one lightmap of linear light. Objects with levels of detail have their
-light at vertices, as colours: their triangles are smaller than a texel, an atlas has a chart for
-each few of them, and their coarser meshes take over colours, but no charts. So have objects that
+The surfaces of a cell share one lightmap of linear light. Objects of thousands of small
+triangles have their light at vertices, as colours: an atlas would have a chart for each few of
+them, and their coarser meshes take over colours, but no charts. So have objects that
 ``--apo`` replaces: their second coordinates are those of their relief.
 
 The light is ambient obscurance (`light.occlusion`): indoors, a ray that meets nothing within reach
@@ -140,11 +140,6 @@ class Baking:
     def _look(self, corner: Floats, side: Floats) -> Rays:
         samples, reach = self.options.light_samples, self.options.light_reach
         return Rays(self.around, corner, samples, reach, side=side, above=ABOVE)
-
-
-def light_of_cell(baking: Baking, piece: Piece) -> CellLight:
-    """`Baking.light` as a task."""
-    return baking.light(piece)
 
 
 def exposed(light: Floats | Singles) -> Floats:

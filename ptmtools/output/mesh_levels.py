@@ -108,7 +108,9 @@ def _heavy(geometry: Geometry, left_out: Collection[int]) -> Iterator[tuple[int,
         changes = np.flatnonzero(np.diff(geometry.object[begin:end])) + begin + 1
         for a, b in pairwise([begin, *changes.tolist(), end]):
             count = geometry.triangle_start[b] - geometry.triangle_start[a]
-            if count >= MANY and int(geometry.object[a]) not in left_out:
+            # Coarser meshes have no place in a lightmap.
+            mapped = geometry.light is not None and geometry.light.mapped[a:b].any()
+            if count >= MANY and int(geometry.object[a]) not in left_out and not mapped:
                 yield cell, range(a, b)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.arrays import Bools, Floats, Ints, areas
 from ptmtools.light.cells import Piece
 from ptmtools.light.occlusion import normals
 from ptmtools.output.mesh_levels import MANY
@@ -19,18 +19,26 @@ if TYPE_CHECKING:
 
 #: The sides of a piece are examined this far off it, in units of the tolerance of planes.
 _OFF = 4.0
+#: Light is at vertices if pieces of more than this square of texels have less than this share of
+#: the area of their object.
+_FEW, _LARGE = 4.0, 0.1
 
 
 def pieces_of(
-    geometry: Geometry, cells: Cells, glass: Bools, replaced: NDArray[np.integer] | None = None
+    geometry: Geometry,
+    cells: Cells,
+    glass: Bools,
+    texel: float,
+    replaced: NDArray[np.integer] | None = None,
 ) -> list[Piece]:
     """The surfaces of each cell.
 
     Parameters
     ----------
     glass: (materials,) whether a material is seen through.
-    replaced: the objects with a relief. Their light is at vertices, as that of objects with levels
-        of detail.
+    texel: metres of a lightmap.
+    replaced: the objects with a relief. Their light is at vertices, as that of objects with
+        thousands of small triangles.
     """
     count = np.diff(geometry.triangle_start)
     shape = np.repeat(np.arange(len(count)), count)
@@ -38,6 +46,7 @@ def pieces_of(
     corner = geometry.point[geometry.shape_point[first[:, None] + geometry.triangle]]
     cell = np.repeat(np.arange(cells.cell_count), np.diff(geometry.cell_start))[shape]
     side = _facing(corner.astype(np.float64), cell, geometry.two_sided[shape], cells)
+    area = areas(corner.astype(np.float64))
     number = geometry.object[shape].astype(np.int64)
     relieved = np.isin(number, [] if replaced is None else replaced)
     starts = geometry.triangle_start[geometry.cell_start]
@@ -47,7 +56,7 @@ def pieces_of(
             number[a:b],
             shape[a:b] - geometry.cell_start[c],
             glass[geometry.material[shape[a:b]]],
-            relieved[a:b] | _many(number[a:b]),
+            relieved[a:b] | _dense(number[a:b], area[a:b], texel),
             side[a:b],
         )
         for c, (a, b) in enumerate(pairwise(starts.tolist()))
@@ -66,7 +75,9 @@ def _facing(corner: Floats, cell: Ints, two_sided: Bools, cells: Cells) -> NDArr
     return side
 
 
-def _many(number: Ints) -> Bools:
-    """(n,) whether each piece belongs to an object with many pieces here."""
+def _dense(number: Ints, area: Floats, texel: float) -> Bools:
+    """(n,) whether each piece belongs to an object with many pieces here, nearly all of which are
+    smaller than a few texels. An object may also be a whole storey."""
     _, place, count = np.unique(number, return_inverse=True, return_counts=True)
-    return np.asarray(count[place] >= MANY)
+    large = np.bincount(place, np.where(area > (_FEW * texel) ** 2, area, 0.0), len(count))
+    return ((count >= MANY) & (large <= _LARGE * np.bincount(place, area, len(count))))[place]

@@ -8,6 +8,7 @@ Build, plan, status, info, validate, tradeoff and the command line loop over tha
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -19,7 +20,7 @@ from ptmtools.errors import DatabaseError, Rebuild, naming
 from ptmtools.lazy import Lazy
 from ptmtools.pipeline.records import StageReport, options_of, parameters, reasons
 from ptmtools.progress import Progress, silent
-from ptmtools.store.layout import MANIFEST, arrays_of
+from ptmtools.store.layout import MANIFEST, arrays_of, sha256
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -63,6 +64,7 @@ class Stage(Generic[A]):
     files: those of `reads` of which it reads all files, not only the arrays.
     inputs: ``inputs(artifacts, options)``: name → SHA-256 of its inputs, if these are not the files
         of `reads`.
+    heeds: stages whose options it depends on, besides its own; `Artifacts.choices` are inputs.
     changes: the stage whose artifact it replaces by another of the same class. If it stores no
         arrays, the artifact is unchanged. A stage that reads it reads the arrays of both.
     artifact: the class of its artifact, with ``to_arrays`` and ``from_arrays``; None if it writes
@@ -90,6 +92,7 @@ class Stage(Generic[A]):
     reads: tuple[Stage[Any], ...] | Callable[[Options], tuple[Stage[Any], ...]] = ()
     files: tuple[Stage[Any], ...] = ()
     inputs: Callable[[Artifacts, Options], Mapping[str, str]] | None = None
+    heeds: tuple[Stage[Any], ...] = ()
     changes: Stage[A] | None = None
     artifact: Lazy[Any] | None = None
     compute: Lazy[Callable[..., A]] | None = None
@@ -150,6 +153,8 @@ class Artifacts:
         self.db = db
         self.model = model
         self._planned = planned
+        #: The options of stages that a planned build would run with.
+        self.chosen: dict[Stage[Any], Any] = {}
         self._files: dict[str, Any] = {}
         self._artifacts: dict[Stage[Any], Any] = {}
 
@@ -250,6 +255,21 @@ class Artifacts:
                 inputs[arrays] = "" if self._planned else self.db.output(read.name, arrays)
         return inputs
 
+    def choices(self, stage: Stage[Any]) -> dict[str, str]:
+        """An input for each stage that a stage heeds: the digest of its options. None for those
+        that have not run, in a plan. Raises PTM-D004."""
+        inputs = {}
+        for heeded in stage.heeds:
+            if heeded in self.chosen:
+                values = parameters(self.chosen[heeded])
+            elif self._planned and self._last(heeded) is None:
+                continue
+            else:
+                values = dict(self.record(heeded).parameters)
+            text = json.dumps(values, sort_keys=True)
+            inputs[f"choice of options of {heeded.name}"] = sha256(text.encode())
+        return inputs
+
     def outdated(self, stage: Stage[Any]) -> str:
         """The input of a stage's last run that has changed since; "" if there is none."""
         if stage.optional and self._last(stage) is None:
@@ -268,7 +288,9 @@ class Artifacts:
         changed = [name for name in names if record.inputs.get(name) != inputs.get(name)]
         if not changed:
             return ""
-        return stage.read_with(options)[0].name if stage.inputs else min(changed)
+        # The inputs of tasks are the tasks.
+        tasks = stage.job.tasks is not Job.tasks
+        return stage.read_with(options)[0].name if tasks else min(changed)
 
     def _check_fit(self, stage: Stage[A], artifact: A) -> None:
         """Raises ValueError if an artifact does not fit those that were read before."""

@@ -183,6 +183,7 @@ def plan_build(
         database.elsewhere = remote
         database.manifest = database.without_lost()
         artifacts = Artifacts(database, file, planned=True)
+        artifacts.chosen = chosen
         #: Stages whose outputs may change.
         changing: set[Stage[Any]] = set()
         plans = tuple(_plan(artifacts, stage, chosen[stage], changing) for stage in STAGES.values())

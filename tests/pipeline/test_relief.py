@@ -71,6 +71,18 @@ def glbs(db: Path) -> list[Path]:
     return sorted((db / "www/gltf").glob("*.glb"))
 
 
+def test_processes_bake_maps_of_a_stored_scene(folder: Path) -> None:
+    """And the same as one process; a rebuild leaves nothing to do."""
+    model, db = folder / "model/two_rooms.obj", folder / "db"
+    finer = statues(apo_error=0.05)
+    report = build_scene(model, db, QUICK, finer, workers=2)
+    assert "relief" in [stage.stage for stage in report.stages if stage.ran]
+    assert built(model, folder / "other", finer)
+    assert contents(db) == contents(folder / "other")
+    build_scene(model, db, QUICK, finer, workers=1, rebuild=True)
+    assert built(model, db, finer) == []
+
+
 def test_the_hints_and_the_cells_name_them(made: Path) -> None:
     db = made / "db"
     assert validate(db).issues == ()

@@ -132,7 +132,9 @@ def concerned(stage: Stage[Any], own: Mapping[Stage[Any], Options]) -> list[Stag
     """A stage and those that depend on its result, in their order."""
     result = [stage]
     for later in STAGES.values():
-        if later in own and later not in result and set(later.read_with(own[later])) & set(result):
+        if later not in own or later in result:
+            continue
+        if {*later.read_with(own[later]), *later.heeds} & set(result):
             result.append(later)
     return result
 

@@ -36,7 +36,7 @@ from ptmtools.output.validation.textures import IMAGES, read_picture, read_ptm
 from ptmtools.progress import Progress, silent
 from ptmtools.quantities import count
 from ptmtools.store.folder import lists_in
-from ptmtools.store.layout import MANIFEST, SERVED
+from ptmtools.store.layout import MANIFEST, SERVED, WRITTEN
 from ptmtools.store.lists import list_file
 from ptmtools.store.manifest import all_outputs, as_current
 from ptmtools.texture.model import Limits
@@ -191,6 +191,8 @@ class _Check:
             for name, digest in record["inputs"].items():
                 if self._outputs.get(name, digest) != digest:
                     at.add("PTM-D656", f"computed from an earlier {name}")
+                elif stage == _EMIT and name not in self._outputs and name.split("/")[0] in WRITTEN:
+                    at.add("PTM-D656", f"computed from {name}, which no stage has written")
 
     def _listed(self, files: dict[str, str] | list[str], outputs: bool) -> dict[str, str]:
         """Inputs or outputs of a stage, of the manifest or of lists."""

@@ -17,10 +17,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from ptmtools.lazy import Lazy
+from ptmtools.lazy import Lazy, component
 from ptmtools.neighbours.apo.options import ReplaceOptions
 from ptmtools.output.names import OCTREE_FOLDER, plain_name
-from ptmtools.pipeline.stage import Artifacts, Job, Stage, described
+from ptmtools.pipeline.stage import Artifacts, Job, Run, Stage, described
 from ptmtools.pipeline.stages.scene import SCENE
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import OCTREE_LIST, SERVED, arrays_of
@@ -41,6 +41,13 @@ _FILE = re.compile(rf"{OCTREE_FOLDER}/[A-Za-z0-9_]+\.bin")
 
 class ReplacingJob(Job):
     """Replaces the selected objects."""
+
+    def __init__(self, run: Run, stage: Stage[Scene], options: ReplaceOptions) -> None:
+        """Raises MissingComponentError: PTM-M100 xatlas is not installed, which a later stage
+        needs."""
+        super().__init__(run, stage, options)
+        if options.apo and options.relief == "normal-map":
+            component("xatlas", "PTM-M100", "baking normal maps needs xatlas", "light")
 
     @staticmethod
     def load(

@@ -6,23 +6,19 @@ textures, and clients fetch them like textures.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ptmtools.errors import DatabaseError
-from ptmtools.lazy import Lazy
+from ptmtools.lazy import Lazy, component
 from ptmtools.light.options import LightOptions
 from ptmtools.output.names import cell_name
 from ptmtools.pipeline.encoding import ImageFile, TextureOptions, encoded_image, ptm_file
-from ptmtools.pipeline.stage import Artifacts, Job, Stage, described
+from ptmtools.pipeline.stage import Artifacts, Job, Run, Stage, described
 from ptmtools.pipeline.stages.apo import APO, replaced_objects
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.textures import TEXTURES
 from ptmtools.quantities import count, size
-from ptmtools.store.layout import sha256
 
 if TYPE_CHECKING:
     from ptmtools.cells.model import Cells
@@ -30,9 +26,6 @@ if TYPE_CHECKING:
     from ptmtools.light.model import Light
     from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
-
-#: The input that stands for the options of the textures.
-_CODING = "options of textures"
 
 
 @dataclass(frozen=True)
@@ -65,8 +58,14 @@ def lightmap_stem(cell: int) -> str:
 class LightJob(Job):
     """Bakes the light of all cells."""
 
-    def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
+    def __init__(self, run: Run, stage: Stage[Light], options: LightOptions) -> None:
         """Raises MissingComponentError: PTM-M100 xatlas is not installed."""
+        super().__init__(run, stage, options)
+        if options.light != "none":
+            component("xatlas", "PTM-M100", "baking lightmaps needs xatlas", "light")
+
+    def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
+        """See `Job.make`."""
         if self.options.light == "none":
             return described(work, {"lightmaps": 0}, ())
         import numpy as np
@@ -80,7 +79,8 @@ class LightJob(Job):
         run = self.run
         scene, cells = run[APO], run[CELLS]
         glass = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials], np.bool_)
-        pieces = pieces_of(Geometry(scene, cells), cells, glass, replaced_objects(run))
+        texel = 1 / self.options.light_density
+        pieces = pieces_of(Geometry(scene, cells), cells, glass, texel, replaced_objects(run))
         shared = LitCells(Baking(Surroundings.of(scene), self.options), run.recorded(TEXTURES))
         lights: list[CellLight] = []
         total = 0
@@ -129,14 +129,10 @@ def _reads(options: LightOptions) -> tuple[Stage[Any], ...]:
 
 
 def _inputs(artifacts: Artifacts, options: LightOptions) -> dict[str, str]:
-    """See `Stage.inputs`: the arrays that it reads, and the options of the textures."""
+    """See `Stage.inputs`."""
     if options.light == "none":
         return {}
-    inputs = artifacts.files_of(LIGHT.sources(options))
-    with suppress(DatabaseError):  # in a plan, of textures that have not been encoded
-        coding = artifacts.record(TEXTURES).parameters
-        inputs[_CODING] = sha256(json.dumps(coding, sort_keys=True).encode())
-    return inputs
+    return artifacts.files_of(LIGHT.sources(options)) | artifacts.choices(LIGHT)
 
 
 def _counts(light: Light) -> Mapping[str, Any]:
@@ -166,6 +162,7 @@ LIGHT: Stage[Light] = Stage(
     options=LightOptions,
     reads=_reads,
     inputs=_inputs,
+    heeds=(TEXTURES,),
     artifact=Lazy("ptmtools.light.model:Light"),
     counts=_counts,
     summary=_summary,

@@ -6,9 +6,8 @@ of the textures, and clients fetch them like textures.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ptmtools.lazy import Lazy
@@ -18,7 +17,6 @@ from ptmtools.pipeline.stages.apo import APO, object_stems, replaced_objects
 from ptmtools.pipeline.stages.scene import SCENE
 from ptmtools.pipeline.stages.textures import TEXTURES
 from ptmtools.quantities import count, size
-from ptmtools.store.layout import sha256
 
 if TYPE_CHECKING:
     from ptmtools.neighbours.apo.normal_map import NormalMap
@@ -68,7 +66,8 @@ class ReliefJob(Job):
         from ptmtools.neighbours.apo.reliefs import Replacing, reliefs_of
         from ptmtools.neighbours.apo.replacing import apo_options
 
-        scene, shown = run[SCENE], run[APO]
+        # Workers need no images.
+        scene, shown = replace(run[SCENE], images=()), replace(run[APO], images=())
         replacing = Replacing(scene, shown, apo_options(run.recorded(APO)))
         names = [shown.objects[number] for number in objects.tolist()]
         tasks = list(zip(objects.tolist(), relief_stems(names), strict=True))
@@ -120,16 +119,11 @@ def relief_files(artifacts: Artifacts, reliefs: Reliefs | None) -> dict[int, str
 
 
 def _inputs(artifacts: Artifacts, options: ReliefOptions) -> dict[str, str]:
-    """See `Stage.inputs`: the arrays that it reads, and the options of replacing and of the
-    textures."""
-    replacing, coding = artifacts.before(APO), artifacts.before(TEXTURES)
-    if replacing is None or artifacts.recorded(APO).relief != "normal-map":
+    """See `Stage.inputs`."""
+    replacing = artifacts.chosen.get(APO) or artifacts.recorded(APO)
+    if not replacing.apo or replacing.relief != "normal-map":
         return {}
-    inputs = artifacts.files_of(RELIEF.sources(options))
-    for record, name in ((replacing, "options of apo"), (coding, "options of textures")):
-        if record:
-            inputs[name] = sha256(json.dumps(record.parameters, sort_keys=True).encode())
-    return inputs
+    return artifacts.files_of(RELIEF.sources(options)) | artifacts.choices(RELIEF)
 
 
 def _counts(reliefs: Reliefs) -> Mapping[str, Any]:
@@ -162,6 +156,7 @@ RELIEF: Stage[Reliefs] = Stage(
     options=ReliefOptions,
     reads=(SCENE, APO),
     inputs=_inputs,
+    heeds=(APO, TEXTURES),
     artifact=Lazy("ptmtools.neighbours.apo.reliefs:Reliefs"),
     counts=_counts,
     summary=_summary,

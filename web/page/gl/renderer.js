@@ -167,7 +167,7 @@ export class Renderer {
       fading = map?.bind(true, true, now) ?? false;
       gl.activeTexture(gl.TEXTURE0);
       gl.uniform1i(at.lightmap, 1);
-      gl.uniform1f(at.lit, map ? -1 : this.means[light][0]);
+      gl.uniform1f(at.lit, map ? -1 : Math.max(this.means[light][0], 1e-3));
     } else gl.uniform1f(at.lit, 0);
     return storage?.bind(clampU, clampV, now) || fading;
   }
