@@ -98,7 +98,7 @@ def test_the_same_bytes_anywhere_and_with_any_number_of_workers(
 def test_stage_by_stage_is_the_same_as_all_at_once(tmp_path: Path, ptm: Ptm) -> None:
     model, db = TWO_ROOMS / "two_rooms.obj", tmp_path / "a.db"
     assert ptm("cells", model, "-o", db).status == 0
-    for stage in ("pvs", "ach", "textures", "emit"):
+    for stage in ("pvs", "ach", "textures", "relief", "light", "emit"):
         outcome = ptm(stage, db)
         assert (outcome.status, outcome.err) == (0, "")
     assert ptm("build-scene", model, "-o", tmp_path / "b.db").status == 0
@@ -124,8 +124,8 @@ def test_textures_within_an_error_have_twins_of_the_same_texels(
 def test_only_what_changed_is_done_again(tmp_path: Path, ptm: Ptm, build: Build) -> None:
     folder = Path(shutil.copytree(TWO_ROOMS, tmp_path / "model"))
     model, db = folder / "two_rooms.obj", tmp_path / "a.db"
-    # A stage that changes nothing of another's is not told of.
-    assert len(ran(build(model, db))) == sum(not stage.changes for stage in STAGES.values())
+    # An optional stage that writes nothing is not reported.
+    assert len(ran(build(model, db))) == sum(not stage.optional for stage in STAGES.values())
     before = listing(db)
     stamps = {p: p.stat().st_mtime_ns for p in db.rglob("*")}
 

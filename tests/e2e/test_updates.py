@@ -149,7 +149,7 @@ def test_status(model: Path, tmp_path: Path, ptm: Ptm) -> None:
         "scene": "done",
         "apo": "done",
         "cells": "done",
-        **dict.fromkeys(["pvs", "ach", "textures", "emit"], "not run"),
+        **dict.fromkeys(["pvs", "ach", "textures", "relief", "light", "emit"], "not run"),
     }
     built(ptm, model, db)
     assert set(states(ptm, db).values()) == {"done"}

@@ -152,7 +152,7 @@ def test_a_hostile_record_does_nothing(opened: Open, campus: Path) -> None:
         assert frame.locator("#inline").evaluate("(e) => e.naturalWidth") == 1
         for target in ("#kept", "#send", "#script", "#leave", "#open"):
             frame.locator(target).click()
-        page.wait_for_timeout(500)
+        visitor.frames(30)
         assert page.evaluate("window.broken") is None
         assert page.url.partition("#")[0] == before
         assert (pages, dialogs) == ([], [])
@@ -191,13 +191,13 @@ def test_a_name_is_pressed_or_dragged(opened: Open, campus: Path) -> None:
         page.mouse.up()
         assert turned["pose"]["eye"] == pose["eye"]
         assert page.locator("#record iframe").count() == 0
-        page.wait_for_timeout(200)
+        visitor.frames(10)
         label = page.locator("#labels button:has-text('Building'):visible").first
         name = label.text_content()
         index = json.loads((campus / "campus.json").read_text())
         (target,) = (o for o in index["objects"] if o["label"] == name.replace(" ", "_").lower())
         visitor.page.evaluate("window.ptm.place([-5, 1.6, 3], 0)")
-        page.wait_for_timeout(200)
+        visitor.frames(10)
         label = page.locator(f"#labels button:text('{name}')")
         label.dispatch_event("click")  # of a screen reader
         place = target["viewpoint"]["position"]

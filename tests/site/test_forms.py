@@ -127,9 +127,12 @@ LOSE = """(() => {
 def test_a_lost_context_comes_back(opened: Open, statue: Path) -> None:
     with opened(statue, "#40,10,2") as visitor:
         visitor.until("s.levels > 3")
-        visitor.page.wait_for_timeout(5500)  # an early loss is an error, see the next test
+        # An early loss is an error, see the next test.
+        visitor.page.wait_for_function("performance.now() > 5500")
         visitor.page.evaluate("window.ptm.place(80, 20, 1.5)")
-        visitor.page.evaluate(LOSE)
+        with visitor.page.expect_navigation():
+            visitor.page.evaluate(LOSE)
+        visitor.page.wait_for_function("window.ptm?.state()")
         visitor.until("s.levels > 3 && !window.before")
         assert visitor.page.url.endswith("#80,20,1.5")
         assert visitor.page.is_hidden("#error")
@@ -142,7 +145,7 @@ def test_a_context_that_is_lost_at_once_is_an_error(opened: Open, statue: Path) 
         visitor.page.evaluate(LOSE)
         visitor.page.wait_for_selector("#error:not([hidden])")
         assert visitor.page.text_content("#error-code") == "PTM-V107"
-        visitor.page.wait_for_timeout(600)
+        visitor.frames(40)
         assert visitor.page.evaluate("window.before")  # it was not loaded again
 
 

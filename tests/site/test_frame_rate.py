@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -80,7 +82,6 @@ def test_a_museum_is_played(
     require: Callable[[str, str], None],
     museum_db: Path,
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
 ) -> None:
     """With less memory than its view takes: `whole` uploads much more than `best`."""
     from tests.e2e.browsers import web
@@ -88,8 +89,10 @@ def test_a_museum_is_played(
     if web.chromium() is None:
         require("Chromium", "apt install chromium")
     words = [str(museum_db), "--seconds", "4", "--size", "160x120", "--budgets", "1"]
-    assert frame_rate.main([*words, "--policies", "whole", "best", "-o", str(tmp_path)]) == 0
-    printed = capsys.readouterr().out
+    words += ["--policies", "whole", "best", "-o", str(tmp_path)]
+    # A process of its own: this one may have a browser open.
+    command = [sys.executable, str(Path(frame_rate.__file__)), *words]
+    printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     rows = dict(re.findall(r"^\| (\w+), 1 MiB \|.*\| ([\d.]+) \| [\d.]+% \|$", printed, re.M))
     assert float(rows["whole"]) > 10 * float(rows["best"])
     assert "SwiftShader" in printed

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import PLAIN, Visiting
 from PIL import Image
 
 from ptmtools.arrays import Floats
@@ -18,6 +17,7 @@ from ptmtools.site.content import Site, site_of
 from ptmtools.site.entry import Entry
 from ptmtools.site.pictures import pictures
 from tests.neighbours.apo.statues import write_rooms
+from tests.site.conftest import PLAIN, Visiting
 
 pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
 

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import PLAIN, Visiting
 
 from ptmtools.cli.main import main
 from ptmtools.output.gltf import pack, unpack
@@ -16,6 +15,7 @@ from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.site.content import Site, site_of
 from ptmtools.site.entry import Entry
 from tests.neighbours.apo.statues import write_rooms
+from tests.site.conftest import PLAIN, Visiting
 
 WIDTH, HEIGHT = 320, 240
 LEVELS = "window.ptm.walk.renderer.statues?.levels ?? []"
