@@ -113,9 +113,11 @@ def test_a_context_that_is_lost(visit: Visiting, site: Site, database: Path) -> 
         visitor.until("s.complete")
         before = visitor.picture()[statue]
         assert np.ptp(before) > 10  # lit
+        levels = visitor.page.evaluate(LEVELS)[1]
         visitor.lose_context()
         visitor.restore_context()
-        visitor.until(f"({LEVELS}).length && s.complete")
+        visitor.until(f"({LEVELS})[1] >= {levels}")
+        visitor.complete()
         after = visitor.picture()[statue]
         assert np.abs(after.astype(int) - before).max() <= 2
 
