@@ -145,12 +145,13 @@ Own = Mapping[Stage[Any], Options]
 
 
 def own_options(artifacts: Artifacts) -> Own:
-    """The options of the last run of each stage, without those of the scene, the first of which
-    needs the model.
+    """The options of the last run of each stage that has written anything, without those of the
+    scene, the first of which needs the model.
 
     Raises DatabaseError PTM-D004 if one has not run, PTM-D002 for options that no stage has.
     """
-    return {stage: artifacts.recorded(stage) for stage in STAGES.values() if not stage.joined}
+    stages = (s for s in STAGES.values() if not s.joined and artifacts.is_stored(s))
+    return {stage: artifacts.recorded(stage) for stage in stages}
 
 
 @contextmanager
