@@ -59,19 +59,19 @@ def main() -> None:
 def row(name: str, model: Path, jobs: int) -> str:
     """A row of the first table."""
     with tempfile.TemporaryDirectory() as folder:
-        found: list[dict[str, Any]] = []
+        measured: list[dict[str, Any]] = []
         for light in ("none", "bake"):
             db = Path(folder, light)
             report = build_scene(model, db, LightOptions(light), workers=jobs)
             stages = {stage.stage: stage for stage in report.stages}
             glbs = (db / "www/gltf").glob("*.glb")
-            found.append({
+            measured.append({
                 "geometry": sum(on_link(file.read_bytes()) for file in glbs),
                 "room": stages[EMIT.name].counts["visit"]["first_room"],
                 "textures": stages[TEXTURES.name].counts["ptm_bytes"],
                 "light": stages.get(LIGHT.name),
             })  # fmt: skip
-    plain, lit = found
+    plain, lit = measured
     counts = lit["light"].counts
     share = counts["ptm_bytes"] / max(plain["textures"], 1)
     numbers = (plain["textures"], counts["ptm_bytes"])

@@ -222,6 +222,11 @@ class Artifacts:
         `outputs`."""
         return not stage.optional or arrays_of(stage.name) in self.outputs(stage)
 
+    def stored(self, stage: Stage[A]) -> A | None:
+        """The artifact of an optional stage, None if it has stored none; raises as
+        `__getitem__`."""
+        return self[stage] if self.is_stored(stage) else None
+
     def recorded(self, stage: Stage[Any]) -> Options:
         """The options of a stage's last run; raises PTM-D002 if they are impossible."""
         from ptmtools.store.manifest import damaged_manifest

@@ -130,8 +130,8 @@ def test_a_cell_without_surfaces() -> None:
 
 def test_light_does_not_lead_over_edges_or_to_the_other_side() -> None:
     """A wall, the lower half of which shows its front, and the upper half its dark back."""
-    low = quad((0, 0, 0), (6, 0, 0), (6, 3, 0), (0, 3, 0))
-    high = quad((0, 3, 0), (6, 3, 0), (6, 6, 0), (0, 6, 0))
+    low = quad((0, 0, 0), (6, 0, 0), (6, 2.96, 0), (0, 2.96, 0))
+    high = quad((0, 2.96, 0), (6, 2.96, 0), (6, 6, 0), (0, 6, 0))
     behind = quad((-9, -9, -0.3), (15, -9, -0.3), (15, 15, -0.3), (-9, 15, -0.3))
     corner = np.concatenate([low, high])
     faces = replace(piece(corner), side=np.array([1, 1, -1, -1], np.int8))

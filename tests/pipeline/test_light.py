@@ -21,7 +21,6 @@ from ptmtools.pipeline.build import build_scene, run_stage
 from ptmtools.pipeline.encoding import TextureOptions
 from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import LIGHT
-from ptmtools.pipeline.stages.light import light_of
 from ptmtools.pipeline.status import database_status, plan_build
 from ptmtools.pipeline.validation import validate
 from ptmtools.store.archive import pack_arrays, unpack_arrays
@@ -76,7 +75,7 @@ def test_the_rest_of_the_database_stays(made: Path) -> None:
 
 def test_each_cell_has_a_lightmap(made: Path) -> None:
     db = made / "lit.db"
-    light = light_of(Artifacts(DatabaseFolder.open(db)))
+    light = Artifacts(DatabaseFolder.open(db)).stored(LIGHT)
     assert light is not None
     served = read_served(db)
     rows = {row["light"]: row for row in served.index["textures"] if "light" in row}

@@ -110,7 +110,7 @@ class Visitor:
         return self.until("s.complete")
 
     def frames(self, count: int) -> None:
-        """Waits until the page has had so many frames, in which it does what it ever does."""
+        """Waits for ``count`` frames of the page."""
         self.page.evaluate(FRAMES, count)
 
     def walk_to_a_wall(self) -> None:

@@ -29,12 +29,12 @@ export async function replay({ catalogue, records, shapes, policy, budget, event
     },
     fetch({ bandwidth, latency, left }) {
       for (const [number, bytes] of left) if (asked[number]) asked[number].left = bytes;
-      const found = [];
+      const made = [];
       for (let request; (request = client.next({ bandwidth, latency, concurrency: 6 })); asked.push(request)) {
         const { kind, number, begin, end, priority } = request;
-        found.push([kind, number, begin, end, priority]);
+        made.push([kind, number, begin, end, priority]);
       }
-      return found;
+      return made;
     },
   };
 

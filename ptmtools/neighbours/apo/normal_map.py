@@ -153,8 +153,8 @@ class Baking:
         face = owner[row, column].astype(np.int64)
         place = np.stack([(column + 0.5) / side, 1 - (row + 0.5) / side], axis=1)
         points = Points(face, nearest_on(atlas.uv[face], place))
-        found, met = self._normals(points)
-        inside = np.linalg.solve(axes_of(frame)[face], found[:, :, None])[:, :, 0]
+        normal, met = self._normals(points)
+        inside = np.linalg.solve(axes_of(frame)[face], normal[:, :, None])[:, :, 0]
         inside[:, 2] = np.maximum(inside[:, 2], _LEAST_ALONG)
         value = np.zeros((side, side, 3), np.float32)
         value[row, column] = _units(inside, 2)
@@ -162,7 +162,7 @@ class Baking:
         return _encoded(_units(full, 2)), 1 - float(met.mean())
 
     def compared(self, count: float) -> Compared:
-        """About so many points of the mesh, with the normals of the source."""
+        """About ``count`` points of the mesh, with the normals of the source."""
         points = spread(self.corner, spacing_for(self.corner, count))
         normal, met = self._normals(points)
         return Compared(Points(points.triangle[met], points.weight[met]), normal[met])

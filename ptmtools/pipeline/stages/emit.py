@@ -17,9 +17,9 @@ from ptmtools.pipeline.stage import Artifacts, Job, Stage, described
 from ptmtools.pipeline.stages.ach import ACH
 from ptmtools.pipeline.stages.apo import APO, octree_records
 from ptmtools.pipeline.stages.cells import CELLS
-from ptmtools.pipeline.stages.light import LIGHT, light_of, lightmap_files
+from ptmtools.pipeline.stages.light import LIGHT, lightmap_files
 from ptmtools.pipeline.stages.pvs import PVS
-from ptmtools.pipeline.stages.relief import RELIEF, relief_files, reliefs_in
+from ptmtools.pipeline.stages.relief import RELIEF, relief_files
 from ptmtools.pipeline.stages.scene import image_digests
 from ptmtools.pipeline.stages.textures import (
     OBJECTS_AHEAD,
@@ -48,7 +48,7 @@ class EmissionJob(Job):
         """See `Job.make`."""
         from ptmtools.output import emit
 
-        run, light, reliefs = self.run, light_of(self.run), reliefs_in(self.run)
+        run, light, reliefs = self.run, self.run.stored(LIGHT), self.run.stored(RELIEF)
         images = texture_records(run)
         maps = relief_records(run, reliefs)
         textures = (*images, *lightmap_records(run, light), *maps)

@@ -112,12 +112,6 @@ def _notes(crowded: int) -> Iterator[str]:
         )
 
 
-def light_of(artifacts: Artifacts) -> Light | None:
-    """The light of a database, None without any; raises PTM-D004 to PTM-D006."""
-    light: Light | None = artifacts[LIGHT] if artifacts.is_stored(LIGHT) else None
-    return light
-
-
 def lightmap_files(light: Light | None) -> dict[int, str]:
     """Cell → `.ptm` of its lightmap, relative to the served folder."""
     sides = [] if light is None else light.side.tolist()

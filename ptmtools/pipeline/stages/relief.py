@@ -95,7 +95,7 @@ class ReliefJob(Job):
 def _notes(name: str, relief: NormalMap) -> Iterator[str]:
     if relief.missed > _MISSED:
         yield (
-            f"{name}: from {relief.missed:.1%} of the texels nothing of the original was found; "
+            f"{name}: from {relief.missed:.1%} of the texels no ray met the original; "
             "there the map has the normals of the simplified mesh"
         )
 
@@ -103,12 +103,6 @@ def _notes(name: str, relief: NormalMap) -> Iterator[str]:
 def relief_stems(objects: list[str]) -> list[str]:
     """The stem of the files of each normal map; no image of a model has such a name."""
     return [f"relief~{stem}" for stem in object_stems(objects)]
-
-
-def reliefs_in(artifacts: Artifacts) -> Reliefs | None:
-    """The reliefs of a database, None without any; raises PTM-D004 to PTM-D006."""
-    reliefs: Reliefs | None = artifacts[RELIEF] if artifacts.is_stored(RELIEF) else None
-    return reliefs
 
 
 def relief_files(artifacts: Artifacts, reliefs: Reliefs | None) -> dict[int, str]:

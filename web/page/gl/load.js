@@ -43,7 +43,7 @@ export class Load {
   }
 
   /**
-   * Seconds of a picture from textures of so many bytes; Infinity if there is no memory for them.
+   * Seconds of a picture from textures of that size; Infinity if there is no memory for them.
    * @param {number} bytes
    */
   async seconds(bytes) {

@@ -11,8 +11,8 @@ const CLOSE = 2 ** 0.25;
  * @param {number} least bytes
  * @param {number} most bytes
  * @param {number} limit s
- * @param {(bytes: number) => Promise<number>} seconds of a picture with so many bytes of textures, the
- *   more, the longer
+ * @param {(bytes: number) => Promise<number>} seconds of a picture with textures of
+ *   that size; ascending
  */
 export async function largestBudget(least, most, limit, seconds) {
   let keeps = 0, misses = Infinity, bytes = Math.min(least, most);
