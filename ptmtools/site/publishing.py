@@ -43,6 +43,7 @@ from ptmtools.site.published import (
     plain_files,
     reading,
 )
+from ptmtools.site.sets import is_of_sets
 from ptmtools.site.uploading import upload
 from ptmtools.store.folder import damaged
 from ptmtools.store.layout import sha256
@@ -235,7 +236,7 @@ def weight_of(site: Site) -> Weight:
 def _walked(name: str, used: Collection[str]) -> bool:
     """Whether every walk may need a file; of scripts that are loaded later those ``used``."""
     script = name.rpartition("/")[2]
-    later = script in LATER and script not in used
+    later = (script in LATER and script not in used) or is_of_sets(name)
     return name == INDEX or (name.startswith(("viewer-", f"{DATA}/")) and not later)
 
 

@@ -85,6 +85,8 @@ export class Walkthrough {
   #expected = null;
   /** @type {number[]} */
   #frames = [];
+  /** Levels of a texture that make a first picture. */
+  firstLevels = 5;
 
   /**
    * @param {HTMLCanvasElement} canvas

@@ -59,6 +59,7 @@ import { levelSizes } from "../../client/src/levels.js";
  * @property {CellRow[]} cells
  * @property {{cell: number, box: number[], errors: number[], files: string[], bytes: number[]}[]} [meshes]
  * @property {import("../octree/statues.js").OctreeRow[]} [octrees]
+ * @property {string} [sets] the document of interlaced images
  *
  * @typedef {object} Leaf
  * @property {number[][]} points

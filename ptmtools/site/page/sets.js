@@ -1,0 +1,97 @@
+function v({eye:n,planes:t},e,s,i=0,o=i){for(let c=0;c<t.length;c+=3){let a=0;for(let r=0;r<3;r++){let h=t[c+r];a+=((h>0?s[o+r]:e[i+r])-n[r])*h}if(!(a>0))return!1}return!0}function k(n,t,e,s=0,i=s){let o=0;for(let c=0;c<3;c++){let a=Math.max(t[s+c]-n[c],n[c]-e[i+c],0);o+=a*a}return Math.sqrt(o)}var rt=({catalogue:n,frustum:t},e)=>!!t&&v(t,n.low,n.high,3*e);function _({catalogue:{meshes:n},cell:t,known:e,downloads:s}){return[...n.keys()].filter(i=>n[i+1]?.mesh!==n[i].mesh&&e[t]?.visible.includes(n[i].cell)&&s.has("geometry",n[i].cell))}function B(n,t){let{cell:e,here:s,known:i,downloads:o}=n,c=o.has("record",s)||!t("record",s)?0:1;for(let a of i[e]?.visible??[])(a===e||rt(n,a))&&!o.has("geometry",a)&&t("geometry",a)&&c++;for(let a of _(n))!o.has("mesh",a)&&t("mesh",a)&&c++;return c}var ot=8,at=.05,R=class{#t;#e;#r;#n;#s;#i;#a;#h=0;#o=[];#c=1;constructor(t,e,s,i){let{T:o}=t.catalogue;this.#t=t,this.#e=e,this.#r=s,this.#n=i,this.#s=new Float64Array(o),this.#i=new Int32Array(o),this.#a=new Int32Array(o).fill(-1),this.target=new Int32Array(o)}learned(){}look(){let{column:t,have:e}=this.#t;this.#f(),this.#u(),this.#l(this.#i,this.target),this.#m(this.#l(this.#i.map((s,i)=>Math.min(s,e[i])),t))}#f(){let{catalogue:{T:t,levels:e},downloads:s,frustum:i}=this.#t,o=this.#n(),c=new Float64Array(2*t);this.#s.fill(1/0),this.#h++;for(let[a,r]of this.#r)if(!(!i||!s.has("geometry",a)))for(let{texture:h,low:l,high:m,side:g}of r){if(!v(i,l,m))continue;let u=Math.max(k(i.eye,l,m),at);this.#s[h]=Math.min(this.#s[h],u);for(let f of[0,1])c[2*h+f]=Math.max(c[2*h+f],g[f]/(u*o))}for(let a=0;a<t;a++){if(this.#i[a]=0,this.#s[a]===1/0)continue;let r=this.#e[a].parts.filter(({joined:{width:h,height:l}})=>h<c[2*a]||l<c[2*a+1]).length;this.#i[a]=Math.min(r+1,e[a]),this.#a[a]=this.#h}}#u(){let t=this.#s,e=s=>Math.floor(t[s]/ot);this.#o=[],this.#i.forEach((s,i)=>{for(let o=1;o<=s;o++)this.#o.push([i,o])}),this.#o.sort(([s,i],[o,c])=>e(s)-e(o)||i-c||t[s]-t[o]||s-o)}#l(t,e){let{budget:s,catalogue:{K:i,memory:o}}=this.#t,c=s;e.fill(0);for(let[a,r]of this.#o){let h=o[a*i+r]-o[a*i+r-1];r>t[a]||e[a]!==r-1||h>c||(e[a]=r,c-=h)}return c}#m(t){let{catalogue:{K:e,memory:s},column:i,have:o}=this.#t,c=this.#a,a=[...c.keys()].filter(r=>c[r]>=0);a.sort((r,h)=>c[h]-c[r]||this.#s[r]-this.#s[h]||r-h);for(let r of a){let h=s[r*e+i[r]],l=i[r];for(;l<o[r]&&s[r*e+l+1]<=h+t;)l++;i[r]=l,t-=s[r*e+l]-h}}missing(t){let{have:e}=this.#t,s=this.target.reduce((i,o,c)=>i+ +(e[c]<o&&t("texture",c)),0);return B(this.#t,t)+s}next({concurrency:t}){let{catalogue:{K:e,ends:s},cell:i,here:o,known:c,downloads:a}=this.#t,r=[["record",o]];for(let h of c[i]?.visible??[])r.push(["geometry",h]);for(let h of _(this.#t))r.push(["mesh",h]);for(let[h,l]of r)if(a.free(h,l))return a.ask(h,l,-this.#c++);if(a.waiting.size>=t)return null;for(let[h,l]of this.#o){let m=s[h*e+l];if(!(l>this.target[h]||a.asked[h]>=m||!a.free("texture",h)))return a.ask("texture",h,-this.#c++,m)}return null}};var I=(n="",t="")=>`#version 300 es
+precision highp float;
+uniform vec3 eye;
+uniform mat3 turn;
+uniform vec4 lens;
+layout(location=0)in vec3 position;
+layout(location=1)in vec2 place;
+layout(location=2)in vec4 paint;
+out vec3 seen;
+out vec2 uv;
+out vec3 painted;${n}
+void main(){
+${t}
+painted=paint.rgb;
+seen=turn*(position-eye);
+uv=place;
+gl_Position=vec4(seen.xy*lens.xy,seen.z*lens.z+lens.w,-seen.z);
+}`,ht=`
+uniform sampler2D map;
+uniform int channels;
+uniform vec4 color;
+uniform vec3 mean;
+uniform bool textured;
+vec4 texel(){
+vec4 sampled=texture(map,uv);
+if(channels==1)sampled=vec4(sampled.rrr,1.0);
+if(channels==2)sampled=sampled.rrrg;
+return channels==0?vec4(mean,1.0):sampled;
+}`,ct=`#version 300 es
+precision highp float;
+in vec3 seen;
+in vec2 uv;
+in vec2 spot;
+in vec3 painted;
+uniform float cutoff;
+uniform sampler2D lightmap;
+uniform float lit;
+out vec4 shown;
+${ht}
+void main(){
+vec4 sampled=texel();
+float light=1.0;
+if(!textured){
+sampled=vec4(1.0);
+float glow=lit !=0.0?0.7:0.25;
+vec3 normal=cross(dFdx(seen),dFdy(seen));
+float size=length(normal);
+light=glow+(1.0-glow)*(size > 0.0?abs(dot(normal,normalize(seen)))/size:1.0);
+}
+if(lit !=0.0)light*=1.055*pow(lit < 0.0?texture(lightmap,spot).r:lit,1.0/2.4)-0.055;
+shown=vec4(sampled.rgb*color.rgb*painted*light,sampled.a*color.a);
+if(shown.a < max(cutoff,0.004))discard;
+if(cutoff > 0.0)shown.a=1.0;
+}`,C=`
+vec2 bytes(float number) {
+  float high = floor(number / 256.0);
+  return vec2(number - 256.0 * high, high) / 255.0;
+}`,lt=`#version 300 es
+precision highp float;
+in vec3 seen;
+in vec2 uv;
+uniform float item;
+uniform vec2 size;
+uniform float pixels;
+out vec4 shown;
+${C}
+void main(){
+float w=gl_FragCoord.w;
+vec2 texels=uv*size;
+vec2 across=(dFdx(texels*w)-texels*dFdx(w))/w;
+vec2 up=(dFdy(texels*w)-texels*dFdy(w))/w;
+float most=max(dot(across,across),dot(up,up));
+float detail=0.5*log2(max(most,1e-30))-log2(pixels);
+shown=vec4(bytes(item),bytes(floor(256.0*clamp(detail,0.0,31.0))));
+}`,ft=`#version 300 es
+precision highp float;
+uniform float item;
+layout(location=1)out vec4 shown;
+${C}
+void main(){shown=vec4(bytes(item),0.0,1.0);}`,j={surface:[I(`
+layout(location = 3) in vec2 place2;
+out vec2 spot;`,"spot = place2;"),ct],item:[I(),lt],placeholder:[I(),ft]};function G(n,t,e=j[t]){let s=n.createProgram(),i=[n.VERTEX_SHADER,n.FRAGMENT_SHADER];if(e.forEach((a,r)=>{let h=n.createShader(i[r]);n.shaderSource(h,a),n.compileShader(h),n.attachShader(s,h),n.deleteShader(h)}),n.linkProgram(s),!n.getProgramParameter(s,n.LINK_STATUS)&&!n.isContextLost())throw new Error(`${t}: ${n.getProgramInfoLog(s)}`);let o={},c=n.isContextLost()?0:n.getProgramParameter(s,n.ACTIVE_UNIFORMS);for(let a=0;a<c;a++){let r=n.getActiveUniform(s,a)?.name??"";o[r]=n.getUniformLocation(s,r)}return{program:s,at:o}}var ut=Uint32Array.from({length:256},(n,t)=>{for(let e=0;e<8;e++)t=t&1?t>>>1^3988292384:t>>>1;return t});function S(n,t=0){let e=~t;for(let s=0;s<n.length;s++)e=ut[(e^n[s])&255]^e>>>8;return~e>>>0}var jt=2**24;var Gt=new Uint8Array([3,0]);function d(n,t){if(!n)throw new Error(t)}var y=(n,t,e)=>Number.isInteger(n)&&t<=n&&n<=e;var V={png:"image/png",jpg:"image/jpeg",webp:"image/webp"},mt=65536,dt=2**30;function W(n){d(n?.format==="ptmtools interlaced image"&&n.schema===1,"not an index of an interlaced image");let{width:t,height:e,container:s,files:i,kind:o,original:c}=n,a=h=>y(h,1,mt);d(a(t)&&a(e)&&a(c?.width)&&a(c?.height),"no size"),d(s in V&&(o==="uint8"||o==="uint16"),"another container"),d(Array.isArray(i)&&y(i.length,1,33),"no files");let r={width:0,height:0};return i.forEach((h,l)=>{let{axis:m,joined:g}=h;d(h.name===`${l+1}.${s}`,"a file of another name"),d(a(h.width)&&a(h.height),"a file without size"),d(y(h.bytes,1,9*h.width*h.height+2**20),"a file of too many bytes"),d(y(h.crc32,0,4294967295)&&(l?m==="columns"||m==="rows":m===null),"no axis");let[u,f]=l?m==="columns"?[2,1]:[1,2]:[1,1];l||(r={width:h.width,height:h.height}),d(h.width===r.width&&h.height===r.height,"a file of another size"),r={width:u*r.width,height:f*r.height},d(g?.width===r.width&&g?.height===r.height,"a step of another size")}),d(r.width===t&&r.height===e,"steps that do not make the image"),n}var pt=`#version 300 es
+void main(){
+gl_Position=vec4(4*(gl_VertexID & 1)-1,4*(gl_VertexID >> 1)-1,0,1);
+}`,gt=`#version 300 es
+precision highp float;
+precision highp sampler2D;
+uniform sampler2D before,next,pattern;
+uniform vec2 size;
+uniform bool pairs;
+out vec4 texel;
+void main(){
+vec2 place=gl_FragCoord.xy/size;
+vec4 added=texture(next,place);
+if(pairs)added=added.rarr;
+texel=texture(pattern,place*size/2.0).r==0.0?texture(before,place):added;
+}`,wt={columns:[0,255,0,255],rows:[0,0,255,255],first:[255,255,255,255]};async function xt(n,t){if(!t)return createImageBitmap(n,{colorSpaceConversion:"none"});let e=URL.createObjectURL(n),s=Object.assign(new Image,{src:e});return await s.decode().finally(()=>URL.revokeObjectURL(e)),s}function H(n,{container:t},{bytes:e,crc32:s}){return d(n.length===e&&S(n)===s,"another checksum"),new Blob([n],{type:V[t]})}async function P(n,{components:t},{width:e,height:s}){let i=await xt(n,t%2===0);return d(i.width===e&&i.height===s,"an image of another size"),i}var A=class{constructor(t){this.gl=t,this.use=G(t,"join",[pt,gt]),this.buffer=t.createFramebuffer(),this.patterns=Object.fromEntries(Object.entries(wt).map(([e,s])=>{let i=this.#t(2,2,t.R8);for(let o of[t.TEXTURE_WRAP_S,t.TEXTURE_WRAP_T])t.texParameteri(t.TEXTURE_2D,o,t.REPEAT);return t.pixelStorei(t.UNPACK_ALIGNMENT,1),t.texSubImage2D(t.TEXTURE_2D,0,0,0,2,2,t.RED,t.UNSIGNED_BYTE,new Uint8Array(s)),[e,i]}))}upload(t){let{gl:e}=this,s=this.#t(t.width,t.height,e.RGBA8);return e.pixelStorei(e.UNPACK_PREMULTIPLY_ALPHA_WEBGL,!1),e.pixelStorei(e.UNPACK_COLORSPACE_CONVERSION_WEBGL,e.NONE),e.texSubImage2D(e.TEXTURE_2D,0,0,0,e.RGBA,e.UNSIGNED_BYTE,t),"close"in t&&t.close(),s}join({axis:t,joined:{width:e,height:s}},i,o,c=4,a=!1){let{gl:r,use:{program:h,at:l}}=this,m=a?1+Math.floor(Math.log2(Math.max(e,s))):1,g=this.#t(e,s,c===1?r.R8:c===2?r.RG8:r.RGBA8,m);r.bindFramebuffer(r.FRAMEBUFFER,this.buffer),r.framebufferTexture2D(r.FRAMEBUFFER,r.COLOR_ATTACHMENT0,r.TEXTURE_2D,g,0),r.viewport(0,0,e,s),r.disable(r.BLEND),r.useProgram(h);let u={before:i??o,next:o,pattern:this.patterns[t??"first"]};return Object.entries(u).forEach(([f,w],x)=>{r.activeTexture(r.TEXTURE0+x),r.bindTexture(r.TEXTURE_2D,w),w===i&&this.#e(r.NEAREST,r.NEAREST),r.uniform1i(l[f],x)}),r.activeTexture(r.TEXTURE0),r.uniform2f(l.size,e,s),r.uniform1i(l.pairs,+(c===2)),r.drawArrays(r.TRIANGLES,0,3),r.bindFramebuffer(r.FRAMEBUFFER,null),r.deleteTexture(i),r.deleteTexture(o),a&&(r.bindTexture(r.TEXTURE_2D,g),r.generateMipmap(r.TEXTURE_2D),this.#e(r.LINEAR_MIPMAP_LINEAR,r.LINEAR)),g}texels(t,e,s){let{gl:i}=this,o=new Uint8Array(4*e*s);return i.bindFramebuffer(i.FRAMEBUFFER,this.buffer),i.framebufferTexture2D(i.FRAMEBUFFER,i.COLOR_ATTACHMENT0,i.TEXTURE_2D,t,0),i.readPixels(0,0,e,s,i.RGBA,i.UNSIGNED_BYTE,o),i.bindFramebuffer(i.FRAMEBUFFER,null),o}#t(t,e,s,i=1){let{gl:o}=this,c=o.createTexture();o.bindTexture(o.TEXTURE_2D,c),o.texStorage2D(o.TEXTURE_2D,i,s,t,e),this.#e(o.NEAREST,o.NEAREST);for(let a of[o.TEXTURE_WRAP_S,o.TEXTURE_WRAP_T])o.texParameteri(o.TEXTURE_2D,a,o.CLAMP_TO_EDGE);return c}#e(t,e){this.gl.texParameteri(this.gl.TEXTURE_2D,this.gl.TEXTURE_MIN_FILTER,t),this.gl.texParameteri(this.gl.TEXTURE_2D,this.gl.TEXTURE_MAG_FILTER,e)}};function K(n,{files:t}){let e=n.getParameter(n.MAX_TEXTURE_SIZE),s=t.findIndex(({joined:{width:i,height:o}})=>Math.max(i,o)>e||4*i*o>dt);return s<0?t.length:s}var Et=3,D=class{#t=-1;constructor(t,e){this.gl=t,this.set=e,this.channels=e.channels,this.steps=0,this.texture=null}get bytes(){return this.steps?this.set.memory[this.steps-1]:0}add(t,e){let s=t.upload(e);this.texture=t.join(this.set.parts[this.steps],this.texture,s,this.channels,!0),this.steps++,this.#t=-1}bind(t,e){let{gl:s}=this,i=+t+2*+e;if(s.bindTexture(s.TEXTURE_2D,this.texture),i!==this.#t){let[o,c]=[t,e].map(a=>a?s.CLAMP_TO_EDGE:s.REPEAT);s.texParameteri(s.TEXTURE_2D,s.TEXTURE_WRAP_S,o),s.texParameteri(s.TEXTURE_2D,s.TEXTURE_WRAP_T,c),this.#t=i}return!1}delete(){this.gl.deleteTexture(this.texture)}},N=class{image=null;constructor(t){this.joined=t}},M=class{#t;#e=new Map;#r=null;#n;#s;#i;constructor(t,e){this.gl=t,this.sets=e,this.#t=e.map(()=>null),this.held=new Int32Array(e.length),this.loss=new Float64Array(e.length),this.#n=new Int32Array(e.length),this.#i=new Int32Array(e.length),this.#s=new Float64Array(e.length),this.budget=1/0,this.peak=0,this.fades=!0}get bytes(){let t=[...this.#t,...[...this.#e.values()].map(e=>e.joined)];return[...new Set(t)].reduce((e,s)=>e+(s?.bytes??0),0)}of(t){return this.#t[t]}settle(t,e){this.#n.set(t),this.#s.set(e),this.#i.fill(0);for(let s=0;s<t.length;s++)t[s]===0&&this.#c(s);this.#a()}hold(){this.#n=this.held.map((t,e)=>Math.max(t,Math.min(this.#n[e],this.#i[e])))}resume(){this.#a()}#a(){let t=()=>[...this.#e.values()].filter(({image:s})=>!s).length,e=[...this.held.keys()].filter(s=>this.#n[s]>0&&this.held[s]!==this.#n[s]);e.sort((s,i)=>+(this.held[s]>0)-+(this.held[i]>0)||this.#s[i]-this.#s[s]);for(let s of e){if(t()>=Et)break;if(this.#e.has(s))continue;let i=this.#t[s],o=i&&i.steps<this.#n[s];this.#h(s,o?i:new D(this.gl,this.sets[s]))}}#h(t,e){let s=new N(e);this.#e.set(t,s),this.sets[t].image(e.steps).then(i=>{this.#e.get(t)===s?s.image=i:"close"in i&&i.close()},()=>this.#o(t))}#o(t){let e=this.#e.get(t);this.#e.delete(t),e?.image&&"close"in e.image&&e.image.close(),e&&e.joined!==this.#t[t]&&e.joined.delete()}#c(t){this.#o(t),this.#t[t]?.delete(),this.#t[t]=null,this.held[t]=0}pump(t,e){let s=!1;for(let[i,{image:o,joined:c}]of[...this.#e]){if(!o)continue;if(e()&&s)break;this.#r??=new A(this.gl),c.add(this.#r,o),s=!0,this.peak=Math.max(this.peak,this.bytes),this.#e.delete(i);let a=this.#t[i],r=this.#n[i];!a||c===a||c.steps>=r?(c!==a&&a?.delete(),this.#t[i]=c,this.held[i]=c.steps):a.steps>r?this.#h(i,c):c.delete()}return s&&this.#a(),s}texels(t){let e=this.#t[t];if(!e||!this.#r)return null;let{width:s,height:i}=e.set.parts[e.steps-1].joined;return{width:s,height:i,texels:this.#r.texels(e.texture,s,i)}}delete(){for(let t=0;t<this.sets.length;t++)this.#c(t)}lose(){this.#i=this.held.map((t,e)=>Math.max(t,this.#i[e])),this.#t.fill(null),this.#e.clear(),this.#r=null,this.held.fill(0)}};var b=class{low=[1/0,1/0,1/0];high=[-1/0,-1/0,-1/0];#t=0;#e=[0,0];add(t,e,s){for(let i of t)this.low=this.low.map((o,c)=>Math.min(o,i[c])),this.high=this.high.map((o,c)=>Math.max(o,i[c]));this.#t+=e,this.#e=this.#e.map((i,o)=>i+e*s[o])}piece(t){let e=this.#e.map(s=>s>0?this.#t/s:0);return{texture:t,low:this.low,high:this.high,side:e}}};function F({positions:n,indices:t},e,s){let i=new b,o=new Map;for(let a=0;a<t.length;a+=3){let r=t.subarray(a,a+3),h=Array.from(r,p=>Array.from(n.subarray(3*p,3*p+3))),[l,m,g]=[h[0],...[1,2].map(p=>h[p].map((E,T)=>E-h[0][T]))],u=[0,1,2].map(p=>m[(p+1)%3]*g[(p+2)%3]-m[(p+2)%3]*g[(p+1)%3]),f=Math.hypot(...u);if(!(f>0))continue;let[w,x]=[0,1].map(p=>{let[E,T]=[1,2].map(U=>s[2*r[U]+p]-s[2*r[0]+p]);return Math.hypot(...m.map((U,nt)=>T*U-E*g[nt]))/f});if(i.add(h,f,[w,x]),o.size>64)continue;let L=u.map(p=>p/f),it=L.reduce((p,E,T)=>p+E*l[T],0),X=[...L.map(p=>50*p),50*it].map(Math.round).join(),$=o.get(X)??new b;o.set(X,$),$.add(h,f,[w,x])}return(o.size>64?[i]:[...o.values()]).map(a=>a.piece(e))}function Tt({width:n,height:t}){let e=n*t;for(;n>1||t>1;)[n,t]=[Math.max(1,n>>1),Math.max(1,t>>1)],e+=n*t;return e}var O=class{#t=[];#e=null;constructor(t,e,s,i){this.index=t,this.urls=e,this.channels=i,this.parts=t.files.slice(0,s);let o=0;this.ends=this.parts.map(({bytes:c})=>o+=c),this.memory=this.parts.map(({joined:c})=>i*Tt(c))}step(t){return this.ends.filter(e=>e<=t).length}async take(t,e){let s=this.parts[t],i=H(e,this.index,s),o=await P(i,this.index,s);this.#r(),this.#e=o,this.#t[t]=i}async image(t){let e=this.#e;return e&&t===this.#t.length-1?(this.#e=null,e):P(this.#t[t],this.index,this.parts[t])}#r(){this.#e&&"close"in this.#e&&this.#e.close(),this.#e=null}};function q(n,t,e,s){return d(n?.format==="ptmtools interlaced images"&&n.schema===1,"not a document of interlaced images"),d(Array.isArray(n.sets)&&n.sets.length===t.length,"other textures"),t.map((i,o)=>{let{manifest:c,files:a}=n.sets[o]??{},r=W(c);d(r.components===i.components,"another texture"),d(Array.isArray(a)&&a.length===r.files.length,"files without names");let h=K(s,r);return d(h>0,"an image larger than this graphics card's textures"),new O(r,a.map(l=>e(String(l))),h,i.gpuTexelBytes)})}function Y(n,{ends:t,parts:e}){let{width:s,height:i}=e[e.length-1].joined;return{...n,width:s,height:i,ends:t,differences:t.map(()=>0),previews:[],offsets:void 0}}function Z(n,t){let e=n.querySelector(t);if(!e)throw new Error(`the page has no ${t}`);return e}function Q(n,t={},...e){let s=document.createElement(n);for(let[i,o]of Object.entries(t))i in s?Reflect.set(s,i,o):s.setAttribute(i,o);return s.append(...e),s}var J="Tell the owner of this site: publishing it again should repair it.",tt="Use a current Chrome, Edge or Firefox, or Safari 16.4 or newer",ne={"PTM-V101":`${tt}, with hardware acceleration on.`,"PTM-V102":`${tt}.`,"PTM-V103":J,"PTM-V104":"Check your connection and reload the page.","PTM-V106":"Update the browser, or allow this page to use web workers and more memory.","PTM-V105":J};var et=8e3;function st(n,...t){let e=Q("p",{},...t);Z(n,"#notices").append(e);let s=()=>{e.contains(n.activeElement)?setTimeout(s,et):e.remove()};setTimeout(s,et)}var yt="This site has no interlaced images, so you see its own textures. `ptm emit DB --format vrml,gltf,interlace` writes some for a database.",vt="The policy and the comparison are those of other textures than interlaced images.";async function fe(n,t,e,s){let{index:i}=n;if(!i.sets)return st(document,yt),null;let o=n.of(i.sets),c=r=>new URL(r,o).href,a=await s.whole(o,r=>q(JSON.parse(new TextDecoder().decode(r)),i.textures,c,t));return e.opening=null,n.index={...i,textures:i.textures.map((r,h)=>Y(r,a[h]))},r=>Rt(r,a)}function Rt(n,t){let{catalogue:e,client:s,gl:i,rows:o,sharpness:c}=n,{K:a,T:r,memory:h}=e;for(let u=0;u<r;u++){for(let f=1;f<a;f++)h[u*a+f]=t[u].memory[f-1]??h[u*a+f-1];o[u].sizes=t[u].parts}e.whole=t.reduce((u,{memory:f})=>u+f[f.length-1],0),n.firstLevels=1,At(n,t);let l=new Map,m=s.learnGeometry.bind(s);s.learnGeometry=(u,f)=>{l.set(u,f.flatMap(w=>[...w.uvs?F(w,w.texture,w.uvs):[],...w.spots?F(w,w.light,w.spots):[]])),m(u,f)};let g=()=>2*Math.tan(n.tall/2)/c.lines;s.policy=()=>new R(s,t,l,g),n.policy="gpuii",n.memory.delete(),n.memory=new M(i,t),n.renderer&&(n.renderer.memory=n.memory),n.choose=n.compare=()=>n.emit("notice",{message:vt})}function At({client:n,fetcher:t,stream:e},s){let{bytes:i}=n.downloads,o=e.url.bind(e),c=t.range.bind(t),a=(h,l=i[h])=>s[h].urls[s[h].step(l)];e.url=(h,l)=>h==="texture"?a(l):o(h,l);let r=new Map(s.flatMap(({urls:h},l)=>h.map(m=>[m,l])));t.range=async(h,l,m,g,...u)=>{let f=r.get(h);if(f===void 0)return c(h,l,m,g,...u);let w=await t.whole(h,async x=>(await s[f].take(s[f].step(l),x),x),...u);return{begin:l,body:w}},e.files=s.map(h=>({row:h,length:0,append(l,{length:m}){this.length=l+m}}))}export{fe as setsOf};
