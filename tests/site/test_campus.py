@@ -13,10 +13,16 @@ import numpy as np
 import pytest
 from browser import Visitor, visiting
 
+from ptmtools.cli.main import main
 from ptmtools.errors import InputError
+from ptmtools.lab.campus.options import CampusWalkOptions
+from ptmtools.lab.campus.simulation import simulate_campus
 from ptmtools.lab.campus.stock import read_stock
+from ptmtools.lab.campus.world import prepare_campus
 from ptmtools.neighbours.campus.model import PRESETS, distances
 from ptmtools.site.forms import FORMS, form_site
+from ptmtools.site.throttle import Throttle
+from ptmtools.walk import read_walk
 
 Open = Callable[..., AbstractContextManager[Visitor]]
 #: `near` of the client.
@@ -78,6 +84,56 @@ def test_a_walk_refines_what_is_near(opened: Open, campus: Path) -> None:
         before = len(fetched(visitor))
         visitor.frames(20)
         assert len(fetched(visitor)) == before  # files are kept
+
+
+#: Walks along the street, some metres a second, and records it from the first frame on.
+WALKS = """
+let app = null;
+Object.defineProperty(window, "ptm", { get: () => app, set: (made) => {
+  (app = made).record();
+  const begun = performance.now();
+  const step = () => {
+    const x = -30 + 0.004 * (performance.now() - begun);
+    window.arrived = x > 30;
+    app.place([Math.min(x, 30), 1.6, 3], -Math.PI / 2);
+    requestAnimationFrame(step);
+  };
+  step();
+} });
+"""
+
+
+def test_a_recording_replays(
+    opened: Open, campus: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The simulator fetches the same files, and is as far as the page where the walk ends."""
+    link = Throttle(1e6, 0.05)
+    prepared = {"prepare": lambda page: page.add_init_script(WALKS), "throttle": link}
+    with opened(campus, "?preset=Medium", **prepared) as visitor:
+        visitor.page.wait_for_function("window.arrived", timeout=60_000)
+        recording = visitor.page.evaluate("window.ptm.recording")
+        asked = [v for v in visitor.visits if "/data-" in v.path]
+        assert visitor.messages == []
+    file = tmp_path / "walk.json"
+    file.write_text(json.dumps(recording))
+    walk = read_walk(file)
+    assert walk.aspect == pytest.approx(320 / 240)
+    assert abs(walk.eye[-1, 0] - walk.eye[0, 0]) > 50
+    place = prepare_campus(campus, walk, every=0)
+    options = CampusWalkOptions(bandwidth="1M", latency="50ms")
+    run = simulate_campus(place, PRESETS[1], options)
+    assert run.begun
+    assert run.requests == pytest.approx(len(asked), rel=0.1)
+    assert run.body == pytest.approx(sum(v.bytes for v in asked), rel=0.1)
+    words = ["walk-campus", campus, "--walk", file, "--every", "0", "--preset", "medium"]
+    assert main([str(word) for word in words]) == 0
+    assert "medium" in capsys.readouterr().out.lower()
+
+
+def test_nothing_was_recorded(opened: Open, campus: Path) -> None:
+    with opened(campus) as visitor:
+        visitor.until("s.begun")
+        assert visitor.page.evaluate("window.ptm.recording") is None
 
 
 def test_it_is_drawn_and_walked_on(opened: Open, campus: Path) -> None:

@@ -10,7 +10,7 @@ import { CampusIndex, LEAST } from "../campus/index.js";
 import { Labels } from "../campus/labels.js";
 import { Records } from "../campus/records.js";
 import { cameraOf } from "../gl/camera.js";
-import { frustumOf, meetsBox } from "../space/frustum.js";
+import { directionOf, frustumOf, meetsBox } from "../space/frustum.js";
 import { attachControls } from "../ui/controls.js";
 import { find, inBytes, make } from "../ui/elements.js";
 import { showNotice } from "../ui/errors.js";
@@ -162,6 +162,7 @@ runForm(async (gl, config, fetcher, fail) => {
       pose: walker.pose,
     }),
     address: () => fragmentOf(walker.pose),
+    look: () => ({ eye: walker.pose.eye, direction: directionOf(walker.pose.yaw, walker.pose.pitch), angle: ANGLE }),
     place: (/** @type {number[]} */ eye, /** @type {number} */ yaw, pitch = 0) => walker.place({ eye, yaw, pitch }),
     files,
   };
