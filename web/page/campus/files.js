@@ -132,11 +132,12 @@ export class CampusFiles {
     this.fetcher = fetcher;
   }
 
-  /** Downloads a file. @param {string} name */
-  async load(name) {
+  /** Downloads a file. @param {string} name @param {() => void} arrived called before it is decoded */
+  async load(name, arrived) {
     const row = /** @type {CampusFile} */ (this.index.files.get(name));
     const content = await this.fetcher.whole(this.urlOf(name), async (body) => {
       demand(body.length === row.bytes && checksum(body) === row.crc32, "another checksum");
+      arrived();
       if (row.size === undefined) return partsOf(body, this.index.materials.length);
       const blob = new Blob([body], { type: "image/jpeg" });
       const bitmap = await createImageBitmap(blob, { colorSpaceConversion: "none" });

@@ -71,15 +71,17 @@ runForm(async (gl, config, fetcher, fail) => {
   /** One of the threads. @param {string} first @param {string[]} thread */
   const run = async (first, thread) => {
     for (let file = /** @type {string | null} */ (first); file; file = client.after(thread)) {
-      try {
-        await files.load(file);
-        client.loaded.add(file);
-      } catch (fault) {
-        // Coarse detail of everything stays; what was asked for is not asked for again.
-        if (!client.begun) throw fault;
-        showNotice(document, /** @type {Error} */ (fault).message);
-        client.failed.add(file);
-      }
+      const name = file;
+      // The next file is requested while this one is decoded.
+      await new Promise((resolve) => {
+        files.load(name, () => resolve(null)).then(() => client.loaded.add(name), (fault) => {
+          // Coarse detail of everything stays; what was asked for is not asked for again.
+          if (!client.begun) return fail(fault);
+          showNotice(document, fault.message);
+          client.failed.add(name);
+          resolve(null);
+        });
+      });
     }
   };
 

@@ -1,6 +1,6 @@
 // The pieces of the surfaces of a cell, by which the client of interlaced images tells what is in view, how far
 // it is, and how large its texels are. A site's GLBs have all walls of a room with one texture in one shape, and
-// the box of that holds the visitor; so a shape of few planes has a piece for each of them.
+// the box of that holds the visitor; so triangles that share vertices are a piece.
 
 /**
  * @typedef {object} Piece
@@ -11,8 +11,8 @@
  *   point of it
  */
 
-/** The most planes of a shape; one of more is a piece. Parts of a normal, and of a metre, that are told apart. */
-const PLANES = 64, TURN = 50, SHIFT = 50;
+/** The most pieces of a shape: one that falls into more is a single piece. */
+const MOST = 256;
 
 /** Triangles of a shape. */
 class Group {
@@ -45,13 +45,13 @@ class Group {
  * @returns {Piece[]}
  */
 export function piecesOf({ positions, indices }, texture, uvs) {
-  const all = new Group();
-  /** @type {Map<string, Group>} */
-  const planes = new Map();
+  const all = new Group(), rootOf = connected(indices, positions.length / 3);
+  /** @type {Map<number, Group>} */
+  const groups = new Map();
   for (let k = 0; k < indices.length; k += 3) {
     const triangle = indices.subarray(k, k + 3);
     const corners = Array.from(triangle, (n) => Array.from(positions.subarray(3 * n, 3 * n + 3)));
-    const [a, ab, ac] = [corners[0], ...[1, 2].map((n) => corners[n].map((x, i) => x - corners[0][i]))];
+    const [ab, ac] = [1, 2].map((n) => corners[n].map((x, i) => x - corners[0][i]));
     const cross = [0, 1, 2].map((i) => ab[(i + 1) % 3] * ac[(i + 2) % 3] - ab[(i + 2) % 3] * ac[(i + 1) % 3]);
     const area = Math.hypot(...cross);
     if (!(area > 0)) continue;
@@ -61,13 +61,28 @@ export function piecesOf({ positions, indices }, texture, uvs) {
       return Math.hypot(...ab.map((x, n) => c * x - b * ac[n])) / area;
     });
     all.add(corners, area, [u, v]);
-    if (planes.size > PLANES) continue;
-    const normal = cross.map((x) => x / area), shift = normal.reduce((sum, x, i) => sum + x * a[i], 0);
-    const key = [...normal.map((x) => TURN * x), SHIFT * shift].map(Math.round).join();
-    const group = planes.get(key) ?? new Group();
-    planes.set(key, group);
+    if (groups.size > MOST) continue;
+    const root = rootOf(triangle[0]), group = groups.get(root) ?? new Group();
+    groups.set(root, group);
     group.add(corners, area, [u, v]);
   }
-  const groups = planes.size > PLANES ? [all] : [...planes.values()];
-  return groups.map((group) => group.piece(texture));
+  return (groups.size > MOST ? [all] : [...groups.values()]).map((group) => group.piece(texture));
+}
+
+/**
+ * The same vertex for all that triangles connect.
+ * @param {Uint16Array | Uint32Array} indices
+ * @param {number} count of vertices
+ */
+function connected(indices, count) {
+  const parent = Uint32Array.from({ length: count }, (_, n) => n);
+  /** @param {number} n */
+  const rootOf = (n) => {
+    while (parent[n] !== n) n = parent[n] = parent[parent[n]];
+    return n;
+  };
+  indices.forEach((n, k) => {
+    if (k % 3) parent[rootOf(n)] = rootOf(indices[k - 1]);
+  });
+  return rootOf;
 }
