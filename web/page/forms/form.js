@@ -91,6 +91,8 @@ export async function runForm(create) {
     };
     requestAnimationFrame(frame);
     document.body.classList.add("begun");
+    // The canvas has the focus from the begin; only visitors with keys need to see it.
+    addEventListener("keydown", () => document.body.classList.add("keys"), { once: true });
   } catch (fault) {
     fail(fault);
   }
