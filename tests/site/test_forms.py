@@ -164,9 +164,7 @@ def test_keys_and_the_wheel(opened: Open, statue: Path) -> None:
 OUTLINE = "getComputedStyle(document.querySelector('canvas')).outlineStyle"
 
 
-def test_the_focus_is_seen_with_keys(
-    opened: Open, statue: Path, pictures: dict[str, Path]
-) -> None:
+def test_the_focus_is_seen_with_keys(opened: Open, statue: Path, pictures: dict[str, Path]) -> None:
     for folder in (statue, pictures["rgb-png"]):
         with opened(folder) as visitor:
             visitor.until("s.pending === 0")
