@@ -95,6 +95,10 @@ export class Site {
     if (index.schema !== SCHEMA) {
       throw new Error(`the index has schema ${index.schema}, and this page reads ${SCHEMA}`);
     }
+    for (const { differences, previews = [] } of index.textures) {
+      // The tables of levels would not end.
+      if (!previews.every(({ level }) => level in differences)) throw new Error("a preview of no level");
+    }
     this.index = index;
     this.address = address;
   }
