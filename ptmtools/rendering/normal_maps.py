@@ -1,4 +1,10 @@
-"""Shading of normal maps (`ptm build-scene --relief normal-map`)."""
+"""Shading of normal maps: of objects (`ptm build-scene --relief normal-map`), and of materials.
+
+A material's map tilts the normals of its faces, and changes their colours by the share by which the
+light of the lamp changes (`ptmtools.rendering.light`). So a level map changes nothing, and walls
+with a map are as bright as those without. (Rejected: the light itself, since all other textured
+surfaces are unlit, and a lamp at the eye, which fades and shimmers at a slant.)
+"""
 
 from __future__ import annotations
 
@@ -17,8 +23,8 @@ from ptmtools.rendering.records import Pyramids, Sight, own_levels, triangles_of
 def show_relief(
     sight: Sight, surfaces: Surfaces, pyramids: Pyramids, column: Ints, lamps: Floats, shown: Floats
 ) -> None:
-    """Lights the pixels ``shown`` (n, 3) of surfaces with a normal map by that, instead of the
-    ``lamps`` (m,) on their faces; ``column`` (T,): levels of each texture."""
+    """Lights the pixels ``shown`` (n, 3) of surfaces with the normal map of an object by that,
+    instead of the ``lamps`` (m,) on their faces; ``column`` (T,): levels of each texture."""
     relief = surfaces.relief
     if relief is None:
         return
@@ -31,10 +37,57 @@ def show_relief(
         color=np.ones_like(surfaces.color),
         clamped=np.ones_like(surfaces.clamped),
     )
-    value = np.empty_like(shown)
-    loaded = np.ones(int(surfaces.cell.max(initial=-1)) + 1, np.bool_)
-    shade(sight, triangles_of(maps), own_levels(pyramids), loaded, column, value)
+    value = _sampled(sight, maps, pyramids, column)
     face = sight.triangle[relieved]
     axes = axes_of(relief.frame[face])
     normal = np.einsum("nij,nj->ni", axes, value[relieved] / 127.5 - 1)
     shown[relieved] *= (light_on(normal) / lamps[face])[:, None]
+
+
+def show_bumps(
+    sight: Sight, surfaces: Surfaces, pyramids: Pyramids, column: Ints, shown: Floats
+) -> None:
+    """Multiplies the pixels ``shown`` (n, 3) of surfaces whose materials have normal maps by the
+    light on these, as a share of that on their faces; ``column`` (T,): levels of each texture.
+    Without a level of the map nothing changes."""
+    bumps, maps = surfaces.bumps, surfaces.bumped
+    if bumps is None or maps is None:
+        return
+    bumped = np.flatnonzero(sight.triangle >= 0)
+    number = bumps.number[sight.triangle[bumped]]
+    bumped = bumped[(number >= 0) & (column[number] > 0)]
+    if not len(bumped):
+        return
+    triangles = triangles_of(maps)
+    value = _sampled(sight, maps, pyramids, column)[bumped] / 127.5 - 1
+    face, ray = sight.triangle[bumped], sight.ray[bumped]
+    normal = triangles.normal[face]
+    facing = np.einsum("ij,ij->i", normal, ray)
+    up = _unit(np.where(facing[:, None] > 0, -normal, normal))
+    # The tangent is the direction along which v stays: across its gradient, to where u grows.
+    du, dv = np.moveaxis(triangles.gradient[face], 1, 0)
+    right = np.cross(dv, up)
+    right = _unit(np.where(np.einsum("ij,ij->i", right, du)[:, None] < 0, -right, right))
+    over = np.cross(up, right)
+    # v grows downwards in the image.
+    over = np.where(np.einsum("ij,ij->i", over, dv)[:, None] > 0, -over, over)
+    scale = bumps.scale[face]
+    tilted = right * (value[:, 0] * scale)[:, None] + over * (value[:, 1] * scale)[:, None]
+    tilted += up * value[:, 2:]
+    flat = ~right.any(axis=1)
+    tilted[flat] = up[flat]
+    shown[bumped] *= (light_on(tilted) / light_on(up))[:, None]
+
+
+def _sampled(sight: Sight, maps: Surfaces, pyramids: Pyramids, column: Ints) -> Floats:
+    """(n, 3) texels of surfaces with maps as textures, 0 to 255."""
+    value = np.empty((len(sight.ray), 3))
+    loaded = np.ones(int(maps.cell.max(initial=-1)) + 1, np.bool_)
+    shade(sight, triangles_of(maps), own_levels(pyramids), loaded, column, value)
+    return value
+
+
+def _unit(rows: Floats) -> Floats:
+    """(n, 3) of length 1, or 0."""
+    length = np.linalg.norm(rows, axis=1, keepdims=True)
+    return np.asarray(np.divide(rows, length, out=np.zeros_like(rows), where=length > 0))
