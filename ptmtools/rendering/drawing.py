@@ -178,19 +178,20 @@ def draw_view(
         column = np.minimum(np.maximum(within.sum(axis=1), 1), column)
     shown = np.empty((len(sight.ray), 3))
     loaded = np.ones(served.cell_count, dtype=np.bool_)
-    shade(sight, triangles, own_levels(pyramids), loaded, column, shown)
+    levels = own_levels(pyramids)
+    shade(sight, triangles, levels, loaded, column, shown)
     if options.lit:
         from ptmtools.rendering.relief import relieve
 
         octrees, lamp = read_octrees(served), lamps(surfaces.corner)
         relieve(sight, triangles, lamp, octrees, loaded, octrees.levels, shown)
-        show_relief(sight, surfaces, pyramids, column, lamp, shown)
+        show_relief(sight, surfaces, levels, loaded, column, lamp, shown)
     else:
         _shade_plain(sight, triangles, light, shown)
-    show_bumps(sight, surfaces, pyramids, column, shown)
+    show_bumps(sight, surfaces, levels, loaded, column, shown)
     if light is not None:
         linear = np.empty_like(shown)
-        shade(sight, triangles_of(light), own_levels(pyramids), loaded, column, linear)
+        shade(sight, triangles_of(light), levels, loaded, column, linear)
         mapped = np.flatnonzero(sight.triangle >= 0)
         mapped = mapped[light.texture[sight.triangle[mapped]] >= 0]
         shown[mapped] *= to_srgb(linear[mapped] / 255)

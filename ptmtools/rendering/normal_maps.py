@@ -11,25 +11,32 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, Ints
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.neighbours.apo.normal_map import axes_of
 from ptmtools.output.served import Surfaces
 from ptmtools.rendering.kernels import shade
 from ptmtools.rendering.light import light_on
-from ptmtools.rendering.records import Pyramids, Sight, own_levels, triangles_of
+from ptmtools.rendering.records import Shows, Sight, triangles_of
 
 
 def show_relief(
-    sight: Sight, surfaces: Surfaces, pyramids: Pyramids, column: Ints, lamps: Floats, shown: Floats
+    sight: Sight,
+    surfaces: Surfaces,
+    shows: Shows,
+    loaded: Bools,
+    column: Ints,
+    lamps: Floats,
+    shown: Floats,
 ) -> None:
     """Lights the pixels ``shown`` (n, 3) of surfaces with the normal map of an object by that,
-    instead of the ``lamps`` (m,) on their faces; ``column`` (T,): levels of each texture."""
+    instead of the ``lamps`` (m,) on their faces. ``loaded`` (C,): the cells that are drawn;
+    ``column`` (T,): of each texture, and without one the faces stay."""
     relief = surfaces.relief
     if relief is None:
         return
-    relieved = np.flatnonzero(sight.triangle >= 0)
-    relieved = relieved[relief.number[sight.triangle[relieved]] >= 0]
+    relieved = _with_map(sight, surfaces, relief.number, loaded, column)
     maps = replace(
         surfaces,
         uv=relief.uv,
@@ -37,7 +44,7 @@ def show_relief(
         color=np.ones_like(surfaces.color),
         clamped=np.ones_like(surfaces.clamped),
     )
-    value = _sampled(sight, maps, pyramids, column)
+    value = _sampled(sight, maps, shows, loaded, column)
     face = sight.triangle[relieved]
     axes = axes_of(relief.frame[face])
     normal = np.einsum("nij,nj->ni", axes, value[relieved] / 127.5 - 1)
@@ -45,21 +52,19 @@ def show_relief(
 
 
 def show_bumps(
-    sight: Sight, surfaces: Surfaces, pyramids: Pyramids, column: Ints, shown: Floats
+    sight: Sight, surfaces: Surfaces, shows: Shows, loaded: Bools, column: Ints, shown: Floats
 ) -> None:
     """Multiplies the pixels ``shown`` (n, 3) of surfaces whose materials have normal maps by the
-    light on these, as a share of that on their faces; ``column`` (T,): levels of each texture.
-    Without a level of the map nothing changes."""
+    light on these, as a share of that on their faces; ``loaded`` and ``column`` as in
+    `show_relief`."""
     bumps, maps = surfaces.bumps, surfaces.bumped
     if bumps is None or maps is None:
         return
-    bumped = np.flatnonzero(sight.triangle >= 0)
-    number = bumps.number[sight.triangle[bumped]]
-    bumped = bumped[(number >= 0) & (column[number] > 0)]
+    bumped = _with_map(sight, surfaces, bumps.number, loaded, column)
     if not len(bumped):
         return
     triangles = triangles_of(maps)
-    value = _sampled(sight, maps, pyramids, column)[bumped] / 127.5 - 1
+    value = _sampled(sight, maps, shows, loaded, column)[bumped] / 127.5 - 1
     face, ray = sight.triangle[bumped], sight.ray[bumped]
     normal = triangles.normal[face]
     facing = np.einsum("ij,ij->i", normal, ray)
@@ -79,11 +84,20 @@ def show_bumps(
     shown[bumped] *= (light_on(tilted) / light_on(up))[:, None]
 
 
-def _sampled(sight: Sight, maps: Surfaces, pyramids: Pyramids, column: Ints) -> Floats:
+def _with_map(
+    sight: Sight, surfaces: Surfaces, number: NDArray[np.int32], loaded: Bools, column: Ints
+) -> Ints:
+    """The pixels of drawn surfaces whose map, (m,) ``number``, has a column."""
+    some = np.flatnonzero(sight.triangle >= 0)
+    face = sight.triangle[some]
+    present = (number[face] >= 0) & (column[number[face]] > 0) & loaded[surfaces.cell[face]]
+    return some[present]
+
+
+def _sampled(sight: Sight, maps: Surfaces, shows: Shows, loaded: Bools, column: Ints) -> Floats:
     """(n, 3) texels of surfaces with maps as textures, 0 to 255."""
     value = np.empty((len(sight.ray), 3))
-    loaded = np.ones(int(maps.cell.max(initial=-1)) + 1, np.bool_)
-    shade(sight, triangles_of(maps), own_levels(pyramids), loaded, column, value)
+    shade(sight, triangles_of(maps), shows, loaded, column, value)
     return value
 
 

@@ -30,14 +30,18 @@ export class Renderer {
    * @param {WebGL2RenderingContext} gl
    * @param {Textures} memory
    * @param {number[][]} means the mean colour of each texture, 0 to 255
+   * @param {boolean} baked whether lightmaps or colours of vertices hold the light
    */
-  constructor(gl, memory, means) {
+  constructor(gl, memory, means, baked) {
     this.gl = gl;
     this.memory = memory;
     this.means = means.map((color) => color.map((part) => part / 255));
     this.surface = programOf(gl, "surface");
-    /** Draws objects with relief, if the site has any.
-     * @type {import("../octree/statues.js").Statues | import("../relief/reliefs.js").Reliefs | null} */
+    /** Least share of their colour that surfaces without texture have: the rest is lit from the eye. */
+    this.glow = baked ? 0.7 : 0.25;
+    /** Draws what has relief, if the site has any.
+     * @type {Pick<import("../octree/statues.js").Statues, "delete" | "has" | "lacks" | "levels" | "advance">
+     *   & Pick<import("../relief/reliefs.js").Reliefs, "draw"> & {bytes?: number} | null} */
     this.statues = null;
   }
 
@@ -157,6 +161,7 @@ export class Renderer {
     gl.uniform4fv(at.color, batch.color);
     gl.uniform1f(at.cutoff, cutoff);
     gl.uniform1i(at.textured, +(texture >= 0));
+    gl.uniform1f(at.glow, this.glow);
     const storage = texture < 0 ? null : this.memory.of(texture);
     gl.uniform1i(at.channels, storage?.channels ?? 0);
     if (texture >= 0) gl.uniform3fv(at.mean, this.means[texture]);
