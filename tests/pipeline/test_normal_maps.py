@@ -154,7 +154,7 @@ def test_trim_keeps_their_levels(made: Path) -> None:
     scene = artifacts[SCENE]
     sizes = [(65536, 65536)] * len(scene.images)
     levels = unresolved_levels(
-        scene, artifacts[CELLS], artifacts[PVS], sizes, Screen(1080, 60.0, 0.5)
+        scene, artifacts[CELLS], artifacts[PVS], sizes, Screen(100, 60.0, 0.5)
     )
     of = {image.name: n for image, n in zip(scene.images, levels.tolist(), strict=True)}
     assert of["room_a.png"] > 0

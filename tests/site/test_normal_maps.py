@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from ptmtools.cli.main import main
+from ptmtools.lab.tables import look
 from ptmtools.output.served import Served, read_served
 from ptmtools.rendering.drawing import ViewOptions, draw_view
+from ptmtools.rendering.pyramids import read_pyramids
+from ptmtools.rendering.rays import Camera
 from ptmtools.site.content import Site, site_of
 from tests.scene.bumpy import write_bumpy
 from tests.site.conftest import PLAIN, Visiting
@@ -89,3 +92,27 @@ def test_they_come_after_the_first_picture(visit: Visiting, site: Site) -> None:
         own = [at for at, path in enumerate(paths) if path in files]
         assert own
         assert min(own) > paths.index(shown)
+
+
+def test_the_simulator_wants_the_same_levels(visit: Visiting, site: Site, database: Path) -> None:
+    """Of a map beside the textures of walls and floor, as much as its own pixels want."""
+    served = read_served(database)
+    name, K = "floor", "window.ptm.walk.catalogue.K"
+    number = next(
+        n for n, row in enumerate(served.index["textures"]) if row["file"] == "textures/waves.ptm"
+    )
+    row = f"[...window.ptm.walk.present].slice({number} * {K}, {number + 1} * {K})"
+    with visit(site, query=address(name), width=WIDTH, height=HEIGHT) as visitor:
+        visitor.until("s.complete")
+        actual = np.array(visitor.page.evaluate(row))[1:]
+    eye, yaw = EYES[name]
+    angle = served.index["viewpoints"][0]["fieldOfView"]
+    camera = Camera(WIDTH, HEIGHT, angle, WIDTH / HEIGHT, HEIGHT)
+    turn = np.radians(yaw)
+    direction = np.array([[-np.sin(turn), 0.0, -np.cos(turn)]])
+    pyramids = read_pyramids(served)
+    views = look(served.surfaces, pyramids, camera, np.array([eye]), direction)[0]
+    expected = views.sight[views.texture == number].sum(axis=0)
+    count = min(len(actual), len(expected))
+    assert expected[0] > 0.3
+    assert actual[:count] == pytest.approx(expected[:count], abs=0.05)

@@ -6,20 +6,22 @@ import { Reliefs } from "./relief/reliefs.js";
 /** @typedef {NonNullable<import("./gl/renderer.js").Renderer["statues"]>} Drawer */
 
 /**
+ * Lets the renderer draw them, and octrees if there are any.
  * @param {import("./walkthrough.js").Walkthrough} walk
  * @param {(fault: import("./net/errors.js").PageError) => void} report
- * @returns {Promise<Drawer>}
  */
-export async function statuesOf(walk, report) {
-  const reliefs = new Reliefs(walk.gl, walk, report);
-  if (!walk.index.octrees) return reliefs;
-  const { statuesOf: octreesOf } = await loadStatues();
-  return both(octreesOf(walk, report), reliefs);
+export async function show(walk, report) {
+  const { index: { octrees }, gl } = walk;
+  if (octrees) (await loadStatues()).show(walk, report);
+  const { renderer } = walk, reliefs = new Reliefs(gl, walk, report);
+  if (!renderer) return;
+  const { statues } = renderer;
+  renderer.statues = statues ? both(statues, reliefs) : reliefs;
 }
 
 /**
  * Objects with octrees, and other surfaces with normal maps.
- * @param {import("./octree/statues.js").Statues} octrees
+ * @param {Drawer} octrees
  * @param {Reliefs} reliefs
  * @returns {Drawer}
  */
@@ -45,7 +47,7 @@ function both(octrees, reliefs) {
     },
     draw(camera, batches, paint, now) {
       const has = (/** @type {typeof batches[0]} */ { batch }) => octrees.has(batch.look);
-      const first = octrees.draw(camera, batches.filter(has), paint);
+      const first = octrees.draw(camera, batches.filter(has), paint, now);
       return reliefs.draw(camera, batches.filter((each) => !has(each)), paint, now) || first;
     },
   };

@@ -141,8 +141,6 @@ export class Walkthrough {
     });
     this.rows = index.textures.map(levelsOf);
     this.memory = this.#memoryOf();
-    this.means = index.textures.map(({ color }) => color);
-    this.baked = index.textures.some((row) => "light" in row);
     const low = [0, 1, 2].map((k) => Math.min(...index.cells.map(({ box }) => box[k])));
     const high = [0, 1, 2].map((k) => Math.max(...index.cells.map(({ box }) => box[k + 3])));
     // Geometry outside of the cells is drawn, too.
@@ -178,18 +176,18 @@ export class Walkthrough {
 
   #make() {
     this.renderer?.statues?.delete();
-    const renderer = (this.renderer = new Renderer(this.gl, this.memory, this.means, this.baked));
-    const relieved = this.index.textures.some((row) => "relief" in row || row.normals);
-    if (relieved || this.index.octrees) {
-      const report = (/** @type {import("./net/errors.js").PageError} */ error) => this.#report(error, "octree", 0);
+    const { gl, index: { octrees, textures } } = this;
+    this.renderer = new Renderer(gl, this.memory, textures);
+    const relieved = textures.some((row) => "relief" in row || row.normals);
+    if (relieved || octrees) {
       this.#loading = true;
-      (relieved ? loadReliefs() : loadStatues()).then(async ({ statuesOf }) => {
-        renderer.statues = await statuesOf(this, report);
-      }).catch(() => this.emit("notice", { message: "The details of statues could not be loaded." }))
+      (relieved ? loadReliefs() : loadStatues())
+        .then(({ show }) => show(this, (error) => this.#report(error, "octree", 0)))
+        .catch(() => this.emit("notice", { message: "Relief could not be loaded." }))
         .finally(() => (this.#loading = false));
     }
-    this.items = new ItemBuffer(this.gl);
-    this.fence = new Fence(this.gl);
+    this.items = new ItemBuffer(gl);
+    this.fence = new Fence(gl);
     this.#turn();
   }
 

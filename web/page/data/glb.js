@@ -21,8 +21,7 @@
  * @property {Float32Array | null} spots u, v of each vertex in the lightmap, from the top left
  * @property {number} relief the place of the normal map of its object or its material in the index, or -1
  * @property {Float32Array[] | null} frames of the vertices in the normal map, as `Reliefs` checks them
- * @property {any[] | null} bump of the normal map of a material the factor of its normals, and whether u and v stop
- *   at its edge
+ * @property {string} extras those of its material as JSON, without the mesh
  * @property {number[]} low corner of their box
  * @property {number[]} high
  */
@@ -175,11 +174,8 @@ export async function readGlb(buffer, textures, decoder) {
   for (const node of tree.nodes ?? []) {
     for (const { attributes, indices, material } of tree.meshes[node.mesh].primitives) {
       const look = tree.materials[material], base = look.pbrMetallicRoughness ?? {};
-      const {
-        texture = -1, mesh = -1, octree = -1, light = -1, normal = -1, wrapS, wrapT,
-        normalCoords, normalScale = 1, normalWrapS, normalWrapT,
-      } = look.extras ?? {};
-      const bumpy = normalCoords >= 0;
+      const { texture = -1, mesh = -1, octree = -1, light = -1, normal = -1, normalCoords = 1, wrapS, wrapT } =
+        look.extras ?? {};
       const textured = texture >= 0 && attributes.TEXCOORD_0 !== undefined;
       const painted = attributes.COLOR_0 !== undefined;
       const positions = /** @type {Float32Array} */ (arrays.vertices(attributes.POSITION));
@@ -187,9 +183,9 @@ export async function readGlb(buffer, textures, decoder) {
       const uvs = textured ? /** @type {Float32Array} */ (arrays.vertices(attributes.TEXCOORD_0)) : null;
       const colors = painted ? /** @type {Uint16Array} */ (arrays.vertices(attributes.COLOR_0)) : null;
       const spots = light < 0 ? null : /** @type {Float32Array} */ (arrays.vertices(attributes.TEXCOORD_1));
-      const names = bumpy ? ["TEXCOORD_" + normalCoords] : ["TEXCOORD_1", "NORMAL", "TANGENT"];
-      const frames = normal < 0 ? null : names.map((name) =>
-        /** @type {Float32Array} */ (arrays.vertices(attributes[name])));
+      const frames = normal < 0 ? null : ["TEXCOORD_" + normalCoords, "NORMAL", "TANGENT"]
+        .filter((name) => name in attributes)
+        .map((name) => /** @type {Float32Array} */ (arrays.vertices(attributes[name])));
       if (![texture, light].every((number) => Number.isInteger(number) && number < textures)) {
         throw new Error("has a texture that is not in the index");
       }
@@ -220,7 +216,7 @@ export async function readGlb(buffer, textures, decoder) {
         octree,
         light,
         relief: normal,
-        bump: bumpy ? [normalScale, normalWrapS === CLAMP, normalWrapT === CLAMP] : null,
+        extras: JSON.stringify({ ...look.extras, mesh: 0 }),
         low,
         high,
       });

@@ -44,7 +44,7 @@ import { meshesOf } from "./meshes.js";
  * The parts of an index that are read here (docs/formats/hints.md).
  * @typedef {object} Index
  * @property {{width: number, height: number, components: number, texelBytes: number,
- *   gpuTexelBytes?: number, ends: number[], differences?: number[], color?: number[], normals?: boolean,
+ *   gpuTexelBytes?: number, ends: number[], differences?: number[], color?: number[],
  *   previews?: {level: number, width: number, height: number, bytes: number, difference: number,
  *   exact?: boolean}[]}[]} textures
  * @property {Parameters<typeof meshesOf>[0]} [meshes]
@@ -55,8 +55,6 @@ import { meshesOf } from "./meshes.js";
 const LEAST = 0.5;
 /** Error of a level as a share of that of the level above it: errors of texels cancel in means. */
 export const HALVED = 0.5;
-/** Worth of a difference of normals: they come after the colours. */
-const NORMALS = 0.25;
 const RECORD_BYTES = 1000, GEOMETRY_BYTES = 4000;
 const GREY = [128, 128, 128];
 
@@ -85,7 +83,7 @@ export function catalogueOf({ textures, cells, meshes = [] }) {
   const previews = previewsOf(textures);
   return {
     T, C, K, levels, stored, ends, memory, differences, whole, previews,
-    gains: gainsOf(differences, K, previews, textures), meshes: meshesOf(meshes),
+    gains: gainsOf(differences, K, previews), meshes: meshesOf(meshes),
     colors: Float64Array.from(textures.flatMap((texture) => texture.color ?? GREY)),
     low: Float64Array.from(cells.flatMap((cell) => cell.box.slice(0, 3))),
     high: Float64Array.from(cells.flatMap((cell) => cell.box.slice(3))),
@@ -112,9 +110,8 @@ function previewsOf(textures) {
  * @param {Float64Array} differences (T × K)
  * @param {number} K
  * @param {Previews} previews
- * @param {{normals?: boolean}[]} textures
  */
-export function gainsOf(differences, K, { first, column, loss }, textures) {
+export function gainsOf(differences, K, { first, column, loss }) {
   const T = first.length - 1, gains = new Float64Array(differences.length + column.length * K);
   gains.set(differences);
   for (let t = 0; t < T; t++) {
@@ -124,10 +121,6 @@ export function gainsOf(differences, K, { first, column, loss }, textures) {
         const own = loss[p] * HALVED ** -k * (k > 1 ? 1 - HALVED : 1);
         gains[(T + p) * K + k] = differences[t * K + k] - own;
       }
-    }
-    if (!textures[t].normals) continue;
-    for (const [row, end] of [[t, t + 1], [T + first[t], T + first[t + 1]]]) {
-      for (let at = row * K; at < end * K; at++) gains[at] *= NORMALS;
     }
   }
   return gains;

@@ -6,14 +6,18 @@
 
 import { encoded, lookOf } from "../gl/cell-buffers.js";
 import { aim, programOf } from "../gl/program.js";
-import { corners, surface, TEXEL } from "../gl/shaders.js";
+import { corners, SOURCES, TEXEL } from "../gl/shaders.js";
 import { PageError } from "../net/errors.js";
 import { LIT } from "../octree/lamp.js";
 import { distance } from "../space/frustum.js";
+import { weigh } from "./weight.js";
 
 /** What a shape has for each vertex: u, v in the normal map, from the top left; a normal; a tangent with the sign
  * of the bitangent. */
 const SIZES = [2, 3, 4];
+const CLAMP = 33071;
+/** How an object's map is used. */
+const WHOLE = { normalWrapS: CLAMP, normalWrapT: CLAMP };
 /** Nearest distance of the eye that counts, m. */
 const NEAREST = 0.1;
 
@@ -51,12 +55,12 @@ const BUMPS = [corners(`
 layout(location = 3) in vec2 place2;
 layout(location = 4) in vec2 place3;
 out vec2 spot;
-out vec2 at;`, "spot = place2; at = place3;"), surface(`
+out vec2 at;`, "spot = place2; at = place3;"), SOURCES.surface[1].replace("out vec4 shown;", `out vec4 shown;
 uniform mat3 turn;
 uniform sampler2D relief;
 uniform float scale;
 in vec2 at;
-${LAMPLIGHT}`, `
+${LAMPLIGHT}`).replace(/shown ?= ?vec4/, `
   vec3 a = dFdx(seen), b = dFdy(seen);
   vec2 p = dFdx(at), q = dFdy(at);
   float side = sign(p.x * q.y - p.y * q.x);
@@ -68,7 +72,8 @@ ${LAMPLIGHT}`, `
     if (dot(across, over) < 0.0) across = -across;
     vec3 normal = scale * (right * tilt.x + across * tilt.y) + up * tilt.z;
     light *= lamplight(normalize(normal) * turn) / lamplight(up * turn);
-  }`)];
+  }
+  $&`)];
 
 /** @typedef {import("../gl/cell-buffers.js").Batch} Batch */
 /** @typedef {import("../gl/cell-buffers.js").CellBuffers} CellBuffers */
@@ -97,6 +102,7 @@ export class Reliefs {
     this.walk = walk;
     this.program = programOf(gl, "relief", [VERTEX, FRAGMENT]);
     this.bumps = programOf(gl, "bumps", BUMPS);
+    weigh(walk.catalogue, walk.index.textures);
   }
 
   delete() {
@@ -110,12 +116,13 @@ export class Reliefs {
 
   /** Whether a shape has a normal map, and a frame for each vertex. @param {Shape} shape */
   #isSound(shape) {
-    const { relief, frames, positions, bump } = shape;
+    const { relief, frames, positions } = shape;
     if (relief < 0 || this.#wrong.has(shape)) return false;
     const count = positions.length / 3;
     const aligned = frames?.every((rows, k) => rows.length === SIZES[k] * count);
+    const needed = isBump(shape) ? 1 : SIZES.length;
     const row = this.walk.index.textures[relief];
-    if (aligned && row && (bump || row.relief !== undefined)) return true;
+    if (aligned && frames?.length === needed && row && (needed === 1 || row.relief !== undefined)) return true;
     this.#wrong.add(shape);
     this.report(new PageError("PTM-V105", `The relief of ${shape.name || "an object"} does not fit the index.`));
     return false;
@@ -145,18 +152,21 @@ export class Reliefs {
     if (!present) return;
     const screen = gl.drawingBufferWidth * gl.drawingBufferHeight;
     let news = false;
+    /** Of each normal map and each texture beside it. @type {Map<string, Float64Array>} */
+    const beside = new Map();
     for (const { batches } of drawn) {
       for (const { look, low, high } of batches) {
-        const { relief, blends, bump, texture } = look;
+        const { relief, blends, texture } = look;
         if (blends || !this.#isSound(look)) continue;
-        if (bump && texture >= 0) {
+        if (isBump(look) && texture >= 0) {
           const finer = Math.log2(this.#densityOf(look) / this.#densityOf(look, texture));
+          const pair = `${relief} ${texture}`, row = beside.get(pair) ?? new Float64Array(K);
+          beside.set(pair, row);
           for (let k = 1; k <= levels[relief]; k++) {
-            const beside = Math.ceil(Math.max(1, levels[texture] - levels[relief] + k + finer));
-            const share = beside < K ? present[texture * K + beside] : 0, at = relief * K + k;
-            if (present[at] >= share) continue;
-            present[at] = share;
-            news = true;
+            // Between two levels of the texture there are pixels that want the finer one.
+            const column = Math.max(1, levels[texture] - levels[relief] + k + finer), low = Math.floor(column);
+            const [one, other] = [low, low + 1].map((n) => (n < K ? present[texture * K + n] : 0));
+            row[k] = Math.max(row[k], one + (column - low) * (other - one));
           }
           continue;
         }
@@ -171,6 +181,17 @@ export class Reliefs {
           news = true;
         }
       }
+    }
+    /** @type {Map<number, number>} */
+    const sums = new Map();
+    for (const [pair, row] of beside) {
+      const first = parseInt(pair) * K;
+      row.forEach((share, k) => sums.set(first + k, (sums.get(first + k) ?? 0) + share));
+    }
+    for (const [at, share] of sums) {
+      if (present[at] >= share) continue;
+      present[at] = share;
+      news = true;
     }
     if (news) client.sees(present, client.hidden);
     this.#looked = true;
@@ -223,8 +244,10 @@ export class Reliefs {
     for (const { buffers, batch } of batches) {
       if (done.has(batch.look)) continue;
       done.add(batch.look);
-      const { relief, bump } = batch.look, [scale, clampU, clampV] = bump ?? [1, true, true];
-      const program = bump ? this.bumps : this.program;
+      const { relief, extras } = batch.look, bumps = isBump(batch.look);
+      const { normalScale: scale = 1, normalWrapS, normalWrapT } = bumps ? JSON.parse(extras) : WHOLE;
+      const clampU = normalWrapS === CLAMP, clampV = normalWrapT === CLAMP;
+      const program = bumps ? this.bumps : this.program;
       gl.useProgram(program.program);
       gl.uniform1f(program.at.scale, scale);
       gl.activeTexture(gl.TEXTURE2);
@@ -246,7 +269,7 @@ export class Reliefs {
   #part(shape) {
     const known = this.#parts.get(shape);
     if (known) return known;
-    const { gl } = this, { positions, uvs, colors, indices, frames, bump, spots } = shape;
+    const { gl } = this, { positions, uvs, colors, indices, frames, spots } = shape;
     const array = gl.createVertexArray(), count = indices.length;
     gl.bindVertexArray(array);
     /** @type {WebGLBuffer[]} */
@@ -255,7 +278,7 @@ export class Reliefs {
     const painted = colors && Float32Array.from(colors, (light) => encoded(light / 65535));
     /** @type {[number, Float32Array | null, number][]} */
     const rows = [[0, positions, 3], [1, uvs, 2], [2, painted, 4]];
-    if (bump) rows.push([3, spots, 2], [4, places, 2]);
+    if (isBump(shape)) rows.push([3, spots, 2], [4, places, 2]);
     else rows.push([3, places, 2], [4, normals, 3], [5, tangents, 4]);
     for (const [location, data, size] of rows) {
       if (!data) continue;
@@ -288,6 +311,9 @@ export class Reliefs {
     this.#parts.delete(shape);
   }
 }
+
+/** Whether the normal map of a shape is that of its material. @param {Shape} shape */
+const isBump = ({ extras }) => extras.includes("normalCoords");
 
 /**
  * Twice the area of a triangle.
