@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image
-from scenes import model_file
+from scenes import SHARED, model_file
 
 from ptmtools.coverage.options import AchOptions
 from ptmtools.output.served import Served, read_served
@@ -30,6 +30,8 @@ from ptmtools.site.publishing import weight_of
 from ptmtools.store.layout import IMAGES
 from ptmtools.visibility.options import PvsOptions
 
+#: The model of a gallery with a leather sofa and a floor of boards.
+GALLERY = SHARED / "scenes/apartment_gallery/gallery.glb"
 #: Pictures.
 WIDTH, HEIGHT = 640, 480
 NONE, DRAW = "none", "draw"
@@ -37,7 +39,7 @@ NONE, DRAW = "none", "draw"
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("models", nargs="*", default=["apartment_gallery"])
+    parser.add_argument("models", nargs="*", default=[str(GALLERY)])
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--keep", type=Path)
     arguments = parser.parse_args()
@@ -45,7 +47,8 @@ def main() -> None:
     print("| first room, kB | with maps | pixels | by |")
     print("|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|")
     for model in arguments.models:
-        print(row(model, model_file(model), arguments.jobs, arguments.keep), flush=True)
+        file = model_file(model)
+        print(row(file.parent.name, file, arguments.jobs, arguments.keep), flush=True)
 
 
 def row(name: str, model: Path, jobs: int, keep: Path | None) -> str:

@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
+from ptmtools.lab.catalogue import NORMALS
+from ptmtools.lab.policies import POLICIES
+from ptmtools.lab.renderer import Renderer
+from ptmtools.lab.simulation import simulate
+from ptmtools.lab.world import World, prepare, relief_of
+from ptmtools.link import Conditions
 from ptmtools.output.served import Served, read_served
 from ptmtools.pipeline.build import build_scene
 from ptmtools.rendering.drawing import ViewOptions, draw_view
-from ptmtools.rendering.light import AMBIENT, LAMP
+from ptmtools.rendering.light import AMBIENT, LAMP, lit
+from ptmtools.rendering.pyramids import read_pyramids
+from ptmtools.walk import read_walk
+from tests.neighbours.apo.statues import write_rooms
 from tests.scene.bumpy import write_bumpy
 
 #: In the first room; looks at its north wall, of which x is to the right.
@@ -19,11 +30,24 @@ EYE, WALL = (-2.1, 1.5, 0.8), (-2.1, 1.5, -2.0)
 
 
 @pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Served:
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A database, and a walk through it."""
     folder = tmp_path_factory.mktemp("bumpy")
     model = write_bumpy(folder / "model", {"room_a": "norm waves.png"})
     build_scene(model, folder / "db", AchOptions(samples=4, backend="embree"), workers=1)
+    walk = ["path", str(folder / "db"), "-o", str(folder / "walk.json"), "--duration", "10"]
+    assert main(["-q", *walk]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def served(folder: Path) -> Served:
     return read_served(folder / "db")
+
+
+@pytest.fixture(scope="module")
+def world(folder: Path, served: Served) -> World:
+    return prepare(served, read_walk(folder / "walk.json"), rate=4)
 
 
 def picture(served: Served, *, lit: bool = False) -> np.ndarray:
@@ -81,3 +105,58 @@ def test_a_scale_of_nothing_is_level(served: Served) -> None:
 def test_lit_pictures_show_them_too(served: Served) -> None:
     difference = picture(served, lit=True) - picture(plain(served), lit=True)
     assert np.abs(difference).max() > 20
+
+
+def number(served: Served) -> int:
+    """Of the map in the hints."""
+    (result,) = [n for n, row in enumerate(served.index["textures"]) if row.get("normals")]
+    return result
+
+
+def test_their_worth_is_a_part(world: World) -> None:
+    stock, own = world.catalogue, number(world.served)
+    assert np.array_equal(stock.gains[own], NORMALS * stock.differences[own])
+    other = stock.gains[: stock.texture_count] / np.maximum(stock.differences, 1e-9)
+    assert set(np.unique(other[np.arange(stock.texture_count) != own])) == {0, 1}
+
+
+def test_clients_fetch_them_after_the_textures(world: World) -> None:
+    """None of the map before a level of each texture on the screen; all of it in the end."""
+    own = number(world.served)
+    run = simulate(world, POLICIES["best"], Conditions(1e6), world.catalogue.whole)
+    assert run.column[-1][own] == world.catalogue.levels[own]
+    begins = np.argmax(run.column > 0, axis=0)
+    assert begins[own] >= begins[world.views.texture[world.views.rows(0)].max()]
+    records = world.served.records
+    assert not any(own in used for record in records for used in record["textures"])
+
+
+def test_pictures_of_a_walk_show_them(world: World) -> None:
+    """With the levels that a client has."""
+    renderer = Renderer(world, 90)
+    sight = renderer.look(np.array(EYE), np.array([0.0, 0.0, -1.0]))
+    full = renderer.full(sight)
+    loaded = np.ones(world.catalogue.cell_count, np.bool_)
+    column = world.catalogue.levels.copy()
+    assert np.abs(renderer.colors(sight, loaded, column) - full).max() < 1e-9
+    column[number(world.served)] = 0
+    without = Renderer(replace(world, served=plain(world.served)), 90).full(sight)
+    assert np.abs(renderer.colors(sight, loaded, column) - without).max() < 1e-9
+    assert np.abs(full - without).max() > 20
+
+
+def test_lit_walks_show_the_maps_of_objects(tmp_path: Path) -> None:
+    model, db = write_rooms(tmp_path / "model", 4), tmp_path / "db"
+    options = ["--samples", "4", "-j", "1", "--apo", "statue*", "--apo-faces", "500"]
+    options += ["--apo-error", "0.1", "--relief", "normal-map"]
+    assert main(["-q", "build-scene", str(model), "-o", str(db), *options]) == 0
+    walk = ["path", str(db), "-o", str(tmp_path / "walk.json"), "--duration", "2"]
+    assert main(["-q", *walk]) == 0
+    served = lit(read_served(db))
+    relief = relief_of(served, read_pyramids(served))
+    world = prepare(served, read_walk(tmp_path / "walk.json"), rate=1, relief=relief)
+    flat = replace(served, surfaces=replace(served.surfaces, relief=None))
+    renderer, other = Renderer(world, 90), Renderer(replace(world, served=flat), 90)
+    sight = renderer.look(np.array((-2.8, 0.6, 0.5)), np.array([0.0, 0.0, -1.0]))
+    difference = np.abs(renderer.full(sight) - other.full(sight)).max(axis=2)
+    assert (difference > 5).mean() > 0.1
