@@ -64,7 +64,8 @@ def pack_source(
 ) -> dict[str, Any]:
     """The message to `read_in_sandbox`; writes the arrays into the folder ``scratch``.
 
-    The materials of ``source`` have no textures and no normal maps; ``images`` are their images by number of material.
+    The materials of ``source`` have no textures and no normal maps; ``images`` are their images by
+    number of material.
     ``files`` names the other files that the model consists of, missing ones included.
     """
     arrays = {name: getattr(source, name) for name in FACE_ARRAYS}

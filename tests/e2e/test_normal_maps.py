@@ -31,6 +31,7 @@ def database(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     folder = tmp_path_factory.mktemp("bumpy")
     options = ["--samples", "4", "--format", "gltf", "-j", "1", "--plain-gltf"]
     if request.param == "lit":
+        pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
         options += ["--light", "bake", "--light-density", "4", "--light-samples", "8"]
     options += ["--viewpoint", ",".join(map(str, EYE))]
     model = write_bumpy(folder / "model")

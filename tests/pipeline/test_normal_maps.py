@@ -108,6 +108,7 @@ def test_coordinates_survive_the_cells(made: Path) -> None:
 
 def test_beside_lightmaps(folder: Path) -> None:
     """Coordinates of their own come third there, in plain cells, too."""
+    pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
     db, model = folder / "db", folder / "model/two_rooms.obj"
     built(model, db, LIGHT)
     assert validate(db).issues == ()

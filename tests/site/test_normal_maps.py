@@ -30,6 +30,7 @@ def database(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     folder = tmp_path_factory.mktemp("bumpy")
     options = list(QUICK)
     if request.param == "lit":
+        pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
         options += ["--light", "bake", "--light-density", "4", "--light-samples", "8"]
     model = write_bumpy(folder / "model")
     assert main(["-q", "build-scene", str(model), "-o", str(folder / "db"), *options]) == 0
