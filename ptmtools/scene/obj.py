@@ -30,6 +30,7 @@ from ptmtools.scene.polygon import triangulate
 from ptmtools.scene.source import (
     MAX_VERTICES,
     FileRange,
+    NormalTexture,
     Source,
     SourceMaterial,
     Texture,
@@ -86,10 +87,11 @@ def resolve_materials(
                 findings.miss("PTM-N207", f"usemtl {name}: no such material", f"{path.name}:{line}")
             materials.append(SourceMaterial(name or "default"))
             continue
-        texture = mask = None
+        texture = mask = normal = None
         if index in used:
             texture = _texture(material, "map_Kd", material.map_kd, findings)
             mask = _texture(material, "map_d", material.map_d, findings)
+            normal = _normal(material, texture, findings)
         if texture is not None and material.map_kd is not None:
             maps[index] = material.map_kd
         materials.append(
@@ -102,9 +104,24 @@ def resolve_materials(
                 texture=texture,
                 mask=mask,
                 shine=_shine(material),
+                normal=normal,
             )
         )
     return tuple(materials), maps
+
+
+def _normal(
+    material: MtlMaterial, texture: Texture | None, findings: Findings
+) -> NormalTexture | None:
+    """The normal map of a material; with the coordinates as written if it has no ``texture``."""
+    if material.relief is None:
+        return None
+    key, statement = material.relief
+    image = _texture(material, key, statement, findings)
+    if image is None:
+        return None
+    height = key != "norm"
+    return NormalTexture(image, max(statement.strength, 0.0), height, own=texture is None)
 
 
 def _shine(material: MtlMaterial) -> Shine | None:
@@ -265,6 +282,7 @@ def read_obj(
                 len(bare),
             )
     triangles = corner_point[cut.corner]
+    own = any(material.normal and material.normal.own for material in materials)
     colors = None
     if statements.colored:
         colored = np.frombuffer(statements.colored, dtype=np.int64)
@@ -279,6 +297,7 @@ def read_obj(
         objects=tuple(statements.objects),
         materials=materials,
         colors=colors,
+        normal_uv=uv if own else None,
     )
 
 

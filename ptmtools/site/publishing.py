@@ -216,7 +216,7 @@ def weight_of(site: Site) -> Weight:
         if row.get("standing", True)
     }
     used = {"statues.js"} if "octrees" in index else set()
-    used |= {"reliefs.js" for row in index["textures"] if "relief" in row}
+    used |= {"reliefs.js" for row in index["textures"] if row.keys() & {"relief", "normals"}}
     bytes_of = {n: link_bytes(e) for n, e in site.entries.items() if _walked(n, used)}
     begins = (f"{DATA}/index-", f"{DATA}/poster-")
     page = sum(size for name, size in bytes_of.items() if not name.startswith(f"{DATA}/"))

@@ -66,6 +66,9 @@ class Replacement:
         colors = None
         if scene.colors is not None and self.colors is not None:
             colors = np.concatenate([scene.colors[kept], self.colors])[order]
+        normal_uv = None
+        if scene.normal_uv is not None:  # replaced objects have other relief
+            normal_uv = np.concatenate([scene.normal_uv[kept], np.zeros_like(self.uv)])[order]
         return replace(
             scene,
             points=np.concatenate([scene.points[used], self.points]),
@@ -75,6 +78,7 @@ class Replacement:
             triangle_material=scene.triangle_material[source],
             two_sided=scene.two_sided[source],
             colors=colors,
+            normal_uv=normal_uv,
         )
 
     def _check(self, scene: Scene) -> None:

@@ -219,6 +219,11 @@ def _read(
         try:
             values = _Values(document, draw, draco, decoded)
             points, triangles, uv, colors = _mesh(values, draw, use, findings)
+            normal_uv = None
+            if use.normal_coords is not None and use.normal_matrix is not None:
+                count = len(points)
+                own = _coordinates(values, use.normal_coords, use.normal_matrix, count)
+                normal_uv = own[triangles]
             placed = instances(document, draw.node)
             key = (True, draco["bufferView"]) if draco else (False, draw.attributes["POSITION"])
             if key not in grids:
@@ -233,7 +238,7 @@ def _read(
             frames = world_of[draw.node] @ placed
             scale = np.linalg.norm(frames[:, :3, :3], axis=1)
             step = max(step, grid * float(scale[np.isfinite(scale)].max(initial=0.0)))
-        rows.add(frames, points, triangles, uv, use.index, colors, first[draw.node])
+        rows.add(frames, points, triangles, uv, use.index, colors, first[draw.node], normal_uv)
     return rows.source(
         materials=materials.materials,
         cameras=cameras(tree, world_of, findings),
@@ -374,16 +379,22 @@ def _mesh(
     # Draco always encodes triangles.
     mode = _TRIANGLES if values.decoded else draw.mode
     triangles = _triangles(values.indices(len(points)), mode)
-    uv, raw = np.zeros((len(points), 2)), values.attribute(use.coords, len(points))
-    if raw is not None:
-        moved = raw @ use.matrix[:, :2].T + use.matrix[:, 2]
-        uv = np.stack([moved[:, 0], 1.0 - moved[:, 1]], axis=1)
+    uv = _coordinates(values, use.coords, use.matrix, len(points))
     colors, raw = None, values.attribute("COLOR_0", len(points))
     if raw is not None:
         colors = encoded(raw[:, :3] * use.light)[triangles]
         if use.see_through and not (raw[:, 3:] == 1).all():
             findings.note("PTM-N215", "opacities of vertices dropped", draw.place)
     return points, triangles, uv[triangles], colors
+
+
+def _coordinates(values: _Values, name: str, matrix: Floats, count: int) -> Floats:
+    """(n, 2) texture coordinates from the lower left, transformed; 0 without the attribute."""
+    raw = values.attribute(name, count)
+    if raw is None:
+        return np.zeros((count, 2))
+    moved = raw @ matrix[:, :2].T + matrix[:, 2]
+    return np.stack([moved[:, 0], 1.0 - moved[:, 1]], axis=1)
 
 
 def _triangles(index: Ints, mode: int) -> Ints:

@@ -32,6 +32,8 @@ import { levelSizes } from "../../client/src/levels.js";
  * @property {Preview[]} [previews]
  * @property {number[]} color
  * @property {string} [relief]
+ * @property {boolean} [normals]
+ * @property {number} [light]
  *
  * @typedef {object} CellRow
  * @property {string} name
