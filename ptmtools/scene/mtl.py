@@ -1,9 +1,9 @@
 """Reads MTL, the materials of an OBJ file.
 
 The reader keeps the statements that the emitted files use: ``Kd``, ``d``/``Tr``, ``map_Kd``,
-``map_d``, and ``map_Ks`` for a campus. It ignores those of physically based extensions (``Pr``,
-``norm``, …). The format has no quoting, so the name of a texture is the rest of the statement after
-the last option, spaces included.
+``map_d``, ``Ke`` and ``map_Ke`` for light, and ``map_Ks`` for a campus. It ignores those of
+physically based extensions (``Pr``, ``norm``, …). The format has no quoting, so the name of a
+texture is the rest of the statement after the last option, spaces included.
 """
 
 from __future__ import annotations
@@ -109,7 +109,8 @@ def parse_map(text: str, line: int = 0) -> MapStatement:
 @dataclass
 class MtlMaterial:
     """A ``newmtl`` block of a library; ``dissolve`` is ``d``, or else 1 - ``Tr``. An invalid
-    ``map_Ks`` is no miss, since few builds use it; ``map_ks_fault`` is its error."""
+    ``map_Ks`` is no miss, since few builds use it; ``map_ks_fault`` is its error. Nor is an invalid
+    ``Ke`` or ``map_Ke``, which then has no effect. ``glow`` is linear light."""
 
     library: Path
     color: tuple[float, float, float] | None = None
@@ -119,6 +120,8 @@ class MtlMaterial:
     map_d: MapStatement | None = None
     map_ks: MapStatement | None = None
     map_ks_fault: str = ""
+    glow: tuple[float, float, float] | None = None
+    map_ke: MapStatement | None = None
 
 
 def read_mtl(path: Path, findings: Findings) -> dict[str, MtlMaterial]:
@@ -184,6 +187,13 @@ def _statement(material: MtlMaterial, key: str, rest: str, line: int) -> None:
         material.map_kd = parse_map(rest, line)
     elif key == "map_d":
         material.map_d = parse_map(rest, line)
+    elif key == "ke":
+        with suppress(ValueError):
+            values = [max(number(word), 0.0) for word in words[:3]]
+            material.glow = (values[0], values[1], values[2]) if len(values) == 3 else None
+    elif key == "map_ke":
+        with suppress(ValueError):
+            material.map_ke = parse_map(rest, line)
     elif key == "map_ks":
         try:
             material.map_ks, material.map_ks_fault = parse_map(rest, line), ""

@@ -1,6 +1,7 @@
 """Reads materials, samplers and images of a glTF document (glTF 2.0, sections 3.8 and 3.9).
 
-The reader keeps only the base colour of the metallic-roughness model. Its factor is linear light,
+The reader keeps only the base colour of the metallic-roughness model, and how bright the emission
+is. Its factor is linear light,
 but the tint of the emitted files is sRGB, so the factor is converted and the conversion noted; for
 partial tints the product of tint and texel differs from the linear product. The alpha of texels
 applies in the modes MASK and BLEND only (section 3.9.6).
@@ -17,7 +18,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.scene.colors import to_srgb
+from ptmtools.scene.colors import luminance, to_srgb
 from ptmtools.scene.gltf.document import Document, data_uri
 from ptmtools.scene.ktx2 import TranscodedBytes
 from ptmtools.scene.notes import Findings
@@ -126,9 +127,21 @@ class MaterialReader:
                 cutoff=max(cutoff / a, 0.0) if tested and opacity and a > 0 else None,
                 two_sided=bool(entry.get("doubleSided", False)),
                 texture=texture,
+                **self._glow(entry, place),
             )
         )
         return MaterialUse(len(self._materials) - 1, coords, matrix, see_through, light)
+
+    def _glow(self, entry: dict[str, Any], place: str) -> dict[str, Any]:
+        """The emission of a material, as the fields of a `SourceMaterial`."""
+        factor = [_share(value) for value in entry.get("emissiveFactor", [0.0, 0.0, 0.0])]
+        if self._texture_of is not None or not any(factor):
+            return {}
+        stronger = entry.get("extensions", {}).get("KHR_materials_emissive_strength", {})
+        strength = finite(stronger.get("emissiveStrength", 1.0))
+        use = entry.get("emissiveTexture")
+        image = None if use is None else self._texture(use["index"], place, 1.0)
+        return {"glow": strength * float(luminance(np.array(factor))), "glow_map": image}
 
     def _texture(self, index: int, place: str, strength: float) -> Texture | None:
         tree = self._document.tree
@@ -167,11 +180,16 @@ class MaterialReader:
         )
 
 
-def _share(value: Any) -> float:
-    """A number, clipped to [0, 1]; ValueError for other values."""
+def finite(value: Any) -> float:
+    """A finite number, 0 for a negative one; ValueError for other values."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise ValueError(f"{value!r} is not a number")
-    return min(max(float(value), 0.0), 1.0)
+    return max(float(value), 0.0)
+
+
+def _share(value: Any) -> float:
+    """A number, clipped to [0, 1]; ValueError for other values."""
+    return min(finite(value), 1.0)
 
 
 def _transform(extension: dict[str, Any]) -> NDArray[np.float64]:
