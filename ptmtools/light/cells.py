@@ -8,8 +8,8 @@ them, and their coarser meshes take over colours, but no charts. So have objects
 The light is that of the model's own lightmaps, or ambient obscurance (`light.occlusion`) with that
 of lamps and the sky (`light.mixing`). Of ambient light, a ray that meets nothing within reach
 counts whole. More of it comes from above than from below, so that forms show where nothing is near:
-a white statue in a white room. Indoors, all surfaces have something within reach in many directions;
-so that pictures keep about their colours, all light is brightened (`exposed`).
+a white statue in a white room. Indoors, all surfaces have something within reach in many
+directions; so that pictures keep about their colours, all light is brightened (`exposed`).
 
 A piece that shows both sides has the light of the side on which its cell lies. If that is either,
 as of a screen within a room, the more open side counts.
@@ -39,6 +39,8 @@ ABOVE = 0.4
 #: Share of the light that comes everywhere, by reflection, and the factor of all light, which is
 #: then cut off at 1.
 REFLECTED, EXPOSURE = 0.15, 1.05
+#: The light that shows as white.
+WHITE = (1 / EXPOSURE - REFLECTED) / (1 - REFLECTED)
 #: Texels with less light are covered, as a wall by a picture, and take that of their neighbours: a
 #: texel is wider than the gap that it would darken.
 COVERED = 0.03

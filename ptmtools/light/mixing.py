@@ -2,10 +2,10 @@
 
 Ambient light is what surfaces nearby leave (`occlusion`). The share of rays that reach the sky, by
 windows and other openings, adds to it, and so does the direct light of lamps. Both saturate: of the
-usual light a surface shows a half, of twice as much two thirds. The sum is divided by as much as its bright end
-exceeds that of ambient light, so that pictures keep about their colours near windows and lamps, and
-become darker elsewhere. (With the mean kept, all floors were cut off at 1.) A building without
-either is as by ambient light alone.
+usual light a surface shows a half, of twice as much two thirds. The sum is scaled so that its
+bright end shows as white: pictures keep about their colours near windows and lamps, and become
+darker elsewhere. (With the mean kept, all floors were cut off at 1.) A building without either is
+as by ambient light alone.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
 #: The usual share of rays that reach the sky beside a window.
 SKY = 0.2
-#: The share of all surfaces that is darker than the bright end, and the least factor of the sum.
-_BRIGHT, _DARKEST = 0.95, 0.5
+#: The share of all surfaces that is darker than the bright end; the range of the factor.
+_BRIGHT, _DARKEST, _WHITE = 0.95, 0.5, 1.0
 #: Shadow rays for each ray of ambient light: lamps themselves have no grain.
 _SHADOWS = 0.25
 #: Points that stand for all surfaces.
@@ -79,15 +79,14 @@ class Mixed:
         return self.rays.grain
 
     def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
-        total = _sum(self.rays, self.lamps, self.mix.sky, (face, point, turn))[1]
+        total = _sum(self.rays, self.lamps, self.mix.sky, (face, point, turn))[0]
         return np.asarray(self.mix.factor * total, np.float32)
 
 
 def _sum(
     rays: Rays, lamps: Lamps | None, sky: bool, places: tuple[Ints, Floats, Floats]
-) -> tuple[Singles, Singles, Singles]:
-    """(n,) ambient light, all light, and the share of rays that reach the sky, at places as of
-    `Look`."""
+) -> tuple[Singles, Singles]:
+    """(n,) all light, and the share of rays that reach the sky, at places as of `Look`."""
     face, point, turn = places
     normal, around = rays.normal[face], rays.around
     of = around, point, normal, turn
@@ -96,7 +95,7 @@ def _sum(
     if lamps is not None:
         by_lamps = direct(around, lamps, point, normal, turn, shadow_rays(rays.samples))
         total = total + (by_lamps / (1 + by_lamps)).astype(np.float32)
-    return ambient, total, seen
+    return total, seen
 
 
 def shadow_rays(samples: int) -> int:
@@ -110,8 +109,10 @@ def mixed(
     lamps: Lamps,
     options: LightOptions,
     above: float,
+    white: float,
 ) -> Mix:
-    """The light of a building of these pieces."""
+    """The light of a building of these pieces. ``above``: see `light`; ``white``: the light that
+    shows as white."""
     corner = np.concatenate([each.corner[~each.glass] for each in pieces]).astype(np.float64)
     side = np.concatenate([each.side[~each.glass] for each in pieces])
     area = areas(corner)
@@ -124,8 +125,8 @@ def mixed(
     some = own if len(own) else None
     rays = Rays(around, corner, options.light_samples, options.light_reach,
                 side=np.where(side < 0, -1.0, 1.0), above=above)  # fmt: skip
-    ambient, total, seen = _sum(rays, some, True, (face, point, turn))
+    total, seen = _sum(rays, some, True, (face, point, turn))
     if some is None and not seen.any():
         return Mix()
-    bright = [float(np.quantile(each.astype(np.float64), _BRIGHT)) for each in (ambient, total)]
-    return Mix(some, bool(seen.any()), max(bright[0] / bright[1], _DARKEST))
+    bright = float(np.quantile(total.astype(np.float64), _BRIGHT))
+    return Mix(some, bool(seen.any()), float(np.clip(white / bright, _DARKEST, _WHITE)))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ptmtools.arrays import Floats
-from ptmtools.light.cells import ABOVE, Baking, CellLight, encoded
+from ptmtools.light.cells import ABOVE, WHITE, Baking, CellLight, encoded
 from ptmtools.light.lamps import (
     _BOTH,
     _PATCH_KIND,
@@ -269,7 +269,7 @@ def lit_room(corner: Floats, lights: Lights | None = None) -> tuple[CellLight, M
     scene, around = scene_of(corner, lamp_faces), surroundings(corner)
     own = piece(corner)
     own.glass[len(corner) - lamp_faces :] = True
-    mix = mixed(around, [own], lamps_of(scene, lights), BAKE, ABOVE)
+    mix = mixed(around, [own], lamps_of(scene, lights), BAKE, ABOVE, WHITE)
     return Baking(around, BAKE, mix).light(own), mix
 
 

@@ -123,7 +123,7 @@ class LightJob(Job):
 
     def _baking(self, lights: Lights | None, pieces: list[Piece]) -> Baking:
         """What the tasks share: the light of the model, or lamps and the sky."""
-        from ptmtools.light.cells import ABOVE, Baking
+        from ptmtools.light.cells import ABOVE, WHITE, Baking
         from ptmtools.light.lamps import lamps_of
         from ptmtools.light.mixing import mixed
         from ptmtools.light.occlusion import Surroundings
@@ -134,7 +134,8 @@ class LightJob(Job):
             assert lights
             return Baking(around, self.options, painted=_painted(self.run, lights))
         lamps = lamps_of(scene, lights)
-        return Baking(around, self.options, mixed(around, pieces, lamps, self.options, ABOVE))
+        mix = mixed(around, pieces, lamps, self.options, ABOVE, WHITE)
+        return Baking(around, self.options, mix)
 
 
 def _check_component() -> None:
