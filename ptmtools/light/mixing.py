@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from ptmtools.light.options import LightOptions
 
 #: The usual share of rays that reach the sky beside a window.
-SKY = 0.2
+SKY = 0.1
 #: The share of all surfaces that is darker than the bright end; the range of the factor.
-_BRIGHT, _DARKEST, _WHITE = 0.95, 0.5, 1.0
+_BRIGHT, _DARKEST, _WHITE = 0.98, 0.5, 1.0
 #: Shadow rays for each ray of ambient light: lamps themselves have no grain.
 _SHADOWS = 0.25
 #: Points that stand for all surfaces.
@@ -75,8 +75,8 @@ class Mixed:
 
     @property
     def grain(self) -> float:
-        """See `Rays.grain`."""
-        return self.rays.grain
+        """See `Rays.grain`: few rays reach the sky, which counts the more."""
+        return self.rays.grain * (2 if self.mix.sky else 1)
 
     def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
         total = _sum(self.rays, self.lamps, self.mix.sky, (face, point, turn))[0]
