@@ -144,7 +144,8 @@ class Baking:
         least = COVERED if self.painted is None else 0.0
         (lit,) = bake(look, corner[own], atlas, look.grain, (size,), least=least)
         uv[own] = atlas.uv
-        reached = size * math.sqrt(plane_areas(atlas.uv).sum() / max(area.sum(), 1e-9)) / density
+        texels_a_metre = size * math.sqrt(plane_areas(atlas.uv).sum() / max(area.sum(), 1e-9))
+        reached = texels_a_metre / max(density, 1e-9)
         texels = self._encoded(lit.value)
         return CellLight(mapped, uv, vertex, texels, atlas.side is None, min(reached, 1.0))
 
