@@ -169,7 +169,7 @@ class Baking:
         """Light in 255ths: as exposed, or that of the model."""
         if self.painted is None:
             return encoded(light)
-        return np.rint(255 * np.clip(light, REFLECTED, 1.0)).astype(np.uint8)
+        return np.asarray(np.rint(255 * np.clip(light, REFLECTED, 1.0)), np.uint8)
 
 
 def exposed(light: Floats | Singles) -> Floats:

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 #: The usual share of rays that reach the sky beside a window.
 SKY = 0.1
+#: Where less of the sky is seen, this many times as many rays look for it: few of them meet it.
+_FINER = 4
 #: The share of all surfaces that is darker than the bright end; the range of the factor.
 _BRIGHT, _DARKEST, _WHITE = 0.98, 0.5, 1.0
 #: Shadow rays for each ray of ambient light: lamps themselves have no grain.
@@ -91,6 +93,10 @@ def _sum(
     normal, around = rays.normal[face], rays.around
     of = around, point, normal, turn
     ambient, seen = light_and_sky(*of, rays.samples, rays.reach, rays.above, sky=sky)
+    few = np.flatnonzero((seen > 0) & (seen < SKY))
+    if len(few):
+        again = (each[few] for each in (point, normal, turn))
+        seen[few] = light_and_sky(around, *again, _FINER * rays.samples, rays.reach)[1]
     total = ambient + seen / (np.float32(SKY) + seen)
     if lamps is not None:
         by_lamps = direct(around, lamps, point, normal, turn, shadow_rays(rays.samples))

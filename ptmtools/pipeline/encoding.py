@@ -37,7 +37,10 @@ if TYPE_CHECKING:
     from ptmtools.texture.model import PtmHeader
     from ptmtools.texture.previews import Steps
 
-Shared, Task, Result = TypeVar("Shared"), TypeVar("Task"), TypeVar("Result")
+S = TypeVar("S")
+T = TypeVar("T")
+R = TypeVar("R")
+
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 #: Folders of the served files: `.ptm`s with fallback images and lossy sources; other previews.
 FOLDER, PREVIEWS = "textures", "previews"
@@ -146,15 +149,15 @@ def encoded_texels(
 def baked(
     run: Run,
     transaction: Transaction,
-    bake: Callable[[Shared, Task], tuple[Result, list[tuple[str, bytes]]]],
-    shared: Shared,
-    tasks: Sequence[Task],
+    bake: Callable[[S, T], tuple[R, list[tuple[str, bytes]]]],
+    shared: S,
+    tasks: Sequence[T],
     unit: str,
-) -> tuple[list[Result], int]:
+) -> tuple[list[R], int]:
     """Bakes textures, a task each: ``bake`` returns a result, and the files of a texture as
     `encoded_image`, or none. Puts these into the transaction; returns the results, and the bytes
     of all `.ptm`s."""
-    results: list[Result] = []
+    results: list[R] = []
     total = 0
     for result, files in run.workers.executor.each(bake, shared, tasks):
         run.progress(len(results), len(tasks), unit)

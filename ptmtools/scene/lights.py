@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 
 LampKind = Literal["point", "spot", "sun"]
 KINDS: tuple[LampKind, ...] = get_args(LampKind)
-#: Wrap modes of lightmaps, by their number in the arrays.
-WRAPS = ("repeat", "clamp", "mirror")
+MapWrap = Literal["repeat", "clamp", "mirror"]
+#: By their number in the arrays.
+WRAPS: tuple[MapWrap, ...] = get_args(MapWrap)
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class ModelMap:
     """
 
     data: bytes
-    wrap: tuple[str, str] = ("repeat", "repeat")
+    wrap: tuple[MapWrap, MapWrap] = ("repeat", "repeat")
     strength: float = 1.0
 
 
