@@ -25,14 +25,14 @@ from ptmtools.scene.lights import KINDS, Lights
 from ptmtools.scene.model import Scene
 
 #: Metres of the side of a patch, and most patches of a scene, which are larger where necessary.
-_PATCH, _MOST = 0.1, 4096
+_PATCH, _MOST = 0.2, 4096
 #: A point of a lamp is no nearer than this, metres: within a bulb light would be infinite.
 _NEAREST = 0.1
 #: Least luminance of a material that is a lamp; less is a shine to bring out colours. If more than
 #: this share of all surfaces glows, the light of the building is part of its colours.
 LEAST, _SHARE = 0.1, 0.25
 #: Lamps that together have less light than this share of the usual one are left out of a cell.
-_FEW = 0.01
+_FEW = 0.03
 #: Kinds of a row of `Lamps`: those of `KINDS`, then patches with one and with two sides.
 _POINT, _SPOT, _SUN = range(len(KINDS))
 _PATCH_KIND, _BOTH = len(KINDS), len(KINDS) + 1
@@ -191,14 +191,19 @@ def _chosen(
     times = np.zeros((len(point), rays), np.int64)
     light = np.zeros(len(kind))
     for p in range(len(point)):
+        nx, ny, nz = normal[p, 0], normal[p, 1], normal[p, 2]
         for k in range(len(kind)):
             light[k] = 0.0
             if kind[k] == _SUN:
-                facing = -(normal[p] * way[k]).sum()
+                facing = -(nx * way[k, 0] + ny * way[k, 1] + nz * way[k, 2])
                 light[k] = power[k] * max(facing, 0.0)
             else:
-                x, y, z = place[k] - point[p]
-                facing = normal[p, 0] * x + normal[p, 1] * y + normal[p, 2] * z
+                x, y, z = (
+                    place[k, 0] - point[p, 0],
+                    place[k, 1] - point[p, 1],
+                    place[k, 2] - point[p, 2],
+                )
+                facing = nx * x + ny * y + nz * z
                 if facing > 0:
                     square = x * x + y * y + z * z
                     far = np.sqrt(square)
@@ -210,8 +215,7 @@ def _chosen(
                     else:
                         spread = 1 / max(square, _NEAREST * _NEAREST)
                         if kind[k] == _SPOT:
-                            inner, outer = cone[k]
-                            edge = (along - outer) / max(inner - outer, 1e-6)
+                            edge = (along - cone[k, 1]) / max(cone[k, 0] - cone[k, 1], 1e-6)
                             edge = min(max(edge, 0.0), 1.0)
                             spread *= edge * edge
                     light[k] = power[k] * spread * facing / far
@@ -219,15 +223,16 @@ def _chosen(
         if total[p] <= 0:
             continue
         step = total[p] / rays
-        ahead, held, used = turn[p] * step, 0.0, 0
+        ahead, held, used, sent = turn[p] * step, 0.0, 0, 0
         for k in range(len(kind)):
             held += light[k]
-            while ahead < held and times[p].sum() < rays:
+            while ahead < held and sent < rays:
                 if used == 0 or chosen[p, used - 1] != k:
                     chosen[p, used] = k
                     used += 1
                 times[p, used - 1] += 1
+                sent += 1
                 ahead += step
         # Rounding may leave the last ray over.
-        times[p, used - 1] += rays - times[p].sum()
+        times[p, used - 1] += rays - sent
     return total, chosen, times

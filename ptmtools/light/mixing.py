@@ -95,8 +95,8 @@ def _sum(
     ambient, seen = light_and_sky(*of, rays.samples, rays.reach, rays.above, sky=sky)
     few = np.flatnonzero((seen > 0) & (seen < SKY))
     if len(few):
-        again = (each[few] for each in (point, normal, turn))
-        seen[few] = light_and_sky(around, *again, _FINER * rays.samples, rays.reach)[1]
+        finer = _FINER * rays.samples
+        seen[few] = light_and_sky(around, point[few], normal[few], turn[few], finer, rays.reach)[1]
     total = ambient + seen / (np.float32(SKY) + seen)
     if lamps is not None:
         by_lamps = direct(around, lamps, point, normal, turn, shadow_rays(rays.samples))
