@@ -105,12 +105,20 @@ def _patches(scene: Scene, glow: Floats) -> Lamps:
     both = scene.two_sided[faces[chosen]]
     return Lamps(
         np.where(both, _BOTH, _PATCH_KIND).astype(np.uint8),
-        points_on(corner[chosen], np.arange(count)),
+        _spread(corner, chosen),
         normals(corner[chosen]),
         glow[scene.triangle_material[faces[chosen]]],
         np.full(count, total / max(count, 1)),
         np.ones((count, 2)),
     )
+
+
+def _spread(corner: Floats, chosen: Ints) -> Floats:
+    """(n, 3) points on the (n,) chosen ones of (T, 3, 3) faces; those of a face have its centre."""
+    points = points_on(corner[chosen], np.arange(len(chosen)))
+    times = np.maximum(np.bincount(chosen, minlength=len(corner)), 1)[:, None]
+    mean = np.stack([np.bincount(chosen, part, len(corner)) for part in points.T], axis=1) / times
+    return np.asarray(points + (corner.mean(axis=1) - mean)[chosen])
 
 
 def measured(

@@ -114,9 +114,9 @@ def test_a_rectangle_that_glows_as_its_formula_says() -> None:
     lamps = lamps_of(scene, shining(5.0))
     assert lamps.area.sum() == pytest.approx(wide * deep)
     corner = received(lamps, np.array([[0.0, 0, 0]]), panel)
-    assert corner == pytest.approx(5 * parallel(wide, deep, high), rel=0.06)
+    assert corner == pytest.approx(5 * parallel(wide, deep, high), rel=0.03)
     beside = 5 * (parallel(3 + wide, deep, high) - parallel(3, deep, high))
-    assert received(lamps, np.array([[-3.0, 0, 0]]), panel) == pytest.approx(beside, rel=0.06)
+    assert received(lamps, np.array([[-3.0, 0, 0]]), panel) == pytest.approx(beside, rel=0.03)
     above = np.array([[0.5, 3.0, 0.3]])
     down = -UP
     assert direct(surroundings(NOWHERE), lamps, above, down, turns(1), 64) == 0
