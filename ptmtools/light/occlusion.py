@@ -151,8 +151,7 @@ def light_and_sky(
     sky: bool = True,
 ) -> tuple[Singles, Singles]:
     """(n,) light as of `light`, and (n,) the share of the same rays that reach the sky: they meet
-    nothing opaque at any distance, and do not go down. Without ``sky``, 0: rays end at
-    ``reach``."""
+    nothing opaque at any distance, nor the ground. Without ``sky``, 0: rays end at ``reach``."""
     result, open_share = np.empty(len(point), np.float32), np.zeros(len(point), np.float32)
     for part, origin, along in _fans(around, point, normal, turn, samples):
         start = origin.astype(np.float32)
@@ -161,8 +160,7 @@ def light_and_sky(
             share *= (1 - above * (1 - along[:, 1]) / 2) / (1 - above / 6)
         result[part] = share.reshape(-1, samples).mean(axis=1)
         if sky:
-            upward = unmet & (along[:, 1] > 0)
-            open_share[part] = upward.reshape(-1, samples).mean(axis=1)
+            open_share[part] = unmet.reshape(-1, samples).mean(axis=1)
     return result, open_share
 
 
