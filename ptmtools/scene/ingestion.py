@@ -22,10 +22,11 @@ from ptmtools.scene.baking import LARGEST, bake, emitted_wraps, near_origin
 from ptmtools.scene.faces import KeptFaces, keep_faces
 from ptmtools.scene.facing import TURNED_AWAY, share_turned_away
 from ptmtools.scene.images import ImageStore
+from ptmtools.scene.lighting import lights_of
 from ptmtools.scene.model import Camera, Material, RoomVolume, Scene, Space, Storey
 from ptmtools.scene.normal_maps import NormalMaps
 from ptmtools.scene.notes import Findings
-from ptmtools.scene.options import IngestOptions
+from ptmtools.scene.options import GLTF, IngestOptions
 from ptmtools.scene.orientation import tolerance_of
 from ptmtools.scene.source import MAX_VERTICES, Source, SourceMaterial
 from ptmtools.scene.space import DeclaredSpace, parse_unit, rotated, settle, to_world
@@ -35,8 +36,6 @@ from ptmtools.tolerance import PLANE_SHARE
 
 #: Default colours: of faces without an image, and of images.
 PLAIN, WHITE = (0.8, 0.8, 0.8), (1.0, 1.0, 1.0)
-#: Suffixes of the formats that prescribe the unit.
-PRESCRIBED = (".glb", ".gltf")
 #: Errors of the system for circular links and sockets, and of `open_regular` for pipes and devices.
 _NO_FILE = {
     errno.ELOOP: "no such file",
@@ -109,7 +108,7 @@ def ingest(
         kept.triangles,
         named,
         DeclaredSpace(metres, options.up),
-        DeclaredSpace(source.metres, source.up, model.suffix.lower() in PRESCRIBED),
+        DeclaredSpace(source.metres, source.up, model.suffix.lower() in GLTF),
         findings,
         ask=ask,
     )
@@ -150,6 +149,7 @@ def ingest(
     progress(len(faces), len(faces), "materials")
     points, triangles = to_world(kept.points, space), kept.triangles.astype(np.int32)
     two_sided = ~kept.paired if options.two_sided else _two_sided(kept, source)
+    lights = lights_of(source, kept, used_material, space, store, findings, options)
     share = share_turned_away(points, triangles, two_sided | kept.paired)
     if share > TURNED_AWAY:
         findings.note(
@@ -192,6 +192,7 @@ def ingest(
         notes=findings.notes,
         files=tuple(findings.folder.sought),
         shines=tuple(material.shine for material in used),
+        lights=lights,
     )
 
 

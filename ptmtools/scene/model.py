@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools import schemas
+from ptmtools.scene.lights import Lights
 from ptmtools.scene.orientation import tolerance_of
 from ptmtools.store.archive import Stored, without_repeats
 from ptmtools.tolerance import Tolerance
@@ -213,6 +214,7 @@ class Scene:
     files: other files that were read or are missing, relative to the model's folder, "/" between
         names: a change to any of them may change the scene. Not part of the artifact.
     shines: for each material its reflection map, or None. Not part of the artifact.
+    lights: lamps, emission and lightmaps, stored beside the artifact.
     """
 
     points: NDArray[np.float64]
@@ -235,6 +237,7 @@ class Scene:
     notes: tuple[Note, ...] = ()
     files: tuple[str, ...] = field(default=(), compare=False)
     shines: tuple[Shine | None, ...] = field(default=(), compare=False)
+    lights: Lights | None = field(default=None, compare=False)
 
     @property
     def corners(self) -> NDArray[np.float64]:

@@ -17,12 +17,13 @@ from collections.abc import Iterable, Iterator, Mapping, Set
 from dataclasses import dataclass, field
 from io import TextIOWrapper
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 import numpy as np
 
 from ptmtools.errors import InputError, LimitError
 from ptmtools.progress import Progress, silent
+from ptmtools.scene.colors import luminance
 from ptmtools.scene.model import Shine, Wrap
 from ptmtools.scene.mtl import MapStatement, MtlMaterial, read_mtl
 from ptmtools.scene.notes import Findings
@@ -105,6 +106,7 @@ def resolve_materials(
                 mask=mask,
                 shine=_shine(material),
                 normal=normal,
+                **_glow(material, findings, index in used),
             )
         )
     return tuple(materials), maps
@@ -132,6 +134,22 @@ def _shine(material: MtlMaterial) -> Shine | None:
         return None
     same = colors is None or (colors.scale, colors.offset) == (reflection.scale, reflection.offset)
     return Shine(reflection.file, base, "" if same else "other texture coordinates")
+
+
+def _glow(material: MtlMaterial, findings: Findings, used: bool) -> dict[str, Any]:
+    """The emission of a material, as the fields of a `SourceMaterial`. ``Ke`` is a factor of
+    ``map_Ke``; without ``Ke`` it is 1. An image that is missing counts as white."""
+    factor = material.glow or (0.0 if material.map_ke is None else 1.0,) * 3
+    glow = float(luminance(np.array(factor)))
+    if not (used and glow):
+        return {}
+    image = None
+    if material.map_ke is not None:
+        base, name = material.library.parent, material.map_ke.file
+        file = findings.folder.find(name, base).path
+        place = f"{findings.folder.label(material.library)}:{material.map_ke.line}"
+        image = file and Texture(FileRange(file), file.name, f"map_Ke {name}", place)
+    return {"glow": glow, "glow_map": image}
 
 
 def _renaming_hint(path: Path, name: str) -> str:

@@ -9,7 +9,8 @@ from ptmtools.errors import InputError
 from ptmtools.options import option
 
 #: Suffixes of model files, by reader: ptmtools, trimesh, pymeshlab, IfcOpenShell, usd-core.
-OWN = (".obj", ".glb", ".gltf")
+GLTF = (".glb", ".gltf")
+OWN = (".obj", *GLTF)
 TRIMESH = (".ply", ".stl", ".off")
 MESHLAB = (".3ds", ".3mf", ".ctm", ".dae", ".wrl", ".x3d")
 IFC = (".ifc", ".ifczip")

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import LimitError
 from ptmtools.files import open_regular
+from ptmtools.scene.lights import Lamp
 from ptmtools.scene.model import Camera, Kind, RoomVolume, Shine, Storey, Wrap
 
 SourceWrap = Literal[Wrap, "mirror"]
@@ -134,6 +135,7 @@ class SourceMaterial:
     texture, mask: colours, and a separate image of opacities (``map_d``).
     shine: its reflection map.
     normal: its normal map.
+    glow, glow_map: linear luminance that it emits, a factor of the mean of the image if it has one.
     """
 
     name: str
@@ -147,6 +149,8 @@ class SourceMaterial:
     mask: Texture | None = None
     shine: Shine | None = None
     normal: NormalTexture | None = None
+    glow: float = 0.0
+    glow_map: Texture | None = None
 
 
 @dataclass(frozen=True)
@@ -171,6 +175,7 @@ class Source:
     kinds: the kind of each object by its class (IFC); empty for formats without classes.
     storeys: named by the file; heights along its up axis, in its units.
     rooms: volumes of rooms, finite, in the space of the file.
+    lamps: finite, in the space of the file.
     """
 
     points: NDArray[np.float64]
@@ -189,6 +194,7 @@ class Source:
     kinds: tuple[Kind, ...] = ()
     storeys: tuple[Storey, ...] = ()
     rooms: tuple[RoomVolume, ...] = ()
+    lamps: tuple[Lamp, ...] = ()
 
 
 @dataclass

@@ -56,10 +56,7 @@ class Replacement:
         Raises ValueError if they do not fit the scene.
         """
         self._check(scene)
-        kept = np.flatnonzero(~np.isin(scene.triangle_object, self.objects))
-        source = np.concatenate([kept, self.source.astype(np.int64)])
-        order = np.argsort(source, kind="stable")
-        source = source[order]
+        kept, order, source = self._sources(scene)
         used, corners = np.unique(scene.triangles[kept], return_inverse=True)
         corners = corners.reshape(-1, 3)
         triangles = np.concatenate([corners, self.triangles + len(used)])[order]
@@ -80,6 +77,19 @@ class Replacement:
             colors=colors,
             normal_uv=normal_uv,
         )
+
+    def sources(self, scene: Scene) -> Ints:
+        """(T,) the triangle of the scene that each triangle of `of` is, or stands for. Raises as
+        `of`."""
+        self._check(scene)
+        return self._sources(scene)[2]
+
+    def _sources(self, scene: Scene) -> tuple[Ints, Ints, Ints]:
+        """The triangles that stay, the order of these and the new ones, and `sources`."""
+        kept = np.flatnonzero(~np.isin(scene.triangle_object, self.objects))
+        source = np.concatenate([kept, self.source.astype(np.int64)])
+        order = np.argsort(source, kind="stable")
+        return kept, order, source[order]
 
     def _check(self, scene: Scene) -> None:
         if self.objects.max(initial=-1) >= len(scene.objects):

@@ -1,9 +1,9 @@
 """Reads materials, samplers and images of a glTF document (glTF 2.0, sections 3.8 and 3.9).
 
-The reader keeps the normal map, and the base colour of the metallic-roughness model. The factor of
-this is linear light, but the tint of the emitted files is sRGB, so the factor is converted and the
-conversion noted; for partial tints the product of tint and texel differs from the linear product.
-The alpha of texels
+The reader keeps the normal map, how bright the emission is, and the base colour of the
+metallic-roughness model. The factor of this is linear light, but the tint of the emitted files is
+sRGB, so the factor is converted and the conversion noted; for partial tints the product of tint and
+texel differs from the linear product. The alpha of texels
 applies in the modes MASK and BLEND only (section 3.9.6).
 """
 
@@ -18,7 +18,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.scene.colors import to_srgb
+from ptmtools.scene.colors import luminance, to_srgb
 from ptmtools.scene.gltf.document import Document, data_uri
 from ptmtools.scene.ktx2 import TranscodedBytes
 from ptmtools.scene.notes import Findings
@@ -131,7 +131,7 @@ class MaterialReader:
             normal_coords, normal_matrix, _ = _placing(relief)
             same = texture is not None and normal_coords == coords
             own = not (same and np.array_equal(normal_matrix, matrix))
-            normal = NormalTexture(image, _positive(relief.get("scale", 1.0)), own=own)
+            normal = NormalTexture(image, finite(relief.get("scale", 1.0)), own=own)
             if not own:
                 normal_coords = normal_matrix = None
         self._materials.append(
@@ -146,6 +146,7 @@ class MaterialReader:
                 two_sided=bool(entry.get("doubleSided", False)),
                 texture=texture,
                 normal=normal,
+                **self._glow(entry, place),
             )
         )
         return MaterialUse(
@@ -157,6 +158,17 @@ class MaterialReader:
             normal_coords,
             normal_matrix,
         )
+
+    def _glow(self, entry: dict[str, Any], place: str) -> dict[str, Any]:
+        """The emission of a material, as the fields of a `SourceMaterial`."""
+        factor = [_share(value) for value in entry.get("emissiveFactor", [0.0, 0.0, 0.0])]
+        if self._texture_of is not None or not any(factor):
+            return {}
+        stronger = entry.get("extensions", {}).get("KHR_materials_emissive_strength", {})
+        strength = finite(stronger.get("emissiveStrength", 1.0))
+        use = entry.get("emissiveTexture")
+        image = None if use is None else self._texture(use["index"], place, 1.0)
+        return {"glow": strength * float(luminance(np.array(factor))), "glow_map": image}
 
     def _texture(self, index: int, place: str, strength: float) -> Texture | None:
         tree = self._document.tree
@@ -197,11 +209,11 @@ class MaterialReader:
 
 def _share(value: Any) -> float:
     """A number, clipped to [0, 1]; ValueError for other values."""
-    return min(_positive(value), 1.0)
+    return min(finite(value), 1.0)
 
 
-def _positive(value: Any) -> float:
-    """A number, at least 0; ValueError for other values."""
+def finite(value: Any) -> float:
+    """A finite number, 0 for a negative one; ValueError for other values."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise ValueError(f"{value!r} is not a number")
     return max(float(value), 0.0)
