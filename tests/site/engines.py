@@ -389,3 +389,5 @@ def visiting_by(
         finally:
             engine.release_all()
             visitor.messages += engine.evaluate("window.said")
+            # The browser stays open, and a page would draw on.
+            engine.goto("about:blank")
