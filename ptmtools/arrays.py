@@ -57,6 +57,12 @@ def areas(corners: Floats) -> Floats:
     return np.asarray(np.linalg.norm(normals(corners), axis=1) / 2)
 
 
+def plane_areas(uv: Floats) -> Floats:
+    """(n,) the areas of (n, 3, 2) triangles."""
+    first, second = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    return np.asarray(np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / 2)
+
+
 def volumes(corners: Floats) -> Floats:
     """(n,) volumes of (n, 4, 3) tetrahedra, m³."""
     a, b, c = (corners[:, 1:] - corners[:, :1]).transpose(1, 0, 2)

@@ -24,10 +24,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, Singles, areas
+from ptmtools.arrays import Bools, Floats, Ints, Singles, areas, plane_areas
 from ptmtools.light.atlas import FILLED, unwrap
 from ptmtools.light.lightmap import SMOOTH, bake, vertex_light
-from ptmtools.light.looks import Painted, Rays, open_sides, plane_areas, planes
+from ptmtools.light.looks import Painted, Rays, open_sides, planes
 from ptmtools.light.mixing import Mix, Mixed
 from ptmtools.light.occlusion import Surroundings, normals
 

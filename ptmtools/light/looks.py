@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, Singles, areas
+from ptmtools.arrays import Bools, Floats, Ints, Singles, areas, plane_areas
 from ptmtools.cells.search import connected
 from ptmtools.errors import naming
 from ptmtools.light.occlusion import (
@@ -149,16 +149,11 @@ class Painted:
         at = corners[:, 0] + share[:, :1] * (corners[:, 1] - corners[:, 0])
         at += share[:, 1:] * (corners[:, 2] - corners[:, 0])
         result = np.ones(len(point), np.float32)
-        for index, image in enumerate(self.images):
-            these = self.image[of] == index
+        index = self.image[of]
+        for number in np.unique(index[index >= 0]).tolist():
+            image, these = self.images[number], index == number
             result[these] = 1 - image.strength * (1 - lookup(image, at[these]))
         return result
-
-
-def plane_areas(uv: Floats) -> Floats:
-    """(n,) the areas of (n, 3, 2) triangles."""
-    first, second = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-    return np.asarray(np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / 2)
 
 
 def lookup(image: LightImage, at: Floats) -> Singles:

@@ -205,12 +205,9 @@ def _examine(texture: Texture, limit: int, channel: str | None = None) -> ImageR
     """
     from ptmtools.texture.images.opening import pillow_faults
 
-    read = texture.read
     try:
         with naming(texture.label, place=texture.place):
-            if size := getattr(read, "size", None):
-                check_bytes(size(), Limits(limit))
-            data = read()
+            data = read_within(texture, limit)
             opened = _decode(data, limit)
             with pillow_faults():
                 bits = _holes(opened, channel)
@@ -227,6 +224,13 @@ def _examine(texture: Texture, limit: int, channel: str | None = None) -> ImageR
         opened.width,
         bits,
     )
+
+
+def read_within(texture: Texture, limit: int) -> bytes:
+    """The bytes of an image. Raises LimitError PTM-L104, and the errors of reading."""
+    if size := getattr(texture.read, "size", None):
+        check_bytes(size(), Limits(limit))
+    return texture.read()
 
 
 def integers(data: bytes, limit: int) -> tuple[NDArray[Any], Description]:

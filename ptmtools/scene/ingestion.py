@@ -80,7 +80,7 @@ def ingest(
     metres = None if options.unit is None else parse_unit(options.unit)
     check_file(model)
     findings = Findings(model, options.allow_outside)
-    source = _read(model, findings, progress, options.max_triangles)
+    source = _read(model, findings, progress, options)
     if len(source.points) > MAX_VERTICES or len(source.triangles) > MAX_VERTICES:
         raise LimitError(
             "PTM-L203",
@@ -137,15 +137,13 @@ def ingest(
             colors[rows] = np.rint(colors[rows] * tint).astype(np.uint8)
             material = replace(material, color=WHITE)
         materials.append(_material(material, uv[rows], store, findings))
-    normal_uv = None
-    if options.normal_maps == "draw":
-        maps = NormalMaps(store, findings)
-        for number, rows in enumerate(faces):
-            if (normal := used[number].normal) is not None:
-                moved = uv is not written and not np.array_equal(uv[rows], written[rows])
-                image = maps.add(normal, baked[number].texture, moved=moved)
-                materials[number] = replace(materials[number], normal=image)
-        normal_uv = _normal_coordinates(source, kept, materials, triangle_material, written)
+    maps = NormalMaps(store, findings)
+    for number, rows in enumerate(faces):
+        if (normal := used[number].normal) is not None:
+            moved = uv is not written and not np.array_equal(uv[rows], written[rows])
+            image = maps.add(normal, baked[number].texture, moved=moved)
+            materials[number] = replace(materials[number], normal=image)
+    normal_uv = _normal_coordinates(source, kept, materials, triangle_material, written)
     progress(len(faces), len(faces), "materials")
     points, triangles = to_world(kept.points, space), kept.triangles.astype(np.int32)
     two_sided = ~kept.paired if options.two_sided else _two_sided(kept, source)
@@ -215,20 +213,21 @@ def check_file(model: Path) -> None:
         raise InputError("PTM-I122", error.strerror or str(error), file=model) from None
 
 
-def _read(model: Path, findings: Findings, progress: Progress, max_triangles: int) -> Source:
-    suffix = model.suffix.lower()
+def _read(model: Path, findings: Findings, progress: Progress, options: IngestOptions) -> Source:
+    suffix, most = model.suffix.lower(), options.max_triangles
+    normals = options.normal_maps == "draw"
     try:
         if suffix == ".obj":
             from ptmtools.scene.obj import read_obj
 
-            return read_obj(model, findings, progress, max_triangles)
+            return read_obj(model, findings, progress, most, normals=normals)
         if suffix in (".glb", ".gltf"):
             from ptmtools.scene.gltf.reader import read_gltf
 
-            return read_gltf(model, findings, max_triangles)
+            return read_gltf(model, findings, most, normals=normals)
         from ptmtools.scene.formats import read_other
 
-        return read_other(model, findings, max_triangles)
+        return read_other(model, findings, most)
     except OSError as error:
         raise InputError(
             "PTM-I122", error.strerror or str(error), file=error.filename or model

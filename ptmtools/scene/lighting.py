@@ -1,31 +1,40 @@
 """Gathers the lights of a model: lamps, the emission of its materials, and its lightmaps.
 
 An occlusion texture of glTF is a lightmap if its surfaces lie in it once. One that repeats belongs
-to its material, like a normal map. What cannot be read is a miss, and then has no effect.
+to its material, like a normal map. What cannot be read is left out with a note, and is no miss,
+because most builds do not need it.
 """
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Callable
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
-from ptmtools.arrays import Ints
-from ptmtools.errors import InputError
+from ptmtools.arrays import Ints, plane_areas
+from ptmtools.errors import PtmError
 from ptmtools.scene.colors import luminance, to_linear
 from ptmtools.scene.faces import KeptFaces
-from ptmtools.scene.images import ImageStore, integers
-from ptmtools.scene.lights import Lamp, Lights, ModelMap
+from ptmtools.scene.images import ImageStore, integers, read_within
+from ptmtools.scene.lights import MOST, Lamp, Lights, ModelMap
 from ptmtools.scene.model import Space
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.options import GLTF, IngestOptions
-from ptmtools.scene.source import Source, SourceMaterial
+from ptmtools.scene.source import Source, SourceMaterial, Texture
 from ptmtools.scene.space import rotated, to_world
+from ptmtools.texture.model import Limits
 
 #: Coordinates may be this far outside of an image that lies on its surfaces once.
 _OUTSIDE = 1e-3
 #: Coordinates beyond this are at the border of an image that clamps.
 _FAR = 1e6
+#: Texels that are counted at a time.
+_STRIP_TEXELS = 1 << 20
+
+T = TypeVar("T")
 
 
 def lights_of(
@@ -38,10 +47,10 @@ def lights_of(
     options: IngestOptions,
 ) -> Lights:
     """The lights of the kept faces of a model. ``used``: (M,) the materials of the scene by their
-    numbers in the source. Raises LimitError PTM-L104."""
-    glow = [_glow(source.materials[number], store) for number in used.tolist()]
+    numbers in the source."""
+    reader = _Reader(store, findings)
     plain = Lights(
-        np.array(glow, np.float32),
+        np.array([reader.glow(source.materials[number]) for number in used.tolist()], np.float32),
         tuple(_placed(lamp, space) for lamp in source.lamps),
         np.full(len(used), -1, np.int32),
         np.zeros((0, 3, 2), np.float32),
@@ -49,23 +58,74 @@ def lights_of(
     )
     if findings.model.suffix.lower() not in GLTF:
         return plain
-    return _with_maps(plain, kept, used, store, findings, options)
+    return _with_maps(plain, kept, used, reader, options)
 
 
-def _glow(material: SourceMaterial, store: ImageStore) -> float:
-    """The linear luminance that a material emits, on average."""
-    if not material.glow or material.glow_map is None:
-        return material.glow
-    if store.record(material.glow_map) is None:
-        return material.glow
-    store.mark_as_input(material.glow_map)
-    try:
-        texels = integers(material.glow_map.read(), store.limit)[0]
-    except InputError:  # an image of floats
-        return material.glow
-    colors = texels[..., :3] if texels.shape[2] > 2 else texels[..., :1].repeat(3, axis=2)
-    light = luminance(to_linear(colors / np.iinfo(texels.dtype).max))
-    return material.glow * float(light.mean())
+class _Reader:
+    """The images of lights, each read and decoded once."""
+
+    def __init__(self, store: ImageStore, findings: Findings) -> None:
+        self._store, self.findings = store, findings
+        self._means = dict[Callable[[], bytes], float | None]()
+        self._maps = dict[Callable[[], bytes], bytes | None]()
+        self._held = dict[bytes, bytes]()
+
+    def glow(self, material: SourceMaterial) -> float:
+        """The linear luminance that a material emits, on average."""
+        glow = min(max(0.0, material.glow), MOST)
+        if glow != material.glow:
+            text = f"{material.name}: emission of {material.glow:g} changed to {glow:g}"
+            self.findings.note("PTM-N215", text)
+        if not glow or material.glow_map is None:
+            return glow
+        mean = self._read(material.glow_map, self._means, _mean)
+        return glow if mean is None else glow * mean
+
+    def lightmap(self, texture: Texture) -> bytes | None:
+        """The bytes of a lightmap that can be decoded; equal ones are the same object. None, and a
+        note, for others."""
+        from ptmtools.texture.images.files import load_image
+
+        def checked(data: bytes, limit: int) -> bytes:
+            load_image(data, Limits(limit)).array()
+            return self._held.setdefault(data, data)
+
+        return self._read(texture, self._maps, checked)
+
+    def _read(
+        self,
+        texture: Texture,
+        results: dict[Callable[[], bytes], T | None],
+        use: Callable[[bytes, int], T],
+    ) -> T | None:
+        """``use(data, limit)`` for the bytes of an image; None, and a note, if it cannot be read or
+        decoded."""
+        if texture.read not in results:
+            self._store.mark_as_input(texture)
+            results[texture.read] = None
+            try:
+                data = read_within(texture, self._store.limit)
+                with warnings.catch_warnings(action="ignore"):
+                    results[texture.read] = use(data, self._store.limit)
+            except (PtmError, OSError) as fault:
+                message = fault.message if isinstance(fault, PtmError) else str(fault)
+                self.findings.note("PTM-N206", f"{texture.what}: {message}", texture.place)
+        return results[texture.read]
+
+
+def _mean(data: bytes, limit: int) -> float:
+    """The mean luminance of an image, linear light. Raises as `integers`."""
+    texels, _ = integers(data, limit)
+    largest = int(np.iinfo(texels.dtype).max)
+    light = to_linear(np.arange(largest + 1) / largest)
+    channels = [0, 1, 2] if texels.shape[2] > 2 else [0, 0, 0]
+    counts = np.zeros((3, largest + 1))
+    step = max(1, _STRIP_TEXELS // texels.shape[1])
+    for y in range(0, len(texels), step):
+        for k, channel in enumerate(channels):
+            row = texels[y : y + step, :, channel].ravel()
+            counts[k] += np.bincount(row, minlength=largest + 1)
+    return float(luminance(counts @ light / counts.sum(axis=1)))
 
 
 def _placed(lamp: Lamp, space: Space) -> Lamp:
@@ -75,39 +135,36 @@ def _placed(lamp: Lamp, space: Space) -> Lamp:
 
 
 def _with_maps(
-    plain: Lights,
-    kept: KeptFaces,
-    used: Ints,
-    store: ImageStore,
-    findings: Findings,
-    options: IngestOptions,
+    plain: Lights, kept: KeptFaces, used: Ints, reader: _Reader, options: IngestOptions
 ) -> Lights:
     """The lights of a glTF with its lightmaps."""
     from ptmtools.scene.gltf.second import read_again
 
+    findings = reader.findings
     read = read_again(findings.model, options, lambda entry: entry.get("occlusionTexture"))
     if read is None:
         return plain
     for note in read.missing:
-        findings.miss(note.code, note.message, note.place)
+        findings.note(note.code, note.message, note.place)
     findings.folder.sought.update(dict.fromkeys(read.sought))
     uv = read.source.uv[kept.source]
     material = read.source.triangle_material[kept.source]
     index = np.full(len(used), -1, np.int32)
-    maps: list[ModelMap] = []
+    maps: dict[ModelMap, int] = {}
     for number, own in enumerate(used.tolist()):
         texture, place = read.source.materials[own].texture, uv[material == own]
-        if texture is None or not np.isfinite(place).all():
+        if texture is None:
+            continue
+        if not (np.isfinite(place).all() and plane_areas(place).any()):
+            text = f"{texture.what}: lightmap of surfaces without coordinates in it left out"
+            findings.note("PTM-N215", text, texture.place)
             continue
         outside = (place < -_OUTSIDE) | (place > 1 + _OUTSIDE)
         ways = texture.wrap_s, texture.wrap_t
         if (outside.any(axis=(0, 1)) & [way != "clamp" for way in ways]).any():
             continue
-        if store.record(texture) is None:
-            continue
-        store.mark_as_input(texture)
-        index[number] = len(maps)
-        maps.append(ModelMap(texture.read(), ways, texture.strength))
+        if (data := reader.lightmap(texture)) is not None:
+            index[number] = maps.setdefault(ModelMap(data, ways, texture.strength), len(maps))
     if not maps:
         return plain
     near = np.clip(np.nan_to_num(uv, nan=0.0), -_FAR, _FAR).astype(np.float32)

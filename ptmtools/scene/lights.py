@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 LampKind = Literal["point", "spot", "sun"]
 KINDS: tuple[LampKind, ...] = get_args(LampKind)
 MapWrap = Literal["repeat", "clamp", "mirror"]
+#: Largest intensity of a lamp, luminance of a surface, and coordinate of a lamp.
+MOST = 1e9
 #: By their number in the arrays.
 WRAPS: tuple[MapWrap, ...] = get_args(MapWrap)
 

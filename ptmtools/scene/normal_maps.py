@@ -8,14 +8,13 @@ whose texels point away from the surface normals.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats
 from ptmtools.errors import LimitError, PtmError
 from ptmtools.scene.baking import OpaqueBytes, emitted_wraps
 from ptmtools.scene.images import ImageStore, integers
@@ -30,6 +29,10 @@ _GREY = 2
 _UP, _LEVEL = 160, 48
 #: Texels that the way from black to white rises with ``-bm 1``.
 RISE = 4.0
+#: Largest factor of x and y of normals, and of heights.
+MOST = 100.0
+#: Texels that are converted at a time.
+_STRIP_TEXELS = 1 << 18
 
 
 @dataclass(frozen=True)
@@ -48,18 +51,30 @@ class HeightBytes:
         from ptmtools.texture.images.png import png_bytes
 
         texels, _ = integers(self.read(), self.limit)
-        largest = np.iinfo(texels.dtype).max
-        height = texels[..., 0].astype(np.float64) * (self.rise / largest)
-        return png_bytes(normals_of(height))
+        return png_bytes(normals_of(texels[..., 0], self.rise / np.iinfo(texels.dtype).max))
 
 
-def normals_of(height: Floats) -> NDArray[np.uint8]:
-    """(h, w, 3) normal map of (h, w) heights in texels, by central differences."""
-    right = (np.roll(height, -1, axis=1) - np.roll(height, 1, axis=1)) / 2
-    up = (np.roll(height, 1, axis=0) - np.roll(height, -1, axis=0)) / 2
-    normal = np.stack([-right, -up, np.ones_like(height)], axis=2)
-    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
-    return np.rint(127.5 * (normal + 1)).astype(np.uint8)
+def normals_of(height: NDArray[Any], factor: float = 1.0) -> NDArray[np.uint8]:
+    """(h, w, 3) normal map of (h, w) heights that repeat, in units of 1 / ``factor`` texels, by
+    central differences."""
+    result = np.empty((*height.shape, 3), np.uint8)
+    for rows in _strips(height):
+        # With a row on either side.
+        around = np.arange(rows.start - 1, rows.stop + 1) % len(height)
+        strip = height[around].astype(np.float32) * np.float32(factor)
+        own = strip[1:-1]
+        normal = np.ones((*own.shape, 3), np.float32)
+        normal[..., 0] = (np.roll(own, 1, axis=1) - np.roll(own, -1, axis=1)) / 2
+        normal[..., 1] = (strip[2:] - strip[:-2]) / 2
+        normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+        result[rows] = np.rint(127.5 * (normal + 1))
+    return result
+
+
+def _strips(image: NDArray[Any]) -> Iterator[slice]:
+    """The rows of an image in strips of about `_STRIP_TEXELS`."""
+    step = max(1, _STRIP_TEXELS // image.shape[1])
+    return (slice(y, min(y + step, len(image))) for y in range(0, len(image), step))
 
 
 class NormalMaps:
@@ -67,6 +82,7 @@ class NormalMaps:
 
     def __init__(self, store: ImageStore, findings: Findings) -> None:
         self._store, self._findings = store, findings
+        self._kinds = dict[Callable[[], bytes], str]()
 
     def add(
         self, normal: NormalTexture, texture: Texture | None, *, moved: bool
@@ -76,27 +92,32 @@ class NormalMaps:
 
         Raises LimitError PTM-L104.
         """
-        use = normal.texture
+        use, scale = normal.texture, min(max(normal.scale, -MOST), MOST)
+        if scale != normal.scale:
+            self._note(use, f"scale of {normal.scale:g} changed to {scale:g}")
+        if not scale:
+            self._note(use, "normal map of scale 0 left out")
+            return None
         if "mirror" in (use.wrap_s, use.wrap_t):
             self._note(use, "mirrored repetition of a normal map ignored")
         wraps = emitted_wraps(use)
         own = normal.own or moved or texture is None or wraps != emitted_wraps(texture)
-        image, scale = self._normals(normal)
+        image, scale = self._normals(use, scale, height=normal.height)
         if image is None or (added := self._store.add(image)) is None:
             return None
         return NormalImage(added[0], scale, *wraps, own)
 
-    def _normals(self, normal: NormalTexture) -> tuple[Texture | None, float]:
+    def _normals(self, use: Texture, scale: float, *, height: bool) -> tuple[Texture | None, float]:
         """The image of normals, and the scale of these."""
-        use, scale = normal.texture, normal.scale
+        if height:  # whose kind depends on its texels
+            self._store.mark_as_input(use)
         record = self._store.record(use)
         if record is None:
             return None, scale
-        if normal.height:
+        if height:
             kind = self._kind(use)
             if kind == "heights":
                 read = HeightBytes(use.read, RISE * scale, self._store.limit)
-                self._store.mark_as_input(use)
                 self._note(use, f"heights converted to normals, {RISE * scale:g} texels high")
                 return replace(use, read=read), 1.0
             if kind != "normals":
@@ -110,15 +131,16 @@ class NormalMaps:
 
     def _kind(self, use: Texture) -> str:
         """ "heights", "normals" or ""."""
-        try:
-            texels, _ = integers(use.read(), self._store.limit)
-        except LimitError:
-            raise
-        except (PtmError, OSError) as fault:
-            message = fault.message if isinstance(fault, PtmError) else str(fault)
-            self._note(use, message)
-            return ""
-        return kind_of(texels)
+        if use.read not in self._kinds:
+            self._kinds[use.read] = ""
+            try:
+                texels, _ = integers(use.read(), self._store.limit)
+                self._kinds[use.read] = kind_of(texels)
+            except LimitError:
+                raise
+            except (PtmError, OSError) as fault:
+                self._note(use, fault.message if isinstance(fault, PtmError) else str(fault))
+        return self._kinds[use.read]
 
     def _note(self, use: Texture, message: str) -> None:
         self._findings.note("PTM-N215", f"{use.what}: {message}", use.place)
@@ -126,13 +148,16 @@ class NormalMaps:
 
 def kind_of(texels: NDArray[Any]) -> str:
     """ "heights" or "normals" for the (h, w, c) texels of a bump map; "" for neither."""
-    if texels.dtype != np.uint8:
-        texels = (texels >> 8).astype(np.uint8)
     if texels.shape[2] < 3:
         return "heights"
-    colors = texels[..., :3].astype(np.int64)
-    if (colors.max(axis=2) - colors.min(axis=2)).max() <= _GREY:
+    spread, sums = 0, np.zeros(3)
+    for rows in _strips(texels):
+        strip = texels[rows, :, :3]
+        colors = (strip if strip.dtype == np.uint8 else strip >> 8).astype(np.int16)
+        spread = max(spread, int((colors.max(axis=2) - colors.min(axis=2)).max()))
+        sums += colors.sum(axis=(0, 1), dtype=np.int64)
+    if spread <= _GREY:
         return "heights"
-    red, green, blue = colors.reshape(-1, 3).mean(axis=0).tolist()
+    red, green, blue = (sums / (texels.shape[0] * texels.shape[1])).tolist()
     level = max(abs(red - 128), abs(green - 128)) <= _LEVEL
     return "normals" if level and blue >= _UP else ""

@@ -6,6 +6,7 @@ docs/formats/codes.md lists the codes.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -54,6 +55,7 @@ class Findings:
         self.folder = Folder(model.absolute().parent, allow_outside)
         self._notes: dict[tuple[str, str, str], int] = {}
         self._misses: dict[tuple[str, str, str], None] = {}
+        self._required = True
 
     def note(self, code: str, message: str, place: str = "", count: int = 1) -> None:
         """Records a guess, a conversion or an omission."""
@@ -62,9 +64,18 @@ class Findings:
 
     def miss(self, code: str, message: str, place: str = "", count: int = 1) -> None:
         """Records a note that is an error with ``strict``."""
-        if (code, message, place) not in self._notes:
+        if self._required and (code, message, place) not in self._notes:
             self._misses[code, message, place] = None
         self.note(code, message, place, count)
+
+    @contextmanager
+    def optional(self) -> Iterator[None]:
+        """A context in which the model does not require what it names: a miss is a note."""
+        self._required = False
+        try:
+            yield
+        finally:
+            self._required = True
 
     def locate(
         self,

@@ -54,6 +54,8 @@ def resolve_materials(
     named: Mapping[str, tuple[int, int]],
     used: Set[int],
     findings: Findings,
+    *,
+    normals: bool = True,
 ) -> tuple[tuple[SourceMaterial, ...], dict[int, MapStatement]]:
     """The materials of an OBJ file, and the map_Kd statements by number of material.
 
@@ -62,6 +64,7 @@ def resolve_materials(
     libraries: text and line of each mtllib statement.
     named: by name of material, in order: its number, and the line of the first usemtl.
     used: numbers of the materials of faces; the images of others are not looked up.
+    normals: whether materials have normal maps.
 
     Raises the errors of `read_mtl`.
     """
@@ -92,7 +95,7 @@ def resolve_materials(
         if index in used:
             texture = _texture(material, "map_Kd", material.map_kd, findings)
             mask = _texture(material, "map_d", material.map_d, findings)
-            normal = _normal(material, texture, findings)
+            normal = _normal(material, texture, findings) if normals else None
         if texture is not None and material.map_kd is not None:
             maps[index] = material.map_kd
         materials.append(
@@ -122,8 +125,7 @@ def _normal(
     image = _texture(material, key, statement, findings)
     if image is None:
         return None
-    height = key != "norm"
-    return NormalTexture(image, max(statement.strength, 0.0), height, own=texture is None)
+    return NormalTexture(image, statement.strength, height=key != "norm", own=texture is None)
 
 
 def _shine(material: MtlMaterial) -> Shine | None:
@@ -232,8 +234,10 @@ def read_obj(
     findings: Findings,
     progress: Progress = silent,
     max_triangles: int = MAX_VERTICES,
+    *,
+    normals: bool = True,
 ) -> Source:
-    """Reads an OBJ file with its materials.
+    """Reads an OBJ file with its materials, and their normal maps if it reads ``normals``.
 
     Raises InputError with the line of an invalid statement, and for a file without faces;
     LimitError for more vertices than int32 can number (PTM-L203), a line longer than `LONGEST_LINE`
@@ -283,7 +287,7 @@ def read_obj(
     face_material = np.frombuffer(statements.face_material, dtype=np.int64)
     used = set(np.unique(face_material).tolist())
     materials, maps = resolve_materials(
-        path, statements.libraries, statements.materials, used, findings
+        path, statements.libraries, statements.materials, used, findings, normals=normals
     )
     triangle_material = face_material[cut.polygon]
     ends = np.cumsum(np.bincount(triangle_material, minlength=len(materials)))

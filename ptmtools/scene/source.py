@@ -108,7 +108,7 @@ class NormalTexture:
     Attributes
     ----------
     texture: its image, or that of heights.
-    scale: factor of x and y of the normals, 0 or more; of heights, see `height`.
+    scale: factor of x and y of the normals; of heights, see `height`.
     height: whether the image holds heights if it is grey (``bump`` of OBJ).
     own: whether its coordinates are those of `Source.normal_uv`.
     """

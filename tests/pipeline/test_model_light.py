@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from ptmtools.arrays import Floats
 from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
 from ptmtools.errors import InputError, MissingComponentError
-from ptmtools.light.looks import LightImage, lookup
+from ptmtools.light import looks
+from ptmtools.light.looks import LightImage, lookup, red_texels
 from ptmtools.light.occlusion import points_on
 from ptmtools.light.options import LightOptions
 from ptmtools.neighbours.apo.options import ReplaceOptions
@@ -142,14 +144,41 @@ def test_without_xatlas(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     """A default build goes on, and says what is left out."""
 
     def missing(*_: Any) -> None:
-        raise MissingComponentError("PTM-M100", "lightmaps need xatlas")
+        remedy = "pip install 'ptmtools[light]'"
+        raise MissingComponentError("PTM-M100", "lightmaps need xatlas", remedy=remedy)
 
+    model, db = made / "lit.glb", tmp_path / "db"
+    with monkeypatch.context() as without:
+        without.setattr(light_stage, "component", missing)
+        stage = built(model, db)["light"]
+        assert stage.counts["lightmaps"] == 0
+        for text in ("xatlas", "pip install 'ptmtools[light]', then build again"):
+            assert text in stage.warnings[0]
+        assert built(model, db) == {}
+        assert validate(db).issues == ()
+        with pytest.raises(MissingComponentError):
+            built(model, db, LightOptions("model"))
+    assert {p.stage: p.plan for p in plan_build(model, db, QUICK)}[LIGHT.name] != "current"
+    assert built(model, db)["light"].counts["lightmaps"] > 0
     monkeypatch.setattr(light_stage, "component", missing)
-    stage = built(made / "lit.glb", tmp_path / "db")["light"]
-    assert stage.counts["lightmaps"] == 0
-    assert "xatlas" in stage.warnings[0]
-    with pytest.raises(MissingComponentError):
-        built(made / "lit.glb", tmp_path / "db", LightOptions("model"))
+    assert built(model, db) == {}  # lightmaps are kept
+
+
+def test_an_image_is_decoded_once(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    lengths = []
+
+    def counted(data: bytes, *rest: Any) -> Any:
+        lengths.append(len(data))
+        return red_texels(data, *rest)
+
+    monkeypatch.setattr(looks, "red_texels", counted)
+    artifacts = Artifacts(DatabaseFolder.open(made / "db"))
+    lights = light_stage.lights_of(artifacts)
+    assert lights is not None
+    maps = [replace(lights.maps[0], strength=share) for share in (1, 0.5, 0.25)]
+    painted = light_stage._painted(cast("Any", artifacts), replace(lights, maps=tuple(maps)))
+    assert [image.strength for image in painted.images] == [1, 0.5, 0.25]
+    assert len(lengths) == 1
 
 
 @pytest.mark.parametrize("array", ["uv", "map", "glow", "image", "lamp"])

@@ -185,3 +185,13 @@ def test_a_map_that_is_gone(folder: Path) -> None:
     (db / "www/textures/waves.ptm").unlink()
     assert {issue.code for issue in validate(db).issues} >= {"PTM-D651"}
     assert main(["build-scene", "-q", str(folder / "model/two_rooms.obj"), "-o", str(db)]) == 0
+
+
+def test_normals_that_become_heights(folder: Path) -> None:
+    """They are converted, as in a new database."""
+    model = folder / "model" / "two_rooms.obj"
+    shutil.copy(model.parent / "heights.png", model.parent / "waves.png")
+    assert SCENE.name in built(model, folder / "db")
+    built(model, folder / "new")
+    again, new = (Artifacts(DatabaseFolder.open(folder / name))[SCENE] for name in ("db", "new"))
+    assert [image.sha256 for image in again.images] == [image.sha256 for image in new.images]

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ptmtools.errors import InputError
-from ptmtools.scene import IngestOptions, Scene, ingest
+from ptmtools.scene import IngestOptions, Scene, ingest, lighting
+from ptmtools.scene.colors import luminance, to_linear
 from ptmtools.scene.lighting import _placed
-from ptmtools.scene.lights import Lamp, Lights
+from ptmtools.scene.lights import MOST, Lamp, Lights
 from ptmtools.scene.model import Space
+from ptmtools.texture.images.png import png_bytes
 from tests.scene.conftest import Gltf, Put, png
 
 GREEN = 0.7152
@@ -27,7 +28,11 @@ def lights(scene: Scene) -> Lights:
     return again
 
 
-def with_lamp(put: Put, light: dict[str, Any], **node: Any) -> Lights:
+def noted(scene: Scene) -> set[tuple[str, str]]:
+    return {(note.code, note.place) for note in scene.notes}
+
+
+def scene_with_lamp(put: Put, light: Any, **node: Any) -> Scene:
     def change(doc: Gltf) -> None:
         doc.tree["extensions"] = {"KHR_lights_punctual": {"lights": [light]}}
         use = {"KHR_lights_punctual": {"light": 0}}
@@ -35,7 +40,11 @@ def with_lamp(put: Put, light: dict[str, Any], **node: Any) -> Lights:
         doc.tree["nodes"].append({"children": [1], "translation": [1, 2, 3]})
         doc.tree["scenes"][0]["nodes"] = [0, 2]
 
-    return lights(ingest(put("lamp.glb", Gltf.wall(change).glb())))
+    return ingest(put("lamp.glb", Gltf.wall(change).glb()), IngestOptions(strict=True))
+
+
+def with_lamp(put: Put, light: dict[str, Any], **node: Any) -> Lights:
+    return lights(scene_with_lamp(put, light, **node))
 
 
 def test_lamps_of_gltf(put: Put) -> None:
@@ -54,30 +63,74 @@ def test_lamps_of_gltf(put: Put) -> None:
     assert (sun.kind, sun.intensity) == ("sun", pytest.approx(1))
     assert sun.direction == pytest.approx((0, 0, -1))
     assert with_lamp(put, {"type": "point", "intensity": 0}).lamps == ()
-    assert with_lamp(put, {"type": "point"}, scale=[0, 0, 0]).lamps == ()
+    (flat,) = with_lamp(put, {"type": "point"}, scale=[1, 1, 0], translation=[0, 1, 0]).lamps
+    assert flat.position == pytest.approx((-4, 3, 3))
 
 
 @pytest.mark.parametrize(
-    "light",
-    [{"type": "laser"}, {"type": "point", "intensity": "9"}, {"type": "spot", "spot": [1]}, []],
-    ids=["kind", "text", "list", "no object"],
+    ("light", "node"),
+    [
+        ({"type": "laser"}, {}),
+        ({"type": "point", "intensity": "9"}, {}),
+        ({"type": "point", "intensity": None}, {}),
+        ({"type": "spot", "spot": [1]}, {}),
+        ([], {}),
+        ({"type": "spot"}, {"scale": [1, 1, 0]}),
+        ({"type": "point"}, {"translation": [0, 1e200, 0]}),
+    ],
+    ids=["kind", "text", "null", "list", "no object", "no direction", "far"],
 )
-def test_lamps_that_are_none(put: Put, light: Any) -> None:
-    with pytest.raises(InputError) as refused:
-        with_lamp(put, light)
-    assert refused.value.code == "PTM-I249"
+def test_lamps_that_are_none(put: Put, light: Any, node: dict[str, Any]) -> None:
+    scene = scene_with_lamp(put, light, **node)
+    assert not scene.lights
+    assert ("PTM-N215", "node 1") in noted(scene)
 
 
-def emitting(put: Put, **material: Any) -> Scene:
+def test_a_lamp_that_the_model_does_not_define(put: Put) -> None:
+    use = {"KHR_lights_punctual": {"light": 0}}
+    scene = ingest(put("lamp.glb", Gltf.wall(extensions=use).glb()))
+    assert not scene.lights
+    assert ("PTM-N215", "node 0") in noted(scene)
+
+
+def test_large_numbers_are_clipped(put: Put, textured: Callable[..., Path]) -> None:
+    bright = {"type": "point", "intensity": 1e308, "color": [1e9, 1e9, 1e9]}
+    scene = scene_with_lamp(put, bright)
+    assert [lamp.intensity for lamp in lights(scene).lamps] == [MOST]
+    assert ("PTM-N215", "node 1") in noted(scene)
+    strong = {"KHR_materials_emissive_strength": {"emissiveStrength": 1e300}}
+    white = [1, 1, 1]
+    for scene in (
+        emitting(put, emissiveFactor=white, extensions=strong),
+        ingest(textured("Ke 1e300 0 0")),
+    ):
+        assert lights(scene).glow.tolist() == [MOST]
+        assert any("emission of" in note.message for note in scene.notes)
+
+
+STRICT = IngestOptions(strict=True)
+#: Left half white.
+HALF = np.repeat([[255] * 4 + [0] * 4], 8, axis=0).astype(np.uint8)[..., None].repeat(3, axis=2)
+
+
+def emitting(
+    put: Put,
+    *,
+    image: bytes = png(HALF),
+    options: IngestOptions = STRICT,
+    uv: np.ndarray | None = None,
+    **material: Any,
+) -> Scene:
     def change(doc: Gltf) -> None:
-        half = np.zeros((8, 8, 3), np.uint8)
-        half[:, :4] = 255
-        doc.tree["images"] = [{"bufferView": doc.view(png(half)), "mimeType": "image/png"}]
+        doc.tree["images"] = [{"bufferView": doc.view(image), "mimeType": "image/png"}]
         doc.tree["textures"] = [{"source": 0}]
         doc.tree["materials"] = [material]
-        doc.tree["meshes"][0]["primitives"][0]["material"] = 0
+        primitive = doc.tree["meshes"][0]["primitives"][0]
+        primitive["material"] = 0
+        if uv is not None:
+            primitive["attributes"]["TEXCOORD_1"] = doc.add(uv.astype(np.float32))
 
-    return ingest(put("glow.glb", Gltf.wall(change).glb()))
+    return ingest(put("glow.glb", Gltf.wall(change).glb()), options)
 
 
 def test_emission_of_gltf(put: Put) -> None:
@@ -90,7 +143,108 @@ def test_emission_of_gltf(put: Put) -> None:
         ({"emissiveTexture": {"index": 0}}, 0.0),
     ):
         assert lights(emitting(put, **material)).glow.tolist() == pytest.approx([expected])
+    unlit = {"KHR_materials_unlit": {}}
     assert not emitting(put).lights
+    assert not emitting(put, emissiveFactor=[1, 1, 1], extensions=unlit).lights
+
+
+#: 1.1 MiB of texels.
+LARGE = png(np.full((1100, 1100), 255, np.uint8))
+
+
+@pytest.mark.parametrize(
+    ("material", "code"),
+    [
+        ({"emissiveFactor": None}, "PTM-N215"),
+        ({"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 9}}, "PTM-N215"),
+        ({"occlusionTexture": {"index": 9}}, "PTM-N204"),
+        ({"occlusionTexture": {"index": 0, "strength": "x"}}, "PTM-N204"),
+        ({"occlusionTexture": [1]}, "PTM-N204"),
+        ({"occlusionTexture": {"index": 0, "texCoord": 5}}, "PTM-N215"),
+    ],
+)
+def test_damage_of_lights_is_a_note(put: Put, material: dict[str, Any], code: str) -> None:
+    scene = emitting(put, **material)
+    assert not scene.lights
+    assert (code, "material 0") in noted(scene)
+
+
+@pytest.mark.parametrize(
+    ("image", "limit"), [(b"none", 1024), (LARGE, 1)], ids=["damaged", "too large"]
+)
+def test_an_image_without_effect_is_a_note(put: Put, image: bytes, limit: int) -> None:
+    options = IngestOptions(strict=True, limit=limit)
+    use = {"index": 0}
+    for material, glow in (
+        ({"emissiveFactor": [1, 1, 1], "emissiveTexture": use}, 1.0),
+        ({"occlusionTexture": use}, 0.0),
+    ):
+        scene = emitting(put, image=image, options=options, **material)
+        assert lights(scene).glow.tolist() == pytest.approx([glow])
+        assert not lights(scene).maps
+        assert ("PTM-N206", "material 0") in noted(scene)
+
+
+def test_missing_images_of_lights_are_no_misses(put: Put, textured: Callable[..., Path]) -> None:
+    def change(doc: Gltf) -> None:
+        doc.tree["images"] = [{"uri": "gone.png"}]
+        doc.tree["textures"] = [{"source": 0}]
+        use = {"index": 0}
+        material = {"emissiveFactor": [1, 1, 1], "emissiveTexture": use, "occlusionTexture": use}
+        doc.tree["materials"] = [material]
+        doc.tree["meshes"][0]["primitives"][0]["material"] = 0
+
+    scene = ingest(put("gone.gltf", Gltf.wall(change).gltf()), IngestOptions(strict=True))
+    assert lights(scene).glow.tolist() == pytest.approx([1])
+    assert ("PTM-N204", "material 0") in noted(scene)
+    model = textured("Ke 1 1 1\nmap_Ke broken.png", {"broken.png": b"none"})
+    scene = ingest(model, IngestOptions(unit="m", up="y", strict=True))
+    assert ("PTM-N206", "room.mtl:3") in noted(scene)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+@pytest.mark.parametrize("bands", [1, 3, 4])
+def test_the_mean_of_an_image(
+    dtype: type[np.unsignedinteger[Any]], bands: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    most = np.iinfo(dtype).max
+    texels = np.random.default_rng(bands).integers(0, most, (37, 29, bands), dtype)
+    monkeypatch.setattr(lighting, "_STRIP_TEXELS", 100)
+    colors = texels[..., :3] if bands > 2 else texels.repeat(3, axis=2)
+    expected = luminance(to_linear(colors / most)).mean()
+    assert lighting._mean(png_bytes(texels), 1 << 20) == pytest.approx(expected)
+
+
+def test_images_are_decoded_once(put: Put, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Materials share the mean of an emission, and a lightmap."""
+    uses: list[int] = []
+    mean = lighting._mean
+
+    def counted(data: bytes, limit: int) -> float:
+        uses.append(len(data))
+        return mean(data, limit)
+
+    monkeypatch.setattr(lighting, "_mean", counted)
+
+    def change(doc: Gltf) -> None:
+        image = {"bufferView": doc.view(png(HALF)), "mimeType": "image/png"}
+        doc.tree["images"] = [image, {**image, "bufferView": doc.view(png(HALF))}]
+        doc.tree["textures"] = [{"source": 0}, {"source": 1}]
+        white = {"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0}}
+        doc.tree["materials"] = [
+            {**white, "occlusionTexture": {"index": number, "strength": strength}}
+            for number, strength in ((0, 1), (0, 1), (1, 1), (0, 0.5))
+        ]
+        for number in range(4):
+            doc.place(doc.quad(material=number), translation=[0, 0, -1 - number])
+        doc.tree["meshes"][0]["primitives"][0]["material"] = 0
+
+    own = lights(ingest(put("shared.glb", Gltf.wall(change).glb())))
+    assert own.glow.tolist() == pytest.approx([0.5] * 4)
+    assert len(uses) == 1
+    assert own.map.tolist() == [0, 0, 0, 1]
+    assert [each.strength for each in own.maps] == [1, 0.5]
+    assert len(own.to_arrays()["image_start"]) == 2
 
 
 def test_emission_of_obj(textured: Callable[..., Path]) -> None:
@@ -127,6 +281,42 @@ def test_a_lightmap_lies_on_its_surfaces_once(put: Put) -> None:
     assert own.uv.shape == (2, 3, 2)
     tiled = {"KHR_texture_transform": {"scale": [2, 2]}}
     assert not emitting(put, occlusionTexture={**use, "extensions": tiled}).lights
+
+
+def test_a_lightmap_of_surfaces_without_coordinates(put: Put) -> None:
+    """It does not darken them."""
+    square = np.array([[0, 1], [1, 1], [1, 0], [0, 0]])
+    use = {"index": 0, "texCoord": 1}
+    assert emitting(put, uv=square, occlusionTexture=use).lights
+    for uv in (None, 0 * square, square[:3]):
+        scene = emitting(put, uv=uv, occlusionTexture=use)
+        assert not scene.lights
+        assert ("PTM-N215", "material 0") in noted(scene)
+
+
+def test_lightmaps_on_mirrored_nodes_and_instances(put: Put) -> None:
+    """Each face has its own coordinates: u grows to the right in the mesh."""
+
+    def change(doc: Gltf) -> None:
+        doc.tree["images"] = [{"bufferView": doc.view(png(HALF)), "mimeType": "image/png"}]
+        doc.tree["textures"] = [{"source": 0}]
+        doc.tree["materials"] = [{"occlusionTexture": {"index": 0}}]
+        moves = np.array([[0, 0, -3], [0, 5, -3]], np.float32)
+        instancing = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": doc.add(moves)}}}
+        for node in (
+            {"translation": [0, 0, -1]},
+            {"translation": [0, 0, -2], "scale": [-1, 1, 1]},
+            {"scale": [-1, 1, 1], "extensions": instancing},
+        ):
+            doc.place(doc.quad(material=0), **node)
+        doc.tree["nodes"].pop(0)
+        doc.tree["scenes"] = [{"nodes": [0, 1, 2]}]
+
+    scene = ingest(put("mirrored.glb", Gltf.wall(change).glb()))
+    own = lights(scene)
+    assert len(scene.triangles) == 8
+    middle = scene.corners[..., 0] - (scene.points[:, 0].min() + scene.points[:, 0].max()) / 2
+    assert set(np.round(own.uv[..., 0] - np.abs(middle) / 10, 6).ravel()) == {0}
 
 
 def test_a_lightmap_that_is_missing(put: Put) -> None:

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ptmtools.scene import ingest
+from ptmtools.errors import InputError
+from ptmtools.scene import ingest, normal_maps
 from ptmtools.scene.model import NormalImage, Scene
 from ptmtools.scene.normal_maps import RISE, kind_of, normals_of
 from ptmtools.scene.options import IngestOptions
@@ -48,7 +49,7 @@ def test_maps_of_an_obj(tmp_path: Path) -> None:
     assert scene.images[a.image].name == "waves.png"
     assert np.array_equal(texels(scene, a), normals_of(heights()))
     grey = np.rint((heights() + 3) * 255 / 6)
-    assert np.array_equal(texels(scene, b), normals_of(grey * (0.5 * RISE / 255)))
+    assert np.array_equal(texels(scene, b), normals_of(grey, 0.5 * RISE / 255))
     assert "bump waves.png: holds normals" in noted(scene)
     assert "map_bump heights.png: heights converted" in noted(scene)
 
@@ -107,6 +108,86 @@ def test_what_cannot_be_used_is_noted(tmp_path: Path, statement: str, message: s
     scene = ingest(write_bumpy(tmp_path / "model", {"room_b": statement}))
     assert set(by_name(scene).values()) == {None}
     assert message in noted(scene)
+
+
+def test_a_missing_map_is_no_miss_of_a_build_without_maps(tmp_path: Path) -> None:
+    model = write_bumpy(tmp_path / "model", {"room_b": "norm gone.png"})
+    strict = IngestOptions(unit="m", up="y", strict=True)
+    ingest(model, replace(strict, normal_maps="none"))
+    with pytest.raises(InputError, match=r"gone\.png"):
+        ingest(model, strict)
+
+
+def test_an_image_of_heights_or_normals_is_not_plain(tmp_path: Path) -> None:
+    """The model is read again when it is repainted, because its kind may change."""
+    for statement, plain in (("norm waves.png", True), ("bump waves.png", False)):
+        scene = ingest(write_bumpy(tmp_path / statement[:4], {"room_a": statement}))
+        assert [i.plain for i in scene.images if i.name == "waves.png"] == [plain]
+    scene = ingest(write_bumpy(tmp_path / "neither", {"room_a": "bump room_b.png"}))
+    assert [i.plain for i in scene.images if i.name == "room_b.png"] == [False]
+
+
+def test_the_kind_of_an_image_is_decided_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shapes = []
+
+    def counted(texels: np.ndarray) -> str:
+        shapes.append(texels.shape)
+        return kind_of(texels)
+
+    monkeypatch.setattr(normal_maps, "kind_of", counted)
+    bumps = dict.fromkeys(("room_a", "room_b", "floor"), "bump waves.png")
+    ingest(write_bumpy(tmp_path / "model", bumps))
+    assert shapes == [(64, 64, 3)]
+
+
+def test_strips_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
+    height = np.random.default_rng(0).integers(0, 256, (37, 29), np.uint8)
+    colors = np.random.default_rng(0).integers(0, 120, (37, 29, 3), np.uint8)
+    whole = normals_of(height, 0.1), kind_of(colors)
+    right = (np.roll(height / 10, -1, axis=1) - np.roll(height / 10, 1, axis=1)) / 2
+    up = (np.roll(height / 10, 1, axis=0) - np.roll(height / 10, -1, axis=0)) / 2
+    normal = np.stack([-right, -up, np.ones_like(up)], axis=2)
+    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+    assert np.abs(whole[0] - 127.5 * (normal + 1)).max() < 0.51
+    monkeypatch.setattr(normal_maps, "_STRIP_TEXELS", 60)
+    assert np.array_equal(normals_of(height, 0.1), whole[0])
+    assert kind_of(colors) == whole[1] == ""
+    colors[-1] = colors[-1, :, :1]
+    assert kind_of(colors[..., :1].repeat(3, axis=2)) == "heights"
+
+
+@pytest.mark.parametrize(("bm", "expected"), [(-3, -3), (1e300, 100), (-1e300, -100), (0, None)])
+def test_scales(tmp_path: Path, bm: float, expected: float | None) -> None:
+    """Of both kinds: a negative one turns bumps into dents; 0 is none."""
+    statements = {"room_a": f"norm -bm {bm:g} waves.png", "room_b": f"bump -bm {bm:g} heights.png"}
+    scene = ingest(write_bumpy(tmp_path / "model", statements))
+    again = Scene.from_arrays(scene.to_arrays(), scene.images)
+    normals, heights_of = (by_name(again)[name] for name in ("room_a", "room_b"))
+    if expected is None:
+        assert normals is heights_of is None
+        assert "scale 0" in noted(scene)
+        return
+    assert normals
+    assert heights_of
+    assert (normals.scale, heights_of.scale) == (expected, 1)
+    grey = np.rint((heights() + 3) * 255 / 6).astype(np.uint8)
+    assert np.array_equal(texels(scene, heights_of), normals_of(grey, expected * RISE / 255))
+    assert (f"changed to {expected:g}" in noted(scene)) == (bm != expected)
+
+
+@pytest.mark.parametrize(
+    "normal", [{"index": 9}, {"index": 0, "scale": "x"}, [], {"index": 0, "texCoord": 7}]
+)
+def test_a_damaged_map_of_a_gltf_is_left_out(tmp_path: Path, normal: Any) -> None:
+    scene = ingest(write_gltf(tmp_path / "model", normal, {"index": 1}))
+    if isinstance(normal, dict) and "texCoord" in normal:  # a flat map
+        assert scene.normal_uv is not None
+        assert not scene.normal_uv.any()
+        return
+    assert scene.materials[0].normal is None
+    assert "normal map left out" in noted(scene)
 
 
 def test_alpha_is_dropped(tmp_path: Path) -> None:
@@ -193,7 +274,7 @@ MOVED = {"extensions": {"KHR_texture_transform": {"offset": [0.5, 0.25]}}}
     ("normal", "base", "expected"),
     [
         ({"index": 0}, {"index": 1}, None),
-        ({"index": 0, "scale": 2.5} | MOVED, {"index": 1} | MOVED, None),
+        ({"index": 0, "scale": -2.5} | MOVED, {"index": 1} | MOVED, None),
         ({"index": 0, "texCoord": 1}, {"index": 1}, (3, 0.25)),
         ({"index": 0}, {"index": 1, "texCoord": 1}, (1, 0)),
         ({"index": 0}, None, (1, 0)),

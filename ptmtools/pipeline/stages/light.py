@@ -8,7 +8,7 @@ textures.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from ptmtools.diagnostics import Warned
@@ -41,6 +41,8 @@ if TYPE_CHECKING:
 _COARSE = 0.5
 #: Decoded bytes of a lightmap of the model, which the scene stage has already decoded.
 _MOST = 1 << 40
+#: An input of a run that left out the lightmaps, as long as xatlas is not installed.
+_ABSENT = "xatlas"
 
 
 @dataclass(frozen=True)
@@ -94,8 +96,10 @@ class LightJob(Job):
             try:
                 _check_component()
             except MissingComponentError as fault:
-                left_out = Warned(f"the lightmaps of the model are left out: {fault.message}")
-                return described(work, {"lightmaps": 0}, (left_out,))
+                left_out = f"the lightmaps of the model are left out: {fault.message}"
+                remedy = f"{fault.remedy}, then build again" if fault.remedy else "build again"
+                work = replace(work, inputs={**work.inputs, _ABSENT: ""})
+                return described(work, {"lightmaps": 0}, (Warned(f"{left_out}; {remedy}"),))
         import numpy as np
 
         from ptmtools.light.model import Light
@@ -143,6 +147,14 @@ def _check_component() -> None:
     component("xatlas", "PTM-M100", "lightmaps need xatlas", "light")
 
 
+def _has_component() -> bool:
+    try:
+        _check_component()
+    except MissingComponentError:
+        return False
+    return True
+
+
 def _unlit(run: Run, lights: Lights | None, *, painted: bool) -> NDArray[np.bool_]:
     """(M,) the materials without light: those seen through, and those without a lightmap of the
     model, or that glow."""
@@ -164,7 +176,8 @@ def _painted(run: Run, lights: Lights) -> Painted:
     from ptmtools.light.looks import LightImage, Painted, red_texels
 
     scene = run[SCENE]
-    decoded = {each.data: red_texels(each.data, _MOST, "lightmap") for each in lights.maps}
+    files = {each.data for each in lights.maps}
+    decoded = {data: red_texels(data, _MOST, "lightmap") for data in files}
     images = tuple(LightImage(decoded[k.data], k.wrap, k.strength) for k in lights.maps)
     image = lights.map[scene.triangle_material]
     uv = lights.uv.astype(np.float64)
@@ -210,6 +223,9 @@ def _inputs(artifacts: Artifacts, options: LightOptions) -> dict[str, str]:
     if options.light == "none" or (options.light == "auto" and digest is None):
         return {}
     lights = {} if digest is None else {name: digest}
+    before = artifacts.before(LIGHT)
+    if before and _ABSENT in before.inputs and options.light == "auto" and not _has_component():
+        lights[_ABSENT] = ""
     return lights | artifacts.files_of(LIGHT.sources(options)) | artifacts.choices(LIGHT)
 
 

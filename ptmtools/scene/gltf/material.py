@@ -12,14 +12,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias, TypeVar
 from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.scene.colors import luminance, to_srgb
-from ptmtools.scene.gltf.document import Document, data_uri
+from ptmtools.scene.gltf.document import FAULTS, Document, data_uri, fault_of
 from ptmtools.scene.ktx2 import TranscodedBytes
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.source import (
@@ -33,6 +33,9 @@ from ptmtools.scene.source import (
 
 #: Maps the JSON of a material to that of one of its textures.
 TextureOf = Callable[[dict[str, Any]], dict[str, Any] | None]
+T = TypeVar("T")
+#: A texture, and as `_placing`.
+_Placed: TypeAlias = "tuple[Texture | None, str, NDArray[np.float64], bool]"
 
 _KTX2 = "image/ktx2"
 _WRAPS: dict[int | None, SourceWrap] = {33071: "clamp", 33648: "mirror"}
@@ -50,6 +53,7 @@ class MaterialUse:
     see_through: whether its alpha mode is not opaque.
     light: (3,) its base colour, linear light, the factor of vertex colours.
     normal_coords, normal_matrix: those of its normal map, if they are not those above; or None.
+    optional: whether it can be drawn without its texture.
     """
 
     index: int
@@ -59,20 +63,29 @@ class MaterialUse:
     light: NDArray[np.float64]
     normal_coords: str | None = None
     normal_matrix: NDArray[np.float64] | None = None
+    optional: bool = False
 
 
 class MaterialReader:
     """Reads each material once, on first use.
 
-    ``texture_of`` selects the texture of a material; the default is that of the base colour.
+    ``texture_of`` selects the texture of a material; the default is that of the base colour. With
+    another, materials have neither normal maps nor emission, and so it is for normal maps without
+    ``normals``. Damage of an emission, a normal map or another texture is a note.
     """
 
     def __init__(
-        self, document: Document, findings: Findings, texture_of: TextureOf | None = None
+        self,
+        document: Document,
+        findings: Findings,
+        texture_of: TextureOf | None = None,
+        *,
+        normals: bool = True,
     ) -> None:
         self._document = document
         self._findings = findings
         self._texture_of = texture_of
+        self._normals = normals and texture_of is None
         self._uses: dict[tuple[int | None, bool], MaterialUse] = {}
         self._materials: list[SourceMaterial] = []
 
@@ -100,8 +113,6 @@ class MaterialReader:
         if glossy is not None:
             factor = glossy.get("diffuseFactor", [1.0, 1.0, 1.0, 1.0])
             use = glossy.get("diffuseTexture")
-        if self._texture_of is not None:
-            use = self._texture_of(entry)
         r, g, b, a = (_share(value) for value in factor)
         if (r, g, b) != (1.0, 1.0, 1.0):
             self._findings.note("PTM-N215", f"{name}: colour factor converted to sRGB", place)
@@ -116,24 +127,31 @@ class MaterialReader:
             self._findings.note("PTM-N215", f"{name}: transmits light, never occludes", place)
             see_through = True
 
-        texture, coords, matrix = None, "TEXCOORD_0", np.eye(2, 3)
-        if use is not None:
-            texture = self._texture(use["index"], place, _share(use.get("strength", 1.0)))
-            coords, matrix, moved = _placing(use)
-            if moved:
-                self._findings.note(
-                    "PTM-N215", f"{name}: KHR_texture_transform baked into its faces", place
-                )
+        placed: _Placed = None, "TEXCOORD_0", np.eye(2, 3), False
+        if self._texture_of is not None:
+            # The code of textures that are missing.
+            what = f"{name}: texture"
+            placed = self._optional("PTM-N204", what, place, self._other, entry) or placed
+        elif use is not None:
+            placed = self._placed(use, place)
+        texture, coords, matrix, moved = placed
+        if moved:
+            message = f"{name}: KHR_texture_transform baked into its faces"
+            self._findings.note("PTM-N215", message, place)
         normal, normal_coords, normal_matrix = None, None, None
-        relief = None if self._texture_of else entry.get("normalTexture")
-        image = None if relief is None else self._texture(relief["index"], place, 1.0)
-        if relief is not None and image is not None:
-            normal_coords, normal_matrix, _ = _placing(relief)
+        relief = glow = None
+        if self._normals and "normalTexture" in entry:
+            what = f"{name}: normal map"
+            relief = self._optional("PTM-N215", what, place, self._normal, entry)
+        if relief is not None:
+            image, scale, normal_coords, normal_matrix = relief
             same = texture is not None and normal_coords == coords
             own = not (same and np.array_equal(normal_matrix, matrix))
-            normal = NormalTexture(image, finite(relief.get("scale", 1.0)), own=own)
+            normal = NormalTexture(image, scale, own=own)
             if not own:
                 normal_coords = normal_matrix = None
+        if self._texture_of is None:
+            glow = self._optional("PTM-N215", f"{name}: emission", place, self._glow, entry)
         self._materials.append(
             SourceMaterial(
                 name=name,
@@ -146,7 +164,7 @@ class MaterialReader:
                 two_sided=bool(entry.get("doubleSided", False)),
                 texture=texture,
                 normal=normal,
-                **self._glow(entry, place),
+                **(glow or {}),
             )
         )
         return MaterialUse(
@@ -157,17 +175,55 @@ class MaterialReader:
             light,
             normal_coords,
             normal_matrix,
+            self._texture_of is not None,
         )
+
+    def _optional(
+        self,
+        code: str,
+        what: str,
+        place: str,
+        read: Callable[[dict[str, Any], str], T | None],
+        entry: dict[str, Any],
+    ) -> T | None:
+        """``read(entry, place)``; None, and a note on ``what``, if it is damaged."""
+        try:
+            return read(entry, place)
+        except FAULTS as fault:
+            self._findings.note(code, f"{what} left out: {fault_of(fault)}", place)
+            return None
+
+    def _placed(self, use: dict[str, Any], place: str) -> _Placed:
+        """A texture that a material names."""
+        texture = self._texture(use["index"], place, _share(use.get("strength", 1.0)))
+        return texture, *_placing(use)
+
+    def _other(self, entry: dict[str, Any], place: str) -> _Placed | None:
+        """The texture in place of that of the base colour."""
+        assert self._texture_of
+        use = self._texture_of(entry)
+        return None if use is None else self._placed(use, place)
+
+    def _normal(
+        self, entry: dict[str, Any], place: str
+    ) -> tuple[Texture, float, str, NDArray[np.float64]] | None:
+        """The image of a normal map, its scale, and as `_placing`."""
+        use = entry["normalTexture"]
+        scale = _finite(use.get("scale", 1.0))
+        image, coords, matrix, _ = self._placed(use, place)
+        return None if image is None else (image, scale, coords, matrix)
 
     def _glow(self, entry: dict[str, Any], place: str) -> dict[str, Any]:
         """The emission of a material, as the fields of a `SourceMaterial`."""
         factor = [_share(value) for value in entry.get("emissiveFactor", [0.0, 0.0, 0.0])]
-        if self._texture_of is not None or not any(factor):
+        extensions = entry.get("extensions", {})
+        if not any(factor) or "KHR_materials_unlit" in extensions:
             return {}
-        stronger = entry.get("extensions", {}).get("KHR_materials_emissive_strength", {})
+        stronger = extensions.get("KHR_materials_emissive_strength", {})
         strength = finite(stronger.get("emissiveStrength", 1.0))
         use = entry.get("emissiveTexture")
-        image = None if use is None else self._texture(use["index"], place, 1.0)
+        with self._findings.optional():
+            image = None if use is None else self._texture(use["index"], place, 1.0)
         return {"glow": strength * float(luminance(np.array(factor))), "glow_map": image}
 
     def _texture(self, index: int, place: str, strength: float) -> Texture | None:
@@ -214,9 +270,14 @@ def _share(value: Any) -> float:
 
 def finite(value: Any) -> float:
     """A finite number, 0 for a negative one; ValueError for other values."""
+    return max(_finite(value), 0.0)
+
+
+def _finite(value: Any) -> float:
+    """A finite number; ValueError for other values."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise ValueError(f"{value!r} is not a number")
-    return max(float(value), 0.0)
+    return float(value)
 
 
 def _placing(use: dict[str, Any]) -> tuple[str, NDArray[np.float64], bool]:

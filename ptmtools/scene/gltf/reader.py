@@ -24,10 +24,17 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError, LimitError
 from ptmtools.glb import COMPONENTS, meaning, natural
 from ptmtools.scene.colors import encoded, luminance
-from ptmtools.scene.gltf.document import Document, check_extensions, damaged, open_document
+from ptmtools.scene.gltf.document import (
+    FAULTS,
+    Document,
+    check_extensions,
+    damaged,
+    fault_of,
+    open_document,
+)
 from ptmtools.scene.gltf.draco import EXTENSION as DRACO, Decoded, decode_primitives
 from ptmtools.scene.gltf.material import MaterialReader, MaterialUse, TextureOf, finite
-from ptmtools.scene.lights import Lamp, LampKind
+from ptmtools.scene.lights import MOST, Lamp, LampKind
 from ptmtools.scene.model import Camera
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.source import MAX_VERTICES, Rows, Source, too_many_triangles
@@ -150,34 +157,53 @@ def cameras(
     return tuple(result)
 
 
-def lamps(tree: dict[str, Any], world: dict[int, Floats]) -> tuple[Lamp, ...]:
-    """The lamps of the nodes (KHR_lights_punctual), which shine along -Z. Their ranges are hints,
-    and have no effect."""
-    kinds: dict[str, LampKind] = {"point": "point", "spot": "spot", "directional": "sun"}
+#: By the names of KHR_lights_punctual.
+_KINDS: dict[str, LampKind] = {"point": "point", "spot": "spot", "directional": "sun"}
+
+
+def lamps(tree: dict[str, Any], world: dict[int, Floats], findings: Findings) -> tuple[Lamp, ...]:
+    """The lamps of the nodes (KHR_lights_punctual). One that is damaged is left out, with a
+    note."""
     result = []
     for node, matrix in world.items():
         use = tree["nodes"][node].get("extensions", {}).get(_LIGHTS)
         if use is None:
             continue
-        entry = tree["extensions"][_LIGHTS]["lights"][natural(use["light"])]
-        color = np.array([finite(part) for part in entry.get("color", [1.0, 1.0, 1.0])])
-        intensity = finite(entry.get("intensity", 1.0)) * float(luminance(color))
-        with np.errstate(all="ignore"):
-            way = -matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
-        if not (intensity and np.isfinite(way).all() and np.isfinite(matrix[:3, 3]).all()):
+        try:
+            lamp = _lamp(tree["extensions"][_LIGHTS]["lights"][natural(use["light"])], matrix)
+        except FAULTS as fault:
+            findings.note("PTM-N215", f"lamp left out: {fault_of(fault)}", f"node {node}")
             continue
-        angles = entry.get("spot", {})
-        outer = min(finite(angles.get("outerConeAngle", math.pi / 4)), math.pi / 2)
-        inner = min(finite(angles.get("innerConeAngle", 0.0)), outer)
-        x, y, z = matrix[:3, 3].tolist()
-        dx, dy, dz = way.tolist()
-        cone = math.cos(inner), math.cos(outer)
-        result.append(Lamp(kinds[entry["type"]], (x, y, z), (dx, dy, dz), intensity, cone))
+        if lamp.intensity > MOST:
+            findings.note("PTM-N215", f"intensity of a lamp reduced to {MOST:g}", f"node {node}")
+            lamp = replace(lamp, intensity=MOST)
+        if lamp.intensity:
+            result.append(lamp)
     return tuple(result)
 
 
-#: Exceptions of malformed documents, which can be malformed in any place.
-_FAULTS = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
+def _lamp(entry: dict[str, Any], matrix: Floats) -> Lamp:
+    """The lamp of a node, which shines along its -Z. Its range is a hint, and has no effect. Raises
+    one of `FAULTS`."""
+    kind = _KINDS[entry["type"]]
+    color = np.array([finite(part) for part in entry.get("color", [1.0, 1.0, 1.0])])
+    intensity = finite(entry.get("intensity", 1.0)) * float(luminance(color))
+    if not (np.abs(matrix[:3, 3]) <= MOST).all():
+        raise ValueError(f"more than {MOST:g} m away")
+    x, y, z = matrix[:3, 3].tolist()
+    if kind == "point":
+        return Lamp(kind, (x, y, z), intensity=intensity)
+    with np.errstate(all="ignore"):
+        way = -matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
+    if not np.isfinite(way).all():
+        raise ValueError("no direction")
+    angles = entry.get("spot", {})
+    outer = min(finite(angles.get("outerConeAngle", math.pi / 4)), math.pi / 2)
+    inner = min(finite(angles.get("innerConeAngle", 0.0)), outer)
+    dx, dy, dz = way.tolist()
+    return Lamp(kind, (x, y, z), (dx, dy, dz), intensity, (math.cos(inner), math.cos(outer)))
+
+
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 #: Largest number of vertices per allowed triangle.
 _VERTICES_PER_TRIANGLE = 10
@@ -209,8 +235,10 @@ def read_gltf(
     findings: Findings,
     max_triangles: int = MAX_VERTICES,
     texture_of: TextureOf | None = None,
+    *,
+    normals: bool = True,
 ) -> Source:
-    """Reads a glTF model; ``texture_of`` as in `MaterialReader`.
+    """Reads a glTF model; ``texture_of`` and ``normals`` as in `MaterialReader`.
 
     Raises InputError if it is damaged or requires an unsupported extension; LimitError, before
     arrays are allocated, for more vertices than int32 can number (PTM-L203) or more triangles than
@@ -218,14 +246,16 @@ def read_gltf(
     """
     try:
         document = open_document(path, findings.folder)
-        return _read(document, findings, max_triangles, texture_of)
-    except _FAULTS as error:
-        text = f"{error.args[0]!r} is missing" if isinstance(error, KeyError) else str(error)
-        raise damaged(path, text.splitlines()[0] if text else type(error).__name__) from None
+        materials = MaterialReader(document, findings, texture_of, normals=normals)
+        return _read(document, findings, max_triangles, materials)
+    except InputError:
+        raise
+    except FAULTS as error:
+        raise damaged(path, fault_of(error)) from None
 
 
 def _read(
-    document: Document, findings: Findings, max_triangles: int, texture_of: TextureOf | None
+    document: Document, findings: Findings, max_triangles: int, materials: MaterialReader
 ) -> Source:
     path, tree = document.path, document.tree
     check_extensions(tree, findings)
@@ -234,7 +264,6 @@ def _read(
     draws = list(_limited(document, every, max_triangles))
     if not draws:
         raise InputError("PTM-I247", "no faces", file=path, remedy="use a model with triangles")
-    materials = MaterialReader(document, findings, texture_of)
     uses = [
         materials.read(draw.primitive.get("material"), "COLOR_0" in draw.attributes)
         for draw in draws
@@ -250,7 +279,8 @@ def _read(
             normal_uv = None
             if use.normal_coords is not None and use.normal_matrix is not None:
                 count = len(points)
-                own = _coordinates(values, use.normal_coords, use.normal_matrix, count)
+                place = use.normal_coords, use.normal_matrix
+                own = _coordinates(values, *place, count, optional=True)
                 normal_uv = own[triangles]
             placed = instances(document, draw.node)
             key = (True, draco["bufferView"]) if draco else (False, draw.attributes["POSITION"])
@@ -270,7 +300,7 @@ def _read(
     return rows.source(
         materials=materials.materials,
         cameras=cameras(tree, world_of, findings),
-        lamps=lamps(tree, world_of),
+        lamps=lamps(tree, world_of, findings),
         metres=1.0,
         up="y",
         step=step,
@@ -408,7 +438,8 @@ def _mesh(
     # Draco always encodes triangles.
     mode = _TRIANGLES if values.decoded else draw.mode
     triangles = _triangles(values.indices(len(points)), mode)
-    uv = _coordinates(values, use.coords, use.matrix, len(points))
+    place = use.coords, use.matrix
+    uv = _coordinates(values, *place, len(points), optional=use.optional)
     colors, raw = None, values.attribute("COLOR_0", len(points))
     if raw is not None:
         colors = encoded(raw[:, :3] * use.light)[triangles]
@@ -417,12 +448,20 @@ def _mesh(
     return points, triangles, uv[triangles], colors
 
 
-def _coordinates(values: _Values, name: str, matrix: Floats, count: int) -> Floats:
-    """(n, 2) texture coordinates from the lower left, transformed; 0 without the attribute."""
-    raw = values.attribute(name, count)
-    if raw is None:
-        return np.zeros((count, 2))
-    moved = raw @ matrix[:, :2].T + matrix[:, 2]
+def _coordinates(
+    values: _Values, name: str, matrix: Floats, count: int, *, optional: bool = False
+) -> Floats:
+    """(n, 2) texture coordinates from the lower left, transformed; 0 without the attribute. With
+    ``optional`` NaN without it, and if it is damaged."""
+    try:
+        raw = values.attribute(name, count)
+        moved = None if raw is None else raw @ matrix[:, :2].T + matrix[:, 2]
+    except FAULTS:
+        if not optional:
+            raise
+        moved = None
+    if moved is None:
+        return np.full((count, 2), np.nan if optional else 0.0)
     return np.stack([moved[:, 0], 1.0 - moved[:, 1]], axis=1)
 
 

@@ -6,6 +6,7 @@ The faces are cleaned as those of the scene, and are the same ones.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -26,18 +27,21 @@ class SecondReading:
 
     Attributes
     ----------
-    source: the file.
-    faces: (T,) its faces that are in the scene.
+    source: the file; coordinates are NaN where it has none for the texture.
     asked: for each of its materials, whether it names such a texture.
-    missing: notes on missing textures, in the order of the materials.
+    missing: notes on missing and damaged textures, in the order of the materials.
     sought: the files that were looked for, as `Scene.files`.
     """
 
     source: Source
-    faces: Ints
     asked: tuple[bool, ...]
     missing: tuple[Note, ...]
     sought: tuple[str, ...]
+
+    @cached_property
+    def faces(self) -> Ints:
+        """(T,) the faces that are in the scene."""
+        return keep_faces(self.source.points, self.source.triangles).source
 
 
 def read_again(model: Path, options: IngestOptions, texture_of: TextureOf) -> SecondReading | None:
@@ -55,5 +59,4 @@ def read_again(model: Path, options: IngestOptions, texture_of: TextureOf) -> Se
     findings = Findings(model, options.allow_outside)
     source = read_gltf(model, findings, options.max_triangles, asking)
     missing = tuple(note for note in findings.notes if note.code in ("PTM-N204", "PTM-N205"))
-    faces = keep_faces(source.points, source.triangles).source
-    return SecondReading(source, faces, tuple(asked), missing, tuple(findings.folder.sought))
+    return SecondReading(source, tuple(asked), missing, tuple(findings.folder.sought))
