@@ -147,6 +147,7 @@ def test_without_xatlas(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(light_stage, "component", missing)
     stage = built(made / "lit.glb", tmp_path / "db")["light"]
     assert stage.counts["lightmaps"] == 0
+    assert stage.counts["light"] == "none"
     assert "xatlas" in stage.warnings[0]
     with pytest.raises(MissingComponentError):
         built(made / "lit.glb", tmp_path / "db", LightOptions("model"))

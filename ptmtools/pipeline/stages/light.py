@@ -67,6 +67,10 @@ def lightmap_stem(cell: int) -> str:
     return f"light~{cell_name(cell)}"
 
 
+#: The counts of a building without light.
+_NO_LIGHT = {"lightmaps": 0, "light": "none"}
+
+
 class LightJob(Job):
     """Bakes the light of all cells."""
 
@@ -89,13 +93,13 @@ class LightJob(Job):
                 remedy="use --light bake, or a glTF with occlusion textures that do not repeat",
             )
         if self.options.light == "none" or (self.options.light == "auto" and not has_maps):
-            return described(work, {"lightmaps": 0}, ())
+            return described(work, _NO_LIGHT, ())
         if self.options.light == "auto":
             try:
                 _check_component()
             except MissingComponentError as fault:
                 left_out = Warned(f"the lightmaps of the model are left out: {fault.message}")
-                return described(work, {"lightmaps": 0}, (left_out,))
+                return described(work, _NO_LIGHT, (left_out,))
         import numpy as np
 
         from ptmtools.light.model import Light
