@@ -127,8 +127,8 @@ def test_lamps_of_unlike_kinds_and_ways_stay_apart() -> None:
     turned = lamps.only(np.arange(_MOST))
     turned.kind[:] = _SPOT
     turned.way[:, 1] *= -1
-    same = [np.concatenate(pair) for pair in zip(*(vars(x).values() for x in (lamps, turned)))]
-    up = Lamps(*same)
+    pairs = zip(vars(lamps).values(), vars(turned).values(), strict=True)
+    up = Lamps(*map(np.concatenate, pairs))
     joined = _joined(up)
     for kind in (_POINT, _SPOT, _SUN):
         own, before = joined.only(joined.kind == kind), up.only(up.kind == kind)
