@@ -154,9 +154,7 @@ def parts(model: Path) -> None:
     glass = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials])
     pieces = pieces_of(Geometry(scene, cells), cells, glass, 1 / LightOptions().light_density)
     options, lit = LightOptions("bake"), with_panels(scene, cells)
-    print(
-        f"| {model.stem} | patches of lamps | slope | s, one processor | of ambient | .ptm, kB |"
-    )
+    print(f"| {model.stem} | patches of lamps | slope | s, one processor | of ambient | .ptm, kB |")
     print("|---|--:|--:|--:|--:|--:|")
     least = 0.0
     for name, of, glowing in (("ambient", scene, None), ("+ sky", scene, None), ("+ lamps", *lit)):
