@@ -154,9 +154,7 @@ def parts(model: Path) -> None:
     glass = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials])
     pieces = pieces_of(Geometry(scene, cells), cells, glass, 1 / LightOptions().light_density)
     options, lit = LightOptions("bake"), with_panels(scene, cells)
-    print(
-        f"| {model.stem} | patches of lamps | factor | s, one processor | of ambient | .ptm, kB |"
-    )
+    print(f"| {model.stem} | patches of lamps | slope | s, one processor | of ambient | .ptm, kB |")
     print("|---|--:|--:|--:|--:|--:|")
     least = 0.0
     for name, of, glowing in (("ambient", scene, None), ("+ sky", scene, None), ("+ lamps", *lit)):
@@ -169,7 +167,7 @@ def parts(model: Path) -> None:
         least = least or seconds
         size = sum(ptm_bytes(r.texels) for r in results if r.texels is not None)
         lamps = 0 if mix.lamps is None else len(mix.lamps)
-        print(f"| {name} | {lamps} | {mix.factor:.2f} | {seconds:.1f} | {seconds / least:.2f} "
+        print(f"| {name} | {lamps} | {mix.slope:.2f} | {seconds:.1f} | {seconds / least:.2f} "
               f"| {size / 1e3:,.0f} |", flush=True)  # fmt: skip
 
 

@@ -138,7 +138,7 @@ class Cluster(Executor):
                 self._wait_for_workers()
             finally:
                 if value is not None:
-                    value.release()  # so would it the value
+                    value.release()  # or the client would keep it on the workers
 
     def close(self) -> None:
         """Leaves the cluster, which drops our tasks."""

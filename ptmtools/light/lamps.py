@@ -2,9 +2,10 @@
 
 Glowing surfaces are divided into patches. The light of a patch at a point is that of a small disc,
 E = L A cos cos' / (r² + A/π), which is finite everywhere and exact far away and on the axis of a
-disc. The light that all lamps would send without anything between is summed, and shadow rays go to
-lamps that are chosen in proportion to their parts of it (systematic sampling): the share that is
-free counts for all of them. So light is without grain where no lamp is half hidden.
+disc. Where there are too many lamps without a surface, those near each other join. The light that
+all lamps would send without anything between is summed, and shadow rays go to lamps that are chosen
+in proportion to their parts of it (systematic sampling): the share that is free counts for all of
+them. So light is without grain where no lamp is half hidden.
 
 Nits, candela and lux of a model seldom fit each other or the pictures. So each kind is measured by
 its own light: 1 is the median on the surfaces that it reaches at all.
@@ -24,8 +25,12 @@ from ptmtools.light.occlusion import RAYS, Surroundings, normals, points_on, spr
 from ptmtools.scene.lights import KINDS, Lights
 from ptmtools.scene.model import Scene
 
-#: Metres of the side of a patch, and most patches of a scene, which are larger where necessary.
+#: Metres of the side of a patch, and most patches of a scene, which are larger where necessary. So
+#: are the cubes in which lamps without a surface join.
 _PATCH, _MOST = 0.2, 4096
+#: Lamps that join differ by at most this in each component of their ways and cones, in cubes of the
+#: least size, and by twice as much in those of twice the size.
+_APART = 0.1
 #: A point of a lamp is no nearer than this, metres: within a bulb light would be infinite.
 _NEAREST = 0.1
 #: Least luminance of a material that is a lamp; less is a shine to bring out colours. If more than
@@ -80,8 +85,41 @@ def lamps_of(scene: Scene, lights: Lights | None) -> Lamps:
         np.zeros(len(lights.lamps)),
         np.array([lamp.cone for lamp in lights.lamps]).reshape(-1, 2),
     )
-    pairs = zip(vars(single).values(), vars(patches).values(), strict=True)
+    pairs = zip(vars(_joined(single)).values(), vars(patches).values(), strict=True)
     return Lamps(*(np.concatenate(pair) for pair in pairs))
+
+
+def _joined(lamps: Lamps) -> Lamps:
+    """Lamps without a surface, at most `_MOST`: those of a kind in a cube with ways and cones alike
+    become one, with the sum of their powers and the means, weighted by these, of all else."""
+    lamps, size = lamps.only(lamps.power > 0), 1.0
+    while len(lamps) > _MOST:
+        turned, placed = lamps.kind != _POINT, lamps.kind != _SUN
+        cube = np.where(placed[:, None], lamps.place, 0) // (size * _PATCH)
+        shape = np.concatenate([lamps.way, lamps.cone], axis=1)
+        alike = np.where(turned[:, None], shape, 0) // (size * _APART)
+        _, first, group = np.unique(
+            np.concatenate([lamps.kind[:, None], cube, alike], axis=1),
+            axis=0,
+            return_index=True,
+            return_inverse=True,
+        )
+        lamps = _together(lamps, group.ravel(), lamps.kind[first])
+        size *= 2
+    return lamps
+
+
+def _together(lamps: Lamps, group: Ints, kind: NDArray[np.uint8]) -> Lamps:
+    """One lamp of each (G,) kind for the lamps of each group."""
+    power = np.bincount(group, lamps.power).astype(np.float64)
+    share = lamps.power / power[group]
+    place, way, cone = (
+        np.stack([np.bincount(group, share * part) for part in value.T], axis=1).astype(np.float64)
+        for value in (lamps.place, lamps.way, lamps.cone)
+    )
+    long = np.linalg.norm(way, axis=1, keepdims=True)
+    way = np.where(long > 0, way / np.where(long > 0, long, 1), [0.0, -1.0, 0.0])
+    return Lamps(kind, place, way, power, np.zeros(len(power)), cone)
 
 
 def glowing(scene: Scene, lights: Lights) -> Floats:

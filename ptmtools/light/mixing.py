@@ -2,10 +2,10 @@
 
 Ambient light is what surfaces nearby leave (`occlusion`). The share of rays that reach the sky, by
 windows and other openings, adds to it, and so does the direct light of lamps. Both saturate: of the
-usual light a surface shows a half, of twice as much two thirds. The sum is scaled so that its
-bright end shows as white: pictures keep about their colours near windows and lamps, and become
-darker elsewhere. (With the mean kept, all floors were cut off at 1.) A building without either is
-as by ambient light alone.
+usual light a surface shows a half, of twice as much two thirds. Of the sum, what is above a knee
+counts less, so that its bright end shows as white: rooms without windows and lamps stay about as
+bright as by ambient light alone, and little is cut off. (With all of the sum scaled, such rooms
+became dark; with the mean kept, all floors were cut off at 1.)
 """
 
 from __future__ import annotations
@@ -36,8 +36,10 @@ if TYPE_CHECKING:
 SKY = 0.1
 #: Where less of the sky is seen, this many times as many rays look for it: few of them meet it.
 _FINER = 4
-#: The share of all surfaces that is darker than the bright end; the range of the factor.
-_BRIGHT, _DARKEST, _WHITE = 0.98, 0.5, 1.0
+#: The share of all surfaces that is darker than the bright end.
+_BRIGHT = 0.98
+#: The least light of which a part shows: somewhat less than that of an open wall in a room.
+_KNEE = 0.57
 #: Shadow rays for each ray of ambient light: lamps themselves have no grain.
 _SHADOWS = 0.25
 #: Points that stand for all surfaces.
@@ -52,12 +54,12 @@ class Mix:
     ----------
     lamps: `measured`; None without any.
     sky: whether the sky is seen from some surface.
-    factor: of the sum.
+    slope: the part that shows of light above the knee.
     """
 
     lamps: Lamps | None = None
     sky: bool = False
-    factor: float = 1.0
+    slope: float = 1.0
 
     def look(self, rays: Rays) -> Mixed | Rays:
         """The light of the faces of ``rays``."""
@@ -65,6 +67,11 @@ class Mix:
             return rays
         lamps = None if self.lamps is None else near(self.lamps, rays.corner)
         return Mixed(rays, lamps, self)
+
+    def shown(self, total: Singles) -> Singles:
+        """(n,) all light as it shows."""
+        above = np.maximum(total - _KNEE, 0)
+        return np.asarray(total - (1 - self.slope) * above, np.float32)
 
 
 @dataclass(frozen=True)
@@ -82,7 +89,7 @@ class Mixed:
 
     def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
         total = _sum(self.rays, self.lamps, self.mix.sky, (face, point, turn))[0]
-        return np.asarray(self.mix.factor * total, np.float32)
+        return self.mix.shown(total)
 
 
 def _sum(
@@ -135,4 +142,5 @@ def mixed(
     if some is None and not seen.any():
         return Mix()
     bright = float(np.quantile(total.astype(np.float64), _BRIGHT))
-    return Mix(some, bool(seen.any()), float(np.clip(white / bright, _DARKEST, _WHITE)))
+    slope = (white - _KNEE) / max(bright - _KNEE, white - _KNEE)
+    return Mix(some, bool(seen.any()), slope)

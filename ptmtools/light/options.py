@@ -47,10 +47,10 @@ class LightOptions:
                     f"--light-{name} {value:g} is not possible",
                     remedy=f"use {least:g} to {most:g}",
                 )
-            used = self.light == "bake" or (self.light == "model" and name == "density")
-            if not used and value != getattr(type(self), field):
+            used = ("auto", "bake", "model") if name == "density" else ("bake",)
+            if self.light not in used and value != getattr(type(self), field):
                 raise InputError(
                     "PTM-I111",
-                    f"--light-{name} does nothing without --light bake",
-                    remedy="add --light bake",
+                    f"--light-{name} does nothing with --light {self.light}",
+                    remedy=f"leave it out, or use --light {' or '.join(used)}",
                 )

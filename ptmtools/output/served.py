@@ -26,6 +26,7 @@ from ptmtools import schemas
 from ptmtools.arrays import Bools, Floats, Ints, normals
 from ptmtools.errors import DatabaseError, Rebuild
 from ptmtools.files import open_regular
+from ptmtools.output.bumps import Bumps, bumps_of, corners_of
 from ptmtools.output.gltf import WRAPS
 from ptmtools.output.gltf_reader import ReadGlb, ReadPrimitive, read_glb
 from ptmtools.output.mesh_levels import row_fault
@@ -153,24 +154,6 @@ class MappedRelief:
     number: NDArray[np.int32]
     uv: Floats
     frame: NDArray[np.float32]
-
-
-@dataclass(frozen=True)
-class Bumps:
-    """The normal maps of materials on triangles.
-
-    Attributes
-    ----------
-    number: (n,) int32, the normal map in the hints, -1 without.
-    uv: (n, 3, 2) float64 coordinates in it, origin at the upper left; 0 without one.
-    scale: (n,) factor of x and y of its normals.
-    clamped: (n, 2) as in `Surfaces`.
-    """
-
-    number: NDArray[np.int32]
-    uv: Floats
-    scale: Floats
-    clamped: Bools
 
 
 @dataclass(frozen=True)
@@ -466,7 +449,7 @@ def _surfaces(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
         -1 if p.uv is None or p.material.texture is None else p.material.texture for _, p in shapes
     ]
     lightmap = [-1 if m.light is None else m.light for m in materials]
-    spot = joined([_corners(p.light, p.triangle) for _, p in shapes], 2)
+    spot = joined([corners_of(p.light, p.triangle) for _, p in shapes], 2)
     clamp = WRAPS["clamp"]
     corner = joined([p.point.astype(np.float64)[p.triangle] for _, p in shapes], 3)
     cell = spread([cell for cell, _ in shapes], np.int32)
@@ -474,7 +457,7 @@ def _surfaces(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
     mean = joined([_colors(p) for _, p in shapes], 3).mean(axis=1)
     return Surfaces(
         corner=corner,
-        uv=joined([_corners(p.uv, p.triangle) for _, p in shapes], 2),
+        uv=joined([corners_of(p.uv, p.triangle) for _, p in shapes], 2),
         cell=cell,
         shape=np.repeat(np.arange(len(shapes), dtype=np.int32), count),
         texture=spread(texture, np.int32),
@@ -489,13 +472,8 @@ def _surfaces(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
         lightmap=spread(lightmap, np.int32) if max(lightmap, default=-1) >= 0 else None,
         spot=spot if max(lightmap, default=-1) >= 0 else None,
         relief=_relief([p for _, p in shapes]),
-        bumps=_bumps([p for _, p in shapes], count),
+        bumps=bumps_of([p for _, p in shapes], count),
     )
-
-
-def _corners(uv: NDArray[np.float32] | None, triangle: Ints) -> Floats:
-    """(m, 3, 2) coordinates of the corners of triangles; 0 without."""
-    return np.zeros((len(triangle), 3, 2)) if uv is None else uv.astype(np.float64)[triangle]
 
 
 def _relief(shapes: list[ReadPrimitive]) -> MappedRelief | None:
@@ -511,19 +489,6 @@ def _relief(shapes: list[ReadPrimitive]) -> MappedRelief | None:
             number[own], uv[own] = p.material.normal or 0, p.light[p.triangle]
             frame[own] = p.frame[p.triangle[:, 0]]  # the corners have the same
     return MappedRelief(number, uv, frame)
-
-
-def _bumps(shapes: list[ReadPrimitive], count: list[int]) -> Bumps | None:
-    if all(p.normal is None for p in shapes):
-        return None
-    number = [-1 if p.normal is None else p.material.normal for p in shapes]
-    clamped = [[wrap == WRAPS["clamp"] for wrap in p.material.normal_wrap] for p in shapes]
-    return Bumps(
-        np.repeat(np.array(number, np.int32), count),
-        np.concatenate([_corners(p.normal, p.triangle) for p in shapes]),
-        np.repeat([float(p.material.scale) for p in shapes], count),
-        np.repeat(np.array(clamped, np.bool_), count, axis=0),
-    )
 
 
 def _colors(primitive: ReadPrimitive) -> Floats:

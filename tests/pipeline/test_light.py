@@ -208,7 +208,31 @@ def test_impossible_options(options: dict[str, Any]) -> None:
 
 def test_options_without_light(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["build-scene", "x.obj", "--light-samples", "9"]) == 3
-    assert "--light-samples does nothing without --light" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert "--light-samples does nothing with --light auto" in error
+    assert "use --light bake" in error
+
+
+@pytest.mark.parametrize("light", ["auto", "model", "bake"])
+def test_density_is_of_all_lightmaps(light: Any) -> None:
+    assert LightOptions(light, light_density=4.0).light_density == 4.0
+
+
+@pytest.mark.parametrize(
+    ("light", "more"),
+    [
+        ("none", {"light_density": 4.0}),
+        ("model", {"light_samples": 9}),
+        ("auto", {"light_reach": 9}),
+    ],
+)
+def test_options_of_other_light(light: Any, more: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match=f"does nothing with --light {light}") as refused:
+        LightOptions(light, **more)
+    assert refused.value.code == "PTM-I111"
+    density = "light_density" in more
+    remedy = "auto or bake or model" if density else "bake"
+    assert refused.value.remedy == f"leave it out, or use --light {remedy}"
 
 
 def replaced(db: Path, **arrays: Any) -> None:

@@ -151,7 +151,7 @@ def test_without_xatlas(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     with monkeypatch.context() as without:
         without.setattr(light_stage, "component", missing)
         stage = built(model, db)["light"]
-        assert stage.counts["lightmaps"] == 0
+        assert (stage.counts["lightmaps"], stage.counts["light"]) == (0, "none")
         for text in ("xatlas", "pip install 'ptmtools[light]', then build again"):
             assert text in stage.warnings[0]
         assert built(model, db) == {}

@@ -29,6 +29,7 @@ from ptmtools.site.publishing import weight_of
 from ptmtools.site.sets import is_of_sets
 from ptmtools.site.throttle import Throttle
 from ptmtools.walk import parse_walk
+from tests.scene.bumpy import write_bumpy
 from tests.site.conftest import PLAIN, ROOT, Visiting, build
 from tests.site.test_forms import check_texels
 from tests.site.test_recording import AT_ONCE
@@ -115,6 +116,25 @@ def test_the_order_of_files(visit: Visiting, hall: Site) -> None:
     assert len(near) == 6
     assert steps == sorted(steps), asked
     assert max(steps) > 2
+
+
+def test_normal_maps_come_after_the_colours_of_a_room(visit: Visiting, tmp_path: Path) -> None:
+    model = write_bumpy(tmp_path / "model")
+    words = ["--format", "gltf,interlace", "--samples", "1"]
+    site = site_of(build(model, tmp_path / "bumpy.db", *words), PLAIN)
+    bumps = {t for t, row in enumerate(site.index["textures"]) if row.get("normals")}
+    with visit(site, query=GPUII, width=640, height=480) as visitor:
+        visitor.complete()
+        visitor.until(SETTLED)
+        visitor.until("ptm.walk.renderer.statues?.levels[0] > 0")
+        held = visitor.state()["held"]
+        assert visitor.messages == []
+    seen = {t for t in bumps if held[t]}
+    assert seen
+    asked = [t for t, _ in files([v.path for v in visitor.visits])]
+    first = min(asked.index(t) for t in seen)
+    assert first > 0
+    assert set(asked[:first]).isdisjoint(bumps)
 
 
 def test_a_site_without_sets(visit: Visiting, museum: Site) -> None:

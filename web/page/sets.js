@@ -38,6 +38,7 @@ export async function setsOf(site, gl, options, fetcher) {
 /** @param {import("./walkthrough.js").Walkthrough} walk @param {TextureSet[]} sets */
 function attach(walk, sets) {
   const { catalogue, client, gl, rows, sharpness } = walk, { K, T, memory } = catalogue;
+  const normals = walk.index.textures.map((row) => row.normals === true);
   for (let t = 0; t < T; t++) {
     for (let k = 1; k < K; k++) memory[t * K + k] = sets[t].memory[k - 1] ?? memory[t * K + k - 1];
     // The files so far have as many texels as the image.
@@ -53,11 +54,12 @@ function attach(walk, sets) {
     pieces.set(cell, /** @type {import("./data/glb.js").Shape[]} */ (shapes).flatMap((shape) => [
       ...(shape.uvs ? piecesOf(shape, shape.texture, shape.uvs) : []),
       ...(shape.spots ? piecesOf(shape, shape.light, shape.spots) : []),
+      ...(shape.frames && normals[shape.relief] ? piecesOf(shape, shape.relief, shape.frames[0]) : []),
     ]));
     learn(cell, shapes);
   };
   const pixel = () => 2 * Math.tan(walk.tall / 2) / sharpness.lines;
-  client.policy = () => new Gpuii(client, sets, pieces, pixel);
+  client.policy = () => new Gpuii(client, sets, pieces, pixel, normals);
   walk.policy = "gpuii";
   walk.memory.delete();
   walk.memory = /** @type {any} */ (new JoinedMemory(gl, sets));

@@ -1,5 +1,7 @@
 // The numbers of the details panel, also for tests and the console (docs/guide/viewer.md).
 
+import { previews } from "./walk/textures.js";
+
 /** @param {import("./walkthrough.js").Walkthrough} walk */
 export function stateOf(walk) {
   const { client, estimate, fetcher, memory } = walk;
@@ -19,7 +21,7 @@ export function stateOf(walk) {
     pending: fetcher.pending,
     complete: walk.complete,
     exact: walk.exact,
-    previews: walk.rows.filter((_, t) => walk.previews(t)).length,
+    previews: walk.rows.filter((_, t) => previews(walk, t)).length,
     fps: walk.fps,
     bandwidth: estimate.bandwidth,
     latency: estimate.latency,

@@ -19,9 +19,11 @@ import { Client } from "./policy/client.js";
 import { Estimate } from "./policy/estimate.js";
 import { POLICIES } from "./policy/policies.js";
 import { sightOf } from "./policy/sight.js";
-import { distance, frustumOf, meetsBox } from "./space/frustum.js";
+import { frustumOf } from "./space/frustum.js";
 import { Stream } from "./stream.js";
+import { inView } from "./walk/in-view.js";
 import { Stillness } from "./walk/stillness.js";
+import { losses, previewed, settled, shares } from "./walk/textures.js";
 
 /** Seconds between item buffers, and between looks of the client. */
 const ITEM_EVERY = 0.1, LOOK_EVERY = 0.2;
@@ -296,10 +298,7 @@ export class Walkthrough {
     return this.frozen || (enough && this.client.missing(true) === 0);
   }
 
-  /**
-   * @param {import("./gl/camera.js").Camera} camera
-   * @param {number} now
-   */
+  /** @param {import("./gl/camera.js").Camera} camera @param {number} now */
   #paint(camera, now) {
     const { gl, canvas: { width, height }, comparison } = this;
     this.#painted = now;
@@ -394,33 +393,15 @@ export class Walkthrough {
     }
   }
 
-  /**
-   * Chooses what is drawn, and which cells are missing.
-   * @param {import("./space/frustum.js").Frustum} frustum
-   */
+  /** Chooses what is drawn, and which cells are missing. @param {import("./space/frustum.js").Frustum} frustum */
   #cull(frustum) {
-    this.drawn = [];
-    for (const [cell, buffers] of this.renderer?.cells ?? []) {
-      const batches = buffers.batches.filter(({ low, high }) => meetsBox(frustum, low, high));
-      if (batches.length) this.drawn.push({ cell, buffers, batches });
-    }
-    const { low, high } = this.catalogue;
-    this.#missing = this.visible
-      .filter((cell) => !this.stream.shapes.has(cell) && meetsBox(frustum, low, high, 3 * cell))
-      .map((cell) => ({ cell, box: this.index.cells[cell].box }));
-    const far = new Map(
-      this.drawn.map(({ cell }) => [cell, distance(frustum.eye, low, high, 3 * cell)]),
-    );
-    this.drawn.sort((a, b) => (far.get(a.cell) ?? 0) - (far.get(b.cell) ?? 0));
+    [this.drawn, this.#missing] = inView(this, frustum);
     const scene = [this.drawn, this.#missing].map((cells) => cells.map(({ cell }) => cell)).join(";");
     if (scene !== this.#scene) this.#turn();
     this.#scene = scene;
   }
 
-  /**
-   * @param {import("./gl/camera.js").Camera} camera
-   * @param {number} now
-   */
+  /** @param {import("./gl/camera.js").Camera} camera @param {number} now */
   #drawItems(camera, now) {
     if (!this.items || this.items.busy) return;
     this.#itemDrawn = now;
@@ -475,20 +456,7 @@ export class Walkthrough {
     client.look({ now, cell: this.cell, frustum, still });
     while (reserve.grow(client.column) && client.fit(this.budget - reserve.bytes));
     memory.budget = this.budget;
-    memory.settle(client.column, this.#priority(), this.#losses());
-  }
-
-  /** The loss of the best source that each texture has of its column. */
-  #losses() {
-    const { column, downloads } = this.client;
-    return Float64Array.from(column, (k, t) => downloads.loss(t, k));
-  }
-
-  /** Share of the view of each texture, for the order of uploads. */
-  #priority() {
-    const { T, K } = this.catalogue, share = new Float64Array(T);
-    for (let t = 0; this.#sight && t < T; t++) share[t] = this.#sight.present[t * K + 1];
-    return share;
+    memory.settle(client.column, shares(this), losses(client));
   }
 
   /** Pictures in the second before the last one. */
@@ -508,34 +476,18 @@ export class Walkthrough {
 
   /** Whether that is so, of objects with any mesh and without relief unless `finer`. @param {boolean} finer */
   has(finer) {
-    const { client, memory, present, renderer, stream, catalogue: { T, K } } = this;
-    if (!present || this.#sightDrawn < this.#turned || this.#looked < this.#changed) return false;
+    const { client, renderer, stream } = this;
+    if (!this.present || this.#sightDrawn < this.#turned || this.#looked < this.#changed) return false;
     if (this.#ready && this.#painted < this.#changed) return false;
     if (this.visible.some((c) => renderer?.cells.get(c)?.shapes !== stream.shapes.get(c))) return false;
     // The walk begins without relief.
     if (finer && (this.#loading || renderer?.statues?.lacks)) return false;
-    if (client.cell !== this.cell || client.missing(false, false, finer) > 0 || !this.sharpness.full) return false;
-    for (let t = 0; t < T; t++) {
-      const held = memory.held[t];
-      const better = client.downloads.loss(t, client.column[t]) < memory.loss[t];
-      if (better && held > 0 && present[t * K + 1] > 0) return false;
-      for (let column = client.column[t]; column > held; column--) {
-        if (present[t * K + column] > 0) return false;
-      }
-    }
-    return true;
-  }
-
-  /** Whether a texture shows a preview. @param {number} t */
-  previews(t) {
-    return this.memory.held[t] > 0 && this.memory.loss[t] > 0;
+    if (client.cell !== this.cell || client.missing(false, false, finer) > 0) return false;
+    return this.sharpness.full && settled(this);
   }
 
   /** Whether it is complete, with exact texels alone, and no file of it has failed. */
   get exact() {
-    const { client, present, catalogue: { T, K } } = this;
-    if (!present || !this.complete || client.missing(false, true) > 0) return false;
-    for (let t = 0; t < T; t++) if (present[t * K + 1] > 0 && this.previews(t)) return false;
-    return true;
+    return this.complete && this.client.missing(false, true) === 0 && !previewed(this);
   }
 }

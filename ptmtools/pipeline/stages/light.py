@@ -69,6 +69,10 @@ def lightmap_stem(cell: int) -> str:
     return f"light~{cell_name(cell)}"
 
 
+#: The counts of a building without light.
+_NO_LIGHT = {"lightmaps": 0, "light": "none"}
+
+
 class LightJob(Job):
     """Bakes the light of all cells."""
 
@@ -91,7 +95,7 @@ class LightJob(Job):
                 remedy="use --light bake, or a glTF with occlusion textures that do not repeat",
             )
         if self.options.light == "none" or (self.options.light == "auto" and not has_maps):
-            return described(work, {"lightmaps": 0}, ())
+            return described(work, _NO_LIGHT, ())
         if self.options.light == "auto":
             try:
                 _check_component()
@@ -99,7 +103,7 @@ class LightJob(Job):
                 left_out = f"the lightmaps of the model are left out: {fault.message}"
                 remedy = f"{fault.remedy}, then build again" if fault.remedy else "build again"
                 work = replace(work, inputs={**work.inputs, _ABSENT: ""})
-                return described(work, {"lightmaps": 0}, (Warned(f"{left_out}; {remedy}"),))
+                return described(work, _NO_LIGHT, (Warned(f"{left_out}; {remedy}"),))
         import numpy as np
 
         from ptmtools.light.model import Light

@@ -1,8 +1,8 @@
 // The client of interlaced images of Englert et al. (2014, section 3.3), as `ptm simulate --policy gpuii`
 // simulates it. The next file is the most important one: its image is visible, as far as boxes tell; the
 // screen needs it, where texels so far are wider or higher than pixels; it is in the nearest ring around the
-// eye; and it is of the lowest step there. Texture memory is filled with steps in the same order, and the
-// rest of it with the others that are here, the last seen first.
+// eye; and it is of the lowest step there. Normal maps of materials come after all colours. Texture memory is
+// filled with steps in the same order, and the rest of it with the others that are here, the last seen first.
 
 import { lacking, modelled } from "../policy/files.js";
 import { distance, meetsBox } from "../space/frustum.js";
@@ -19,7 +19,7 @@ const RING = 8, NEAR = 0.05;
 
 /** @implements {Policy} */
 export class Gpuii {
-  #client; #sets; #pieces; #pixel;
+  #client; #sets; #pieces; #pixel; #later;
   /** (T) metres to each texture in view, and the columns that the screen needs. */
   #distance; #wanted;
   /** (T) the look at which each was seen last, and their number. */
@@ -35,13 +35,15 @@ export class Gpuii {
    * @param {TextureSet[]} sets of the textures
    * @param {Map<number, Piece[]>} pieces of each cell
    * @param {() => number} pixel size of a pixel at a distance of 1
+   * @param {boolean[]} later whether each texture comes after all others
    */
-  constructor(client, sets, pieces, pixel) {
+  constructor(client, sets, pieces, pixel, later) {
     const { T } = client.catalogue;
     this.#client = client;
     this.#sets = sets;
     this.#pieces = pieces;
     this.#pixel = pixel;
+    this.#later = later;
     this.#distance = new Float64Array(T);
     this.#wanted = new Int32Array(T);
     this.#seen = new Int32Array(T).fill(-1);
@@ -83,14 +85,15 @@ export class Gpuii {
     }
   }
 
-  /** Orders the needed steps: by ring, step, distance. */
+  /** Orders the needed steps: colours first, by ring, step, distance. */
   #order() {
-    const far = this.#distance, ring = (/** @type {number} */ t) => Math.floor(far[t] / RING);
+    const far = this.#distance, later = this.#later, ring = (/** @type {number} */ t) => Math.floor(far[t] / RING);
     this.#steps = [];
     this.#wanted.forEach((last, t) => {
       for (let step = 1; step <= last; step++) this.#steps.push([t, step]);
     });
-    this.#steps.sort(([a, one], [b, other]) => ring(a) - ring(b) || one - other || far[a] - far[b] || a - b);
+    this.#steps.sort(([a, one], [b, other]) =>
+      +later[a] - +later[b] || ring(a) - ring(b) || one - other || far[a] - far[b] || a - b);
   }
 
   /**
