@@ -24,7 +24,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from statistics import median
@@ -40,6 +40,7 @@ from browser import visiting  # noqa: E402
 
 from ptmtools.lab.campus.options import CampusWalkOptions  # noqa: E402
 from ptmtools.lab.campus.simulation import simulate_campus  # noqa: E402
+from ptmtools.lab.campus.stock import Stock  # noqa: E402
 from ptmtools.lab.campus.world import prepare_campus  # noqa: E402
 from ptmtools.lab.network import Link  # noqa: E402
 from ptmtools.lab.policies import POLICIES  # noqa: E402
@@ -47,7 +48,7 @@ from ptmtools.lab.simulation import simulate  # noqa: E402
 from ptmtools.lab.world import prepare, read_forms  # noqa: E402
 from ptmtools.link import Conditions  # noqa: E402
 from ptmtools.neighbours.apo.files import read_mesh  # noqa: E402
-from ptmtools.neighbours.campus.model import PRESETS  # noqa: E402
+from ptmtools.neighbours.campus.model import MASK, PRESETS  # noqa: E402
 from ptmtools.output.served import read_served  # noqa: E402
 from ptmtools.quantities import parse_bandwidth, parse_duration  # noqa: E402
 from ptmtools.rendering.pyramids import read_pyramids  # noqa: E402
@@ -104,6 +105,13 @@ def traffic(requests: int, time: Floats, arrived: Floats) -> Traffic:
     return Traffic(requests, float(arrived[-1]), mean)
 
 
+def traffic_of(answers: Sequence[tuple[float, float, float]]) -> Traffic:
+    """Of answers: s of the first byte and of the last, and bytes, which arrive evenly."""
+    begun, ended, size = np.array(answers).T
+    total = float(size.sum())
+    return Traffic(len(answers), total, float((size * (begun + ended)).sum() / 2 / total))
+
+
 @dataclass(frozen=True)
 class Visit:
     """A visit in the browser: its traffic, the recording, and s from the index to its begin."""
@@ -126,6 +134,7 @@ def visit(
         visitor.page.wait_for_function(
             f"performance.now() > window.begun + {1000 * seconds}", timeout=300_000
         )
+        now = time.monotonic()
         recording = visitor.page.evaluate("window.ptm.recording ?? null")
         asked = [v for v in visitor.visits if v.path.startswith("/data")]
         begun = visitor.page.evaluate(
@@ -136,10 +145,11 @@ def visit(
             print("the page reported", visitor.messages, file=sys.stderr)
     # Documents of interlaced images are no files of the simulated client.
     asked = [v for v in asked if "/sets-" not in v.path]
-    ended = sorted((v.ended or time.monotonic(), v.bytes) for v in asked)
-    moment, size = np.array(ended).T
     first = min(v.begun for v in asked)
-    return Visit(traffic(len(asked), moment - first, np.cumsum(size)), recording, begun)
+    answers = [
+        (v.first_byte - first, (v.ended or now) - first, v.bytes) for v in asked if v.first_byte
+    ]
+    return Visit(traffic_of(answers)._replace(requests=len(asked)), recording, begun)
 
 
 def poses_of(walk: Walk, seconds: float) -> list[list[float]]:
@@ -160,7 +170,7 @@ def steps(
     """A client that requests the files of a step together, and those of the next one when they are
     here and wanted at that time."""
     line = Link(link)
-    moment, arrived = [0.0], [0.0]
+    answers = []
     for step, sizes in enumerate(files):
         while not wanted(step, line.now) and line.now < seconds:
             line.advance(line.now + 1 / 60)
@@ -170,9 +180,8 @@ def steps(
             line.request(size, 0.0, size)
         for _ in sizes:
             if finished := line.advance(1e9):
-                moment.append(line.now)
-                arrived.append(arrived[-1] + finished.size)
-    return traffic(line.requests, np.array(moment), np.array(arrived))
+                answers.append((finished.first_byte or 0.0, line.now, finished.size))
+    return traffic_of(answers)
 
 
 class Scene(NamedTuple):
@@ -210,12 +219,28 @@ def database(folder: Path, walk: Walk, seconds: float) -> Scene:
     return Scene(folder.stem, site, "?form=gpuii", WALKED, poses_of(walk, seconds), simulated)
 
 
+def since_index(visit: Visit) -> Walk:
+    """The recorded walk from the request of the index on: until the page begins, it stands."""
+    (_, *pose), *_ = samples = visit.recording["samples"]
+    moved = [[time + visit.begun, *rest] for time, *rest in samples]
+    return parse_walk(json.dumps(visit.recording | {"samples": [[0, *pose], *moved]}).encode())
+
+
+def without_masks(stock: Stock) -> Stock:
+    """The files that the page fetches: it draws no reflections."""
+    materials = [
+        replace(one, channels=tuple(c for c in one.channels if c != MASK))
+        for one in stock.campus.materials
+    ]
+    return replace(stock, campus=replace(stock.campus, materials=tuple(materials)))
+
+
 def campus(folder: Path, site: Site, walk: Walk, seconds: float) -> Scene:
     """A walk through a campus."""
 
     def simulated(visit: Visit, link: Conditions) -> Traffic:
-        recording = parse_walk(json.dumps(visit.recording).encode())
-        place = prepare_campus(folder, recording, every=0)
+        place = prepare_campus(folder, since_index(visit), every=0)
+        place = replace(place, stock=without_masks(place.stock))
         run = simulate_campus(place, PRESET, CampusWalkOptions(), conditions=link)
         return traffic(run.requests, run.time, run.fetched)
 

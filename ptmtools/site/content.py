@@ -28,6 +28,8 @@ from ptmtools.output.served import FORM, Served, read_served
 from ptmtools.pipeline.command import naming_command, open_database
 from ptmtools.pipeline.stages.emit import EMIT
 from ptmtools.progress import Progress, silent
+from ptmtools.rendering.octree_levels import level_differences
+from ptmtools.rendering.octrees import read_octrees
 from ptmtools.site.entry import DIGITS, Entry, state_of
 from ptmtools.site.geometry import lean_glb
 from ptmtools.site.program import INDEX, address_of, page, program_files
@@ -232,9 +234,12 @@ class _Builder:
             yield row | {"files": names, "bytes": sizes}
 
     def _octrees(self) -> Iterator[dict[str, Any]]:
-        for row in self._served.index["octrees"]:
+        octrees = read_octrees(self._served)
+        differences = level_differences(self._served.surfaces, octrees).round(3).tolist()
+        for row, steps in zip(self._served.index["octrees"], differences, strict=True):
             file, digest = self._place(row["file"])
-            yield row | {"file": self._add(file.stem, ".bin", PTM, file, digest=digest)}
+            name = self._add(file.stem, ".bin", PTM, file, digest=digest)
+            yield row | {"file": name, "differences": steps[: len(row["levels"])]}
 
     def _sets(self) -> str:
         """The URL of the document of all interlaced images."""

@@ -7,8 +7,9 @@ flow's share of `PIECE` seconds. So each flow receives one every 10 ms, whatever
 browsers expect of a link; the shares of a second differ from the fluid's by less than a hundredth.
 
 `Link` has no clock: callers pass the time. Pieces are booked one after another, each from the
-moment at which the one before it is through. A late timer therefore costs nothing, within `LATE`; a
-client that is slow to read loses its share of the meantime.
+moment at which the one before it is through. A late timer of a busy server therefore costs nothing:
+what could have left meanwhile leaves at once. A client that is slow to read loses its share of the
+meantime, beyond `LATE`.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 #: Seconds of the link that a round of pieces takes, one piece of each flow.
 PIECE = 0.01
-#: Seconds by which a flow may be late to ask for its next piece and lose nothing.
+#: Seconds by which a client may be late to take a piece and lose nothing.
 LATE = 0.05
 #: Bytes of a head besides its fields: status line, the date that uvicorn adds, and the empty line.
 _HEAD = len("HTTP/1.1 206 Partial Content\r\ndate: Mon, 23 Nov 2026 03:29:48 GMT\r\n\r\n")
@@ -41,10 +42,16 @@ class Throttle(Conditions):
 
 
 class Flow:
-    """A response on the link; ``ready``: s, from when its next piece may be on the link."""
+    """A response on the link.
+
+    Attributes
+    ----------
+    ready: s, from when its next piece may be on the link.
+    late: s by which the timer of its last piece was late.
+    """
 
     def __init__(self, ready: float) -> None:
-        self.ready = ready
+        self.ready, self.late = ready, 0.0
 
 
 class Link:
@@ -167,7 +174,7 @@ class Paced:
 
     async def _start(self, flow: Flow, visit: Visit, message: Message, send: Send) -> None:
         head = left = _HEAD + sum(len(n) + len(v) + 4 for n, v in message["headers"])
-        await _until(flow.ready)
+        flow.late = await _until(flow.ready)
         while left:
             left -= await self._piece(flow, left)
         length = dict(message["headers"]).get(b"content-length")
@@ -192,11 +199,13 @@ class Paced:
 
     async def _piece(self, flow: Flow, left: int) -> int:
         """Number of bytes, of ``left``, that are through next."""
-        piece, through = self.link.book(flow, left, time.monotonic())
-        await _until(through)
+        piece, through = self.link.book(flow, left, time.monotonic() - flow.late)
+        flow.late = await _until(through)
         return piece
 
 
-async def _until(moment: float) -> None:
-    """Wait for a moment of `time.monotonic`; other tasks run even if it is past."""
+async def _until(moment: float) -> float:
+    """Wait for a moment of `time.monotonic`; other tasks run even if it is past. Returns by how
+    many seconds it is."""
     await asyncio.sleep(max(0.0, moment - time.monotonic()))
+    return max(0.0, time.monotonic() - moment)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from ptmtools.lab.allocation import best_step
 from ptmtools.output.served import read_served
 from ptmtools.rendering.drawing import ViewOptions, draw_view, eye_of
 from ptmtools.rendering.rays import Camera, Caster
@@ -15,7 +18,9 @@ from ptmtools.site.content import Site, site_of
 from ptmtools.site.entry import Entry
 from tests.neighbours.apo.statues import write_rooms
 from tests.site.conftest import OCTREES, PLAIN, Visiting, build
+from tests.web import node
 
+HERE = Path(__file__).parent
 WIDTH, HEIGHT = 320, 240
 #: Levels of each octree that has been in view.
 LEVELS = "window.ptm.walk.renderer.statues?.levels ?? []"
@@ -198,3 +203,70 @@ def test_other_sites_do_not_load_the_script(
 
     assert loads(site)
     assert not loads(museum)
+
+
+#: Bytes of a request besides its own, and the weight of the surroundings (`web/page/policy`).
+OVERHEAD, AROUND = 300, 0.1
+
+
+def expected_order(case: dict[str, Any]) -> list[list[Any]]:
+    """The requests of the simulator, of which each takes the step of most worth for its bytes."""
+    rows = [case["texture"], case["octree"]]
+    shares = [case["sight"] + AROUND, case["share"]]
+    worth = [np.array([0, *np.maximum(row["differences"], 0.5)]) * share
+             for row, share in zip(rows, shares, strict=True)]  # fmt: skip
+    ends = [np.array([0, *row["ends"]]) for row in rows]
+    have, order = [0, case["there"]], []
+    while any(have[k] + 1 < len(ends[k]) for k in range(2)):
+        steps = [
+            best_step(worth[k], ends[k], have[k], ends[k][have[k]] - OVERHEAD, len(ends[k]) - 1)
+            for k in range(2)
+        ]
+        first = int(steps[1][0] > steps[0][0])
+        have[first] = int(steps[first][1])
+        order.append([bool(first), have[first]])
+    return order
+
+
+def test_levels_and_textures_come_by_worth() -> None:
+    """With `?octrees=best`, as for `best+apo`: the greater worth for its bytes first, of either."""
+    random = np.random.default_rng(3)
+
+    def row(levels: int) -> dict[str, Any]:
+        ends = np.cumsum(random.integers(1, 900, levels) + 10)
+        return {"ends": ends.tolist(), "differences": random.uniform(0, 60, levels).tolist()}
+
+    cases = [
+        {"texture": row(7), "octree": row(9), "there": int(random.integers(1, 8)),
+         "sight": float(random.uniform(0, 0.5)), "share": float(random.uniform(0, 0.5))}
+        for _ in range(100)
+    ]  # fmt: skip
+    actual = json.loads(node.run(HERE / "levels.mjs", json.dumps(cases)))
+    assert actual == [expected_order(case) for case in cases]
+    first = [order[0][0] for order in actual]
+    assert 20 < sum(first) < 80
+    assert any(a[0] < b[0] for order in actual for a, b in pairwise(order))  # they take turns
+
+
+def test_all_levels_come_by_worth(visit: Visiting, site: Site, database: Path) -> None:
+    """On the page: those of little worth together with one of great worth behind them."""
+    (name,) = (n for n in site.entries if "/index-" in n)
+    document = json.loads(site.entries[name].read())
+    row = document["octrees"][0]
+    assert len(row["differences"]) == len(row["ends"])
+    assert max(row["differences"]) > 1
+    row["differences"] = [255.0 * (k == 7) for k in range(len(row["ends"]))]
+    index = Entry(name, json.dumps(document).encode(), "application/json")
+    eye, yaw = pose(database, 0, 0.9)
+    query = f"?octrees=best{address(eye, yaw)}"
+    with visit(Site({**site.entries, name: index}, document), query=query) as visitor:
+        visitor.until("s.complete")
+        assert visitor.page.evaluate(LEVELS)[0] > 7
+        assert visitor.messages == []
+        asked = [v.range for v in visitor.visits if "statue_01" in v.path]
+    assert int(str(asked[0]).rpartition("-")[2]) > row["ends"][6]
+    # Another policy requests them as without the option.
+    with visit(site, query=query.replace("?", "?policy=whole&")) as visitor:
+        visitor.until("s.complete")
+        asked = [v.range for v in visitor.visits if "statue_01" in v.path]
+    assert asked[0] == f"bytes=2-{row['ends'][6] - 1}"

@@ -7,13 +7,19 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 from random import Random
+from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
 import pytest
 
 from ptmtools.errors import InputError
 from ptmtools.lab.network import Link as FluidLink
 from ptmtools.link import Conditions
-from ptmtools.site.throttle import LATE, PIECE, Link, Throttle
+from ptmtools.site import throttle
+from ptmtools.site.throttle import LATE, PIECE, Link, Paced, Throttle, Visits
+
+if TYPE_CHECKING:
+    from starlette.types import Message, Receive, Scope, Send
 
 BANDWIDTHS = [56e3, 512e3, 4e6, 16e6]
 #: Seconds by which timers are late at most, as those of a busy machine are.
@@ -105,6 +111,42 @@ def test_late_timers_lose_nothing_but_long_absence_does() -> None:
         piece, through = link.book(flow, 10**6, 0.0)
         second, again = link.book(flow, 10**6, through + absence)
         assert again == pytest.approx((piece + second) / rate + lost)
+
+
+@pytest.mark.parametrize(("timer", "client", "most"), [(1.0, 0.0, 2.1), (0.0, 1.0, math.inf)])
+def test_the_server_may_be_late_and_a_client_may_not(
+    monkeypatch: pytest.MonkeyPatch, timer: float, client: float, most: float
+) -> None:
+    """A second of the link, in pieces, with timers that ring a second late, or a client that takes
+    each piece after a second."""
+    now = 0.0
+
+    async def sleep(seconds: float) -> None:
+        nonlocal now
+        now += seconds + timer * (seconds > 0)
+
+    async def send(message: Message) -> None:
+        nonlocal now
+        now += client
+
+    async def app(scope: Scope, receive: Receive, send: Send) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        await send({"type": "http.response.body", "body": bytes(125_000)})
+
+    async def receive() -> Message:
+        raise AssertionError
+
+    monkeypatch.setattr(throttle, "time", SimpleNamespace(monotonic=lambda: now))
+    monkeypatch.setattr(throttle, "asyncio", SimpleNamespace(sleep=sleep))
+    visits = Visits()
+    scope = {"type": "http", "method": "GET", "raw_path": b"/", "headers": []}
+    paced = Paced(app, Throttle(1e6), visits)
+    # Nothing in it waits for an event loop.
+    with pytest.raises(StopIteration):
+        paced(scope, receive, send).send(None)
+    assert visits[0].bytes == 125_000
+    assert now <= most
+    assert now > 1.0 if timer else now > 1.0 / PIECE * (1.0 - LATE)
 
 
 def test_who_gives_up_leaves_the_link_to_the_others() -> None:

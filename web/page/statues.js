@@ -1,6 +1,7 @@
 // The script of sites with octree textures.
 
 import { Statues } from "./octree/statues.js";
+import { weighLevels } from "./octree/weighing.js";
 
 /**
  * Lets the renderer draw them.
@@ -9,5 +10,8 @@ import { Statues } from "./octree/statues.js";
  */
 export function show(walk, report) {
   const { gl, index, site, fetcher, renderer } = walk;
-  if (renderer) renderer.statues = new Statues(gl, index.octrees ?? [], site, fetcher, report, () => walk.touch());
+  if (!renderer) return;
+  const statues = new Statues(gl, index.octrees ?? [], site, fetcher, report, () => walk.touch());
+  renderer.statues = statues;
+  if (new URLSearchParams(location.search).get("octrees") === "best") weighLevels(walk, statues);
 }

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ptmtools.arrays import Floats, areas
+from ptmtools.arrays import Floats
 from ptmtools.lab.catalogue import Catalogue, Columns, Shapes, aligned
 from ptmtools.lab.previews import LEAST
 from ptmtools.output.served import Served
+from ptmtools.rendering.octree_levels import level_differences
 from ptmtools.rendering.octrees import Octrees
 
-#: Number of points of each object at which the levels of its octree are compared, and the seed of
-#: their places.
-_POINTS, _SEED = 4096, 1
 #: Bytes of a texel in texture memory.
 _TEXEL = 4
-#: Brightness of the lit surface in the comparison, 0 to 255.
-_BRIGHT = 255 * 0.7
 
 
 def octree_columns(served: Served) -> Columns:
@@ -42,7 +38,7 @@ def with_octrees(stock: Catalogue, served: Served, octrees: Octrees) -> Catalogu
     """The catalogue of a client that draws octrees; ``stock`` is that of the textures alone."""
     columns = octree_columns(served)
     extended = stock.joined_with(
-        columns, differences(served, octrees, columns), _shapes(served, octrees)
+        columns, _differences(served, octrees, columns), _shapes(served, octrees)
     )
     # After them, errors that no download reduces; see the package.
     return _with_empty(extended, 1, octrees)
@@ -56,28 +52,12 @@ def _with_empty(stock: Catalogue, count: int, octrees: Octrees) -> Catalogue:
     return stock.joined_with(nothing, np.zeros((count, wide)))
 
 
-def differences(served: Served, octrees: Octrees, columns: Columns) -> Floats:
-    """(O, K) mean difference of each level to the one before, over the object as displayed, 0 to
-    255. hints.json does not hold them; its writer could."""
-    from ptmtools.rendering.relief import DEEP, descend
-
+def _differences(served: Served, octrees: Octrees, columns: Columns) -> Floats:
+    """(O, K) mean difference of each level to the one before, at least `LEAST`."""
     result = np.zeros(columns.ends.shape)
-    random, surfaces = np.random.default_rng(_SEED), served.surfaces
-    for o in range(octrees.number):
-        own = np.flatnonzero(octrees.of == o)
+    for o, steps in enumerate(level_differences(served.surfaces, octrees)):
         levels = int(octrees.levels[o])
-        if len(own):
-            corner = surfaces.corner[own]
-            total = np.cumsum(areas(corner))
-            which = np.searchsorted(total, random.uniform(0, total[-1], _POINTS), "right")
-            weight = random.dirichlet(np.ones(3), _POINTS)
-            place = np.einsum("nk,nkj->nj", weight, corner[np.minimum(which, len(own) - 1)])
-            light, steps = np.zeros(DEEP), np.zeros(levels)
-            for x, y, z in place.tolist():
-                count = descend(octrees, o, x, y, z, DEEP, light)
-                steps[1:count] += np.abs(np.diff(light[:count]))
-            result[o, 1 : levels + 1] = _BRIGHT * steps / _POINTS
-        result[o, 1 : levels + 1] = np.maximum(result[o, 1 : levels + 1], LEAST)
+        result[o, 1 : levels + 1] = np.maximum(steps[:levels], LEAST)
     return result
 
 

@@ -83,6 +83,11 @@ runForm(async (gl, config, fetcher, fail) => {
         });
       });
     }
+    advance();
+  };
+  /** Gives the next objects to free threads, in every frame and when a thread ends. */
+  const advance = () => {
+    for (let job = client.next(); job; job = client.next()) run(job.file, job.thread).catch(fail);
   };
 
   /** The objects in view with the detail that they are shown in. @param {ReturnType<typeof frustumOf>} frustum
@@ -132,7 +137,7 @@ runForm(async (gl, config, fetcher, fail) => {
       if (client.look(pose.eye)) {
         bases = new Set(client.near.flatMap((k) => index.objects[k].materials.map((m) => index.materials[m].base)));
       }
-      for (let job = client.next(); job; job = client.next()) run(job.file, job.thread).catch(fail);
+      advance();
       const aspect = canvas.width / canvas.height, camera = cameraOf(pose, ANGLE, aspect, far);
       const { shown, kept } = shownOf(frustumOf(pose, ANGLE, aspect), dt);
       for (const { base, channels } of index.materials) {

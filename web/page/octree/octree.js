@@ -57,6 +57,10 @@ const STRIPE = 64;
 /** Seconds until levels that could not be downloaded are requested again. */
 const REST = 10;
 
+/** The fewest levels that are there after the next request. @param {number} levels that are there
+ * @param {number} count in all */
+export const followingOf = (levels, count) => (levels ? levels + 1 : Math.min(FIRST, count));
+
 /** Whether an error has a code and a message for visitors; scripts have classes of their own.
  * @param {any} fault */
 const isKnown = (fault) => typeof fault?.code === "string" && fault.code.startsWith("PTM-V");
@@ -140,6 +144,8 @@ export class Octree {
     this.updates = 0;
     this.running = false;
     this.restsUntil = 0;
+    /** Receives the bytes still to come of the levels on their way. @type {{left: number} | undefined} */
+    this.progress = undefined;
   }
 
   /** Whether all levels are there. */
@@ -173,19 +179,19 @@ export class Octree {
    * @param {(levels: number) => boolean} wanted whether more than these levels are
    * @param {(fault: PageError) => void} fail
    * @param {() => void} [done] called when they are there
+   * @param {number} [end] their number then
    */
-  advance(wanted, fail, done) {
+  advance(wanted, fail, done, end = followingOf(this.levels, this.index.levels.length)) {
     if (this.running || this.complete || this.rests || !wanted(this.levels)) return;
     this.running = true;
-    this.#next().then(() => done?.(), (fault) => {
+    return this.#next(end).then(() => done?.(), (fault) => {
       this.restsUntil = fault.code === "PTM-V104" ? clock() + REST : Infinity;
       if (!this.#deleted) fail(fault);
     }).finally(() => (this.running = false));
   }
 
-  async #next() {
-    const total = this.index.levels.length;
-    const end = this.levels ? this.levels + 1 : Math.min(FIRST, total);
+  /** @param {number} end */
+  async #next(end) {
     const timer = this.step && this.levels ? setInterval(() => this.#show(), 1000 * this.step) : 0;
     try {
       await Promise.all(this.streams.map((_, k) => this.#fetch(k, this.levels, end)));
@@ -278,7 +284,7 @@ export class Octree {
     const { file, ends } = this.streams[number], size = /** @type {number} */ (ends.at(-1));
     let whole = this.#whole[number];
     if (!whole) {
-      const answer = await this.fetcher.range(this.urlOf(file), begin, end, size, undefined, cache);
+      const answer = await this.fetcher.range(this.urlOf(file), begin, end, size, this.progress, cache);
       if (answer.begin === begin && answer.body.length === end - begin) return answer.body;
       whole = this.#whole[number] = answer.body;
     }

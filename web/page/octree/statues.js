@@ -8,7 +8,7 @@ import { corners, TEXEL } from "../gl/shaders.js";
 import { distance } from "../space/frustum.js";
 import { LIT } from "./lamp.js";
 import { LOOK_UP } from "./look-up.js";
-import { checkOctree, Octree } from "./octree.js";
+import { checkOctree, Octree, followingOf } from "./octree.js";
 
 /** Bytes of octrees on the graphics card, at most. */
 const MOST = 128 << 20;
@@ -44,13 +44,17 @@ void main() {
 
 /** @typedef {import("../gl/renderer.js").Drawn} Drawn */
 /** @typedef {{file: string, cube: {low: number[], side: number}, levels: number[], ends: number[],
- *   crc32: number[]}} OctreeRow */
+ *   crc32: number[], differences?: number[]}} OctreeRow */
 
 export class Statues {
   /** Those that are, or were, in view. @type {(Octree | undefined)[]} */
   #octrees = [];
   /** Of those in view, the pixels of a node of depth 0. @type {Map<number, number>} */
   #pixels = new Map();
+  /** Of those in view, the share of the screen that their boxes take. @type {Map<number, number>} */
+  #shares = new Map();
+  /** Whether levels wait for `load`. */
+  competes = () => false;
   #looked = false;
   /** When each was last in view, s. @type {number[]} */
   #seen = [];
@@ -116,25 +120,44 @@ export class Statues {
    */
   advance(drawn, eye, lines, loads) {
     this.#pixels.clear();
+    this.#shares.clear();
     this.#looked = true;
-    const now = clock();
+    const now = clock(), screen = this.gl.drawingBufferWidth * this.gl.drawingBufferHeight;
     for (const { batches } of drawn) {
       for (const { look: { octree, blends }, low, high } of batches) {
         const index = this.indices[octree];
         if (!index || blends) continue;
         const away = Math.max(NEAREST, distance(eye, low, high));
-        const pixels = (lines / 2 / away) * index.cube.side;
+        const scale = lines / 2 / away, pixels = scale * index.cube.side;
         this.#pixels.set(octree, Math.max(pixels, this.#pixels.get(octree) ?? 0));
+        const [width, height, depth] = [0, 1, 2].map((k) => high[k] - low[k]);
+        const share = Math.min(1, scale * scale * height * Math.max(width, depth) / screen);
+        this.#shares.set(octree, Math.max(share, this.#shares.get(octree) ?? 0));
         this.#seen[octree] = now;
       }
     }
-    if (!loads || this.#octrees.some((octree) => octree?.running)) return;
+    if (!loads || this.competes() || this.#octrees.some((octree) => octree?.running)) return;
     let next = -1, most = 0;
     for (const number of this.#pixels.keys()) {
       const size = this.#nodes(number);
       if (size > most && this.#wants(number)) [next, most] = [number, size];
     }
-    if (next >= 0) this.#load(next);
+    if (next >= 0) this.load(next);
+  }
+
+  /**
+   * The octrees in view that may be requested now: their numbers, levels that are there, that the next request
+   * brings at least, and that the screen wants, and their shares of the screen.
+   */
+  get wanted() {
+    const free = [...this.#pixels].filter(([number]) => this.#wants(number) && !this.#octrees[number]?.running);
+    return free.map(([number, pixels]) => {
+      const levels = this.#octrees[number]?.levels ?? 0, count = this.indices[number]?.levels.length ?? 0;
+      return {
+        number, levels, following: followingOf(levels, count), share: this.#shares.get(number) ?? 0,
+        finest: Math.min(count, 1 + Math.ceil(Math.log2(pixels))),
+      };
+    });
   }
 
   /** Pixels of the finest nodes of an octree in view. @param {number} number */
@@ -161,8 +184,13 @@ export class Statues {
     return others.reduce((sum, other) => sum + this.#size(other), this.#size(number)) <= MOST;
   }
 
-  /** @param {number} number */
-  #load(number) {
+  /**
+   * Fetches the next levels of an octree.
+   * @param {number} number
+   * @param {number} [end] the number of its levels then
+   * @param {{left: number}} [progress] bytes still to come, updated
+   */
+  load(number, end, progress) {
     let octree = this.#octrees[number];
     const index = this.indices[number];
     if (!index) return;
@@ -171,7 +199,8 @@ export class Statues {
       octree = new Octree(this.gl, index, (name) => this.site.of(name), this.fetcher, 0);
       this.#octrees[number] = octree;
     }
-    octree.advance(() => true, this.report, this.touch);
+    octree.progress = progress;
+    return octree.advance(() => true, this.report, this.touch, end);
   }
 
   /** Removes octrees out of view, those first that were seen first, until there is room. @param {number} bytes */

@@ -47,7 +47,7 @@ export function room(estimate, waiting) {
  * brought while it waits. So a fast link requests more levels at once.
  * @param {Belief} estimate
  */
-function overheadOf({ latency, bandwidth, concurrency }) {
+export function overheadOf({ latency, bandwidth, concurrency }) {
   const waiting = latency > 0 ? latency * bandwidth / 8 / concurrency : 0;
   return OVERHEAD + Math.floor(Math.min(waiting, LONGEST_WAIT));
 }
