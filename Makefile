@@ -62,9 +62,9 @@ $(VENV)/.installed-viewer: $(VENV)/.installed
 
 setup: $(VENV)/.installed
 
-# The stamp, not the OBJ, is the target: the script decides what to write again.
-build/museum/.made: $(wildcard sample_data/*.py sample_data/museum_parts/*.py) | $(VENV)/.installed
-	$(BIN)/python sample_data/make_museum.py -o build/museum
+# The stamp, not the OBJ, is the target: the command decides what to write again.
+build/museum/.made: $(wildcard ptmtools/sample/*.py) | $(VENV)/.installed
+	$(BIN)/ptm sample museum -o build/museum
 	@touch $@
 
 sample: build/museum/.made
