@@ -11,6 +11,7 @@
 #                    (a day; it continues where it was stopped)
 # make fuzz    100,000 damaged and hostile files for every reader, 1,000 damaged buildings (an hour)
 # make page    bundle the page of web/page into the package, with esbuild
+# make dist    a wheel and an sdist in build/dist
 # make sample  only the sample museum
 # make setup   only the virtual environment
 # make docs-tables     print the exact tables of benchmarks/RESULTS.md into it (ten minutes)
@@ -32,7 +33,7 @@ JOBS ?= 2
 PYTEST_ARGS ?=
 export PTM_SHARED ?= $(abspath ../shared)
 
-.PHONY: help setup demo walk test lint bench bench-codec bench-pvs bench-ach bench-walk bench-web fuzz page sample docs-tables docs-timings docs-pictures clean
+.PHONY: help setup demo walk test lint bench bench-codec bench-pvs bench-ach bench-walk bench-web fuzz page sample dist docs-tables docs-timings docs-pictures clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -68,6 +69,10 @@ build/museum/.made: $(wildcard ptmtools/sample/*.py) | $(VENV)/.installed
 	@touch $@
 
 sample: build/museum/.made
+
+dist: $(VENV)/.installed-dev
+	@rm -rf build/dist
+	$(BIN)/python -m build --no-isolation -o build/dist .
 
 # The cell of the first viewpoint.
 FIRST_CELL = $(BIN)/python -c 'import json; hints = json.load(open("build/museum.db/www/hints.json")); print(hints["viewpoints"][0]["cell"])'

@@ -12,24 +12,11 @@ TWO_ROOMS = ROOT / "sample_data/two_rooms/two_rooms.obj"
 #: Windows lacks these modules and names.
 MODULES = ("fcntl", "resource", "pwd", "grp", "termios", "_posixsubprocess", "_posixshmem")
 NAMES = {
-    "os": [
-        "O_NOFOLLOW",
-        "O_CLOEXEC",
-        "O_NONBLOCK",
-        "O_NOCTTY",
-        "O_TMPFILE",
-        "pwrite",
-        "pread",
-        "fork",
-        "getuid",
-        "geteuid",
-        "mkfifo",
-        "sched_getaffinity",
-        "killpg",
-        "setsid",
-        "statvfs",
-    ],
-    "signal": ["pthread_sigmask", "SIGKILL", "SIGHUP"],
+    "os": (
+        *("O_NOFOLLOW", "O_CLOEXEC", "O_NONBLOCK", "O_NOCTTY", "O_TMPFILE", "pwrite", "pread"),
+        *("fork", "getuid", "geteuid", "mkfifo", "sched_getaffinity", "killpg", "setsid"),
+    ),
+    "signal": ("pthread_sigmask", "SIGKILL", "SIGHUP"),
 }
 #: Everything that numpy and numba take from them has been imported before they go.
 WITHOUT = """
@@ -149,9 +136,8 @@ GUARDED = {
     "ptmtools/files.py": {"os.O_TMPFILE": "except (AttributeError", "os.O_CLOEXEC": "os.O_TMPFILE"},
 }
 PATTERN = re.compile(
-    r"import (?:fcntl|resource|pwd|grp|termios)\b|os\.(?:kill|fork|getuid|geteuid|pwrite|pread|mkfifo"
-    r"|sched_getaffinity|killpg|setsid|statvfs|O_NOFOLLOW|O_CLOEXEC|O_NONBLOCK|O_NOCTTY|O_TMPFILE)\b"
-    r"|signal\.(?:pthread_sigmask|SIGKILL|SIGHUP)|asyncio\.add_signal_handler"
+    rf"import (?:fcntl|resource|pwd|grp|termios)\b|os\.(?:kill|{'|'.join(NAMES['os'])})\b"
+    rf"|signal\.(?:{'|'.join(NAMES['signal'])})\b"
 )
 
 
