@@ -32,6 +32,7 @@ from ptmtools.site.entry import DIGITS, Entry, state_of
 from ptmtools.site.geometry import lean_glb
 from ptmtools.site.program import INDEX, address_of, page, program_files
 from ptmtools.site.textures import web_texture, without_exact
+from ptmtools.site.tours import site_tour
 from ptmtools.store.folder import DatabaseFolder, damaged
 from ptmtools.store.layout import SERVED, sha256
 from ptmtools.texture.previews import FORMATS
@@ -83,6 +84,12 @@ class SiteOptions:
         "Write openings: each is one file with everything small that a viewpoint needs, which the "
         "page fetches together with its program. The first viewpoint has one, others while they "
         "add little to the site.",
+    )
+    tour: str = option(
+        "",
+        "Labels and stops (docs/formats/tour.md), or none. Default: tour.json in the folder that "
+        "contains the database, if it exists.",
+        metavar="FILE",
     )
     clients: Literal["page", "vrml"] = option(
         "page",
@@ -160,7 +167,7 @@ class _Builder:
             self._vrml()
         text = json.dumps(index, ensure_ascii=False, separators=(",", ":")).encode()
         name = self._add("index", ".json", JSON, text, compressed=True)
-        self._page(index, f"{DATA}/{name}", poster, openings)
+        self._page(index, f"{DATA}/{name}", poster, openings, self._tour())
         return Site(self._entries, index, tuple(self._notes))
 
     def _openings(self, index: Mapping[str, Any]) -> tuple[str, ...]:
@@ -190,8 +197,27 @@ class _Builder:
             for number, one in enumerate(data)
         )
 
+    def _tour(self) -> str | None:
+        """The URL of the tour, None without one."""
+        document, note = site_tour(
+            self._folder,
+            self._options.tour,
+            lambda file, media: self._add(file.stem, file.suffix, media, file.read_bytes()),
+        )
+        if note:
+            self._notes.append(note)
+        if document is None:
+            return None
+        text = json.dumps(document, ensure_ascii=False, separators=(",", ":")).encode()
+        return f"{DATA}/{self._add('tour', '.json', JSON, text, compressed=True)}"
+
     def _page(
-        self, index: Mapping[str, Any], url: str, poster: str | None, openings: Sequence[str]
+        self,
+        index: Mapping[str, Any],
+        url: str,
+        poster: str | None,
+        openings: Sequence[str],
+        tour: str | None,
     ) -> None:
         program = program_files()
         self._entries |= {entry.name: entry for entry in program.values()}
@@ -201,6 +227,7 @@ class _Builder:
             "wasm": program["decoder.wasm"].name,
             "poster": poster,
             "title": self._options.title or title_of(self._folder.path),
+            **({"tour": tour} if tour else {}),
         }
         preload = [url, program["decoder.wasm"].name]
         if not openings:
