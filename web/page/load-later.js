@@ -4,3 +4,4 @@ export const loadLater = () => import("./later.js");
 export const loadComparison = () => import("./compare.js");
 export const loadStatues = () => import("./statues.js");
 export const loadReliefs = () => import("./reliefs.js");
+export const loadTour = () => import("./tour.js");

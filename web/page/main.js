@@ -3,6 +3,7 @@
 import { DecoderWorkers, hasSimd, loadViewDecoder } from "../ptm/src/index.js";
 import { App } from "./app.js";
 import { readConfig, Site } from "./data/site.js";
+import { loadTour } from "./load-later.js";
 import { PageError } from "./net/errors.js";
 import { clock, Fetcher } from "./net/fetcher.js";
 import { Opening } from "./net/opening.js";
@@ -60,6 +61,8 @@ async function main() {
     const options = { opening, policy: known ? policy : "best" };
     const app = new App(canvas, gl, await site, config, decoders, options);
     Object.assign(window, { ptm: app });
+    const { tour } = config;
+    if (tour) app.on("first-picture", async () => (app.tour = await loadTour().then((s) => s.attachTour(app, tour), () => null)));
     const controls = attachUi(app);
     let before = clock();
     const frame = () => {

@@ -9,6 +9,7 @@ import { levelSizes } from "../../client/src/levels.js";
  * @property {string} wasm
  * @property {string} [poster]
  * @property {string} title
+ * @property {string} [tour] URL of the tour
  *
  * @typedef {object} Preview
  * @property {string} file
