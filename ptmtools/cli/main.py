@@ -57,7 +57,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
     "Publish": {
         "serve": Entry("Serve a database to browsers on this machine.", "publish:serve"),
         "publish": Entry("Write a database as a web site.", "publish:publish"),
-        "tour": Entry("Label the works of a building.", "tour:tour"),
+        "tour": Entry("Label the works of a building.", "tour:commands"),
     },
     "Images": {
         "encode": Entry("Encode images as .ptm files.", "images:encode"),

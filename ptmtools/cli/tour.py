@@ -20,12 +20,12 @@ from ptmtools.quantities import count
 
 
 @click.group("tour")
-def tour() -> None:
+def commands() -> None:
     """Labels and stops of a building, in a file that `ptm serve` and `ptm publish` show
     (docs/formats/tour.md)."""
 
 
-@tour.command("init", cls=Command)
+@commands.command("init", cls=Command)
 @database_argument
 @output_option("File to write. Default: tour.json in the folder that contains the database.")
 @force_option()
@@ -55,7 +55,7 @@ def init(console: Console, db: str, output: str | None, force: bool) -> None:
     )
 
 
-@tour.command("check", cls=Command)
+@commands.command("check", cls=Command)
 @database_argument
 @option(
     "--tour",
@@ -75,16 +75,16 @@ def check(console: Console, db: str, choice: str) -> None:
     from ptmtools.tour.model import NAME
 
     with naming_command(db):
-        document, note = site_tour(open_database(db), choice, lambda file, _: file.name)
-    if document is None:
+        tour, note = site_tour(open_database(db), choice, lambda file, _: file.name)
+    if tour is None:
         raise InputError(
             "PTM-I120",
             note or f"there is no {NAME} beside the database",
             file=db,
             remedy="make one with `ptm tour init DB`, or name one with --tour",
         )
-    labels, stops = len(document["labels"]), len(document["stops"])
-    languages = document["languages"]
+    labels, stops = len(tour.document["labels"]), len(tour.document["stops"])
+    languages = tour.document["languages"]
     console.result(
         {"labels": labels, "stops": stops, "languages": languages},
         [f"{count(labels, 'label')}, {count(stops, 'stop')}, in {', '.join(languages)}"],

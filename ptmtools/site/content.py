@@ -13,10 +13,10 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, TypeVar
 from urllib.parse import quote, unquote
 
 from ptmtools.errors import DatabaseError, InputError, LimitError, Rebuild
@@ -28,15 +28,17 @@ from ptmtools.output.served import FORM, Served, read_served
 from ptmtools.pipeline.command import naming_command, open_database
 from ptmtools.pipeline.stages.emit import EMIT
 from ptmtools.progress import Progress, silent
+from ptmtools.site.catalogue import ANGLE, Content, catalogue_of
 from ptmtools.site.entry import DIGITS, Entry, state_of
 from ptmtools.site.geometry import lean_glb
-from ptmtools.site.program import INDEX, address_of, page, program_files
+from ptmtools.site.program import HTML, INDEX, address_of, page, program_files
 from ptmtools.site.textures import web_texture, without_exact
-from ptmtools.site.tours import site_tour
+from ptmtools.site.tours import SiteTour, site_tour
 from ptmtools.store.folder import DatabaseFolder, damaged
 from ptmtools.store.layout import SERVED, sha256
 from ptmtools.texture.previews import FORMATS
 
+T = TypeVar("T")
 FORMAT = "ptmtools site"
 DATA = "data"
 JSON, JPEG = "application/json", "image/jpeg"
@@ -145,6 +147,7 @@ class _Builder:
     ) -> None:
         self._folder, self._served, self._options = folder, served, options
         self._progress = progress
+        self._title = options.title or title_of(folder.path)
         self._digests = folder.manifest.outputs()
         self._entries: dict[str, Entry] = {}
         self._notes: list[str] = []
@@ -197,19 +200,40 @@ class _Builder:
             for number, one in enumerate(data)
         )
 
-    def _tour(self) -> str | None:
-        """The URL of the tour, None without one."""
-        document, note = site_tour(
+    def _tour(self) -> dict[str, str]:
+        """The settings of the page for the tour: its URL and that of its catalogue; none without a
+        tour."""
+        tour, note = site_tour(
             self._folder,
             self._options.tour,
             lambda file, media: self._add(file.stem, file.suffix, media, file.read_bytes()),
         )
         if note:
             self._notes.append(note)
-        if document is None:
-            return None
-        text = json.dumps(document, ensure_ascii=False, separators=(",", ":")).encode()
-        return f"{DATA}/{self._add('tour', '.json', JSON, text, compressed=True)}"
+        if tour is None:
+            return {}
+        text = json.dumps(tour.document, ensure_ascii=False, separators=(",", ":")).encode()
+        url = f"{DATA}/{self._add('tour', '.json', JSON, text, compressed=True)}"
+        pages = catalogue_of(self._catalogue(tour))
+        for name, html in pages.items():
+            self._entries[name] = Entry(name, html.encode(), HTML, compressed=True)
+        return {"tour": url, "catalogue": next(iter(pages))}
+
+    def _catalogue(self, tour: SiteTour) -> Content:
+        stops: dict[int, Mapping[str, Any]] = {}
+        for stop in tour.document["stops"]:
+            if "label" in stop:
+                stops.setdefault(stop["label"], stop | {"fieldOfView": ANGLE})
+        pictures: dict[int, str] = {}
+        if self._options.pictures and stops:
+            drawn = self._rendered(lambda: _works(self._served, [*stops.values()]))
+            for number, data in zip(stops, drawn or (), strict=False):
+                id = tour.document["labels"][number]["id"]
+                pictures[number] = f"{DATA}/{self._add(f'work-{id}', '.jpg', JPEG, data)}"
+        rooms: dict[int, str] = {}
+        for viewpoint in self._served.index["viewpoints"]:
+            rooms.setdefault(viewpoint["cell"], viewpoint["description"])
+        return Content(tour.document, self._title, rooms, pictures, tour.transcripts, f"{DATA}/")
 
     def _page(
         self,
@@ -217,7 +241,7 @@ class _Builder:
         url: str,
         poster: str | None,
         openings: Sequence[str],
-        tour: str | None,
+        tour: Mapping[str, str],
     ) -> None:
         program = program_files()
         self._entries |= {entry.name: entry for entry in program.values()}
@@ -226,8 +250,8 @@ class _Builder:
             "worker": program["worker.js"].name,
             "wasm": program["decoder.wasm"].name,
             "poster": poster,
-            "title": self._options.title or title_of(self._folder.path),
-            **({"tour": tour} if tour else {}),
+            "title": self._title,
+            **tour,
         }
         preload = [url, program["decoder.wasm"].name]
         if not openings:
@@ -326,25 +350,23 @@ class _Builder:
             media, suffix, data = _picture_file(self._options.poster)
             poster = self._add("poster", suffix, media, data)
         if self._options.pictures:
-            drawn, small = self._drawn()
+            drawn, small = self._rendered(lambda: _viewpoints(self._served)) or (b"", [])
             if drawn and not poster:
                 poster = self._add("poster", ".jpg", JPEG, drawn)
             for number, (row, data) in enumerate(zip(rows, small, strict=False)):
                 row["thumbnail"] = self._add(f"vp-{number:03}", ".jpg", JPEG, data)
         return rows, poster and f"{DATA}/{poster}"
 
-    def _drawn(self) -> tuple[bytes, list[bytes]]:
-        """The poster and the small pictures; empty where Embree is missing."""
-        from ptmtools.site.pictures import pictures
-
+    def _rendered(self, render: Callable[[], T]) -> T | None:
+        """Pictures; None where Embree is missing."""
         self._progress(0, 1, "pictures")
         try:
-            return pictures(self._served)
+            return render()
         except ImportError:
-            self._notes.append(
-                "no poster or thumbnails: embreex, which renders them, is not installed"
-            )
-            return b"", []
+            note = "no pictures: embreex, which renders them, is not installed"
+            if note not in self._notes:
+                self._notes.append(note)
+            return None
         except LimitError:
             raise
         except InputError as fault:
@@ -396,6 +418,18 @@ class _Builder:
         entry = Entry(f"{DATA}/{name}", source, media, True, compressed, state, digest)
         self._entries[entry.name] = entry
         return name
+
+
+def _viewpoints(served: Served) -> tuple[bytes, list[bytes]]:
+    from ptmtools.site.pictures import pictures
+
+    return pictures(served)
+
+
+def _works(served: Served, views: Sequence[Mapping[str, Any]]) -> list[bytes]:
+    from ptmtools.site.pictures import WORK, pictures_of
+
+    return list(pictures_of(served, [(WORK, view) for view in views]))
 
 
 def _picture_file(file: str) -> tuple[str, str, bytes]:

@@ -89,7 +89,13 @@ def page(
             f'<link id="opening" rel="next" as="fetch" href="{next(iter(openings))}" '
             f'data-views="{views}" crossorigin>'
         )
-    fields = {"poster": html.escape(str(settings.get("poster") or ""))}
+    catalogue = settings.get("catalogue")
+    fields = {
+        "poster": html.escape(str(settings.get("poster") or "")),
+        "catalogue": f'<p><a href="{catalogue}">The works as text and pictures</a></p>'
+        if catalogue
+        else "",
+    }
     return _filled(INDEX, settings, script, links, fields)
 
 

@@ -6,6 +6,7 @@ The page fetches the document after its first view, with a script that only site
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +17,9 @@ from ptmtools.errors import InputError, naming
 from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import APO, CELLS
 from ptmtools.store.folder import DatabaseFolder
+from ptmtools.tour.captions import transcript_of
 from ptmtools.tour.markdown import nodes_of
-from ptmtools.tour.model import NAME, Label, Tour
+from ptmtools.tour.model import NAME, Label, Texts, Tour
 from ptmtools.tour.placing import Anchor, anchors
 from ptmtools.tour.reading import CAPTIONS, SOUNDS, read_tour
 
@@ -46,10 +48,16 @@ def tour_file(database: Path, choice: str) -> Path | None:
     return file
 
 
-def site_tour(
-    folder: DatabaseFolder, choice: str, name_of: NameOf
-) -> tuple[dict[str, Any] | None, str]:
-    """The document of a site's tour, None without one; and a note, "" without one.
+@dataclass(frozen=True)
+class SiteTour:
+    """The document of a site's tour, and the texts of the captions of its labels."""
+
+    document: dict[str, Any]
+    transcripts: Mapping[int, Texts]
+
+
+def site_tour(folder: DatabaseFolder, choice: str, name_of: NameOf) -> tuple[SiteTour | None, str]:
+    """The tour of a site, None without one; and a note, "" without one.
 
     Raises as `tour_file`, `read_tour` and `anchors`, and PTM-D004 to D008 for the artifacts.
     """
@@ -64,7 +72,14 @@ def site_tour(
     with naming(file):
         places = anchors(tour, artifacts[APO])
     inside = artifacts[CELLS].locate(np.array([place.marker for place in places]).reshape(-1, 3))
-    return _document(tour, places, inside.tolist(), name_of), ""
+    transcripts: dict[int, Texts] = {
+        number: {
+            tag: transcript_of(file.read_text("utf-8-sig")) for tag, file in label.captions.items()
+        }
+        for number, label in enumerate(tour.labels)
+        if label.captions
+    }
+    return SiteTour(_document(tour, places, inside.tolist(), name_of), transcripts), ""
 
 
 def _document(

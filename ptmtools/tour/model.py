@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
+T = TypeVar("T")
 #: Language → text. A text for all languages has the key "".
 Texts = Mapping[str, str]
 #: Language → file, likewise.
@@ -88,10 +90,12 @@ class Tour:
                 yield from (files or {}).values()
 
 
-def in_language(texts: Texts | None, language: str, default: str) -> tuple[str, str]:
+def in_language(
+    texts: Mapping[str, T] | None, language: str, default: str
+) -> tuple[T, str] | tuple[None, str]:
     """A text in a language, else in the default language, else in any; and the tag of the language
-    that it is in, "" if it is for all. ("", "") without a text."""
+    that it is in, "" if it is for all. (None, "") without a text."""
     for tag in (language, "", default, *(texts or {})):
         if texts and tag in texts:
             return texts[tag], tag
-    return "", ""
+    return None, ""

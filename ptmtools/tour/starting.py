@@ -37,6 +37,8 @@ _NEAREST = 0.8
 _STEPS = (1.0, 0.85, 1.2, 0.7, 1.5, 0.55, 2.0)
 #: Tilt to the side of views that are tried, radians.
 _TURNS = (0.0, 0.35, -0.35, 0.7, -0.7)
+#: Height above the lowest floor of the views that are tried, metres: a bench is higher.
+_STEP = 0.25
 #: Distance of a point before a picture, metres.
 _BEFORE = 0.1
 _DOWN = np.array([0.0, -1.0, 0.0])
@@ -132,14 +134,15 @@ class _Eyes:
         low, high = scene.points.min(axis=0), scene.points.max(axis=0)
         self._middle = (low + high) / 2
         self._tree = ray_tree(scene.corners - self._middle)
-        self._far = float(np.linalg.norm(high - low)) + 1.0
+        floor = cells.eye_floor
+        self._floor = ray_tree(floor - self._middle) if len(floor) else self._tree
 
     def hangs(self, picture: Picture) -> bool:
         """Whether a picture has a plausible size and is not a wall."""
         if not all(_LEAST <= side <= _GREATEST for side in (picture.width, picture.height)):
             return False
         before = picture.centre + _BEFORE * picture.normal
-        return self._first(before, _DOWN)[1] > picture.height / 2 + _HANGS
+        return _first(self._tree, before - self._middle, _DOWN)[1] > picture.height / 2 + _HANGS
 
     def view_of(self, picture: Picture, own: Ints) -> tuple[Floats, Floats] | None:
         """Eye and direction from which nothing hides the centre of a picture; None if no visitor
@@ -150,17 +153,18 @@ class _Eyes:
             picture.width / (2 * tall * _ASPECT * _FILLED),
             _NEAREST,
         )
-        for turn in _TURNS:
-            away = np.cos(turn) * picture.normal + np.sin(turn) * picture.right
-            for step in _STEPS:
-                eye = self._eye(picture.centre + away * best * step)
-                if eye is not None and self._sees(eye, picture, own):
-                    return eye, picture.centre - eye
+        ways = [np.cos(turn) * picture.normal + np.sin(turn) * picture.right for turn in _TURNS]
+        tried = [self._eye(picture.centre + way * best * step) for way in ways for step in _STEPS]
+        eyes = [eye for eye in tried if eye is not None]
+        lowest = min((eye[1] for eye in eyes), default=0.0)
+        for eye in sorted(eyes, key=lambda eye: eye[1] > lowest + _STEP):
+            if self._sees(eye, picture, own):
+                return eye, picture.centre - eye
         return None
 
     def _eye(self, point: Floats) -> Floats | None:
         """The eye of a visitor below or above a point, where one can stand."""
-        down = self._first(point, _DOWN)[1]
+        down = _first(self._floor, point - self._middle, _DOWN)[1]
         if not np.isfinite(down):
             return None
         eye = point + [0.0, _EYE - down, 0.0]
@@ -169,18 +173,15 @@ class _Eyes:
 
     def _sees(self, eye: Floats, picture: Picture, own: Ints) -> bool:
         """Whether the first surface towards the centre of a picture is its object."""
-        hit, _ = self._first(eye, picture.centre - eye)
+        hit, _ = _first(self._tree, eye - self._middle, picture.centre - eye)
         return hit >= 0 and bool((own == hit).any())
 
-    def _first(self, start: Floats, along: Floats) -> tuple[int, float]:
-        """The first face along a ray, -1 for none, and its distance in units of the ray."""
-        answer = self._tree.run(
-            (start - self._middle)[None].astype(np.float32),
-            along[None].astype(np.float32),
-            output=1,
-        )
-        hit = int(answer["primID"][0])
-        return hit, float(answer["tfar"][0]) if hit >= 0 else np.inf
+
+def _first(tree: Any, start: Floats, along: Floats) -> tuple[int, float]:
+    """The first face of a tree along a ray, -1 for none, and its distance in units of the ray."""
+    answer = tree.run(start[None].astype(np.float32), along[None].astype(np.float32), output=1)
+    hit = int(answer["primID"][0])
+    return hit, float(answer["tfar"][0]) if hit >= 0 else np.inf
 
 
 def _row(eye: Floats, direction: Floats) -> dict[str, Any]:

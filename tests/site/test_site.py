@@ -178,15 +178,15 @@ def test_the_page(site: Site, two_rooms: Path) -> None:
 
 def test_pictures(site: Site) -> None:
     poster = site.entries[told(site)["poster"]].read()
-    assert len(poster) <= drawing.POSTER_BYTES
+    assert len(poster) <= drawing.POSTER.most
     image = Image.open(io.BytesIO(poster))
-    assert (image.format, image.size) == ("JPEG", drawing.POSTER)
+    assert (image.format, image.size) == ("JPEG", drawing.POSTER.size)
     # Not a blank one.
     assert np.asarray(image.convert("L")).std() > 5
     for row in site.index["viewpoints"]:
         small = site.entries[f"data/{row['thumbnail']}"].read()
-        assert len(small) <= drawing.SMALL_BYTES
-        assert Image.open(io.BytesIO(small)).size == drawing.SMALL
+        assert len(small) <= drawing.SMALL.most
+        assert Image.open(io.BytesIO(small)).size == drawing.SMALL.size
 
 
 def test_the_poster_shows_the_first_viewpoint(two_rooms: Path, site: Site) -> None:

@@ -64,7 +64,7 @@ def test_a_complete_tour(folder: Path) -> None:
     assert in_language(own.title, "de", "en") == ("Nacht", "de")
     assert in_language(own.text, "de", "en") == ("*Text*", "en"), "another language, named"
     assert in_language(own.maker, "de", "en") == ("R.", "")
-    assert in_language(None, "de", "en") == ("", "")
+    assert in_language(None, "de", "en") == (None, "")
 
 
 @pytest.mark.parametrize(

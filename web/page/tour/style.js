@@ -16,7 +16,6 @@ const STYLE = `
 #label h3 { color: inherit; font-size: 15px; }
 #label .by { color: var(--dim); margin: 0 0 10px; }
 #label p, #label li { max-width: 65ch; }
-#label a { color: var(--warm); }
 #label blockquote { margin: 8px 0; padding-inline-start: 12px; border-inline-start: 3px solid var(--line); }
 #label audio { width: 100%; margin: 8px 0 0; }
 #label .captions { min-height: 3em; margin: 6px 0 0; padding: 8px 10px; background: #000; border-radius: 8px; }

@@ -122,7 +122,13 @@ export class Tour {
     });
     const options = languages.map((tag) => make("option", { value: tag, selected: tag === this.language }, named(tag)));
     const select = make("select", { ariaLabel: "Language", onchange: () => this.speak(select.value) }, ...options);
-    this.list.replaceChildren(heading, ...(languages.length > 1 ? [select] : []), make("ol", {}, ...rows));
+    const { catalogue = "" } = this.app.config;
+    this.list.replaceChildren(
+      heading,
+      ...(languages.length > 1 ? [select] : []),
+      make("ol", {}, ...rows),
+      ...(catalogue ? [make("p", {}, make("a", { href: catalogue }, "As a page of text and pictures"))] : []),
+    );
   }
 
   /** Shows everything in a language. @param {string} language */
