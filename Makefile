@@ -56,11 +56,6 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 	$(PIP) install --editable '.[dev]'
 	@touch $@
 
-$(VENV)/.installed-viewer: $(VENV)/.installed
-	@echo "Installing what serves the page into $(VENV) …"
-	$(PIP) install --editable '.[viewer]'
-	@touch $@
-
 setup: $(VENV)/.installed
 
 # The stamp, not the OBJ, is the target: the command decides what to write again.
@@ -85,7 +80,7 @@ demo: build/museum/.made
 	@echo "Walk through it: make walk"
 	@echo "Your own model: $(BIN)/ptm build-scene MODEL.obj -o MODEL.db"
 
-walk: build/museum/.made $(VENV)/.installed-viewer
+walk: build/museum/.made
 	$(BIN)/ptm build-scene build/museum/museum.obj -o build/museum.db
 	$(BIN)/ptm serve build/museum.db --open
 

@@ -32,7 +32,7 @@ from ptmtools.site.forms import form_of, form_site, form_weight
 from ptmtools.site.lookup import files_of
 from ptmtools.site.published import PublishOptions
 from ptmtools.site.publishing import COARSE, publish as write, weight_of
-from ptmtools.site.serving import ServeOptions, require, serving
+from ptmtools.site.serving import ServeOptions, serving
 from ptmtools.store.objects import is_url
 
 _ORIGIN = re.compile(r"\*|https?://[^\s/?#@]+")
@@ -68,7 +68,6 @@ def serve(console: Console, db: str, opened: bool, origin: str | None, **values:
     wrote. --bandwidth and --latency simulate a slow connection.
     """
     options = take(ServeOptions, values)
-    require()
     files = files_of(db)
     try:
         with serving(
