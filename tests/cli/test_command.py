@@ -8,6 +8,7 @@ import math
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal
@@ -133,7 +134,7 @@ def commands(group: click.Group, words: tuple[str, ...] = ()) -> Iterator[tuple[
             yield (*words, name)
 
 
-@pytest.mark.parametrize("words", commands(ptm), ids=" ".join)
+@pytest.mark.parametrize("words", [*commands(ptm)], ids=" ".join)
 def test_every_option_of_every_command_is_explained(words: tuple[str, ...]) -> None:
     command: click.Command | None = ptm
     for word in words:
