@@ -1,6 +1,6 @@
 // The style of markers and labels, which pages without a tour do not have.
 
-const STYLE = `
+export const STYLE = `
 #markers { position: fixed; inset: 0; pointer-events: none; overflow: hidden; }
 #markers button { position: absolute; left: 0; top: 0; width: 44px; min-height: 44px; height: 44px; margin: -22px; padding: 0; border: 0; border-radius: 50%; background: none; pointer-events: auto; }
 #markers button::before { content: ""; position: absolute; inset: 11px; border: 2px solid #16171b; border-radius: 50%; background: var(--ink); box-shadow: 0 0 0 2px #fffc, 0 2px 8px #000a; }
@@ -24,10 +24,3 @@ const STYLE = `
 #label details summary { min-height: 32px; cursor: pointer; color: var(--dim); }
 @media (forced-colors: active) { #markers button::before { border-color: CanvasText; forced-color-adjust: none; } }
 `;
-
-/** Adds the style to a page. @param {Document} root */
-export function addStyle(root) {
-  const sheet = new CSSStyleSheet();
-  sheet.replaceSync(STYLE);
-  root.adoptedStyleSheets = [...root.adoptedStyleSheets, sheet];
-}

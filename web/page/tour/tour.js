@@ -1,11 +1,11 @@
 // The tour of a walk: markers of labels, their panel, and the list of stops.
 
 import { PageError } from "../net/errors.js";
-import { calm, find, make } from "../ui/elements.js";
+import { addStyle, calm, find, make } from "../ui/elements.js";
 import { checked, inLanguage, languageFor } from "./document.js";
 import { fillLabel } from "./label.js";
 import { Markers } from "./markers.js";
-import { addStyle } from "./style.js";
+import { STYLE } from "./style.js";
 
 /** Greatest movement of a click, pixels, and its longest time, ms. */
 const STILL = 6, SHORT = 500;
@@ -21,7 +21,7 @@ export async function attachTour(app, address) {
   const url = new URL(address, document.baseURI).href;
   try {
     const tour = await app.walk.fetcher.whole(url, (body) => checked(JSON.parse(new TextDecoder().decode(body))));
-    addStyle(document);
+    addStyle(STYLE);
     return new Tour(app, tour, url);
   } catch (fault) {
     const code = fault instanceof PageError ? fault.code : "PTM-V105";
