@@ -86,7 +86,7 @@ walk: build/museum/.made
 
 test: $(VENV)/.installed-dev
 	@.ci/test-components
-	$(BIN)/python -m pytest -n $(JOBS) $(PYTEST_ARGS)
+	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal $(PYTEST_ARGS)
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

@@ -1,12 +1,19 @@
 """Measures what light costs: bytes of lightmaps and seconds of baking, and what accuracy costs.
 
-    python benchmarks/light.py [MODEL…] [--jobs 2] [--accuracy]
+    python benchmarks/light.py [MODEL…] [--jobs 2] [--accuracy | --parts | --model]
 
 Each model is built without light and with `--light bake`. *Textures* are the bytes of the model's
 `.ptm`s; *lightmaps* those of the lightmaps' `.ptm`s, and *geometry* by how much more the GLBs have
 with gzip. The first room is that of `ptm build-scene`. With `--accuracy`, the lightmaps of each
 model at several densities and numbers of rays: the error is the root mean square from the light by
 `REFERENCE` rays at points of the surfaces, of 255, as a client looks it up.
+
+With `--parts`, what the sky and lamps cost beside ambient light: seconds of one processor, and
+bytes of the lightmaps' `.ptm`s. The lamps are panels of 0.6 m below the ceilings, one in each cell.
+
+With `--model`, each model becomes a glTF with one lightmap of `SIDE` texels, and a database of it
+has default options: the bytes of the lightmaps' `.ptm`s against those of the PNG in the glTF, and
+the error of the light at points of the surfaces, of 255.
 """
 
 from __future__ import annotations
@@ -15,27 +22,45 @@ import argparse
 import sys
 import tempfile
 import time
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scenes import model_file
 
 from ptmtools.arrays import Floats, areas
-from ptmtools.light.cells import ABOVE, COVERED, Baking, exposed
-from ptmtools.light.looks import LightImage, lookup
+from ptmtools.cells.model import Cells
+from ptmtools.light.atlas import unwrap
+from ptmtools.light.cells import ABOVE, COVERED, WHITE, Baking, encoded, exposed
+from ptmtools.light.lamps import lamps_of
+from ptmtools.light.lightmap import bake
+from ptmtools.light.looks import LightImage, Painted, Rays, lookup
+from ptmtools.light.mixing import Mix, mixed
 from ptmtools.light.occlusion import Surroundings, light, normals, points_on, spread_over, turns
 from ptmtools.light.options import LightOptions
 from ptmtools.output.content import Geometry
+from ptmtools.output.gltf import pack
 from ptmtools.output.pieces import pieces_of
 from ptmtools.output.served import on_link
 from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.command import open_database
+from ptmtools.pipeline.encoding import TextureOptions, encoded_texels
 from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import APO, CELLS, EMIT, LIGHT, TEXTURES
+from ptmtools.pipeline.stages.light import lightmap_files
+from ptmtools.scene import Scene, ingest
+from ptmtools.scene.lights import Lights
+from ptmtools.scene.model import Material
+from ptmtools.texture import decode
+from ptmtools.texture.images import png_bytes
 
 #: Rays of the reference, and its points.
 REFERENCE, POINTS = 1024, 2000
+#: Texels of the lightmap of a glTF.
+SIDE = 2048
 DENSITIES, SAMPLES = (2.5, 5.0, 10.0, 20.0), (16, 64, 256)
 
 
@@ -44,11 +69,18 @@ def main() -> None:
     parser.add_argument("models", nargs="*", default=["museum", "hospital", "office", "gallery"])
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--accuracy", action="store_true")
+    parser.add_argument("--parts", action="store_true")
+    parser.add_argument("--model", action="store_true")
     arguments = parser.parse_args()
-    if arguments.accuracy:
-        for model in arguments.models:
-            accuracy(model_file(model))
-        return
+    for chosen, table in (
+        (arguments.accuracy, accuracy),
+        (arguments.parts, parts),
+        (arguments.model, of_the_model),
+    ):
+        if chosen:
+            for model in arguments.models:
+                table(model_file(model))
+            return
     print("| model | lightmaps | texels | s | textures, kB | lightmaps, kB | of textures ", end="")
     print("| geometry, kB | first room, kB | with light |")
     print("|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|")
@@ -85,10 +117,7 @@ def row(name: str, model: Path, jobs: int) -> str:
 
 def accuracy(model: Path) -> None:
     """The second table."""
-    with tempfile.TemporaryDirectory() as folder:
-        build_scene(model, folder, until=CELLS)
-        artifacts = Artifacts(open_database(folder))
-        scene, cells = artifacts[APO], artifacts[CELLS]
+    scene, cells = cut(model)
     glass = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials])
     pieces = pieces_of(Geometry(scene, cells), cells, glass, 1 / LightOptions().light_density)
     around = Surroundings.of(scene)
@@ -109,6 +138,150 @@ def accuracy(model: Path) -> None:
             error = 255 * np.sqrt(square / max(count, 1))
             print(f"| {density:g} | {samples} | {seconds:.1f} | {texels:,} | {error:.2f} |")
             sys.stdout.flush()
+
+
+def cut(model: Path) -> tuple[Scene, Cells]:
+    """The scene of a model, and its cells."""
+    with tempfile.TemporaryDirectory() as folder:
+        build_scene(model, folder, until=CELLS)
+        artifacts = Artifacts(open_database(folder))
+        return artifacts[APO], artifacts[CELLS]
+
+
+def parts(model: Path) -> None:
+    """The third table."""
+    scene, cells = cut(model)
+    glass = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials])
+    pieces = pieces_of(Geometry(scene, cells), cells, glass, 1 / LightOptions().light_density)
+    options, lit = LightOptions("bake"), with_panels(scene, cells)
+    print(
+        f"| {model.stem} | patches of lamps | factor | s, one processor | of ambient | .ptm, kB |"
+    )
+    print("|---|--:|--:|--:|--:|--:|")
+    least = 0.0
+    for name, of, glowing in (("ambient", scene, None), ("+ sky", scene, None), ("+ lamps", *lit)):
+        around, began = Surroundings.of(of), time.process_time()
+        mix = Mix()
+        if name != "ambient":
+            mix = mixed(around, pieces, lamps_of(of, glowing), options, ABOVE, WHITE)
+        results = [Baking(around, options, mix).light(piece) for piece in pieces]
+        seconds = time.process_time() - began
+        least = least or seconds
+        size = sum(ptm_bytes(r.texels) for r in results if r.texels is not None)
+        lamps = 0 if mix.lamps is None else len(mix.lamps)
+        print(f"| {name} | {lamps} | {mix.factor:.2f} | {seconds:.1f} | {seconds / least:.2f} "
+              f"| {size / 1e3:,.0f} |", flush=True)  # fmt: skip
+
+
+def ptm_bytes(texels: NDArray[np.uint8]) -> int:
+    """The bytes of a lightmap as stored."""
+    return len(encoded_texels(TextureOptions(fallback=False), "light", texels[:, :, None])[0][1])
+
+
+def with_panels(scene: Scene, cells: Cells) -> tuple[Scene, Lights]:
+    """The scene with a panel that glows below the ceiling of each cell, and its lights."""
+    middle = []
+    for cell in range(cells.cell_count):
+        own = np.flatnonzero(cells.leaf_cell == cell)
+        rows = [cells.leaf_point[slice(*cells.leaf_point_start[k : k + 2])] for k in own]
+        corner = np.concatenate(rows)
+        middle.append((corner.min(axis=0) + corner.max(axis=0)) / 2)
+    place = np.array(middle)
+    place[:, 1] = Surroundings.of(scene).upright(place, 20.0, 1.0) - 0.02
+    panel = 0.3 * np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]])
+    points = (place[:, None] + panel).reshape(-1, 3)
+    first = len(scene.points) + 4 * np.arange(len(place))[:, None, None]
+    triangles = (first + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
+    new, materials = len(triangles), len(scene.materials)
+    longer = replace(
+        scene,
+        points=np.concatenate([scene.points, points]),
+        triangles=np.concatenate([scene.triangles, triangles]).astype(np.int32),
+        uv=np.concatenate([scene.uv, np.zeros((new, 3, 2))]),
+        triangle_object=np.append(scene.triangle_object, np.zeros(new, np.int32)),
+        triangle_material=np.append(scene.triangle_material, np.full(new, materials, np.int32)),
+        two_sided=np.append(scene.two_sided, np.zeros(new, np.bool_)),
+        materials=(*scene.materials, Material("panel")),
+        colors=None,
+    )
+    glow = np.append(np.zeros(materials, np.float32), np.float32(1))
+    none = np.full(materials + 1, -1, np.int32)
+    return longer, Lights(glow, (), none, np.zeros((0, 3, 2), np.float32), ())
+
+
+def of_the_model(model: Path) -> None:
+    """The fourth table."""
+    scene = ingest(model)
+    corner, area = scene.corners, areas(scene.corners)
+    atlas = unwrap(scene.points, scene.triangles, (SIDE,), padding=1, purpose="the benchmark")
+    look = Rays(Surroundings.of(scene), corner, LightOptions().light_samples, 3.0, above=ABOVE)
+    texels = encoded(bake(look, corner, atlas, look.grain, (SIDE,))[0].value)
+    image = png_bytes(texels[:, :, None])
+    with tempfile.TemporaryDirectory() as folder:
+        lit = Path(folder, "lit.glb")
+        lit.write_bytes(lit_glb(corner, atlas.uv, image))
+        report = build_scene(lit, Path(folder, "db"), until=LIGHT)
+        (stage,) = (stage for stage in report.stages if stage.stage == LIGHT.name)
+        artifacts = Artifacts(open_database(str(Path(folder, "db"))))
+        light, files = artifacts.stored(LIGHT), {}
+        assert light is not None
+        for cell, name in lightmap_files(light).items():
+            files[cell] = decode(Path(folder, "db/www", name).read_bytes())[:, :, 0]
+        scene, cells = artifacts[APO], artifacts[CELLS]
+    geometry = Geometry(scene, cells)
+    pieces = pieces_of(geometry, cells, np.zeros(1, np.bool_), 1.0)
+    painted = LightImage(texels, ("clamp", "clamp"))
+    square, count = 0.0, 0
+    for cell, piece in enumerate(pieces):
+        rows = slice(*geometry.triangle_start[geometry.cell_start[cell : cell + 2]].tolist())
+        own = light.mapped[geometry.cell_start[cell] + piece.shape]
+        if not own.any():
+            continue
+        share = areas(piece.corner[own].astype(np.float64))
+        face = spread_over(share, np.zeros(len(share), np.int64), np.array([0]), POINTS)[0]
+        number = np.arange(POINTS)
+        flat = [np.pad(k, [(0, 0), (0, 0), (0, 1)]) for k in (light.uv[rows][own], atlas.uv)]
+        seen = lookup(LightImage(files[cell], ("clamp", "clamp")),
+                      points_on(flat[0][face].astype(np.float64), number)[:, :2])  # fmt: skip
+        point = points_on(piece.corner[own][face].astype(np.float64), number)
+        source = piece.face[own][face]
+        there = Painted(scene.corners, atlas.uv, np.zeros(len(area), np.int32), (painted,),
+                        np.arange(len(area)))(source, point, turns(POINTS))  # fmt: skip
+        square, count = square + float(((seen - there) ** 2).sum()), count + POINTS
+    error = 255 * np.sqrt(square / max(count, 1))
+    print("| model | lightmaps | PNG of the glTF, kB | .ptm, kB | of the PNG | error |")
+    print("|---|--:|--:|--:|--:|--:|")
+    size = stage.counts["ptm_bytes"]
+    print(f"| {model.stem} | {stage.counts['lightmaps']} | {len(image) / 1e3:,.0f} "
+          f"| {size / 1e3:,.0f} | {size / len(image):.2f} | {error:.2f} |", flush=True)  # fmt: skip
+
+
+def lit_glb(corner: Floats, uv: Floats, image: bytes) -> bytes:
+    """A GLB of (T, 3, 3) faces with a lightmap, a PNG, at (T, 3, 2) coordinates."""
+    place = uv.astype("<f4") * np.float32([1, -1]) + np.float32([0, 1])
+    data = [corner.astype("<f4").tobytes(), place.tobytes(), image]
+    start = np.cumsum([0, *map(len, data)]).tolist()
+    count = 3 * len(corner)
+    document = {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"name": "building", "mesh": 0}],
+        "meshes": [
+            {"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_1": 1}, "material": 0}]}
+        ],
+        "materials": [{"doubleSided": True, "occlusionTexture": {"index": 0, "texCoord": 1}}],
+        "textures": [{"source": 0}],
+        "images": [{"bufferView": 2, "mimeType": "image/png"}],
+        "buffers": [{"byteLength": start[-1]}],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": a, "byteLength": b - a} for a, b in pairwise(start)
+        ],
+        "accessors": [
+            {"bufferView": k, "componentType": 5126, "count": count, "type": f"VEC{3 - k}"}
+            for k in (0, 1)
+        ],
+    }
+    return pack(document, b"".join(data))
 
 
 def errors(around: Surroundings, corner: Floats, result: Any, options: LightOptions) -> Floats:

@@ -19,9 +19,9 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import CancelledError, Future
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import closing, contextmanager, nullcontext, suppress
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
@@ -97,11 +97,13 @@ class Cluster(Executor):
     def _each(
         self, function: Task, shared: Any, tasks: Iterable[Any], releases_lock: bool, chunk: int
     ) -> Iterator[Any]:
-        return results(self._outcomes(function, shared, chunks(tasks, chunk), not releases_lock))
+        outcomes = self._outcomes(function, shared, chunks(tasks, chunk), not releases_lock)
+        with closing(outcomes):  # a fault's traceback would keep it open
+            yield from results(outcomes)
 
     def _outcomes(
         self, function: Task, shared: Any, rest: Iterator[list[Any]], alone: bool
-    ) -> Iterator[Outcome]:
+    ) -> Generator[Outcome]:
         sent: deque[list[Any]] = deque()  # chunks whose results have not come
         value: Any = None
 
@@ -134,6 +136,9 @@ class Cluster(Executor):
                 if not (left and lost and self._client.status == "running"):
                     raise
                 self._wait_for_workers()
+            finally:
+                if value is not None:
+                    value.release()  # so would it the value
 
     def close(self) -> None:
         """Leaves the cluster, which drops our tasks."""

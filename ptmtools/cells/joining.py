@@ -50,6 +50,8 @@ def patches(scene: Scene, triangle: Ints, corner: Ints, may: Bools, tolerance: T
     corners, uv = scene.corners[triangle], scene.uv[triangle]
     if scene.colors is not None:  # they differ where they are a level of 255 apart
         uv = np.concatenate([uv, 2 * _UV * scene.colors[triangle].astype(np.float64)], axis=2)
+    if scene.normal_uv is not None:
+        uv = np.concatenate([uv, scene.normal_uv[triangle]], axis=2)
     flat, same = _continues(corners, uv, one // 3, other // 3, tolerance)
     back = _continues(corners, uv, other // 3, one // 3, tolerance)
     flat, same = flat & back[0], same & back[1]

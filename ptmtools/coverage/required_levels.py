@@ -233,6 +233,7 @@ def unresolved_levels(
     scene: Scene, cells: Cells, pvs: Pvs, sizes: Sequence[tuple[int, int]], screen: Screen
 ) -> Ints:
     """(I,) the number of finest levels of each image that no eye resolves; `ALL` if no eye sees it.
+    Normal maps keep their levels.
 
     Parameters
     ----------
@@ -248,6 +249,7 @@ def unresolved_levels(
     footprint = screen.pixel * distance * texels[cells.triangle_source[piece]]
     least = np.full(len(sizes), np.inf)
     np.minimum.at(least, shown, footprint)
+    least[[m.normal.image for m in scene.materials if m.normal]] = 1.0
     # The exponent of a number from 1 up is its logarithm rounded down, plus 1.
     levels = np.frexp(np.where(np.isfinite(least), least, 0.0))[1].astype(np.int64) - 1
     return np.where(np.isfinite(least), np.clip(levels, 0, ALL), ALL)

@@ -28,6 +28,9 @@ from ptmtools.scene.colors import gradients
 from ptmtools.texture.model import gpu_texel_bytes
 from ptmtools.walk import Browser
 
+#: Worth, and error, of a difference of normals: they come after the colours.
+NORMALS = 0.25
+
 
 class Columns(NamedTuple):
     """The columns of textures that can be fetched; columns after the last one of a texture repeat
@@ -144,6 +147,7 @@ class Catalogue:
     records, statistics: of each cell.
     shapes: see `Shapes`.
     previews: see `Previews`. meshes: see `Meshes`.
+    normals: the textures that are normal maps of materials.
     """
 
     levels: Ints
@@ -164,6 +168,7 @@ class Catalogue:
     shapes: Shapes
     previews: Previews
     meshes: Meshes
+    normals: tuple[int, ...] = ()
 
     @property
     def texture_count(self) -> int:
@@ -183,10 +188,14 @@ class Catalogue:
     @cached_property
     def gains(self) -> Floats:
         """(R, K) mean difference that each column of each source removes on pixels that want it, 0
-        to 255, less than 0 if its texels are worse than the column before."""
+        to 255, less than 0 if its texels are worse than the column before; of normal maps
+        `NORMALS` of it."""
         own = self.differences[self.previews.texture] - self.previews.losses(self.ends.shape[1])
         own[np.arange(own.shape[1]) > self.previews.column[:, None]] = 0.0
-        return np.concatenate([self.differences, own])
+        gains = np.concatenate([self.differences, own])
+        textures = np.concatenate([np.arange(self.texture_count), self.previews.texture])
+        gains[np.isin(textures, self.normals)] *= NORMALS
+        return gains
 
     def by_source(self, shares: Floats) -> Floats:
         """(R, K) the (T, K) shares of the textures of all sources."""
@@ -312,6 +321,7 @@ def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalog
         shapes=_shapes(served.surfaces),
         previews=previews_of(textures),
         meshes=meshes_of(served.index.get("meshes", ()), served.mesh_bytes),
+        normals=tuple(t for t, row in enumerate(textures) if row.get("normals")),
     )
 
 

@@ -65,8 +65,9 @@ class Renderer:
 
     def _drawn(self, sight: Sight, shows: Shows, loaded: Bools, column: Ints) -> Floats:
         from ptmtools.rendering.kernels import shade
+        from ptmtools.rendering.normal_maps import show_bumps, show_relief
 
-        shown = np.empty((len(sight.ray), 3))
+        surfaces, shown = self._world.served.surfaces, np.empty((len(sight.ray), 3))
         shade(sight, self._triangles, shows, loaded, column, shown)
         if self._world.relief:
             from ptmtools.rendering.relief import relieve
@@ -74,6 +75,8 @@ class Renderer:
             octrees, first = self._world.relief.octrees, len(self._world.pyramids.levels)
             held = column[first : first + octrees.number]
             relieve(sight, self._triangles, self._lamps, octrees, loaded, held, shown)
+            show_relief(sight, surfaces, shows, loaded, column, self._lamps, shown)
+        show_bumps(sight, surfaces, shows, loaded, column, shown)
         return self._picture(shown)
 
     def _picture(self, shown: Floats) -> Floats:

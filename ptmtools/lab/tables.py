@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles
+from ptmtools.lab.catalogue import NORMALS
 from ptmtools.lab.relief.tables import Relief, Tally as ReliefTally
 from ptmtools.lab.rows import Rows, RowSums
 from ptmtools.output.served import Surfaces
@@ -42,7 +43,8 @@ class Views:
     ----------
     start: (F + 1,) first row of each frame.
     cell, texture: (R,) int32 of each row; the texture is -1 for surfaces without. Octrees come
-        after the textures, see `ptmtools.lab.relief`. A surface with a lightmap is in two rows.
+        after the textures, see `ptmtools.lab.relief`. A surface with a lightmap is in two rows, and
+        one whose material has a normal map in another.
     error, square: (R, S + 1) part of the frame's mean error, and mean squared error, with these as
         the finest data: nothing, the mean colour, then the states from 1 on (`Lossy`), which begin
         with level 0, level 1, …; in other forms their columns in place of states.
@@ -90,18 +92,20 @@ def look(
     """The tables of (F, 3) eyes and unit directions of view: of ``pyramids`` and their ``lossy``
     previews, and of the same textures in other ``forms``; with octrees and other relief, if any.
     The reference is ``full``, which holds the same textures in other quality, or ``pyramids``; of
-    lightmaps it is always that."""
+    lightmaps and normal maps it is always that."""
     triangles, caster, seen = triangles_of(surfaces), Caster(surfaces), camera.sparse
     full = pyramids if full is None else full
     lossy = no_previews(len(pyramids.levels)) if lossy is None else lossy
     shown: list[Pyramids | Shows] = [pyramids, *forms]
     tallies = [_Tally(triangles, textures, lossy, full, seen) for textures in shown]
-    light = surfaces.light
-    lights = (
-        []
-        if light is None
-        else [_Tally(triangles_of(light), textures, lossy, pyramids, seen) for textures in shown]
-    )
+    others = [
+        (
+            weight,
+            [_Tally(triangles_of(maps), textures, lossy, pyramids, seen) for textures in shown],
+        )
+        for maps, weight in ((surfaces.light, 1.0), (surfaces.bumped, NORMALS))
+        if maps is not None
+    ]
     relief_tally = ReliefTally(relief, surfaces, triangles, pyramids, seen) if relief else None
     owner = np.empty((len(eye), int(seen.sum())), np.int32)
     depth = np.empty(owner.shape, np.float32)
@@ -111,23 +115,27 @@ def look(
         plain = relief_tally.add(sight) if relief_tally else sight
         for tally in tallies:
             tally.add(plain)
-        for tally in lights:
+        for tally in (tally for _, maps in others for tally in maps):
             tally.add(sight)
         owner[k], depth[k] = _item_buffer(sight, triangles, seen)
     progress(len(eye), len(eye), "looking along the walk")
     more = [relief_tally.rows()] if relief_tally else []
     parts = [[tally.rows(), *more] for tally in tallies]
-    for own, tally in zip(parts, lights, strict=False):
-        own.append(_of_lightmaps(tally.rows()))
+    for weight, maps in others:
+        for own, tally in zip(parts, maps, strict=True):
+            own.append(_of_maps(tally.rows(), weight))
     return [_views(own, owner, depth) for own in parts]
 
 
-def _of_lightmaps(rows: Rows) -> Rows:
-    """Rows of surfaces with a lightmap as their texture, without those of other surfaces. The error
-    of a missing cell is in the rows of its textures."""
+def _of_maps(rows: Rows, weight: float) -> Rows:
+    """Rows of surfaces with a lightmap or normal map as their texture, without those of other
+    surfaces; errors times ``weight``. The error of a missing cell is in the rows of its textures.
+    """
     lit = rows.texture >= 0
     kept = {name: table[lit] for name, table in rows._asdict().items()}
     kept["error"][:, 0] = kept["square"][:, 0] = 0.0
+    kept["error"] *= weight
+    kept["square"] *= weight**2
     return Rows(**kept)
 
 

@@ -27,8 +27,8 @@ from ptmtools.lazy import component
 _LARGE = 1024.0
 #: The share of a lightmap that the first packing aims at.
 FILLED = 0.6
-#: Most packings.
-_TRIES = 8
+#: Most packings, the part of the side that each aims at, and the least next density of one before.
+_TRIES, _AIM, _STEP = 8, 0.98, 0.3
 #: An atlas with less than this share of the intended density is mostly edges,
 _WORTH = 0.4
 #: unless a chart, such as a street, is as long as this share of the side.
@@ -113,6 +113,7 @@ def _packed(
 ) -> tuple[_Packed, float]:
     """An atlas for a lightmap of that side, a mesh for each part, and its texels to the metre,
     ``density`` at most."""
+    before: tuple[float, int] | None = None
     for _ in range(_TRIES):
         atlas = xatlas.Atlas()
         for faces in parts:
@@ -125,7 +126,13 @@ def _packed(
         got = max(atlas.width, atlas.height)
         if got <= side:
             break
-        density *= 0.97 * side / got
+        less = _AIM * side / got * density
+        if before is not None and before[1] > got:
+            # The edges of charts have a width of their own: the side is nearly linear in density.
+            slope = (before[1] - got) / (before[0] - density)
+            less = min(less, density - (got - _AIM * side) / slope)
+        before = density, got
+        density = max(less, _STEP * density)
     texel, chart = np.zeros((len(triangles), 3, 2)), np.zeros(len(triangles), np.int64)
     charts = 0
     for k, faces in enumerate(parts):

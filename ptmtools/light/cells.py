@@ -5,7 +5,8 @@ triangles have their light at vertices, as colours: an atlas would have a chart 
 them, and their coarser meshes take over colours, but no charts. So have objects that
 ``--apo`` replaces: their second coordinates are those of their relief.
 
-The light is ambient obscurance (`light.occlusion`): indoors, a ray that meets nothing within reach
+The light is that of the model's own lightmaps, or ambient obscurance (`light.occlusion`) with that
+of lamps and the sky (`light.mixing`). Of ambient light, a ray that meets nothing within reach
 counts whole. More of it comes from above than from below, so that forms show where nothing is near:
 a white statue in a white room. Indoors, all surfaces have something within reach in many
 directions; so that pictures keep about their colours, all light is brightened (`exposed`).
@@ -17,7 +18,7 @@ as of a screen within a room, the more open side counts.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,7 +27,8 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints, Singles, areas
 from ptmtools.light.atlas import FILLED, unwrap
 from ptmtools.light.lightmap import SMOOTH, bake, vertex_light
-from ptmtools.light.looks import Rays, open_sides, planes
+from ptmtools.light.looks import Painted, Rays, open_sides, plane_areas, planes
+from ptmtools.light.mixing import Mix, Mixed
 from ptmtools.light.occlusion import Surroundings, normals
 
 if TYPE_CHECKING:
@@ -37,6 +39,8 @@ ABOVE = 0.4
 #: Share of the light that comes everywhere, by reflection, and the factor of all light, which is
 #: then cut off at 1.
 REFLECTED, EXPOSURE = 0.15, 1.05
+#: The light that shows as white.
+WHITE = (1 / EXPOSURE - REFLECTED) / (1 - REFLECTED)
 #: Texels with less light are covered, as a wall by a picture, and take that of their neighbours: a
 #: texel is wider than the gap that it would darken.
 COVERED = 0.03
@@ -57,9 +61,10 @@ class Piece:
     ----------
     corner: (n, 3, 3) float32 metres.
     object, shape: (n,) of the scene; of the cell, ascending.
-    glass: (n,) whether the surface is seen through, and has no light.
+    glass: (n,) whether the surface has no light of its own: it is seen through, or glows.
     dense: (n,) whether its light is at vertices.
     side: (n,) 1 where the front of a face counts, -1 the back, 0 the more open of the two.
+    face: (n,) the triangle of the scene that it is a piece of.
     """
 
     corner: NDArray[np.float32]
@@ -68,6 +73,7 @@ class Piece:
     glass: Bools
     dense: Bools
     side: NDArray[np.int8]
+    face: Ints
 
 
 @dataclass(frozen=True)
@@ -78,6 +84,7 @@ class CellLight:
     ----------
     texels: (side, side) uint8 linear light, of 255; None without a lightmap.
     crowded: whether neighbours in the lightmap run into each other.
+    density: texels to the metre, of those that were asked for; 1 without a lightmap.
     """
 
     mapped: Bools
@@ -85,14 +92,24 @@ class CellLight:
     vertex: NDArray[np.uint8]
     texels: NDArray[np.uint8] | None
     crowded: bool
+    density: float = 1.0
 
 
 @dataclass(frozen=True)
 class Baking:
-    """The shared input of all tasks."""
+    """The shared input of all tasks.
+
+    Attributes
+    ----------
+    around, options: what occludes, and the options.
+    mix: lamps and the sky.
+    painted: the light of the model's own lightmaps, for the faces of the scene, instead of rays.
+    """
 
     around: Surroundings
     options: LightOptions
+    mix: Mix = Mix()  # noqa: RUF009 - a frozen value
+    painted: Painted | None = None
 
     def light(self, piece: Piece) -> CellLight:
         """The light of a cell. Raises MissingComponentError PTM-M100: xatlas is not installed."""
@@ -105,15 +122,16 @@ class Baking:
         vertex = np.full((len(corner), 3), 255, np.uint8)
         side = self._sides(corner, piece.side)
         for own in _objects(piece.object, dense):
-            light = vertex_light(
-                self._look(corner[own], side[own]), corner[own], normals(corner[own])
-            )
-            vertex[own] = encoded(light)
+            look = self._look(corner[own], side[own], piece.face[own])
+            vertex[own] = self._encoded(vertex_light(look, corner[own], normals(corner[own])))
         if not flat.any():
             return CellLight(mapped, uv, vertex, None, False)
         own = np.flatnonzero(flat)
         points, triangles = np.unique(piece.corner[own].reshape(-1, 3), axis=0, return_inverse=True)
-        sizes = _sizes(float(areas(corner[own]).sum()), self.options.light_density)
+        area, density = areas(corner[own]), self.options.light_density
+        if self.painted is not None:
+            density = min(density, self.painted.density(piece.face[own], area))
+        sizes = _sizes(float(area.sum()), density)
         atlas = unwrap(
             points.astype(np.float64),
             triangles.reshape(-1, 3).astype(np.int32),
@@ -121,25 +139,37 @@ class Baking:
             padding=_PADDING,
             group=_groups(corner[own], side[own]),
         )
-        look = self._look(corner[own], side[own])
+        look = self._look(corner[own], side[own], piece.face[own])
         size = atlas.side or sizes[-1]
-        (lit,) = bake(look, corner[own], atlas, look.grain, (size,), least=COVERED)
+        least = COVERED if self.painted is None else 0.0
+        (lit,) = bake(look, corner[own], atlas, look.grain, (size,), least=least)
         uv[own] = atlas.uv
-        return CellLight(mapped, uv, vertex, encoded(lit.value), atlas.side is None)
+        texels_a_metre = size * math.sqrt(plane_areas(atlas.uv).sum() / max(area.sum(), 1e-9))
+        reached = texels_a_metre / max(density, 1e-9)
+        texels = self._encoded(lit.value)
+        return CellLight(mapped, uv, vertex, texels, atlas.side is None, min(reached, 1.0))
 
     def _sides(self, corner: Floats, side: NDArray[np.int8]) -> Floats:
         either = side == 0
         result = np.where(side < 0, -1.0, 1.0)
-        if either.any():
+        if either.any() and self.painted is None:
             reach = self.options.light_reach
             result[either] = open_sides(
                 self.around, corner[either], either[either], reach, indoors=True
             )
         return result
 
-    def _look(self, corner: Floats, side: Floats) -> Rays:
+    def _look(self, corner: Floats, side: Floats, face: Ints) -> Rays | Mixed | Painted:
+        if self.painted is not None:
+            return replace(self.painted, source=self.painted.source[face])
         samples, reach = self.options.light_samples, self.options.light_reach
-        return Rays(self.around, corner, samples, reach, side=side, above=ABOVE)
+        return self.mix.look(Rays(self.around, corner, samples, reach, side=side, above=ABOVE))
+
+    def _encoded(self, light: Floats | Singles) -> NDArray[np.uint8]:
+        """Light in 255ths: as exposed, or that of the model."""
+        if self.painted is None:
+            return encoded(light)
+        return np.asarray(np.rint(255 * np.clip(light, REFLECTED, 1.0)), np.uint8)
 
 
 def exposed(light: Floats | Singles) -> Floats:

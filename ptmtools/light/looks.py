@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles, areas
 from ptmtools.cells.search import connected
+from ptmtools.errors import naming
 from ptmtools.light.occlusion import (
     Surroundings,
     escaping,
@@ -58,7 +59,8 @@ class Rays:
     above: float = 0.0
 
     @cached_property
-    def _normal(self) -> Floats:
+    def normal(self) -> Floats:
+        """(T, 3) of the lit sides."""
         side = np.broadcast_to(self.side, len(self.corner))
         return np.asarray(normals(self.corner) * side[:, None])
 
@@ -68,7 +70,7 @@ class Rays:
         return _GRAIN / math.sqrt(self.samples)
 
     def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
-        normal = self._normal[face]
+        normal = self.normal[face]
         place = outermost(self.around, point, normal, self.error)
         return light(self.around, place, normal, turn, self.samples, self.reach, self.above)
 
@@ -87,6 +89,18 @@ class LightImage:
     texels: NDArray[np.uint8]
     wrap: tuple[SourceWrap, SourceWrap] = ("repeat", "repeat")
     strength: float = 1.0
+
+
+def red_texels(data: bytes, limit: int, label: str) -> NDArray[np.uint8]:
+    """(h, w) the red channel of an image of at most ``limit`` decoded bytes, which ``label`` names
+    in errors. Raises as decoding."""
+    from ptmtools.texture.images import load_image
+    from ptmtools.texture.model import Limits
+    from ptmtools.texture.samples import in_eight_bits
+
+    with naming(label):
+        texels = in_eight_bits(load_image(data, Limits(limit)).array())
+    return np.ascontiguousarray(texels[:, :, 0])
 
 
 @dataclass(frozen=True)
@@ -112,6 +126,14 @@ class Painted:
         """0: painted light is exact."""
         return 0.0
 
+    def density(self, face: Ints, area: Floats) -> float:
+        """Texels to the metre of (n,) faces, on average over parts of these of (n,) m²; 0 for those
+        without."""
+        of = self.source[face]
+        size = np.array([image.texels.size for image in self.images] + [0])[self.image[of]]
+        texels = size * plane_areas(self.uv[of]) / np.maximum(areas(self.corner[of]), 1e-9)
+        return math.sqrt(float((texels * area).sum() / max(area.sum(), 1e-9)))
+
     def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
         of = self.source[face]
         a, b, c = np.moveaxis(self.corner[of], 1, 0)
@@ -131,6 +153,12 @@ class Painted:
             these = self.image[of] == index
             result[these] = 1 - image.strength * (1 - lookup(image, at[these]))
         return result
+
+
+def plane_areas(uv: Floats) -> Floats:
+    """(n,) the areas of (n, 3, 2) triangles."""
+    first, second = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    return np.asarray(np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / 2)
 
 
 def lookup(image: LightImage, at: Floats) -> Singles:

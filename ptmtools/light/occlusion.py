@@ -136,13 +136,32 @@ def light(
     above: by how much less light comes from straight below than from straight above, in [0, 1]. Of
         a level surface in the open, the light stays 1.
     """
-    result = np.empty(len(point), np.float32)
+    return light_and_sky(around, point, normal, turn, samples, reach, above, sky=False)[0]
+
+
+def light_and_sky(
+    around: Surroundings,
+    point: Floats,
+    normal: Floats,
+    turn: Floats,
+    samples: int,
+    reach: float,
+    above: float = 0.0,
+    *,
+    sky: bool = True,
+) -> tuple[Singles, Singles]:
+    """(n,) light as of `light`, and (n,) the share of the same rays that reach the sky: they meet
+    nothing opaque at any distance, nor the ground. Without ``sky``, 0: rays end at ``reach``."""
+    result, open_share = np.empty(len(point), np.float32), np.zeros(len(point), np.float32)
     for part, origin, along in _fans(around, point, normal, turn, samples):
-        share = _escaping(around, origin.astype(np.float32), along, reach)
+        start = origin.astype(np.float32)
+        share, unmet = _escaping(around, start, along, reach, math.inf if sky else reach)
         if above:
             share *= (1 - above * (1 - along[:, 1]) / 2) / (1 - above / 6)
         result[part] = share.reshape(-1, samples).mean(axis=1)
-    return result
+        if sky:
+            open_share[part] = unmet.reshape(-1, samples).mean(axis=1)
+    return result, open_share
 
 
 def _fans(
@@ -249,18 +268,22 @@ def _frames(normal: Floats, turn: Floats) -> Singles:
     )
 
 
-def _escaping(around: Surroundings, origin: Singles, along: Singles, reach: float) -> Singles:
-    """(n,) the light of each ray."""
-    far = np.full(len(origin), min(reach, np.finfo(np.float32).max), np.float32)
+def _escaping(
+    around: Surroundings, origin: Singles, along: Singles, reach: float, longest: float
+) -> tuple[Singles, Bools]:
+    """(n,) the light of each ray, and (n,) whether it meets nothing within ``longest``, which is
+    ``reach`` at least."""
+    far = np.full(len(origin), min(longest, np.finfo(np.float32).max), np.float32)
     with np.errstate(divide="ignore", invalid="ignore"):
         down = (np.float32(around.ground - around.middle[1]) - origin[:, 1]) / along[:, 1]
     limit = np.where((along[:, 1] < 0) & (down < far), np.maximum(down, 0), far)
     if around.tree is not None:
         # A copy: Embree writes into its arguments.
         limit = around.tree.run(origin, along, dists=limit.astype(np.float32), query="DISTANCE")
+    unmet = limit >= far
     if math.isinf(reach):
-        return (limit >= far).astype(np.float32)
-    return np.minimum(limit / np.float32(reach), np.float32(1))
+        return unmet.astype(np.float32), unmet
+    return np.minimum(limit / np.float32(reach), np.float32(1)), unmet
 
 
 #: Multiples of these modulo 1 are far apart in both directions (Roberts' R2 sequence).

@@ -22,10 +22,12 @@ class LightOptions:
 
     heading: ClassVar[str] = "Light"
 
-    light: Literal["bake", "none"] = option(
-        "none",
-        "Light of the surfaces: bake (ambient light, darker in corners and below things, in one "
-        "lightmap for each cell) or none (colours as in the model).",
+    light: Literal["auto", "bake", "model", "none"] = option(
+        "auto",
+        "Light of the surfaces, in one lightmap for each cell: bake (ambient light, darker in "
+        "corners and below things, with that of lamps and of the sky through windows), model (the "
+        "lightmaps of a glTF, its occlusion textures) or none (colours as in the model). auto: "
+        "model if there are any, else none.",
         basic=True,
     )
     light_density: float = option(
@@ -45,9 +47,10 @@ class LightOptions:
                     f"--light-{name} {value:g} is not possible",
                     remedy=f"use {least:g} to {most:g}",
                 )
-            if self.light == "none" and value != getattr(type(self), field):
+            used = self.light == "bake" or (self.light == "model" and name == "density")
+            if not used and value != getattr(type(self), field):
                 raise InputError(
                     "PTM-I111",
-                    f"--light-{name} does nothing without --light",
+                    f"--light-{name} does nothing without --light bake",
                     remedy="add --light bake",
                 )

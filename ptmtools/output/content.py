@@ -56,6 +56,8 @@ class Shape:
         lower left; None where it does not light the shape.
     relief: (m, 3, 9) float32 coordinates of the corners in the normal map of the object, likewise,
         and the frames there, see `NormalMap`; None without one.
+    normal: (m, 3, 2) float32 coordinates of the corners in the normal map of the material,
+        likewise, if that has its own; else None.
     """
 
     object: int
@@ -68,6 +70,7 @@ class Shape:
     color: NDArray[np.uint8] | None = None
     light: NDArray[np.float32] | None = None
     relief: NDArray[np.float32] | None = None
+    normal: NDArray[np.float32] | None = None
 
 
 class Geometry:
@@ -86,6 +89,7 @@ class Geometry:
     shape_point, point_start: (P,) rows of `point`, ascending; (S + 1,) those of each shape.
     shape_uv, uv_start: the same for `uv`.
     color: (M, 3, 3) uint8 sRGB of the corners of triangles; None if the scene has no colours.
+    normal: (M, 3, 2) float32 as in `Shape`; None if no normal map has its own coordinates.
     piece: (M,) the piece of `Cells` that each triangle is.
     collapsed: pieces dropped by the rounding, over all cells.
     light: the light of the cells, or None.
@@ -126,6 +130,9 @@ class Geometry:
         )
         self.piece = piece[order]
         self.color = _corner_colors(scene, cells, self.piece)
+        self.normal = _normal_coordinates(scene, cells, self.piece)
+        own = [m.normal is not None and m.normal.own for m in scene.materials]
+        self._own_normal = np.array(own, np.bool_)[self.material]
         uv_corner = uv_of[cells.triangle[self.piece]].reshape(-1, 3)
         self.shape_uv, self.uv_start, self.uv_triangle = _indexed(
             uv_corner, shape, len(first), len(self.uv)
@@ -192,6 +199,7 @@ class Geometry:
             None if self.color is None or (self.color[rows] == 255).all() else self.color[rows],
             self.light.uv[rows] if self.light is not None and self.light.mapped[s] else None,
             self.relief[rows] if self.relief is not None and self.relieved[s] else None,
+            self.normal[rows] if self.normal is not None and self._own_normal[s] else None,
         )
 
     def shapes(self, cell: int) -> Iterator[Shape]:
@@ -208,6 +216,16 @@ def _corner_colors(
         return None
     interpolated = _carried(scene, cells, piece, scene.colors)
     return np.asarray(np.clip(np.rint(interpolated), 0, 255).astype(np.uint8))
+
+
+def _normal_coordinates(
+    scene: Scene, cells: Cells, piece: NDArray[np.integer]
+) -> NDArray[np.float32] | None:
+    """(M, 3, 2) the coordinates of pieces' corners in the normal maps that have their own."""
+    if scene.normal_uv is None:
+        return None
+    uv = _carried(scene, cells, piece, scene.normal_uv)
+    return (np.rint(uv / _RELIEF_STEP) * _RELIEF_STEP).astype(np.float32)
 
 
 def _carried(
@@ -339,6 +357,12 @@ class Content:
     def octree_of(self) -> Mapping[int, int]:
         """Object of the scene → the place of its octree in `octrees`."""
         return {record.number: place for place, record in enumerate(self.octrees)}
+
+    @cached_property
+    def normal_maps(self) -> frozenset[int]:
+        """The images of the scene that are normal maps of materials, and nothing else."""
+        maps = {m.normal.image for m in self.scene.materials if m.normal}
+        return frozenset(maps - {m.image for m in self.scene.materials})
 
     @cached_property
     def paint(self) -> NDArray[np.int64]:

@@ -316,7 +316,8 @@ def _check(
             f"the stages do not belong together: {fault}",
             remedy="run the stages again, from `cells` on",
         )
-    used = {scene.materials[m].image for m in np.unique(scene.triangle_material[source]).tolist()}
+    shown = [scene.materials[m] for m in np.unique(scene.triangle_material[source]).tolist()]
+    used = {m.image for m in shown} | {m.normal.image for m in shown if m.normal}
     for image in sorted(used - {-1} - {texture.image for texture in textures}):
         raise DatabaseError(
             "PTM-D004",

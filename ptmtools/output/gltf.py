@@ -110,7 +110,7 @@ class MaterialWriter:
         self._lightmap = lightmap
         self._reliefs = reliefs
         self._fallback = fallback
-        self._known: dict[tuple[int, bool, int | None, bool, int | None], int] = {}
+        self._known: dict[tuple[Any, ...], int] = {}
         self._materials: list[dict[str, Any]] = []
         self._textures: dict[tuple[int, int], int] = {}
         self._images: dict[str, int] = {}
@@ -124,11 +124,13 @@ class MaterialWriter:
         *,
         lit: bool,
         relief: int | None = None,
+        normal: int | None = None,
     ) -> int:
         """The index of a scene's material, seen from one side or from both; of a coarsest mesh with
         finer ones, its row in the hints is ``mesh``. ``lit``: whether the lightmap lights it;
-        ``relief``: the object whose normal map it has."""
-        key = material, two_sided, mesh, lit, relief
+        ``relief``: the object whose normal map it has; ``normal``: the number of the coordinates in
+        its own."""
+        key = material, two_sided, mesh, lit, relief, normal
         place = self._known.setdefault(key, len(self._materials))
         if place == len(self._materials):
             row = self._material(self._scene[material], two_sided, mesh)
@@ -137,6 +139,8 @@ class MaterialWriter:
                 self._add(row, "light", "occlusionTexture", *self._lightmap)
             if relief is not None:
                 self._add(row, "normal", "normalTexture", *self._reliefs[relief])
+            elif normal is not None:
+                self._add_normal(row, self._scene[material], normal)
             self._materials.append(row)
         return place
 
@@ -148,6 +152,25 @@ class MaterialWriter:
         if self._fallback and record.fallback is not None:
             index = self._texture(UP + quote(record.fallback), "clamp", "clamp")
             row[member] = {"index": index, "texCoord": 1}
+
+    def _add_normal(self, row: dict[str, Any], material: Material, coords: int) -> None:
+        """Gives a material its normal map."""
+        use = material.normal
+        assert use
+        place, record = self._records[use.image]
+        wraps = {
+            f"normal{name[0].upper()}{name[1:]}": number
+            for name, number in _wrap(use.wrap_s, use.wrap_t).items()
+        }
+        scale = {} if use.scale == 1 else {"normalScale": use.scale}
+        extras = {"normal": place, "normalCoords": coords, **scale, **wraps}
+        row["extras"] = row.get("extras", {}) | extras
+        if self._fallback and record.fallback is not None:
+            index = self._texture(UP + quote(record.fallback), use.wrap_s, use.wrap_t)
+            other = {"texCoord": coords} if coords else {}
+            row["normalTexture"] = {"index": index, **other} | (
+                {"scale": use.scale} if scale else {}
+            )
 
     def members(self) -> dict[str, Any]:
         """The document's "materials", "textures", "images" and "samplers"."""
@@ -248,6 +271,16 @@ def _drawn(content: Content, cell: int) -> Iterator[_Drawn]:
             yield from ((level, coarse, place) for coarse in level.shapes)
 
 
+def _normal_coords(content: Content, shape: Shape) -> int | None:
+    """The number of the coordinates of a shape in the normal map of its material; None if that is
+    not drawn: replaced objects have other relief, and coarse meshes no coordinates of their own."""
+    normal = content.scene.materials[shape.material].normal
+    replaced = shape.object in content.octree_of or shape.object in content.relief_of
+    if normal is None or replaced or (normal.own and shape.normal is None):
+        return None
+    return 0 if not normal.own else 1 if shape.light is None else 2
+
+
 def _glb(content: Content, cell: int, name: str, shapes: Iterable[_Drawn]) -> bytes:
     scene, options = content.scene, content.options
     buffer = PlainBuffer() if options.plain_gltf else CompressedBuffer(content.position_exponent)
@@ -263,13 +296,25 @@ def _glb(content: Content, cell: int, name: str, shapes: Iterable[_Drawn]) -> by
         record = content.records[image][1] if image >= 0 else None
         vertices = vertices_of(tables, shape, textured=record is not None)
         relief = None if shape.relief is None else shape.object
+        normal = _normal_coords(content, shape)
         material = materials.take(
-            shape.material, shape.two_sided, place, lit=shape.light is not None, relief=relief
+            shape.material,
+            shape.two_sided,
+            place,
+            lit=shape.light is not None,
+            relief=relief,
+            normal=normal,
         )
         second = lightmap if relief is None else content.relief_of[relief]
+        third = None
+        if normal:
+            own = scene.materials[shape.material].normal
+            third = None if own is None else content.records[own.image]
+            second = third if normal == 1 else second
         sizes = (
             None if record is None else record.finest,
             None if second is None else second[1].finest,
+            None if third is None else third[1].finest,
         )
         primitive = buffer.take(vertices, material, sizes)
         if primitive is None:

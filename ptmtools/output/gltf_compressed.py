@@ -2,10 +2,10 @@
 
 All shapes of a cell share one array of vertices and one of indices; those with colours have two of
 their own, and so have those with a lightmap, and those with a normal map. A vertex is a position,
-texture coordinates and coordinates in the lightmap or the normal map, float32 on the grids of
-`ptmtools.output.grid`, stored as 24 bits and an exponent (filter EXPONENTIAL). Normals and tangents
-are a view of their own: they are those of charts, and take next to no bytes. Shapes lie in the
-order of their materials, the vertices and triangles of each in that of
+texture coordinates and coordinates in the lightmap or the normal map, or both, float32 on the grids
+of `ptmtools.output.grid`, stored as 24 bits and an exponent (filter EXPONENTIAL). Normals and
+tangents are a view of their own: they are those of charts, and take next to no bytes. Shapes lie in
+the order of their materials, the vertices and triangles of each in that of
 `ptmtools.meshopt.encoding.reordered`. Buffer 1 is the fallback of the extension: it has no data,
 and the extension is required.
 
@@ -44,8 +44,9 @@ MESHOPT = "EXT_meshopt_compression"
 EXTENSIONS = {"extensionsUsed": [MESHOPT], "extensionsRequired": [MESHOPT]}
 #: Bytes of a position, of texture coordinates, of a colour.
 _POSITION, _COORDINATES, _COLOR = 12, 8, 8
-#: Columns of positions, of these and texture coordinates, and of these and light.
-_PLACED, _TEXTURED, _LIT = 3, 5, 7
+#: Columns of positions, of these and texture coordinates, of these and light, and of all these and
+#: the normal map.
+_PLACED, _TEXTURED, _LIT, _BOTH = 3, 5, 7, 9
 #: Exponents of the steps of normal, tangent and sign, see `apo.normal_map`; bytes of a normal.
 _FRAME, _NORMAL = np.array([-9] * 6 + [0]), 12
 _WHOLE_BYTES = 0
@@ -59,9 +60,11 @@ class _Part:
     ----------
     primitive: its object in the document, to be completed.
     material: its index, by which parts are sorted.
-    step: (n, 7) coordinates in steps; those of a texture and of a lightmap are 0 without one.
-    exponent: (7,) of the steps.
-    textured, lit: whether it has texture coordinates, and those in a lightmap or normal map.
+    step: (n, 9) coordinates in steps; those of a texture, of a lightmap and of a normal map are 0
+        without one.
+    exponent: (9,) of the steps.
+    textured, lit, both: whether it has texture coordinates, those in a lightmap or normal map, and
+        those in a normal map besides.
     frame: (n, 7) in steps, or None.
     color: (n, 4) or None.
     triangle: (m, 3)
@@ -73,14 +76,15 @@ class _Part:
     exponent: NDArray[np.int64]
     textured: bool
     lit: bool
+    both: bool
     frame: NDArray[np.int64] | None
     color: NDArray[np.uint16] | None
     triangle: NDArray[np.int64]
 
     @property
-    def kind(self) -> tuple[bool, bool, bool]:
+    def kind(self) -> tuple[bool, bool, bool, bool]:
         """Parts of one kind share their arrays."""
-        return self.lit, self.frame is not None, self.color is not None
+        return self.lit, self.both, self.frame is not None, self.color is not None
 
 
 class CompressedBuffer:
@@ -98,11 +102,11 @@ class CompressedBuffer:
     def take(self, vertices: Vertices, material: int, sizes: Sizes) -> dict[str, Any] | None:
         """The primitive of a shape, complete after `finish`; None if none of its triangles has
         three corners on the grid."""
-        step = np.zeros((len(vertices.point), _LIT), dtype=np.int64)
-        exponent = np.array([self._exponent] * _PLACED + [0] * (_LIT - _PLACED))
+        step = np.zeros((len(vertices.point), _BOTH), dtype=np.int64)
+        exponent = np.array([self._exponent] * _PLACED + [0] * (_BOTH - _PLACED))
         step[:, :_PLACED] = _steps(vertices.point, exponent[:_PLACED])
-        both = vertices.uv, vertices.light
-        for first, coordinates, size in zip((_PLACED, _TEXTURED), both, sizes, strict=True):
+        each = vertices.uv, vertices.light, vertices.normal
+        for first, coordinates, size in zip((_PLACED, _TEXTURED, _LIT), each, sizes, strict=True):
             if coordinates is not None:
                 own = slice(first, first + 2)
                 exponent[own] = texture_exponents(coordinates, *(size or (1, 1)))
@@ -118,9 +122,20 @@ class CompressedBuffer:
         color = None if vertices.color is None else vertices.color[rows]
         frame = None if vertices.frame is None else _steps(vertices.frame[rows], _FRAME)
         primitive = {"attributes": {}, "indices": 0, "material": material}
-        textured, lit = (coordinates is not None for coordinates in both)
+        textured, lit, both = (coordinates is not None for coordinates in each)
         self._parts.append(
-            _Part(primitive, material, step[rows], exponent, textured, lit, frame, color, triangle)
+            _Part(
+                primitive,
+                material,
+                step[rows],
+                exponent,
+                textured,
+                lit,
+                both,
+                frame,
+                color,
+                triangle,
+            )
         )
         return primitive
 
@@ -130,11 +145,13 @@ class CompressedBuffer:
             parts = [part for part in self._parts if part.kind == kind]
             self._encode(sorted(parts, key=lambda p: p.material), *kind)
 
-    def _encode(self, parts: list[_Part], lit: bool, framed: bool, painted: bool) -> None:
+    def _encode(
+        self, parts: list[_Part], lit: bool, normal: bool, framed: bool, painted: bool
+    ) -> None:
         step = np.concatenate([part.step for part in parts])
         exponent = np.repeat([p.exponent for p in parts], [len(p.step) for p in parts], axis=0)
         textured = any(part.textured for part in parts)
-        width = _LIT if lit else _TEXTURED if textured else _PLACED
+        width = _BOTH if normal else _LIT if lit else _TEXTURED if textured else _PLACED
         element = exponential(step[:, :width], exponent[:, :width])
         form = {"mode": "ATTRIBUTES", "filter": "EXPONENTIAL"}
         vertices = self._view(encode_attributes(element, _WHOLE_BYTES), element, form)
@@ -147,6 +164,9 @@ class CompressedBuffer:
             place = self._accessor(vertices, _POSITION + _COORDINATES, FLOAT, count, "VEC2")
             # glTF has no second coordinates without first ones.
             attributes |= {"TEXCOORD_0": place, "TEXCOORD_1": place}
+        if normal:
+            begin = _POSITION + 2 * _COORDINATES
+            attributes["TEXCOORD_2"] = self._accessor(vertices, begin, FLOAT, count, "VEC2")
         if framed:
             frame = np.concatenate([p.frame for p in parts if p.frame is not None])
             element = exponential(frame, np.broadcast_to(_FRAME, frame.shape))

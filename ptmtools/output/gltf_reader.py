@@ -21,6 +21,7 @@ from ptmtools.output.gltf_compressed import EXTENSIONS, MESHOPT
 from ptmtools.output.model import FileError
 
 _VERTICES, _INDICES, _FLOAT = 34962, 34963, 5126
+_WRAPS = ("wrapS", "wrapT")
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,9 @@ class ReadMaterial:
     mesh: its object's row in the hints if this mesh is the coarsest of several, or None.
     light, lightmap: index in the hints of the lightmap of the cell, and URI of that as an image, or
         None.
-    normal, normal_map: the same for the normal map of the object.
+    normal, normal_map: the same for the normal map of the object or of the material; coords,
+        scale, normal_wrap: of that of the material, the number of its coordinates, the factor of
+        its normals and the numbers of its sampler; coords is None of that of the object.
     """
 
     factor: tuple[float, ...]
@@ -54,6 +57,9 @@ class ReadMaterial:
     lightmap: str | None = None
     normal: int | None = None
     normal_map: str | None = None
+    coords: int | None = None
+    scale: float = 1.0
+    normal_wrap: tuple[int, int] = (WRAPS["repeat"], WRAPS["repeat"])
 
 
 @dataclass(frozen=True)
@@ -69,8 +75,9 @@ class ReadPrimitive:
     uv: (n, 2) float32, origin at the upper left, or None.
     color: (n, 3) linear light, or None.
     triangle: (m, 3) int64 indices into `point` and `uv`.
-    light: (n, 2) float32 coordinates in the lightmap or in the normal map, origin at the upper
-        left, or None.
+    light: (n, 2) float32 coordinates in the lightmap or in the normal map of the object, origin at
+        the upper left, or None.
+    normal: (n, 2) likewise in the normal map of the material, or None.
     frame: (n, 7) float32 normal, tangent and sign of the bitangent, or None.
     """
 
@@ -84,6 +91,7 @@ class ReadPrimitive:
     material: ReadMaterial
     light: NDArray[np.float32] | None = None
     frame: NDArray[np.float32] | None = None
+    normal: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True)
@@ -160,8 +168,8 @@ class _Reader:
         attributes = primitive["attributes"]
         point = self._vertices(attributes["POSITION"], "VEC3")
         self._check_bounds(attributes["POSITION"], point)
-        uv, light = (
-            self._rows(attributes, f"TEXCOORD_{n}", "VEC2", len(point), place) for n in (0, 1)
+        uv, light, third = (
+            self._rows(attributes, f"TEXCOORD_{n}", "VEC2", len(point), place) for n in range(3)
         )
         frame = self._frames(attributes, len(point), place)
         color = self._colors(attributes, len(point), place)
@@ -176,18 +184,38 @@ class _Reader:
             point = point[own]
             uv = None if uv is None else uv[own]
             light = None if light is None else light[own]
+            third = None if third is None else third[own]
             frame = None if frame is None else frame[own]
             color = None if color is None else color[own]
         material = self._material(primitive["material"])
         if light is not None and material.texture is None:
             uv = None  # the second coordinates once more
-        if (material.normal is None) != (frame is None):
+        if (material.normal is None or material.coords is not None) != (frame is None):
             _foreign(place, "has only one of a normal map and its frames")
+        if (third is None) != (material.coords != 2) or (material.coords == 0 and uv is None):
+            _foreign(place, "has only one of a normal map and its coordinates")
+        normal = None
+        if material.coords is not None:
+            normal = (uv, light, third)[material.coords]
+        if material.coords == 1:
+            normal, light = light, None
+            if normal is None:
+                _foreign(place, "has only one of a normal map and its coordinates")
         if (material.light is None and frame is None) != (light is None):
             _foreign(place, "has only one of a lightmap, or normal map, and its coordinates")
         octree = node.get("extras", {}).get("octree")
         return ReadPrimitive(
-            place, node["name"], octree, point, uv, color, triangle, material, light, frame
+            place,
+            node["name"],
+            octree,
+            point,
+            uv,
+            color,
+            triangle,
+            material,
+            light,
+            frame,
+            normal,
         )
 
     def _rows(
@@ -301,7 +329,11 @@ class _Reader:
         material = self._row("materials", index)
         surface, extras = material["pbrMetallicRoughness"], material.get("extras", {})
         factor = surface.get("baseColorFactor", WHITE)
-        if extras.keys() - {"mesh", "light", "normal"} and not {"ptm", "texture"} <= extras.keys():
+        normal_extras = {name for name in extras if name.startswith("normal")}
+        if (
+            extras.keys() - {"mesh", "light"} - normal_extras
+            and not {"ptm", "texture"} <= extras.keys()
+        ):
             _foreign(
                 f"materials[{index}].extras",
                 "has members of a texture, but not its .ptm and its place",
@@ -310,11 +342,30 @@ class _Reader:
         place = f"materials[{index}]"
         image = self._image(surface.get("baseColorTexture"), wrap, place)
         lightmap = self._image(material.get("occlusionTexture"), (clamp, clamp), place)
-        normal_map = self._image(material.get("normalTexture"), (clamp, clamp), place)
+        coords = extras.get("normalCoords")
+        normal_wrap = clamp, clamp
+        if coords is not None:
+            normal_wrap = _wrap(
+                {
+                    name: extras[f"normalW{name[1:]}"]
+                    for name in _WRAPS
+                    if f"normalW{name[1:]}" in extras
+                }
+            )
+        normal_use = material.get("normalTexture")
+        normal_map = self._image(normal_use, normal_wrap, place)
+        scale = extras.get("normalScale", 1)
+        if normal_use is not None and (
+            normal_use.get("texCoord", 0) != (1 if coords is None else coords)
+            or normal_use.get("scale", 1) != scale
+        ):
+            _foreign(place, "its normal map and its extras differ")
+        if normal_extras - {"normal"} and not {"normal", "normalCoords"} <= extras.keys():
+            _foreign(place, "has members of a normal map, but not its place and coordinates")
         for image_of, name in ((lightmap, "light"), (normal_map, "normal")):
             if image_of is not None and name not in extras:
                 _foreign(place, f"has an image of {name}, but not its place in the hints")
-        if "light" in extras and "normal" in extras:
+        if "light" in extras and "normal" in extras and coords is None:
             _foreign(place, "has both a lightmap and a normal map")
         return ReadMaterial(
             factor=tuple(factor),
@@ -332,6 +383,9 @@ class _Reader:
             lightmap=lightmap,
             normal=extras.get("normal"),
             normal_map=normal_map,
+            coords=coords,
+            scale=scale,
+            normal_wrap=normal_wrap,
         )
 
     def _image(self, use: dict[str, int] | None, wrap: tuple[int, int], place: str) -> str | None:

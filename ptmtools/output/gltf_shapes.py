@@ -44,6 +44,7 @@ class Vertices:
     triangle: (m, 3)
     light: (n, 2) float32 coordinates in the lightmap, or in the normal map, origin at the upper
         left; None without one.
+    normal: (n, 2) those in the normal map of a shape with a lightmap, if they are its own.
     frame: (n, 7) float32 normal, tangent and sign of the bitangent; None without a normal map.
     """
 
@@ -53,6 +54,7 @@ class Vertices:
     triangle: NDArray[np.int64]
     light: NDArray[np.float32] | None = None
     frame: NDArray[np.float32] | None = None
+    normal: NDArray[np.float32] | None = None
 
 
 def vertices_of(tables: Tables, shape: Shape, *, textured: bool) -> Vertices:
@@ -62,7 +64,11 @@ def vertices_of(tables: Tables, shape: Shape, *, textured: bool) -> Vertices:
     corner = shape.triangle * width + (shape.uv_triangle if textured else 0)
     vertex, triangle = by_first_use(corner)
     second = None
-    if (rows := shape.light if shape.relief is None else shape.relief) is not None:
+    own = None if shape.relief is not None else shape.normal
+    parts = [shape.light if shape.relief is None else shape.relief, own]
+    present = [rows for rows in parts if rows is not None]
+    if present:
+        rows = np.concatenate(present, axis=2)
         table, place = np.unique(rows.reshape(-1, rows.shape[2]), axis=0, return_inverse=True)
         both, triangle = by_first_use(triangle * len(table) + place.reshape(-1, 3))
         vertex, second = vertex[both // len(table)], table[both % len(table)]
@@ -78,7 +84,9 @@ def vertices_of(tables: Tables, shape: Shape, *, textured: bool) -> Vertices:
     uv = flipped(tables.uv[shape.uv[vertex % width]]) if textured else None
     light = None if second is None else flipped(second[:, :2])
     frame = None if second is None or shape.relief is None else second[:, 2:]
-    return Vertices(point, uv, rgba, triangle, light, frame)
+    third = len(present) > 1 and second is not None
+    normal = flipped(second[:, 2:4]) if third and second is not None else None
+    return Vertices(point, uv, rgba, triangle, light, frame, normal)
 
 
 def flipped(uv: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -94,9 +102,9 @@ def shortest(values: NDArray[np.float32]) -> list[float]:
     return [int(v) if v.is_integer() and abs(v) < _WHOLE else v for v in numbers]
 
 
-#: Width and height of the texture, and of the lightmap or normal map of a shape, texels; None
-#: without one.
-Sizes = tuple[tuple[int, int] | None, tuple[int, int] | None]
+#: Width and height of the texture, of the lightmap or normal map, and of the normal map beside a
+#: lightmap of a shape, texels; None without one.
+Sizes = tuple[tuple[int, int] | None, tuple[int, int] | None, tuple[int, int] | None]
 #: In the order of the views: component type and type.
 _KINDS = (
     (FLOAT, "VEC3"),
@@ -129,9 +137,9 @@ class PlainBuffer(BufferWriter):
         """The primitive of a shape. Where it has second coordinates but no first ones, glTF demands
         these, and the second ones take their place."""
         attributes = {"POSITION": self.positions(vertices.point)}
-        for name, coordinates in (("TEXCOORD_0", vertices.uv), ("TEXCOORD_1", vertices.light)):
+        for n, coordinates in enumerate((vertices.uv, vertices.light, vertices.normal)):
             if coordinates is not None:
-                attributes[name] = self.vectors(coordinates)
+                attributes[f"TEXCOORD_{n}"] = self.vectors(coordinates)
         if vertices.light is not None and vertices.uv is None:
             attributes["TEXCOORD_0"] = attributes["TEXCOORD_1"]
         if vertices.frame is not None:

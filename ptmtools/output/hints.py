@@ -77,7 +77,9 @@ def index_text(content: Content) -> str:
     lists: dict[str, list[Any]] = {
         "viewpoints": [_viewpoint(v) for v in content.viewpoints],
         "textures": [
-            _texture(r, content.scene.objects, content.options.fallback) for r in content.textures
+            _texture(r, content.scene.objects, content.options.fallback)
+            | ({"normals": True} if r.image in content.normal_maps else {})
+            for r in content.textures
         ],
         "octrees": [_octree(r) for r in content.octrees],
         "cells": [
@@ -112,7 +114,7 @@ def _viewpoint(viewpoint: Viewpoint) -> dict[str, Any]:
     }
 
 
-def _texture(record: TextureRecord, objects: Sequence[str], fallback: bool) -> Mapping[str, Any]:
+def _texture(record: TextureRecord, objects: Sequence[str], fallback: bool) -> dict[str, Any]:
     png = record.fallback if fallback else None
     level = len(record.levels) - 1 if record.fallback_level is None else record.fallback_level
     texel = texel_bytes(record.levels[0]) if record.levels else record.components

@@ -35,7 +35,7 @@ def pieces_of(
 
     Parameters
     ----------
-    glass: (materials,) whether a material is seen through.
+    glass: (materials,) whether a material has no light, see `Piece`.
     texel: metres of a lightmap.
     replaced: the objects with a relief. Their light is at vertices, as that of objects with
         thousands of small triangles.
@@ -49,6 +49,7 @@ def pieces_of(
     area = areas(corner.astype(np.float64))
     number = geometry.object[shape].astype(np.int64)
     relieved = np.isin(number, [] if replaced is None else replaced)
+    face = cells.triangle_source[geometry.piece]
     starts = geometry.triangle_start[geometry.cell_start]
     return [
         Piece(
@@ -58,6 +59,7 @@ def pieces_of(
             glass[geometry.material[shape[a:b]]],
             relieved[a:b] | _dense(number[a:b], area[a:b], texel),
             side[a:b],
+            face[a:b],
         )
         for c, (a, b) in enumerate(pairwise(starts.tolist()))
     ]

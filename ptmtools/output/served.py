@@ -156,6 +156,24 @@ class MappedRelief:
 
 
 @dataclass(frozen=True)
+class Bumps:
+    """The normal maps of materials on triangles.
+
+    Attributes
+    ----------
+    number: (n,) int32, the normal map in the hints, -1 without.
+    uv: (n, 3, 2) float64 coordinates in it, origin at the upper left; 0 without one.
+    scale: (n,) factor of x and y of its normals.
+    clamped: (n, 2) as in `Surfaces`.
+    """
+
+    number: NDArray[np.int32]
+    uv: Floats
+    scale: Floats
+    clamped: Bools
+
+
+@dataclass(frozen=True)
 class Surfaces:
     """All triangles that are drawn, in the order of their cells.
 
@@ -172,7 +190,7 @@ class Surfaces:
     octree: (n,) int32, the octree texture of its object in the hints, -1 without.
     lightmap, spot: (n,) int32, the lightmap in the hints' textures, -1 without; (n, 3, 2) float64
         coordinates in it, origin at the upper left. None if there are no lightmaps.
-    relief: the normal maps of objects, if there are any.
+    relief: the normal maps of objects, if there are any. bumps: those of materials.
     """
 
     corner: Floats
@@ -189,6 +207,7 @@ class Surfaces:
     lightmap: NDArray[np.int32] | None = None
     spot: Floats | None = None
     relief: MappedRelief | None = None
+    bumps: Bumps | None = None
 
     @property
     def light(self) -> Surfaces | None:
@@ -204,6 +223,16 @@ class Surfaces:
             color=np.ones((count, 3)),
             clamped=np.ones((count, 2), np.bool_),
         )
+
+    @property
+    def bumped(self) -> Surfaces | None:
+        """The same surfaces with the normal maps of their materials as textures; None if there are
+        no such maps."""
+        bumps = self.bumps
+        if bumps is None:
+            return None
+        white = np.ones((len(self.corner), 3))
+        return replace(self, uv=bumps.uv, texture=bumps.number, color=white, clamped=bumps.clamped)
 
     def boxes(self) -> tuple[Floats, Floats]:
         """(s, 3) corners of the boxes of the shapes, metres; infinite of one without triangles."""
@@ -460,6 +489,7 @@ def _surfaces(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
         lightmap=spread(lightmap, np.int32) if max(lightmap, default=-1) >= 0 else None,
         spot=spot if max(lightmap, default=-1) >= 0 else None,
         relief=_relief([p for _, p in shapes]),
+        bumps=_bumps([p for _, p in shapes], count),
     )
 
 
@@ -481,6 +511,19 @@ def _relief(shapes: list[ReadPrimitive]) -> MappedRelief | None:
             number[own], uv[own] = p.material.normal or 0, p.light[p.triangle]
             frame[own] = p.frame[p.triangle[:, 0]]  # the corners have the same
     return MappedRelief(number, uv, frame)
+
+
+def _bumps(shapes: list[ReadPrimitive], count: list[int]) -> Bumps | None:
+    if all(p.normal is None for p in shapes):
+        return None
+    number = [-1 if p.normal is None else p.material.normal for p in shapes]
+    clamped = [[wrap == WRAPS["clamp"] for wrap in p.material.normal_wrap] for p in shapes]
+    return Bumps(
+        np.repeat(np.array(number, np.int32), count),
+        np.concatenate([_corners(p.normal, p.triangle) for p in shapes]),
+        np.repeat([float(p.material.scale) for p in shapes], count),
+        np.repeat(np.array(clamped, np.bool_), count, axis=0),
+    )
 
 
 def _colors(primitive: ReadPrimitive) -> Floats:

@@ -12,12 +12,12 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from ptmtools.errors import InputError, WorkerError, naming
 from ptmtools.options import option
@@ -26,13 +26,20 @@ from ptmtools.texture.model import EncodeOptions
 from ptmtools.texture.previews import FORMATS, Preview, PreviewOptions
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from ptmtools.executor import Executor
+    from ptmtools.pipeline.stage import Run
     from ptmtools.store.objects import Objects
     from ptmtools.store.remote import RemoteDatabase
     from ptmtools.store.transaction import Transaction
     from ptmtools.texture.images import Picture
     from ptmtools.texture.model import PtmHeader
     from ptmtools.texture.previews import Steps
+
+S = TypeVar("S")
+T = TypeVar("T")
+R = TypeVar("R")
 
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 #: Folders of the served files: `.ptm`s with fallback images and lossy sources; other previews.
@@ -128,6 +135,38 @@ class ImageFile:
     name: str
     data: bytes
     unresolved: int = 0
+
+
+def encoded_texels(
+    options: TextureOptions, stem: str, texels: NDArray[Any]
+) -> list[tuple[str, bytes]]:
+    """The files of (h, w, c) texels that are no image of the model, as `encoded_image`."""
+    from ptmtools.texture.images import png_bytes
+
+    return encoded_image(options, ImageFile(f"{stem}.png", png_bytes(texels)))
+
+
+def baked(
+    run: Run,
+    transaction: Transaction,
+    bake: Callable[[S, T], tuple[R, list[tuple[str, bytes]]]],
+    shared: S,
+    tasks: Sequence[T],
+    unit: str,
+) -> tuple[list[R], int]:
+    """Bakes textures, a task each: ``bake`` returns a result, and the files of a texture as
+    `encoded_image`, or none. Puts these into the transaction; returns the results, and the bytes
+    of all `.ptm`s."""
+    results: list[R] = []
+    total = 0
+    for result, files in run.workers.executor.each(bake, shared, tasks):
+        run.progress(len(results), len(tasks), unit)
+        results.append(result)
+        for name, data in files:
+            transaction.put(name, data)
+        total += len(files[0][1]) if files else 0
+    run.progress(len(tasks), len(tasks), unit)
+    return results, total
 
 
 def encoded_image(options: TextureOptions, image: ImageFile) -> list[tuple[str, bytes]]:

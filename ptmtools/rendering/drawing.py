@@ -1,9 +1,9 @@
 """Draws a view of a served database with the finest levels of its textures.
 
 Embree finds the surface of each ray, and the kernels of the simulator sample the textures. A lit
-picture has the lamp of `ptmtools.rendering.light`, and the relief of octree textures and normal
-maps. Others have lightmaps, and shade surfaces without texture by the angle to the viewer, like the
-web page.
+picture has the lamp of `ptmtools.rendering.light`, and the relief of octree textures and of the
+normal maps of objects. Others have lightmaps, and shade surfaces without texture by the angle to
+the viewer, like the web page. All have the normal maps of materials.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ FIELD_OF_VIEW = 60.0
 _SAMPLES, _MANY_PIXELS = 2, 1 << 22
 #: Colour of the sky, 0 to 255, as on the web page.
 _SKY = (0.16 * 255, 0.17 * 255, 0.19 * 255)
-#: Least share of their colour that surfaces without texture have, and such with a lightmap.
+#: Least share of their colour that surfaces without texture have, and such with baked light.
 GLOW, LIT_GLOW = 0.25, 0.7
 
 
@@ -144,6 +144,7 @@ def draw_view(
     """
     from ptmtools.rendering.kernels import shade
     from ptmtools.rendering.light import lamps, lit
+    from ptmtools.rendering.normal_maps import show_bumps, show_relief
     from ptmtools.rendering.octrees import read_octrees
     from ptmtools.rendering.pyramids import read_pyramids
 
@@ -168,6 +169,8 @@ def draw_view(
         used |= set(light.texture[hit].tolist())
     if options.lit and surfaces.relief:
         used |= set(surfaces.relief.number[hit].tolist())
+    if surfaces.bumps:
+        used |= set(surfaces.bumps.number[hit].tolist())
     pyramids = read_pyramids(served, progress, only=used)
     column = pyramids.levels
     if options.max_side:
@@ -175,19 +178,20 @@ def draw_view(
         column = np.minimum(np.maximum(within.sum(axis=1), 1), column)
     shown = np.empty((len(sight.ray), 3))
     loaded = np.ones(served.cell_count, dtype=np.bool_)
-    shade(sight, triangles, own_levels(pyramids), loaded, column, shown)
+    levels = own_levels(pyramids)
+    shade(sight, triangles, levels, loaded, column, shown)
     if options.lit:
-        from ptmtools.rendering.normal_maps import show_relief
         from ptmtools.rendering.relief import relieve
 
         octrees, lamp = read_octrees(served), lamps(surfaces.corner)
         relieve(sight, triangles, lamp, octrees, loaded, octrees.levels, shown)
-        show_relief(sight, surfaces, pyramids, column, lamp, shown)
+        show_relief(sight, surfaces, levels, loaded, column, lamp, shown)
     else:
         _shade_plain(sight, triangles, light, shown)
+    show_bumps(sight, surfaces, levels, loaded, column, shown)
     if light is not None:
         linear = np.empty_like(shown)
-        shade(sight, triangles_of(light), own_levels(pyramids), loaded, column, linear)
+        shade(sight, triangles_of(light), levels, loaded, column, linear)
         mapped = np.flatnonzero(sight.triangle >= 0)
         mapped = mapped[light.texture[sight.triangle[mapped]] >= 0]
         shown[mapped] *= to_srgb(linear[mapped] / 255)
@@ -205,13 +209,11 @@ def _vertical(degrees: float, options: ViewOptions) -> float:
 
 
 def _shade_plain(sight: Sight, triangles: Triangles, light: Surfaces | None, shown: Floats) -> None:
-    """Multiplies the colours of surfaces without texture by the cosine to the viewer, less of those
-    with a lightmap."""
+    """Multiplies the colours of surfaces without texture by the cosine to the viewer, less where
+    light is baked: in lightmaps, or in the colours of vertices."""
     plain = np.flatnonzero(sight.triangle >= 0)
     plain = plain[triangles.texture[sight.triangle[plain]] < 0]
-    glow = np.full(len(plain), GLOW)
-    if light is not None:
-        glow[light.texture[sight.triangle[plain]] >= 0] = LIT_GLOW
+    glow = GLOW if light is None else LIT_GLOW
     normal, ray = triangles.normal[sight.triangle[plain]], sight.ray[plain]
     length = np.linalg.norm(normal, axis=1) * np.linalg.norm(ray, axis=1)
     along = np.abs(np.einsum("ij,ij->i", normal, ray))

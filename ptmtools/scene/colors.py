@@ -31,6 +31,11 @@ def to_linear(encoded: Floats) -> Floats:
     return np.where(clipped <= 0.04045, clipped / 12.92, ((clipped + 0.055) / 1.055) ** 2.4)
 
 
+def luminance(light: Floats) -> Floats:
+    """(...,) of (..., 3) linear light (ITU-R BT.709)."""
+    return np.asarray(light @ np.array([0.2126, 0.7152, 0.0722]))
+
+
 def packed(colors: NDArray[np.uint8]) -> NDArray[np.int64]:
     """(...,) one number for each of (..., 3) colours."""
     red, green, blue = np.moveaxis(colors.astype(np.int64), -1, 0)

@@ -22,9 +22,11 @@ from ptmtools.scene.baking import LARGEST, bake, emitted_wraps, near_origin
 from ptmtools.scene.faces import KeptFaces, keep_faces
 from ptmtools.scene.facing import TURNED_AWAY, share_turned_away
 from ptmtools.scene.images import ImageStore
+from ptmtools.scene.lighting import lights_of
 from ptmtools.scene.model import Camera, Material, RoomVolume, Scene, Space, Storey
+from ptmtools.scene.normal_maps import NormalMaps
 from ptmtools.scene.notes import Findings
-from ptmtools.scene.options import IngestOptions
+from ptmtools.scene.options import GLTF, IngestOptions
 from ptmtools.scene.orientation import tolerance_of
 from ptmtools.scene.source import MAX_VERTICES, Source, SourceMaterial
 from ptmtools.scene.space import DeclaredSpace, parse_unit, rotated, settle, to_world
@@ -34,8 +36,6 @@ from ptmtools.tolerance import PLANE_SHARE
 
 #: Default colours: of faces without an image, and of images.
 PLAIN, WHITE = (0.8, 0.8, 0.8), (1.0, 1.0, 1.0)
-#: Suffixes of the formats that prescribe the unit.
-PRESCRIBED = (".glb", ".gltf")
 #: Errors of the system for circular links and sockets, and of `open_regular` for pipes and devices.
 _NO_FILE = {
     errno.ELOOP: "no such file",
@@ -108,7 +108,7 @@ def ingest(
         kept.triangles,
         named,
         DeclaredSpace(metres, options.up),
-        DeclaredSpace(source.metres, source.up, model.suffix.lower() in PRESCRIBED),
+        DeclaredSpace(source.metres, source.up, model.suffix.lower() in GLTF),
         findings,
         ask=ask,
     )
@@ -123,6 +123,7 @@ def ingest(
     grouped = np.argsort(triangle_material, kind="stable")
     faces = np.split(grouped, np.cumsum(np.bincount(triangle_material))[:-1])
     used = [source.materials[index] for index in used_material.tolist()]
+    written = uv
     baked, uv = bake(used, faces, uv, store, findings, progress, workers=workers)
     colors = None if source.colors is None else source.colors[kept.source]
     if colors is not None and (colors == 255).all():
@@ -136,9 +137,19 @@ def ingest(
             colors[rows] = np.rint(colors[rows] * tint).astype(np.uint8)
             material = replace(material, color=WHITE)
         materials.append(_material(material, uv[rows], store, findings))
+    normal_uv = None
+    if options.normal_maps == "draw":
+        maps = NormalMaps(store, findings)
+        for number, rows in enumerate(faces):
+            if (normal := used[number].normal) is not None:
+                moved = uv is not written and not np.array_equal(uv[rows], written[rows])
+                image = maps.add(normal, baked[number].texture, moved=moved)
+                materials[number] = replace(materials[number], normal=image)
+        normal_uv = _normal_coordinates(source, kept, materials, triangle_material, written)
     progress(len(faces), len(faces), "materials")
     points, triangles = to_world(kept.points, space), kept.triangles.astype(np.int32)
     two_sided = ~kept.paired if options.two_sided else _two_sided(kept, source)
+    lights = lights_of(source, kept, used_material, space, store, findings, options)
     share = share_turned_away(points, triangles, two_sided | kept.paired)
     if share > TURNED_AWAY:
         findings.note(
@@ -170,6 +181,7 @@ def ingest(
         images=store.images,
         cameras=tuple(_camera(camera, space) for camera in source.cameras),
         colors=colors,
+        normal_uv=normal_uv,
         kinds=tuple(source.kinds[i] for i in used_object.tolist()) if source.kinds else (),
         storeys=_storeys(source, space),
         rooms=tuple(
@@ -180,6 +192,7 @@ def ingest(
         notes=findings.notes,
         files=tuple(findings.folder.sought),
         shines=tuple(material.shine for material in used),
+        lights=lights,
     )
 
 
@@ -256,6 +269,34 @@ def _coordinates(source: Source, kept: KeptFaces, findings: Findings) -> NDArray
         findings.note("PTM-N211", message, "", int(unusable.sum()))
         uv[unusable] = 0.0
     return uv
+
+
+def _normal_coordinates(
+    source: Source,
+    kept: KeptFaces,
+    materials: list[Material],
+    material: NDArray[np.int64],
+    uv: NDArray[np.float64],
+) -> NDArray[np.float64] | None:
+    """(T, 3, 2) of kept faces, finite and near the origin, in the normal maps that have their own
+    coordinates: those of the source, or else ``uv``; ``material`` (T,) of each face. None without.
+    """
+    own = np.array([m.normal is not None and m.normal.own for m in materials], np.bool_)[material]
+    if not own.any():
+        return None
+    result = np.zeros_like(uv)
+    result[own] = uv[own]
+    if source.normal_uv is not None:
+        given = source.normal_uv[kept.source]
+        has = [m.normal is not None and m.normal.own for m in source.materials]
+        other = own & np.array(has, np.bool_)[source.triangle_material[kept.source]]
+        result[other] = given[other]
+    fits = np.isfinite(result).all(axis=(1, 2)) & (np.abs(result) <= LARGEST).all(axis=(1, 2))
+    result[~fits] = 0.0
+    wraps = [(m.normal.wrap_s, m.normal.wrap_t) if m.normal else ("clamp",) * 2 for m in materials]
+    repeats = np.array([[wrap == "repeat" for wrap in each] for each in wraps], np.bool_)
+    owner = source.triangle_object[kept.source]
+    return near_origin(result, material * np.int64(len(source.objects)) + owner, repeats[material])
 
 
 def _two_sided(kept: KeptFaces, source: Source) -> NDArray[np.bool_]:

@@ -64,7 +64,8 @@ def pack_source(
 ) -> dict[str, Any]:
     """The message to `read_in_sandbox`; writes the arrays into the folder ``scratch``.
 
-    The materials of ``source`` have no textures; ``images`` are their images by number of material.
+    The materials of ``source`` have no textures and no normal maps; ``images`` are their images by
+    number of material.
     ``files`` names the other files that the model consists of, missing ones included.
     """
     arrays = {name: getattr(source, name) for name in FACE_ARRAYS}
@@ -73,7 +74,10 @@ def pack_source(
     Path(scratch, _ARRAYS).write_bytes(pack_arrays(arrays | room_arrays(source.rooms)))
     return {
         "objects": source.objects,
-        "materials": [vars(material) for material in source.materials],
+        "materials": [
+            {name: value for name, value in vars(material).items() if name != "normal"}
+            for material in source.materials
+        ],
         "images": {str(number): vars(image) for number, image in images.items()},
         "cameras": [vars(camera) for camera in source.cameras],
         "kinds": source.kinds,

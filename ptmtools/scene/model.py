@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools import schemas
+from ptmtools.scene.lights import Lights
 from ptmtools.scene.orientation import tolerance_of
 from ptmtools.store.archive import Stored, without_repeats
 from ptmtools.tolerance import Tolerance
@@ -50,6 +51,25 @@ class Space:
 
 
 @dataclass(frozen=True)
+class NormalImage:
+    """The normal map of a material (glTF's normalTexture, ``norm`` and ``map_Bump`` of OBJ).
+
+    Attributes
+    ----------
+    image: index into `Scene.images`; linear values, tangent space, green up.
+    scale: factor of x and y of its normals.
+    wrap_s, wrap_t: wrap modes beyond [0, 1].
+    own: whether its coordinates are those of `Scene.normal_uv` instead of `Scene.uv`.
+    """
+
+    image: int
+    scale: float = 1.0
+    wrap_s: Wrap = "repeat"
+    wrap_t: Wrap = "repeat"
+    own: bool = False
+
+
+@dataclass(frozen=True)
 class Material:
     """A material as emitted.
 
@@ -64,6 +84,7 @@ class Material:
         alpha < 255 unless the mode of the material ignores alpha.
     cutoff: texels with less alpha than this, in [0, 1], are not drawn, and all others are opaque;
         None if texels are blended.
+    normal: its normal map, or None.
     """
 
     name: str
@@ -74,6 +95,7 @@ class Material:
     wrap_t: Wrap = "repeat"
     transparent: bool = False
     cutoff: float | None = None
+    normal: NormalImage | None = None
 
 
 @dataclass(frozen=True)
@@ -182,6 +204,8 @@ class Scene:
     materials, images, cameras: see their classes.
     colors: (T, 3, 3) uint8 sRGB per corner, multiplied with the image's; None if no corner has a
         colour. Materials of triangles with colours other than white are white.
+    normal_uv: (T, 3, 2) float64 per corner, as `uv`, coordinates in normal maps that have their
+        own; 0 elsewhere. None if no normal map has its own.
     kinds: for each object its role by class; empty for formats without classes.
     storeys: named by the model, from the lowest.
     rooms: volumes of rooms in the order of the model file; empty for formats without them.
@@ -190,6 +214,7 @@ class Scene:
     files: other files that were read or are missing, relative to the model's folder, "/" between
         names: a change to any of them may change the scene. Not part of the artifact.
     shines: for each material its reflection map, or None. Not part of the artifact.
+    lights: lamps, emission and lightmaps, stored beside the artifact.
     """
 
     points: NDArray[np.float64]
@@ -204,6 +229,7 @@ class Scene:
     images: tuple[SourceImage, ...] = ()
     cameras: tuple[Camera, ...] = ()
     colors: NDArray[np.uint8] | None = None
+    normal_uv: NDArray[np.float64] | None = None
     kinds: tuple[Kind, ...] = ()
     storeys: tuple[Storey, ...] = ()
     rooms: tuple[RoomVolume, ...] = ()
@@ -211,6 +237,7 @@ class Scene:
     notes: tuple[Note, ...] = ()
     files: tuple[str, ...] = field(default=(), compare=False)
     shines: tuple[Shine | None, ...] = field(default=(), compare=False)
+    lights: Lights | None = field(default=None, compare=False)
 
     @property
     def corners(self) -> NDArray[np.float64]:
@@ -246,6 +273,8 @@ class Scene:
         arrays = {name: getattr(self, name) for name in (*FACE_ARRAYS, "two_sided")}
         if self.colors is not None:
             arrays["colors"] = self.colors
+        if self.normal_uv is not None:
+            arrays["normal_uv"] = self.normal_uv
         arrays["about"] = np.frombuffer(text.encode(), dtype=np.uint8)
         arrays = without_repeats(arrays, *_OFTEN_ALIKE)
         return arrays | room_arrays(self.rooms) | self.tolerance.to_arrays()
@@ -262,9 +291,11 @@ class Scene:
         text = stored.array("about", np.uint8, None).tobytes()
         about = schemas.read(text, schemas.SCENE)
         objects, images = tuple(about["objects"]), tuple(images)
-        materials = tuple(Material(**fields_of(row)) for row in about["materials"])
-        if any(material.image >= len(images) for material in materials):
+        materials = tuple(map(_material_of, about["materials"]))
+        used = [m.image for m in materials] + [m.normal.image for m in materials if m.normal]
+        if max(used, default=-1) >= len(images):
             raise ValueError("a material refers to a missing image")
+        own = any(material.normal and material.normal.own for material in materials)
         points = stored.array("points", np.float64, None, 3, finite=True)
         triangles = stored.indices("triangles", np.int32, None, 3, high=len(points))
         n = len(triangles)
@@ -277,6 +308,7 @@ class Scene:
             triangle_material=stored.indices("triangle_material", np.int32, n, high=len(materials)),
             two_sided=stored.array("two_sided", np.bool_, n),
             colors=stored.array("colors", np.uint8, n, 3, 3) if "colors" in arrays else None,
+            normal_uv=stored.array("normal_uv", np.float64, n, 3, 2, finite=True) if own else None,
             objects=objects,
             materials=materials,
             tolerance=Tolerance.from_arrays(arrays),
@@ -327,8 +359,15 @@ def rooms_of(stored: Stored, names: Sequence[str]) -> tuple[RoomVolume, ...]:
 
 
 def _material_row(material: Material) -> dict[str, Any]:
-    """The fields of a material, without an absent `cutoff`."""
-    return {name: v for name, v in vars(material).items() if name != "cutoff" or v is not None}
+    """The fields of a material, without an absent `cutoff` or `normal`."""
+    row = {name: v for name, v in vars(material).items() if v is not None}
+    return row | ({"normal": vars(material.normal)} if material.normal else {})
+
+
+def _material_of(row: Mapping[str, Any]) -> Material:
+    """Inverse of `_material_row`."""
+    normal = {"normal": NormalImage(**row["normal"])} if "normal" in row else {}
+    return Material(**fields_of(row) | normal)
 
 
 def _kinds(kinds: Sequence[Kind], objects: int) -> tuple[Kind, ...]:

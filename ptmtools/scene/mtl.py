@@ -1,9 +1,9 @@
 """Reads MTL, the materials of an OBJ file.
 
 The reader keeps the statements that the emitted files use: ``Kd``, ``d``/``Tr``, ``map_Kd``,
-``map_d``, and ``map_Ks`` for a campus. It ignores those of physically based extensions (``Pr``,
-``norm``, …). The format has no quoting, so the name of a texture is the rest of the statement after
-the last option, spaces included.
+``map_d``, ``norm`` and ``bump``/``map_Bump``, ``Ke`` and ``map_Ke`` for light, and ``map_Ks`` for a
+campus. It ignores those of physically based extensions (``Pr``, …). The format has no quoting, so
+the name of a texture is the rest of the statement after the last option, spaces included.
 """
 
 from __future__ import annotations
@@ -48,6 +48,7 @@ class MapStatement:
     scale, offset: texture coordinates become ``uv * scale + offset``.
     clamp: ``-clamp on``.
     channel: of ``-imfchan``, or "".
+    strength: of ``-bm``.
     ignored: unsupported options that would change the image.
     line: number of the line, from 1.
     """
@@ -57,6 +58,7 @@ class MapStatement:
     offset: tuple[float, float] = (0.0, 0.0)
     clamp: bool = False
     channel: str = ""
+    strength: float = 1.0
     ignored: tuple[str, ...] = ()
     line: int = 0
 
@@ -101,6 +103,7 @@ def parse_map(text: str, line: int = 0) -> MapStatement:
         offset=(offset[0], offset[1]),
         clamp=word.get("-clamp") == "on",
         channel=word.get("-imfchan", ""),
+        strength=numbers.get("-bm", [1.0])[0],
         ignored=tuple(name for name, changed in changes.items() if changed),
         line=line,
     )
@@ -109,7 +112,9 @@ def parse_map(text: str, line: int = 0) -> MapStatement:
 @dataclass
 class MtlMaterial:
     """A ``newmtl`` block of a library; ``dissolve`` is ``d``, or else 1 - ``Tr``. An invalid
-    ``map_Ks`` is no miss, since few builds use it; ``map_ks_fault`` is its error."""
+    ``map_Ks`` is no miss, since few builds use it; ``map_ks_fault`` is its error. Nor is an invalid
+    ``Ke`` or ``map_Ke``, which then has no effect. ``glow`` is linear light. ``relief`` is the last
+    of ``norm``, a normal map, and ``bump`` or ``map_Bump``, with its keyword."""
 
     library: Path
     color: tuple[float, float, float] | None = None
@@ -119,6 +124,9 @@ class MtlMaterial:
     map_d: MapStatement | None = None
     map_ks: MapStatement | None = None
     map_ks_fault: str = ""
+    relief: tuple[str, MapStatement] | None = None
+    glow: tuple[float, float, float] | None = None
+    map_ke: MapStatement | None = None
 
 
 def read_mtl(path: Path, findings: Findings) -> dict[str, MtlMaterial]:
@@ -167,6 +175,11 @@ def _share(words: list[str]) -> float:
     return min(max(number(words[0]), 0.0), 1.0)
 
 
+def _is_normal_map(material: MtlMaterial) -> bool:
+    """Whether the relief is that of ``norm``, which ``bump`` repeats for older readers."""
+    return material.relief is not None and material.relief[0] == "norm"
+
+
 def _statement(material: MtlMaterial, key: str, rest: str, line: int) -> None:
     words = rest.split()
     if key == "kd":
@@ -184,6 +197,15 @@ def _statement(material: MtlMaterial, key: str, rest: str, line: int) -> None:
         material.map_kd = parse_map(rest, line)
     elif key == "map_d":
         material.map_d = parse_map(rest, line)
+    elif key == "norm" or (key in ("bump", "map_bump") and not _is_normal_map(material)):
+        material.relief = key, parse_map(rest, line)
+    elif key == "ke":
+        with suppress(ValueError):
+            values = [max(number(word), 0.0) for word in words[:3]]
+            material.glow = (values[0], values[1], values[2]) if len(values) == 3 else None
+    elif key == "map_ke":
+        with suppress(ValueError):
+            material.map_ke = parse_map(rest, line)
     elif key == "map_ks":
         try:
             material.map_ks, material.map_ks_fault = parse_map(rest, line), ""

@@ -17,12 +17,13 @@ from collections.abc import Iterable, Iterator, Mapping, Set
 from dataclasses import dataclass, field
 from io import TextIOWrapper
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 import numpy as np
 
 from ptmtools.errors import InputError, LimitError
 from ptmtools.progress import Progress, silent
+from ptmtools.scene.colors import luminance
 from ptmtools.scene.model import Shine, Wrap
 from ptmtools.scene.mtl import MapStatement, MtlMaterial, read_mtl
 from ptmtools.scene.notes import Findings
@@ -30,6 +31,7 @@ from ptmtools.scene.polygon import triangulate
 from ptmtools.scene.source import (
     MAX_VERTICES,
     FileRange,
+    NormalTexture,
     Source,
     SourceMaterial,
     Texture,
@@ -86,10 +88,11 @@ def resolve_materials(
                 findings.miss("PTM-N207", f"usemtl {name}: no such material", f"{path.name}:{line}")
             materials.append(SourceMaterial(name or "default"))
             continue
-        texture = mask = None
+        texture = mask = normal = None
         if index in used:
             texture = _texture(material, "map_Kd", material.map_kd, findings)
             mask = _texture(material, "map_d", material.map_d, findings)
+            normal = _normal(material, texture, findings)
         if texture is not None and material.map_kd is not None:
             maps[index] = material.map_kd
         materials.append(
@@ -102,9 +105,25 @@ def resolve_materials(
                 texture=texture,
                 mask=mask,
                 shine=_shine(material),
+                normal=normal,
+                **_glow(material, findings, index in used),
             )
         )
     return tuple(materials), maps
+
+
+def _normal(
+    material: MtlMaterial, texture: Texture | None, findings: Findings
+) -> NormalTexture | None:
+    """The normal map of a material; with the coordinates as written if it has no ``texture``."""
+    if material.relief is None:
+        return None
+    key, statement = material.relief
+    image = _texture(material, key, statement, findings)
+    if image is None:
+        return None
+    height = key != "norm"
+    return NormalTexture(image, max(statement.strength, 0.0), height, own=texture is None)
 
 
 def _shine(material: MtlMaterial) -> Shine | None:
@@ -115,6 +134,22 @@ def _shine(material: MtlMaterial) -> Shine | None:
         return None
     same = colors is None or (colors.scale, colors.offset) == (reflection.scale, reflection.offset)
     return Shine(reflection.file, base, "" if same else "other texture coordinates")
+
+
+def _glow(material: MtlMaterial, findings: Findings, used: bool) -> dict[str, Any]:
+    """The emission of a material, as the fields of a `SourceMaterial`. ``Ke`` is a factor of
+    ``map_Ke``; without ``Ke`` it is 1. An image that is missing counts as white."""
+    factor = material.glow or (0.0 if material.map_ke is None else 1.0,) * 3
+    glow = float(luminance(np.array(factor)))
+    if not (used and glow):
+        return {}
+    image = None
+    if material.map_ke is not None:
+        base, name = material.library.parent, material.map_ke.file
+        file = findings.folder.find(name, base).path
+        place = f"{findings.folder.label(material.library)}:{material.map_ke.line}"
+        image = file and Texture(FileRange(file), file.name, f"map_Ke {name}", place)
+    return {"glow": glow, "glow_map": image}
 
 
 def _renaming_hint(path: Path, name: str) -> str:
@@ -265,6 +300,7 @@ def read_obj(
                 len(bare),
             )
     triangles = corner_point[cut.corner]
+    own = any(material.normal and material.normal.own for material in materials)
     colors = None
     if statements.colored:
         colored = np.frombuffer(statements.colored, dtype=np.int64)
@@ -279,6 +315,7 @@ def read_obj(
         objects=tuple(statements.objects),
         materials=materials,
         colors=colors,
+        normal_uv=uv if own else None,
     )
 
 

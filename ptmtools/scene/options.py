@@ -9,7 +9,8 @@ from ptmtools.errors import InputError
 from ptmtools.options import option
 
 #: Suffixes of model files, by reader: ptmtools, trimesh, pymeshlab, IfcOpenShell, usd-core.
-OWN = (".obj", ".glb", ".gltf")
+GLTF = (".glb", ".gltf")
+OWN = (".obj", *GLTF)
 TRIMESH = (".ply", ".stl", ".off")
 MESHLAB = (".3ds", ".3mf", ".ctm", ".dae", ".wrl", ".x3d")
 IFC = (".ifc", ".ifczip")
@@ -39,6 +40,12 @@ class IngestOptions:
         "Up axis of the model. Default: the axis that the file records or its format prescribes "
         "(glTF: y); otherwise guessed from floors and walls.",
         basic=True,
+    )
+    normal_maps: Literal["draw", "none"] = option(
+        "draw",
+        "Normal maps and bump maps of glTF and OBJ materials: draw (they are stored, and clients "
+        "fetch them after the textures) or none.",
+        default_before=(9, "none"),
     )
     two_sided: bool = option(False, "Draw both sides of every face.")
     strict: bool = option(

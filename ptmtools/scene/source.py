@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import LimitError
 from ptmtools.files import open_regular
+from ptmtools.scene.lights import Lamp
 from ptmtools.scene.model import Camera, Kind, RoomVolume, Shine, Storey, Wrap
 
 SourceWrap = Literal[Wrap, "mirror"]
@@ -101,6 +102,24 @@ class Texture:
 
 
 @dataclass(frozen=True)
+class NormalTexture:
+    """A reference of a material to its normal map.
+
+    Attributes
+    ----------
+    texture: its image, or that of heights.
+    scale: factor of x and y of the normals, 0 or more; of heights, see `height`.
+    height: whether the image holds heights if it is grey (``bump`` of OBJ).
+    own: whether its coordinates are those of `Source.normal_uv`.
+    """
+
+    texture: Texture
+    scale: float = 1.0
+    height: bool = False
+    own: bool = False
+
+
+@dataclass(frozen=True)
 class SourceMaterial:
     """A material of the model.
 
@@ -115,6 +134,8 @@ class SourceMaterial:
     two_sided: whether both sides of its faces are drawn.
     texture, mask: colours, and a separate image of opacities (``map_d``).
     shine: its reflection map.
+    normal: its normal map.
+    glow, glow_map: linear luminance that it emits, a factor of the mean of the image if it has one.
     """
 
     name: str
@@ -127,6 +148,9 @@ class SourceMaterial:
     texture: Texture | None = None
     mask: Texture | None = None
     shine: Shine | None = None
+    normal: NormalTexture | None = None
+    glow: float = 0.0
+    glow_map: Texture | None = None
 
 
 @dataclass(frozen=True)
@@ -145,10 +169,13 @@ class Source:
     metres, up: unit and up axis if the format defines them, otherwise None.
     colors: (T, 3, 3) uint8 sRGB per corner, multiplied with the material's; None if no corner has
         a colour.
+    normal_uv: (T, 3, 2) float64 as `uv`, coordinates in the normal maps that have their own; None
+        without such.
     step: step of the coarsest grid of coordinates, in units of the file; 0 for float32.
     kinds: the kind of each object by its class (IFC); empty for formats without classes.
     storeys: named by the file; heights along its up axis, in its units.
     rooms: volumes of rooms, finite, in the space of the file.
+    lamps: finite, in the space of the file.
     """
 
     points: NDArray[np.float64]
@@ -162,10 +189,12 @@ class Source:
     metres: float | None = None
     up: Literal["y", "z"] | None = None
     colors: NDArray[np.uint8] | None = None
+    normal_uv: NDArray[np.float64] | None = None
     step: float = 0.0
     kinds: tuple[Kind, ...] = ()
     storeys: tuple[Storey, ...] = ()
     rooms: tuple[RoomVolume, ...] = ()
+    lamps: tuple[Lamp, ...] = ()
 
 
 @dataclass
@@ -176,6 +205,7 @@ class Rows:
     triangles: list[Ints] = field(default_factory=list)
     uv: list[Floats] = field(default_factory=list)
     colors: list[NDArray[np.uint8] | None] = field(default_factory=list)
+    normal_uv: list[Floats | None] = field(default_factory=list)
     object: list[Ints] = field(default_factory=list)
     material: list[Ints] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
@@ -190,6 +220,7 @@ class Rows:
         material: Ints | int,
         colors: NDArray[np.uint8] | None,
         first_object: int,
+        normal_uv: Floats | None = None,
     ) -> None:
         """Adds the instances of a mesh.
 
@@ -197,7 +228,7 @@ class Rows:
         ----------
         frames: (k, 4, 4) from the mesh to the model.
         points, triangles: (p, 3) and (t, 3) over these.
-        uv: (t, 3, 2). colors: (t, 3, 3), see `Source`.
+        uv, normal_uv: (t, 3, 2). colors: (t, 3, 3), see `Source`.
         material: (t,), or one number for all.
         first_object: the object of the first instance; the others follow.
         """
@@ -212,6 +243,7 @@ class Rows:
         self.triangles.append(copies.reshape(-1, 3))
         self.uv.append(_repeated(uv, k, mirrored))
         self.colors.append(None if colors is None else _repeated(colors, k, mirrored))
+        self.normal_uv.append(None if normal_uv is None else _repeated(normal_uv, k, mirrored))
         self.object.append(np.repeat(first_object + np.arange(k), t))
         self.material.append(np.tile(np.broadcast_to(material, t), k))
         self.count += k * p
@@ -225,6 +257,10 @@ class Rows:
             colors = np.concatenate(
                 [np.full((len(t), 3, 3), 255, np.uint8) if c is None else c for c, t in parts]
             )
+        normal_uv = None
+        if any(part is not None for part in self.normal_uv):
+            pairs = zip(self.normal_uv, self.uv, strict=True)
+            normal_uv = np.concatenate([np.zeros_like(uv) if n is None else n for n, uv in pairs])
         return Source(
             points=np.concatenate(self.points),
             triangles=np.concatenate(self.triangles),
@@ -233,6 +269,7 @@ class Rows:
             triangle_material=np.concatenate(self.material).astype(np.int64),
             objects=tuple(self.names),
             colors=colors,
+            normal_uv=normal_uv,
             **others,
         )
 

@@ -32,6 +32,7 @@ from ptmtools.site.catalogue import ANGLE, Content, catalogue_of
 from ptmtools.site.entry import DIGITS, Entry, state_of
 from ptmtools.site.geometry import lean_glb
 from ptmtools.site.program import HTML, INDEX, address_of, page, program_files
+from ptmtools.site.sets import has_sets, is_of_sets, set_entries
 from ptmtools.site.textures import web_texture, without_exact
 from ptmtools.site.tours import SiteTour, site_tour
 from ptmtools.store.folder import DatabaseFolder, damaged
@@ -164,6 +165,8 @@ class _Builder:
         if "octrees" in index:
             index["octrees"] = list(self._octrees())
         index["textures"] = list(self._textures())
+        if has_sets(self._served.index):
+            index["sets"] = self._sets()
         index["viewpoints"], poster = self._pictures()
         openings = self._openings(index) if self._options.opening else ()
         if self._options.clients == "vrml":
@@ -188,7 +191,7 @@ class _Builder:
                 url = index["cells"][number][kind]
             return self._entries[f"{DATA}/{url}"].read(end)
 
-        entries = self._entries.values()
+        entries = (entry for entry in self._entries.values() if not is_of_sets(entry.name))
         size = sum(entry.state[2] if entry.state else len(entry.read()) for entry in entries)
         try:
             data = list(openings_of(self._served, index, read, size))
@@ -283,6 +286,12 @@ class _Builder:
         for row in self._served.index["octrees"]:
             file, digest = self._place(row["file"])
             yield row | {"file": self._add(file.stem, ".bin", PTM, file, digest=digest)}
+
+    def _sets(self) -> str:
+        """The URL of the document of all interlaced images."""
+        entries = list(set_entries(self._served.index, self._place))
+        self._entries |= {entry.name: entry for entry in entries}
+        return entries[-1].name.removeprefix(f"{DATA}/")
 
     def _data(self, url: str, stem: str, suffix: str, media: str) -> tuple[str, int]:
         """The name in the site, and the bytes on the link, of a document or a GLB."""

@@ -16,7 +16,8 @@ from ptmtools.output.gltf import pack, unpack
 #: The members of a material, of its surface and of its extras that the page reads.
 _LOOK = ("alphaMode", "alphaCutoff", "doubleSided")
 _SURFACE = ("baseColorFactor",)
-_EXTRAS = ("texture", "wrapS", "wrapT", "mesh", "octree", "light", "normal")
+_NORMAL = ("normal", "normalCoords", "normalScale", "normalWrapS", "normalWrapT")
+_EXTRAS = ("texture", "wrapS", "wrapT", "mesh", "octree", "light", *_NORMAL)
 
 
 def lean_glb(data: bytes) -> bytes:

@@ -18,7 +18,7 @@ INDEX = "index.html"
 PAGE = Path(__file__).parent / "page"
 HTML, JAVASCRIPT = "text/html; charset=utf-8", "text/javascript; charset=utf-8"
 #: Scripts that few visits need.
-LATER = ("later.js", "compare.js", "statues.js", "reliefs.js", "tour.js")
+LATER = ("later.js", "compare.js", "statues.js", "reliefs.js", "sets.js", "tour.js")
 #: The media type of each file.
 PROGRAM = {
     "viewer.js": JAVASCRIPT,

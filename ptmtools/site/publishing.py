@@ -43,6 +43,7 @@ from ptmtools.site.published import (
     plain_files,
     reading,
 )
+from ptmtools.site.sets import is_of_sets
 from ptmtools.site.uploading import upload
 from ptmtools.store.folder import damaged
 from ptmtools.store.layout import sha256
@@ -215,7 +216,7 @@ def weight_of(site: Site) -> Weight:
         if row.get("standing", True)
     }
     used = {"statues.js"} if "octrees" in index else set()
-    used |= {"reliefs.js" for row in index["textures"] if "relief" in row}
+    used |= {"reliefs.js" for row in index["textures"] if row.keys() & {"relief", "normals"}}
     used |= {"tour.js" for name in site.entries if name.startswith(f"{DATA}/tour-")}
     bytes_of = {n: link_bytes(e) for n, e in site.entries.items() if _walked(n, used)}
     begins = (f"{DATA}/index-", f"{DATA}/poster-")
@@ -236,7 +237,7 @@ def weight_of(site: Site) -> Weight:
 def _walked(name: str, used: Collection[str]) -> bool:
     """Whether every walk may need a file; of scripts that are loaded later those ``used``."""
     script = name.rpartition("/")[2]
-    later = script in LATER and script not in used
+    later = (script in LATER and script not in used) or is_of_sets(name)
     walked = name.startswith(("viewer-", f"{DATA}/")) and not name.startswith(f"{DATA}/work-")
     return name == INDEX or (walked and not later)
 

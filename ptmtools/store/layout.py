@@ -6,6 +6,7 @@
     stages/NAME.npz     the arrays of a stage
     stages/images.json  the list of the model's images
     stages/images/      a copy of each, under its SHA-256
+    stages/lights.npz   the lights of the model
     stages/octrees.json the list of the octree textures
     stages/textures/    the details of the levels of each texture
     stages/lists/       names and digests of the files of large stages, see `lists`
@@ -24,6 +25,7 @@ STAGES_FOLDER = "stages"
 #: The folders that stages write in.
 WRITTEN = (STAGES_FOLDER, SERVED)
 IMAGES, IMAGE_LIST = f"{STAGES_FOLDER}/images", f"{STAGES_FOLDER}/images.json"
+LIGHTS = "lights"
 OCTREE_LIST = f"{STAGES_FOLDER}/octrees.json"
 LISTS = f"{STAGES_FOLDER}/lists"
 STAGING = ".ptm-new"

@@ -123,10 +123,14 @@ def check_conservative(
     pairs: dict[tuple[int, int], MissedPair] = {}
     while tried < segments and drawn < PATIENCE * segments:
         rng = np.random.default_rng([seed, batch])
-        size = min(BATCH, segments - tried)
+        # Where eyes have little room the last few would come one by one.
+        size = min(BATCH, max(segments - tried, drawn // 4 - segments))
         start, end = draw.segments(rng, size)
         drawn, batch = drawn + size, batch + 1
         start, end = eyes.first(start, end)
+        if len(start) > segments - tried:
+            some = rng.permutation(len(start))[: segments - tried]
+            start, end = start[some], end[some]
         tried += len(start)
         a, b = cells.locate(start), cells.locate(end)
         clear = ~blockers.between(start, end)

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from ptmtools.cli.main import main
+from tests.builds import once
 
 TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data" / "two_rooms"
 
@@ -42,13 +43,20 @@ def ptm(capfd: pytest.CaptureFixture[str]) -> Ptm:
     return run
 
 
+def built_rooms(factory: pytest.TempPathFactory) -> Path:
+    """A folder with the model of the two rooms and its database."""
+
+    def build(folder: Path) -> None:
+        shutil.copytree(TWO_ROOMS, folder / "model")
+        model = folder / "model" / "two_rooms.obj"
+        assert main(["-q", "build-scene", str(model), "-o", str(folder / "db"), "-j", "1"]) == 0
+
+    return once(factory, "two_rooms", build)
+
+
 @pytest.fixture(scope="session")
 def _built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("built")
-    shutil.copytree(TWO_ROOMS, folder / "model")
-    model = folder / "model" / "two_rooms.obj"
-    assert main(["-q", "build-scene", str(model), "-o", str(folder / "db"), "-j", "1"]) == 0
-    return folder
+    return built_rooms(tmp_path_factory)
 
 
 @pytest.fixture
@@ -75,10 +83,12 @@ def make_museum(folder: Path, rooms: int = 1, textures: int = 9, size: int = 64)
 @pytest.fixture(scope="session")
 def gltf_museum(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The database of the smallest museum; not to be changed."""
-    folder = tmp_path_factory.mktemp("museum")
-    built = ["-q", "build-scene", str(make_museum(folder / "model")), "-o", str(folder / "db")]
-    assert main([*built, "-j", "1"]) == 0
-    return folder / "db"
+
+    def build(folder: Path) -> None:
+        words = ["build-scene", str(make_museum(folder / "model")), "-o", str(folder / "db")]
+        assert main(["-q", *words, "-j", "1"]) == 0
+
+    return once(tmp_path_factory, "gltf_museum", build) / "db"
 
 
 @pytest.fixture(scope="session")

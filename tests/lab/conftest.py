@@ -15,7 +15,8 @@ from ptmtools.lab.world import World, prepare, read_forms
 from ptmtools.output.served import read_served
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.walk import Walk, read_walk
-from tests.e2e.conftest import Ptm, ptm
+from tests.builds import once
+from tests.e2e.conftest import Ptm, built_rooms, ptm
 
 __all__ = ["Ptm", "ptm"]
 
@@ -25,19 +26,18 @@ SAMPLES = Path(__file__).resolve().parents[2] / "sample_data"
 @pytest.fixture(scope="session")
 def two_rooms(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The database of the two rooms; not to be changed."""
-    folder = tmp_path_factory.mktemp("two_rooms")
-    shutil.copytree(SAMPLES / "two_rooms", folder / "model")
-    model = folder / "model" / "two_rooms.obj"
-    assert main(["-q", "build-scene", str(model), "-o", str(folder / "db"), "-j", "1"]) == 0
-    return folder / "db"
+    return built_rooms(tmp_path_factory) / "db"
 
 
 @pytest.fixture(scope="session")
-def walk_file(two_rooms: Path) -> Path:
+def walk_file(tmp_path_factory: pytest.TempPathFactory, two_rooms: Path) -> Path:
     """A walk of 20 s through them."""
-    file = two_rooms.parent / "walk.json"
-    assert main(["-q", "path", str(two_rooms), "-o", str(file), "--duration", "20"]) == 0
-    return file
+
+    def plan(folder: Path) -> None:
+        words = ["-o", str(folder / "walk.json"), "--duration", "20"]
+        assert main(["-q", "path", str(two_rooms), *words]) == 0
+
+    return once(tmp_path_factory, "walk", plan) / "walk.json"
 
 
 @pytest.fixture(scope="session")
@@ -50,7 +50,10 @@ def world(two_rooms: Path, walk_file: Path) -> World:
 def interlaced_rooms(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The database of the two rooms, with interlaced images, of which two have several files: one
     of 256 × 256 texels, and one of 300 × 200 that is scaled."""
-    folder = tmp_path_factory.mktemp("interlaced_rooms")
+    return once(tmp_path_factory, "interlaced_rooms", _build_interlaced) / "db"
+
+
+def _build_interlaced(folder: Path) -> None:
     shutil.copytree(SAMPLES / "two_rooms", folder / "model")
     random = np.random.default_rng(7)
     for name, shape in {"room_a": (256, 256), "room_b": (200, 300)}.items():
@@ -61,7 +64,6 @@ def interlaced_rooms(tmp_path_factory: pytest.TempPathFactory) -> Path:
     model, formats = folder / "model" / "two_rooms.obj", "vrml,gltf,interlace"
     words = ["-q", "build-scene", str(model), "-o", str(folder / "db"), "-j", "1"]
     assert main([*words, "--format", formats]) == 0
-    return folder / "db"
 
 
 @pytest.fixture(scope="session")

@@ -24,7 +24,7 @@ def room() -> Floats:
     corner = [(0, 0), (s, 0), (s, s), (0, s)]
     walls = []
     for (a, b), (c, d) in zip(corner, corner[1:] + corner[:1], strict=True):
-        walls.append(quad((c, 0, d), (a, 0, b), (a, h, b), (c, h, d)))
+        walls.append(quad((a, 0, b), (c, 0, d), (c, h, d), (a, h, b)))
     floor = quad((0, 0, 0), (0, 0, s), (s, 0, s), (s, 0, 0))
     ceiling = quad((0, h, 0), (s, h, 0), (s, h, s), (0, h, s))
     return np.concatenate([floor, ceiling, *walls])
@@ -47,6 +47,7 @@ def piece(corner: Floats, side: int = 1, *, dense: bool = False) -> Piece:
         np.zeros(count, np.bool_),
         np.full(count, dense),
         np.full(count, side, np.int8),
+        np.arange(count),
     )
 
 

@@ -18,7 +18,7 @@ import pytest
 from ptmtools import cluster as module
 from ptmtools.cli.main import main
 from ptmtools.cluster import Cluster, software
-from ptmtools.errors import MissingComponentError, WorkerError
+from ptmtools.errors import InputError, MissingComponentError, WorkerError
 from ptmtools.parallel import open_executor
 
 
@@ -125,20 +125,37 @@ def test_closing_while_results_wait_to_be_fetched(alone, gate):
     assert list(alone.each(tasks.wait_for, gate, [3])) == [3]
 
 
-def test_closing_drops_the_tasks(alone, gate):
-    def known(dask_scheduler) -> int:
-        return len(dask_scheduler.tasks)
-
-    actual = alone.each(tasks.wait_for, gate, range(100))
-    assert next(actual) == 0
-    while alone._client.run_on_scheduler(known) <= alone.workers:
-        time.sleep(0.01)
-    actual.close()
+def _left(executor: Cluster) -> int:
+    """The keys that the scheduler still has, once it has had time to drop them."""
     for _ in range(1000):
-        if not (left := alone._client.run_on_scheduler(known)):
+        if not (left := executor._client.run_on_scheduler(_known)):
             break
         time.sleep(0.01)
-    assert left == 0
+    return left
+
+
+def _known(dask_scheduler) -> int:
+    return len(dask_scheduler.tasks)
+
+
+def test_closing_drops_the_tasks(alone, gate):
+    actual = alone.each(tasks.wait_for, gate, range(100))
+    assert next(actual) == 0
+    while alone._client.run_on_scheduler(_known) <= alone.workers:
+        time.sleep(0.01)
+    actual.close()
+    assert _left(alone) == 0
+
+
+@pytest.mark.parametrize("kind", ["of a task", "of a worker"])
+def test_a_fault_that_is_kept_keeps_nothing_on_the_cluster(alone, monkeypatch, kind):
+    """Its traceback has the frames in which the shared value and the other tasks were."""
+    if kind == "of a worker":
+        monkeypatch.setattr(module, "software", lambda: ("ptmtools 0.0.1",))
+    with pytest.raises(InputError if kind == "of a task" else WorkerError) as caught:
+        list(alone.each(tasks.refuse, 3, range(100)))
+    assert _left(alone) == 0
+    assert caught.tb
 
 
 def test_a_worker_that_ends_before_it_gets_the_value(cluster, monkeypatch):

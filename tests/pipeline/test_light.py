@@ -112,6 +112,33 @@ def test_any_number_of_workers_gives_the_same_bytes(made: Path, tmp_path: Path) 
     assert contents(tmp_path / "two.db") == contents(made / "lit.db")
 
 
+def test_lamps_of_a_model(tmp_path: Path) -> None:
+    """Any number of workers gives the same bytes; the lamps are bright, and nothing is black."""
+    model = write_rooms(tmp_path / "model", 3)
+    text = model.read_text()
+    first = sum(line.startswith("v ") for line in text.splitlines()) + 1
+    corners = ((1, 2.4, 1), (2, 2.4, 1), (2, 2.4, 2), (1, 2.4, 2))
+    lines = ["o panel", "usemtl panel", *(f"v {x} {y} {z}" for x, y, z in corners)]
+    lines.append("f " + " ".join(str(first + k) for k in range(4)))
+    model.write_text(text + "\n".join(lines) + "\n")
+    library = next(model.parent.glob("*.mtl"))
+    library.write_text(library.read_text() + "\nnewmtl panel\nKd 1 1 1\nKe 5 5 5\n")
+    for workers in (1, 2):
+        report = build_scene(model, tmp_path / f"{workers}.db", QUICK, BAKE, workers=workers)
+    (stage,) = (stage for stage in report.stages if stage.stage == LIGHT.name)
+    assert stage.counts["lamps"] >= 25
+    assert contents(tmp_path / "1.db") == contents(tmp_path / "2.db")
+    light = Artifacts(DatabaseFolder.open(tmp_path / "1.db")).stored(LIGHT)
+    assert light is not None
+    served = read_served(tmp_path / "1.db")
+    lightmaps = [row["file"] for row in served.index["textures"] if "light" in row]
+    assert min(decode(served.file(name)).min() for name in lightmaps) > 20
+    glbs = [read_glb(f.read_bytes()) for f in (tmp_path / "1.db/www/gltf").glob("*.glb")]
+    panels = [k for glb in glbs for k in glb.primitives if k.object == "panel"]
+    assert panels
+    assert all(panel.light is None and panel.color is None for panel in panels)
+
+
 def test_baked_again_only_when_something_has_changed(folder: Path) -> None:
     model, db = folder / "model/two_rooms.obj", folder / "lit.db"
     assert built(model, db, BAKE) == []

@@ -66,6 +66,7 @@ def test_options_come_in_any_order_before_a_name_with_blanks(
         offset=full_offset,
         clamp=(clamp or "off").lower() == "on",
         channel=channel or "",
+        strength=0.5 if "-bm 0.5" in harmless else 1.0,
         line=7,
     )
 

@@ -5,6 +5,7 @@ import { readFileSync } from "node:fs";
 import { allocate, nextFetch } from "../../web/page/policy/allocation.js";
 import { catalogueOf } from "../../web/page/policy/catalogue.js";
 import { duration, Estimate } from "../../web/page/policy/estimate.js";
+import { weigh } from "../../web/page/relief/weight.js";
 import { refresh, shareOut } from "../../web/page/policy/sharing.js";
 import {
   directionOf, distance, frustumOf, meetsBox, meetsHull,
@@ -58,7 +59,9 @@ const functions = {
     });
   },
   catalogue({ index }) {
-    const { levels, T, C, K, whole: all, previews, ...tables } = catalogueOf(index);
+    const catalogue = catalogueOf(index);
+    weigh(catalogue, index.textures);
+    const { levels, T, C, K, whole: all, previews, ...tables } = catalogue;
     const lists = (some) => Object.entries(some).map(([name, table]) => [name, [...table]]);
     const rest = Object.fromEntries(lists(tables)), some = Object.fromEntries(lists(previews));
     return { levels: [...levels], T, C, K, whole: all, previews: some, ...rest };

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +19,12 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 sys.path[:0] = [str(HERE), str(ROOT / "benchmarks")]
 from browser import Visitor, visiting  # noqa: E402
+from engines import Engine, launched, missing  # noqa: E402
 from samples import campus, pictures, statue  # noqa: E402
 
+from tests.builds import once  # noqa: E402
 from tests.lab.conftest import Ptm, ptm, two_rooms  # noqa: E402
+from tests.neighbours.apo.statues import write_rooms  # noqa: E402
 
 __all__ = ["Ptm", "campus", "pictures", "ptm", "statue", "two_rooms"]
 
@@ -39,6 +43,20 @@ def visit(chromium: Any) -> Visiting:
     return of
 
 
+@pytest.fixture(scope="session")
+def engines(require: Callable[[str, str], None]) -> Iterator[Callable[[str], Engine]]:
+    """``engines("firefox")``: that browser, which is started once."""
+    with ExitStack() as running:
+
+        @cache
+        def of(name: str) -> Engine:
+            if packages := missing(name):
+                require(name, f"apt install {packages}")
+            return running.enter_context(launched(name))
+
+        yield of
+
+
 def build(model: Path, database: Path, *more: str) -> Path:
     """A database with cells as glTF alone; ``more`` options."""
     options = ["--format", "gltf", "--no-fallback", "-j", "1", *more]
@@ -49,18 +67,24 @@ def build(model: Path, database: Path, *more: str) -> Path:
 @pytest.fixture(scope="session")
 def museum_db(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A museum of four rooms and stairs, with twelve small textures."""
-    folder = tmp_path_factory.mktemp("museum")
-    words = ["-o", folder / "model", "--rooms", 4, "--textures", 12, "--size", 256]
-    command = [sys.executable, "-m", "ptmtools", "sample", "museum", *words]
-    subprocess.run([str(word) for word in command], check=True, capture_output=True, timeout=300)
-    return build(folder / "model" / "museum.obj", folder / "museum.db")
+
+    def of(folder: Path) -> None:
+        words = ["-o", folder / "model", "--rooms", 4, "--textures", 12, "--size", 256]
+        command = [sys.executable, "-m", "ptmtools", "sample", "museum", *words]
+        subprocess.run(
+            [str(word) for word in command], check=True, capture_output=True, timeout=300
+        )
+        build(folder / "model" / "museum.obj", folder / "museum.db")
+
+    return once(tmp_path_factory, "museum", of) / "museum.db"
 
 
 @pytest.fixture(scope="session")
 def hospital_db(tmp_path_factory: pytest.TempPathFactory, shared: Path) -> Path:
     """A floor of a hospital."""
-    folder = tmp_path_factory.mktemp("hospital")
-    return build(shared / "scenes" / "hospital" / "hospital.obj", folder / "hospital.db")
+    model = shared / "scenes" / "hospital" / "hospital.obj"
+    folder = once(tmp_path_factory, "hospital", lambda f: build(model, f / "hospital.db"))
+    return folder / "hospital.db"
 
 
 @pytest.fixture(scope="session")
@@ -73,3 +97,24 @@ def museum(museum_db: Path) -> Site:
 def hospital(hospital_db: Path) -> Site:
     """The site of the hospital."""
     return site_of(hospital_db, PLAIN)
+
+
+#: How objects get octrees.
+OCTREES = ("--apo", "statue*", "--apo-faces", "500", "--apo-error", "0.02", "--backend", "embree")
+
+
+@pytest.fixture(scope="session")
+def statues_db(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two rooms with a statue each, of which the second has no texture."""
+    folder = once(
+        tmp_path_factory,
+        "statues",
+        lambda f: build(write_rooms(f / "model", 5), f / "statues.db", *OCTREES),
+    )
+    return folder / "statues.db"
+
+
+@pytest.fixture(scope="session")
+def statues(statues_db: Path) -> Site:
+    """The site of the rooms with statues."""
+    return site_of(statues_db, PLAIN)

@@ -17,7 +17,7 @@ import tempfile
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -93,6 +93,24 @@ PATHS = {
     "WebDriver:SetTimeouts": ("POST", "timeouts"),
     "WebDriver:DeleteSession": ("DELETE", ""),
 }
+#: Fingers without a driver, whose pointers no element can capture.
+TOUCHING = """
+async (fingers) => {
+  const view = document.querySelector("#view");
+  view.setPointerCapture = () => {};
+  const send = (kind, step) => fingers.forEach((places, number) => {
+    const [clientX, clientY] = places[Math.min(step, places.length - 1)];
+    const more = { bubbles: true, pointerId: 100 + number, pointerType: "touch" };
+    view.dispatchEvent(new PointerEvent(`pointer${kind}`, { clientX, clientY, ...more }));
+  });
+  send("down", 0);
+  for (let step = 1; step < Math.max(...fingers.map((places) => places.length)); step++) {
+    await new Promise(requestAnimationFrame);
+    send("move", step);
+  }
+  send("up", Infinity);
+}
+"""
 Command = Callable[[str, dict[str, Any]], Any]
 
 
@@ -145,6 +163,22 @@ class Engine:
     def release(self, key: str) -> None:
         self._key("keyUp", key)
 
+    def touch(self, *fingers: Sequence[tuple[int, int]]) -> None:
+        """Fingers that go down at the first of their places, pixels, move to the others and go up,
+        all at the same time. The driver of WebKitGTK has no fingers: the page gets the events that
+        they would cause."""
+        if self.name == "webkit":
+            self.evaluate(TOUCHING, [[list(place) for place in finger] for finger in fingers])
+            return
+        sources = []
+        for number, (start, *rest) in enumerate(fingers):
+            moves = [_moved(place, 50) for place in rest]
+            down, up = ({"type": f"pointer{way}", "button": 0} for way in ("Down", "Up"))
+            actions = [_moved(start, 0), down, *moves, up]
+            words = {"type": "pointer", "id": f"finger{number}", "actions": actions}
+            sources.append({**words, "parameters": {"pointerType": "touch"}})
+        self._command("WebDriver:PerformActions", {"actions": sources})
+
     def release_all(self) -> None:
         """Lets go of the keys that are still held."""
         self._command("WebDriver:ReleaseActions", {})
@@ -169,6 +203,11 @@ class Engine:
     def screenshot(self) -> bytes:
         """A PNG of the page as it is seen."""
         return base64.b64decode(self._command("WebDriver:TakeScreenshot", {"full": False}))
+
+
+def _moved(place: tuple[int, int], milliseconds: int) -> dict[str, Any]:
+    x, y = place
+    return {"type": "pointerMove", "x": x, "y": y, "duration": milliseconds}
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Sites that several tests look at: each is made once in a process."""
+"""Sites that several tests look at: each is made once in a run."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from PIL import Image
 from ptmtools.cli.main import main
 from ptmtools.neighbours.campus import CampusOptions, make_campus
 from ptmtools.scene.options import IngestOptions
+from tests.builds import once
 from tests.neighbours.apo.meshes import ply, sphere
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -37,11 +38,13 @@ HOSTILE = f"""</iframe></header><script>top.broken = 1; parent.broken = 1</scrip
 @pytest.fixture(scope="session")
 def statue(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A ball with relief, of nine levels."""
-    folder = tmp_path_factory.mktemp("statue")
-    mesh = ply(folder / "ball.ply", *sphere(6, 0.1))
-    options = ["--faces", "800", "--depth", "9", "--error", "0.01"]
-    assert main(["-q", "apo", str(mesh), "-o", str(folder / "ball.apo"), *options]) == 0
-    return folder / "ball.apo"
+
+    def make(folder: Path) -> None:
+        mesh = ply(folder / "ball.ply", *sphere(6, 0.1))
+        options = ["--faces", "800", "--depth", "9", "--error", "0.01"]
+        assert main(["-q", "apo", str(mesh), "-o", str(folder / "ball.apo"), *options]) == 0
+
+    return once(tmp_path_factory, "statue", make) / "ball.apo"
 
 
 @pytest.fixture(scope="session")
@@ -70,7 +73,10 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 @pytest.fixture(scope="session")
 def campus(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A short street with two buildings, trees and lamps; the buildings have records."""
-    folder = tmp_path_factory.mktemp("campus")
+    return once(tmp_path_factory, "campus", _make_campus) / "campus"
+
+
+def _make_campus(folder: Path) -> None:
     script = ROOT / "sample_data" / "make_campus.py"
     words = ["-o", folder / "model", "--buildings", 2, "--length", 60, "--texture", 32]
     subprocess.run([sys.executable, *map(str, (script, *words))], check=True, capture_output=True)
@@ -80,4 +86,3 @@ def campus(tmp_path_factory: pytest.TempPathFactory) -> Path:
     options = CampusOptions(samples=1, faces=50)
     reading, records = IngestOptions(unit="m"), folder / "records"
     make_campus(folder / "model/campus.obj", folder / "campus", options, reading, records=records)
-    return folder / "campus"

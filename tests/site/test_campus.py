@@ -13,10 +13,18 @@ import numpy as np
 import pytest
 from browser import Visitor, visiting
 
+from ptmtools.cli.main import main
 from ptmtools.errors import InputError
+from ptmtools.lab.campus.options import CampusWalkOptions
+from ptmtools.lab.campus.simulation import simulate_campus
 from ptmtools.lab.campus.stock import read_stock
+from ptmtools.lab.campus.world import prepare_campus
 from ptmtools.neighbours.campus.model import PRESETS, distances
 from ptmtools.site.forms import FORMS, form_site
+from ptmtools.site.throttle import Throttle
+from ptmtools.walk import read_walk
+
+from .test_recording import AT_ONCE
 
 Open = Callable[..., AbstractContextManager[Visitor]]
 #: `near` of the client.
@@ -78,6 +86,43 @@ def test_a_walk_refines_what_is_near(opened: Open, campus: Path) -> None:
         before = len(fetched(visitor))
         visitor.frames(20)
         assert len(fetched(visitor)) == before  # files are kept
+
+
+def test_a_recording_replays(
+    opened: Open, campus: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The simulator fetches the same files. The visitor stands until the page has all of a place:
+    how fast it is depends on the machine."""
+    link = Throttle(4e6, 0.02)
+    prepared = {"prepare": lambda page: page.add_init_script(AT_ONCE), "throttle": link}
+    with opened(campus, "?preset=Medium#-25,1.6,3,0", **prepared) as visitor:
+        visitor.until("s.complete")
+        for sorts, x in ((2, 0), (3, 25)):
+            visitor.page.evaluate(f"window.ptm.place([{x}, 1.6, 3], 0)")
+            visitor.until(f"s.sorts >= {sorts} && s.complete && !s.pending")
+        recording = visitor.page.evaluate("window.ptm.recording")
+        asked = [v for v in visitor.visits if "/data-" in v.path]
+        assert visitor.messages == []
+    file = tmp_path / "walk.json"
+    file.write_text(json.dumps(recording))
+    walk = read_walk(file)
+    assert walk.aspect == pytest.approx(320 / 240)
+    assert walk.eye[[0, -1], 0].tolist() == [-25, 25]
+    place = prepare_campus(campus, walk, every=0)
+    options = CampusWalkOptions(bandwidth="4M", latency="20ms")
+    run = simulate_campus(place, PRESETS[1], options)
+    assert run.begun
+    assert run.requests == pytest.approx(len(asked), rel=0.1)
+    assert run.body == pytest.approx(sum(v.bytes for v in asked), rel=0.1)
+    words = ["walk-campus", campus, "--walk", file, "--every", "0", "--preset", "medium"]
+    assert main([str(word) for word in words]) == 0
+    assert "medium" in capsys.readouterr().out.lower()
+
+
+def test_nothing_was_recorded(opened: Open, campus: Path) -> None:
+    with opened(campus) as visitor:
+        visitor.until("s.begun")
+        assert visitor.page.evaluate("window.ptm.recording") is None
 
 
 def test_it_is_drawn_and_walked_on(opened: Open, campus: Path) -> None:

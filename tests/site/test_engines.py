@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from browser import visiting
-from engines import PACKAGES, Engine, EngineVisitor, launched, missing, visiting_by
+from engines import PACKAGES, Engine, EngineVisitor, visiting_by
 from numpy.typing import NDArray
 
 from ptmtools.lab.world import World
@@ -30,6 +30,7 @@ from .previews import brightened, with_previews
 from .test_forms import OCTREE_FAULTS, SET_FAULTS, check_texels
 from .test_page import LEVELS, as_held, read
 from .test_previews import KINDS, shown_by
+from .test_statues import LEVELS as OCTREE_LEVELS, address, pose
 
 __all__ = ["walk_file", "world"]
 
@@ -41,11 +42,8 @@ LIKE = 34.0
 
 
 @pytest.fixture(scope="module", params=PACKAGES)
-def engine(request: pytest.FixtureRequest, require: Callable[[str, str], None]) -> Iterator[Engine]:
-    if packages := missing(request.param):
-        require(request.param, f"apt install {packages}")
-    with launched(request.param) as page:
-        yield page
+def engine(request: pytest.FixtureRequest, engines: Callable[[str], Engine]) -> Engine:
+    return engines(request.param)
 
 
 @pytest.fixture(scope="module")
@@ -283,6 +281,75 @@ def test_forms(
         engine.evaluate(f"{gl}.getExtension('WEBGL_lose_context').loseContext()")
         assert failed(visitor) == "PTM-V107"
     assert visitor.messages == []
+
+
+#: Of each form: what two fingers that part, and one that goes right, change.
+ZOOMED = {
+    "apo.json": "s.camera.away < 0.8 * before.camera.away",
+    "interlace.json": "s.pixels > 1.3 * before.pixels",
+}
+DRAGGED = {
+    "apo.json": "Math.abs(s.camera.eye[0] - before.camera.eye[0]) > 0.05",
+    "interlace.json": "s.shift[0] > before.shift[0] + 40",
+}
+
+
+@pytest.mark.parametrize("form", ZOOMED)
+def test_fingers(engine: Engine, forms: dict[str, Site], form: str) -> None:
+    with visiting_by(engine, forms[form].entries, width=WIDTH, height=HEIGHT) as visitor:
+        visitor.until("s.complete || s.needed === false || s.paused")
+        steps = [(x, 200) for x in range(200, 320, 20)]
+        pinch = [(x, 200) for x in range(200, 80, -20)], steps
+        for fingers, changed in (([steps], DRAGGED[form]), (pinch, ZOOMED[form])):
+            engine.evaluate("window.before = structuredClone(ptm.state())")
+            engine.touch(*fingers)
+            visitor.until(changed, 20)
+    assert visitor.messages == []
+
+
+def test_fingers_walk(engine: Engine, museum: Site) -> None:
+    """A thumb that goes up walks ahead; two fingers look and do not walk."""
+    with visiting_by(engine, museum.entries, width=WIDTH, height=HEIGHT) as visitor:
+        before = visitor.complete()["pose"]
+        engine.touch([(256, 300), *((256, 220) for _ in range(20))])
+        x, _, z = before["eye"]
+        visitor.until(f"Math.hypot(s.pose.eye[0] - {x}, s.pose.eye[2] - {z}) > 0.1", 20)
+        before = visitor.complete()["pose"]
+        down = [(200, y) for y in range(200, 280, 20)]
+        engine.touch(down, [(x + 100, y) for x, y in down])
+        after = visitor.until(f"s.pose.pitch > {before['pitch']} + 0.05", 20)["pose"]
+        assert np.abs(np.subtract(after["eye"], before["eye"])).max() < 0.05
+    assert visitor.messages == []
+
+
+@pytest.fixture(scope="module")
+def statue_view(chromium: Any, statues: Site, statues_db: Path) -> tuple[str, NDArray[np.uint8]]:
+    """The address of a view of a statue, and Chromium's picture of it."""
+    where = address(*pose(statues_db, 1, 0.9))
+    sizes = {"width": WIDTH, "height": HEIGHT, "query": where, "reduced_motion": "reduce"}
+    with visiting(chromium, statues.entries, **sizes) as visitor:
+        visitor.complete()
+        return where, visitor.picture()
+
+
+def test_statues_of_a_walk(
+    engine: Engine, statues: Site, statue_view: tuple[str, NDArray[np.uint8]]
+) -> None:
+    """They are drawn as by Chromium; without a damaged octree the walk goes on."""
+    where, picture = statue_view
+    sizes = {"width": WIDTH, "height": HEIGHT, "query": where}
+    with visiting_by(engine, statues.entries, **sizes) as visitor:
+        visitor.complete()
+        assert engine.evaluate(OCTREE_LEVELS)[1] >= 6
+        assert shows(visitor, picture)
+    assert visitor.messages == []
+    (name,) = (name for name in statues.entries if "statue_02" in name)
+    data = statues.entries[name].read()
+    spoilt = replace(statues.entries[name], source=data[:50] + bytes(99) + data[149:], state=None)
+    with visiting_by(engine, {**statues.entries, name: spoilt}, **sizes) as visitor:
+        visitor.until("ptm.errors.length > 0 && s.complete")
+        assert engine.evaluate("ptm.errors[0].code") == "PTM-V105"
+        assert engine.evaluate("document.querySelector('#error').hidden")
 
 
 @pytest.mark.parametrize("kind", ["rgb-png", "rgba-png", "grey-webp", "rgba-webp"])

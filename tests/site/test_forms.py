@@ -161,6 +161,19 @@ def test_keys_and_the_wheel(opened: Open, statue: Path) -> None:
         visitor.until(f"s.camera.away < 0.8 * {before['away']}")
 
 
+OUTLINE = "getComputedStyle(document.querySelector('canvas')).outlineStyle"
+
+
+def test_the_focus_is_seen_with_keys(opened: Open, statue: Path, pictures: dict[str, Path]) -> None:
+    for folder in (statue, pictures["rgb-png"]):
+        with opened(folder) as visitor:
+            visitor.until("s.pending === 0")
+            visitor.page.wait_for_function("document.activeElement.tagName === 'CANVAS'")
+            assert visitor.page.evaluate(OUTLINE) == "none"
+            visitor.page.keyboard.press("ArrowRight")
+            assert visitor.page.evaluate(OUTLINE) == "solid"
+
+
 @pytest.mark.parametrize(
     "name", ["grey-png", "rgb-png", "rgba-png", "grey-webp", "rgb-webp", "rgba-webp"]
 )

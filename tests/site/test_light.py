@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,22 @@ def psnr(one: Floats, other: Floats) -> float:
 
 def lightmaps(site: Site) -> set[str]:
     return {row["file"] for row in site.index["textures"] if "light" in row}
+
+
+def test_light_at_vertices_is_baked_light(visit: Visiting, site: Site, folder: Path) -> None:
+    """The second statue, plain and with light in its colours, keeps as much of them as plain
+    surfaces with a lightmap."""
+    served, statue = read_served(folder / "lit"), (slice(80, 160), slice(120, 200))
+    angle = float(np.degrees(served.index["viewpoints"][0]["fieldOfView"]))
+    eye = (2.7, 0.45, -0.3, 180.0)
+    view = ViewOptions(eye=eye, field_of_view=angle, width=WIDTH, height=HEIGHT)
+    expected = draw_view(served, view).astype(float)[statue]
+    unlit = replace(served, surfaces=replace(served.surfaces, lightmap=None))
+    assert expected.mean() > draw_view(unlit, view)[statue].mean() + 5
+    query = "#" + ",".join(map(str, eye))
+    with visit(site, query=query, width=WIDTH, height=HEIGHT) as visitor:
+        visitor.complete()
+        assert psnr(visitor.picture().astype(float)[statue], expected) > 34
 
 
 @pytest.mark.parametrize("viewpoint", [0, 1])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -230,8 +231,11 @@ def test_only_a_shorter_wait_behind_another_counts(
     assert latency == pytest.approx(expected)
 
 
-def test_the_catalogue_of_an_index(tmp_path: Path, world: World) -> None:
-    served = world.served
+@pytest.mark.parametrize("normals", [False, True])
+def test_the_catalogue_of_an_index(tmp_path: Path, world: World, normals: bool) -> None:
+    served = replace(world.served, index=json.loads(json.dumps(world.served.index)))
+    for row in served.index["textures"][::2] if normals else ():
+        row["normals"] = True
     expected = tables(catalogue_of(served, world.pyramids.differences, world.pyramids.mean))
     sizes = {"recordBytes": served.record_bytes, "geometryBytes": served.geometry_bytes}
     index = json.loads(json.dumps(served.index))

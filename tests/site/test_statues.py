@@ -8,50 +8,27 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ptmtools.cli.main import main
 from ptmtools.output.served import read_served
 from ptmtools.rendering.drawing import ViewOptions, draw_view, eye_of
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.site.content import Site, site_of
 from ptmtools.site.entry import Entry
 from tests.neighbours.apo.statues import write_rooms
-from tests.site.conftest import PLAIN, Visiting
+from tests.site.conftest import OCTREES, PLAIN, Visiting, build
 
 WIDTH, HEIGHT = 320, 240
 #: Levels of each octree that has been in view.
 LEVELS = "window.ptm.walk.renderer.statues?.levels ?? []"
 
 
-def built(model: Path, db: Path) -> Path:
-    options = ["--apo", "statue*", "--apo-faces", "500", "--apo-error", "0.02", "--format", "gltf"]
-    options += ["--no-fallback", "-j", "1", "--backend", "embree"]
-    assert main(["-q", "build-scene", str(model), "-o", str(db), *options]) == 0
-    return db
+@pytest.fixture(scope="module")
+def database(statues_db: Path) -> Path:
+    return statues_db
 
 
 @pytest.fixture(scope="module")
-def database(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two rooms with a statue each, of which the second has no texture."""
-    folder = tmp_path_factory.mktemp("statues")
-    model = write_rooms(folder / "model", 5)
-    options = ["--apo", "statue*", "--apo-faces", "500", "--apo-error", "0.02", "--format", "gltf"]
-    command = [
-        "-q",
-        "build-scene",
-        str(model),
-        "-o",
-        str(folder / "db"),
-        "--no-fallback",
-        "-j",
-        "1",
-    ]
-    assert main([*command, *options, "--backend", "embree"]) == 0
-    return folder / "db"
-
-
-@pytest.fixture(scope="module")
-def site(database: Path) -> Site:
-    return site_of(database, PLAIN)
+def site(statues: Site) -> Site:
+    return statues
 
 
 def pose(database: Path, statue: int, away: float) -> tuple[np.ndarray, float]:
@@ -179,7 +156,7 @@ def test_it_begins_without_textures(visit: Visiting, tmp_path: Path) -> None:
     for file in model.parent.glob("*.mtl"):
         lines = file.read_text().splitlines()
         file.write_text("\n".join(line for line in lines if "map_" not in line))
-    built(model, tmp_path / "db")
+    build(model, tmp_path / "db", *OCTREES)
     eye, yaw = pose(tmp_path / "db", 1, 0.9)
     plain = site_of(tmp_path / "db", PLAIN)
     with visit(plain, query=address(eye, yaw), width=WIDTH, height=HEIGHT) as visitor:

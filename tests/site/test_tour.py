@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import struct
 from collections.abc import Iterator
 from dataclasses import replace
@@ -234,15 +235,19 @@ def tour_name(site: Site) -> str:
     return name
 
 
-def test_the_default_is_the_tour_beside_the_database(museum_db: Path, tour_file: Path) -> None:
-    beside, document = museum_db.parent / "tour.json", json.loads(tour_file.read_text())
+def test_the_default_is_the_tour_beside_the_database(
+    museum_db: Path, tour_file: Path, tmp_path: Path
+) -> None:
+    database, beside = tmp_path / "museum.db", tmp_path / "tour.json"
+    shutil.copytree(museum_db, database)
+    for file in tour_file.parent.iterdir():
+        shutil.copy(file, tmp_path)
     plain = SiteOptions(pictures=False, opening=False)
-    try:
-        beside.write_text(json.dumps({**document, "labels": [], "stops": [], "model": "other.obj"}))
-        site = site_of(museum_db, plain)
-        assert not any("tour-" in name for name in site.entries)
-        assert any("other.obj" in note for note in site.notes)
-    finally:
-        beside.unlink()
+    assert tour_name(site_of(database, plain))
+    document = json.loads(tour_file.read_text())
+    beside.write_text(json.dumps({**document, "model": "other.obj"}))
+    site = site_of(database, plain)
+    assert not any("tour-" in name for name in site.entries)
+    assert any("other.obj" in note for note in site.notes)
     with pytest.raises(InputError, match="PTM-I120"):
-        site_of(museum_db, SiteOptions(pictures=False, tour=str(beside)))
+        site_of(database, replace(plain, tour=str(tmp_path / "no.json")))

@@ -4,7 +4,6 @@ import { loadLater } from "./load-later.js";
 import { clock } from "./net/fetcher.js";
 import { loadPolicy } from "./policy/policies.js";
 import { Recorder } from "./recorder.js";
-import { footprintOf } from "./space/footprint.js";
 import { stateOf } from "./state.js";
 import { poseOf } from "./ui/address.js";
 import { Solids } from "./walk/solids.js";
@@ -181,8 +180,7 @@ export class App {
     const { walk, index } = this;
     const cells = index.cells.map(({ box }, cell) => {
       const leaves = walk.stream.records.get(cell)?.leaves;
-      const outline = leaves && footprintOf(leaves.flatMap(({ points }) => points));
-      return { cell, low: box.slice(0, 3), high: box.slice(3), outline };
+      return { cell, low: box.slice(0, 3), high: box.slice(3), leaves };
     });
     return { cells, here: walk.cell, visible: walk.visible };
   }

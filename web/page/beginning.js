@@ -1,7 +1,5 @@
 // Progress until the first picture: the room, then the coarse levels of its visible textures.
 
-/** Levels of a texture that make a first picture. */
-const FIRST_LEVELS = 5;
 /** Share of the pixels that need them; what few others show may come much later. */
 const ENOUGH = 0.95;
 /** Steps of the progress that textures make; the room makes two. */
@@ -14,7 +12,7 @@ export function beginningOf(walk) {
   let share = 0, total = 0;
   for (let t = 0; t < T; t++) {
     if (!present || client.downloads.rests("texture", t)) continue;
-    const seen = present[t * K + 1], wanted = Math.min(FIRST_LEVELS, levels[t]);
+    const seen = present[t * K + 1], wanted = Math.min(walk.firstLevels, levels[t]);
     total += seen;
     share += seen * Math.min(memory.held[t] / wanted, 1);
   }

@@ -26,7 +26,7 @@ PTM = ROOT / "web" / "ptm" / "src"
 FORMS = HERE / "forms"
 OUTPUT = ROOT / "ptmtools" / "site" / "page"
 #: Scripts that the page loads when it needs them.
-LATER = ("later.js", "compare.js", "statues.js", "reliefs.js", "tour.js")
+LATER = ("later.js", "compare.js", "statues.js", "reliefs.js", "sets.js", "tour.js")
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _LINE_END = re.compile(r"\s*\n\s*")
 #: Template strings with shaders, and what esbuild leaves in them.

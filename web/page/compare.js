@@ -8,11 +8,11 @@ import { RANGE_BYTES, RANGE_SECONDS, room } from "./policy/best.js";
 export class Comparison {
   /** @param {import("./walkthrough.js").Walkthrough} walk */
   constructor(walk) {
-    const { gl, rows, stream, means } = walk;
+    const { gl, rows, stream, index } = walk;
     this.walk = walk;
     this.memory = new TextureMemory(gl, rows, (t, levels) => stream.decode(t, levels));
     this.memory.fades = false;
-    this.renderer = new Renderer(gl, this.memory, means);
+    this.renderer = new Renderer(gl, this.memory, index.textures);
     this.renderer.statues = walk.renderer?.statues ?? null;
   }
 

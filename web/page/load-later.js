@@ -5,3 +5,4 @@ export const loadComparison = () => import("./compare.js");
 export const loadStatues = () => import("./statues.js");
 export const loadReliefs = () => import("./reliefs.js");
 export const loadTour = () => import("./tour.js");
+export const loadSets = () => import("./sets.js");

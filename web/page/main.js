@@ -3,7 +3,7 @@
 import { DecoderWorkers, hasSimd, loadViewDecoder } from "../ptm/src/index.js";
 import { App } from "./app.js";
 import { readConfig, Site } from "./data/site.js";
-import { loadTour } from "./load-later.js";
+import { loadSets, loadTour } from "./load-later.js";
 import { PageError } from "./net/errors.js";
 import { clock, Fetcher } from "./net/fetcher.js";
 import { Opening } from "./net/opening.js";
@@ -56,10 +56,13 @@ async function main() {
     const opening = preload ? new Opening(preload.href) : null;
     const gl = contextOf(canvas);
     if (!gl) throw new PageError("PTM-V101", "This browser cannot draw with WebGL 2.");
-    const policy = new URLSearchParams(location.search).get("policy") ?? "best";
+    const query = new URLSearchParams(location.search), policy = query.get("policy") ?? "best";
     const known = await loadPolicy(policy).catch(() => false);
     const options = { opening, policy: known ? policy : "best" };
+    const form = query.get("form") === "gpuii" && await loadSets();
+    const attach = form && await form.setsOf(await site, gl, options, new Fetcher(() => {}));
     const app = new App(canvas, gl, await site, config, decoders, options);
+    if (attach) attach(app.walk);
     Object.assign(window, { ptm: app });
     const { tour } = config;
     if (tour) app.on("first-picture", async () => (app.tour = await loadTour().then((s) => s.attachTour(app, tour), () => null)));

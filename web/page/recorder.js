@@ -69,7 +69,7 @@ export class Recorder {
     const address = opening && new URL(opening.url, location.href).href;
     return /** @type {PerformanceResourceTiming[]} */ (entries)
       .filter(({ name, requestStart, transferSize }) => transferSize > 0
-        && (asked.has(name) ? requestStart < 1000 * this.#begun : !name.endsWith(".ptm")))
+        && (asked.has(name) ? requestStart < 1000 * this.#begun : !/\.ptm$|\/sets\/\d/.test(name)))
       .flatMap(({ name, requestStart, encodedBodySize }) => {
         const at = short(requestStart / 1000);
         if (name !== address) return [[at, ...(asked.get(name) ?? ["page", 0]), encodedBodySize]];

@@ -87,6 +87,8 @@ export class Walkthrough {
   #expected = null;
   /** @type {number[]} */
   #frames = [];
+  /** Levels of a texture that make a first picture. */
+  firstLevels = 5;
 
   /**
    * @param {HTMLCanvasElement} canvas
@@ -143,7 +145,6 @@ export class Walkthrough {
     });
     this.rows = index.textures.map(levelsOf);
     this.memory = this.#memoryOf();
-    this.means = index.textures.map(({ color }) => color);
     const low = [0, 1, 2].map((k) => Math.min(...index.cells.map(({ box }) => box[k])));
     const high = [0, 1, 2].map((k) => Math.max(...index.cells.map(({ box }) => box[k + 3])));
     // Geometry outside of the cells is drawn, too.
@@ -179,18 +180,18 @@ export class Walkthrough {
 
   #make() {
     this.renderer?.statues?.delete();
-    const renderer = (this.renderer = new Renderer(this.gl, this.memory, this.means));
-    const relieved = this.index.textures.some((row) => "relief" in row);
-    if (relieved || this.index.octrees) {
-      const report = (/** @type {import("./net/errors.js").PageError} */ error) => this.#report(error, "octree", 0);
+    const { gl, index: { octrees, textures } } = this;
+    this.renderer = new Renderer(gl, this.memory, textures);
+    const relieved = textures.some((row) => "relief" in row || row.normals);
+    if (relieved || octrees) {
       this.#loading = true;
-      (relieved ? loadReliefs() : loadStatues()).then(({ statuesOf }) => {
-        renderer.statues = statuesOf(this, report);
-      }).catch(() => this.emit("notice", { message: "The details of statues could not be loaded." }))
+      (relieved ? loadReliefs() : loadStatues())
+        .then(({ show }) => show(this, (error) => this.#report(error, "octree", 0)))
+        .catch(() => this.emit("notice", { message: "Relief could not be loaded." }))
         .finally(() => (this.#loading = false));
     }
-    this.items = new ItemBuffer(this.gl);
-    this.fence = new Fence(this.gl);
+    this.items = new ItemBuffer(gl);
+    this.fence = new Fence(gl);
     this.#turn();
   }
 
@@ -267,13 +268,14 @@ export class Walkthrough {
     this.#cull(frustum);
     const until = clock() + time, late = () => clock() > until;
     if (this.memory.pump(now, late) || this.comparison?.memory.pump(now, late)) this.touch();
-    if (this.stream.news || now - this.#looked >= LOOK_EVERY) this.#look(now, frustum, stillness.lasts(now));
-    const camera = cameraOf(pose, this.tall, this.aspect, this.far);
     const { fence, items, renderer } = this;
     if (this.begun) {
       const lines = this.sharpness.lines / Math.tan(this.tall / 2);
       renderer?.statues?.advance(this.drawn, pose.eye, lines, !this.frozen && !document.hidden);
-    } else {
+    }
+    if (this.stream.news || now - this.#looked >= LOOK_EVERY) this.#look(now, frustum, stillness.lasts(now));
+    const camera = cameraOf(pose, this.tall, this.aspect, this.far);
+    if (!this.begun) {
       const { progress, over } = beginningOf(this);
       this.emit("progress", progress);
       this.begun = this.#ready && !fence?.busy;

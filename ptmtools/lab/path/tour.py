@@ -139,8 +139,9 @@ def _worth(
     corners = scene.corners
     length = np.array([len(one.load()) for one in scene.images] + [0], dtype=np.float64)
     size = areas(corners)
-    shown = np.bincount(image + 1, size, len(length))
-    density = np.divide(length, np.roll(shown, -1), out=np.zeros(len(length)), where=length > 0)
+    shown = np.roll(np.bincount(image + 1, size, len(length)), -1)
+    # No face shows a normal map alone.
+    density = np.divide(length, shown, out=np.zeros(len(length)), where=shown > 0)
     met, far = obstacles.first(eye, along, FAR)
     front = normals(corners[met])
     width = np.linalg.norm(front, axis=1)

@@ -19,8 +19,8 @@ recently seen ones. The page with this policy also uploads what does not fit, in
 3. It is near: rings around the camera, the nearest first.
 4. Within a ring the lowest step first, "to get a consistent look".
 
-Files arrive as a whole, as many at a time as HTTP/1.1 has connections, and requests are not
-cancelled. Where no image needs another step, nothing is requested.
+Files arrive as a whole, as many at a time as HTTP/1.1 has connections, in a browser one of an
+image, and requests are not cancelled. Where no image needs another step, nothing is requested.
 
 Our reading: the width of a ring (`RING`); of equal files the nearest image comes first. Texture
 memory, which the paper has only as "one step less", is filled with steps in the same order, and a
@@ -202,12 +202,13 @@ class GpuiiClient(WholeFileClient):
         """See `Client.fetch`."""
         if not self.documents():
             return
-        stock = self.world.catalogue
+        stock, asked = self.world.catalogue, self.textures.asked
         for t, step in self._steps:
             if len(self.waiting) >= CONNECTIONS:
                 break
             end = int(stock.ends[t, step])
-            if step <= self._target[t] and self.textures.asked[t] < end:
+            busy = self.world.one_range and asked[t] > self.textures.loaded[t]
+            if step <= self._target[t] and asked[t] < end and not busy:
                 self.ask(Kind.TEXTURE, t, end, -self.link.requests)
 
     def _see(self) -> None:

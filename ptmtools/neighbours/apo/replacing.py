@@ -56,16 +56,16 @@ class Replacement:
         Raises ValueError if they do not fit the scene.
         """
         self._check(scene)
-        kept = np.flatnonzero(~np.isin(scene.triangle_object, self.objects))
-        source = np.concatenate([kept, self.source.astype(np.int64)])
-        order = np.argsort(source, kind="stable")
-        source = source[order]
+        kept, order, source = self._sources(scene)
         used, corners = np.unique(scene.triangles[kept], return_inverse=True)
         corners = corners.reshape(-1, 3)
         triangles = np.concatenate([corners, self.triangles + len(used)])[order]
         colors = None
         if scene.colors is not None and self.colors is not None:
             colors = np.concatenate([scene.colors[kept], self.colors])[order]
+        normal_uv = None
+        if scene.normal_uv is not None:  # replaced objects have other relief
+            normal_uv = np.concatenate([scene.normal_uv[kept], np.zeros_like(self.uv)])[order]
         return replace(
             scene,
             points=np.concatenate([scene.points[used], self.points]),
@@ -75,7 +75,21 @@ class Replacement:
             triangle_material=scene.triangle_material[source],
             two_sided=scene.two_sided[source],
             colors=colors,
+            normal_uv=normal_uv,
         )
+
+    def sources(self, scene: Scene) -> Ints:
+        """(T,) the triangle of the scene that each triangle of `of` is, or stands for. Raises as
+        `of`."""
+        self._check(scene)
+        return self._sources(scene)[2]
+
+    def _sources(self, scene: Scene) -> tuple[Ints, Ints, Ints]:
+        """The triangles that stay, the order of these and the new ones, and `sources`."""
+        kept = np.flatnonzero(~np.isin(scene.triangle_object, self.objects))
+        source = np.concatenate([kept, self.source.astype(np.int64)])
+        order = np.argsort(source, kind="stable")
+        return kept, order, source[order]
 
     def _check(self, scene: Scene) -> None:
         if self.objects.max(initial=-1) >= len(scene.objects):

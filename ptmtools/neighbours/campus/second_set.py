@@ -2,8 +2,7 @@
 "Sources by format").
 
 A mask has the texture coordinates of the colours, or is left out. For OBJ, the scene's own reader
-names the masks. A glTF is read a second time with the other texture in place of the colours'; its
-faces are cleaned as before, and are the scene's, one by one.
+names the masks. A glTF is read a second time (`read_again`).
 """
 
 from __future__ import annotations
@@ -11,26 +10,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, Ints
+from ptmtools.arrays import Floats
 from ptmtools.errors import InputError, LimitError, PtmError
-from ptmtools.light.looks import LightImage
-from ptmtools.neighbours.campus.textures import Mask, decoded_lightmap
-from ptmtools.scene.faces import keep_faces
+from ptmtools.light.looks import LightImage, red_texels
+from ptmtools.neighbours.campus.textures import Mask
+from ptmtools.scene.gltf.second import SecondReading, read_again
 from ptmtools.scene.model import Scene
-from ptmtools.scene.notes import Findings
-from ptmtools.scene.options import IngestOptions
+from ptmtools.scene.options import GLTF, IngestOptions
 from ptmtools.scene.reference import Folder
-from ptmtools.scene.source import FileRange, Source, Texture
+from ptmtools.scene.source import FileRange, Texture
 
-if TYPE_CHECKING:
-    from ptmtools.scene.gltf.material import TextureOf
-
-_GLTF = (".glb", ".gltf")
 #: Reasons for leaving out a file that a model names.
 _NOT_THERE = {"missing": "not found", "outside": "lies outside the model's folder"}
 
@@ -58,8 +52,8 @@ def model_light(model: Path, options: IngestOptions) -> ModelLight:
     and as reading and decoding.
     """
     read = None
-    if model.suffix.lower() in _GLTF:
-        read = _again(model, options, lambda entry: entry.get("occlusionTexture"))
+    if model.suffix.lower() in GLTF:
+        read = read_again(model, options, lambda entry: entry.get("occlusionTexture"))
     if read is None:
         raise InputError(
             "PTM-I701",
@@ -91,12 +85,12 @@ def model_light(model: Path, options: IngestOptions) -> ModelLight:
     )
 
 
-def _missing(model: Path, material: str, number: int, read: _Read) -> InputError:
+def _missing(model: Path, material: str, number: int, read: SecondReading) -> InputError:
     """The error for a missing lightmap that a material names."""
     # Each material without the texture that it names left a note, in the same order.
     textures = zip(read.asked, read.source.materials, strict=True)
     lost = [k for k, (asked, m) in enumerate(textures) if asked and m.texture is None]
-    fault = read.missing[min(lost.index(number), len(read.missing) - 1)]
+    fault = read.missing[min(lost.index(number), len(read.missing) - 1)].message
     return InputError(
         "PTM-I701",
         f"the lightmap of material {material}, {fault}",
@@ -109,7 +103,7 @@ def _missing(model: Path, material: str, number: int, read: _Read) -> InputError
 def _red(texture: Texture, material: str, options: IngestOptions) -> NDArray[np.uint8]:
     """(h, w) red samples of a lightmap. Raises as decoding, and InputError PTM-I122."""
     try:
-        image = decoded_lightmap(texture.read(), options.limit << 20, texture.label)
+        return red_texels(texture.read(), options.limit << 20, texture.label)
     except InputError as fault:
         place, remedy = f"lightmap of material {material}", "mend it, or use --lightmaps bake"
         raise InputError(
@@ -118,7 +112,6 @@ def _red(texture: Texture, material: str, options: IngestOptions) -> NDArray[np.
     except OSError as fault:
         what = fault.strerror or str(fault)
         raise InputError("PTM-I122", what, file=fault.filename or texture.label) from None
-    return np.asarray(image.getchannel("R"))
 
 
 def model_masks(
@@ -126,7 +119,7 @@ def model_masks(
 ) -> tuple[dict[int, Mask], tuple[str, ...]]:
     """The masks of a model that was read as ``scene``, by the number of its material, and notes on
     invalid ones."""
-    masks_of = _gltf_masks if model.suffix.lower() in _GLTF else _obj_masks
+    masks_of = _gltf_masks if model.suffix.lower() in GLTF else _obj_masks
     masks, notes = {}, []
     for number, label, mask in masks_of(model, scene, options):
         if fault := mask if isinstance(mask, str) else _fault(mask, options):
@@ -137,45 +130,6 @@ def model_masks(
     return masks, tuple(notes)
 
 
-@dataclass(frozen=True)
-class _Read:
-    """A glTF with other textures.
-
-    Attributes
-    ----------
-    source: the file.
-    faces: (T,) its faces that are in the scene.
-    asked: for each of its materials, whether it names such a texture.
-    missing: messages about missing textures, in the order of the materials.
-    """
-
-    source: Source
-    faces: Ints
-    asked: tuple[bool, ...]
-    missing: tuple[str, ...]
-
-
-def _again(model: Path, options: IngestOptions, texture_of: TextureOf) -> _Read | None:
-    """A glTF with other textures; None if no material has such a texture."""
-    from ptmtools.scene.gltf.document import document_json
-    from ptmtools.scene.gltf.reader import read_gltf
-
-    if not any(map(texture_of, document_json(model).get("materials", []))):
-        return None
-    asked: list[bool] = []
-
-    def asking(entry: dict[str, Any]) -> dict[str, Any] | None:
-        use = texture_of(entry)
-        asked.append(use is not None)
-        return use
-
-    findings = Findings(model, options.allow_outside)
-    source = read_gltf(model, findings, options.max_triangles, asking)
-    missing = [note.message for note in findings.notes if note.code in ("PTM-N204", "PTM-N205")]
-    faces = keep_faces(source.points, source.triangles).source
-    return _Read(source, faces, tuple(asked), tuple(missing))
-
-
 #: The number of a material, the beginning of a note on its mask, and the mask or its fault.
 _Candidates = Iterator[tuple[int, str, Mask | str]]
 
@@ -184,7 +138,7 @@ def _gltf_masks(model: Path, scene: Scene, options: IngestOptions) -> _Candidate
     def glossy(entry: Mapping[str, Any]) -> Any:
         return entry.get("pbrMetallicRoughness", {}).get("metallicRoughnessTexture")
 
-    if (read := _again(model, options, glossy)) is None:
+    if (read := read_again(model, options, glossy)) is None:
         return
     source, faces = read.source, read.faces
     material = source.triangle_material[faces]
@@ -218,7 +172,7 @@ def _obj_masks(model: Path, scene: Scene, options: IngestOptions) -> _Candidates
 def _fault(mask: Mask, options: IngestOptions) -> str:
     """The fault of a mask that is no image, or "". Raises LimitError."""
     try:
-        decoded_lightmap(mask.load(), options.limit << 20, mask.label)
+        red_texels(mask.load(), options.limit << 20, mask.label)
     except LimitError:
         raise
     except PtmError as fault:

@@ -139,11 +139,6 @@ def weighted(colors: Image.Image, alpha: Image.Image, size: int) -> Image.Image:
     return Image.fromarray(np.rint(np.clip(held, 0, 255)).astype(np.uint8))
 
 
-def decoded_lightmap(data: bytes, most: int, label: str) -> Image.Image:
-    """An image as RGB. Raises as decoding."""
-    return _decoded(data, most, label).convert("RGB")
-
-
 def _resized(texels: Singles, size: int) -> Singles:
     from PIL import Image
 

@@ -45,7 +45,14 @@ def check_files(database: ServedDatabase) -> None:
         numbers += [("octree texture", p.octree, p.place) for p in glb.primitives]
         numbers += [("mesh", m.mesh, "materials") for m in materials]
         numbers += [("lightmap", m.light, "materials") for m in materials]
-        numbers += [("normal map", p.material.normal, p.place) for p in glb.primitives]
+        numbers += [
+            (
+                "normal map" if p.material.coords is None else "map of normals",
+                p.material.normal,
+                p.place,
+            )
+            for p in glb.primitives
+        ]
         objects = {primitive.place: primitive.object for primitive in glb.primitives}
         lists = {
             "texture": hints.index["textures"],
@@ -53,6 +60,7 @@ def check_files(database: ServedDatabase) -> None:
             "mesh": hints.index.get("meshes", ()),
             "lightmap": hints.index["textures"],
             "normal map": hints.index["textures"],
+            "map of normals": hints.index["textures"],
         }
         for noun, number, place in numbers:
             if number is not None and not 0 <= number < len(lists[noun]):

@@ -196,6 +196,7 @@ def _ascends(entries: Sequence[int]) -> bool:
 
 def _check_textures(hints: ReadHints, database: ServedDatabase) -> None:
     used = {t for _, record in hints.known() for row in record["textures"][:1] for t in row}
+    used |= {t for t, row in enumerate(hints.index["textures"]) if row.get("normals")}
     complete = all(record is not None for record in hints.records)
     for i, (row, images) in enumerate(zip(hints.index["textures"], hints.images, strict=True)):
         at = database.at(HINTS, f"textures[{i}]")

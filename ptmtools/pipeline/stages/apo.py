@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ptmtools.neighbours.apo.model import Octree
-    from ptmtools.neighbours.apo.replacing import ReplacedObject
+    from ptmtools.neighbours.apo.replacing import ReplacedObject, Replacement
     from ptmtools.output.model import OctreeRecord
     from ptmtools.scene.model import Scene
     from ptmtools.store.manifest import StageRecord
@@ -136,14 +136,30 @@ def replaced_objects(artifacts: Artifacts) -> NDArray[np.int32]:
     """The numbers of the objects that were replaced, ascending; raises PTM-D004 to PTM-D006."""
     import numpy as np
 
+    replacement = _replacement(artifacts)
+    return np.zeros(0, np.int32) if replacement is None else replacement.objects
+
+
+def source_triangles(artifacts: Artifacts) -> NDArray[np.int64]:
+    """(T,) for each triangle of the scene with replaced objects that of the scene that it is, or
+    stands for; raises as `replaced_objects`."""
+    import numpy as np
+
+    replacement, scene = _replacement(artifacts), artifacts[SCENE]
+    if replacement is None:
+        return np.arange(len(scene.triangles))
+    return replacement.sources(scene)
+
+
+def _replacement(artifacts: Artifacts) -> Replacement | None:
     from ptmtools.neighbours.apo.replacing import Replacement
 
     name = arrays_of(APO.name)
     if name not in artifacts.outputs(APO):
-        return np.zeros(0, np.int32)
+        return None
     arrays = artifacts.db.read_arrays(APO.name)
     with artifacts.reading(name):
-        return Replacement.from_arrays(arrays).objects
+        return Replacement.from_arrays(arrays)
 
 
 def _row(file: str, replaced: ReplacedObject, octree: Octree) -> tuple[dict[str, Any], bytes]:

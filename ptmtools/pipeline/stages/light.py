@@ -1,7 +1,8 @@
 """Bakes the light of the building: a lightmap for each cell, encoded as a texture.
 
-Without ``--light bake`` this stage writes nothing. Lightmaps are encoded with the options of the
-textures, and clients fetch them like textures.
+Without ``--light``, a building without lightmaps of its own has no light, and this stage writes
+nothing. Lightmaps are encoded with the options of the textures, and clients fetch them like
+textures.
 """
 
 from __future__ import annotations
@@ -10,22 +11,36 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from ptmtools.diagnostics import Warned
+from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.lazy import Lazy, component
 from ptmtools.light.options import LightOptions
 from ptmtools.output.names import cell_name
-from ptmtools.pipeline.encoding import ImageFile, TextureOptions, encoded_image, ptm_file
+from ptmtools.pipeline.encoding import TextureOptions, baked, encoded_texels, ptm_file
 from ptmtools.pipeline.stage import Artifacts, Job, Run, Stage, described
-from ptmtools.pipeline.stages.apo import APO, replaced_objects
+from ptmtools.pipeline.stages.apo import APO, replaced_objects, source_triangles
 from ptmtools.pipeline.stages.cells import CELLS
+from ptmtools.pipeline.stages.scene import SCENE, lights_of
 from ptmtools.pipeline.stages.textures import TEXTURES
 from ptmtools.quantities import count, size
+from ptmtools.store.layout import LIGHTS, arrays_of
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from ptmtools.cells.model import Cells
     from ptmtools.light.cells import Baking, CellLight, Piece
+    from ptmtools.light.looks import Painted
     from ptmtools.light.model import Light
+    from ptmtools.scene.lights import Lights
     from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
+
+#: Lightmaps with less than this share of the texels to the metre that were asked for are reported.
+_COARSE = 0.5
+#: Decoded bytes of a lightmap of the model, which the scene stage has already decoded.
+_MOST = 1 << 40
 
 
 @dataclass(frozen=True)
@@ -39,15 +54,12 @@ class LitCells:
 def lit(shared: LitCells, task: tuple[int, Piece]) -> tuple[CellLight, list[tuple[str, bytes]]]:
     """The light of a cell, and the files of its lightmap as `encoded_image` returns them; none
     without one."""
-    from ptmtools.texture.images import png_bytes
-
     cell, piece = task
     light = shared.baking.light(piece)
     if light.texels is None:
         return light, []
-    return light, encoded_image(
-        shared.options, ImageFile(f"{lightmap_stem(cell)}.png", png_bytes(light.texels[:, :, None]))
-    )
+    texels = light.texels[:, :, None]
+    return light, encoded_texels(shared.options, lightmap_stem(cell), texels)
 
 
 def lightmap_stem(cell: int) -> str:
@@ -61,54 +73,123 @@ class LightJob(Job):
     def __init__(self, run: Run, stage: Stage[Light], options: LightOptions) -> None:
         """Raises MissingComponentError: PTM-M100 xatlas is not installed."""
         super().__init__(run, stage, options)
-        if options.light != "none":
-            component("xatlas", "PTM-M100", "baking lightmaps needs xatlas", "light")
+        if options.light in ("bake", "model"):
+            _check_component()
 
     def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
-        """See `Job.make`."""
-        if self.options.light == "none":
+        """Raises InputError PTM-I701: the model has no lightmaps, which the options ask for."""
+        run = self.run
+        lights = None if self.options.light == "none" else lights_of(run)
+        has_maps = lights is not None and bool(lights.maps)
+        if self.options.light == "model" and not has_maps:
+            raise InputError(
+                "PTM-I701",
+                "the model has no lightmaps",
+                file=run.model,
+                remedy="use --light bake, or a glTF with occlusion textures that do not repeat",
+            )
+        if self.options.light == "none" or (self.options.light == "auto" and not has_maps):
             return described(work, {"lightmaps": 0}, ())
+        if self.options.light == "auto":
+            try:
+                _check_component()
+            except MissingComponentError as fault:
+                left_out = Warned(f"the lightmaps of the model are left out: {fault.message}")
+                return described(work, {"lightmaps": 0}, (left_out,))
         import numpy as np
 
-        from ptmtools.light.cells import Baking
         from ptmtools.light.model import Light
-        from ptmtools.light.occlusion import Surroundings
         from ptmtools.output.content import Geometry
         from ptmtools.output.pieces import pieces_of
 
-        run = self.run
         scene, cells = run[APO], run[CELLS]
-        glass = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials], np.bool_)
+        own = lights if self.options.light != "bake" else None
+        unlit = _unlit(run, lights, painted=own is not None)
         texel = 1 / self.options.light_density
-        pieces = pieces_of(Geometry(scene, cells), cells, glass, texel, replaced_objects(run))
-        shared = LitCells(Baking(Surroundings.of(scene), self.options), run.recorded(TEXTURES))
-        lights: list[CellLight] = []
-        total = 0
-        tasks = run.workers.executor.each(lit, shared, enumerate(pieces))
-        for cell, (light, files) in enumerate(tasks):
-            run.progress(cell, len(pieces), "light")
-            lights.append(light)
-            for name, data in files:
-                transaction.put(name, data)
-            total += len(files[0][1]) if files else 0
-        run.progress(len(pieces), len(pieces), "light")
+        pieces = pieces_of(Geometry(scene, cells), cells, unlit, texel, replaced_objects(run))
+        shared = LitCells(self._baking(lights, pieces), run.recorded(TEXTURES))
+        tasks = list(enumerate(pieces))
+        cell_lights, total = baked(run, transaction, lit, shared, tasks, "light")
         artifact = Light(
-            np.array([0 if k.texels is None else len(k.texels) for k in lights], np.int32),
-            np.concatenate([light.mapped for light in lights]),
-            np.concatenate([light.uv for light in lights]),
-            np.concatenate([light.vertex for light in lights]),
+            np.array([0 if k.texels is None else len(k.texels) for k in cell_lights], np.int32),
+            np.concatenate([light.mapped for light in cell_lights]),
+            np.concatenate([light.uv for light in cell_lights]),
+            np.concatenate([light.vertex for light in cell_lights]),
         )
         run.keep(LIGHT, artifact)
         transaction.put_arrays(LIGHT.name, artifact.to_arrays())
-        crowded = sum(light.crowded for light in lights)
-        return described(work, {**_counts(artifact), "ptm_bytes": total}, _notes(crowded))
+        counts = {**_counts(artifact), "ptm_bytes": total, **_about(shared.baking)}
+        return described(work, counts, _notes(cell_lights))
+
+    def _baking(self, lights: Lights | None, pieces: list[Piece]) -> Baking:
+        """What the tasks share: the light of the model, or lamps and the sky."""
+        from ptmtools.light.cells import ABOVE, WHITE, Baking
+        from ptmtools.light.lamps import lamps_of
+        from ptmtools.light.mixing import mixed
+        from ptmtools.light.occlusion import Surroundings
+
+        scene = self.run[APO]
+        around = Surroundings.of(scene)
+        if self.options.light != "bake":
+            assert lights
+            return Baking(around, self.options, painted=_painted(self.run, lights))
+        lamps = lamps_of(scene, lights)
+        mix = mixed(around, pieces, lamps, self.options, ABOVE, WHITE)
+        return Baking(around, self.options, mix)
 
 
-def _notes(crowded: int) -> Iterator[str]:
-    if crowded:
+def _check_component() -> None:
+    """Raises MissingComponentError."""
+    component("xatlas", "PTM-M100", "lightmaps need xatlas", "light")
+
+
+def _unlit(run: Run, lights: Lights | None, *, painted: bool) -> NDArray[np.bool_]:
+    """(M,) the materials without light: those seen through, and those without a lightmap of the
+    model, or that glow."""
+    import numpy as np
+
+    from ptmtools.light.lamps import glowing
+
+    scene = run[APO]
+    glass = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials], np.bool_)
+    if lights is None:
+        return glass
+    return glass | (lights.map < 0 if painted else glowing(scene, lights) > 0)
+
+
+def _painted(run: Run, lights: Lights) -> Painted:
+    """The lightmaps of the model, for the faces of the scene with replaced objects."""
+    import numpy as np
+
+    from ptmtools.light.looks import LightImage, Painted, red_texels
+
+    scene = run[SCENE]
+    decoded = {each.data: red_texels(each.data, _MOST, "lightmap") for each in lights.maps}
+    images = tuple(LightImage(decoded[k.data], k.wrap, k.strength) for k in lights.maps)
+    image = lights.map[scene.triangle_material]
+    uv = lights.uv.astype(np.float64)
+    return Painted(scene.corners, uv, image, images, source_triangles(run))
+
+
+def _about(baking: Baking) -> Mapping[str, Any]:
+    """What the light consists of."""
+    if baking.painted is not None:
+        return {"light": "model"}
+    lamps = baking.mix.lamps
+    return {"light": "bake", "lamps": 0 if lamps is None else len(lamps), "sky": baking.mix.sky}
+
+
+def _notes(lights: list[CellLight]) -> Iterator[str]:
+    if crowded := sum(light.crowded for light in lights):
         yield (
             f"the lightmaps of {count(crowded, 'cell')} have too many parts to keep them all "
             "apart; neighbours there run into each other (--light-density)"
+        )
+    coarse = [light.density for light in lights if light.density < _COARSE]
+    if coarse:
+        yield (
+            f"the lightmaps of {count(len(coarse), 'cell')} are too small for --light-density: "
+            f"they have {min(coarse):.0%} of it at least"
         )
 
 
@@ -119,14 +200,17 @@ def lightmap_files(light: Light | None) -> dict[int, str]:
 
 
 def _reads(options: LightOptions) -> tuple[Stage[Any], ...]:
-    return () if options.light == "none" else (APO, CELLS)
+    return () if options.light == "none" else (SCENE, APO, CELLS)
 
 
 def _inputs(artifacts: Artifacts, options: LightOptions) -> dict[str, str]:
     """See `Stage.inputs`."""
-    if options.light == "none":
+    name = arrays_of(LIGHTS)
+    digest = artifacts.outputs(SCENE).get(name)
+    if options.light == "none" or (options.light == "auto" and digest is None):
         return {}
-    return artifacts.files_of(LIGHT.sources(options)) | artifacts.choices(LIGHT)
+    lights = {} if digest is None else {name: digest}
+    return lights | artifacts.files_of(LIGHT.sources(options)) | artifacts.choices(LIGHT)
 
 
 def _counts(light: Light) -> Mapping[str, Any]:
@@ -139,9 +223,11 @@ def _counts(light: Light) -> Mapping[str, Any]:
 def _summary(n: Mapping[str, Any]) -> str:
     if not n["lightmaps"]:
         return "no light"
+    parts = [("of the model", n.get("light") == "model"), ("with lamps", n.get("lamps")),
+             ("with the sky", n.get("sky"))]  # fmt: skip
     return (
         f"{count(n['lightmaps'], 'lightmap')} of {count(n['texels'], 'texel')}, "
-        f"{size(n['ptm_bytes'])}"
+        f"{size(n['ptm_bytes'])}" + "".join(f", {text}" for text, given in parts if given)
     )
 
 
@@ -152,7 +238,8 @@ def _fits_cells(light: Light, cells: Cells) -> str:
 LIGHT: Stage[Light] = Stage(
     name="light",
     about="Bake the light of the surfaces into lightmaps.",
-    recipe=1,
+    recipe=2,
+    changed="lamps, and the sky through windows and openings, give light",
     options=LightOptions,
     reads=_reads,
     inputs=_inputs,

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ptmtools.lazy import Lazy
-from ptmtools.pipeline.encoding import ImageFile, TextureOptions, encoded_image, ptm_file
+from ptmtools.pipeline.encoding import TextureOptions, baked, encoded_texels, ptm_file
 from ptmtools.pipeline.stage import Artifacts, Job, Stage, described
 from ptmtools.pipeline.stages.apo import APO, object_stems, replaced_objects
 from ptmtools.pipeline.stages.scene import SCENE
@@ -46,12 +46,9 @@ class Mapped:
 
 def mapped(shared: Mapped, task: tuple[int, str]) -> tuple[NormalMap, list[tuple[str, bytes]]]:
     """The normal map of an object, and its files as `encoded_image` returns them."""
-    from ptmtools.texture.images import png_bytes
-
     number, stem = task
     relief = shared.replacing.normal_map(number)
-    image = ImageFile(f"{stem}.png", png_bytes(relief.texels))
-    return relief, encoded_image(shared.options, image)
+    return relief, encoded_texels(shared.options, stem, relief.texels)
 
 
 class ReliefJob(Job):
@@ -72,19 +69,8 @@ class ReliefJob(Job):
         names = [shown.objects[number] for number in objects.tolist()]
         tasks = list(zip(objects.tolist(), relief_stems(names), strict=True))
         shared = Mapped(replacing, run.recorded(TEXTURES))
-        maps: list[NormalMap] = []
-        notes: list[str] = []
-        total = 0
-        for name, (relief, files) in zip(
-            names, run.workers.executor.each(mapped, shared, tasks), strict=True
-        ):
-            run.progress(len(maps), len(tasks), "normal maps")
-            maps.append(relief)
-            notes += _notes(name, relief)
-            for file, data in files:
-                transaction.put(file, data)
-            total += len(files[0][1])
-        run.progress(len(tasks), len(tasks), "normal maps")
+        maps, total = baked(run, transaction, mapped, shared, tasks, "normal maps")
+        notes = [note for pair in zip(names, maps, strict=True) for note in _notes(*pair)]
         reliefs = reliefs_of(shown, objects, maps)
         run.keep(RELIEF, reliefs)
         transaction.put_arrays(RELIEF.name, reliefs.to_arrays())

@@ -1,8 +1,8 @@
 """Reads the model: arrays in metres, a list of its images, and a copy of each image.
 
 The list is a file of its own beside the arrays, so that a repainted texture changes neither the
-cells nor the stages after them. If only the contents of plain images (see `SourceImage`) have
-changed, the model is not read again: the arrays would be the same.
+cells nor the stages after them. So are the lights of the model. If only the contents of plain
+images (see `SourceImage`) have changed, the model is not read again: the arrays would be the same.
 """
 
 from __future__ import annotations
@@ -19,12 +19,13 @@ from ptmtools.lazy import Lazy
 from ptmtools.pipeline.stage import Artifacts, Job, Stage
 from ptmtools.quantities import count
 from ptmtools.scene.options import IngestOptions
-from ptmtools.store.layout import IMAGE_LIST, IMAGES, sha256
+from ptmtools.store.layout import IMAGE_LIST, IMAGES, LIGHTS, arrays_of, sha256
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from ptmtools.scene.lights import Lights
     from ptmtools.scene.model import Scene, SourceImage
     from ptmtools.store.digests import Digests
     from ptmtools.store.manifest import StageRecord
@@ -124,6 +125,24 @@ def _repainted(artifacts: Artifacts, work: StageRecord) -> dict[int, str] | None
     return repainted if len(digests) == len(rows) else None
 
 
+def lights_of(artifacts: Artifacts) -> Lights | None:
+    """The lights of the scene; None if it has none. Raises PTM-D004 to PTM-D006."""
+    name = arrays_of(LIGHTS)
+    if name not in artifacts.outputs(SCENE):
+        return None
+
+    def read() -> Lights:
+        from ptmtools.scene.lights import Lights
+        from ptmtools.store.archive import unpack_arrays
+
+        data = artifacts.db.read_output(SCENE.name, name)
+        lights = Lights.from_arrays(unpack_arrays(data, file=artifacts.db.path / name))
+        lights.check(artifacts[SCENE])
+        return lights
+
+    return artifacts.cached(name, read)
+
+
 class ReadingJob(Job):
     """Reads the model, or its repainted images alone."""
 
@@ -138,7 +157,11 @@ class ReadingJob(Job):
 
     @staticmethod
     def missing(artifacts: Artifacts, artifact: Scene) -> Iterator[tuple[str, str, str]]:
-        """The images without a copy in the database, see `Job.missing`."""
+        """The images without a copy in the database, and damaged lights, see `Job.missing`."""
+        try:
+            lights_of(artifacts)
+        except DatabaseError as fault:
+            yield arrays_of(LIGHTS), "", fault.message
         outputs = artifacts.record(SCENE).outputs
         for image in artifact.images:
             if outputs.get(f"{IMAGES}/{image.sha256}") != image.sha256:
@@ -172,6 +195,9 @@ class ReadingJob(Job):
         scene = ingest(self._model, self.options, run.progress, workers=run.workers.here)
         run.keep(SCENE, scene)
         transaction.put_arrays(SCENE.name, scene.to_arrays())
+        if scene.lights:
+            transaction.put_arrays(LIGHTS, scene.lights.to_arrays())
+        run.cache(arrays_of(LIGHTS), scene.lights or None)
         self._put_images(transaction, scene.images, scene.images)
         return replace(
             work,
@@ -282,8 +308,8 @@ def _summary(n: Mapping[str, Any]) -> str:
 SCENE: Stage[Scene] = Stage(
     name="scene",
     about="Read a model.",
-    recipe=8,
-    changed="the spaces of an IFC model bound and name rooms",
+    recipe=9,
+    changed="normal maps, lamps, emission and lightmaps of a model are read",
     options=IngestOptions,
     inputs=_inputs,
     artifact=Lazy("ptmtools.scene.model:Scene"),

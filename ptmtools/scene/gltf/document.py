@@ -273,15 +273,15 @@ Support = Literal["read", "silent", "noted"]
 _SUPPORTED: dict[Support, str] = {
     "read": """
         EXT_mesh_gpu_instancing EXT_meshopt_compression EXT_texture_webp
-        KHR_draco_mesh_compression KHR_materials_pbrSpecularGlossiness
-        KHR_materials_transmission KHR_materials_unlit KHR_mesh_quantization
-        KHR_meshopt_compression KHR_node_visibility KHR_texture_basisu KHR_texture_transform
+        KHR_draco_mesh_compression KHR_lights_punctual KHR_materials_emissive_strength
+        KHR_materials_pbrSpecularGlossiness KHR_materials_transmission KHR_materials_unlit
+        KHR_mesh_quantization KHR_meshopt_compression KHR_node_visibility KHR_texture_basisu
+        KHR_texture_transform
     """,
     "silent": """
-        KHR_animation_pointer KHR_lights_punctual KHR_materials_anisotropy
-        KHR_materials_clearcoat KHR_materials_dispersion KHR_materials_emissive_strength
-        KHR_materials_ior KHR_materials_iridescence KHR_materials_sheen KHR_materials_specular
-        KHR_materials_volume KHR_xmp_json_ld
+        KHR_animation_pointer KHR_materials_anisotropy KHR_materials_clearcoat
+        KHR_materials_dispersion KHR_materials_ior KHR_materials_iridescence KHR_materials_sheen
+        KHR_materials_specular KHR_materials_volume KHR_xmp_json_ld
     """,
     "noted": """
         KHR_materials_diffuse_transmission KHR_materials_variants

@@ -1,8 +1,9 @@
 """Reads materials, samplers and images of a glTF document (glTF 2.0, sections 3.8 and 3.9).
 
-The reader keeps only the base colour of the metallic-roughness model. Its factor is linear light,
-but the tint of the emitted files is sRGB, so the factor is converted and the conversion noted; for
-partial tints the product of tint and texel differs from the linear product. The alpha of texels
+The reader keeps the normal map, how bright the emission is, and the base colour of the
+metallic-roughness model. The factor of this is linear light, but the tint of the emitted files is
+sRGB, so the factor is converted and the conversion noted; for partial tints the product of tint and
+texel differs from the linear product. The alpha of texels
 applies in the modes MASK and BLEND only (section 3.9.6).
 """
 
@@ -17,11 +18,18 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.scene.colors import to_srgb
+from ptmtools.scene.colors import luminance, to_srgb
 from ptmtools.scene.gltf.document import Document, data_uri
 from ptmtools.scene.ktx2 import TranscodedBytes
 from ptmtools.scene.notes import Findings
-from ptmtools.scene.source import FileRange, HeldBytes, SourceMaterial, SourceWrap, Texture
+from ptmtools.scene.source import (
+    FileRange,
+    HeldBytes,
+    NormalTexture,
+    SourceMaterial,
+    SourceWrap,
+    Texture,
+)
 
 #: Maps the JSON of a material to that of one of its textures.
 TextureOf = Callable[[dict[str, Any]], dict[str, Any] | None]
@@ -41,6 +49,7 @@ class MaterialUse:
     matrix: (2, 3) KHR_texture_transform, origin at the upper left as in glTF.
     see_through: whether its alpha mode is not opaque.
     light: (3,) its base colour, linear light, the factor of vertex colours.
+    normal_coords, normal_matrix: those of its normal map, if they are not those above; or None.
     """
 
     index: int
@@ -48,6 +57,8 @@ class MaterialUse:
     matrix: NDArray[np.float64]
     see_through: bool
     light: NDArray[np.float64]
+    normal_coords: str | None = None
+    normal_matrix: NDArray[np.float64] | None = None
 
 
 class MaterialReader:
@@ -108,13 +119,21 @@ class MaterialReader:
         texture, coords, matrix = None, "TEXCOORD_0", np.eye(2, 3)
         if use is not None:
             texture = self._texture(use["index"], place, _share(use.get("strength", 1.0)))
-            transform = use.get("extensions", {}).get("KHR_texture_transform", {})
-            matrix = _transform(transform)
-            coords = f"TEXCOORD_{transform.get('texCoord', use.get('texCoord', 0))}"
-            if transform:
+            coords, matrix, moved = _placing(use)
+            if moved:
                 self._findings.note(
                     "PTM-N215", f"{name}: KHR_texture_transform baked into its faces", place
                 )
+        normal, normal_coords, normal_matrix = None, None, None
+        relief = None if self._texture_of else entry.get("normalTexture")
+        image = None if relief is None else self._texture(relief["index"], place, 1.0)
+        if relief is not None and image is not None:
+            normal_coords, normal_matrix, _ = _placing(relief)
+            same = texture is not None and normal_coords == coords
+            own = not (same and np.array_equal(normal_matrix, matrix))
+            normal = NormalTexture(image, finite(relief.get("scale", 1.0)), own=own)
+            if not own:
+                normal_coords = normal_matrix = None
         self._materials.append(
             SourceMaterial(
                 name=name,
@@ -126,9 +145,30 @@ class MaterialReader:
                 cutoff=max(cutoff / a, 0.0) if tested and opacity and a > 0 else None,
                 two_sided=bool(entry.get("doubleSided", False)),
                 texture=texture,
+                normal=normal,
+                **self._glow(entry, place),
             )
         )
-        return MaterialUse(len(self._materials) - 1, coords, matrix, see_through, light)
+        return MaterialUse(
+            len(self._materials) - 1,
+            coords,
+            matrix,
+            see_through,
+            light,
+            normal_coords,
+            normal_matrix,
+        )
+
+    def _glow(self, entry: dict[str, Any], place: str) -> dict[str, Any]:
+        """The emission of a material, as the fields of a `SourceMaterial`."""
+        factor = [_share(value) for value in entry.get("emissiveFactor", [0.0, 0.0, 0.0])]
+        if self._texture_of is not None or not any(factor):
+            return {}
+        stronger = entry.get("extensions", {}).get("KHR_materials_emissive_strength", {})
+        strength = finite(stronger.get("emissiveStrength", 1.0))
+        use = entry.get("emissiveTexture")
+        image = None if use is None else self._texture(use["index"], place, 1.0)
+        return {"glow": strength * float(luminance(np.array(factor))), "glow_map": image}
 
     def _texture(self, index: int, place: str, strength: float) -> Texture | None:
         tree = self._document.tree
@@ -169,9 +209,22 @@ class MaterialReader:
 
 def _share(value: Any) -> float:
     """A number, clipped to [0, 1]; ValueError for other values."""
+    return min(finite(value), 1.0)
+
+
+def finite(value: Any) -> float:
+    """A finite number, 0 for a negative one; ValueError for other values."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise ValueError(f"{value!r} is not a number")
-    return min(max(float(value), 0.0), 1.0)
+    return max(float(value), 0.0)
+
+
+def _placing(use: dict[str, Any]) -> tuple[str, NDArray[np.float64], bool]:
+    """The attribute with the coordinates of a texture, their (2, 3) matrix, and whether the
+    material defines that."""
+    transform = use.get("extensions", {}).get("KHR_texture_transform", {})
+    coords = transform.get("texCoord", use.get("texCoord", 0))
+    return f"TEXCOORD_{coords}", _transform(transform), bool(transform)
 
 
 def _transform(extension: dict[str, Any]) -> NDArray[np.float64]:

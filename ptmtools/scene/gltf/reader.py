@@ -1,7 +1,7 @@
 """Reads the nodes and primitives of glTF 2.0 models (.glb and .gltf) into a `Source`.
 
-Covers sections 3.5.3 (transformations), 3.7.2 (meshes) and 3.10 (cameras), KHR_node_visibility and
-EXT_mesh_gpu_instancing. The unit is the metre and Y is up by specification.
+Covers sections 3.5.3 (transformations), 3.7.2 (meshes) and 3.10 (cameras), KHR_node_visibility,
+KHR_lights_punctual and EXT_mesh_gpu_instancing. The unit is the metre and Y is up by specification.
 
 trimesh (5.2) is not used because it reads only TEXCOORD_0, leaves normalised integers unscaled,
 drops the mesh and children of a camera's node, keeps neither wrap modes nor the bytes of images,
@@ -11,6 +11,7 @@ and takes a time that grows with the third power of the graph's depth (six minut
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,15 +23,16 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError, LimitError
 from ptmtools.glb import COMPONENTS, meaning, natural
-from ptmtools.scene.colors import encoded
+from ptmtools.scene.colors import encoded, luminance
 from ptmtools.scene.gltf.document import Document, check_extensions, damaged, open_document
 from ptmtools.scene.gltf.draco import EXTENSION as DRACO, Decoded, decode_primitives
-from ptmtools.scene.gltf.material import MaterialReader, MaterialUse, TextureOf
+from ptmtools.scene.gltf.material import MaterialReader, MaterialUse, TextureOf, finite
+from ptmtools.scene.lights import Lamp, LampKind
 from ptmtools.scene.model import Camera
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.source import MAX_VERTICES, Rows, Source, too_many_triangles
 
-_INSTANCING = "EXT_mesh_gpu_instancing"
+_INSTANCING, _LIGHTS = "EXT_mesh_gpu_instancing", "KHR_lights_punctual"
 _DEFAULTS = {
     "TRANSLATION": (0.0, 0.0, 0.0),
     "ROTATION": (0.0, 0.0, 0.0, 1.0),
@@ -148,6 +150,32 @@ def cameras(
     return tuple(result)
 
 
+def lamps(tree: dict[str, Any], world: dict[int, Floats]) -> tuple[Lamp, ...]:
+    """The lamps of the nodes (KHR_lights_punctual), which shine along -Z. Their ranges are hints,
+    and have no effect."""
+    kinds: dict[str, LampKind] = {"point": "point", "spot": "spot", "directional": "sun"}
+    result = []
+    for node, matrix in world.items():
+        use = tree["nodes"][node].get("extensions", {}).get(_LIGHTS)
+        if use is None:
+            continue
+        entry = tree["extensions"][_LIGHTS]["lights"][natural(use["light"])]
+        color = np.array([finite(part) for part in entry.get("color", [1.0, 1.0, 1.0])])
+        intensity = finite(entry.get("intensity", 1.0)) * float(luminance(color))
+        with np.errstate(all="ignore"):
+            way = -matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
+        if not (intensity and np.isfinite(way).all() and np.isfinite(matrix[:3, 3]).all()):
+            continue
+        angles = entry.get("spot", {})
+        outer = min(finite(angles.get("outerConeAngle", math.pi / 4)), math.pi / 2)
+        inner = min(finite(angles.get("innerConeAngle", 0.0)), outer)
+        x, y, z = matrix[:3, 3].tolist()
+        dx, dy, dz = way.tolist()
+        cone = math.cos(inner), math.cos(outer)
+        result.append(Lamp(kinds[entry["type"]], (x, y, z), (dx, dy, dz), intensity, cone))
+    return tuple(result)
+
+
 #: Exceptions of malformed documents, which can be malformed in any place.
 _FAULTS = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
@@ -219,6 +247,11 @@ def _read(
         try:
             values = _Values(document, draw, draco, decoded)
             points, triangles, uv, colors = _mesh(values, draw, use, findings)
+            normal_uv = None
+            if use.normal_coords is not None and use.normal_matrix is not None:
+                count = len(points)
+                own = _coordinates(values, use.normal_coords, use.normal_matrix, count)
+                normal_uv = own[triangles]
             placed = instances(document, draw.node)
             key = (True, draco["bufferView"]) if draco else (False, draw.attributes["POSITION"])
             if key not in grids:
@@ -233,10 +266,11 @@ def _read(
             frames = world_of[draw.node] @ placed
             scale = np.linalg.norm(frames[:, :3, :3], axis=1)
             step = max(step, grid * float(scale[np.isfinite(scale)].max(initial=0.0)))
-        rows.add(frames, points, triangles, uv, use.index, colors, first[draw.node])
+        rows.add(frames, points, triangles, uv, use.index, colors, first[draw.node], normal_uv)
     return rows.source(
         materials=materials.materials,
         cameras=cameras(tree, world_of, findings),
+        lamps=lamps(tree, world_of),
         metres=1.0,
         up="y",
         step=step,
@@ -374,16 +408,22 @@ def _mesh(
     # Draco always encodes triangles.
     mode = _TRIANGLES if values.decoded else draw.mode
     triangles = _triangles(values.indices(len(points)), mode)
-    uv, raw = np.zeros((len(points), 2)), values.attribute(use.coords, len(points))
-    if raw is not None:
-        moved = raw @ use.matrix[:, :2].T + use.matrix[:, 2]
-        uv = np.stack([moved[:, 0], 1.0 - moved[:, 1]], axis=1)
+    uv = _coordinates(values, use.coords, use.matrix, len(points))
     colors, raw = None, values.attribute("COLOR_0", len(points))
     if raw is not None:
         colors = encoded(raw[:, :3] * use.light)[triangles]
         if use.see_through and not (raw[:, 3:] == 1).all():
             findings.note("PTM-N215", "opacities of vertices dropped", draw.place)
     return points, triangles, uv[triangles], colors
+
+
+def _coordinates(values: _Values, name: str, matrix: Floats, count: int) -> Floats:
+    """(n, 2) texture coordinates from the lower left, transformed; 0 without the attribute."""
+    raw = values.attribute(name, count)
+    if raw is None:
+        return np.zeros((count, 2))
+    moved = raw @ matrix[:, :2].T + matrix[:, 2]
+    return np.stack([moved[:, 0], 1.0 - moved[:, 1]], axis=1)
 
 
 def _triangles(index: Ints, mode: int) -> Ints:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from pxr import Ar, Sdf, Usd, UsdGeom, UsdShade
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.scene.colors import encoded, to_srgb
+from ptmtools.scene.colors import encoded, luminance, to_srgb
 from ptmtools.scene.messages import NamedImage
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.source import SourceMaterial, SourceWrap
@@ -65,6 +65,12 @@ def tint(linear: Any) -> Color:
     return r, g, b
 
 
+def _glow(shader: Any) -> float:
+    """The linear luminance that a shader emits; images have no effect."""
+    emitted = np.array(_numbers(_resolved(shader.GetInput("emissiveColor"))[0], _ZEROS)[:3])
+    return float(luminance(np.maximum(emitted, 0.0)))
+
+
 class MaterialReader:
     """Reads each material of the file ``model`` once."""
 
@@ -87,7 +93,8 @@ class MaterialReader:
             self._findings.miss("PTM-N214", f"{name}: no UsdPreviewSurface, ignored", place)
             return Surface(SourceMaterial(name))
         opacity, varies, from_image = self._opacity(shader, name, place)
-        plain = SourceMaterial(name, opacity=opacity, see_through=varies or from_image is not None)
+        see_through = varies or from_image is not None
+        plain = SourceMaterial(name, opacity=opacity, see_through=see_through, glow=_glow(shader))
         value, source, output = _resolved(shader.GetInput("diffuseColor"))
         if source is None:
             self._findings.note("PTM-N215", f"{name}: colour factor converted to sRGB", place)

@@ -119,10 +119,10 @@ def test_triangles_without_area_on_the_grid_are_left_out() -> None:
     buffer = CompressedBuffer(-10)
     point = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [1.0001, 1, 0]], np.float32)
     thin = Vertices(point, None, None, np.array([[1, 2, 3]]))
-    assert buffer.take(thin, 0, (None, None)) is None
+    assert buffer.take(thin, 0, (None, None, None)) is None
     assert buffer.members() == {}
     both = Vertices(point, None, None, np.array([[0, 1, 2], [1, 3, 2]]))
-    assert buffer.take(both, 0, (None, None)) is not None
+    assert buffer.take(both, 0, (None, None, None)) is not None
     buffer.finish()
     (position, indices) = buffer.members()["accessors"]
     assert (position["count"], indices["count"]) == (3, 3)
@@ -136,7 +136,7 @@ def test_indices_are_wide_where_they_must(vertices: int, component: int) -> None
     point[:, 1] = np.arange(vertices) // 1000
     point[1::3, 2] = 1
     triangle = np.arange(vertices).reshape(-1, 3)
-    buffer.take(Vertices(point, None, None, triangle), 0, (None, None))
+    buffer.take(Vertices(point, None, None, triangle), 0, (None, None, None))
     buffer.finish()
     assert buffer.members()["accessors"][-1]["componentType"] == component
 

@@ -122,6 +122,8 @@ export class CampusFiles {
   #kept = new Map();
   /** On the graphics card; null while an image is decoded again. @type {Map<string, Buffers | Image | null>} */
   #shown = new Map();
+  /** Images that are decoded again, once even if they are freed and shown meanwhile. @type {Set<string>} */
+  #decoding = new Set();
 
   /** @param {WebGL2RenderingContext} gl @param {import("./index.js").CampusIndex} index
    * @param {(file: string) => string} urlOf @param {import("../net/fetcher.js").Fetcher} fetcher */
@@ -132,11 +134,12 @@ export class CampusFiles {
     this.fetcher = fetcher;
   }
 
-  /** Downloads a file. @param {string} name */
-  async load(name) {
+  /** Downloads a file. @param {string} name @param {() => void} arrived called before it is decoded */
+  async load(name, arrived) {
     const row = /** @type {CampusFile} */ (this.index.files.get(name));
     const content = await this.fetcher.whole(this.urlOf(name), async (body) => {
       demand(body.length === row.bytes && checksum(body) === row.crc32, "another checksum");
+      arrived();
       if (row.size === undefined) return partsOf(body, this.index.materials.length);
       const blob = new Blob([body], { type: "image/jpeg" });
       const bitmap = await createImageBitmap(blob, { colorSpaceConversion: "none" });
@@ -182,10 +185,12 @@ export class CampusFiles {
     const shown = this.#shown.get(name), blob = this.#kept.get(name);
     if (shown === undefined && blob) {
       this.#shown.set(name, null);
+      if (this.#decoding.has(name)) return null;
+      this.#decoding.add(name);
       createImageBitmap(/** @type {Blob} */ (blob), { colorSpaceConversion: "none" }).then((bitmap) => {
         if (this.#shown.has(name)) this.#upload(name, bitmap);
         else bitmap.close();
-      }, () => {});
+      }, () => {}).finally(() => this.#decoding.delete(name));
     }
     return /** @type {Image | null | undefined} */ (shown) ?? null;
   }

@@ -19,8 +19,9 @@
  * @property {number} octree the place of its octree texture in the index, or -1
  * @property {number} light the lightmap of its cell in the index, or -1
  * @property {Float32Array | null} spots u, v of each vertex in the lightmap, from the top left
- * @property {number} relief the place of the normal map of its object in the index, or -1
+ * @property {number} relief the place of the normal map of its object or its material in the index, or -1
  * @property {Float32Array[] | null} frames of the vertices in the normal map, as `Reliefs` checks them
+ * @property {string} extras those of its material as JSON, without the mesh
  * @property {number[]} low corner of their box
  * @property {number[]} high
  */
@@ -173,7 +174,8 @@ export async function readGlb(buffer, textures, decoder) {
   for (const node of tree.nodes ?? []) {
     for (const { attributes, indices, material } of tree.meshes[node.mesh].primitives) {
       const look = tree.materials[material], base = look.pbrMetallicRoughness ?? {};
-      const { texture = -1, mesh = -1, octree = -1, light = -1, normal = -1, wrapS, wrapT } = look.extras ?? {};
+      const { texture = -1, mesh = -1, octree = -1, light = -1, normal = -1, normalCoords = 1, wrapS, wrapT } =
+        look.extras ?? {};
       const textured = texture >= 0 && attributes.TEXCOORD_0 !== undefined;
       const painted = attributes.COLOR_0 !== undefined;
       const positions = /** @type {Float32Array} */ (arrays.vertices(attributes.POSITION));
@@ -181,8 +183,9 @@ export async function readGlb(buffer, textures, decoder) {
       const uvs = textured ? /** @type {Float32Array} */ (arrays.vertices(attributes.TEXCOORD_0)) : null;
       const colors = painted ? /** @type {Uint16Array} */ (arrays.vertices(attributes.COLOR_0)) : null;
       const spots = light < 0 ? null : /** @type {Float32Array} */ (arrays.vertices(attributes.TEXCOORD_1));
-      const frames = normal < 0 ? null : ["TEXCOORD_1", "NORMAL", "TANGENT"].map((name) =>
-        /** @type {Float32Array} */ (arrays.vertices(attributes[name])));
+      const frames = normal < 0 ? null : ["TEXCOORD_" + normalCoords, "NORMAL", "TANGENT"]
+        .filter((name) => name in attributes)
+        .map((name) => /** @type {Float32Array} */ (arrays.vertices(attributes[name])));
       if (![texture, light].every((number) => Number.isInteger(number) && number < textures)) {
         throw new Error("has a texture that is not in the index");
       }
@@ -213,6 +216,7 @@ export async function readGlb(buffer, textures, decoder) {
         octree,
         light,
         relief: normal,
+        extras: JSON.stringify({ ...look.extras, mesh: 0 }),
         low,
         high,
       });

@@ -34,6 +34,8 @@ import { levelSizes } from "../../client/src/levels.js";
  * @property {Preview[]} [previews]
  * @property {number[]} color
  * @property {string} [relief]
+ * @property {boolean} [normals]
+ * @property {number} [light]
  *
  * @typedef {object} CellRow
  * @property {string} name
@@ -61,6 +63,7 @@ import { levelSizes } from "../../client/src/levels.js";
  * @property {CellRow[]} cells
  * @property {{cell: number, box: number[], errors: number[], files: string[], bytes: number[]}[]} [meshes]
  * @property {import("../octree/statues.js").OctreeRow[]} [octrees]
+ * @property {string} [sets] the document of interlaced images
  *
  * @typedef {object} Leaf
  * @property {number[][]} points
@@ -95,6 +98,10 @@ export class Site {
   constructor(index, address) {
     if (index.schema !== SCHEMA) {
       throw new Error(`the index has schema ${index.schema}, and this page reads ${SCHEMA}`);
+    }
+    for (const { differences, previews = [] } of index.textures) {
+      // The tables of levels would not end.
+      if (!previews.every(({ level }) => level in differences)) throw new Error("a preview of no level");
     }
     this.index = index;
     this.address = address;

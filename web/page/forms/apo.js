@@ -10,7 +10,7 @@ import { find, inBytes } from "../ui/elements.js";
 import { showNotice } from "../ui/errors.js";
 import { indexOf, runForm } from "./form.js";
 import { meshOf, OctreeDrawing } from "./octree-drawing.js";
-import { Orbit } from "./orbit.js";
+import { ANGLE, Orbit } from "./orbit.js";
 
 /** What the page needs of `apo.json`, checked. @param {any} index */
 function checkedIndex(index) {
@@ -71,6 +71,7 @@ runForm(async (gl, config, fetcher, fail) => {
       camera: orbit.camera,
     }),
     address: () => `#${[orbit.azimuth, orbit.elevation, orbit.distance].map((part) => Number(part.toFixed(3))).join()}`,
+    look: () => ({ eye: orbit.camera.eye, direction: orbit.camera.ahead, angle: ANGLE }),
     place: orbit.place.bind(orbit),
   };
 });

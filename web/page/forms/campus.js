@@ -10,7 +10,7 @@ import { CampusIndex, LEAST } from "../campus/index.js";
 import { Labels } from "../campus/labels.js";
 import { Records } from "../campus/records.js";
 import { cameraOf } from "../gl/camera.js";
-import { frustumOf, meetsBox } from "../space/frustum.js";
+import { directionOf, frustumOf, meetsBox } from "../space/frustum.js";
 import { attachControls } from "../ui/controls.js";
 import { find, inBytes, make } from "../ui/elements.js";
 import { showNotice } from "../ui/errors.js";
@@ -71,15 +71,17 @@ runForm(async (gl, config, fetcher, fail) => {
   /** One of the threads. @param {string} first @param {string[]} thread */
   const run = async (first, thread) => {
     for (let file = /** @type {string | null} */ (first); file; file = client.after(thread)) {
-      try {
-        await files.load(file);
-        client.loaded.add(file);
-      } catch (fault) {
-        // Coarse detail of everything stays; what was asked for is not asked for again.
-        if (!client.begun) throw fault;
-        showNotice(document, /** @type {Error} */ (fault).message);
-        client.failed.add(file);
-      }
+      const name = file;
+      // The next file is requested while this one is decoded.
+      await new Promise((resolve) => {
+        files.load(name, () => resolve(null)).then(() => client.loaded.add(name), (fault) => {
+          // Coarse detail of everything stays; what was asked for is not asked for again.
+          if (!client.begun) return fail(fault);
+          showNotice(document, fault.message);
+          client.failed.add(name);
+          resolve(null);
+        });
+      });
     }
   };
 
@@ -162,6 +164,7 @@ runForm(async (gl, config, fetcher, fail) => {
       pose: walker.pose,
     }),
     address: () => fragmentOf(walker.pose),
+    look: () => ({ eye: walker.pose.eye, direction: directionOf(walker.pose.yaw, walker.pose.pitch), angle: ANGLE }),
     place: (/** @type {number[]} */ eye, /** @type {number} */ yaw, pitch = 0) => walker.place({ eye, yaw, pitch }),
     files,
   };

@@ -4,6 +4,7 @@ import { PageError } from "../net/errors.js";
 import { clock, Fetcher } from "../net/fetcher.js";
 import { find } from "../ui/elements.js";
 import { showError, showNotice } from "../ui/errors.js";
+import { Track } from "./track.js";
 
 /** Seconds until a lost context must be back, and that a page shows before it is loaded anew for another loss. */
 const BACK = 15, STEADY = 5;
@@ -17,6 +18,8 @@ const BACK = 15, STEADY = 5;
  * @property {(dt: number) => string} frame draws, and returns the status line
  * @property {() => object} state for tests and users of the console
  * @property {() => string} [address] the fragment that leads back to the present view
+ * @property {() => import("./track.js").Look} [look] of a view that can be recorded: `record()` begins, and
+ *   `recording` is the walk so far, or null
  */
 
 /**
@@ -59,7 +62,15 @@ export async function runForm(create) {
     view = await create(gl, config, fetcher, (fault) => {
       if (!lost) fail(fault);
     });
-    const shown = view;
+    const shown = view, { look } = view;
+    /** @type {Track | null} */
+    let track = null;
+    if (look) {
+      Object.defineProperties(view, {
+        record: { value: () => (track = new Track(canvas, look)) },
+        recording: { get: () => track?.document ?? null },
+      });
+    }
     Object.assign(window, { ptm: view });
     const status = find(document, "#status");
     let before = clock();
@@ -69,6 +80,7 @@ export async function runForm(create) {
       try {
         fit(canvas);
         const line = shown.frame(Math.min(now - before, 0.1));
+        track?.frame();
         if (status.textContent !== line) status.textContent = line;
       } catch (fault) {
         fail(fault);
@@ -79,6 +91,8 @@ export async function runForm(create) {
     };
     requestAnimationFrame(frame);
     document.body.classList.add("begun");
+    // The canvas has the focus from the begin; only visitors with keys need to see it.
+    addEventListener("keydown", () => document.body.classList.add("keys"), { once: true });
   } catch (fault) {
     fail(fault);
   }

@@ -84,6 +84,8 @@ runForm(async (gl, config, fetcher, fail) => {
     state: () => ({
       steps: joining.steps,
       size: joining.size,
+      pixels: panning.pixels,
+      shift: panning.shift,
       complete: joining.steps === joining.most,
       needed,
       pending: fetcher.pending,

@@ -63,20 +63,23 @@ void main() {
   gl_Position = vec4(4 * (gl_VertexID & 1) - 1, 4 * (gl_VertexID >> 1) - 1, 0, 1);
 }`;
 
-/** The step of the paper (Eq. 1). */
+/** The step of the paper (Eq. 1). In two channels the second is alpha. */
 const JOIN = `#version 300 es
 precision highp float;
 precision highp sampler2D;
 uniform sampler2D before, next, pattern;
 uniform vec2 size;
+uniform bool pairs;
 out vec4 texel;
 void main() {
   vec2 place = gl_FragCoord.xy / size;
-  texel = texture(pattern, place * size / 2.0).r == 0.0 ? texture(before, place) : texture(next, place);
+  vec4 added = texture(next, place);
+  if (pairs) added = added.rarr;
+  texel = texture(pattern, place * size / 2.0).r == 0.0 ? texture(before, place) : added;
 }`;
 
 /** Texels that decide between the image so far and the next file; 2 × 2, repeated. */
-const PATTERNS = { columns: [0, 255, 0, 255], rows: [0, 0, 255, 255] };
+const PATTERNS = { columns: [0, 255, 0, 255], rows: [0, 0, 255, 255], first: [255, 255, 255, 255] };
 
 /**
  * An image whose colours alpha does not multiply: in WebKitGTK it always multiplies those of an ImageBitmap.
@@ -90,31 +93,147 @@ async function decoded(blob, alpha) {
   return image;
 }
 
-export class Joining {
-  /** @param {WebGL2RenderingContext} gl @param {SetIndex} index
-   * @param {(file: string) => string} urlOf @param {import("../net/fetcher.js").Fetcher} fetcher */
-  constructor(gl, index, urlOf, fetcher) {
+/**
+ * The bytes of a file, checked. Throws if it is another.
+ * @param {Uint8Array<ArrayBuffer>} body
+ * @param {SetIndex} index
+ * @param {Part} part
+ */
+export function checkedPart(body, { container }, { bytes, crc32 }) {
+  demand(body.length === bytes && checksum(body) === crc32, "another checksum");
+  return new Blob([body], { type: MEDIA[container] });
+}
+
+/**
+ * The image in a file. Rejects if it cannot be decoded, or is of another size.
+ * @param {Blob} blob
+ * @param {SetIndex} index
+ * @param {Part} part
+ */
+export async function imageOf(blob, { components }, { width, height }) {
+  const image = await decoded(blob, components % 2 === 0);
+  demand(image.width === width && image.height === height, "an image of another size");
+  return image;
+}
+
+/** @typedef {Awaited<ReturnType<typeof imageOf>>} Picture */
+
+export class Joiner {
+  /** @param {WebGL2RenderingContext} gl */
+  constructor(gl) {
     this.gl = gl;
-    this.index = index;
-    this.urlOf = urlOf;
-    this.fetcher = fetcher;
     this.use = programOf(gl, "join", [QUAD, JOIN]);
     this.buffer = gl.createFramebuffer();
     this.patterns = Object.fromEntries(Object.entries(PATTERNS).map(([axis, texels]) => {
-      const texture = this.#texture(2, 2, gl.R8, gl.REPEAT);
+      const texture = this.#texture(2, 2, gl.R8);
+      for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, gl.REPEAT);
       gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
       gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, 2, 2, gl.RED, gl.UNSIGNED_BYTE, new Uint8Array(texels));
       return [axis, texture];
     }));
+  }
+
+  /** A texture of four channels with the image of a file, which is closed. @param {Picture} image */
+  upload(image) {
+    const { gl } = this, texture = this.#texture(image.width, image.height, gl.RGBA8);
+    gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, false);
+    gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, gl.RGBA, gl.UNSIGNED_BYTE, image);
+    if ("close" in image) image.close();
+    return texture;
+  }
+
+  /**
+   * The image that a file makes of the one before, which is deleted, as the file is; both are looked up nearest.
+   * @param {Part} part
+   * @param {WebGLTexture | null} before null for the first file
+   * @param {WebGLTexture} next that of the file
+   * @param {number} [channels] of the image: 4, or 1 for grey, 2 for grey and alpha
+   * @param {boolean} [mips] whether it gets mip levels, and is looked up among them
+   */
+  join({ axis, joined: { width, height } }, before, next, channels = 4, mips = false) {
+    const { gl, use: { program, at } } = this;
+    const levels = mips ? 1 + Math.floor(Math.log2(Math.max(width, height))) : 1;
+    const result = this.#texture(width, height, channels === 1 ? gl.R8 : channels === 2 ? gl.RG8 : gl.RGBA8, levels);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.buffer);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, result, 0);
+    gl.viewport(0, 0, width, height);
+    gl.disable(gl.BLEND);
+    gl.useProgram(program);
+    const inputs = { before: before ?? next, next, pattern: this.patterns[axis ?? "first"] };
+    Object.entries(inputs).forEach(([name, texture], unit) => {
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      gl.bindTexture(gl.TEXTURE_2D, texture);
+      // It may have been drawn from with mip levels.
+      if (texture === before) this.#filter(gl.NEAREST, gl.NEAREST);
+      gl.uniform1i(at[name], unit);
+    });
+    gl.activeTexture(gl.TEXTURE0);
+    gl.uniform2f(at.size, width, height);
+    gl.uniform1i(at.pairs, +(channels === 2));
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.deleteTexture(before);
+    gl.deleteTexture(next);
+    if (mips) {
+      gl.bindTexture(gl.TEXTURE_2D, result);
+      gl.generateMipmap(gl.TEXTURE_2D);
+      this.#filter(gl.LINEAR_MIPMAP_LINEAR, gl.LINEAR);
+    }
+    return result;
+  }
+
+  /** Texels of a texture, four bytes each, rows from the top. @param {WebGLTexture | null} texture
+   * @param {number} width @param {number} height */
+  texels(texture, width, height) {
+    const { gl } = this, texels = new Uint8Array(4 * width * height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.buffer);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, texels);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    return texels;
+  }
+
+  /** A texture looked up nearest. @param {number} width @param {number} height @param {number} format
+   * @param {number} [levels] */
+  #texture(width, height, format, levels = 1) {
+    const { gl } = this, texture = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texStorage2D(gl.TEXTURE_2D, levels, format, width, height);
+    this.#filter(gl.NEAREST, gl.NEAREST);
+    for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, gl.CLAMP_TO_EDGE);
+    return texture;
+  }
+
+  /** @param {number} smaller @param {number} larger */
+  #filter(smaller, larger) {
+    this.gl.texParameteri(this.gl.TEXTURE_2D, this.gl.TEXTURE_MIN_FILTER, smaller);
+    this.gl.texParameteri(this.gl.TEXTURE_2D, this.gl.TEXTURE_MAG_FILTER, larger);
+  }
+}
+
+/** Steps of an image that a graphics card can hold. @param {WebGL2RenderingContext} gl @param {SetIndex} index */
+export function mostSteps(gl, { files }) {
+  const widest = gl.getParameter(gl.MAX_TEXTURE_SIZE);
+  const fitting = files.findIndex(({ joined: { width, height } }) =>
+    Math.max(width, height) > widest || 4 * width * height > LARGEST);
+  return fitting < 0 ? files.length : fitting;
+}
+
+export class Joining {
+  /** @param {WebGL2RenderingContext} gl @param {SetIndex} index
+   * @param {(file: string) => string} urlOf @param {import("../net/fetcher.js").Fetcher} fetcher */
+  constructor(gl, index, urlOf, fetcher) {
+    this.index = index;
+    this.urlOf = urlOf;
+    this.fetcher = fetcher;
+    this.joiner = new Joiner(gl);
     /** Steps that are joined, and the image that they make. @type {WebGLTexture | null} */
     this.texture = null;
     this.steps = 0;
     this.running = false;
-    const widest = gl.getParameter(gl.MAX_TEXTURE_SIZE);
-    const fitting = index.files.findIndex(({ joined: { width, height } }) =>
-      Math.max(width, height) > widest || 4 * width * height > LARGEST);
     /** Steps that the graphics card can hold. */
-    this.most = fitting < 0 ? index.files.length : fitting;
+    this.most = mostSteps(gl, index);
     if (!this.most) throw new PageError("PTM-V101", "The image is larger than this graphics card's textures.");
   }
 
@@ -131,69 +250,17 @@ export class Joining {
   }
 
   async #next() {
-    const { gl } = this, part = this.index.files[this.steps];
-    const image = await this.fetcher.whole(this.urlOf(part.name), async (body) => {
-      demand(body.length === part.bytes && checksum(body) === part.crc32, "another checksum");
-      const blob = new Blob([body], { type: MEDIA[this.index.container] });
-      const image = await decoded(blob, this.index.components % 2 === 0);
-      demand(image.width === part.width && image.height === part.height, "an image of another size");
-      return image;
-    });
-    const next = this.#texture(part.width, part.height, gl.RGBA8, gl.CLAMP_TO_EDGE);
-    gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, false);
-    gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, gl.RGBA, gl.UNSIGNED_BYTE, image);
-    if ("close" in image) image.close();
-    if (part.axis) {
-      const joined = this.#joined(part, next);
-      gl.deleteTexture(this.texture);
-      gl.deleteTexture(next);
-      this.texture = joined;
-    } else {
-      this.texture = next;
-    }
+    const { index, joiner } = this, part = index.files[this.steps];
+    const image = await this.fetcher.whole(this.urlOf(part.name), (body) =>
+      imageOf(checkedPart(body, index, part), index, part));
+    const next = joiner.upload(image);
+    this.texture = part.axis ? joiner.join(part, this.texture, next) : next;
     this.steps++;
-  }
-
-  /** @param {Part} part @param {WebGLTexture} next */
-  #joined({ axis, joined: { width, height } }, next) {
-    const { gl, use: { program, at } } = this;
-    const result = this.#texture(width, height, gl.RGBA8, gl.CLAMP_TO_EDGE);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.buffer);
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, result, 0);
-    gl.viewport(0, 0, width, height);
-    gl.disable(gl.BLEND);
-    gl.useProgram(program);
-    const inputs = { before: this.texture, next, pattern: this.patterns[/** @type {string} */ (axis)] };
-    Object.entries(inputs).forEach(([name, texture], unit) => {
-      gl.activeTexture(gl.TEXTURE0 + unit);
-      gl.bindTexture(gl.TEXTURE_2D, texture);
-      gl.uniform1i(at[name], unit);
-    });
-    gl.uniform2f(at.size, width, height);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    return result;
   }
 
   /** The texels of the image so far, four bytes each, rows from the top. */
   texels() {
-    const { gl } = this, { width, height } = this.size, texels = new Uint8Array(4 * width * height);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.buffer);
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this.texture, 0);
-    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, texels);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    return texels;
-  }
-
-  /** A texture looked up nearest. @param {number} width @param {number} height @param {number} format
-   * @param {number} wrap */
-  #texture(width, height, format, wrap) {
-    const { gl } = this, texture = gl.createTexture();
-    gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, format, width, height);
-    for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
-    for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, wrap);
-    return texture;
+    const { width, height } = this.size;
+    return this.joiner.texels(this.texture, width, height);
   }
 }

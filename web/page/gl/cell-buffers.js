@@ -30,8 +30,8 @@ const AT_ONCE = 1 << 14;
 const MOST = 3 << 11;
 
 /** What shapes of one look have in common. @param {Shape} shape */
-export function lookOf({ texture, clampU, clampV, factor, blends, cutoff, twoSided, octree, light, relief }) {
-  return [texture, clampU, clampV, factor, blends, cutoff, twoSided, octree, light, relief].join();
+export function lookOf({ texture, factor, blends, cutoff, twoSided, extras }) {
+  return [texture, factor, blends, cutoff, twoSided, extras].join();
 }
 
 /**

@@ -29,15 +29,18 @@ export class Renderer {
   /**
    * @param {WebGL2RenderingContext} gl
    * @param {Textures} memory
-   * @param {number[][]} means the mean colour of each texture, 0 to 255
+   * @param {import("../data/site.js").TextureRow[]} rows of the textures
    */
-  constructor(gl, memory, means) {
+  constructor(gl, memory, rows) {
     this.gl = gl;
     this.memory = memory;
-    this.means = means.map((color) => color.map((part) => part / 255));
+    this.means = rows.map(({ color }) => color.map((part) => part / 255));
     this.surface = programOf(gl, "surface");
-    /** Draws objects with relief, if the site has any.
-     * @type {import("../octree/statues.js").Statues | import("../relief/reliefs.js").Reliefs | null} */
+    /** Whether the light is baked: in lightmaps or at vertices. */
+    this.baked = rows.some((row) => "light" in row);
+    /** Draws what has relief, if the site has any.
+     * @type {Pick<import("../octree/statues.js").Statues, "delete" | "has" | "lacks" | "levels" | "advance">
+     *   & Pick<import("../relief/reliefs.js").Reliefs, "draw"> & {bytes?: number} | null} */
     this.statues = null;
   }
 
@@ -160,15 +163,16 @@ export class Renderer {
     const storage = texture < 0 ? null : this.memory.of(texture);
     gl.uniform1i(at.channels, storage?.channels ?? 0);
     if (texture >= 0) gl.uniform3fv(at.mean, this.means[texture]);
-    let fading = false;
+    let fading = false, lit = +this.baked;
     if (light >= 0) {
       const map = this.memory.of(light);
       gl.activeTexture(gl.TEXTURE1);
       fading = map?.bind(true, true, now) ?? false;
       gl.activeTexture(gl.TEXTURE0);
       gl.uniform1i(at.lightmap, 1);
-      gl.uniform1f(at.lit, map ? -1 : Math.max(this.means[light][0], 1e-3));
-    } else gl.uniform1f(at.lit, 0);
+      lit = map ? -1 : Math.max(this.means[light][0], 1e-3);
+    }
+    gl.uniform1f(at.lit, lit);
     return storage?.bind(clampU, clampV, now) || fading;
   }
 }

@@ -38,7 +38,7 @@ vec4 texel() {
 
 /**
  * Surfaces with a texture are unlit, as in VRML browsers; the rest glow a little and are lit from the eye. A
- * lightmap multiplies this, and surfaces without texture then glow more. Colours multiply as they are encoded.
+ * lightmap multiplies this, and surfaces without texture then glow more, also those with light at vertices. Colours multiply as they are encoded.
  */
 const SURFACE = `#version 300 es
 precision highp float;
@@ -48,7 +48,7 @@ in vec2 spot;
 in vec3 painted;
 uniform float cutoff;
 uniform sampler2D lightmap;
-uniform float lit; // linear light, until the lightmap arrives; -1 with it, 0 without one
+uniform float lit; // linear light, 1 at vertices, and until the lightmap arrives; -1 with it, 0 without light
 out vec4 shown;
 ${TEXEL}
 void main() {

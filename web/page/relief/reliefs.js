@@ -1,17 +1,23 @@
-// Objects with normal maps, in the rooms of a walk: a script of its own, which sites with such objects load.
-// The maps are textures, so the policies fetch them and texture memory holds them; the item buffer does not
-// show them, and their part of the view follows from their boxes. They are lit as octree textures are.
+// Objects and materials with normal maps, in the rooms of a walk: a script of its own, which sites with such
+// maps load. The maps are textures, so the policies fetch them and texture memory holds them; the item buffer
+// does not show them. The part of the view of an object's map follows from its box, that of a material's from
+// the texture beside it. Objects are lit as octree textures are; a material's map changes its colours by the
+// share by which the light on its normals differs from that on the face.
 
 import { encoded, lookOf } from "../gl/cell-buffers.js";
 import { aim, programOf } from "../gl/program.js";
-import { corners, TEXEL } from "../gl/shaders.js";
+import { corners, SOURCES, TEXEL } from "../gl/shaders.js";
 import { PageError } from "../net/errors.js";
 import { LIT } from "../octree/lamp.js";
 import { distance } from "../space/frustum.js";
+import { weigh } from "./weight.js";
 
 /** What a shape has for each vertex: u, v in the normal map, from the top left; a normal; a tangent with the sign
  * of the bitangent. */
 const SIZES = [2, 3, 4];
+const CLAMP = 33071;
+/** How an object's map is used. */
+const WHOLE = { normalWrapS: CLAMP, normalWrapT: CLAMP };
 /** Nearest distance of the eye that counts, m. */
 const NEAREST = 0.1;
 
@@ -42,6 +48,33 @@ void main() {
   shown.a = 1.0;
 }`;
 
+/** The surface has a uniform of that name. */
+const LAMPLIGHT = LIT.replace("lit", "lamplight");
+/** The axes of the map follow from the derivatives, exactly: positions are linear in it. Its y is up, v is down. */
+const BUMPS = [corners(`
+layout(location = 3) in vec2 place2;
+layout(location = 4) in vec2 place3;
+out vec2 spot;
+out vec2 at;`, "spot = place2; at = place3;"), SOURCES.surface[1].replace("out vec4 shown;", `out vec4 shown;
+uniform mat3 turn;
+uniform sampler2D relief;
+uniform float scale;
+in vec2 at;
+${LAMPLIGHT}`).replace(/shown ?= ?vec4/, `
+  vec3 a = dFdx(seen), b = dFdy(seen);
+  vec2 p = dFdx(at), q = dFdy(at);
+  float side = sign(p.x * q.y - p.y * q.x);
+  vec3 up = normalize(cross(a, b)), right = (a * q.y - b * p.y) * side, over = (a * q.x - b * p.x) * side;
+  if (dot(right, right) > 0.0) {
+    vec3 tilt = texture(relief, at).rgb * 2.0 - 1.0;
+    right = normalize(right);
+    vec3 across = cross(up, right);
+    if (dot(across, over) < 0.0) across = -across;
+    vec3 normal = scale * (right * tilt.x + across * tilt.y) + up * tilt.z;
+    light *= lamplight(normalize(normal) * turn) / lamplight(up * turn);
+  }
+  $&`)];
+
 /** @typedef {import("../gl/cell-buffers.js").Batch} Batch */
 /** @typedef {import("../gl/cell-buffers.js").CellBuffers} CellBuffers */
 /** @typedef {import("../data/glb.js").Shape} Shape */
@@ -52,6 +85,8 @@ export class Reliefs {
   #parts = new Map();
   /** Texels of the finest level to a metre, by shape. @type {WeakMap<Shape, number>} */
   #density = new WeakMap();
+  /** The same of the textures beside them. @type {WeakMap<Shape, number>} */
+  #own = new WeakMap();
   /** Shapes that do not fit the index. @type {WeakSet<Shape>} */
   #wrong = new WeakSet();
   #looked = false;
@@ -66,6 +101,8 @@ export class Reliefs {
     this.report = report;
     this.walk = walk;
     this.program = programOf(gl, "relief", [VERTEX, FRAGMENT]);
+    this.bumps = programOf(gl, "bumps", BUMPS);
+    weigh(walk.catalogue, walk.index.textures);
   }
 
   delete() {
@@ -83,7 +120,9 @@ export class Reliefs {
     if (relief < 0 || this.#wrong.has(shape)) return false;
     const count = positions.length / 3;
     const aligned = frames?.every((rows, k) => rows.length === SIZES[k] * count);
-    if (aligned && this.walk.index.textures[relief]?.relief !== undefined) return true;
+    const needed = isBump(shape) ? 1 : SIZES.length;
+    const row = this.walk.index.textures[relief];
+    if (aligned && frames?.length === needed && row && (needed === 1 || row.relief !== undefined)) return true;
     this.#wrong.add(shape);
     this.report(new PageError("PTM-V105", `The relief of ${shape.name || "an object"} does not fit the index.`));
     return false;
@@ -96,12 +135,13 @@ export class Reliefs {
 
   /** Levels of each normal map. */
   get levels() {
-    return this.walk.index.textures.flatMap(({ relief }, t) => (relief === undefined ? [] : [this.walk.memory.held[t]]));
+    const { index: { textures }, memory: { held } } = this.walk;
+    return textures.flatMap(({ relief, normals }, t) => (normals || relief !== undefined ? [held[t]] : []));
   }
 
   /**
-   * Adds the share of the view of each normal map to those of the item buffer, at the level of its nearest
-   * point.
+   * Adds the share of the view of each normal map to those of the item buffer: with a texture beside it that of
+   * the texture at levels of as many texels to a metre, else that of its box at the level of its nearest point.
    * @param {import("../gl/renderer.js").Drawn[]} drawn
    * @param {ArrayLike<number>} eye
    * @param {number} lines of a screen that sees an angle whose half has the tangent 1
@@ -112,10 +152,24 @@ export class Reliefs {
     if (!present) return;
     const screen = gl.drawingBufferWidth * gl.drawingBufferHeight;
     let news = false;
+    /** Of each normal map and each texture beside it. @type {Map<string, Float64Array>} */
+    const beside = new Map();
     for (const { batches } of drawn) {
       for (const { look, low, high } of batches) {
-        const { relief, blends } = look;
+        const { relief, blends, texture } = look;
         if (blends || !this.#isSound(look)) continue;
+        if (isBump(look) && texture >= 0) {
+          const finer = Math.log2(this.#densityOf(look) / this.#densityOf(look, texture));
+          const pair = `${relief} ${texture}`, row = beside.get(pair) ?? new Float64Array(K);
+          beside.set(pair, row);
+          for (let k = 1; k <= levels[relief]; k++) {
+            // Between two levels of the texture there are pixels that want the finer one.
+            const column = Math.max(1, levels[texture] - levels[relief] + k + finer), low = Math.floor(column);
+            const [one, other] = [low, low + 1].map((n) => (n < K ? present[texture * K + n] : 0));
+            row[k] = Math.max(row[k], one + (column - low) * (other - one));
+          }
+          continue;
+        }
         // Pixels of a metre.
         const metre = lines / 2 / Math.max(NEAREST, distance(eye, low, high));
         const [x, y, z] = low.map((from, k) => high[k] - from);
@@ -127,6 +181,17 @@ export class Reliefs {
           news = true;
         }
       }
+    }
+    /** @type {Map<number, number>} */
+    const sums = new Map();
+    for (const [pair, row] of beside) {
+      const first = parseInt(pair) * K;
+      row.forEach((share, k) => sums.set(first + k, (sums.get(first + k) ?? 0) + share));
+    }
+    for (const [at, share] of sums) {
+      if (present[at] >= share) continue;
+      present[at] = share;
+      news = true;
     }
     if (news) client.sees(present, client.hidden);
     this.#looked = true;
@@ -140,20 +205,22 @@ export class Reliefs {
     for (const shape of this.#parts.keys()) if (!here.has(shape)) this.#drop(shape);
   }
 
-  /** @param {Shape} shape */
-  #densityOf(shape) {
-    const known = this.#density.get(shape);
+  /** @param {Shape} shape @param {number} [texture] its own in place of the normal map */
+  #densityOf(shape, texture) {
+    const densities = texture === undefined ? this.#density : this.#own;
+    const known = densities.get(shape);
     if (known) return known;
-    const { positions, indices, relief, frames } = shape, [places] = /** @type {Float32Array[]} */ (frames);
-    const { width, height } = this.walk.index.textures[relief];
+    const { positions, indices, relief, frames, uvs } = shape;
+    const places = /** @type {Float32Array} */ (texture === undefined ? frames?.[0] : uvs);
+    const { width, height } = this.walk.index.textures[texture ?? relief];
     let area = 0, texels = 0;
     for (let k = 0; k < indices.length; k += 3) {
       const [a, b, c] = indices.subarray(k, k + 3);
       area += areaOf(positions, 3, a, b, c);
       texels += areaOf(places, 2, a, b, c);
     }
-    const density = area > 0 ? Math.sqrt(texels * width * height / area) : 1;
-    this.#density.set(shape, density);
+    const density = area * texels > 0 ? Math.sqrt(texels * width * height / area) : 1;
+    densities.set(shape, density);
     return density;
   }
 
@@ -166,17 +233,25 @@ export class Reliefs {
    * @param {number} now s
    */
   draw(camera, batches, paint, now) {
-    const { gl, program, walk } = this;
-    aim(gl, program, camera);
-    gl.uniform1i(program.at.relief, 1);
+    const { gl, walk } = this;
+    for (const program of [this.program, this.bumps]) {
+      aim(gl, program, camera);
+      gl.uniform1i(program.at.relief, 2);
+    }
     let fading = false;
     /** @type {Set<Shape>} */
     const done = new Set();
     for (const { buffers, batch } of batches) {
       if (done.has(batch.look)) continue;
       done.add(batch.look);
-      gl.activeTexture(gl.TEXTURE1);
-      fading = walk.memory.of(batch.look.relief)?.bind(true, true, now) || fading;
+      const { relief, extras } = batch.look, bumps = isBump(batch.look);
+      const { normalScale: scale = 1, normalWrapS, normalWrapT } = bumps ? JSON.parse(extras) : WHOLE;
+      const clampU = normalWrapS === CLAMP, clampV = normalWrapT === CLAMP;
+      const program = bumps ? this.bumps : this.program;
+      gl.useProgram(program.program);
+      gl.uniform1f(program.at.scale, scale);
+      gl.activeTexture(gl.TEXTURE2);
+      fading = walk.memory.of(relief)?.bind(clampU, clampV, now) || fading;
       gl.activeTexture(gl.TEXTURE0);
       fading = paint(program.at, batch) || fading;
       const alike = lookOf(batch.look);
@@ -194,15 +269,17 @@ export class Reliefs {
   #part(shape) {
     const known = this.#parts.get(shape);
     if (known) return known;
-    const { gl } = this, { positions, uvs, colors, indices, frames } = shape;
+    const { gl } = this, { positions, uvs, colors, indices, frames, spots } = shape;
     const array = gl.createVertexArray(), count = indices.length;
     gl.bindVertexArray(array);
     /** @type {WebGLBuffer[]} */
     const buffers = [];
-    const [places, normals, tangents] = /** @type {Float32Array[]} */ (frames);
+    const [places, normals, tangents = null] = /** @type {Float32Array[]} */ (frames);
     const painted = colors && Float32Array.from(colors, (light) => encoded(light / 65535));
     /** @type {[number, Float32Array | null, number][]} */
-    const rows = [[0, positions, 3], [1, uvs, 2], [2, painted, 4], [3, places, 2], [4, normals, 3], [5, tangents, 4]];
+    const rows = [[0, positions, 3], [1, uvs, 2], [2, painted, 4]];
+    if (isBump(shape)) rows.push([3, spots, 2], [4, places, 2]);
+    else rows.push([3, places, 2], [4, normals, 3], [5, tangents, 4]);
     for (const [location, data, size] of rows) {
       if (!data) continue;
       buffers.push(this.#buffer(gl.ARRAY_BUFFER, data));
@@ -234,6 +311,9 @@ export class Reliefs {
     this.#parts.delete(shape);
   }
 }
+
+/** Whether the normal map of a shape is that of its material. @param {Shape} shape */
+const isBump = ({ extras }) => extras.includes("normalCoords");
 
 /**
  * Twice the area of a triangle.

@@ -48,9 +48,9 @@ import { attachLoading } from "./loading.js";
  * @property {boolean} [dataSaver]
  */
 /**
- * The plan for the map; an outline is of x and z.
+ * The plan for the map; without a record a cell has no leaves.
  * @typedef {object} Plan
- * @property {{cell: number, low: number[], high: number[], outline?: number[][]}[]} cells
+ * @property {{cell: number, low: number[], high: number[], leaves?: {points: number[][]}[]}[]} cells
  * @property {number} here
  * @property {number[]} visible
  */

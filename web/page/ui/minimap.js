@@ -1,5 +1,6 @@
 // The map: the cells of the storey, those visible from here, and the visitor.
 
+import { footprintOf } from "../space/footprint.js";
 import { make } from "./elements.js";
 
 /** @typedef {import("./all.js").App} App */
@@ -44,9 +45,10 @@ export function attachMinimap(root, app) {
     paint.scale(scale, scale);
     paint.lineWidth = 1 / scale;
     paint.strokeStyle = WALLS;
-    for (const { cell, low, high, outline } of cells) {
+    for (const { cell, low, high, leaves } of cells) {
       if (eye[1] < low[1] || eye[1] > high[1]) continue;
       const [x, , z] = low, [u, , w] = high;
+      const outline = leaves && footprintOf(leaves.flatMap(({ points }) => points));
       paint.beginPath();
       for (const [a, b] of outline ?? [[x, z], [u, z], [u, w], [x, w]]) paint.lineTo(a, b);
       paint.closePath();

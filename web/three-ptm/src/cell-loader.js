@@ -1,16 +1,17 @@
 // Cells from their GLBs, as docs/formats/gltf.md describes them: in unlit materials, with the textures
-// and lightmaps of this adapter. Only objects with normal maps are lit by a lamp.
+// and lightmaps of this adapter. Only what has a normal map is lit by a lamp.
 
 import { ClampToEdgeWrapping, Mesh, MeshBasicMaterial, RepeatWrapping, Texture } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 
 import { loadViewDecoder } from "ptm-decoder";
-import { relieve } from "./relief.js";
+import { bump, relieve } from "./relief.js";
 
 /** @typedef {import("three").Group} Group */
 /**
- * Returns the texture with a number in the index, with these wrap modes.
- * @typedef {(texture: number, wrapS: number, wrapT: number) => Texture} TextureOf
+ * Returns the texture with a number in the index, with these wrap modes; of a material's normal map, `beside` is
+ * the texture that the material shows, or -1.
+ * @typedef {(texture: number, wrapS: number, wrapT: number, beside?: number) => Texture} TextureOf
  */
 
 const CLAMP = 33071;
@@ -81,7 +82,11 @@ export class CellLoader {
     const depthWrite = !transparent;
     const drawn = { opacity, transparent, alphaTest, vertexColors, side, depthWrite };
     const look = Object.assign(new MeshBasicMaterial({ color, map, aoMap, ...drawn }), { userData: { mesh } });
-    if (normal !== undefined) {
+    const { normalCoords, normalScale = 1, normalWrapS, normalWrapT } = userData;
+    if (normal !== undefined && normalCoords !== undefined) {
+      const relief = this.#textureOf(normal, wrap(normalWrapS), wrap(normalWrapT), texture ?? -1);
+      bump(look, relief, normalScale, normalCoords);
+    } else if (normal !== undefined) {
       relieve(look, this.#textureOf(normal, ClampToEdgeWrapping, ClampToEdgeWrapping));
     }
     return look;

@@ -20,7 +20,8 @@ import { RangeFile } from "./range-file.js";
  *   description: string}[]} viewpoints
  * @property {{file: string, width: number, height: number, ends: number[], color?: number[],
  *   components?: number, offsets?: number[], previews?: {file: string, level: number, width: number,
- *   height: number, bytes: number, exact?: boolean}[], light?: number, relief?: string}[]} textures
+ *   height: number, bytes: number, exact?: boolean}[], light?: number, relief?: string,
+ *   normals?: boolean}[]} textures
  * @property {{name: string, box: number[], record?: string, geometry?: string}[]} cells
  * @property {{cell: number, files: string[]}[]} [meshes] objects with levels of detail
  */
@@ -52,6 +53,8 @@ import { RangeFile } from "./range-file.js";
  * @property {Map<number, Promise<void>>} meshes objects as modelled, by their place in the index
  */
 
+/** Weight of normal maps beside textures, and share of the view of a surface without texture that has one. */
+const NORMALS = 0.25, PLAIN_SHARE = 0.01;
 /** Texels of a side to which all textures are refined before any is refined further. */
 const FIRST_LOOK = 64;
 
@@ -76,6 +79,8 @@ export class Walk {
   /** The file of each texture and its copies, by wraps.
    * @type {Map<number, {file: RangeFile, copies: Map<string, PtmTexture>}>} */
   #textures = new Map();
+  /** The textures beside each normal map of materials; -1 for none. @type {Map<number, Set<number>>} */
+  #beside = new Map();
   #entered = new AbortController();
   #locating = false;
 
@@ -175,16 +180,31 @@ export class Walk {
       const records = (await Promise.all([own, ...others])).filter((record) => record !== undefined);
       if (signal.aborted) return false;
       const shares = sharesOf(records), cells = new Set(records.flatMap(byCoverage));
-      this.#free(cells, shares);
+      this.#free(cells, this.#withNormals(shares));
       await this.#all([...cells].map((cell) => () => this.#load(cell)), signal);
-      if (!signal.aborted) await this.#refine(shares, signal);
+      if (!signal.aborted) await this.#refine(this.#withNormals(shares), signal);
       const textures = this.#textures.size;
       await this.#all([...cells].flatMap((cell) => this.#coarse(cell)), signal);
-      if (!signal.aborted && this.#textures.size > textures) await this.#refine(shares, signal);
+      if (!signal.aborted && this.#textures.size > textures) await this.#refine(this.#withNormals(shares), signal);
     } catch (error) {
       this.#report(error);
     }
     return !signal.aborted;
+  }
+
+  /**
+   * The shares with those of normal maps, which records do not list: a part of that of the texture beside them.
+   * @param {Map<number, number>} shares
+   */
+  #withNormals(shares) {
+    const all = new Map(shares);
+    for (const [number, beside] of this.#beside) {
+      for (const texture of beside) {
+        const share = texture < 0 ? PLAIN_SHARE : shares.get(texture);
+        if (share !== undefined) all.set(number, Math.max(all.get(number) ?? 0, NORMALS * share));
+      }
+    }
+    return all;
   }
 
   /** Frees everything; the walk cannot be used any more. */
@@ -291,8 +311,10 @@ export class Walk {
    * @param {number} number
    * @param {number} wrapS
    * @param {number} wrapT
+   * @param {number} [beside] the texture beside a normal map
    */
-  #texture(number, wrapS, wrapT) {
+  #texture(number, wrapS, wrapT, beside) {
+    if (beside !== undefined) this.#beside.set(number, (this.#beside.get(number) ?? new Set()).add(beside));
     const row = this.index.textures[number], { file, ends, color, components, offsets } = row;
     const light = row.light !== undefined;
     const slot = this.#textures.get(number) ?? {
@@ -303,7 +325,7 @@ export class Walk {
     const workers = this.#options.workers ?? this.#ownWorkers;
     const previews = row.previews?.map((one) => ({ ...one, file: new URL(one.file, this.#url) }));
     const sizes = levelSizes(row);
-    const linear = light || row.relief !== undefined, channel = +light;
+    const linear = light || row.relief !== undefined || beside !== undefined, channel = +light;
     const options = { workers, ends, color, components, offsets, previews, sizes, wrapS, wrapT, linear, channel };
     const texture =
       slot.copies.get(`${wrapS} ${wrapT}`) ?? new PtmTexture(this.#renderer, slot.file, options);

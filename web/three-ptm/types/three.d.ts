@@ -68,6 +68,10 @@ export class Material {
     mesh?: number;
     light?: number;
     normal?: number;
+    normalCoords?: number;
+    normalScale?: number;
+    normalWrapS?: number;
+    normalWrapT?: number;
   };
   dispose(): void;
 }
@@ -83,6 +87,7 @@ export class MeshBasicMaterial extends Material {
     map?: Texture | null;
     aoMap?: Texture | null;
   });
+  customProgramCacheKey: () => string;
   onBeforeCompile: (shader: {
     uniforms: Record<string, { value: unknown }>;
     vertexShader: string;

@@ -1,0 +1,246 @@
+"""The direct light of lamps: surfaces that glow, and lamps without a surface.
+
+Glowing surfaces are divided into patches. The light of a patch at a point is that of a small disc,
+E = L A cos cos' / (r² + A/π), which is finite everywhere and exact far away and on the axis of a
+disc. The light that all lamps would send without anything between is summed, and shadow rays go to
+lamps that are chosen in proportion to their parts of it (systematic sampling): the share that is
+free counts for all of them. So light is without grain where no lamp is half hidden.
+
+Nits, candela and lux of a model seldom fit each other or the pictures. So each kind is measured by
+its own light: 1 is the median on the surfaces that it reaches at all.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Bools, Floats, Ints, areas
+from ptmtools.jit import kernel
+from ptmtools.light.occlusion import RAYS, Surroundings, normals, points_on, spread_over
+from ptmtools.scene.lights import KINDS, Lights
+from ptmtools.scene.model import Scene
+
+#: Metres of the side of a patch, and most patches of a scene, which are larger where necessary.
+_PATCH, _MOST = 0.2, 4096
+#: A point of a lamp is no nearer than this, metres: within a bulb light would be infinite.
+_NEAREST = 0.1
+#: Least luminance of a material that is a lamp; less is a shine to bring out colours. If more than
+#: this share of all surfaces glows, the light of the building is part of its colours.
+LEAST, _SHARE = 0.1, 0.25
+#: Lamps that together have less light than this share of the usual one are left out of a cell.
+_FEW = 0.03
+#: Kinds of a row of `Lamps`: those of `KINDS`, then patches with one and with two sides.
+_POINT, _SPOT, _SUN = range(len(KINDS))
+_PATCH_KIND, _BOTH = len(KINDS), len(KINDS) + 1
+
+
+@dataclass(frozen=True)
+class Lamps:
+    """Lamps and patches of glowing surfaces.
+
+    Attributes
+    ----------
+    kind: (n,) see `_POINT` and so on.
+    place, way: (n, 3) metres, and unit vectors along which they shine.
+    power: (n,) luminance of patches, luminous intensity, or illuminance of a sun.
+    area: (n,) m² of patches.
+    cone: (n, 2) see `Lamp`.
+    """
+
+    kind: NDArray[np.uint8]
+    place: Floats
+    way: Floats
+    power: Floats
+    area: Floats
+    cone: Floats
+
+    def __len__(self) -> int:
+        return len(self.kind)
+
+    def only(self, chosen: Bools | Ints) -> Lamps:
+        """Some of them."""
+        return Lamps(*(held[chosen] for held in vars(self).values()))
+
+
+def lamps_of(scene: Scene, lights: Lights | None) -> Lamps:
+    """The lamps of a scene; none if it has none."""
+    if lights is None:
+        none = np.zeros(len(scene.materials), np.float32)
+        lights = Lights(none, (), none.astype(np.int32), np.zeros((0, 3, 2), np.float32), ())
+    patches = _patches(scene, glowing(scene, lights))
+    single = Lamps(
+        np.array([KINDS.index(lamp.kind) for lamp in lights.lamps], np.uint8),
+        np.array([lamp.position for lamp in lights.lamps]).reshape(-1, 3),
+        np.array([lamp.direction for lamp in lights.lamps]).reshape(-1, 3),
+        np.array([lamp.intensity for lamp in lights.lamps]),
+        np.zeros(len(lights.lamps)),
+        np.array([lamp.cone for lamp in lights.lamps]).reshape(-1, 2),
+    )
+    pairs = zip(vars(single).values(), vars(patches).values(), strict=True)
+    return Lamps(*(np.concatenate(pair) for pair in pairs))
+
+
+def glowing(scene: Scene, lights: Lights) -> Floats:
+    """(M,) the luminance of each material that is a lamp, 0 of the others."""
+    glow = np.where(lights.glow >= LEAST, lights.glow, 0.0).astype(np.float64)
+    area = areas(scene.corners)
+    if area[glow[scene.triangle_material] > 0].sum() > _SHARE * area.sum():
+        return np.zeros(len(glow))
+    return glow
+
+
+def _patches(scene: Scene, glow: Floats) -> Lamps:
+    faces = np.flatnonzero(glow[scene.triangle_material] > 0)
+    corner = scene.corners[faces]
+    area = areas(corner)
+    total = float(area.sum())
+    count = min(_MOST, max(len(faces), math.ceil(total / _PATCH**2))) if total else 0
+    chosen = np.zeros(0, np.int64)
+    if count:
+        chosen = spread_over(area, np.zeros(len(faces), np.int64), np.array([0]), count)[0]
+    both = scene.two_sided[faces[chosen]]
+    return Lamps(
+        np.where(both, _BOTH, _PATCH_KIND).astype(np.uint8),
+        _spread(corner, chosen),
+        normals(corner[chosen]),
+        glow[scene.triangle_material[faces[chosen]]],
+        np.full(count, total / max(count, 1)),
+        np.ones((count, 2)),
+    )
+
+
+def _spread(corner: Floats, chosen: Ints) -> Floats:
+    """(n, 3) points on the (n,) chosen ones of (T, 3, 3) faces; those of a face have its centre."""
+    points = points_on(corner[chosen], np.arange(len(chosen)))
+    times = np.maximum(np.bincount(chosen, minlength=len(corner)), 1)[:, None]
+    mean = np.stack([np.bincount(chosen, part, len(corner)) for part in points.T], axis=1) / times
+    return np.asarray(points + (corner.mean(axis=1) - mean)[chosen])
+
+
+def measured(
+    around: Surroundings, lamps: Lamps, point: Floats, normal: Floats, turn: Floats, rays: int
+) -> Lamps:
+    """The lamps with powers by which each kind has a median of 1 at those of (n, 3) points with
+    (n, 3) normals that it reaches; without kinds that reach none."""
+    result = []
+    for kinds in ((_POINT, _SPOT), (_SUN,), (_PATCH_KIND, _BOTH)):
+        own = lamps.only(np.isin(lamps.kind, kinds))
+        light = direct(around, own, point, normal, turn, rays)
+        if (light > 0).any():
+            usual = float(np.median(light[light > 0]))
+            result.append(Lamps(*{**vars(own), "power": own.power / usual}.values()))
+    if not result:
+        return lamps.only(np.zeros(0, np.int64))
+    held = zip(*(vars(each).values() for each in result), strict=True)
+    return Lamps(*map(np.concatenate, held))
+
+
+def near(lamps: Lamps, corner: Floats) -> Lamps:
+    """Those lamps, `measured`, that can matter to (T, 3, 3) faces."""
+    low, high = corner.min(axis=(0, 1)), corner.max(axis=(0, 1))
+    far = np.linalg.norm(lamps.place - np.clip(lamps.place, low, high), axis=1)
+    patch = lamps.kind >= _PATCH_KIND
+    size = np.where(patch, lamps.area, 1.0)
+    most = lamps.power * size / (far**2 + np.where(patch, size / math.pi, _NEAREST**2))
+    most = np.where(lamps.kind == _SUN, lamps.power, most)
+    order = np.argsort(most, kind="stable")
+    kept = np.cumsum(most[order]) > _FEW
+    return lamps.only(np.sort(order[kept]))
+
+
+def direct(
+    around: Surroundings, lamps: Lamps, point: Floats, normal: Floats, turn: Floats, rays: int
+) -> Floats:
+    """(n,) the light of lamps at (n, 3) points with (n, 3) normals, by at most ``rays`` shadow rays
+    for each point. ``turn``: (n,) shares of the way between two lamps at which choosing begins."""
+    result = np.zeros(len(point))
+    if not len(lamps):
+        return result
+    step = max(1, RAYS // rays)
+    for at in range(0, len(point), step):
+        part = slice(at, at + step)
+        here = point[part] + around.lift * normal[part]
+        total, chosen, times = _chosen(
+            here, np.ascontiguousarray(normal[part]), turn[part], rays, *vars(lamps).values()
+        )
+        row, column = np.nonzero(times)
+        lamp = chosen[row, column]
+        target = lamps.place[lamp]
+        sun = lamps.kind[lamp] == _SUN
+        size = 2 * np.linalg.norm(around.points.max(axis=0) - around.points.min(axis=0), axis=-1)
+        target[sun] = here[row[sun]] - size * lamps.way[lamp[sun]]
+        free = around.free(here[row], target)
+        share = np.bincount(row, times[row, column] * free, len(here)) / rays
+        result[part] = total * share
+    return result
+
+
+@kernel
+def _chosen(
+    point: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    turn: NDArray[np.float64],
+    rays: int,
+    kind: NDArray[np.uint8],
+    place: NDArray[np.float64],
+    way: NDArray[np.float64],
+    power: NDArray[np.float64],
+    area: NDArray[np.float64],
+    cone: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    """(n,) the light of all lamps without shadows; (n, rays) the lamps that rays go to, and how
+    many of the ``rays`` each of these stands for, 0 beyond the last."""
+    total = np.zeros(len(point))
+    chosen = np.zeros((len(point), rays), np.int64)
+    times = np.zeros((len(point), rays), np.int64)
+    light = np.zeros(len(kind))
+    for p in range(len(point)):
+        nx, ny, nz = normal[p, 0], normal[p, 1], normal[p, 2]
+        for k in range(len(kind)):
+            light[k] = 0.0
+            if kind[k] == _SUN:
+                facing = -(nx * way[k, 0] + ny * way[k, 1] + nz * way[k, 2])
+                light[k] = power[k] * max(facing, 0.0)
+            else:
+                x, y, z = (
+                    place[k, 0] - point[p, 0],
+                    place[k, 1] - point[p, 1],
+                    place[k, 2] - point[p, 2],
+                )
+                facing = nx * x + ny * y + nz * z
+                if facing > 0:
+                    square = x * x + y * y + z * z
+                    far = np.sqrt(square)
+                    along = -(way[k, 0] * x + way[k, 1] * y + way[k, 2] * z) / far
+                    if kind[k] == _BOTH:
+                        along = abs(along)
+                    if kind[k] >= _PATCH_KIND:
+                        spread = area[k] * max(along, 0.0) / (square + area[k] / np.pi)
+                    else:
+                        spread = 1 / max(square, _NEAREST * _NEAREST)
+                        if kind[k] == _SPOT:
+                            edge = (along - cone[k, 1]) / max(cone[k, 0] - cone[k, 1], 1e-6)
+                            edge = min(max(edge, 0.0), 1.0)
+                            spread *= edge * edge
+                    light[k] = power[k] * spread * facing / far
+            total[p] += light[k]
+        if total[p] <= 0:
+            continue
+        step = total[p] / rays
+        ahead, held, used, sent = turn[p] * step, 0.0, 0, 0
+        for k in range(len(kind)):
+            held += light[k]
+            while ahead < held and sent < rays:
+                if used == 0 or chosen[p, used - 1] != k:
+                    chosen[p, used] = k
+                    used += 1
+                times[p, used - 1] += 1
+                sent += 1
+                ahead += step
+        # Rounding may leave the last ray over.
+        times[p, used - 1] += rays - sent
+    return total, chosen, times

@@ -1,0 +1,68 @@
+"""The interlaced images of a database in its site: visitors with ``?form=gpuii`` walk among them
+(`web/page/sets.js`), and others download none of them.
+
+One document has the manifests of all sets, so that a client orders files
+by the sizes of all images after one request.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from ptmtools.errors import InputError, LimitError
+from ptmtools.neighbours.interlace.model import INDEX
+from ptmtools.neighbours.interlace.reading import read_manifest
+from ptmtools.output.names import INTERLACE, texture_name
+from ptmtools.site.entry import DIGITS, Entry, state_of
+from ptmtools.store.folder import damaged
+from ptmtools.store.layout import sha256
+
+#: Folder of the sets.
+FOLDER = "data/sets"
+FORMAT, SCHEMA = "ptmtools interlaced images", 1
+
+
+def has_sets(index: Mapping[str, Any]) -> bool:
+    """Whether an index of the hints names interlaced images."""
+    return INTERLACE in index.get("textureSets", {})
+
+
+def is_of_sets(name: str) -> bool:
+    """Whether a file of a site is one of its sets."""
+    return name.startswith(f"{FOLDER}/")
+
+
+def set_entries(
+    index: Mapping[str, Any], place: Callable[[str], tuple[Path, str]]
+) -> Iterator[Entry]:
+    """The files of the sets of all textures, the document last.
+
+    Parameters
+    ----------
+    index: of the hints, with sets. place: the file of a URL of the index, and its SHA-256.
+
+    Raises DatabaseError: PTM-D006 a manifest is damaged; and as ``place``.
+    """
+    sets = []
+    for number, row in enumerate(index["textures"]):
+        url = index["textureSets"][INTERLACE].replace("{name}", texture_name(row["file"]))
+        manifest, _ = place(url + INDEX)
+        try:
+            interlaced = read_manifest(manifest.parent)
+        except (InputError, LimitError) as fault:
+            raise damaged(manifest, fault.message) from None
+        media = f"image/{'jpeg' if interlaced.container == 'jpg' else interlaced.container}"
+        files = []
+        for part in interlaced.parts:
+            file, digest = place(url + part.name)
+            files.append(f"{number:04}-{file.stem}-{digest[:DIGITS]}{file.suffix}")
+            own = f"{FOLDER}/{files[-1]}"
+            yield Entry(own, file, media, True, state=state_of(file.stat()), digest=digest)
+        sets.append({"manifest": interlaced.document(), "files": files})
+    document = {"format": FORMAT, "schema": SCHEMA, "sets": sets}
+    text = json.dumps(document, ensure_ascii=False, separators=(",", ":")).encode()
+    own = f"{FOLDER}/sets-{sha256(text)[:DIGITS]}.json"
+    yield Entry(own, text, "application/json", True, compressed=True)

@@ -1,0 +1,72 @@
+"""Hostile files on the pages, in each engine: a message or a picture, and no crash.
+
+Each engine stays the same process throughout, so that one that ends or hangs fails the tests after.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+import pytest
+from browser import Visitor, visiting
+from engines import PACKAGES, visiting_by
+
+from ptmtools.site.content import Site
+from ptmtools.site.forms import FORMS, form_site
+
+from .hostile import hostile
+
+COUNT = 20
+#: Of each form: what follows the address of its page.
+PLACES = {"walk": "", "apo.json": "#40,20,0.55", "interlace.json": "?all", "campus.json": ""}
+#: When a sound one is there; of a campus, in low detail.
+THERE = dict.fromkeys(PLACES, "s.complete") | {"campus.json": "s.begun"}
+#: Whether the page says something: a message, a notice, or an error of a walk.
+SAYS = """
+!document.querySelector("#error").hidden || document.querySelector("#notices p") ||
+window.ptm?.errors?.length > 0
+"""
+#: The codes of the message and of errors of a walk; a notice has none.
+TOLD = """
+[document.querySelector("#error-code").textContent,
+  ...(window.ptm?.errors ?? []).map(({ code }) => code),
+  document.querySelector("#notices p") && "notice"].filter(Boolean)
+"""
+
+
+@pytest.fixture(scope="module")
+def sites(statue: Path, pictures: dict[str, Path], campus: Path, statues: Site) -> dict[str, Site]:
+    """A sound one of each form."""
+    folders = {"apo.json": statue, "interlace.json": pictures["rgb-png"], "campus.json": campus}
+    return {"walk": statues} | {name: form_site(f, FORMS[name]) for name, f in folders.items()}
+
+
+@pytest.mark.parametrize("form", PLACES)
+@pytest.mark.parametrize("engine", ["chromium", *PACKAGES])
+def test_a_message_or_a_picture(
+    request: pytest.FixtureRequest, sites: dict[str, Site], engine: str, form: str
+) -> None:
+    opened = opening(request, engine)
+    told = []
+    for seed in range(COUNT):
+        with opened(hostile(sites[form], seed), PLACES[form]) as visitor:
+            visitor.until(f"{SAYS.strip()} || {THERE[form]}")
+            told.append(visitor.page.evaluate(TOLD))
+        assert set(told[-1]) <= {"PTM-V103", "PTM-V105", "PTM-V107", "notice"}, seed
+        own = [said for said in visitor.messages if "Failed to load resource" not in said]
+        assert not [said for said in own if said.startswith("error: ")], seed
+    assert COUNT // 3 < sum(map(bool, told)) < COUNT
+
+
+def opening(
+    request: pytest.FixtureRequest, engine: str
+) -> Callable[..., AbstractContextManager[Visitor]]:
+    """What opens a site in an engine."""
+    sizes = {"width": 512, "height": 384}
+    if engine == "chromium":
+        browser = request.getfixturevalue("chromium")
+        return lambda entries, query: visiting(browser, entries, query=query, **sizes)
+    page = request.getfixturevalue("engines")(engine)
+    return lambda entries, query: visiting_by(page, entries, query=query, **sizes)
