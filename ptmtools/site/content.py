@@ -31,7 +31,7 @@ from ptmtools.progress import Progress, silent
 from ptmtools.site.catalogue import ANGLE, Content, catalogue_of
 from ptmtools.site.entry import DIGITS, Entry, state_of
 from ptmtools.site.geometry import lean_glb
-from ptmtools.site.program import HTML, INDEX, address_of, page, program_files
+from ptmtools.site.program import HTML, INDEX, address_of, element, page, program_files
 from ptmtools.site.sets import has_sets, is_of_sets, set_entries
 from ptmtools.site.textures import web_texture, without_exact
 from ptmtools.site.tours import SiteTour, site_tour
@@ -247,7 +247,7 @@ class _Builder:
         tour: Mapping[str, str],
     ) -> None:
         program = program_files()
-        self._entries |= {entry.name: entry for entry in program.values()}
+        self._entries |= {entry.name: entry for entry in (*program.values(), element())}
         settings = {
             "index": url,
             "worker": program["worker.js"].name,

@@ -18,7 +18,7 @@ INDEX = "index.html"
 PAGE = Path(__file__).parent / "page"
 HTML, JAVASCRIPT = "text/html; charset=utf-8", "text/javascript; charset=utf-8"
 #: Scripts that few visits need.
-LATER = ("later.js", "compare.js", "statues.js", "reliefs.js", "sets.js", "tour.js")
+LATER = ("later.js", "compare.js", "statues.js", "reliefs.js", "sets.js", "tour.js", "embedded.js")
 #: The media type of each file.
 PROGRAM = {
     "viewer.js": JAVASCRIPT,
@@ -26,6 +26,8 @@ PROGRAM = {
     "worker.js": JAVASCRIPT,
     "decoder.wasm": "application/wasm",
 }
+#: Defines the element for pages that embed a walk.
+ELEMENT = "ptm-walk.js"
 #: The page of other forms, and their scripts (`ptmtools.site.forms`).
 FORM_PAGE, FORM_SCRIPTS = "form.html", ("apo.js", "interlace.js", "campus.js")
 _FIELD = re.compile(r"\{\{(\w+)\}\}")
@@ -97,6 +99,11 @@ def page(
         else "",
     }
     return _filled(INDEX, settings, script, links, fields)
+
+
+def element() -> Entry:
+    """The script of ``<ptm-walk>``, for pages that embed the walk; its name never changes."""
+    return Entry(ELEMENT, _built(ELEMENT), JAVASCRIPT, compressed=True)
 
 
 def form_script(name: str) -> Entry:

@@ -61,8 +61,9 @@ export class Tour {
     });
     this.#fillList();
     this.#listen();
-    const label = tour.labels.findIndex(({ id }) => id === query.get("label"));
+    const label = tour.labels.findIndex(({ id }) => id === query.get("label")), stop = query.get("stop") ?? "";
     if (label >= 0) this.visit(label);
+    else if (/^\d+$/.test(stop) && Number(stop) in tour.stops) this.go(Number(stop));
   }
 
   /** The version of a text for the visitor. @template T @param {Record<string, T> | undefined} texts */
