@@ -1,5 +1,5 @@
 // The script of a walk in a frame of another page, and of walks without an interface (`?ui=none`): it tells
-// that page about the visit, and lets it lead the visitor. See docs/guide/embedding.md.
+// that page about the visit, and lets it lead the visitor. See docs/formats/embedding.md.
 
 import { addStyle } from "./ui/elements.js";
 
