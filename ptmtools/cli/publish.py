@@ -170,8 +170,8 @@ def publish(
 def _frame(title: str) -> str:
     """The HTML that shows a site in another page, where SITE is its address."""
     return (
-        f'<iframe src="https://SITE/" title="{html.escape(title)}" allow="fullscreen" loading="lazy" '
-        'width="960" height="540"></iframe>'
+        f'<iframe src="https://SITE/" title="{html.escape(title)}" allow="fullscreen" '
+        'loading="lazy" width="960" height="540"></iframe>'
     )
 
 
