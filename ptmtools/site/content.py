@@ -32,6 +32,7 @@ from ptmtools.site.catalogue import ANGLE, Content, catalogue_of
 from ptmtools.site.entry import DIGITS, Entry, state_of
 from ptmtools.site.geometry import lean_glb
 from ptmtools.site.program import HTML, INDEX, address_of, element, page, program_files
+from ptmtools.site.security import secured
 from ptmtools.site.sets import has_sets, is_of_sets, set_entries
 from ptmtools.site.textures import web_texture, without_exact
 from ptmtools.site.tours import SiteTour, site_tour
@@ -219,7 +220,7 @@ class _Builder:
         url = f"{DATA}/{self._add('tour', '.json', JSON, text, compressed=True)}"
         pages = catalogue_of(self._catalogue(tour))
         for name, html in pages.items():
-            self._entries[name] = Entry(name, html.encode(), HTML, compressed=True)
+            self._entries[name] = Entry(name, secured(html).encode(), HTML, compressed=True)
         return {"tour": url, "catalogue": next(iter(pages))}
 
     def _catalogue(self, tour: SiteTour) -> Content:

@@ -12,6 +12,7 @@ from typing import Any
 
 from ptmtools.errors import InputError
 from ptmtools.site.entry import DIGITS, Entry
+from ptmtools.site.security import secured
 from ptmtools.store.layout import sha256
 
 INDEX = "index.html"
@@ -136,4 +137,6 @@ def _filled(
         **fields,
     }
     filled = _FIELD.sub(lambda match: values[match[1]], _built(template).decode())
+    if template == INDEX:
+        filled = secured(filled)
     return Entry(INDEX, filled.encode(), HTML, compressed=True)

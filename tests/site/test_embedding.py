@@ -60,7 +60,7 @@ def frame_of(page: Any) -> Any:
 
 def test_events_and_ways_of_an_embedded_walk(chromium: Any, served: str, toured: Site) -> None:
     with host(chromium, served) as url:
-        page = chromium.new_context().new_page()
+        page = chromium.new_context(bypass_csp=True).new_page()
         page.goto(url)
         frame = frame_of(page)
         assert url.split("/")[2] != served.split("/")[2], "another origin"
@@ -93,7 +93,7 @@ STRANGE = [
 
 def test_strange_messages_change_nothing(chromium: Any, served: str) -> None:
     with host(chromium, served) as url:
-        page = chromium.new_context().new_page()
+        page = chromium.new_context(bypass_csp=True).new_page()
         page.goto(url)
         frame = frame_of(page)
         before = frame.evaluate("ptm.walker.pose")
@@ -115,7 +115,7 @@ def test_a_frame_without_an_interface_that_begins_at_a_label(
     (name,) = (n for n in toured.entries if n.startswith("data/tour-"))
     id = json.loads(toured.entries[name].read())["labels"][2]["id"]
     with host(chromium, served, f'ui="none" label="{id}"') as url:
-        page = chromium.new_context().new_page()
+        page = chromium.new_context(bypass_csp=True).new_page()
         page.goto(url)
         frame = frame_of(page)
         assert not frame.locator("nav").is_visible()
@@ -125,7 +125,7 @@ def test_a_frame_without_an_interface_that_begins_at_a_label(
 
 
 def test_the_page_alone_loads_no_script_of_frames(chromium: Any, served: str) -> None:
-    page = chromium.new_context().new_page()
+    page = chromium.new_context(bypass_csp=True).new_page()
     names: list[str] = []
     page.on("request", lambda request: names.append(request.url))
     page.goto(served)
