@@ -11,6 +11,7 @@
 #                    (a day; it continues where it was stopped)
 # make fuzz    100,000 damaged and hostile files for every reader, 1,000 damaged buildings (an hour)
 # make page    bundle the page of web/page into the package, with esbuild
+# make dist    a wheel and an sdist in build/dist
 # make sample  only the sample museum
 # make setup   only the virtual environment
 # make docs-tables     print the exact tables of benchmarks/RESULTS.md into it (ten minutes)
@@ -32,7 +33,7 @@ JOBS ?= 2
 PYTEST_ARGS ?=
 export PTM_SHARED ?= $(abspath ../shared)
 
-.PHONY: help setup demo walk test lint bench bench-codec bench-pvs bench-ach bench-walk bench-web fuzz page sample docs-tables docs-timings docs-pictures clean
+.PHONY: help setup demo walk test lint bench bench-codec bench-pvs bench-ach bench-walk bench-web fuzz page sample dist docs-tables docs-timings docs-pictures clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -55,19 +56,18 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 	$(PIP) install --editable '.[dev]'
 	@touch $@
 
-$(VENV)/.installed-viewer: $(VENV)/.installed
-	@echo "Installing what serves the page into $(VENV) …"
-	$(PIP) install --editable '.[viewer]'
-	@touch $@
-
 setup: $(VENV)/.installed
 
-# The stamp, not the OBJ, is the target: the script decides what to write again.
-build/museum/.made: $(wildcard sample_data/*.py sample_data/museum_parts/*.py) | $(VENV)/.installed
-	$(BIN)/python sample_data/make_museum.py -o build/museum
+# The stamp, not the OBJ, is the target: the command decides what to write again.
+build/museum/.made: $(wildcard ptmtools/sample/*.py) | $(VENV)/.installed
+	$(BIN)/ptm sample museum -o build/museum
 	@touch $@
 
 sample: build/museum/.made
+
+dist: $(VENV)/.installed-dev
+	@rm -rf build/dist
+	$(BIN)/python -m build --no-isolation -o build/dist .
 
 # The cell of the first viewpoint.
 FIRST_CELL = $(BIN)/python -c 'import json; hints = json.load(open("build/museum.db/www/hints.json")); print(hints["viewpoints"][0]["cell"])'
@@ -80,7 +80,7 @@ demo: build/museum/.made
 	@echo "Walk through it: make walk"
 	@echo "Your own model: $(BIN)/ptm build-scene MODEL.obj -o MODEL.db"
 
-walk: build/museum/.made $(VENV)/.installed-viewer
+walk: build/museum/.made
 	$(BIN)/ptm build-scene build/museum/museum.obj -o build/museum.db
 	$(BIN)/ptm serve build/museum.db --open
 

@@ -22,7 +22,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
-from scenes import MODELS, MUSEUM, ROOT
+from scenes import MODELS, MUSEUM
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide, subdivision
 from ptmtools.scene import Scene, ingest
@@ -36,8 +36,8 @@ def opened(name: str) -> Scene:
     if name != MUSEUM:
         return ingest(MODELS[name])
     with tempfile.TemporaryDirectory() as folder:
-        maker = ROOT / "sample_data/make_museum.py"
-        command = [sys.executable, maker, "-o", f"{folder}/{name}", "--size", "16"]
+        command = [sys.executable, "-m", "ptmtools", "sample", "museum"]
+        command += ["-o", f"{folder}/{name}", "--size", "16"]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         return ingest(Path(folder, name, f"{name}.obj"))
 

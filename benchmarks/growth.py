@@ -1,6 +1,6 @@
 """Growth of time and memory with the model: ``python benchmarks/growth.py [KIND…] [--jobs 2]``
 
-rooms         sample museums of 12, 50, 200 and 800 rooms (`sample_data/make_museum.py`)
+rooms         sample museums of 12, 50, 200 and 800 rooms (`ptm sample museum`)
 buildings     streets of 3, 6 and 12 buildings (`sample_data/make_campus.py`)
 walls         the museum of 12 rooms, its walls subdivided into 200,000 to 5 million triangles
 furniture     the same with an equal number of triangles of curved furniture (`enlarging.py`)
@@ -161,7 +161,7 @@ def make_model(kind: str, size: int, folder: Path) -> None:
         model.with_name("campus.obj").rename(model)
         return
     rooms = size if kind == "rooms" else FEW_ROOMS
-    maker = [sys.executable, str(ROOT / "sample_data/make_museum.py"), "-o", str(model.parent)]
+    maker = [sys.executable, "-m", "ptmtools", "sample", "museum", "-o", str(model.parent)]
     maker += ["--rooms", str(rooms), "--size", "16", "--force"]
     subprocess.run(maker, check=True, stdout=subprocess.DEVNULL)
     if kind != "rooms":

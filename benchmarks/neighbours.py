@@ -61,18 +61,22 @@ RINGS = (0.5, 1.0, 2.0, 4.0, 8.0, 1000.0)
 
 @dataclass(frozen=True)
 class Scene:
-    """A scene: what makes its model, and where that is."""
+    """A scene: the arguments of Python that make its model, and the model."""
 
     name: str
-    script: str
+    maker: tuple[str, ...]
     model: Path
 
 
 SCENES = {
     scene.name: scene
     for scene in (
-        Scene("museum", "make_museum.py", ROOT / "build/museum/museum.obj"),
-        Scene("photos", "make_photo_gallery.py", ROOT / "build/photo_gallery/photo_gallery.obj"),
+        Scene("museum", ("-m", "ptmtools", "sample", "museum"), ROOT / "build/museum/museum.obj"),
+        Scene(
+            "photos",
+            ("sample_data/make_photo_gallery.py",),
+            ROOT / "build/photo_gallery/photo_gallery.obj",
+        ),
     )
 }
 
@@ -98,7 +102,7 @@ def main() -> None:
 def world_of(scene: Scene, policies: Sequence[PolicyEntry]) -> World:
     """The world of a walk through a scene, in all forms that the policies take."""
     FOLDER.mkdir(parents=True, exist_ok=True)
-    made(scene.script, scene.model)
+    made(scene.maker, scene.model)
     database, walk = FOLDER / f"{scene.name}.db", FOLDER / f"{scene.name}-{SECONDS}.json"
     # The simulator's pictures have no coarser meshes.
     options = ("--format", "vrml,gltf,interlace", "--lods", "none")
@@ -110,10 +114,10 @@ def world_of(scene: Scene, policies: Sequence[PolicyEntry]) -> World:
     return prepare(served, read_walk(walk), pyramids, forms=forms)
 
 
-def made(script: str, model: Path) -> None:
-    """Makes a model by a script of the sample data, unless it is there."""
+def made(maker: tuple[str, ...], model: Path) -> None:
+    """Makes a model, unless it exists."""
     if not model.is_file():
-        call = [sys.executable, str(ROOT / "sample_data" / script), "-o", str(model.parent)]
+        call = [sys.executable, *maker, "-o", str(model.parent)]
         subprocess.run(call, check=True, cwd=ROOT)
 
 

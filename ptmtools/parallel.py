@@ -12,13 +12,14 @@ loky 3.7: busy workers still ran 15 s after their parent was killed.
 
 from __future__ import annotations
 
+import atexit
 import os
 import pickle
 import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cached_property
 from itertools import count
 from queue import LifoQueue, SimpleQueue
@@ -197,14 +198,17 @@ def _shared_file(shared: object) -> Iterator[_File]:
         return raw.nbytes < SMALL
 
     pickled = pickle.dumps(shared, 5, buffer_callback=stays)
+    cleaning = ExitStack()
     with writing(tempfile.gettempdir()):
         file: IO[bytes] = tempfile.TemporaryFile(prefix="ptmtools-")  # noqa: SIM115
         path = f"/proc/{os.getpid()}/fd/{file.fileno()}"
         if not os.path.exists(path):
             file.close()
-            named = tempfile.NamedTemporaryFile(prefix="ptmtools-")  # noqa: SIM115
+            # A second process may open it on Windows, too, if its name does not end with it.
+            named = tempfile.NamedTemporaryFile(prefix="ptmtools-", delete=False)  # noqa: SIM115
             file, path = named, named.name
-    with file:
+            cleaning.callback(_remove, path)
+    with cleaning, file:
         places = []
         with writing(tempfile.gettempdir()):
             for data in [pickled, *arrays]:
@@ -214,6 +218,19 @@ def _shared_file(shared: object) -> Iterator[_File]:
             pickle.dump(places, file)
             file.flush()
         yield _File(next(_numbers), path, end)
+
+
+def _remove(path: str) -> None:
+    """Removes a file; one that a worker still maps on Windows, when this process ends."""
+    try:
+        os.remove(path)
+    except PermissionError:
+        atexit.register(_remove_if_possible, path)
+
+
+def _remove_if_possible(path: str) -> None:
+    with suppress(OSError):
+        os.remove(path)
 
 
 #: In a worker process: the value of the last file.
@@ -274,8 +291,8 @@ class Process:
             if self._closed:
                 raise EOFError("the worker has been closed")
             if self._running is None:
-                resource_tracker.ensure_running()  # unblocks Ctrl-C when it starts
-                if hasattr(signal, "pthread_sigmask"):
+                if hasattr(signal, "pthread_sigmask"):  # not Windows
+                    resource_tracker.ensure_running()  # unblocks Ctrl-C when it starts
                     # Inherited by the process, which so ignores Ctrl-C while it starts.
                     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
                 context = get_context("spawn")

@@ -5,7 +5,6 @@
 The target scene of tools for single dense models: about 250,000 triangles in one room, most of them
 in columns, capitals, drapes, vases and balustrades, and 25 textures of 1024 × 1024 texels. Metres,
 Y up; closed. The same options give the same bytes on every machine (for the same numpy and Pillow).
-Needs numpy and Pillow, not ptmtools.
 """
 
 from __future__ import annotations
@@ -16,14 +15,18 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from arguments import between
 from atrium_parts.building import arcades, shell
 from atrium_parts.furnishing import balustrades, drapes, frescoes, reliefs, runners, vases
 from atrium_parts.sheets import Sheet, obj_text
 from atrium_parts.textures import TEXTURES
-from make_museum import File, between, generator, png, write
-from museum_parts.noise import bytes_of
-from museum_parts.paintings import PAINTINGS
 from PIL import Image
+
+from ptmtools.errors import PtmError
+from ptmtools.sample.files import File, png, write
+from ptmtools.sample.museum import generator
+from ptmtools.sample.noise import bytes_of
+from ptmtools.sample.paintings import PAINTINGS
 
 HEAD = "# ptmtools sample atrium"
 #: Paintings of the walls, of different styles.
@@ -96,7 +99,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         files = list(make_atrium(AtriumOptions(given.size, given.seed)))
         write(given.output, files, force=given.force)
-    except OSError as error:
+    except PtmError as error:
         parser.exit(1, f"make_atrium: {error}\n")
     return 0
 

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from arguments import between
 from campus_parts.buildings import build
 from campus_parts.furniture import furnish
 from campus_parts.ground import make_ground
@@ -30,11 +31,13 @@ from campus_parts.quarters import MIXED, residence
 from campus_parts.recipes import Recipe
 from campus_parts.textures import ALPHAS, IMAGES, mask, signs
 from campus_parts.way import way_text
-from museum_parts.files import HEAD, File, between, png, write
-from museum_parts.mesh import Face, Thing
-from museum_parts.noise import bytes_of
-from museum_parts.obj import number, obj_text
 from PIL import Image
+
+from ptmtools.errors import PtmError
+from ptmtools.sample.files import HEAD, File, png, write
+from ptmtools.sample.mesh import Face, Thing
+from ptmtools.sample.noise import bytes_of
+from ptmtools.sample.obj import number, obj_text
 
 #: Recipes in order along the street: all different, then recurring ones, then a single kind.
 RECIPES = [*HETEROGENEOUS, *MIXED, *(residence(k) for k in range(14))]
@@ -205,7 +208,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         files = list(make_campus(options))
         write(given.output, files, force=given.force)
-    except (OSError, ValueError) as error:
+    except (PtmError, ValueError) as error:
         parser.exit(1, f"make_campus: {error}\n")
     total = sum((given.output / name).stat().st_size for name, _ in files)
     print(f"{given.output}: {len(files)} files, {total / 1e6:.1f} MB")

@@ -5,9 +5,7 @@
 The target scene of systems for large image collections: nearly all bytes are images with 1024 to
 4096 texels a side (powers of two), in one room that shows most of them at once. The images are
 landscapes, portraits and still lifes of the museum, in place of photographs. Metres, Y up; closed.
-The same options give the same bytes on every machine (for the same numpy and Pillow). Needs numpy
-and Pillow, not ptmtools.
-"""
+The same options give the same bytes on every machine (for the same numpy and Pillow)."""
 
 from __future__ import annotations
 
@@ -17,10 +15,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from make_museum import File, generator, png, write
-from museum_parts.mesh import Face, Point, Thing, Uv, tiled
-from museum_parts.obj import obj_text
-from museum_parts.paintings import PAINTINGS, Painting
+from ptmtools.errors import PtmError
+from ptmtools.sample.files import File, png, write
+from ptmtools.sample.mesh import Face, Point, Thing, Uv, tiled
+from ptmtools.sample.museum import generator
+from ptmtools.sample.obj import obj_text
+from ptmtools.sample.paintings import PAINTINGS, Painting
 
 HEAD = "# ptmtools sample gallery of photographs"
 #: Styles closest to photographs.
@@ -158,7 +158,7 @@ def main(arguments: list[str] | None = None) -> int:
         parser.error("--images is 1 to 200, --seed 0 or more")
     try:
         write(given.output, list(make_gallery(given.images, given.seed)), force=given.force)
-    except OSError as error:
+    except PtmError as error:
         parser.exit(1, f"make_photo_gallery: {error}\n")
     return 0
 

@@ -6,8 +6,7 @@ axis.
 
 The target scene of octree textures: nearly all bytes are triangles (`make_statues.py`), few are
 images. Metres, Y up; closed. The same options give the same bytes on every machine (for the same
-numpy and Pillow). Needs numpy and Pillow, not ptmtools.
-"""
+numpy and Pillow)."""
 
 from __future__ import annotations
 
@@ -17,10 +16,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from make_museum import File, generator, png, write
 from make_photo_gallery import COLORS, WIDTH_RATIO, Photo, hall, hung, photos
 from make_statues import STATUES, StatueOptions, make_statue
-from museum_parts.obj import obj_text
+
+from ptmtools.errors import PtmError
+from ptmtools.sample.files import File, png, write
+from ptmtools.sample.museum import generator
+from ptmtools.sample.obj import obj_text
 
 HEAD = "# ptmtools sample hall of statues"
 #: Side of all images, texels.
@@ -127,7 +129,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = HallOptions(given.statues, given.triangles, given.images, given.seed)
     try:
         write(given.output, list(make_hall(options)), force=given.force)
-    except OSError as error:
+    except PtmError as error:
         parser.exit(1, f"make_statue_hall: {error}\n")
     return 0
 

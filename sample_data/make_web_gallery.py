@@ -6,7 +6,7 @@ Rooms of the sample museum, without windows, whose 40 paintings and surfaces are
 sizes, none a power of two on the walls, and whose geometry is compressed with Draco
 (KHR_draco_mesh_compression). A model that is small already: a tool that makes it larger has no
 excuse. Metres, Y up; closed; unlit. The same options give the same bytes on every machine (for the
-same numpy, Pillow and DracoPy). Needs numpy, Pillow and DracoPy, not ptmtools.
+same numpy, Pillow and DracoPy). Needs DracoPy.
 
 Positions of all meshes are rounded on one grid of half a millimetre, as `gltf-transform draco
 --quantization-volume scene` does: rounded by the bounds of each mesh, walls would part from floors.
@@ -26,18 +26,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from make_museum import MATERIALS, between, generator, surface_names
+from arguments import between
 from make_statues import STATUES, StatueOptions, make_statue
-from museum_parts.files import HEAD, File, write
-from museum_parts.furnishing import furnish, hang
-from museum_parts.mesh import Face, Thing
-from museum_parts.noise import bytes_of
-from museum_parts.paintings import PAINTINGS
-from museum_parts.plan import make_plan
-from museum_parts.shell import make_shell
-from museum_parts.surfaces import SURFACES
 from numpy.typing import NDArray
 from PIL import Image
+
+from ptmtools.errors import PtmError
+from ptmtools.sample.files import HEAD, File, write
+from ptmtools.sample.furnishing import furnish, hang
+from ptmtools.sample.mesh import Face, Thing
+from ptmtools.sample.museum import MATERIALS, generator, surface_names
+from ptmtools.sample.noise import bytes_of
+from ptmtools.sample.paintings import PAINTINGS
+from ptmtools.sample.plan import make_plan
+from ptmtools.sample.shell import make_shell
+from ptmtools.sample.surfaces import SURFACES
 
 DRACO, UNLIT = "KHR_draco_mesh_compression", "KHR_materials_unlit"
 #: Texels of the longer side of paintings, in turn; of surfaces.
@@ -186,7 +189,7 @@ def _primitive(
 
 def glb_of(meshes: Sequence[Mesh], images: dict[str, bytes], about: str) -> bytes:
     """A GLB with a node for each mesh; ``images`` by the name of the material, or of the texture
-    that it uses (`make_museum.MATERIALS`)."""
+    that it uses (`ptmtools.sample.museum.MATERIALS`)."""
     buffer, accessors = _Buffer(), []
     every = np.concatenate([mesh.points for mesh in meshes]).astype(np.float64)
     low = every.min(axis=0)
@@ -284,7 +287,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = WebGalleryOptions(given.rooms, given.paintings, seed=given.seed)
     try:
         write(given.output, list(make_web_gallery(options)), force=given.force)
-    except (ImportError, OSError, ValueError) as error:
+    except (ImportError, PtmError, ValueError) as error:
         parser.exit(1, f"make_web_gallery: {error}\n")
     return 0
 

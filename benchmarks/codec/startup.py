@@ -22,7 +22,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from images import ROOT, SHARED
+from images import SHARED
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -96,7 +96,7 @@ def print_first_runs(only: list[str], runs: int, folder: str) -> None:
         command = [*PTM, "encode", str(image)]
         print_first("`ptm encode`, 1024²", command, Path(folder) / "a.ptm", runs)
     if "build" in only:
-        make = [sys.executable, str(ROOT / "sample_data" / "make_museum.py"), "-o", folder]
+        make = [*PTM, "sample", "museum", "-o", folder, "--force"]
         subprocess.run(make, check=True, stdout=subprocess.DEVNULL)
         command = [*PTM, "build-scene", f"{folder}/museum.obj", "-j", "2"]
         print_first("`ptm build-scene -j 2`, museum", command, Path(folder) / "museum.db", runs)

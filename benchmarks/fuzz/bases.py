@@ -10,7 +10,6 @@ Real scenes lie in the folder that ``PTM_SHARED`` names; without it there are th
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable, Mapping
 from functools import lru_cache, partial
 from itertools import pairwise
@@ -76,13 +75,10 @@ def _museum(rng: np.random.Generator) -> Soup:
 
 @lru_cache(maxsize=4)
 def _whole_museum(seed: int) -> Soup:
-    sys.path.insert(0, str(ROOT / "sample_data"))
-    try:
-        from museum_parts.furnishing import furnish, hang
-        from museum_parts.plan import make_plan
-        from museum_parts.shell import make_shell
-    finally:
-        sys.path.pop(0)
+    from ptmtools.sample.furnishing import furnish, hang
+    from ptmtools.sample.plan import make_plan
+    from ptmtools.sample.shell import make_shell
+
     plan = make_plan(5, np.random.default_rng(seed))
     shell, panels = make_shell(plan)
     hung = hang(panels, [1.4] * 6, 5, np.random.default_rng(seed))

@@ -42,6 +42,9 @@ class Entry:
 
 #: Heading → name → command. Besides, each stage has a command.
 GROUPS: dict[str, dict[str, Entry]] = {
+    "Start": {
+        "sample": Entry("Write a model to try ptmtools on.", "sample:sample"),
+    },
     "Build and check": {
         "build-scene": Entry("Build or update a database from a model.", "build:build_scene"),
         "info": Entry("Describe a model, a database or a .ptm file.", "info:info"),
@@ -54,6 +57,7 @@ GROUPS: dict[str, dict[str, Entry]] = {
     "Publish": {
         "serve": Entry("Serve a database to browsers on this machine.", "publish:serve"),
         "publish": Entry("Write a database as a web site.", "publish:publish"),
+        "tour": Entry("Label the works of a building.", "tour:commands"),
     },
     "Images": {
         "encode": Entry("Encode images as .ptm files.", "images:encode"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import re
 import sys
 import threading
@@ -27,12 +28,12 @@ from ptmtools.cli.parameters import (
 )
 from ptmtools.pipeline.validation import check_folder
 from ptmtools.quantities import count, size
-from ptmtools.site.content import Site, SiteOptions, site_of
+from ptmtools.site.content import Site, SiteOptions, site_of, title_of
 from ptmtools.site.forms import form_of, form_site, form_weight
 from ptmtools.site.lookup import files_of
 from ptmtools.site.published import PublishOptions
 from ptmtools.site.publishing import COARSE, publish as write, weight_of
-from ptmtools.site.serving import ServeOptions, require, serving
+from ptmtools.site.serving import ServeOptions, serving
 from ptmtools.store.objects import is_url
 
 _ORIGIN = re.compile(r"\*|https?://[^\s/?#@]+")
@@ -68,7 +69,6 @@ def serve(console: Console, db: str, opened: bool, origin: str | None, **values:
     wrote. --bandwidth and --latency simulate a slow connection.
     """
     options = take(ServeOptions, values)
-    require()
     files = files_of(db)
     try:
         with serving(
@@ -162,8 +162,17 @@ def publish(
         f"{len(done.unchanged):,} unchanged{removed}"
     )
     weight, lines = _weight_of_form(site) if form else _weight_of_walk(site)
-    document = {**changed, "notes": list(site.notes), "bytes": weight}
-    console.result(document, (first, *lines))
+    frame = _frame(site_options.title or title_of(Path(db)))
+    document = {**changed, "notes": list(site.notes), "bytes": weight, "embed": frame}
+    console.result(document, (first, *lines, f"embed: {frame}"))
+
+
+def _frame(title: str) -> str:
+    """The HTML that shows a site in another page, where SITE is its address."""
+    return (
+        f'<iframe src="https://SITE/" title="{html.escape(title)}" allow="fullscreen" '
+        'loading="lazy" width="960" height="540"></iframe>'
+    )
 
 
 def _weight_of_form(site: Site) -> tuple[dict[str, int], tuple[str, ...]]:

@@ -21,10 +21,11 @@ from ptmtools.pipeline.stage import Artifacts, Options, Stage
 from ptmtools.pipeline.stages import STAGES
 from ptmtools.store.folder import DatabaseFolder, read_manifest
 from ptmtools.store.layout import LOCK, STAGING
+from ptmtools.store.lock import holder, is_held
 from ptmtools.store.manifest import Manifest
 from ptmtools.store.remote import folder_to_build, model_file
 from ptmtools.store.transaction import finished_tasks
-from ptmtools.store.writer import admitted, holder, is_held
+from ptmtools.store.writer import admitted
 
 State = Literal["done", "not run", "stale", "damaged"]
 

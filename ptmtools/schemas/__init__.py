@@ -30,7 +30,7 @@ from typing import Any
 HINTS, CELL, STATISTICS = "hints", "cell", "statistics"
 MANIFEST, FILES, VALIDATION, GLB, SCENE = "manifest", "files", "validation", "glb", "scene"
 WALK, TRACE, SIMULATION, SITE = "walk", "trace", "simulation", "site"
-MESSAGES = "messages"
+MESSAGES, TOUR = "messages", "tour"
 INTERLACE, APO, CAMPUS, CAMPUS_WALK = "interlace", "apo", "campus", "campus_walk"
 #: Levels of lists and objects in a value without a schema.
 DEEPEST = 16
@@ -59,6 +59,7 @@ _BOUNDS: dict[str, tuple[set[type], Callable[[Any, Any], bool], str]] = {
     "exclusiveMinimum": (_NUMBERS, operator.gt, "is not more than"),
     "exclusiveMaximum": (_NUMBERS, operator.lt, "is not less than"),
     "minLength": ({str}, operator.ge, "characters, fewer than"),
+    "maxLength": ({str}, operator.le, "characters, more than"),
     "minItems": ({list}, operator.ge, "entries, fewer than"),
     "maxItems": ({list}, operator.le, "entries, more than"),
 }

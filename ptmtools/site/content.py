@@ -13,10 +13,10 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, TypeVar
 from urllib.parse import quote, unquote
 
 from ptmtools.errors import DatabaseError, InputError, LimitError, Rebuild
@@ -28,17 +28,19 @@ from ptmtools.output.served import FORM, Served, read_served
 from ptmtools.pipeline.command import naming_command, open_database
 from ptmtools.pipeline.stages.emit import EMIT
 from ptmtools.progress import Progress, silent
-from ptmtools.rendering.octree_levels import level_differences
-from ptmtools.rendering.octrees import read_octrees
+from ptmtools.site.catalogue import ANGLE, Content, catalogue_of
 from ptmtools.site.entry import DIGITS, Entry, state_of
 from ptmtools.site.geometry import lean_glb
-from ptmtools.site.program import INDEX, address_of, page, program_files
+from ptmtools.site.program import HTML, INDEX, address_of, element, page, program_files
+from ptmtools.site.security import secured
 from ptmtools.site.sets import has_sets, is_of_sets, set_entries
 from ptmtools.site.textures import web_texture, without_exact
+from ptmtools.site.tours import SiteTour, site_tour
 from ptmtools.store.folder import DatabaseFolder, damaged
 from ptmtools.store.layout import SERVED, sha256
 from ptmtools.texture.previews import FORMATS
 
+T = TypeVar("T")
 FORMAT = "ptmtools site"
 DATA = "data"
 JSON, JPEG = "application/json", "image/jpeg"
@@ -86,6 +88,12 @@ class SiteOptions:
         "Write openings: each is one file with everything small that a viewpoint needs, which the "
         "page fetches together with its program. The first viewpoint has one, others while they "
         "add little to the site.",
+    )
+    tour: str = option(
+        "",
+        "Labels and stops (docs/formats/tour.md), or none. Default: tour.json in the folder that "
+        "contains the database, if it exists.",
+        metavar="FILE",
     )
     clients: Literal["page", "vrml"] = option(
         "page",
@@ -141,6 +149,7 @@ class _Builder:
     ) -> None:
         self._folder, self._served, self._options = folder, served, options
         self._progress = progress
+        self._title = options.title or title_of(folder.path)
         self._digests = folder.manifest.outputs()
         self._entries: dict[str, Entry] = {}
         self._notes: list[str] = []
@@ -165,7 +174,7 @@ class _Builder:
             self._vrml()
         text = json.dumps(index, ensure_ascii=False, separators=(",", ":")).encode()
         name = self._add("index", ".json", JSON, text, compressed=True)
-        self._page(index, f"{DATA}/{name}", poster, openings)
+        self._page(index, f"{DATA}/{name}", poster, openings, self._tour())
         return Site(self._entries, index, tuple(self._notes))
 
     def _openings(self, index: Mapping[str, Any]) -> tuple[str, ...]:
@@ -195,17 +204,58 @@ class _Builder:
             for number, one in enumerate(data)
         )
 
+    def _tour(self) -> dict[str, str]:
+        """The settings of the page for the tour: its URL and that of its catalogue; none without a
+        tour."""
+        tour, note = site_tour(
+            self._folder,
+            self._options.tour,
+            lambda file, media: self._add(file.stem, file.suffix, media, file.read_bytes()),
+        )
+        if note:
+            self._notes.append(note)
+        if tour is None:
+            return {}
+        text = json.dumps(tour.document, ensure_ascii=False, separators=(",", ":")).encode()
+        url = f"{DATA}/{self._add('tour', '.json', JSON, text, compressed=True)}"
+        pages = catalogue_of(self._catalogue(tour))
+        for name, html in pages.items():
+            self._entries[name] = Entry(name, secured(html).encode(), HTML, compressed=True)
+        return {"tour": url, "catalogue": next(iter(pages))}
+
+    def _catalogue(self, tour: SiteTour) -> Content:
+        stops: dict[int, Mapping[str, Any]] = {}
+        for stop in tour.document["stops"]:
+            if "label" in stop:
+                stops.setdefault(stop["label"], stop | {"fieldOfView": ANGLE})
+        pictures: dict[int, str] = {}
+        if self._options.pictures and stops:
+            drawn = self._rendered(lambda: _works(self._served, [*stops.values()]))
+            for number, data in zip(stops, drawn or (), strict=False):
+                id = tour.document["labels"][number]["id"]
+                pictures[number] = f"{DATA}/{self._add(f'work-{id}', '.jpg', JPEG, data)}"
+        rooms: dict[int, str] = {}
+        for viewpoint in self._served.index["viewpoints"]:
+            rooms.setdefault(viewpoint["cell"], viewpoint["description"])
+        return Content(tour.document, self._title, rooms, pictures, tour.transcripts, f"{DATA}/")
+
     def _page(
-        self, index: Mapping[str, Any], url: str, poster: str | None, openings: Sequence[str]
+        self,
+        index: Mapping[str, Any],
+        url: str,
+        poster: str | None,
+        openings: Sequence[str],
+        tour: Mapping[str, str],
     ) -> None:
         program = program_files()
-        self._entries |= {entry.name: entry for entry in program.values()}
+        self._entries |= {entry.name: entry for entry in (*program.values(), element())}
         settings = {
             "index": url,
             "worker": program["worker.js"].name,
             "wasm": program["decoder.wasm"].name,
             "poster": poster,
-            "title": self._options.title or title_of(self._folder.path),
+            "title": self._title,
+            **tour,
         }
         preload = [url, program["decoder.wasm"].name]
         if not openings:
@@ -234,6 +284,9 @@ class _Builder:
             yield row | {"files": names, "bytes": sizes}
 
     def _octrees(self) -> Iterator[dict[str, Any]]:
+        from ptmtools.rendering.octree_levels import level_differences
+        from ptmtools.rendering.octrees import read_octrees
+
         octrees = read_octrees(self._served)
         differences = level_differences(self._served.surfaces, octrees).round(3).tolist()
         for row, steps in zip(self._served.index["octrees"], differences, strict=True):
@@ -313,25 +366,23 @@ class _Builder:
             media, suffix, data = _picture_file(self._options.poster)
             poster = self._add("poster", suffix, media, data)
         if self._options.pictures:
-            drawn, small = self._drawn()
+            drawn, small = self._rendered(lambda: _viewpoints(self._served)) or (b"", [])
             if drawn and not poster:
                 poster = self._add("poster", ".jpg", JPEG, drawn)
             for number, (row, data) in enumerate(zip(rows, small, strict=False)):
                 row["thumbnail"] = self._add(f"vp-{number:03}", ".jpg", JPEG, data)
         return rows, poster and f"{DATA}/{poster}"
 
-    def _drawn(self) -> tuple[bytes, list[bytes]]:
-        """The poster and the small pictures; empty where Embree is missing."""
-        from ptmtools.site.pictures import pictures
-
+    def _rendered(self, render: Callable[[], T]) -> T | None:
+        """Pictures; None where Embree is missing."""
         self._progress(0, 1, "pictures")
         try:
-            return pictures(self._served)
+            return render()
         except ImportError:
-            self._notes.append(
-                "no poster or thumbnails: embreex, which renders them, is not installed"
-            )
-            return b"", []
+            note = "no pictures: embreex, which renders them, is not installed"
+            if note not in self._notes:
+                self._notes.append(note)
+            return None
         except LimitError:
             raise
         except InputError as fault:
@@ -383,6 +434,18 @@ class _Builder:
         entry = Entry(f"{DATA}/{name}", source, media, True, compressed, state, digest)
         self._entries[entry.name] = entry
         return name
+
+
+def _viewpoints(served: Served) -> tuple[bytes, list[bytes]]:
+    from ptmtools.site.pictures import pictures
+
+    return pictures(served)
+
+
+def _works(served: Served, views: Sequence[Mapping[str, Any]]) -> list[bytes]:
+    from ptmtools.site.pictures import WORK, pictures_of
+
+    return list(pictures_of(served, [(WORK, view) for view in views]))
 
 
 def _picture_file(file: str) -> tuple[str, str, bytes]:

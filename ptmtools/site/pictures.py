@@ -1,8 +1,9 @@
-"""Pictures of viewpoints, as the page draws them: a poster, and a small one for each in the menu.
+"""Pictures of views, as the page draws them: a poster, a small one for each viewpoint in the menu,
+and one for each work in the catalogue.
 
 Rays find the surfaces of the pixels (`ptmtools.rendering.rays`), and textures are sampled at the
-level nearest to the size of a pixel, up to `FINEST` texels a side: textures that no picture shows
-are not read, and only the first bytes of the others. (Tried: the compiled sampling of
+level nearest to the size of a pixel, up to a number of texels a side: textures that no picture
+shows are not read, and only the first bytes of the others. (Tried: the compiled sampling of
 `ptmtools.rendering`, trilinear: the two look the same at this size, and where it is not compiled
 yet that takes four seconds.)
 """
@@ -10,9 +11,11 @@ yet that takes four seconds.)
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
-from itertools import islice
+from itertools import groupby, islice
 from typing import Any
 
 import numpy as np
@@ -28,19 +31,32 @@ from ptmtools.rendering.previews import read_preview
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.rendering.records import Sight, Triangles, triangles_of
 from ptmtools.scene.colors import to_srgb
+from ptmtools.site.catalogue import PICTURE
 from ptmtools.texture.detail import with_offset
 from ptmtools.texture.model import Limits
 from ptmtools.texture.samples import in_eight_bits
 
-#: Pixels of the poster, and of the small pictures; bytes that they may have.
-POSTER, POSTER_BYTES = (640, 360), 12_000
-SMALL, SMALL_BYTES = (160, 90), 3_000
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of picture: width and height in pixels, the bytes that it may have, and the texels of
+    the longer side of the finest level that is sampled."""
+
+    size: tuple[int, int]
+    most: int
+    finest: int = 256
+
+
+POSTER = Kind((640, 360), 12_000)
+SMALL = Kind((160, 90), 3_000)
+#: Of a work.
+WORK = Kind(PICTURE, 40_000, 512)
 #: Rays for a pixel, each way.
 _FINER = 1.5
 #: Viewpoints that have a picture at most.
 MOST = 32
-#: Texels of the longer side of the finest level that is sampled.
-FINEST = 256
+#: Rays in memory, 50 bytes each.
+_TOGETHER = 1 << 22
 #: The background, 0 to 1, as in the page.
 _SKY = (0.16, 0.17, 0.19)
 _LIMITS = Limits(decoded_bytes=1 << 33)
@@ -52,39 +68,58 @@ Levels = Sequence[NDArray[np.uint8]]
 
 
 def pictures(served: Served) -> tuple[bytes, list[bytes]]:
-    """JPEGs of a database's viewpoints: a poster of the first, and small ones of the first `MOST`.
+    """JPEGs of a database's viewpoints: a poster of the first, and small ones of the first `MOST`;
+    raises as `pictures_of`."""
+    viewpoints = served.index["viewpoints"][:MOST]
+    views = [(POSTER, viewpoints[0]), *((SMALL, each) for each in viewpoints)]
+    poster, *small = pictures_of(served, views)
+    return poster, small
+
+
+def pictures_of(served: Served, views: Sequence[tuple[Kind, Mapping[str, Any]]]) -> Iterator[bytes]:
+    """JPEGs of views: position, direction and fieldOfView as those of viewpoints.
 
     Raises
     ------
     ImportError: Embree is missing.
     InputError, LimitError: those of `ptmtools.texture.open` and `PtmReader.levels`.
     """
-    viewpoints = served.index["viewpoints"][:MOST]
     caster, triangles = Caster(served.surfaces), triangles_of(served.surfaces)
     light = None if served.surfaces.light is None else triangles_of(served.surfaces.light)
-    wanted = [(POSTER, viewpoints[0]), *((SMALL, each) for each in viewpoints)]
-    sights = [_look(caster, size, viewpoint) for size, viewpoint in wanted]
+    rays = np.cumsum([math.prod(_rays(kind.size)) for kind, _ in views])
+    for _, group in groupby(zip(rays // _TOGETHER, views, strict=True), lambda each: each[0]):
+        yield from _drawn(served, caster, triangles, light, [view for _, view in group])
+
+
+def _drawn(
+    served: Served,
+    caster: Caster,
+    triangles: Triangles,
+    light: Triangles | None,
+    views: Sequence[tuple[Kind, Mapping[str, Any]]],
+) -> Iterator[bytes]:
+    """The pictures of some views, with the textures that they show in memory."""
+    sights = [_look(caster, kind.size, view) for kind, view in views]
     shown = np.unique(np.concatenate([np.unique(sight.triangle) for sight in sights]))
     seen = (each.texture[shown[shown >= 0]].tolist() for each in (triangles, light) if each)
     used = {texture for textures in seen for texture in textures} - {-1}
     textures = sorted(used)
     # The lock of the interpreter is free while levels are decoded and numpy is at work.
-    levels = ordered(partial(_levels, served), textures, _THREADS)
+    finest = max(kind.finest for kind, _ in views)
+    levels = ordered(partial(_levels, served, finest), textures, _THREADS)
     draw = partial(_jpeg_of, triangles, light, dict(zip(textures, levels, strict=True)))
-    sizes = [size for size, _ in wanted]
-    poster, *small = ordered(draw, zip(sights, sizes, strict=True), _THREADS)
-    return poster, small
+    kinds = [kind for kind, _ in views]
+    yield from ordered(draw, zip(sights, kinds, strict=True), _THREADS)
 
 
 def _jpeg_of(
     triangles: Triangles,
     light: Triangles | None,
     textures: Mapping[int, Levels],
-    shown: tuple[Sight, tuple[int, int]],
+    shown: tuple[Sight, Kind],
 ) -> bytes:
-    sight, size = shown
-    most = POSTER_BYTES if size == POSTER else SMALL_BYTES
-    return jpeg(_colors(sight, triangles, light, textures), size, most)
+    sight, kind = shown
+    return jpeg(_colors(sight, triangles, light, textures), kind.size, kind.most)
 
 
 def jpeg(colors: Floats, size: tuple[int, int], most: int) -> bytes:
@@ -117,13 +152,13 @@ def _look(caster: Caster, size: tuple[int, int], viewpoint: Mapping[str, Any]) -
     return sight._replace(pixel=2 * np.tan(camera.field_of_view / 2) / size[1])
 
 
-def _levels(served: Served, texture: int) -> Levels:
-    """The levels of a texture up to `FINEST`, always with the coarsest: those of the `.ptm`, or, of
-    one that has too few, of a preview."""
+def _levels(served: Served, finest: int, texture: int) -> Levels:
+    """The levels of a texture up to ``finest`` texels, always with the coarsest: those of the
+    `.ptm`, or, of one that has too few, of a preview."""
     from ptmtools.texture import open as open_ptm
 
     row = served.index["textures"][texture]
-    count = max(1, sum(max(size) <= FINEST for size in sizes_of(row)))
+    count = max(1, sum(max(size) <= finest for size in sizes_of(row)))
     if count > len(row["ends"]):
         fine = (n for n, preview in enumerate(row["previews"]) if preview["level"] >= count - 1)
         return _shown(row, read_preview(served, texture, next(fine))[:count])

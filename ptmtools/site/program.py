@@ -12,13 +12,14 @@ from typing import Any
 
 from ptmtools.errors import InputError
 from ptmtools.site.entry import DIGITS, Entry
+from ptmtools.site.security import secured
 from ptmtools.store.layout import sha256
 
 INDEX = "index.html"
 PAGE = Path(__file__).parent / "page"
 HTML, JAVASCRIPT = "text/html; charset=utf-8", "text/javascript; charset=utf-8"
 #: Scripts that few visits need.
-LATER = ("later.js", "compare.js", "statues.js", "reliefs.js", "sets.js")
+LATER = ("later.js", "compare.js", "statues.js", "reliefs.js", "sets.js", "tour.js", "embedded.js")
 #: The media type of each file.
 PROGRAM = {
     "viewer.js": JAVASCRIPT,
@@ -26,6 +27,8 @@ PROGRAM = {
     "worker.js": JAVASCRIPT,
     "decoder.wasm": "application/wasm",
 }
+#: Defines the element for pages that embed a walk.
+ELEMENT = "ptm-walk.js"
 #: The page of other forms, and their scripts (`ptmtools.site.forms`).
 FORM_PAGE, FORM_SCRIPTS = "form.html", ("apo.js", "interlace.js", "campus.js")
 _FIELD = re.compile(r"\{\{(\w+)\}\}")
@@ -89,8 +92,19 @@ def page(
             f'<link id="opening" rel="next" as="fetch" href="{next(iter(openings))}" '
             f'data-views="{views}" crossorigin>'
         )
-    fields = {"poster": html.escape(str(settings.get("poster") or ""))}
+    catalogue = settings.get("catalogue")
+    fields = {
+        "poster": html.escape(str(settings.get("poster") or "")),
+        "catalogue": f'<p><a href="{catalogue}">The works as text and pictures</a></p>'
+        if catalogue
+        else "",
+    }
     return _filled(INDEX, settings, script, links, fields)
+
+
+def element() -> Entry:
+    """The script of ``<ptm-walk>``, for pages that embed the walk; its name never changes."""
+    return Entry(ELEMENT, _built(ELEMENT), JAVASCRIPT, compressed=True)
 
 
 def form_script(name: str) -> Entry:
@@ -123,4 +137,6 @@ def _filled(
         **fields,
     }
     filled = _FIELD.sub(lambda match: values[match[1]], _built(template).decode())
+    if template == INDEX:
+        filled = secured(filled)
     return Entry(INDEX, filled.encode(), HTML, compressed=True)

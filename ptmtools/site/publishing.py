@@ -217,6 +217,7 @@ def weight_of(site: Site) -> Weight:
     }
     used = {"statues.js"} if "octrees" in index else set()
     used |= {"reliefs.js" for row in index["textures"] if row.keys() & {"relief", "normals"}}
+    used |= {"tour.js" for name in site.entries if name.startswith(f"{DATA}/tour-")}
     bytes_of = {n: link_bytes(e) for n, e in site.entries.items() if _walked(n, used)}
     begins = (f"{DATA}/index-", f"{DATA}/poster-")
     page = sum(size for name, size in bytes_of.items() if not name.startswith(f"{DATA}/"))
@@ -237,7 +238,8 @@ def _walked(name: str, used: Collection[str]) -> bool:
     """Whether every walk may need a file; of scripts that are loaded later those ``used``."""
     script = name.rpartition("/")[2]
     later = (script in LATER and script not in used) or is_of_sets(name)
-    return name == INDEX or (name.startswith(("viewer-", f"{DATA}/")) and not later)
+    walked = name.startswith(("viewer-", f"{DATA}/")) and not name.startswith(f"{DATA}/work-")
+    return name == INDEX or (walked and not later)
 
 
 def _room(entries: Mapping[str, Entry], index: Mapping[str, Any], row: Mapping[str, Any]) -> int:

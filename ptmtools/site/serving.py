@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from ptmtools.errors import InputError
-from ptmtools.lazy import component
 from ptmtools.options import option
 from ptmtools.quantities import parse_bandwidth, parse_duration
 from ptmtools.site.entry import Entry
@@ -81,9 +80,8 @@ def serving(
     files: by their names, or a function that finds them.
     host, port: see `running`. throttle, visits, origin: see `ptmtools.site.responses.app_of`.
 
-    Raises as `require` and `running` do.
+    Raises as `running` does.
     """
-    require()
     from ptmtools.site.responses import app_of
 
     lookup = among(files) if isinstance(files, Mapping) else files
@@ -129,12 +127,6 @@ def running(app: ASGIApp, *, host: str = "127.0.0.1", port: int = 0) -> Iterator
         finally:
             server.should_exit = True
             thread.join()
-
-
-def require() -> None:
-    """Raises `MissingComponentError` PTM-M100 without Starlette or uvicorn."""
-    for module in ("starlette", "uvicorn"):
-        component(module, "PTM-M100", f"{module} is not installed; `ptm serve` needs it", "viewer")
 
 
 def url_of(listener: socket.socket) -> str:

@@ -44,10 +44,10 @@ from ptmtools.store.digests import Digests
 from ptmtools.store.folder import damaged, last_manifest, lists_in, read_manifest, unreadable
 from ptmtools.store.layout import MANIFEST, sha256
 from ptmtools.store.lists import read_list
+from ptmtools.store.lock import acquire
 from ptmtools.store.manifest import Manifest, listed_before
 from ptmtools.store.objects import Headers, Objects, is_url, plain_path
 from ptmtools.store.transaction import recover, remove_former, remove_output
-from ptmtools.store.writer import acquire
 
 #: Objects that are sent or fetched at a time: each waits for the network.
 AT_ONCE = 8

@@ -1,7 +1,7 @@
 """Textures of the atrium: those of the museum where they fit, and some of its own.
 
 Each function takes a generator and a size and returns (size, size, 3) colours 0…255. Like the
-museum's, they use arithmetic that is the same on every machine (`museum_parts.noise`).
+museum's, they use arithmetic that is the same on every machine (`ptmtools.sample.noise`).
 """
 
 from __future__ import annotations
@@ -10,8 +10,9 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from museum_parts.noise import Color, Field, axes, blend, fractal, ramp, step, wave
-from museum_parts.surfaces import SURFACES, Surface, speckled
+
+from ptmtools.sample.noise import Color, Field, axes, blend, fractal, ramp, step, wave
+from ptmtools.sample.surfaces import SURFACES, Surface, speckled
 
 #: Dark and light of each drape.
 DRAPES = {

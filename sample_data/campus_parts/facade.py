@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from museum_parts.mesh import Face, Point
 
 from campus_parts.openings import (
     Hole,
@@ -19,6 +18,7 @@ from campus_parts.openings import (
     within,
 )
 from campus_parts.solids import Flat, Ring, Wall, box, walls_of, zipped
+from ptmtools.sample.mesh import Face, Point
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,12 @@
-"""Tiling textures of walls and roofs. See `museum_parts.noise` for the arithmetic."""
+"""Tiling textures of walls and roofs. See `ptmtools.sample.noise` for the arithmetic."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import numpy as np
-from museum_parts.noise import (
+
+from ptmtools.sample.noise import (
     Color,
     Field,
     axes,
@@ -17,7 +18,7 @@ from museum_parts.noise import (
     warped,
     wave,
 )
-from museum_parts.surfaces import speckled
+from ptmtools.sample.surfaces import speckled
 
 Surface = Callable[[np.random.Generator, int], Field]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from museum_parts.noise import Color
+from ptmtools.sample.noise import Color
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ import itertools
 import math
 
 import numpy as np
-from museum_parts.mesh import Face, Point
 
 from campus_parts.solids import (
     Flat,
@@ -20,6 +19,7 @@ from campus_parts.solids import (
     swept,
     walls_of,
 )
+from ptmtools.sample.mesh import Face, Point
 
 
 def flat(rings: list[Ring], top: float, coping: str, inside: str, surface: str) -> list[Face]:

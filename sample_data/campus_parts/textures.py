@@ -9,8 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from museum_parts.brush import lettered
-from museum_parts.noise import (
+from PIL import Image
+
+from campus_parts.masonry import WALLS_AND_ROOFS, Surface, courses, shaded
+from ptmtools.sample.brush import lettered
+from ptmtools.sample.noise import (
     Color,
     Field,
     axes,
@@ -23,10 +26,7 @@ from museum_parts.noise import (
     warped,
     wave,
 )
-from museum_parts.surfaces import speckled
-from PIL import Image
-
-from campus_parts.masonry import WALLS_AND_ROOFS, Surface, courses, shaded
+from ptmtools.sample.surfaces import speckled
 
 
 def paint(rng: np.random.Generator, size: int) -> Field:

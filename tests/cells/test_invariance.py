@@ -90,9 +90,9 @@ def leaf_pvs(cells: Cells) -> Pvs:
 @pytest.fixture(scope="module")
 def models(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Model]:
     museum = tmp_path_factory.mktemp("museum") / "model"
-    script = ROOT / "sample_data/make_museum.py"
     how = ["--size", "16", "--rooms", "5", "--no-windows"]
-    subprocess.run([sys.executable, script, "-o", museum, *how], check=True)
+    command = [sys.executable, "-m", "ptmtools", "sample", "museum", "-o", museum, *how]
+    subprocess.run(command, check=True)
     return {
         "two_rooms": read(ROOT / "sample_data/two_rooms/two_rooms.obj"),
         "museum": read(museum / "museum.obj"),

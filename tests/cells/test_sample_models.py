@@ -24,10 +24,8 @@ def test_two_rooms() -> None:
 
 
 def test_a_museum_without_windows_is_closed_and_its_walls_are_nobodys(tmp_path: Path) -> None:
-    script = SAMPLES / "make_museum.py"
-    subprocess.run(
-        [sys.executable, script, "-o", tmp_path / "m", "--size", "16", "--no-windows"], check=True
-    )
+    command = [sys.executable, "-m", "ptmtools", "sample", "museum", "-o", tmp_path / "m"]
+    subprocess.run([*command, "--size", "16", "--no-windows"], check=True)
     scene = ingest(tmp_path / "m/museum.obj")
     cells = subdivide(scene)
     assert cells.closed

@@ -8,6 +8,7 @@ import math
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal
@@ -123,9 +124,22 @@ def test_help_has_headings_and_levels() -> None:
     assert "--titles" not in whole
 
 
-@pytest.mark.parametrize("name", ptm.list_commands(click.Context(ptm)))
-def test_every_option_of_every_command_is_explained(name: str) -> None:
-    command = ptm.get_command(click.Context(ptm), name)
+def commands(group: click.Group, words: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    """The words of every command, those of groups within groups included."""
+    for name in group.list_commands(click.Context(group)):
+        command = group.get_command(click.Context(group), name)
+        if isinstance(command, click.Group):
+            yield from commands(command, (*words, name))
+        else:
+            yield (*words, name)
+
+
+@pytest.mark.parametrize("words", [*commands(ptm)], ids=" ".join)
+def test_every_option_of_every_command_is_explained(words: tuple[str, ...]) -> None:
+    command: click.Command | None = ptm
+    for word in words:
+        assert isinstance(command, click.Group)
+        command = command.get_command(click.Context(command), word)
     assert command is not None
     assert command.help
     options = [p for p in command.params if isinstance(p, click.Option)]
@@ -133,7 +147,7 @@ def test_every_option_of_every_command_is_explained(name: str) -> None:
     assert [o.name for o in options if not o.help] == []
     names = [name for o in options for name in (*o.opts, *o.secondary_opts)]
     assert len(names) == len(set(names))
-    assert CliRunner().invoke(ptm, [name, "--help"], obj=Console()).exit_code == 0
+    assert CliRunner().invoke(ptm, [*words, "--help"], obj=Console()).exit_code == 0
 
 
 def test_version_and_help_load_nothing_heavy() -> None:

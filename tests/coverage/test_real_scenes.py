@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[2]
 def museum(tmp_path_factory) -> Path:
     """The sample museum, with small pictures."""
     folder = tmp_path_factory.mktemp("museum")
-    make = [sys.executable, "sample_data/make_museum.py", "-o", str(folder), "--force"]
+    make = [sys.executable, "-m", "ptmtools", "sample", "museum", "-o", str(folder), "--force"]
     subprocess.run([*make, "--size", "16", "--textures", "2"], cwd=ROOT, check=True)
     return folder / "museum.obj"
 

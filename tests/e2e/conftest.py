@@ -75,10 +75,8 @@ def make_museum(folder: Path, rooms: int = 1, textures: int = 9, size: int = 64)
     """The model of a made-up museum, the smallest unless more is asked for."""
     sizes = {"--rooms": rooms, "--textures": textures, "--size": size}
     words = [str(word) for option in sizes.items() for word in option]
-    script = TWO_ROOMS.parent / "make_museum.py"
-    subprocess.run(
-        [sys.executable, script, "-o", folder, *words], check=True, capture_output=True, timeout=300
-    )
+    command = [sys.executable, "-m", "ptmtools", "sample", "museum", "-o", folder, *words]
+    subprocess.run(command, check=True, capture_output=True, timeout=300)
     return folder / "museum.obj"
 
 

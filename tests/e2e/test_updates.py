@@ -18,7 +18,7 @@ import pytest
 from PIL import Image
 
 from ptmtools.store.layout import LOCK, STAGING
-from ptmtools.store.writer import holder
+from ptmtools.store.lock import holder
 from tests.e2e.conftest import Ptm, listing
 
 ROOT = Path(__file__).resolve().parents[2]

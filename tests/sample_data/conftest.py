@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,11 +16,10 @@ SAMPLE_DATA = Path(__file__).resolve().parents[2] / "sample_data"
 
 @pytest.fixture(scope="session")
 def museum() -> ModuleType:
-    if str(SAMPLE_DATA) not in sys.path:
-        sys.path.insert(0, str(SAMPLE_DATA))
-    import make_museum
+    """The generator of the museum."""
+    from ptmtools.sample import museum
 
-    return make_museum
+    return museum
 
 
 @dataclass(frozen=True)

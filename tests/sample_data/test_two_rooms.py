@@ -5,18 +5,19 @@ from __future__ import annotations
 import io
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from ptmtools.sample.two_rooms import two_rooms
+
 FOLDER = Path(__file__).resolve().parents[2] / "sample_data" / "two_rooms"
 
 
-def test_committed_files_are_the_scripts(museum: ModuleType) -> None:
-    made = museum.two_rooms()
+def test_committed_files_are_those_of_the_generator() -> None:
+    made = two_rooms()
     committed = {p.name: p.read_bytes() for p in FOLDER.iterdir()}
     assert committed.keys() == made.keys()
     for name, data in made.items():

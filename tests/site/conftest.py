@@ -69,9 +69,8 @@ def museum_db(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A museum of four rooms and stairs, with twelve small textures."""
 
     def of(folder: Path) -> None:
-        script = ROOT / "sample_data" / "make_museum.py"
         words = ["-o", folder / "model", "--rooms", 4, "--textures", 12, "--size", 256]
-        command = [sys.executable, script, *words]
+        command = [sys.executable, "-m", "ptmtools", "sample", "museum", *words]
         subprocess.run(
             [str(word) for word in command], check=True, capture_output=True, timeout=300
         )

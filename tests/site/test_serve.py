@@ -159,20 +159,6 @@ def test_addresses_that_cannot_be(
     assert "[PTM-I920]" in printed
 
 
-@pytest.mark.parametrize("module", ["starlette", "uvicorn"])
-def test_without_the_extra(
-    folder: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    module: str,
-) -> None:
-    monkeypatch.setitem(sys.modules, module, None)
-    status, printed = failing(capsys, folder)
-    assert status == 6
-    assert f"{module} is not installed" in printed
-    assert "pip install 'ptmtools[viewer]' [PTM-M100]" in printed
-
-
 @pytest.mark.parametrize(
     ("options", "status", "code"),
     [

@@ -30,7 +30,7 @@ from ptmtools.site.sets import is_of_sets
 from ptmtools.site.throttle import Throttle
 from ptmtools.walk import parse_walk
 from tests.scene.bumpy import write_bumpy
-from tests.site.conftest import PLAIN, ROOT, Visiting, build
+from tests.site.conftest import PLAIN, Visiting, build
 from tests.site.test_forms import check_texels
 from tests.site.test_recording import AT_ONCE
 
@@ -50,9 +50,8 @@ TEXELS = """(t) => {
 def hall_db(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A museum of four rooms with interlaced images of five files each."""
     folder = tmp_path_factory.mktemp("sets")
-    script = ROOT / "sample_data" / "make_museum.py"
     words = ["-o", folder / "model", "--rooms", 4, "--textures", 8, "--size", 512]
-    command = [sys.executable, script, *words]
+    command = [sys.executable, "-m", "ptmtools", "sample", "museum", *words]
     subprocess.run([str(word) for word in command], check=True, capture_output=True, timeout=300)
     model = folder / "model" / "museum.obj"
     return build(model, folder / "hall.db", "--format", "gltf,interlace", "--samples", "1")

@@ -23,7 +23,7 @@ from ptmtools.site import pictures as drawing
 from ptmtools.site.content import DATA, Site, SiteOptions, site_of, title_of
 from ptmtools.site.entry import link_bytes
 from ptmtools.site.geometry import lean_glb
-from ptmtools.site.program import LATER, PROGRAM
+from ptmtools.site.program import ELEMENT, LATER, PROGRAM
 from ptmtools.site.publishing import weight_of
 from ptmtools.site.textures import web_texture
 from ptmtools.texture import EncodeOptions, decode, decode_levels, encode, read_header
@@ -72,7 +72,7 @@ def test_names_are_hashes(site: Site, two_rooms: Path) -> None:
     assert previews
     for name, entry in site.entries.items():
         assert entry.name == name
-        assert entry.forever is (name != "index.html")
+        assert entry.forever is (name not in ("index.html", ELEMENT))
         if name.startswith(DATA) and name not in previews and "/opening-" not in name:
             digest = hashlib.sha256(entry.read()).hexdigest()
             assert re.fullmatch(rf"data/[\w-]+-{digest[:10]}\.\w+", name)
@@ -178,15 +178,15 @@ def test_the_page(site: Site, two_rooms: Path) -> None:
 
 def test_pictures(site: Site) -> None:
     poster = site.entries[told(site)["poster"]].read()
-    assert len(poster) <= drawing.POSTER_BYTES
+    assert len(poster) <= drawing.POSTER.most
     image = Image.open(io.BytesIO(poster))
-    assert (image.format, image.size) == ("JPEG", drawing.POSTER)
+    assert (image.format, image.size) == ("JPEG", drawing.POSTER.size)
     # Not a blank one.
     assert np.asarray(image.convert("L")).std() > 5
     for row in site.index["viewpoints"]:
         small = site.entries[f"data/{row['thumbnail']}"].read()
-        assert len(small) <= drawing.SMALL_BYTES
-        assert Image.open(io.BytesIO(small)).size == drawing.SMALL
+        assert len(small) <= drawing.SMALL.most
+        assert Image.open(io.BytesIO(small)).size == drawing.SMALL.size
 
 
 def test_the_poster_shows_the_first_viewpoint(two_rooms: Path, site: Site) -> None:
@@ -328,6 +328,7 @@ def test_weight(site: Site) -> None:
     weight = weight_of(site)
     sizes = {name: link_bytes(entry) for name, entry in site.entries.items()}
     needed = [name for name in sizes if not name.endswith(tuple(f"/{each}" for each in LATER))]
+    needed.remove(ELEMENT)
     assert weight.page == sum(sizes[name] for name in needed if not name.startswith("data/"))
     assert weight.whole == sum(sizes[name] for name in needed)
     row = site.index["cells"][site.index["viewpoints"][0]["cell"]]

@@ -34,8 +34,8 @@ OPTIONS = {
 @pytest.fixture(scope="module")
 def models(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     museum = tmp_path_factory.mktemp("museum") / "model"
-    script = ROOT / "sample_data/make_museum.py"
-    subprocess.run([sys.executable, script, "-o", museum, "--size", "16"], check=True)
+    command = [sys.executable, "-m", "ptmtools", "sample", "museum", "-o", museum, "--size", "16"]
+    subprocess.run(command, check=True)
     real = {name: shared / f"scenes/{name}/{name}.obj" for name in OPTIONS if name != "museum"}
     return {**real, "museum": museum / "museum.obj"}
 

@@ -28,6 +28,8 @@ export class App {
   #listeners = new Map();
   /** What `?memory=auto` measured. @type {import("./measuring.js").Measured | null} */
   measured = null;
+  /** The tour, once it is there. @type {import("./tour/tour.js").Tour | null} */
+  tour = null;
   /** The policy that was chosen last; it may be on its way. */
   #wanted = "";
 

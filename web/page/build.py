@@ -26,7 +26,7 @@ PTM = ROOT / "web" / "ptm" / "src"
 FORMS = HERE / "forms"
 OUTPUT = ROOT / "ptmtools" / "site" / "page"
 #: Scripts that the page loads when it needs them.
-LATER = ("later.js", "compare.js", "statues.js", "reliefs.js", "sets.js")
+LATER = ("later.js", "compare.js", "statues.js", "reliefs.js", "sets.js", "tour.js", "embedded.js")
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _LINE_END = re.compile(r"\s*\n\s*")
 #: Template strings with shaders, and what esbuild leaves in them.
@@ -69,6 +69,7 @@ def build(folder: Path) -> None:
         **{f"{name}.js": script(FORMS / f"{name}.js") for name in ("apo", "interlace", "campus")},
         "viewer.js": script(HERE / "main.js"),
         **{name: script(HERE / name) for name in LATER},
+        "ptm-walk.js": minified(ROOT / "web" / "embed" / "ptm-walk.js"),
         "worker.js": minified(PTM / "worker.js"),
         "decoder.wasm": (PTM / "decoder.wasm").read_bytes(),
     }

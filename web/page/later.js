@@ -1,6 +1,9 @@
 // The panels, the policies besides the default, the measurement of texture memory, and decoding of previews
 // for browsers whose workers cannot: a script of its own, loaded when one of them is first needed.
 
+import { addStyle } from "./ui/elements.js";
+import { PANEL_STYLE } from "./ui/panel-style.js";
+
 export { WholeMemory } from "./gl/whole-memory.js";
 export { measureBudget } from "./measuring.js";
 export { Paper } from "./policy/paper.js";
@@ -9,3 +12,5 @@ export { attachMenu } from "./ui/menu.js";
 export { attachMinimap } from "./ui/minimap.js";
 export { attachOverlay } from "./ui/overlay.js";
 export { decodePreview } from "../ptm/src/preview.js";
+
+addStyle(PANEL_STYLE);

@@ -3,7 +3,7 @@
 import { DecoderWorkers, hasSimd, loadViewDecoder } from "../ptm/src/index.js";
 import { App } from "./app.js";
 import { readConfig, Site } from "./data/site.js";
-import { loadSets } from "./load-later.js";
+import { loadEmbedding, loadSets, loadTour } from "./load-later.js";
 import { PageError } from "./net/errors.js";
 import { clock, Fetcher } from "./net/fetcher.js";
 import { Opening } from "./net/opening.js";
@@ -64,6 +64,9 @@ async function main() {
     const app = new App(canvas, gl, await site, config, decoders, options);
     if (attach) attach(app.walk);
     Object.assign(window, { ptm: app });
+    if (parent !== window || query.has("ui")) loadEmbedding().then((s) => s.attachEmbedding(app), () => {});
+    const { tour } = config;
+    if (tour) app.on("first-picture", async () => (app.tour = await loadTour().then((s) => s.attachTour(app, tour), () => null)));
     const controls = attachUi(app);
     let before = clock();
     const frame = () => {

@@ -65,6 +65,8 @@ export class Walkthrough {
   comparison = null;
   /** @type {import("./recorder.js").Recorder | null} */
   recorder = null;
+  /** Tests markers against the depth of the item buffer. @type {((camera: import("./gl/camera.js").Camera) => void) | null} */
+  probe = null;
   /** Times of the last change of the picture, of that of the view or its geometry, and of the last picture, s. */
   #changed = 0;
   #turned = 0;
@@ -415,6 +417,7 @@ export class Walkthrough {
       drawn: this.drawn,
       missing: this.#missing,
       sizeOf: (t) => [textures[t].width, textures[t].height],
+      probe: this.probe,
     });
   }
 

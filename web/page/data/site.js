@@ -9,6 +9,8 @@ import { levelSizes } from "../../client/src/levels.js";
  * @property {string} wasm
  * @property {string} [poster]
  * @property {string} title
+ * @property {string} [tour] URL of the tour
+ * @property {string} [catalogue] and of its plain page
  *
  * @typedef {object} Preview
  * @property {string} file

@@ -84,8 +84,9 @@ export class ItemBuffer {
    * @param {import("./renderer.js").Drawn[]} view.drawn
    * @param {{cell: number, box: number[]}[]} view.missing
    * @param {(texture: number) => number[]} view.sizeOf texels of the finest level, across and down
+   * @param {((camera: Camera) => void) | null} view.probe tests more against the depth of the surfaces
    */
-  draw({ camera, aspect, lines, now, drawn, missing, sizeOf }) {
+  draw({ camera, aspect, lines, now, drawn, missing, sizeOf, probe }) {
     const { gl, item } = this;
     this.#resize(aspect);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
@@ -114,6 +115,7 @@ export class ItemBuffer {
         buffers.draw(batch);
       }
     }
+    probe?.(camera);
     if (missing.length) this.#drawPlaceholders(camera, missing);
     this.#read(0);
     if (missing.length) this.#read(1);

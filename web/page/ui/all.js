@@ -61,6 +61,7 @@ import { attachLoading } from "./loading.js";
  * @property {number} cell
  * @property {{code: string, message: string}} error
  * @property {{message: string}} notice
+ * @property {string} label the id of a label that opens
  */
 
 /** Fill a panel. @type {Record<string, (panel: HTMLElement, app: App) => Promise<void>>} */

@@ -35,3 +35,10 @@ export function inBytes(bytes) {
   const unit = bytes < 1e6 ? ["kB", 1e3] : ["MB", 1e6], value = bytes / Number(unit[1]);
   return `${value.toFixed(value < 10 ? 1 : 0)} ${unit[0]}`;
 }
+
+/** Adds a style to the page. @param {string} css */
+export function addStyle(css) {
+  const sheet = new CSSStyleSheet();
+  sheet.replaceSync(css);
+  document.adoptedStyleSheets = [...document.adoptedStyleSheets, sheet];
+}

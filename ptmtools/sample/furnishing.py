@@ -12,9 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from museum_parts.mesh import Face, Point, Thing, Uv, block, tiled
-from museum_parts.plan import STAIR_LANDING, STAIR_RUN, STOREY, Box, Plan
-from museum_parts.shell import TILE, Panel
+from ptmtools.errors import InputError
+from ptmtools.sample.mesh import Face, Point, Thing, Uv, block, tiled
+from ptmtools.sample.plan import STAIR_LANDING, STAIR_RUN, STOREY, Box, Plan
+from ptmtools.sample.shell import TILE, Panel
 
 #: Distance of a frame's back, and of its canvas, from the wall; mm.
 HANG = (2, 20)
@@ -47,7 +48,7 @@ class Place:
 def places(panels: list[Panel], wanted: int) -> list[Place]:
     """Returns positions for at least ``wanted`` pictures, with as much spacing as possible.
 
-    Raises ValueError if they do not fit even with the least spacing.
+    Raises InputError: PTM-I111 they do not fit even with the least spacing.
     """
     walls = [p for p in panels if p.top - p.bottom > 3500 and p.high - p.low > 1300]
     for pitch, rows, tall in HANGINGS:
@@ -63,7 +64,11 @@ def places(panels: list[Panel], wanted: int) -> list[Place]:
                 ]
         if len(actual) >= wanted:
             return actual
-    raise ValueError(f"{wanted} pictures do not fit on the walls")
+    raise InputError(
+        "PTM-I111",
+        f"{wanted} pictures do not fit on the walls",
+        remedy="use more rooms or fewer pictures",
+    )
 
 
 def hang(

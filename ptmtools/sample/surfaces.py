@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from museum_parts.noise import (
+from ptmtools.sample.noise import (
     Color,
     Field,
     axes,

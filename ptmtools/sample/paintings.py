@@ -12,9 +12,9 @@ from collections.abc import Callable
 import numpy as np
 from PIL import Image
 
-from museum_parts.abstract import color_field, constructed, drips, marbled
-from museum_parts.figurative import landscape, night, portrait, seascape, still_life
-from museum_parts.printed import manuscript, poster
+from ptmtools.sample.abstract import color_field, constructed, drips, marbled
+from ptmtools.sample.figurative import landscape, night, portrait, seascape, still_life
+from ptmtools.sample.printed import manuscript, poster
 
 Painting = Callable[[np.random.Generator, int], Image.Image]
 

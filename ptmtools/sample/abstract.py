@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from PIL import Image, ImageDraw
 
-from museum_parts.brush import painted, pick, woven
-from museum_parts.noise import (
+from ptmtools.sample.brush import painted, pick, woven
+from ptmtools.sample.noise import (
     Color,
     axes,
     blend,

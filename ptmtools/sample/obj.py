@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from museum_parts.mesh import Point, Thing, Uv
+from ptmtools.sample.mesh import Point, Thing, Uv
 
 
 def number(value: float, digits: int) -> str:

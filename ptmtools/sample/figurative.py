@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from PIL import Image
 
-from museum_parts.brush import BOLD, FINE, disk, inside, painted, pick, signed
-from museum_parts.noise import (
+from ptmtools.sample.brush import BOLD, FINE, disk, inside, painted, pick, signed
+from ptmtools.sample.noise import (
     Color,
     Field,
     axes,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from PIL import Image
 
-from museum_parts.brush import disk, inside, lettered, pick, woven
-from museum_parts.noise import (
+from ptmtools.sample.brush import disk, inside, lettered, pick, woven
+from ptmtools.sample.noise import (
     Color,
     axes,
     blend,

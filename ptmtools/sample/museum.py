@@ -1,36 +1,31 @@
-"""Generates the sample museum, a building to try ptmtools on, as OBJ, MTL and PNG files.
-
-    python sample_data/make_museum.py -o sample_data/museum
-    python sample_data/make_museum.py -o big --rooms 200 --textures 120
-    python sample_data/make_museum.py -o mine --images ~/Pictures
-    python sample_data/make_museum.py --two-rooms -o sample_data/two_rooms
+"""The sample museum, a building to try ptmtools on: OBJ, MTL and PNG files.
 
 Metres, Y up. Floors of rooms, joined by doorways, corridors and stairwells; walls with thickness;
 windows of transparent glass (without them, by ``--no-windows``, the building is closed); pictures,
 statues and benches. The same seed gives the same bytes on every machine (for the same numpy and
-Pillow). Needs numpy and Pillow, not ptmtools.
+Pillow).
 """
 
 from __future__ import annotations
 
-import argparse
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from museum_parts.files import HEAD, File, between, constant, png, write
-from museum_parts.furnishing import furnish, hang
-from museum_parts.mesh import Thing
-from museum_parts.noise import bytes_of
-from museum_parts.obj import number, obj_text
-from museum_parts.paintings import PAINTINGS
-from museum_parts.plan import make_plan
-from museum_parts.shell import make_shell
-from museum_parts.surfaces import SURFACES
-from museum_parts.two_rooms import two_rooms
 from PIL import Image, ImageOps
+
+from ptmtools.errors import InputError
+from ptmtools.sample.files import HEAD, File, constant, png
+from ptmtools.sample.furnishing import furnish, hang
+from ptmtools.sample.mesh import Thing
+from ptmtools.sample.noise import bytes_of
+from ptmtools.sample.obj import number, obj_text
+from ptmtools.sample.options import MuseumOptions
+from ptmtools.sample.paintings import PAINTINGS
+from ptmtools.sample.plan import make_plan
+from ptmtools.sample.shell import make_shell
+from ptmtools.sample.surfaces import SURFACES
 
 Color = tuple[float, float, float]
 
@@ -55,18 +50,6 @@ MATERIALS: dict[str, tuple[str, Color, Color]] = {
     "roof": ("stone", (0.5, 0.5, 0.52), (0.32, 0.32, 0.33)),
 }
 GLASS = "newmtl glass\nKd 0.75 0.85 0.9\nd 0.3\nillum 1\n"
-
-
-@dataclass(frozen=True)
-class MuseumOptions:
-    """Options of `make_museum`; ``size`` is the side of the square textures, texels."""
-
-    rooms: int = 12
-    textures: int = 31
-    size: int = 1024
-    seed: int = 1
-    windows: bool = True
-    images: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -114,13 +97,15 @@ def generated_pictures(count: int, options: MuseumOptions) -> list[Picture]:
     ]
 
 
-def users_pictures(folder: Path) -> list[Picture]:
-    """Returns the images of a folder, ordered by name, under names safe on every system.
+def users_pictures(folder: Path) -> tuple[list[Picture], list[str]]:
+    """The images of a folder, ordered by name, under names safe on every system, and notes on
+    files that Pillow cannot read.
 
     PNG and JPEG files are copied byte for byte unless the camera orientation must be applied; other
-    formats are converted to PNG. Files that Pillow cannot read are named on stderr.
+    formats are converted to PNG.
     """
     actual: list[Picture] = []
+    notes: list[str] = []
     for path in sorted(p for p in folder.iterdir() if p.is_file()):
         try:
             with Image.open(path) as image:
@@ -129,7 +114,7 @@ def users_pictures(folder: Path) -> list[Picture]:
                 kept = image.format in ("PNG", "JPEG") and image.getexif().get(0x0112, 1) == 1
                 suffix = ".jpg" if kept and image.format == "JPEG" else ".png"
         except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-            print(f"make_museum: {path}: not an image, left out: {error}", file=sys.stderr)
+            notes.append(f"{path}: not an image, left out: {error}")
             continue
         data = (
             path.read_bytes()
@@ -143,7 +128,7 @@ def users_pictures(folder: Path) -> list[Picture]:
                 constant(data),
             )
         )
-    return actual
+    return actual, notes
 
 
 def mtl_text(things: list[Thing], surfaces: list[str], pictures: list[Picture]) -> str:
@@ -164,22 +149,29 @@ def mtl_text(things: list[Thing], surfaces: list[str], pictures: list[Picture]) 
     return "\n".join(blocks)
 
 
-def make_museum(options: MuseumOptions) -> Iterator[File]:
-    """Returns the files of the museum: relative path and a function that returns the bytes; the OBJ
-    comes last.
+def make_museum(
+    options: MuseumOptions, note: Callable[[str], object] = lambda text: None
+) -> Iterator[File]:
+    """The files of the museum: relative path and a function that returns the bytes; the OBJ comes
+    last. ``note`` gets a line about each of the user's files that is left out.
 
-    Raises ValueError if there are more pictures than walls, or if no image of the user can be read.
+    Raises InputError: PTM-I111 more pictures than the walls hold, or no image of the user can be
+    read.
     """
     plan = make_plan(options.rooms, generator(options.seed, 0), windows=options.windows)
     shell, panels = make_shell(plan)
     furniture = furnish(plan, generator(options.seed, 4))
     surfaces = surface_pictures(surface_names([*shell, *furniture], options.textures), options)
     if options.images:
-        pictures = users_pictures(options.images)
+        pictures, notes = users_pictures(Path(options.images))
+        for text in notes:
+            note(text)
     else:
         pictures = generated_pictures(options.textures - len(surfaces), options)
     if not pictures:
-        raise ValueError(f"no image in {options.images}")
+        raise InputError(
+            "PTM-I111", "contains no image", file=options.images, remedy="name a folder of images"
+        )
     hung = hang(panels, [p.aspect for p in pictures], options.rooms, generator(options.seed, 3))
     things = [*shell, *hung, *furniture]
     head = [
@@ -194,47 +186,3 @@ def make_museum(options: MuseumOptions) -> Iterator[File]:
         yield f"textures/{picture.name}", picture.load
     yield "museum.mtl", lambda: materials
     yield "museum.obj", lambda: model
-
-
-def main(arguments: list[str] | None = None) -> int:
-    default = MuseumOptions()
-    parser = argparse.ArgumentParser(
-        description="Make the sample museum: OBJ, MTL and PNG files.",
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
-    )
-    add = parser.add_argument
-    add("-o", "--output", type=Path, required=True, metavar="DIR", help="folder to write")
-    add("--rooms", type=between(1, 2000), default=default.rooms, help="rooms besides corridors")
-    add(
-        "--textures",
-        type=between(1, 5000),
-        default=default.textures,
-        help="number of generated images",
-    )
-    add("--size", type=between(4, 8192), default=default.size, help="side of an image, texels")
-    add("--seed", type=between(0, 2**63), default=default.seed, help="seed of the random numbers")
-    add("--images", type=Path, metavar="DIR", help="hang the images of this folder instead")
-    add("--no-windows", action="store_true", help="a closed building")
-    add("--two-rooms", action="store_true", help="write the hand-checkable two rooms instead")
-    add("--force", action="store_true", help="write into a folder that holds other files")
-    given = parser.parse_args(arguments)
-    if given.images and not given.images.is_dir():
-        parser.error(f"{given.images} is not a folder")
-    options = MuseumOptions(
-        given.rooms, given.textures, given.size, given.seed, not given.no_windows, given.images
-    )
-    try:
-        if given.two_rooms:
-            files = [(name, constant(data)) for name, data in two_rooms().items()]
-        else:
-            files = list(make_museum(options))
-        write(given.output, files, force=given.force)
-    except (OSError, ValueError) as error:
-        parser.exit(1, f"make_museum: {error}\n")
-    total = sum((given.output / name).stat().st_size for name, _ in files)
-    print(f"{given.output}: {len(files)} files, {total / 1e6:.1f} MB")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -7,9 +7,9 @@ import io
 import numpy as np
 from PIL import Image
 
-from museum_parts.mesh import Face, Point, Thing, Uv
-from museum_parts.obj import obj_text
-from museum_parts.shell import rectangles
+from ptmtools.sample.mesh import Face, Point, Thing, Uv
+from ptmtools.sample.obj import obj_text
+from ptmtools.sample.shell import rectangles
 
 HEAD = """\
 # ptmtools sample: two rooms joined by one door. Metres, Y up; closed; all faces seen from inside.

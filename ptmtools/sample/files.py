@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import argparse
 import io
 import os
 import re
-import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
 from PIL import Image
+
+from ptmtools.errors import OutputError
+from ptmtools.files import writing
+from ptmtools.progress import Progress, silent
 
 HEAD = "# ptmtools sample"
 #: A path in the output folder, and a function that returns the bytes.
@@ -45,38 +47,35 @@ def ours(folder: Path, stem: str) -> set[str]:
     return {f"{stem}.obj", f"{stem}.mtl", *(name for name in images if safe.fullmatch(name))}
 
 
-def write(folder: Path, files: list[File], *, force: bool) -> None:
+def write(folder: Path, files: list[File], *, force: bool, progress: Progress = silent) -> None:
     """Writes the files, all or (short of a power cut during the renames) none.
 
     A folder that is not empty and holds no sample is refused without ``force``; foreign files are
     left alone. Textures of an earlier sample that the new one lacks are removed.
+
+    Raises OutputError: PTM-O001 the folder holds other files, PTM-O002 it cannot be written,
+    PTM-O003 the disk is full.
     """
-    before = ours(folder, Path(files[-1][0]).stem) if folder.is_dir() else set()
-    if folder.exists() and not folder.is_dir():
-        raise NotADirectoryError(f"{folder} is not a folder")
-    if folder.exists() and not before and not force and any(folder.iterdir()):
-        raise FileExistsError(f"{folder} holds files that this script did not write; use --force")
-    folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".sample-", dir=folder) as staging:
-        for k, (name, load) in enumerate(files):
-            if sys.stderr.isatty():
-                print(f"\r{k + 1}/{len(files)} {name:40}", end="", file=sys.stderr)
-            (Path(staging) / str(k)).write_bytes(load())
-        if sys.stderr.isatty():
-            print(file=sys.stderr)
-        for k, (name, _) in enumerate(files):
-            target = folder / name
-            target.parent.mkdir(exist_ok=True)
-            os.replace(Path(staging) / str(k), target)
-    for name in sorted(before - {name for name, _ in files}):
-        (folder / name).unlink(missing_ok=True)
-
-
-def between(least: int, most: int) -> Callable[[str], int]:
-    def number(text: str) -> int:
-        value = int(text)
-        if not least <= value <= most:
-            raise argparse.ArgumentTypeError(f"{value} is not between {least} and {most}")
-        return value
-
-    return number
+    with writing(folder):
+        if folder.exists() and not folder.is_dir():
+            raise OutputError("PTM-O002", "is not a folder", file=folder, remedy="name a folder")
+        before = ours(folder, Path(files[-1][0]).stem) if folder.is_dir() else set()
+        if folder.exists() and not before and not force and any(folder.iterdir()):
+            raise OutputError(
+                "PTM-O001",
+                "holds files that are no sample",
+                file=folder,
+                remedy="name another folder, or use --force",
+            )
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".sample-", dir=folder) as staging:
+            for k, (_, load) in enumerate(files):
+                progress(k, len(files), "files")
+                (Path(staging) / str(k)).write_bytes(load())
+            progress(len(files), len(files), "files")
+            for k, (name, _) in enumerate(files):
+                target = folder / name
+                target.parent.mkdir(exist_ok=True)
+                os.replace(Path(staging) / str(k), target)
+        for name in sorted(before - {name for name, _ in files}):
+            (folder / name).unlink(missing_ok=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from museum_parts.noise import (
+from ptmtools.sample.noise import (
     Color,
     Field,
     axes,

@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
-from museum_parts.mesh import Face, Point, Thing, block, tiled
-from museum_parts.plan import Box, Plan
+from ptmtools.sample.mesh import Face, Point, Thing, block, tiled
+from ptmtools.sample.plan import Box, Plan
 
 #: Metres per repetition of the image of a surface.
 TILE = {

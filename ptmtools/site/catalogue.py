@@ -1,0 +1,252 @@
+"""The catalogue of a tour: the same content as a plain page, which needs no script.
+
+One page for each language, in the order of the tour and under the names of the rooms: title, maker,
+date, text and description of each work, a picture of it as its stop shows it, its sound, and the
+text of the captions. Each work links to its place in the walk.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from itertools import groupby
+from typing import Any, TypeVar
+
+from ptmtools.tour.markdown import html_of, plain_text
+from ptmtools.tour.model import Texts, in_language
+
+T = TypeVar("T")
+INDEX = "index.html"
+#: Width and height of the pictures, pixels, and their vertical field of view, radians.
+PICTURE, ANGLE = (480, 360), math.pi / 3
+#: Right-to-left scripts, by the languages that are usually written in them.
+_RIGHT_TO_LEFT = {"ar", "fa", "he", "ur", "yi", "ps", "sd", "ug", "dv", "ku"}
+_STYLE = """
+:root { color-scheme: light dark; font: 17px/1.55 system-ui, sans-serif; }
+body { max-width: 46rem; margin: 0 auto; padding: 1rem; }
+a { color: #0b57a4; } a:hover { text-decoration-thickness: 2px; }
+:focus-visible { outline: 3px solid currentColor; outline-offset: 3px; }
+img { display: block; width: 100%; height: auto; border-radius: 6px; }
+article { margin: 0 0 3rem; } h2 { margin: 2.5rem 0 1rem; } h3 { margin: .8rem 0 .2rem; }
+.by { margin: 0 0 .8rem; } audio { width: 100%; } nav ul { padding: 0; list-style: none; }
+nav li { display: inline-block; margin-inline-end: 1rem; }
+.skip:not(:focus) { position: absolute; left: -999px; }
+@media (prefers-color-scheme: dark) { a { color: #9cc7ff; } }
+"""
+#: Words of the page by language; others are in English.
+WORDS: dict[str, dict[str, str]] = {
+    "en": {
+        "catalogue": "Catalogue",
+        "walk": "Walk through the building",
+        "here": "See it in the walk",
+        "about": "More about it",
+        "captions": "Text of the recording",
+        "image": "Description of the picture",
+        "elsewhere": "Other works",
+        "contents": "Contents",
+        "skip": "Skip to the content",
+        "languages": "Languages",
+        "access": "This page has the content of the walk as text and pictures. It works without "
+        "scripts, by keyboard and with screen readers, and can be enlarged to 400 %.",
+    }
+}
+
+
+@dataclass(frozen=True)
+class Content:
+    """The content of a catalogue.
+
+    Attributes
+    ----------
+    tour: the document of the site's tour (`ptmtools.site.tours`).
+    title: of the site.
+    rooms: cell → name of the room.
+    pictures: label → URL of its picture, relative to the page.
+    transcripts: label → texts of its captions.
+    base: URL of the folder of the tour's files, relative to the page, with a slash.
+    """
+
+    tour: Mapping[str, Any]
+    title: str
+    rooms: Mapping[int, str]
+    pictures: Mapping[int, str]
+    transcripts: Mapping[int, Texts]
+    base: str
+
+
+def page_name(language: str, languages: Sequence[str]) -> str:
+    """The file of a language: the default one has the short name."""
+    return "catalogue.html" if language == languages[0] else f"catalogue-{language}.html"
+
+
+def catalogue_of(content: Content) -> dict[str, str]:
+    """The pages, file → HTML; the first is in the default language."""
+    languages = content.tour["languages"]
+    return {page_name(tag, languages): _Page(content, tag).html() for tag in languages}
+
+
+class _Page:
+    """A page of the catalogue in one language."""
+
+    def __init__(self, content: Content, language: str) -> None:
+        self._content, self._tour, self._language = content, content.tour, language
+        self._words = WORDS["en"] | WORDS.get(language.split("-")[0], {})
+        own = self._plain(content.tour.get("title")) or content.title
+        self._title = f"{own}: {self._words['catalogue']}"
+
+    def html(self) -> str:
+        """The whole page."""
+        language, words = self._language, self._words
+        direction = "rtl" if language.split("-")[0].lower() in _RIGHT_TO_LEFT else "ltr"
+        others = [tag for tag in self._tour["languages"] if tag != language]
+        names = {tag: page_name(tag, self._tour["languages"]) for tag in others}
+        alternates = "".join(
+            f'<link rel="alternate" hreflang="{escape(tag)}" href="{escape(name)}">\n'
+            for tag, name in names.items()
+        )
+        links = "".join(
+            f'<li><a lang="{escape(tag)}" hreflang="{escape(tag)}" href="{escape(name)}">'
+            f"{escape(tag)}</a></li>\n"
+            for tag, name in names.items()
+        )
+        nav = (
+            f'<nav aria-label="{escape(words["languages"])}"><ul>\n{links}</ul></nav>\n'
+            if others
+            else ""
+        )
+        return (
+            f'<!doctype html>\n<html lang="{escape(language)}" dir="{direction}">\n<head>\n'
+            '<meta charset="utf-8">\n<meta name="viewport" content="width=device-width, '
+            f'initial-scale=1">\n<title>{escape(self._title)}</title>\n{alternates}'
+            f'<link rel="icon" href="data:,">\n<style>{_STYLE}</style>\n'
+            f"{self._linked_data()}</head>\n<body>\n"
+            f'<a class="skip" href="#content">{escape(words["skip"])}</a>\n'
+            f"<header>\n<h1>{escape(self._title)}</h1>\n"
+            f'<p><a href="{INDEX}">{escape(words["walk"])}</a></p>\n{nav}</header>\n'
+            f'<main id="content">\n{"".join(self._sections())}</main>\n'
+            f"<footer>\n<p>{escape(words['access'])}</p>\n</footer>\n</body>\n</html>\n"
+        )
+
+    def _sections(self) -> Iterator[str]:
+        """Works under the names of their rooms."""
+        for room, group in groupby(self._order(), self._room):
+            articles = "".join(self._article(number) for number in group)
+            yield f"<section>\n<h2>{escape(room)}</h2>\n{articles}</section>\n"
+
+    def _order(self) -> list[int]:
+        """Labels: rooms by their first stop, in them the order of the tour."""
+        stops = [stop["label"] for stop in self._tour["stops"] if "label" in stop]
+        order = list(dict.fromkeys([*stops, *range(len(self._tour["labels"]))]))
+        rooms = list(dict.fromkeys(map(self._room, order)))
+        return sorted(order, key=lambda number: rooms.index(self._room(number)))
+
+    def _room(self, number: int) -> str:
+        cell = self._tour["labels"][number]["cell"]
+        return self._content.rooms.get(cell, self._words["elsewhere"])
+
+    def _article(self, number: int) -> str:
+        label, words = self._tour["labels"][number], self._words
+        by = [part for name in ("maker", "date") if (part := self._span(label.get(name)))]
+        image = self._plain(label.get("image"))
+        parts = [f"<h3>{self._heading(number)}</h3>\n"]
+        if by:
+            parts.append(f'<p class="by">{", ".join(by)}</p>\n')
+        if number in self._content.pictures:
+            width, height = PICTURE
+            parts.append(
+                f'<img src="{escape(self._content.pictures[number])}" width="{width}" '
+                f'height="{height}" loading="lazy" alt="{escape(image or self._name(number))}">\n'
+            )
+        nodes, tag = self._version(label.get("text"))
+        if nodes:
+            parts.append(f"<div{_lang(tag)}>{html_of(nodes)}</div>\n")
+        if image:
+            parts.append(
+                f"<details><summary>{escape(words['image'])}</summary>"
+                f"<p>{self._span(label['image'])}</p></details>\n"
+            )
+        parts += self._sound(number)
+        link = self._plain(label.get("link"))
+        if link:
+            parts.append(_link(link, words["about"]))
+        parts.append(_link(f"{INDEX}?label={label['id']}", words["here"]))
+        return f'<article id="{escape(label["id"])}">\n{"".join(parts)}</article>\n'
+
+    def _sound(self, number: int) -> Iterator[str]:
+        label = self._tour["labels"][number]
+        sound, captions = self._plain(label.get("sound")), self._plain(label.get("captions"))
+        if not sound:
+            return
+        track = (
+            f'<track kind="captions" src="{escape(self._content.base + captions)}" default>'
+            if captions
+            else ""
+        )
+        source = escape(self._content.base + sound)
+        yield f'<audio controls preload="none" src="{source}">{track}</audio>\n'
+        if text := self._plain(self._content.transcripts.get(number)):
+            yield (
+                f"<details><summary>{escape(self._words['captions'])}</summary>"
+                f"<p>{escape(text)}</p></details>\n"
+            )
+
+    def _heading(self, number: int) -> str:
+        label = self._tour["labels"][number]
+        return self._span(label.get("title")) or escape(label["id"])
+
+    def _name(self, number: int) -> str:
+        label = self._tour["labels"][number]
+        parts = [self._plain(label.get("title")) or label["id"], self._plain(label.get("maker"))]
+        return ", ".join(filter(None, parts))
+
+    def _version(self, texts: Mapping[str, T] | None) -> tuple[T, str] | tuple[None, str]:
+        return in_language(texts, self._language, self._tour["languages"][0])
+
+    def _plain(self, texts: Texts | None) -> str:
+        return self._version(texts)[0] or ""
+
+    def _span(self, texts: Texts | None) -> str:
+        """A text as HTML, marked with its language where that is not the page's."""
+        text, tag = self._version(texts)
+        if not text:
+            return ""
+        mark = _lang(tag) if tag and tag != self._language else ""
+        return f'<span dir="auto"{mark}>{escape(text)}</span>'
+
+    def _linked_data(self) -> str:
+        """The works as schema.org data, which search engines read."""
+        works = []
+        for number in self._order():
+            label = self._tour["labels"][number]
+            nodes, _ = self._version(label.get("text"))
+            fields = {
+                "@type": "VisualArtwork",
+                "name": self._plain(label.get("title")),
+                "creator": self._plain(label.get("maker")),
+                "dateCreated": self._plain(label.get("date")),
+                "description": re.sub(r"\s+", " ", plain_text(nodes or ())).strip(),
+                "image": self._content.pictures.get(number, ""),
+                "url": f"{INDEX}?label={label['id']}",
+            }
+            works.append({name: value for name, value in fields.items() if value})
+        data = {
+            "@context": "https://schema.org",
+            "@type": "Collection",
+            "name": self._title,
+            "hasPart": works,
+        }
+        # Nothing in it ends the element that holds it.
+        text = json.dumps(data, ensure_ascii=False).replace("<", "\\u003c")
+        return f'<script type="application/ld+json">{text}</script>\n'
+
+
+def _link(address: str, text: str) -> str:
+    return f'<p><a href="{escape(address)}" rel="noopener">{escape(text)}</a></p>\n'
+
+
+def _lang(tag: str) -> str:
+    return f' lang="{escape(tag)}"' if tag else ""

@@ -1,0 +1,132 @@
+"""The tour of a site: `tour.json` with places in the world, and texts as trees.
+
+The page fetches the document after its first view, with a script that only sites with a tour have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ptmtools.arrays import Floats
+from ptmtools.errors import InputError, naming
+from ptmtools.pipeline.stage import Artifacts
+from ptmtools.pipeline.stages import APO, CELLS
+from ptmtools.store.folder import DatabaseFolder
+from ptmtools.tour.captions import transcript_of
+from ptmtools.tour.markdown import nodes_of
+from ptmtools.tour.model import NAME, Label, Texts, Tour
+from ptmtools.tour.placing import Anchor, anchors
+from ptmtools.tour.reading import CAPTIONS, SOUNDS, read_tour
+
+#: A file of the tour, and its media type → its URL, relative to the document.
+NameOf = Callable[[Path, str], str]
+#: The choice of no tour.
+NONE = "none"
+
+
+def tour_file(database: Path, choice: str) -> Path | None:
+    """The file of the tour of a database: that of the choice; without one, `tour.json` in the
+    folder that contains the database, if it exists.
+
+    Raises InputError: PTM-I120 the file of the choice does not exist.
+    """
+    if choice == NONE:
+        return None
+    if not choice:
+        beside = database.absolute().parent / NAME
+        return beside if beside.is_file() else None
+    file = Path(choice)
+    if not file.exists():
+        raise InputError(
+            "PTM-I120", "no such file", file=file, remedy="make one with `ptm tour init DB`"
+        )
+    return file
+
+
+@dataclass(frozen=True)
+class SiteTour:
+    """The document of a site's tour, and the texts of the captions of its labels."""
+
+    document: dict[str, Any]
+    transcripts: Mapping[int, Texts]
+
+
+def site_tour(folder: DatabaseFolder, choice: str, name_of: NameOf) -> tuple[SiteTour | None, str]:
+    """The tour of a site, None without one; and a note, "" without one.
+
+    Raises as `tour_file`, `read_tour` and `anchors`, and PTM-D004 to D008 for the artifacts.
+    """
+    file = tour_file(folder.path, choice)
+    if file is None:
+        return None, ""
+    tour = read_tour(file)
+    model = folder.manifest.model
+    if tour.model and tour.model != model and not choice:
+        return None, f"{file} is the tour of {tour.model}, not of {model}: left out"
+    artifacts = Artifacts(folder)
+    with naming(file):
+        places = anchors(tour, artifacts[APO])
+    inside = artifacts[CELLS].locate(np.array([place.marker for place in places]).reshape(-1, 3))
+    transcripts: dict[int, Texts] = {
+        number: {
+            tag: transcript_of(file.read_text("utf-8-sig")) for tag, file in label.captions.items()
+        }
+        for number, label in enumerate(tour.labels)
+        if label.captions
+    }
+    return SiteTour(_document(tour, places, inside.tolist(), name_of), transcripts), ""
+
+
+def _document(
+    tour: Tour, places: list[Anchor], cells: list[int], name_of: NameOf
+) -> dict[str, Any]:
+    labels = [
+        _label(label, place, cell, name_of)
+        for label, place, cell in zip(tour.labels, places, cells, strict=True)
+    ]
+    stops = [
+        {
+            **({"title": stop.title} if stop.title else {}),
+            **({"label": stop.label} if stop.label >= 0 else {}),
+            "position": list(stop.view.position),
+            "direction": list(stop.view.direction),
+        }
+        for stop in tour.stops
+    ]
+    title = {"title": tour.title} if tour.title else {}
+    return {"languages": list(tour.languages), **title, "labels": labels, "stops": stops}
+
+
+def _label(label: Label, place: Anchor, cell: int, name_of: NameOf) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        "id": label.id,
+        "marker": _point(place.marker),
+        "box": [*_point(place.low), *_point(place.high)],
+        "cell": cell,
+    }
+    if place.picture is not None:
+        row["normal"] = [round(float(value), 4) for value in place.picture.normal]
+    plain = ("title", "maker", "date", "image", "link")
+    row |= {name: texts for name in plain if (texts := getattr(label, name))}
+    if label.text:
+        row["text"] = {tag: nodes_of(text) for tag, text in label.text.items()}
+    if label.sound:
+        row["sound"] = _urls(label.sound, SOUNDS, name_of)
+    if label.captions:
+        row["captions"] = _urls(label.captions, CAPTIONS, name_of)
+    return row
+
+
+def _urls(
+    files: Mapping[str, Path], media: Mapping[str, str], name_of: NameOf
+) -> Mapping[str, str]:
+    return {tag: name_of(file, media[file.suffix.lower()]) for tag, file in files.items()}
+
+
+def _point(point: Floats) -> list[float]:
+    return [round(float(value), 3) for value in point]

@@ -1,0 +1,1 @@
+"""Tours: labels of works and rooms, and stops in order, in a file that museums write."""

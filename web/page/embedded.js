@@ -1,0 +1,33 @@
+// The script of a walk in a frame of another page, and of walks without an interface (`?ui=none`): it tells
+// that page about the visit, and lets it lead the visitor. See docs/formats/embedding.md.
+
+import { addStyle } from "./ui/elements.js";
+
+const FORMAT = "ptm-walk";
+/** @param {any[]} list @param {any} number */
+const isOf = (list, number) => Number.isInteger(number) && number in list;
+
+/** @param {import("./app.js").App} app */
+export function attachEmbedding(app) {
+  if (new URLSearchParams(location.search).get("ui") === "none") addStyle("nav { display: none; }");
+  if (parent === window) return;
+  /** @param {string} event @param {Record<string, any>} [detail] nothing about the visitor but where he is */
+  const tell = (event, detail = {}) => parent.postMessage({ format: FORMAT, event, ...detail }, "*");
+  const ready = () => tell("ready", { title: app.config.title });
+  if (app.walk.begun) ready();
+  else app.on("first-picture", ready);
+  app.on("cell", (cell) => {
+    const name = app.index.viewpoints.find((row) => row.cell === cell)?.description ?? "";
+    tell("room", { cell, name });
+  });
+  app.on("label", (id) => tell("label", { id }));
+  addEventListener("message", ({ source, data }) => {
+    if (source !== parent || data?.format !== FORMAT) return;
+    const { place, label, stop } = data.goTo ?? {}, { tour } = app;
+    if (isOf(app.index.viewpoints, place)) app.goTo(place);
+    if (!tour) return;
+    const number = tour.tour.labels.findIndex(({ id }) => id === label);
+    if (number >= 0) tour.visit(number);
+    if (isOf(tour.tour.stops, stop)) tour.go(stop);
+  });
+}

@@ -1,0 +1,25 @@
+// The style of the panels, which are loaded when one is first opened.
+
+export const PANEL_STYLE = `
+#places ol { list-style: none; margin: 0; padding: 0; display: grid; gap: 6px; }
+#places ol button { width: 100%; min-height: 56px; padding: 6px 10px; display: flex; gap: 12px; align-items: center; text-align: left; background: #ffffff0d; }
+#places img { width: 80px; height: 45px; object-fit: cover; border-radius: 6px; background: var(--line); flex: none; }
+#places [aria-current] { border-color: var(--warm); }
+
+#map canvas { display: block; width: 100%; }
+#map h2 span { color: var(--dim); font-weight: 400; float: right; }
+.key { margin: 10px 0 0; color: var(--dim); font-size: 13px; }
+.key span { margin-right: 14px; }
+.key span::before { content: ""; display: inline-block; width: 10px; height: 10px; margin-right: 6px; border-radius: 3px; background: var(--color); }
+
+#details { font-size: 14px; font-variant-numeric: tabular-nums; }
+#memory { margin: 0 0 6px; }
+#details dl { margin-top: 12px; }
+#details dd { text-align: right; }
+.bars { display: flex; gap: 3px; margin: 0; font-size: 11px; color: var(--dim); text-align: center; }
+.bars span { flex: 1; padding-top: 44px; background: linear-gradient(var(--warm) 0 0) 0 calc(44px * (1 - var(--share))) / 100% calc(44px * var(--share)) no-repeat; background-origin: border-box; }
+#details label { display: flex; flex-wrap: wrap; justify-content: space-between; align-items: center; gap: 0 8px; min-height: 44px; }
+label span { color: var(--dim); }
+input[type="range"] { flex: 1 0 100%; height: 28px; margin: 0; accent-color: var(--warm); }
+input[type="checkbox"] { width: 22px; height: 22px; margin: 0; accent-color: var(--warm); }
+`;
