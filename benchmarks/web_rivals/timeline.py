@@ -141,7 +141,7 @@ def watch(
     script = Path(__file__).with_name("recorder.js").read_text()
     scheme = "https" if http == "2" else "http"
     with nginx(entrant.files, http, own) as server, shaped(server.port, link, traffic) as port:
-        context = browser.new_context(viewport={"width": WIDTH, "height": HEIGHT})
+        context = browser.new_context(viewport={"width": WIDTH, "height": HEIGHT}, bypass_csp=True)
         try:
             context.add_init_script(script.replace("COMPLETE", entrant.complete))
             page, messages = context.new_page(), []

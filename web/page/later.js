@@ -13,4 +13,5 @@ export { attachMinimap } from "./ui/minimap.js";
 export { attachOverlay } from "./ui/overlay.js";
 export { decodePreview } from "../ptm/src/preview.js";
 
-addStyle(PANEL_STYLE);
+// The policies also run without a page.
+if (typeof document === "object") addStyle(PANEL_STYLE);

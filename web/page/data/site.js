@@ -103,6 +103,9 @@ export class Site {
       // The tables of levels would not end.
       if (!previews.every(({ level }) => level in differences)) throw new Error("a preview of no level");
     }
+    if (!index.viewpoints.every(({ position, direction }) => [...position, ...direction].every(Number.isFinite))) {
+      throw new Error("a view of no place");
+    }
     this.index = index;
     this.address = address;
   }
