@@ -82,9 +82,9 @@ def first_bytes(site: Site) -> int:
 def visit(browser: object, site: Site, bandwidth: float) -> tuple[float, float, float]:
     """Seconds until the first picture, and until the view is complete; kilobytes until then."""
     with serving(site.entries, throttle=Throttle(bandwidth, LATENCY)) as url:
-        page = browser.new_context(
-            viewport={"width": 960, "height": 540}, bypass_csp=True
-        ).new_page()  # type: ignore[attr-defined]
+        size = {"width": 960, "height": 540}
+        context = browser.new_context(viewport=size, bypass_csp=True)  # type: ignore[attr-defined]
+        page = context.new_page()
         begun = time.perf_counter()
         page.goto(url, wait_until="commit")
         page.wait_for_function("window.ptm?.walk.begun", timeout=600_000, polling=50)

@@ -5,6 +5,7 @@ Each engine stays the same process throughout, so that one that ends or hangs fa
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -18,7 +19,8 @@ from ptmtools.site.forms import FORMS, form_site
 
 from .hostile import hostile
 
-COUNT = 20
+#: Sites of each form in Chromium, and in other engines; PTM_HOSTILE is the number for all.
+COUNT, FEWER = 20, 8
 #: Of each form: what follows the address of its page.
 PLACES = {"walk": "", "apo.json": "#40,20,0.55", "interlace.json": "?all", "campus.json": ""}
 #: When a sound one is there; of a campus, in low detail.
@@ -50,14 +52,15 @@ def test_a_message_or_a_picture(
 ) -> None:
     opened = opening(request, engine)
     told = []
-    for seed in range(COUNT):
+    count = int(os.environ.get("PTM_HOSTILE") or (COUNT if engine == "chromium" else FEWER))
+    for seed in range(count):
         with opened(hostile(sites[form], seed), PLACES[form]) as visitor:
             visitor.until(f"{SAYS.strip()} || {THERE[form]}")
             told.append(visitor.page.evaluate(TOLD))
         assert set(told[-1]) <= {"PTM-V103", "PTM-V105", "PTM-V107", "notice"}, seed
         own = [said for said in visitor.messages if "Failed to load resource" not in said]
         assert not [said for said in own if said.startswith("error: ")], seed
-    assert COUNT // 3 < sum(map(bool, told)) < COUNT
+    assert count // 4 < sum(map(bool, told)) < count
 
 
 def opening(
