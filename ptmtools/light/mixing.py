@@ -112,7 +112,7 @@ def _sum(
 
 
 def shadow_rays(samples: int) -> int:
-    """The number of shadow rays for so many of ambient light."""
+    """The number of shadow rays, from the number of rays of ambient light."""
     return max(1, int(samples * _SHADOWS))
 
 

@@ -31,7 +31,7 @@ SAYS = """
 window.ptm?.errors?.length > 0
 """
 #: The codes of the message and of errors of a walk; a notice has none.
-TOLD = """
+ANSWER = """
 [document.querySelector("#error-code").textContent,
   ...(window.ptm?.errors ?? []).map(({ code }) => code),
   document.querySelector("#notices p") && "notice"].filter(Boolean)
@@ -51,17 +51,17 @@ def test_a_message_or_a_picture(
     request: pytest.FixtureRequest, sites: dict[str, Site], engine: str, form: str
 ) -> None:
     opened = opening(request, engine)
-    told = []
+    answers = []
     many = engine == "chromium" and form != "campus.json"
     count = int(os.environ.get("PTM_HOSTILE") or (COUNT if many else FEWER))
     for seed in range(count):
         with opened(hostile(sites[form], seed), PLACES[form]) as visitor:
             visitor.until(f"{SAYS.strip()} || {THERE[form]}")
-            told.append(visitor.page.evaluate(TOLD))
-        assert set(told[-1]) <= {"PTM-V103", "PTM-V105", "PTM-V107", "notice"}, seed
+            answers.append(visitor.page.evaluate(ANSWER))
+        assert set(answers[-1]) <= {"PTM-V103", "PTM-V105", "PTM-V107", "notice"}, seed
         own = [said for said in visitor.messages if "Failed to load resource" not in said]
         assert not [said for said in own if said.startswith("error: ")], seed
-    assert count // 4 < sum(map(bool, told)) < count
+    assert count // 4 < sum(map(bool, answers)) < count
 
 
 def opening(

@@ -182,13 +182,13 @@ export class Markers {
     const view = [(2 * across / width - 1) / lens[0], (1 - 2 * down / height) / lens[1], -1];
     // The transpose turns back.
     const ray = [0, 1, 2].map((k) => turn[3 * k] * view[0] + turn[3 * k + 1] * view[1] + turn[3 * k + 2] * view[2]);
-    let found = -1, first = Infinity;
+    let nearest = -1, first = Infinity;
     for (const { label } of this.#near(eye)) {
       if (!this.#seen[label]) continue;
       const away = entry(eye, ray, this.labels[label].box);
-      if (away < first) [found, first] = [label, away];
+      if (away < first) [nearest, first] = [label, away];
     }
-    return found;
+    return nearest;
   }
 }
 
