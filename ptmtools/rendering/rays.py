@@ -86,6 +86,8 @@ class Caster:
         self._corner = corner
         self._normal = normals(corner)
         self._one_sided, self._seen = ~surfaces.two_sided, surfaces.seen
+        #: (T,) 0 for faces with two sides; of two opposite faces one has 1 and the other -1.
+        self._way = np.where(self._one_sided, _ways(self._normal), 0)
         low, high = corner.min(axis=(0, 1), initial=0), corner.max(axis=(0, 1), initial=0)
         self._middle = (low + high) / 2
         #: Offset of a ray's new origin behind a surface that it passed through, metres.
@@ -93,6 +95,8 @@ class Caster:
         self._tree: Any = None
         if len(self._which):
             self._tree = ray_tree(corner[self._which] - self._middle)
+        #: Trees of the faces that may coincide with the back of one of a `_way`.
+        self._others: dict[int, tuple[Any, Ints]] = {}
 
     def look(self, camera: Camera, eye: Floats, direction: Floats) -> Sight:
         """Casts all rays of a camera from an eye (3,) in a direction (3,)."""
@@ -122,10 +126,45 @@ class Caster:
             if not len(waiting):
                 break
             to = self._corner[triangle, 0] - self._middle - start[waiting]
-            far = np.einsum("ij,ij->i", to, self._normal[triangle]) / turn
-            length = np.linalg.norm(along[waiting], axis=1)
-            start[waiting] += along[waiting] * (np.maximum(far, 0) + self._step / length)[:, None]
+            far = np.maximum(np.einsum("ij,ij->i", to, self._normal[triangle]) / turn, 0)
+            step = self._step / np.linalg.norm(along[waiting], axis=1)
+            start[waiting] += along[waiting] * (far - step)[:, None]
+            met = self._coincident(start[waiting], along[waiting], 2 * step, self._way[triangle])
+            result[waiting] = met
+            start[waiting] += along[waiting] * (2 * step)[:, None]
+            waiting = waiting[met < 0]
         return result
+
+    def _coincident(self, start: Floats, along: Floats, far: Floats, way: Ints) -> Ints:
+        """(n,) the visible triangle in the place of a face that a ray passes through, -1 for none:
+        a wall may consist of two one-sided faces in one plane, of which Embree returns either.
+
+        start, along: (n, 3) of the rays; far: (n,) their ends; way: (n,) of the faces, see `_way`.
+        """
+        result = np.full(len(start), -1, np.int64)
+        for one in np.unique(way).tolist():
+            rows = np.flatnonzero(way == one)
+            if one not in self._others:
+                which = self._which[self._way[self._which] != one]
+                tree = ray_tree(self._corner[which] - self._middle) if len(which) else None
+                self._others[one] = tree, which
+            tree, which = self._others[one]
+            if tree is None:
+                continue
+            ray = start[rows].astype(np.float32), along[rows].astype(np.float32)
+            hit = tree.run(*ray, dists=far[rows].astype(np.float32), query="INTERSECT")
+            rows, triangle = rows[hit >= 0], which[hit[hit >= 0]]
+            turn = np.einsum("ij,ij->i", self._normal[triangle], along[rows])
+            faced = ~self._one_sided[triangle] | (turn <= 0)
+            behind = turn[faced] > 0
+            result[rows[faced]] = self._seen[triangle[faced], behind.astype(np.int64)]
+        return result
+
+
+def _ways(normal: Floats) -> Ints:
+    """(T,) 1 or -1, opposite for opposite (T, 3) normals."""
+    place = np.abs(normal).argmax(axis=1)
+    return np.where(normal[np.arange(len(normal)), place] > 0, 1, -1)
 
 
 #: Distance of the near plane, metres.
