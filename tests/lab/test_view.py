@@ -22,6 +22,8 @@ from tests.lab.worlds import SEEDS, leaf
 CAMERA = Camera(16, 10, 1.0, 1.6)
 #: Rays that pass so near to an edge, in its triangle's own coordinates, could meet either side.
 EDGE = 1e-4
+#: Panels of two opposite faces in one plane.
+PAIRS = 3
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,8 @@ class Room:
 
 
 def room(random: np.random.Generator) -> Room:
-    """Walls of 6 × 3 × 4 m, and panels within, of two cells; one-sided ones and glass as well."""
+    """Walls of 6 × 3 × 4 m, and panels within, of two cells; one-sided ones and glass as well. The
+    last panels have a one-sided face for each side."""
     levels = []
     for shape in ((16, 8), (5, 7), (32, 32)):
         rows = [random.integers(0, 256, (*shape, 3), dtype=np.uint8)]
@@ -70,7 +73,10 @@ def room(random: np.random.Generator) -> Room:
     for _ in range(6):
         middle = random.uniform(low + 0.5, high - 0.5)
         corner.append(middle + random.normal(0, 1.0, (3, 3)))
+    corner += [each[::-1] for each in corner[-PAIRS:]]
     count = len(corner)
+    two_sided = random.random(count) < 0.7
+    two_sided[-2 * PAIRS :] = False
     # Up to so fine that a pixel covers many texels.
     uv = random.uniform(-1, 1, (count, 3, 2)) * 10 ** random.uniform(0, 2.5, (count, 1, 1))
     texture = random.integers(-1, 3, count).astype(np.int32)
@@ -82,7 +88,7 @@ def room(random: np.random.Generator) -> Room:
             shape=np.arange(count, dtype=np.int32),
             texture=texture,
             color=random.uniform(0.3, 1, (count, 3)),
-            two_sided=random.random(count) < 0.7,
+            two_sided=two_sided,
             glass=(random.random(count) < 0.3) & (texture < 0),
             clamped=random.random((count, 2)) < 0.5,
             seen=np.repeat(np.arange(count)[:, None], 2, axis=1),
