@@ -11,7 +11,7 @@ walk.jpg     the page of `ptm serve` in Chromium, with the map and the details o
 door-*.png   two rooms with a door leaf in the doorway; a closed door makes one unreachable
 interlace.jpg  two paintings at an eighth and a quarter of their sides: means of texels (a level of
              the `.ptm`) beside the texels of the first interlaced files, with bytes and PSNR
-light.jpg    the same view without light and with `--light bake`, as `ptm render` draws it
+light.jpg    the same view with `--light none` and with light, as `ptm render` draws it
 apo.jpg      a bust as modelled, simplified, and with some levels of its octree
 """
 
@@ -218,18 +218,18 @@ def octree_levels() -> Image.Image:
 def lit(database: Path) -> Image.Image:
     """A viewpoint of the museum without and with light."""
     with tempfile.TemporaryDirectory() as folder:
-        baked = Path(folder, "baked.db")
-        shutil.copytree(database, baked)
+        unlit = Path(folder, "unlit.db")
+        shutil.copytree(database, unlit)
         ptm(
             "build-scene",
             str(ROOT / "build/museum/museum.obj"),
             "-o",
-            str(baked),
+            str(unlit),
             "--light",
-            "bake",
+            "none",
         )
         view = ViewOptions(viewpoint=LIT, width=WIDTH, height=HEIGHT)
-        pictures = [draw_view(read_served(each), view) for each in (database, baked)]
+        pictures = [draw_view(read_served(each), view) for each in (unlit, database)]
     return Image.fromarray(np.concatenate(pictures, axis=1))
 
 

@@ -203,8 +203,7 @@ def with_panels(scene: Scene, cells: Cells) -> tuple[Scene, Lights]:
         colors=None,
     )
     glow = np.append(np.zeros(materials, np.float32), np.float32(1))
-    none = np.full(materials + 1, -1, np.int32)
-    return longer, Lights(glow, (), none, np.zeros((0, 3, 2), np.float32), ())
+    return longer, replace(Lights.none(materials + 1), glow=glow)
 
 
 def of_the_model(model: Path) -> None:

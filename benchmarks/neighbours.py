@@ -105,7 +105,7 @@ def world_of(scene: Scene, policies: Sequence[PolicyEntry]) -> World:
     made(scene.maker, scene.model)
     database, walk = FOLDER / f"{scene.name}.db", FOLDER / f"{scene.name}-{SECONDS}.json"
     # The simulator's pictures have no coarser meshes.
-    options = ("--format", "vrml,gltf,interlace", "--lods", "none")
+    options = ("--format", "vrml,gltf,interlace", "--lods", "none", "--light", "none")
     ptm("build-scene", scene.model, "-o", database, *options)
     ptm("path", database, "-o", walk, "--duration", SECONDS, "--force")
     served = read_served(database)

@@ -21,6 +21,7 @@ from PIL import Image
 from scenes import SHARED, model_file
 
 from ptmtools.coverage.options import AchOptions
+from ptmtools.light.options import LightOptions
 from ptmtools.output.served import Served, read_served
 from ptmtools.pipeline.build import build_scene
 from ptmtools.rendering.drawing import ViewOptions, draw_view
@@ -64,6 +65,7 @@ def row(name: str, model: Path, jobs: int, keep: Path | None) -> str:
                 IngestOptions(normal_maps=choice),  # type: ignore[arg-type]
                 PvsOptions(method="fast"),
                 AchOptions(samples=4, backend="embree"),
+                LightOptions("none"),
                 workers=jobs,
             )
             served = read_served(database)

@@ -52,8 +52,9 @@ ROOMS, TEXTURES = 40, 120
 SCENES = ("museum", *SIDES, "hospital")
 #: Seeds of the walks, and how long each is, s.
 WALKS, SECONDS = (1, 2, 3), 150
-#: Per-texture hints are for the policy `ach-texture`; the fallback images are not measured.
-BUILD = ("--per-texture", "--fallback-size", "256")
+#: Per-texture hints are for the policy `ach-texture`; the fallback images are not measured, nor is
+#: light, of which its own benchmark tells the cost.
+BUILD = ("--per-texture", "--fallback-size", "256", "--light", "none")
 
 
 def model_file(given: str) -> Path:

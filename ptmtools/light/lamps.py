@@ -74,8 +74,7 @@ class Lamps:
 def lamps_of(scene: Scene, lights: Lights | None) -> Lamps:
     """The lamps of a scene; none if it has none."""
     if lights is None:
-        none = np.zeros(len(scene.materials), np.float32)
-        lights = Lights(none, (), none.astype(np.int32), np.zeros((0, 3, 2), np.float32), ())
+        lights = Lights.none(len(scene.materials))
     patches = _patches(scene, glowing(scene, lights))
     single = Lamps(
         np.array([KINDS.index(lamp.kind) for lamp in lights.lamps], np.uint8),

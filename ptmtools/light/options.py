@@ -27,7 +27,7 @@ class LightOptions:
         "Light of the surfaces, in one lightmap for each cell: bake (ambient light, darker in "
         "corners and below things, with that of lamps and of the sky through windows), model (the "
         "lightmaps of a glTF, its occlusion textures) or none (colours as in the model). auto: "
-        "model if there are any, else none.",
+        "model if there are any, else bake, within a tenth of the bytes of the images, else none.",
         basic=True,
     )
     light_density: float = option(
@@ -47,7 +47,7 @@ class LightOptions:
                     f"--light-{name} {value:g} is not possible",
                     remedy=f"use {least:g} to {most:g}",
                 )
-            used = ("auto", "bake", "model") if name == "density" else ("bake",)
+            used = ("auto", "bake") if name != "density" else ("auto", "bake", "model")
             if self.light not in used and value != getattr(type(self), field):
                 raise InputError(
                     "PTM-I111",

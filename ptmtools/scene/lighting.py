@@ -49,8 +49,10 @@ def lights_of(
     """The lights of the kept faces of a model. ``used``: (M,) the materials of the scene by their
     numbers in the source."""
     reader = _Reader(store, findings)
+    materials = [source.materials[number] for number in used.tolist()]
     plain = Lights(
-        np.array([reader.glow(source.materials[number]) for number in used.tolist()], np.float32),
+        np.array([reader.glow(material) for material in materials], np.float32),
+        np.array([material.unlit for material in materials], np.bool_),
         tuple(_placed(lamp, space) for lamp in source.lamps),
         np.full(len(used), -1, np.int32),
         np.zeros((0, 3, 2), np.float32),

@@ -1,4 +1,4 @@
-"""What gives light in a model: lamps, surfaces that glow, and lightmaps.
+"""What gives light in a model: lamps, surfaces that glow, lightmaps, and colours that contain it.
 
 They are stored beside the arrays of the scene, because the light stage alone reads them: another
 lamp changes neither the cells nor the stages after them.
@@ -72,6 +72,7 @@ class Lights:
     Attributes
     ----------
     glow: (M,) float32 linear luminance that a material emits.
+    unlit: (M,) bool, whether its colours contain their light.
     lamps: those without a surface.
     map: (M,) int32 index into `maps`, -1 of materials without.
     uv: (T, 3, 2) float32 coordinates in the map, origin at the lower left; (0, 3, 2) without maps.
@@ -79,13 +80,26 @@ class Lights:
     """
 
     glow: NDArray[np.float32]
+    unlit: NDArray[np.bool_]
     lamps: tuple[Lamp, ...]
     map: NDArray[np.int32]
     uv: NDArray[np.float32]
     maps: tuple[ModelMap, ...]
 
+    @staticmethod
+    def none(materials: int) -> Lights:
+        """Those of a scene without any."""
+        return Lights(
+            np.zeros(materials, np.float32),
+            np.zeros(materials, np.bool_),
+            (),
+            np.full(materials, -1, np.int32),
+            np.zeros((0, 3, 2), np.float32),
+            (),
+        )
+
     def __bool__(self) -> bool:
-        return bool(self.lamps or self.maps or self.glow.any())
+        return bool(self.lamps or self.maps or self.glow.any() or self.unlit.any())
 
     def check(self, scene: Scene) -> None:
         """Raises ValueError if they are those of another scene."""
@@ -103,6 +117,7 @@ class Lights:
         ]
         return {
             "glow": self.glow,
+            "unlit": self.unlit,
             "lamp_kind": np.array([KINDS.index(lamp.kind) for lamp in self.lamps], np.uint8),
             "lamp": np.array(rows, np.float64).reshape(-1, 9),
             "map": self.map,
@@ -132,6 +147,7 @@ class Lights:
         data = [image[a:b].tobytes() for a, b in pairwise(start.tolist())]
         return Lights(
             glow,
+            stored.array("unlit", np.bool_, len(glow)),
             tuple(
                 Lamp(KINDS[k], tuple(row[:3]), tuple(row[3:6]), row[6], tuple(row[7:]))
                 for k, row in zip(kind.tolist(), rows.tolist(), strict=True)

@@ -135,6 +135,7 @@ class SourceMaterial:
     texture, mask: colours, and a separate image of opacities (``map_d``).
     shine: its reflection map.
     normal: its normal map.
+    unlit: the texture shows as it is, and contains its light (KHR_materials_unlit).
     glow, glow_map: linear luminance that it emits, a factor of the mean of the image if it has one.
     """
 
@@ -149,6 +150,7 @@ class SourceMaterial:
     mask: Texture | None = None
     shine: Shine | None = None
     normal: NormalTexture | None = None
+    unlit: bool = False
     glow: float = 0.0
     glow_map: Texture | None = None
 

@@ -73,9 +73,7 @@ def scene_of(corner: Floats, lamp_faces: int, *, two_sided: bool = False) -> Sce
 
 
 def shining(luminance: float, *lamps: Lamp) -> Lights:
-    glow = np.array([0, luminance], np.float32)
-    nothing = np.zeros((0, 3, 2), np.float32)
-    return Lights(glow, lamps, np.full(2, -1, np.int32), nothing, ())
+    return replace(Lights.none(2), glow=np.array([0, luminance], np.float32), lamps=lamps)
 
 
 def test_a_point_lights_by_the_square_of_its_distance() -> None:

@@ -207,10 +207,10 @@ def test_impossible_options(options: dict[str, Any]) -> None:
 
 
 def test_options_without_light(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["build-scene", "x.obj", "--light-samples", "9"]) == 3
+    assert main(["build-scene", "x.obj", "--light", "none", "--light-samples", "9"]) == 3
     error = capsys.readouterr().err
-    assert "--light-samples does nothing with --light auto" in error
-    assert "use --light bake" in error
+    assert "--light-samples does nothing with --light none" in error
+    assert "use --light auto or bake" in error
 
 
 @pytest.mark.parametrize("light", ["auto", "model", "bake"])
@@ -223,7 +223,7 @@ def test_density_is_of_all_lightmaps(light: Any) -> None:
     [
         ("none", {"light_density": 4.0}),
         ("model", {"light_samples": 9}),
-        ("auto", {"light_reach": 9}),
+        ("none", {"light_reach": 9}),
     ],
 )
 def test_options_of_other_light(light: Any, more: dict[str, Any]) -> None:
@@ -231,7 +231,7 @@ def test_options_of_other_light(light: Any, more: dict[str, Any]) -> None:
         LightOptions(light, **more)
     assert refused.value.code == "PTM-I111"
     density = "light_density" in more
-    remedy = "auto or bake or model" if density else "bake"
+    remedy = "auto or bake or model" if density else "auto or bake"
     assert refused.value.remedy == f"leave it out, or use --light {remedy}"
 
 

@@ -1,8 +1,8 @@
 """Bakes the light of the building: a lightmap for each cell, encoded as a texture.
 
-Without ``--light``, a building without lightmaps of its own has no light, and this stage writes
-nothing. Lightmaps are encoded with the options of the textures, and clients fetch them like
-textures.
+By default the light is that of the model's own lightmaps, or baked if it costs little beside the
+images of the model. Lightmaps are encoded with the options of the textures, and clients fetch them
+like textures.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from ptmtools.pipeline.encoding import TextureOptions, baked, encoded_texels, pt
 from ptmtools.pipeline.stage import Artifacts, Job, Run, Stage, described
 from ptmtools.pipeline.stages.apo import APO, replaced_objects, source_triangles
 from ptmtools.pipeline.stages.cells import CELLS
-from ptmtools.pipeline.stages.scene import SCENE, lights_of
+from ptmtools.pipeline.stages.scene import SCENE, image_bytes, lights_of
 from ptmtools.pipeline.stages.textures import TEXTURES
 from ptmtools.quantities import count, size
-from ptmtools.store.layout import LIGHTS, arrays_of
+from ptmtools.store.layout import LIGHTS, arrays_of, sha256
 
 if TYPE_CHECKING:
     import numpy as np
@@ -41,6 +41,8 @@ if TYPE_CHECKING:
 _COARSE = 0.5
 #: Decoded bytes of a lightmap of the model, which the scene stage has already decoded.
 _MOST = 1 << 40
+#: The input for the bytes of the images, as `rounded`.
+_IMAGES = "bytes of images"
 #: An input of a run that left out the lightmaps, as long as xatlas is not installed.
 _ABSENT = "xatlas"
 
@@ -94,28 +96,37 @@ class LightJob(Job):
                 file=run.model,
                 remedy="use --light bake, or a glTF with occlusion textures that do not repeat",
             )
-        if self.options.light == "none" or (self.options.light == "auto" and not has_maps):
+        if self.options.light == "none":
             return described(work, _NO_LIGHT, ())
         if self.options.light == "auto":
             try:
                 _check_component()
             except MissingComponentError as fault:
-                left_out = f"the lightmaps of the model are left out: {fault.message}"
+                left_out = f"lightmaps are left out: {fault.message}"
                 remedy = f"{fault.remedy}, then build again" if fault.remedy else "build again"
                 work = replace(work, inputs={**work.inputs, _ABSENT: ""})
-                return described(work, _NO_LIGHT, (Warned(f"{left_out}; {remedy}"),))
+                warned = has_maps or image_bytes(run)
+                notes = (Warned(f"{left_out}; {remedy}"),) if warned else ()
+                return described(work, _NO_LIGHT, notes)
         import numpy as np
 
+        from ptmtools.light.budget import affordable, rounded
         from ptmtools.light.model import Light
         from ptmtools.output.content import Geometry
         from ptmtools.output.pieces import pieces_of
 
         scene, cells = run[APO], run[CELLS]
-        own = lights if self.options.light != "bake" else None
+        own = lights if has_maps and self.options.light != "bake" else None
         unlit = _unlit(run, lights, painted=own is not None)
-        texel = 1 / self.options.light_density
+        options, texel = self.options, 1 / self.options.light_density
         pieces = pieces_of(Geometry(scene, cells), cells, unlit, texel, replaced_objects(run))
-        shared = LitCells(self._baking(lights, pieces), run.recorded(TEXTURES))
+        if options.light == "auto" and not own:
+            density = affordable(pieces, options.light_density, rounded(image_bytes(run)))
+            if not density:
+                return described(work, _NO_LIGHT, ())
+            options = replace(options, light_density=density)
+        baking = self._baking(options, own, lights, pieces)
+        shared = LitCells(baking, run.recorded(TEXTURES))
         tasks = list(enumerate(pieces))
         cell_lights, total = baked(run, transaction, lit, shared, tasks, "light")
         artifact = Light(
@@ -129,7 +140,9 @@ class LightJob(Job):
         counts = {**_counts(artifact), "ptm_bytes": total, **_about(shared.baking)}
         return described(work, counts, _notes(cell_lights))
 
-    def _baking(self, lights: Lights | None, pieces: list[Piece]) -> Baking:
+    def _baking(
+        self, options: LightOptions, own: Lights | None, lights: Lights | None, pieces: list[Piece]
+    ) -> Baking:
         """What the tasks share: the light of the model, or lamps and the sky."""
         from ptmtools.light.cells import ABOVE, WHITE, Baking
         from ptmtools.light.lamps import lamps_of
@@ -138,12 +151,10 @@ class LightJob(Job):
 
         scene = self.run[APO]
         around = Surroundings.of(scene)
-        if self.options.light != "bake":
-            assert lights
-            return Baking(around, self.options, painted=_painted(self.run, lights))
+        if own:
+            return Baking(around, options, painted=_painted(self.run, own))
         lamps = lamps_of(scene, lights)
-        mix = mixed(around, pieces, lamps, self.options, ABOVE, WHITE)
-        return Baking(around, self.options, mix)
+        return Baking(around, options, mixed(around, pieces, lamps, options, ABOVE, WHITE))
 
 
 def _check_component() -> None:
@@ -160,8 +171,8 @@ def _has_component() -> bool:
 
 
 def _unlit(run: Run, lights: Lights | None, *, painted: bool) -> NDArray[np.bool_]:
-    """(M,) the materials without light: those seen through, and those without a lightmap of the
-    model, or that glow."""
+    """(M,) the materials without light: those seen through, those whose colours contain it, and
+    those without a lightmap of the model, or that glow."""
     import numpy as np
 
     from ptmtools.light.lamps import glowing
@@ -170,7 +181,8 @@ def _unlit(run: Run, lights: Lights | None, *, painted: bool) -> NDArray[np.bool
     glass = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials], np.bool_)
     if lights is None:
         return glass
-    return glass | (lights.map < 0 if painted else glowing(scene, lights) > 0)
+    own = glass | lights.unlit
+    return own | (lights.map < 0 if painted else glowing(scene, lights) > 0)
 
 
 def _painted(run: Run, lights: Lights) -> Painted:
@@ -224,9 +236,13 @@ def _inputs(artifacts: Artifacts, options: LightOptions) -> dict[str, str]:
     """See `Stage.inputs`."""
     name = arrays_of(LIGHTS)
     digest = artifacts.outputs(SCENE).get(name)
-    if options.light == "none" or (options.light == "auto" and digest is None):
+    if options.light == "none":
         return {}
     lights = {} if digest is None else {name: digest}
+    if options.light == "auto":
+        from ptmtools.light.budget import rounded
+
+        lights[_IMAGES] = sha256(str(rounded(image_bytes(artifacts))).encode())
     before = artifacts.before(LIGHT)
     if before and _ABSENT in before.inputs and options.light == "auto" and not _has_component():
         lights[_ABSENT] = ""
@@ -258,8 +274,8 @@ def _fits_cells(light: Light, cells: Cells) -> str:
 LIGHT: Stage[Light] = Stage(
     name="light",
     about="Bake the light of the surfaces into lightmaps.",
-    recipe=2,
-    changed="lamps, and the sky through windows and openings, give light",
+    recipe=3,
+    changed="light is baked by default if it costs little beside the images",
     options=LightOptions,
     reads=_reads,
     inputs=_inputs,

@@ -37,7 +37,8 @@ _SHA256 = re.compile(r"[0-9a-f]{64}")
 
 
 def image_rows(artifacts: Artifacts) -> list[Mapping[str, Any]]:
-    """The list of the scene's images: name, sha256, files and plain, as in `SourceImage`.
+    """The list of the scene's images: name, sha256, files and plain, as in `SourceImage`, and their
+    bytes.
 
     Names and digests become file names, so only the form that ingest writes is accepted. Raises
     PTM-D004 to PTM-D006.
@@ -52,6 +53,8 @@ def image_rows(artifacts: Artifacts) -> list[Mapping[str, Any]]:
             texts = isinstance(row["files"], list) and all(isinstance(f, str) for f in row["files"])
             if not texts or not isinstance(row["plain"], bool):
                 raise TypeError("an image without a list of files")
+            if type(row["bytes"]) is not int or row["bytes"] < 0:
+                raise TypeError("an image without its number of bytes")
         if len({row["name"].partition(".")[0].casefold() for row in rows}) < len(rows):
             raise ValueError("two images whose textures would have the same name")
         return rows
@@ -62,6 +65,11 @@ def image_rows(artifacts: Artifacts) -> list[Mapping[str, Any]]:
 def image_digests(artifacts: Artifacts) -> dict[str, str]:
     """Name → SHA-256 of the scene's images, in their order; raises as `image_rows`."""
     return {row["name"]: row["sha256"] for row in image_rows(artifacts)}
+
+
+def image_bytes(artifacts: Artifacts) -> int:
+    """The bytes of the scene's images as in the model; raises as `image_rows`."""
+    return sum(row["bytes"] for row in image_rows(artifacts))
 
 
 def images_of(artifacts: Artifacts) -> tuple[SourceImage, ...]:
@@ -173,7 +181,12 @@ class ReadingJob(Job):
         repainted = _repainted(artifacts, work)
         if repainted is None:
             return False
-        new = {i: {"sha256": work.inputs[name]} for i, name in repainted.items()}
+        assert artifacts.model
+        folder = artifacts.model.parent
+        new = {
+            i: {"sha256": work.inputs[name], "bytes": (folder / name).stat().st_size}
+            for i, name in repainted.items()
+        }
         rows = [{**row, **new.get(i, {})} for i, row in enumerate(image_rows(artifacts))]
         artifacts.cache(IMAGE_LIST, rows)
         return True
@@ -233,7 +246,7 @@ class ReadingJob(Job):
         if not transaction.keep(kept):
             return None
         images = [fresh.get(i, image) for i, image in enumerate(images_of(self.run))]
-        self._put_images(transaction, images, fresh.values())
+        self._put_images(transaction, images, fresh.values(), rows)
         counts = {**before.counts, **self._bytes(work.inputs, images)}
         return replace(work, counts=counts, notes=before.notes, warnings=before.warnings)
 
@@ -250,30 +263,40 @@ class ReadingJob(Job):
         transaction: Transaction,
         images: Iterable[SourceImage],
         fresh: Iterable[SourceImage],
+        before: Iterable[Mapping[str, Any]] = (),
     ) -> None:
-        """Stages the list of images, and a copy of each fresh one, which must be decodable."""
+        """Stages the list of images, and a copy of each fresh one, which must be decodable; the
+        others are in the list ``before``."""
         from ptmtools.parallel import ordered
         from ptmtools.texture.images import check_image
         from ptmtools.texture.model import Limits
 
-        images = tuple(images)
+        images, fresh = tuple(images), tuple(fresh)
+
+        def put(image: SourceImage) -> int:
+            data = image.load()
+            with naming(image.name):
+                check_image(data, Limits(self.options.limit << 20))
+            transaction.put(f"{IMAGES}/{image.sha256}", data, image.sha256)
+            return len(data)
+
+        sizes = {row["name"]: row["bytes"] for row in before}
+        lengths = ordered(put, fresh, self.run.workers.here)
+        sizes |= {image.name: length for image, length in zip(fresh, lengths, strict=True)}
         rows = [
-            {"name": i.name, "sha256": i.sha256, "files": list(i.files), "plain": i.plain}
+            {
+                "name": i.name,
+                "sha256": i.sha256,
+                "files": list(i.files),
+                "plain": i.plain,
+                "bytes": sizes[i.name],
+            }
             for i in images
         ]
         self.run.cache(IMAGES, images)
         self.run.cache(IMAGE_LIST, rows)
         text = json.dumps({"images": rows}, indent=1, ensure_ascii=False) + "\n"
         transaction.put(IMAGE_LIST, text.encode())
-
-        def put(image: SourceImage) -> None:
-            data = image.load()
-            with naming(image.name):
-                check_image(data, Limits(self.options.limit << 20))
-            transaction.put(f"{IMAGES}/{image.sha256}", data, image.sha256)
-
-        for _ in ordered(put, fresh, self.run.workers.here):
-            pass
 
 
 def _counts(scene: Scene) -> Mapping[str, Any]:
@@ -308,8 +331,8 @@ def _summary(n: Mapping[str, Any]) -> str:
 SCENE: Stage[Scene] = Stage(
     name="scene",
     about="Read a model.",
-    recipe=9,
-    changed="normal maps, lamps, emission and lightmaps of a model are read",
+    recipe=10,
+    changed="the list of images has their sizes",
     options=IngestOptions,
     inputs=_inputs,
     artifact=Lazy("ptmtools.scene.model:Scene"),

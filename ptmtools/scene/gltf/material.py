@@ -37,6 +37,7 @@ T = TypeVar("T")
 #: A texture, and as `_placing`.
 _Placed: TypeAlias = "tuple[Texture | None, str, NDArray[np.float64], bool]"
 
+_UNLIT = "KHR_materials_unlit"
 _KTX2 = "image/ktx2"
 _WRAPS: dict[int | None, SourceWrap] = {33071: "clamp", 33648: "mirror"}
 
@@ -164,6 +165,7 @@ class MaterialReader:
                 two_sided=bool(entry.get("doubleSided", False)),
                 texture=texture,
                 normal=normal,
+                unlit=_UNLIT in entry.get("extensions", {}),
                 **(glow or {}),
             )
         )
@@ -217,7 +219,7 @@ class MaterialReader:
         """The emission of a material, as the fields of a `SourceMaterial`."""
         factor = [_share(value) for value in entry.get("emissiveFactor", [0.0, 0.0, 0.0])]
         extensions = entry.get("extensions", {})
-        if not any(factor) or "KHR_materials_unlit" in extensions:
+        if not any(factor) or _UNLIT in extensions:
             return {}
         stronger = extensions.get("KHR_materials_emissive_strength", {})
         strength = finite(stronger.get("emissiveStrength", 1.0))
