@@ -58,8 +58,8 @@ def engines(require: Callable[[str, str], None]) -> Iterator[Callable[[str], Eng
 
 
 def build(model: Path, database: Path, *more: str) -> Path:
-    """A database with cells as glTF alone; ``more`` options."""
-    options = ["--format", "gltf", "--no-fallback", "-j", "1", *more]
+    """A database with cells as glTF alone, without light; ``more`` options."""
+    options = ["--format", "gltf", "--no-fallback", "--light", "none", "-j", "1", *more]
     assert main(["-q", "build-scene", str(model), "-o", str(database), *options]) == 0
     return database
 
