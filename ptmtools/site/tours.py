@@ -20,7 +20,7 @@ from ptmtools.store.folder import DatabaseFolder
 from ptmtools.tour.captions import transcript_of
 from ptmtools.tour.markdown import nodes_of
 from ptmtools.tour.model import NAME, Label, Texts, Tour
-from ptmtools.tour.placing import Anchor, anchors
+from ptmtools.tour.placing import Anchor, Placing
 from ptmtools.tour.reading import CAPTIONS, SOUNDS, read_tour
 
 #: A file of the tour, and its media type → its URL, relative to the document.
@@ -59,7 +59,7 @@ class SiteTour:
 def site_tour(folder: DatabaseFolder, choice: str, name_of: NameOf) -> tuple[SiteTour | None, str]:
     """The tour of a site, None without one; and a note, "" without one.
 
-    Raises as `tour_file`, `read_tour` and `anchors`, and PTM-D004 to D008 for the artifacts.
+    Raises as `tour_file`, `read_tour` and `Placing.anchors`, and PTM-D004 to D008 for the artifacts.
     """
     file = tour_file(folder.path, choice)
     if file is None:
@@ -70,7 +70,7 @@ def site_tour(folder: DatabaseFolder, choice: str, name_of: NameOf) -> tuple[Sit
         return None, f"{file} is the tour of {tour.model}, not of {model}: left out"
     artifacts = Artifacts(folder)
     with naming(file):
-        places = anchors(tour, artifacts[APO])
+        places = Placing(artifacts[APO]).anchors(tour)
     inside = artifacts[CELLS].locate(np.array([place.marker for place in places]).reshape(-1, 3))
     transcripts: dict[int, Texts] = {
         number: {
