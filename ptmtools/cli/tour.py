@@ -51,8 +51,8 @@ def init(console: Console, db: str, output: str | None, force: bool) -> None:
     write_bytes(file, text.encode(), force=force)
     if not pictures + rooms:
         console.warn(
-            "note: no object is a picture: upright, flat, with an image of its own, and 0.3 m above "
-            "the floor (docs/formats/tour.md); place labels by hand with `ptm serve DB --edit`"
+            "note: no object is a picture: upright, flat, with an image of its own, above the "
+            "floor (docs/formats/tour.md); place labels by hand with `ptm serve DB --edit`"
         )
     console.result(
         {"tour": str(file), "pictures": pictures, "rooms": rooms},

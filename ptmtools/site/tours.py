@@ -59,7 +59,7 @@ class SiteTour:
 def site_tour(folder: DatabaseFolder, choice: str, name_of: NameOf) -> tuple[SiteTour | None, str]:
     """The tour of a site, None without one; and a note, "" without one.
 
-    Raises as `tour_file`, `read_tour` and `Placing.anchors`, and PTM-D004 to D008 for the artifacts.
+    Raises as `tour_file`, `read_tour`, `Placing.anchors`; PTM-D004 to D008 for the artifacts.
     """
     file = tour_file(folder.path, choice)
     if file is None:

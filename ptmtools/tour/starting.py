@@ -6,7 +6,6 @@ floor and shows an image once. The texture of a wall repeats, and a wall reaches
 
 from __future__ import annotations
 
-import json
 import re
 from collections import Counter
 from collections.abc import Iterator
@@ -22,6 +21,7 @@ from ptmtools.scene.model import Scene
 from ptmtools.tour.model import FORMAT, SCHEMA
 from ptmtools.tour.pictures import Picture, Pictures, first_face
 from ptmtools.tour.placing import faces_of_objects
+from ptmtools.tour.writing import formatted
 
 #: Sides of a picture, metres.
 _LEAST, _GREATEST = 0.1, 5.0
@@ -72,10 +72,7 @@ def first_tour(scene: Scene, cells: Cells, model: str) -> tuple[str, int, int]:
         "labels": labels,
         "stops": stops,
     }
-    text = json.dumps(document, indent=1, ensure_ascii=False)
-    # One line for each point.
-    text = re.sub(r"\[\s+(-?[\d.e-]+),\s+(-?[\d.e-]+),\s+(-?[\d.e-]+)\s+\]", r"[\1, \2, \3]", text)
-    return text + "\n", len(pictures), len(rooms)
+    return formatted(document) + "\n", len(pictures), len(rooms)
 
 
 def _pictures(scene: Scene, cells: Cells) -> Iterator[Proposal]:
