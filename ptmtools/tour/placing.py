@@ -47,7 +47,7 @@ class Placing:
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self._faces = faces_of_objects(scene)
-        self._pictures = Pictures(scene)
+        self.pictures = Pictures(scene)
 
     def anchors(self, tour: Tour) -> list[Anchor]:
         """The anchor of each label.
@@ -78,7 +78,7 @@ class Placing:
         """The anchor of an object with the faces (n,)."""
         corners = self._scene.corners[own].reshape(-1, 3)
         low, high = corners.min(axis=0), corners.max(axis=0)
-        picture = self._pictures.of(own)
+        picture = self.pictures.of(own)
         if picture is None:
             marker = np.array([(low[0] + high[0]) / 2, high[1] + _ABOVE, (low[2] + high[2]) / 2])
         else:

@@ -42,7 +42,7 @@ def read_tour(path: str | os.PathLike[str]) -> Tour:
     LimitError: PTM-L204 a file is too large.
     """
     file = Path(path)
-    return tour_of(_content(file, LARGEST), file)
+    return tour_of(content_of(file, LARGEST), file)
 
 
 def tour_of(data: bytes, file: Path) -> Tour:
@@ -150,7 +150,7 @@ class _Reader:
             inside = Path(os.path.normpath(file)).is_relative_to(self._folder)
             if Path(text).is_absolute() or not inside:
                 raise _wrong(where, f"{text} lies outside the folder of the tour")
-            data = _content(file, most)
+            data = content_of(file, most)
             if suffixes is CAPTIONS and not _is_captions(data):
                 raise _wrong(where, f"{text} is not WebVTT")
             files[tag] = file
@@ -166,7 +166,11 @@ def _view(row: Mapping[str, Any], place: str) -> View:
     return View(tuple(row["position"]), (x, y, z))
 
 
-def _content(file: Path, most: int) -> bytes:
+def content_of(file: Path, most: int) -> bytes:
+    """The bytes of a file.
+
+    Raises InputError: PTM-I122 it cannot be read. LimitError: PTM-L204 it has more than ``most``.
+    """
     try:
         with open_regular(file) as stream:
             data = stream.read(most + 1)
