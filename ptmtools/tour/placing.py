@@ -48,6 +48,8 @@ class Placing:
         self._scene = scene
         self._faces = faces_of_objects(scene)
         self.pictures = Pictures(scene)
+        #: Anchors by the name of the object: an editor places a tour again and again.
+        self._known: dict[str, Anchor] = {}
 
     def anchors(self, tour: Tour) -> list[Anchor]:
         """The anchor of each label.
@@ -62,7 +64,9 @@ class Placing:
             own = self._faces.get(label.object, np.zeros(0, np.int64))
             if not len(own):
                 raise _unknown("object", label.object, scene.objects, number)
-            return self._of_faces(own)
+            if label.object not in self._known:
+                self._known[label.object] = self._of_faces(own)
+            return self._known[label.object]
         if label.room:
             rooms = [room for room in scene.rooms if room.name == label.room and len(room.points)]
             if not rooms:

@@ -13,7 +13,7 @@ ACROSS, UP, LOW = 0.8, 1.2, 1.0
 
 
 def write_hall(folder: Path) -> Path:
-    """The file: four pictures on the wall at z = 0."""
+    """The file: four pictures on the wall at z = 0, and a screen with a sign, which is none."""
     lines = ["mtllib hall.mtl"]
     count = 0
 
@@ -58,9 +58,13 @@ def write_hall(folder: Path) -> Path:
     quad(*canvas(7, 0.04))
     start("wallpaper", "wall")
     quad(*canvas(10, 0.03))
+    start("screen", "wall")
+    box((1, 0, 7.9), (4, 3, 7.95))
+    lines.append("usemtl sign")
+    quad((2, 2, 7.89), (1.6, 2, 7.89), (1.6, 2.3, 7.89), (2, 2.3, 7.89))
     materials = []
-    for number, name in enumerate(("wall", "one", "two", "three")):
-        Image.new("RGB", (8, 8), (60 * number, 90, 120)).save(folder / f"{name}.png")
+    for number, name in enumerate(("wall", "one", "two", "three", "sign")):
+        Image.new("RGB", (8, 8), (50 * number, 90, 120)).save(folder / f"{name}.png")
         materials += [f"newmtl {name}", f"map_Kd {name}.png"]
     (folder / "hall.mtl").write_text("\n".join(materials) + "\n")
     file = folder / "hall.obj"
