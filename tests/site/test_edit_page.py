@@ -140,6 +140,10 @@ def test_order_undo_refusals_and_changes_of_the_file(visitor: Visitor, tmp_path:
     assert names.all_inner_texts() == ["The end", "painting_01"]
     assert page.evaluate("document.activeElement.ariaLabel") == "Move The end down"
     names.last.click()
+    field(visitor, "place").fill("1")
+    field(visitor, "place").press("Enter")
+    assert page.evaluate("editor.draft.stops[0].label") == "painting_01"
+    button(visitor, "Undo").click()
     button(visitor, "Delete label").click()
     assert names.all_inner_texts() == ["The end"]
     button(visitor, "Undo").click()

@@ -8,6 +8,7 @@ import socket
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -269,6 +270,23 @@ def test_what_cannot_be_edited(folder: Path, capsys: pytest.CaptureFixture[str])
     assert main(["serve", database, "--edit"]) == 3
     assert "is the tour of other.obj, not of museum.obj" in capsys.readouterr().err
     assert main(["serve", str(folder), "--edit"]) == 5
+
+
+def test_the_command_prints_an_address_with_a_token(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def ask() -> None:
+        """In place of the wait for Ctrl-C."""
+        url, token = capsys.readouterr().out.strip().split("?edit#token=")
+        with client_of(url) as client:
+            for given, status in ((token, 200), (token[:-1], 403)):
+                answer = client("/edit/tour", Authorization=f"Bearer {given}")
+                assert answer.status == status
+        raise KeyboardInterrupt
+
+    waiting = SimpleNamespace(Event=lambda: SimpleNamespace(wait=ask))
+    monkeypatch.setattr("ptmtools.cli.publish.threading", waiting)
+    assert main(["serve", str(folder / "museum.db"), "--edit"]) == 0
 
 
 def test_a_published_site_has_no_trace_of_it(folder: Path) -> None:

@@ -51,8 +51,9 @@ export async function attachEditor() {
 /** What is wrong, for people. @param {unknown} fault */
 function textOf(fault) {
   if (fault instanceof Refusal) {
-    const place = fault.place ? `${fault.place}: ` : "";
-    return `${place}${fault.message}${fault.remedy ? `; ${fault.remedy}` : ""}${fault.code ? ` [${fault.code}]` : ""}`;
+    const { place, message, remedy, code } = fault;
+    const text = `${place && `${place}: `}${message}${remedy && `; ${remedy}`}${code && ` [${code}]`}`;
+    return text[0].toUpperCase() + text.slice(1);
   }
   return "The server does not answer. Is `ptm serve` still running? What you wrote is still here.";
 }
@@ -303,12 +304,18 @@ export class Editor {
 
   /** Moves a stop up with -1, down with 1. @param {number} number @param {number} by */
   move(number, by) {
-    const { stops } = this.draft, name = this.nameOfStop(number);
-    this.step(`move “${name}”`, () => stops.splice(number + by, 0, ...stops.splice(number, 1)));
+    this.place(number, number + by);
     this.refresh();
     const way = (/** @type {number} */ up) => [...this.body.querySelectorAll("ol li")][number + by]?.querySelectorAll("button")[up];
     const same = way(by < 0 ? 1 : 2);
     (same?.disabled ? way(by < 0 ? 2 : 1) : same)?.focus();
+  }
+
+  /** Moves a stop to another place in the order. @param {number} number @param {number} to */
+  place(number, to) {
+    const { stops } = this.draft;
+    this.step(`move “${this.nameOfStop(number)}”`, () => stops.splice(to, 0, ...stops.splice(number, 1)));
+    if (this.#chosen && "stop" in this.#chosen) this.#chosen.stop = to;
   }
 
   /** @param {number} number of a label */

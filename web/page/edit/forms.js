@@ -146,8 +146,14 @@ export function describe(row, name, value) {
 
 /** The view of a stop. @param {Editor} editor @param {number} number */
 function stopForm(editor, number) {
+  const { length } = editor.draft.stops;
+  const place = make("input", { type: "number", min: 1, max: length, value: number + 1, "data-field": "place" });
+  place.onchange = () => {
+    if (place.checkValidity() && place.value) editor.place(number, Number(place.value) - 1);
+    editor.refresh("place");
+  };
   return [
-    make("p", { className: "dim" }, `Stop ${number + 1} of ${editor.draft.stops.length}`),
+    labelled(`Place in the order, of ${length}`, place),
     make("p", { className: "row" },
       button("Set the view from here", () => editor.setView(number)),
       button("Go to it", () => editor.goTo(number))),

@@ -35,5 +35,5 @@ export const STYLE = `
 #aim::before { content: ""; width: 28px; height: 28px; border: 2px solid var(--warm); border-radius: 50%; box-shadow: 0 0 0 2px #000a; }
 #aim p { position: absolute; top: 12px; margin: 0; padding: 10px 16px; border-radius: 10px; background: var(--warm); color: #16171b; max-width: min(560px, 60vw); }
 .aiming #view { cursor: crosshair; }
-@media (max-width: 640px) { #panels #edit { width: 100%; } .aiming #edit { display: none; } #aim p { max-width: 92vw; } }
+@media (max-width: 640px) { #panels #edit { width: 100%; } .aiming #panels #edit, #edit ~ #label { display: none; } #aim p { max-width: 92vw; } }
 `;
