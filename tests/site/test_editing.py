@@ -210,6 +210,12 @@ def test_a_change_by_another_program_is_kept(page: Page) -> None:
     assert answer.status == 412
     assert "another program" in message(answer)["message"]
     assert "By hand" in page.file.read_text()
+    # The plain page has what was written by hand; of a damaged file, the tour before.
+    before = page.client("/").body
+    page.file.write_text("{")
+    assert page.client("/").body == before
+    assert b"data/tour-" in before
+    assert page.ask("tour").status == 422
 
 
 def test_a_ray_names_the_object_before_it(page: Page) -> None:
