@@ -10,7 +10,7 @@ import webbrowser
 from dataclasses import asdict
 from ipaddress import ip_address
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -35,6 +35,9 @@ from ptmtools.site.published import PublishOptions
 from ptmtools.site.publishing import COARSE, publish as write, weight_of
 from ptmtools.site.serving import ServeOptions, serving
 from ptmtools.store.objects import is_url
+
+if TYPE_CHECKING:
+    from ptmtools.site.edit_requests import Editing
 
 _ORIGIN = re.compile(r"\*|https?://[^\s/?#@]+")
 
@@ -69,6 +72,9 @@ def serve(console: Console, db: str, opened: bool, origin: str | None, **values:
     wrote. --bandwidth and --latency simulate a slow connection.
     """
     options = take(ServeOptions, values)
+    if options.edit and origin:
+        raise click.UsageError("--edit is for the page of this server: without --cors")
+    editing = _editing(db) if options.edit else None
     files = files_of(db)
     try:
         with serving(
@@ -77,7 +83,9 @@ def serve(console: Console, db: str, opened: bool, origin: str | None, **values:
             port=options.port,
             throttle=options.throttle,
             origin=origin,
+            editing=editing,
         ) as url:
+            url += editing.address if editing else ""
             console.print(url)
             if not console.quiet and sys.stderr.isatty():
                 click.echo("Press Ctrl-C to stop", err=True)
@@ -91,6 +99,14 @@ def serve(console: Console, db: str, opened: bool, origin: str | None, **values:
             threading.Event().wait()
     except KeyboardInterrupt:
         pass  # the usual end
+
+
+def _editing(db: str) -> Editing:
+    """The editing of the tour of a database."""
+    from ptmtools.site.edit_requests import Editing
+    from ptmtools.site.editing import TourEditor
+
+    return Editing(TourEditor(db))
 
 
 def _is_local(host: str) -> bool:

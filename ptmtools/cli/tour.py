@@ -49,6 +49,11 @@ def init(console: Console, db: str, output: str | None, force: bool) -> None:
         scene, cells = artifacts[APO], artifacts[CELLS]
     text, pictures, rooms = first_tour(scene, cells, folder.manifest.model)
     write_bytes(file, text.encode(), force=force)
+    if not pictures + rooms:
+        console.warn(
+            "note: no object is a picture: upright, flat, with an image of its own, above the "
+            "floor (docs/formats/tour.md); place labels by hand with `ptm serve DB --edit`"
+        )
     console.result(
         {"tour": str(file), "pictures": pictures, "rooms": rooms},
         [f"{file}: labels of {count(pictures, 'picture')} and {count(rooms, 'room')}"],

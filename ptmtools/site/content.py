@@ -14,7 +14,7 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Literal, TypeVar
 from urllib.parse import quote, unquote
@@ -112,11 +112,13 @@ class Site:
     entries: its files, by name.
     index: the document that the page reads first.
     notes: remarks for the user, one line each.
+    again: makes the site with the tour as it is then; raises as `site_tour`.
     """
 
     entries: Mapping[str, Entry]
     index: Mapping[str, Any]
     notes: tuple[str, ...] = ()
+    again: Callable[[], Site] | None = field(default=None, repr=False, compare=False)
 
 
 def site_of(
@@ -174,8 +176,14 @@ class _Builder:
             self._vrml()
         text = json.dumps(index, ensure_ascii=False, separators=(",", ":")).encode()
         name = self._add("index", ".json", JSON, text, compressed=True)
-        self._page(index, f"{DATA}/{name}", poster, openings, self._tour())
-        return Site(self._entries, index, tuple(self._notes))
+        body, notes = self._entries, self._notes
+
+        def toured() -> Site:
+            self._entries, self._notes = dict(body), list(notes)
+            self._page(index, f"{DATA}/{name}", poster, openings, self._tour())
+            return Site(self._entries, index, tuple(self._notes), toured)
+
+        return toured()
 
     def _openings(self, index: Mapping[str, Any]) -> tuple[str, ...]:
         """The URLs of the openings of the first viewpoints; none where Embree is missing."""

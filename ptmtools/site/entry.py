@@ -48,6 +48,14 @@ def state_of(stat: os.stat_result) -> tuple[int, int, int]:
     return stat.st_ino, stat.st_mtime_ns, stat.st_size
 
 
+def stamp_of(file: Path) -> tuple[int, ...]:
+    """`state_of` a file; () where it does not exist."""
+    try:
+        return state_of(file.stat())
+    except OSError:
+        return ()
+
+
 def link_bytes(entry: Entry) -> int:
     """Bytes of a file on the link without headers; of its gzip copy where that is sent."""
     if isinstance(entry.source, Path) and not entry.compressed:

@@ -16,11 +16,12 @@ from urllib.parse import unquote, unquote_to_bytes
 
 from ptmtools.errors import DatabaseError, PtmError
 from ptmtools.files import leads_inside
-from ptmtools.site.content import SiteOptions, site_of
-from ptmtools.site.entry import Entry
+from ptmtools.site.content import Site, SiteOptions, site_of
+from ptmtools.site.entry import Entry, stamp_of
 from ptmtools.site.forms import form_of, form_site
 from ptmtools.site.program import HTML, INDEX, JAVASCRIPT
 from ptmtools.store.layout import MANIFEST, SERVED
+from ptmtools.tour.model import NAME
 
 #: The file of a decoded name, or None; raises BlockingIOError for one that will exist later.
 Lookup = Callable[[str], Entry | None]
@@ -104,44 +105,49 @@ def files_of(folder: str | PathLike[str]) -> Lookup:
 
 
 class _Database:
-    """The files of a database. It may be built again meanwhile: the next request for the page then
-    gets a new site."""
+    """The files of a database. It may be built again meanwhile, or its tour changed: the next
+    request for the page then gets a new site."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._lock = Lock()
-        stamp = self._stamp()
-        #: The site, and the state of the database that it describes.
-        self._site = self._new_site(), stamp
+        self._stamps = self._database_stamp(), self._tour_stamp()
+        self._site = self._new_site()
+        self._find = among(self._site.entries)
         self._others = below(path / SERVED)
 
     def __call__(self, name: str) -> Entry | None:
         if name == INDEX:
             self._renew()
-        return self._site[0](name) or self._others(name)
+        return self._find(name) or self._others(name)
 
     def _renew(self) -> None:
         with self._lock:
-            stamp = self._stamp()
-            if self._site[1] == stamp:
+            before = self._stamps
+            stamps = self._database_stamp(), self._tour_stamp()
+            if stamps == before:
                 return
             try:
-                self._site = self._new_site(), stamp
+                again = self._site.again if stamps[0] == before[0] else None
+                self._site = again() if again else self._new_site()
             except (PtmError, OSError) as fault:
                 print(f"ptm: {fault}", file=sys.stderr)
-                raise BlockingIOError("the database is being built, or damaged") from None
+                if stamps[0] != before[0]:
+                    raise BlockingIOError("the database is being built, or damaged") from None
+            # A tour with an error leaves the one before it, and is reported once.
+            self._stamps = stamps
+            self._find = among(self._site.entries)
 
-    def _stamp(self) -> tuple[int, int]:
-        """Time and inode of the manifest, which change when a stage is finished."""
-        try:
-            state = (self._path / MANIFEST).stat()
-        except OSError:
-            return 0, 0
-        return state.st_mtime_ns, state.st_ino
+    def _database_stamp(self) -> tuple[int, ...]:
+        """That of the manifest, which changes when a stage is finished."""
+        return stamp_of(self._path / MANIFEST)
 
-    def _new_site(self) -> Lookup:
+    def _tour_stamp(self) -> tuple[int, ...]:
+        return stamp_of(self._path.absolute().parent / NAME)
+
+    def _new_site(self) -> Site:
         try:
-            return among(site_of(self._path, SiteOptions(pictures=False)).entries)
+            return site_of(self._path, SiteOptions(pictures=False))
         except DatabaseError as fault:
             if fault.code == "PTM-D001" and self._path.exists():
                 fault.message = (

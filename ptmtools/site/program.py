@@ -47,6 +47,11 @@ def program_files() -> dict[str, Entry]:
     }
 
 
+def script_file(name: str) -> bytes:
+    """The bytes of a script that is not among the files of a site; raises as `program_files`."""
+    return _built(name)
+
+
 def _built(name: str) -> bytes:
     try:
         return (PAGE / name).read_bytes()

@@ -26,15 +26,20 @@ from ptmtools.site.throttle import Throttle, Visits
 if TYPE_CHECKING:
     from starlette.types import ASGIApp
 
+    from ptmtools.site.edit_requests import Editing
+
 #: Seconds for which an idle connection is kept: browsers that pause find it open.
 _KEPT = 75
+#: Addresses that only this machine can reach.
+LOCAL = ("127.0.0.1", "::1")
 
 
 @dataclass(frozen=True)
 class ServeOptions:
     """Options of `ptm serve`.
 
-    Raises InputError: PTM-I111 an impossible link or an unreadable quantity.
+    Raises InputError: PTM-I111 an impossible link, an unreadable quantity, or --edit at an address
+    that other machines can reach.
     """
 
     heading: ClassVar[str] = "Server"
@@ -54,8 +59,21 @@ class ServeOptions:
         "0", "Delay before the first byte of each response: 100ms or 0.1.", metavar="TIME"
     )
 
+    edit: bool = option(
+        False,
+        "Edit the tour on the page: place labels with a click, write, and save to tour.json beside "
+        "the database. Open the printed address, which has the permission to write. On "
+        "127.0.0.1 or ::1 only.",
+    )
+
     def __post_init__(self) -> None:
         self.throttle  # noqa: B018 - raises for unreadable values
+        if self.edit and self.host not in LOCAL:
+            raise InputError(
+                "PTM-I111",
+                f"--edit with --host {self.host}: other machines could write",
+                remedy=f"use --host {LOCAL[0]} or {LOCAL[1]}",
+            )
 
     @property
     def throttle(self) -> Throttle:
@@ -72,6 +90,7 @@ def serving(
     throttle: Throttle | None = None,
     visits: Visits | None = None,
     origin: str | None = None,
+    editing: Editing | None = None,
 ) -> Iterator[str]:
     """Serves files in a thread inside the ``with``; yields the URL, which ends in a slash.
 
@@ -79,13 +98,17 @@ def serving(
     ----------
     files: by their names, or a function that finds them.
     host, port: see `running`. throttle, visits, origin: see `ptmtools.site.responses.app_of`.
+    editing: of the tour, at an address of `LOCAL`.
 
     Raises as `running` does.
     """
     from ptmtools.site.responses import app_of
 
     lookup = among(files) if isinstance(files, Mapping) else files
-    app = app_of(lookup, throttle=throttle, visits=visits, origin=origin)
+    lookup = editing.lookup(lookup) if editing else lookup
+    app: ASGIApp = app_of(lookup, throttle=throttle, visits=visits, origin=origin)
+    if editing:
+        app = editing.app(app, lookup)
     with running(app, host=host, port=port) as url:
         yield url
 

@@ -13,14 +13,16 @@ from typing import Any
 import numpy as np
 
 from ptmtools.arrays import Floats
+from ptmtools.cells.model import Cells
 from ptmtools.errors import InputError, naming
 from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import APO, CELLS
+from ptmtools.scene.model import Scene
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.tour.captions import transcript_of
 from ptmtools.tour.markdown import nodes_of
 from ptmtools.tour.model import NAME, Label, Texts, Tour
-from ptmtools.tour.placing import Anchor, anchors
+from ptmtools.tour.placing import Anchor, Placing
 from ptmtools.tour.reading import CAPTIONS, SOUNDS, read_tour
 
 #: A file of the tour, and its media type → its URL, relative to the document.
@@ -59,7 +61,7 @@ class SiteTour:
 def site_tour(folder: DatabaseFolder, choice: str, name_of: NameOf) -> tuple[SiteTour | None, str]:
     """The tour of a site, None without one; and a note, "" without one.
 
-    Raises as `tour_file`, `read_tour` and `anchors`, and PTM-D004 to D008 for the artifacts.
+    Raises as `tour_file`, `read_tour`, `Placing.anchors`; PTM-D004 to D008 for the artifacts.
     """
     file = tour_file(folder.path, choice)
     if file is None:
@@ -68,10 +70,8 @@ def site_tour(folder: DatabaseFolder, choice: str, name_of: NameOf) -> tuple[Sit
     model = folder.manifest.model
     if tour.model and tour.model != model and not choice:
         return None, f"{file} is the tour of {tour.model}, not of {model}: left out"
-    artifacts = Artifacts(folder)
     with naming(file):
-        places = anchors(tour, artifacts[APO])
-    inside = artifacts[CELLS].locate(np.array([place.marker for place in places]).reshape(-1, 3))
+        document = TourPlacer(folder).placed(tour, name_of)
     transcripts: dict[int, Texts] = {
         number: {
             tag: transcript_of(file.read_text("utf-8-sig")) for tag, file in label.captions.items()
@@ -79,7 +79,24 @@ def site_tour(folder: DatabaseFolder, choice: str, name_of: NameOf) -> tuple[Sit
         for number, label in enumerate(tour.labels)
         if label.captions
     }
-    return SiteTour(_document(tour, places, inside.tolist(), name_of), transcripts), ""
+    return SiteTour(document, transcripts), ""
+
+
+class TourPlacer:
+    """Places tours in the scene of a database."""
+
+    def __init__(self, folder: DatabaseFolder) -> None:
+        """Raises PTM-D004 to D008 for the artifacts."""
+        artifacts = Artifacts(folder)
+        self.scene: Scene = artifacts[APO]
+        self._cells: Cells = artifacts[CELLS]
+        self.placing = Placing(self.scene)
+
+    def placed(self, tour: Tour, name_of: NameOf) -> dict[str, Any]:
+        """The document of a tour on the page; raises as `Placing.anchors`."""
+        places = self.placing.anchors(tour)
+        markers = np.array([place.marker for place in places]).reshape(-1, 3)
+        return _document(tour, places, self._cells.locate(markers).tolist(), name_of)
 
 
 def _document(

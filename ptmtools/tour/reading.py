@@ -42,12 +42,19 @@ def read_tour(path: str | os.PathLike[str]) -> Tour:
     LimitError: PTM-L204 a file is too large.
     """
     file = Path(path)
-    data = _content(file, LARGEST)
+    return tour_of(content_of(file, LARGEST), file)
+
+
+def tour_of(data: bytes, file: Path) -> Tour:
+    """The tour in ``data``, for a file; raises as `read_tour`."""
     with naming(file):
-        return _tour(_document(data), file.absolute().parent)
+        if len(data) > LARGEST:
+            raise LimitError("PTM-L204", f"more than {LARGEST >> 20} MiB")
+        return _tour(document_of(data), file.absolute().parent)
 
 
-def _document(data: bytes) -> dict[str, Any]:
+def document_of(data: bytes) -> dict[str, Any]:
+    """The document in ``data``, which matches the schema. Raises InputError: PTM-I870."""
     try:
         document = schemas.parse(data)
     except schemas.ShapeError as fault:
@@ -63,6 +70,10 @@ def _document(data: bytes) -> dict[str, Any]:
         schemas.check(document, schemas.TOUR)
     except schemas.ShapeError as fault:
         raise _wrong(fault.place, fault.message) from None
+    try:
+        json.dumps(document, ensure_ascii=False).encode()
+    except UnicodeEncodeError:
+        raise _no_tour("an escape is half of a character") from None
     return document
 
 
@@ -139,7 +150,7 @@ class _Reader:
             inside = Path(os.path.normpath(file)).is_relative_to(self._folder)
             if Path(text).is_absolute() or not inside:
                 raise _wrong(where, f"{text} lies outside the folder of the tour")
-            data = _content(file, most)
+            data = content_of(file, most)
             if suffixes is CAPTIONS and not _is_captions(data):
                 raise _wrong(where, f"{text} is not WebVTT")
             files[tag] = file
@@ -155,7 +166,11 @@ def _view(row: Mapping[str, Any], place: str) -> View:
     return View(tuple(row["position"]), (x, y, z))
 
 
-def _content(file: Path, most: int) -> bytes:
+def content_of(file: Path, most: int) -> bytes:
+    """The bytes of a file.
+
+    Raises InputError: PTM-I122 it cannot be read. LimitError: PTM-L204 it has more than ``most``.
+    """
     try:
         with open_regular(file) as stream:
             data = stream.read(most + 1)

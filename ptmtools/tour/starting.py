@@ -6,7 +6,6 @@ floor and shows an image once. The texture of a wall repeats, and a wall reaches
 
 from __future__ import annotations
 
-import json
 import re
 from collections import Counter
 from collections.abc import Iterator
@@ -20,7 +19,9 @@ from ptmtools.cells.model import Cells
 from ptmtools.embree import ray_tree
 from ptmtools.scene.model import Scene
 from ptmtools.tour.model import FORMAT, SCHEMA
-from ptmtools.tour.placing import Picture, faces_of_objects, picture_of
+from ptmtools.tour.pictures import Picture, Pictures, first_face
+from ptmtools.tour.placing import faces_of_objects
+from ptmtools.tour.writing import formatted
 
 #: Sides of a picture, metres.
 _LEAST, _GREATEST = 0.1, 5.0
@@ -71,21 +72,18 @@ def first_tour(scene: Scene, cells: Cells, model: str) -> tuple[str, int, int]:
         "labels": labels,
         "stops": stops,
     }
-    text = json.dumps(document, indent=1, ensure_ascii=False)
-    # One line for each point.
-    text = re.sub(r"\[\s+(-?[\d.e-]+),\s+(-?[\d.e-]+),\s+(-?[\d.e-]+)\s+\]", r"[\1, \2, \3]", text)
-    return text + "\n", len(pictures), len(rooms)
+    return formatted(document) + "\n", len(pictures), len(rooms)
 
 
 def _pictures(scene: Scene, cells: Cells) -> Iterator[Proposal]:
     """The pictures of a scene, in the order of its objects."""
-    shown = _objects_of_images(scene)
-    eyes = _Eyes(scene, cells)
+    shown, all_pictures = _objects_of_images(scene), Pictures(scene)
+    eyes = _Eyes(scene, cells, all_pictures)
     counts = Counter(scene.objects)
     for name, faces in faces_of_objects(scene).items():
         if not name or counts[name] > 1 or not _shows_an_image(scene, faces, shown):
             continue
-        picture = picture_of(scene, faces)
+        picture = all_pictures.of(faces)
         if picture and eyes.hangs(picture):
             view = eyes.view_of(picture, faces)
             yield Proposal(name, {"object": name}, view and _row(*view))
@@ -106,43 +104,47 @@ def _rooms(scene: Scene, cells: Cells) -> Iterator[Proposal]:
         yield Proposal(room.name, {"room": room.name}, _row(eye, along) if standing else None)
 
 
-def _objects_of_images(scene: Scene) -> dict[int, int]:
-    """Image → number of objects that show it."""
-    image = np.array([material.image for material in scene.materials], np.int64)
-    pairs = np.stack([image[scene.triangle_material], scene.triangle_object], axis=1)
-    images, counts = np.unique(np.unique(pairs, axis=0)[:, 0], return_counts=True)
-    return dict(zip(images.tolist(), counts.tolist(), strict=True))
+def _objects_of_images(scene: Scene) -> Counter[int]:
+    """Image → number of objects that show it once. Those that repeat it, such as walls, do not
+    count: a hall may have pictures of the same image as its walls."""
+    shown: Counter[int] = Counter()
+    for faces in faces_of_objects(scene).values():
+        shown.update(_images_once(scene, faces))
+    return shown
 
 
-def _shows_an_image(scene: Scene, faces: Ints, shown: dict[int, int]) -> bool:
-    """Whether one of the materials of an object has an image that few objects show, once."""
+def _images_once(scene: Scene, faces: Ints) -> set[int]:
+    """The images that an object shows once."""
+    images = set()
     for material in np.unique(scene.triangle_material[faces]).tolist():
         image = scene.materials[material].image
-        if image < 0 or shown[image] > _COPIES:
-            continue
         uv = scene.uv[faces[scene.triangle_material[faces] == material]].reshape(-1, 2)
-        if (np.ptp(uv, axis=0) <= _SPAN).all():
-            return True
-    return False
+        if image >= 0 and (np.ptp(uv, axis=0) <= _SPAN).all():
+            images.add(image)
+    return images
+
+
+def _shows_an_image(scene: Scene, faces: Ints, shown: Counter[int]) -> bool:
+    """Whether an object shows an image once that few objects show."""
+    return any(shown[image] <= _COPIES for image in _images_once(scene, faces))
 
 
 class _Eyes:
     """Places to look at pictures from."""
 
-    def __init__(self, scene: Scene, cells: Cells) -> None:
-        self._cells = cells
+    def __init__(self, scene: Scene, cells: Cells, pictures: Pictures) -> None:
+        self._cells, self._pictures = cells, pictures
         low, high = scene.points.min(axis=0), scene.points.max(axis=0)
         self._middle = (low + high) / 2
-        self._tree = ray_tree(scene.corners - self._middle)
         floor = cells.eye_floor
-        self._floor = ray_tree(floor - self._middle) if len(floor) else self._tree
+        self._floor = ray_tree((floor if len(floor) else scene.corners) - self._middle)
 
     def hangs(self, picture: Picture) -> bool:
         """Whether a picture has a plausible size and is not a wall."""
         if not all(_LEAST <= side <= _GREATEST for side in (picture.width, picture.height)):
             return False
         before = picture.centre + _BEFORE * picture.normal
-        return _first(self._tree, before - self._middle, _DOWN)[1] > picture.height / 2 + _HANGS
+        return self._pictures.first(before, _DOWN)[1] > picture.height / 2 + _HANGS
 
     def view_of(self, picture: Picture, own: Ints) -> tuple[Floats, Floats] | None:
         """Eye and direction from which nothing hides the centre of a picture; None if no visitor
@@ -164,7 +166,7 @@ class _Eyes:
 
     def _eye(self, point: Floats) -> Floats | None:
         """The eye of a visitor below or above a point, where one can stand."""
-        down = _first(self._floor, point - self._middle, _DOWN)[1]
+        down = first_face(self._floor, point - self._middle, _DOWN)[1]
         if not np.isfinite(down):
             return None
         eye = point + [0.0, _EYE - down, 0.0]
@@ -173,15 +175,8 @@ class _Eyes:
 
     def _sees(self, eye: Floats, picture: Picture, own: Ints) -> bool:
         """Whether the first surface towards the centre of a picture is its object."""
-        hit, _ = _first(self._tree, eye - self._middle, picture.centre - eye)
+        hit, _ = self._pictures.first(eye, picture.centre - eye)
         return hit >= 0 and bool((own == hit).any())
-
-
-def _first(tree: Any, start: Floats, along: Floats) -> tuple[int, float]:
-    """The first face of a tree along a ray, -1 for none, and its distance in units of the ray."""
-    answer = tree.run(start[None].astype(np.float32), along[None].astype(np.float32), output=1)
-    hit = int(answer["primID"][0])
-    return hit, float(answer["tfar"][0]) if hit >= 0 else np.inf
 
 
 def _row(eye: Floats, direction: Floats) -> dict[str, Any]:

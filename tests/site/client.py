@@ -29,10 +29,12 @@ class Client:
     def __init__(self, url: str) -> None:
         self.connection = http.client.HTTPConnection(urlsplit(url).netloc, timeout=20)
 
-    def __call__(self, path: str, method: str = "GET", **headers: str) -> Answer:
+    def __call__(
+        self, path: str, method: str = "GET", body: bytes | None = None, **headers: str
+    ) -> Answer:
         """Headers are named with _ for -."""
         given = {name.replace("_", "-"): value for name, value in headers.items()}
-        self.connection.request(method, path, headers=given)
+        self.connection.request(method, path, body, headers=given)
         response = self.connection.getresponse()
         actual = {name.lower(): value for name, value in response.getheaders()}
         return Answer(response.status, actual, response.read())

@@ -19,8 +19,9 @@ from ptmtools.sample.options import MuseumOptions
 from ptmtools.scene import ingest
 from ptmtools.scene.model import RoomVolume, Scene
 from ptmtools.tour.model import Label, Tour
-from ptmtools.tour.placing import anchors
+from ptmtools.tour.placing import Placing
 from ptmtools.tour.starting import first_tour
+from tests.tour.hall import write_hall
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +61,7 @@ def test_every_painting_has_a_label_and_a_view_that_nothing_hides(
 def test_markers_of_pictures_are_in_front_of_their_lower_edge(built: tuple[Scene, Cells]) -> None:
     scene, cells = built
     names = [name for name in scene.objects if name.startswith("painting_")]
-    places = anchors(tour(*(Label(name, object=name) for name in names)), scene)
+    places = Placing(scene).anchors(tour(*(Label(name, object=name) for name in names)))
     for name, place in zip(names, places, strict=True):
         picture = place.picture
         assert picture is not None
@@ -81,7 +82,7 @@ def test_markers_of_statues_rooms_and_places(built: tuple[Scene, Cells]) -> None
     scene = replace(scene, rooms=(hall,))
     other = next(name for name in scene.objects if name.startswith(("statue", "bench")))
     labels = Label("a", object=other), Label("b", room="Hall"), Label("c", at=(1.0, 2.0, 3.0))
-    statue, room, place = anchors(tour(*labels), scene)
+    statue, room, place = Placing(scene).anchors(tour(*labels))
     assert statue.picture is None
     assert statue.marker[1] > statue.high[1]
     assert room.marker.tolist() == [2, 1.5, 1]
@@ -91,13 +92,30 @@ def test_markers_of_statues_rooms_and_places(built: tuple[Scene, Cells]) -> None
 def test_unknown_names_are_errors_with_the_nearest_name(built: tuple[Scene, Cells]) -> None:
     scene, _ = built
     with pytest.raises(InputError, match="PTM-I302") as caught:
-        anchors(tour(Label("a", object="paintng_01")), scene)
+        Placing(scene).anchors(tour(Label("a", object="paintng_01")))
     assert caught.value.place == "labels[0].object"
     assert "painting_01" in str(caught.value.remedy)
     with pytest.raises(InputError, match="no room is called Hall"):
-        anchors(tour(Label("a", room="Hall")), scene)
+        Placing(scene).anchors(tour(Label("a", room="Hall")))
 
 
 def test_a_wall_is_no_picture() -> None:
     scene = ingest(Path(__file__).resolve().parents[2] / "sample_data/two_rooms/two_rooms.obj")
     assert first_tour(scene, subdivide(scene), "two_rooms.obj")[1] == 0
+
+
+def test_pictures_as_programs_write_them(tmp_path: Path) -> None:
+    """A slab, a canvas that is wound the other way, one on a board with a texture, and one with the
+    image of the walls: each has a stop in the hall, and its marker before it."""
+    scene = ingest(write_hall(tmp_path))
+    cells = subdivide(scene)
+    text, pictures, _ = first_tour(scene, cells, "hall.obj")
+    document = json.loads(text)
+    names = ["slab", "turned", "board", "wallpaper"]
+    assert [label["object"] for label in document["labels"]] == names
+    assert pictures == len(document["stops"]) == 4
+    for place in Placing(scene).anchors(tour(*(Label(name, object=name) for name in names))):
+        assert place.picture is not None
+        assert place.picture.normal[2] > 0.99, "all hang on the wall at the back"
+        assert place.picture.width == pytest.approx(0.8)
+        assert cells.locate(place.marker[None])[0] >= 0

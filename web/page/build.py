@@ -69,6 +69,8 @@ def build(folder: Path) -> None:
         **{f"{name}.js": script(FORMS / f"{name}.js") for name in ("apo", "interlace", "campus")},
         "viewer.js": script(HERE / "main.js"),
         **{name: script(HERE / name) for name in LATER},
+        # Of `ptm serve --edit` alone.
+        "editor.js": script(HERE / "editor.js"),
         "ptm-walk.js": minified(ROOT / "web" / "embed" / "ptm-walk.js"),
         "worker.js": minified(PTM / "worker.js"),
         "decoder.wasm": (PTM / "decoder.wasm").read_bytes(),

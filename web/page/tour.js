@@ -1,3 +1,3 @@
 // The script of sites with a tour.
 
-export { attachTour } from "./tour/tour.js";
+export { addTourStyle, attachTour, Tour } from "./tour/tour.js";

@@ -194,7 +194,7 @@ export class Walkthrough {
     }
     this.items = new ItemBuffer(gl);
     this.fence = new Fence(gl);
-    this.#turn();
+    this.turn();
   }
 
   /** The picture has changed. */
@@ -202,8 +202,8 @@ export class Walkthrough {
     this.#changed = clock();
   }
 
-  /** The view has changed, or its geometry: the item buffer, too. */
-  #turn() {
+  /** The view has changed, or its geometry, or what the item buffer is probed for. */
+  turn() {
     this.touch();
     this.#turned = this.#changed;
   }
@@ -262,7 +262,7 @@ export class Walkthrough {
     const turns = stillness.takes(pose, now);
     // A canvas of another size is empty.
     const resized = this.sharpness.settle(now - this.#before, now - stillness.moved < RESTING);
-    if (turns || resized) this.#turn();
+    if (turns || resized) this.turn();
     const time = Math.max(UPLOAD_TIME, Math.min(UPLOAD_SHARE * (now - this.#before), UPLOAD_MOST));
     this.#before = now;
     const frustum = frustumOf(pose, this.tall, this.aspect);
@@ -390,7 +390,7 @@ export class Walkthrough {
       if (!shapes || before?.shapes === shapes) continue;
       if (!renderer.add(cell, shapes, late)) break;
       // None of it may be in view, but now the item buffer has the room.
-      if (before || cell === this.cell) this.#turn();
+      if (before || cell === this.cell) this.turn();
       if (late()) break;
     }
   }
@@ -399,7 +399,7 @@ export class Walkthrough {
   #cull(frustum) {
     [this.drawn, this.#missing] = inView(this, frustum);
     const scene = [this.drawn, this.#missing].map((cells) => cells.map(({ cell }) => cell)).join(";");
-    if (scene !== this.#scene) this.#turn();
+    if (scene !== this.#scene) this.turn();
     this.#scene = scene;
   }
 

@@ -12,7 +12,7 @@ const line = (name, chosen, properties = {}) =>
   chosen ? [make(name, { ...properties, lang: chosen.tag, dir: "auto" }, String(chosen.text))] : [];
 
 /**
- * Fills the panel.
+ * Fills the panel; returns its heading.
  * @param {HTMLElement} root
  * @param {Label} label
  * @param {object} use
@@ -41,8 +41,7 @@ export function fillLabel(root, label, { choose, urlOf, close, ways }) {
       : []),
     make("p", { className: "row" }, ...ways.map(({ text: name, go }) => make("button", { onclick: go }, name))),
   );
-  heading.focus({ preventScroll: true });
-  root.scrollTop = 0;
+  return heading;
 }
 
 /** Texts with commas between. @param {{text: string, tag: string}[]} parts */

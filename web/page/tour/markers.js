@@ -62,6 +62,7 @@ export class Markers {
     this.root = make("div", { id: "markers" });
     walk.canvas.after(this.root);
     walk.probe = (camera) => this.#probe(camera);
+    walk.turn();
     walk.canvas.addEventListener("webglcontextlost", () => {
       this.#program = null;
       this.#queries = [];
@@ -170,6 +171,31 @@ export class Markers {
   }
 
   /**
+   * The ray through a pixel of the picture.
+   * @param {import("../gl/camera.js").Pose} pose @param {number} across @param {number} down
+   */
+  rayAt(pose, across, down) {
+    const { walk } = this, { clientWidth: width, clientHeight: height } = walk.canvas;
+    const { eye, turn, lens } = cameraOf(pose, walk.tall, walk.aspect, walk.far);
+    const view = [(2 * across / width - 1) / lens[0], (1 - 2 * down / height) / lens[1], -1];
+    // The transpose turns back.
+    const ray = [0, 1, 2].map((k) => turn[3 * k] * view[0] + turn[3 * k + 1] * view[1] + turn[3 * k + 2] * view[2]);
+    return { eye, ray };
+  }
+
+  /** Shows other labels. @param {Label[]} labels */
+  renew(labels) {
+    const { gl } = this.walk, before = new Map(this.labels.map((label, k) => [keyOf(label), this.#seen[k]]));
+    this.labels = labels;
+    this.#seen = labels.map((label) => before.get(keyOf(label)) ?? false);
+    for (const { query } of this.#queries) gl.deleteQuery(query);
+    this.#queries = [];
+    for (const button of this.#buttons.values()) button.remove();
+    this.#buttons.clear();
+    this.walk.turn();
+  }
+
+  /**
    * The label whose object a pixel of the picture shows, or -1: the nearest box on its ray, if the marker of
    * the label is seen.
    * @param {import("../gl/camera.js").Pose} pose
@@ -177,11 +203,7 @@ export class Markers {
    * @param {number} down pixels from the top
    */
   at(pose, across, down) {
-    const { walk } = this, { clientWidth: width, clientHeight: height } = walk.canvas;
-    const { eye, turn, lens } = cameraOf(pose, walk.tall, walk.aspect, walk.far);
-    const view = [(2 * across / width - 1) / lens[0], (1 - 2 * down / height) / lens[1], -1];
-    // The transpose turns back.
-    const ray = [0, 1, 2].map((k) => turn[3 * k] * view[0] + turn[3 * k + 1] * view[1] + turn[3 * k + 2] * view[2]);
+    const { eye, ray } = this.rayAt(pose, across, down);
     let nearest = -1, first = Infinity;
     for (const { label } of this.#near(eye)) {
       if (!this.#seen[label]) continue;
@@ -191,6 +213,9 @@ export class Markers {
     return nearest;
   }
 }
+
+/** A label at its place. @param {Label} label */
+const keyOf = ({ id, marker }) => `${id} ${marker}`;
 
 /**
  * Where a ray enters a box, in units of the ray; Infinity if it misses it.

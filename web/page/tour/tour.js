@@ -21,7 +21,7 @@ export async function attachTour(app, address) {
   const url = new URL(address, document.baseURI).href;
   try {
     const tour = await app.walk.fetcher.whole(url, (body) => checked(JSON.parse(new TextDecoder().decode(body))));
-    addStyle(STYLE);
+    addTourStyle();
     return new Tour(app, tour, url);
   } catch (fault) {
     const code = fault instanceof PageError ? fault.code : "PTM-V105";
@@ -31,10 +31,14 @@ export async function attachTour(app, address) {
   }
 }
 
+export const addTourStyle = () => addStyle(STYLE);
+
 export class Tour {
   /** The label that is open, and the stop of the visitor; -1 for none. */
   open = -1;
   stop = -1;
+  /** Takes a click on the picture, pixels, in place of the labels. @type {((across: number, down: number) => void) | null} */
+  pick = null;
   /** What had the focus before a label opened. @type {HTMLElement | null} */
   #before = null;
 
@@ -98,6 +102,7 @@ export class Tour {
       const slow = event.timeStamp - down.timeStamp > SHORT;
       down = null;
       if (moved > STILL || slow) return;
+      if (this.pick) return this.pick(event.clientX, event.clientY);
       const label = this.markers.at(app.walker.pose, event.clientX, event.clientY);
       if (label >= 0) this.show(label);
     });
@@ -134,11 +139,16 @@ export class Tour {
 
   /** Shows everything in a language. @param {string} language */
   speak(language) {
+    this.speakQuietly(language);
+    find(this.list, "select").focus();
+  }
+
+  /** Shows everything in a language; the focus stays. @param {string} language */
+  speakQuietly(language) {
     this.language = language;
     this.#fillList();
     this.markers.rename();
-    if (this.open >= 0) this.show(this.open);
-    find(this.list, "select").focus();
+    if (this.open >= 0) this.show(this.open, true);
   }
 
   /** @param {boolean} on */
@@ -148,8 +158,22 @@ export class Tour {
     if (!on && this.list.contains(document.activeElement)) this.button.focus();
   }
 
-  /** Opens a label. @param {number} label */
-  show(label) {
+  /**
+   * Shows a changed tour.
+   * @param {import("./document.js").Document} tour
+   */
+  renew(tour) {
+    this.tour = tour;
+    this.markers.renew(tour.labels);
+    if (!tour.languages.includes(this.language)) this.language = tour.languages[0];
+    if (!(this.stop in tour.stops)) this.stop = -1;
+    this.#fillList();
+    if (this.open in tour.labels) this.show(this.open, true);
+    else if (!this.panel.hidden) this.close();
+  }
+
+  /** Opens a label; `quiet`: the focus stays, and no event says so. @param {number} label @param {boolean} [quiet] */
+  show(label, quiet = false) {
     const { panel, tour } = this, active = document.activeElement;
     if (panel.hidden) this.#before = active instanceof HTMLElement ? active : null;
     this.open = this.markers.current = label;
@@ -158,12 +182,15 @@ export class Tour {
     const ways = tour.stops.length > 1
       ? [{ text: "Previous", go: () => this.step(-1) }, { text: "Next", go: () => this.step(1) }]
       : [];
-    fillLabel(panel, tour.labels[label], {
+    const heading = fillLabel(panel, tour.labels[label], {
       choose: this.choose,
       urlOf: (file) => new URL(file, this.url).href,
       close: () => this.close(),
       ways,
     });
+    if (quiet) return;
+    heading.focus({ preventScroll: true });
+    panel.scrollTop = 0;
     this.app.emit("label", tour.labels[label].id);
   }
 

@@ -1,0 +1,195 @@
+"""Pictures: upright rectangles that show an image, and the side from which visitors see them.
+
+The canvas of a picture is the part of one material. It is flat, or a slab whose front, back and
+edges have that material, as many programs write them. A frame may have a texture, too: a flat part
+comes first, then the larger one.
+
+Where faces have two sides, or a slab has two faces, the winding does not say which side is the
+front. Then rays decide: a picture hangs on a wall, and looks into a room.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ptmtools.arrays import Floats, Ints, areas, normals
+from ptmtools.embree import ray_tree
+from ptmtools.scene.model import Scene
+
+#: Cosine within which faces lie in one plane, and of the plane's angle to the vertical.
+_ALIKE, _UPRIGHT = 0.99, 0.2
+#: Share of the textured area that lies in the plane of a flat part; share of its rectangle that the
+#: front of a slab fills; thickness of a slab, in units of its smaller side.
+_MOST, _THIN = 0.9, 0.25
+#: Share of the width and height of its object that a picture has: the rest is its frame.
+_SHARE = 0.5
+#: Greatest distance of a picture from its wall; distance from a face behind which a ray starts; in
+#: metres. The most faces of the own object that a ray passes.
+_ON_WALL, _NEXT, _PASSED = 0.3, 1e-4, 16
+
+
+@dataclass(frozen=True)
+class Picture:
+    """An upright rectangle around a flat part of an object, metres.
+
+    Attributes
+    ----------
+    centre, normal, right: (3,) its centre, unit normal of its front, and unit vector to the right.
+    width, height: along `right`, and along the third axis, which points up.
+    """
+
+    centre: Floats
+    normal: Floats
+    right: Floats
+    width: float
+    height: float
+
+    @property
+    def up(self) -> Floats:
+        """(3,) unit vector to its upper edge."""
+        up: Floats = np.cross(self.normal, self.right)
+        return up
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A picture of one material; whether it is flat; and its thickness if it could be seen from
+    behind, else None."""
+
+    picture: Picture
+    flat: bool
+    thickness: float | None
+
+
+class Pictures:
+    """Finds the pictures of a scene."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._textured = np.array([m.image >= 0 for m in scene.materials], np.bool_)
+
+    @cached_property
+    def _middle(self) -> Floats:
+        points = self._scene.points
+        middle: Floats = (points.min(axis=0) + points.max(axis=0)) / 2
+        return middle
+
+    @cached_property
+    def _tree(self) -> Any:
+        return ray_tree(self._scene.corners - self._middle)
+
+    def first(self, start: Floats, along: Floats) -> tuple[int, float]:
+        """The first face of the scene along a ray, -1 for none, and its distance in units of the
+        ray."""
+        return first_face(self._tree, start - self._middle, along)
+
+    def of(self, own: Ints) -> Picture | None:
+        """The picture that an object with the faces (n,) is; None if it is none."""
+        textured = own[self._textured[self._scene.triangle_material[own]]]
+        if not len(textured):
+            return None
+        points = self._scene.corners[own].reshape(-1, 3)
+        parts = [part for part in self._parts(textured) if _fills(part.picture, points)]
+        if not parts:
+            return None
+        best = max(parts, key=lambda part: (part.flat, part.picture.width * part.picture.height))
+        if best.thickness is None or not self._looks_at_a_wall(best, own):
+            return best.picture
+        return _turned(best.picture, best.thickness)
+
+    def _parts(self, faces: Ints) -> Iterator[_Part]:
+        """Those of each material of the faces."""
+        material = self._scene.triangle_material[faces]
+        for number in np.unique(material).tolist():
+            part = self._part(faces[material == number])
+            if part:
+                yield part
+
+    def _part(self, faces: Ints) -> _Part | None:
+        """The rectangle in the plane of the largest of the faces, if that is upright and nearly all
+        that one sees of them."""
+        corners = self._scene.corners[faces]
+        size, across = areas(corners), normals(corners)
+        length = np.linalg.norm(across, axis=1)
+        across = across / np.maximum(length, np.finfo(np.float64).tiny)[:, None]
+        main = across[int(size.argmax())]
+        front, behind = across @ main > _ALIKE, across @ main < -_ALIKE
+        if abs(main[1]) > _UPRIGHT or not front.any():
+            return None
+        right = np.cross([0.0, 1.0, 0.0], main)
+        right /= np.linalg.norm(right)
+        axes = np.stack([right, np.cross(main, right), main], axis=1)
+        low, high = _span(corners[front] @ axes)
+        width, height = float(high[0] - low[0]), float(high[1] - low[1])
+        middle = (low + high) / 2
+        centre = axes @ [middle[0], middle[1], high[2]]
+        first, last = _span(corners @ axes)
+        thickness = float(last[2] - first[2])
+        shown, whole = float(size[front].sum()), float(size.sum())
+        flat = shown >= _MOST * whole
+        slab = thickness <= _THIN * min(width, height) and shown >= _MOST * width * height
+        if not flat and not slab:
+            return None
+        two = bool(self._scene.two_sided[faces[front]].any())
+        back = two or float(size[behind].sum()) >= _MOST * shown
+        picture = Picture(centre, main, right, width, height)
+        return _Part(picture, flat, thickness if back else None)
+
+    def _looks_at_a_wall(self, part: _Part, own: Ints) -> bool:
+        """Whether visitors see a part from behind: something is just before it, and nothing behind
+        it; or out of the building before it."""
+        picture = part.picture
+        before = self._free(picture.centre, picture.normal, own)
+        behind = self._free(
+            picture.centre - picture.normal * (part.thickness or 0), -picture.normal, own
+        )
+        if (before < _ON_WALL) != (behind < _ON_WALL):
+            return before < _ON_WALL
+        return bool(np.isinf(before) and np.isfinite(behind))
+
+    def _free(self, start: Floats, along: Floats, own: Ints) -> float:
+        """The distance to the first face along a unit vector that is not among its own ones."""
+        away = _NEXT
+        for _ in range(_PASSED):
+            hit, step = self.first(start + away * along, along)
+            if hit < 0:
+                return float("inf")
+            away += step
+            if not (own == hit).any():
+                return away
+            away += _NEXT
+        return away
+
+
+def first_face(tree: Any, start: Floats, along: Floats) -> tuple[int, float]:
+    """The first face of a tree along a ray, -1 for none, and its distance in units of the ray."""
+    answer = tree.run(start[None].astype(np.float32), along[None].astype(np.float32), output=1)
+    hit = int(answer["primID"][0])
+    return hit, float(answer["tfar"][0]) if hit >= 0 else np.inf
+
+
+def _span(points: Floats) -> tuple[Floats, Floats]:
+    flat = points.reshape(-1, 3)
+    return flat.min(axis=0), flat.max(axis=0)
+
+
+def _fills(picture: Picture, points: Floats) -> bool:
+    """Whether a picture is a large part of its object, whose points are (n, 3)."""
+    low, high = _span(points @ np.stack([picture.right, picture.up, picture.normal], axis=1))
+    width, height, _ = high - low
+    return bool(picture.width >= _SHARE * width and picture.height >= _SHARE * height)
+
+
+def _turned(picture: Picture, thickness: float) -> Picture:
+    """The other side of a picture."""
+    return replace(
+        picture,
+        centre=picture.centre - picture.normal * thickness,
+        normal=-picture.normal,
+        right=-picture.right,
+    )
