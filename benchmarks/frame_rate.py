@@ -1,7 +1,7 @@
 """Frames per second in a browser, without a limit of the link.
 
     python benchmarks/frame_rate.py [museum | DB | FOLDER]… [--budgets 4 8 16 32 64]
-    python benchmarks/frame_rate.py DB --angle gl-egl --uncapped      on a graphics card
+    python benchmarks/frame_rate.py DB --angle gl-egl                 on a graphics card
 
 Databases (Marvie & Bouatouch 2003, §7 and Figure 2, bottom): a walk with many turns, by `ptm path`
 or the recording `--walk`, is played twice in each page; the first time loads all that it needs, and
@@ -341,7 +341,8 @@ def main(arguments: list[str] | None = None) -> int:
     add("--headed", action="store_true", help="show the window")
     add("--angle", default=SOFTWARE, metavar="NAME",
         help="what draws: swiftshader (default), gl, gl-egl, vulkan, metal, d3d11")  # fmt: skip
-    add("--uncapped", action="store_true", help="more frames than the screen shows")
+    add("--uncapped", action="store_true",
+        help="more frames than the screen shows, by software")  # fmt: skip
     add("-o", "--output", type=Path, default=ROOT / "build/bench/frame_rate", metavar="DIR")
     options = parser.parse_args(arguments)
     if web.chromium() is None:

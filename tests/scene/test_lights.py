@@ -145,7 +145,9 @@ def test_emission_of_gltf(put: Put) -> None:
         assert lights(emitting(put, **material)).glow.tolist() == pytest.approx([expected])
     unlit = {"KHR_materials_unlit": {}}
     assert not emitting(put).lights
-    assert not emitting(put, emissiveFactor=[1, 1, 1], extensions=unlit).lights
+    bare = emitting(put, emissiveFactor=[1, 1, 1], extensions=unlit).lights
+    assert bare.unlit.all()
+    assert not bare.glow.any()
 
 
 #: 1.1 MiB of texels.
