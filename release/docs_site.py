@@ -20,9 +20,11 @@ from ptmtools.version import __version__
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
-#: Code, and outside of code `](target)` or `](target#anchor)`.
+#: Code, and outside of code `](target)` or `](target#anchor)`, and `][`, which mkdocstrings takes
+#: for a link.
 CODE_OR_LINK = re.compile(
-    r"^```.*?^```$|`[^`\n]+`|\]\((?!\w+:)(?P<target>[^()\s#]+)(?P<anchor>#[^()\s]*)?\)",
+    r"^ *```.*?^ *```$|`[^`\n]+`|\]\["
+    r"|\]\((?!\w+:)(?P<target>[^()\s#]+)(?P<anchor>#[^()\s]*)?\)",
     re.MULTILINE | re.DOTALL,
 )
 #: A row of a table, and code.
@@ -83,7 +85,7 @@ def on_page_markdown(markdown: str, page: Page, config: Any, files: Files) -> st
 
     def moved(match: re.Match[str]) -> str:
         if not match["target"]:
-            return match[0]
+            return r"]\[" if match[0] == "][" else match[0]
         target = uri_of((source.parent / match["target"]).resolve())
         return f"]({posixpath.relpath(target, start)}{match['anchor'] or ''})"
 
