@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, get_args, get_or
 
 import click
 from click.core import ParameterSource
+from click.shell_completion import CompletionItem
 
 from ptmtools.cli.console import Console
 from ptmtools.options import Option as Declared, default_of, degrees_text, option_name, option_of
@@ -123,7 +124,7 @@ class Command(click.Command):
 
 
 def _print_all_help(context: click.Context, parameter: click.Parameter, given: bool) -> None:
-    if given:
+    if given and not context.resilient_parsing:  # a shell completes a line
         context.meta[_ALL] = True
         click.echo(context.get_help())
         context.exit()
@@ -168,6 +169,16 @@ class Named(click.ParamType):  # type: ignore[type-arg]  # generic only in newer
             if name not in self.table:
                 self.fail(f"{name!r} is not one of {', '.join(self.table)}", param, ctx)
         return str(value)
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        given, comma, last = incomplete.rpartition(",") if self.several else ("", "", incomplete)
+        return [
+            CompletionItem(given + comma + name, help=about)
+            for name, about in self.explained
+            if name.startswith(last) and name not in given.split(",")
+        ]
 
     @property
     def explained(self) -> list[tuple[str, str]]:
@@ -364,6 +375,8 @@ def local_copy(context: click.Context, parameter: click.Parameter, value: str) -
     """The folder of a database to read; of one at a URL that of its copy."""
     from ptmtools.store.objects import is_url, plain_path
 
+    if context.resilient_parsing:  # a shell completes a line
+        return value
     if not is_url(plain_path(value)):
         return os.fspath(plain_path(value))
     from ptmtools.store.remote import fetch_database
