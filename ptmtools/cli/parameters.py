@@ -35,7 +35,7 @@ Decorator = Callable[[Function], Function]
 GENERAL = "General"
 #: Values of an option that its help explains; more are listed under a heading.
 INLINE_VALUES = 5
-_ALL = "ptmtools.cli.help_all"
+HELP_ALL = "ptmtools.cli.help_all"
 _ADDRESS = re.compile(r"\w+://.+:\d+")
 _METAVARS = {"integer": "N", "integer range": "N", "float": "X", "float range": "X"}
 
@@ -106,7 +106,7 @@ class Command(click.Command):
             record = each.get_help_record(ctx) if isinstance(each, click.Option) else None
             if record is None:
                 continue
-            if ctx.meta.get(_ALL) or getattr(each, "basic", True):
+            if ctx.meta.get(HELP_ALL) or getattr(each, "basic", True):
                 sections.setdefault(getattr(each, "heading", GENERAL), []).append(record)
             else:
                 omitted += 1
@@ -125,7 +125,7 @@ class Command(click.Command):
 
 def _print_all_help(context: click.Context, parameter: click.Parameter, given: bool) -> None:
     if given and not context.resilient_parsing:  # a shell completes a line
-        context.meta[_ALL] = True
+        context.meta[HELP_ALL] = True
         click.echo(context.get_help())
         context.exit()
 
