@@ -105,6 +105,8 @@ lint: $(VENV)/.installed-dev
 	  [ -z "$$large" ] || { echo "Tracked files over 1 MiB: $$large" >&2; exit 1; }
 	$(BIN)/python benchmarks/house.py --check
 	$(BIN)/python benchmarks/docs_tables.py --check
+	$(BIN)/repo-review . --show err
+	$(BIN)/zizmor --offline --quiet .github
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
 
 bench-codec: $(VENV)/.installed-dev

@@ -150,7 +150,7 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]  # generic only in new
             numbers = ()
         if len(numbers) not in self.counts:
             wanted = " or ".join(str(count) for count in self.counts)
-            whole = "whole " if self.kind is int else ""
+            whole = "whole " if issubclass(self.kind, int) else ""
             self.fail(f"{value!r} is not {wanted} {whole}numbers separated by commas", param, ctx)
         return numbers
 
