@@ -20,6 +20,17 @@ SECTION = re.compile(
 )
 #: The beginning of an entry for several names.
 NAMES = re.compile(r"^(\w+(?:, \w+)+): ")
+#: Placeholders of the command line that are units.
+UNITS = {
+    "BYTES": "bytes",
+    "M/S": "m/s",
+    "M2": "m²",
+    "METRES": "metres",
+    "MIB": "MiB",
+    "PIXELS": "pixels",
+    "SECONDS": "seconds",
+    "TEXELS": "texels",
+}
 
 
 def google_style(docstring: str) -> str:
@@ -55,8 +66,18 @@ class HouseStyle(griffe.Extension):
 
     def on_attribute_instance(self, *, attr: griffe.Attribute, **settings: Any) -> None:
         call = attr.value
+        if attr.parent is None or not attr.parent.is_class:  # of a command
+            return
         if isinstance(call, griffe.ExprCall) and str(call.function) == "option":
-            default, text, *_ = call.arguments
+            default, text, *details = call.arguments
             attr.value = default
             if isinstance(text, str):  # a literal, not computed
-                attr.docstring = griffe.Docstring(ast.literal_eval(text), parent=attr)
+                shown = ast.literal_eval(text) + _unit(details)
+                attr.docstring = griffe.Docstring(shown, parent=attr)
+
+
+def _unit(details: list[Any]) -> str:
+    """A sentence on the unit that the keywords of an option name."""
+    given = {each.name: str(each.value) for each in details}
+    unit = "radians" if "degrees" in given else UNITS.get(given.get("metavar", "").strip("\"'"), "")
+    return f" In {unit}." if unit else ""
