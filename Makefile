@@ -12,8 +12,10 @@
 # make fuzz    100,000 damaged and hostile files for every reader, 1,000 damaged buildings (an hour)
 # make page    bundle the page of web/page into the package, with esbuild
 # make dist    a wheel and an sdist in build/dist
+# make man     the manual page of ptm, in release/man (make dist packs it)
 # make sample  only the sample museum
 # make setup   only the virtual environment
+# make docs    the documentation as a web site, in build/docs
 # make docs-tables     print the exact tables of benchmarks/RESULTS.md into it (ten minutes)
 # make docs-timings    print its timed tables, on a machine that does nothing else (an hour)
 # make docs-pictures   draw the pictures of the docs
@@ -33,7 +35,7 @@ JOBS ?= 2
 PYTEST_ARGS ?=
 export PTM_SHARED ?= $(abspath ../shared)
 
-.PHONY: help setup demo walk test lint bench bench-codec bench-pvs bench-ach bench-walk bench-web fuzz page sample dist docs-tables docs-timings docs-pictures clean
+.PHONY: help setup demo walk test lint bench bench-codec bench-pvs bench-ach bench-walk bench-web fuzz page sample dist docs man docs-tables docs-timings docs-pictures clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -65,9 +67,12 @@ build/museum/.made: $(wildcard ptmtools/sample/*.py) | $(VENV)/.installed
 
 sample: build/museum/.made
 
-dist: $(VENV)/.installed-dev
+dist: $(VENV)/.installed-dev man
 	@rm -rf build/dist
 	$(BIN)/python -m build --no-isolation -o build/dist .
+
+man: $(VENV)/.installed-dev
+	$(BIN)/python release/man_page.py -o release/man/ptm.1
 
 # The cell of the first viewpoint.
 FIRST_CELL = $(BIN)/python -c 'import json; hints = json.load(open("build/museum.db/www/hints.json")); print(hints["viewpoints"][0]["cell"])'
@@ -100,6 +105,9 @@ lint: $(VENV)/.installed-dev
 	  [ -z "$$large" ] || { echo "Tracked files over 1 MiB: $$large" >&2; exit 1; }
 	$(BIN)/python benchmarks/house.py --check
 	$(BIN)/python benchmarks/docs_tables.py --check
+	$(BIN)/repo-review . --show err
+	$(BIN)/zizmor --offline --quiet .github
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
 
 bench-codec: $(VENV)/.installed-dev
 	@mkdir -p build/bench
@@ -154,6 +162,10 @@ fuzz: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks.fuzz.foreign --count 200 --jobs $(JOBS)
 	$(BIN)/python -m benchmarks.fuzz.geometry --count 1000 --jobs $(JOBS)
 
+# A warning, such as a broken link, is an error (mkdocs.yml). Without the variable Material advertises.
+docs: $(VENV)/.installed-dev
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
+
 docs-tables: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/docs_tables.py
 
@@ -169,5 +181,5 @@ page: $(VENV)/.installed-dev
 	$(BIN)/python web/page/build.py
 
 clean:
-	rm -rf build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf build dist release/man *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -not -path './$(VENV)/*' -prune -exec rm -rf {} +

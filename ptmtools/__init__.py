@@ -3,10 +3,12 @@
 The functions here are the commands of `ptm`: `build_scene` builds a database from a model,
 `run_stage` runs one stage of it, `ingest`, `subdivide`, `compute_pvs`, `compute_ach` and `emit` are
 the stages, `encode` and `decode` turn one image into a `.ptm` and back, `open` reads one level by
-level, `validate` and `plot_plan` look at the result. Each has a frozen class of options, which
+level, `validate` and `plot_plan` look at the result, `read_served` reads it as clients do,
+`site_of`, `publish` and `serving` bring it to browsers. Each has a frozen class of options, which
 holds the defaults. Every failure that a user can cause raises a `PtmError`.
 
-Names are imported when first used.
+Names are imported when first used. They are the public interface, together with `ptmtools.pillow`
+and the names of `ptmtools.lab` and others that docs/reference lists.
 """
 
 from __future__ import annotations
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
         MissingComponentError as MissingComponentError,
         OutputError as OutputError,
         PtmError as PtmError,
+        WorkerError as WorkerError,
     )
     from ptmtools.output import (
         EmitOptions as EmitOptions,
@@ -41,12 +44,24 @@ if TYPE_CHECKING:
         emit as emit,
         plot_plan as plot_plan,
     )
+    from ptmtools.output.served import Served as Served, read_served as read_served
     from ptmtools.pipeline.build import build_scene as build_scene, run_stage as run_stage
     from ptmtools.pipeline.encoding import TextureOptions as TextureOptions
     from ptmtools.pipeline.report import BuildReport as BuildReport
     from ptmtools.pipeline.stage import Artifacts as Artifacts
     from ptmtools.pipeline.validation import validate as validate
     from ptmtools.scene import IngestOptions as IngestOptions, Scene as Scene, ingest as ingest
+    from ptmtools.site.content import (
+        Site as Site,
+        SiteOptions as SiteOptions,
+        site_of as site_of,
+    )
+    from ptmtools.site.published import (
+        Published as Published,
+        PublishOptions as PublishOptions,
+    )
+    from ptmtools.site.publishing import publish as publish
+    from ptmtools.site.serving import serving as serving
     from ptmtools.store.folder import DatabaseFolder as DatabaseFolder
     from ptmtools.texture import (
         Description as Description,
@@ -67,6 +82,7 @@ if TYPE_CHECKING:
     from ptmtools.visibility.model import Pvs as Pvs
     from ptmtools.visibility.options import PvsOptions as PvsOptions
     from ptmtools.visibility.pvs import compute_pvs as compute_pvs
+    from ptmtools.walk import Walk as Walk, read_walk as read_walk
 
 __getattr__ = lazy_exports(
     __name__,
@@ -78,15 +94,20 @@ __getattr__ = lazy_exports(
         "ptmtools.diagnostics": "ValidationReport",
         "ptmtools.errors": (
             "CheckError DatabaseError InputError LimitError MissingComponentError OutputError "
-            "PtmError"
+            "PtmError WorkerError"
         ),
         "ptmtools.output": "EmitOptions PlotOptions emit plot_plan",
+        "ptmtools.output.served": "Served read_served",
         "ptmtools.pipeline.build": "build_scene run_stage",
         "ptmtools.pipeline.encoding": "TextureOptions",
         "ptmtools.pipeline.report": "BuildReport",
         "ptmtools.pipeline.stage": "Artifacts",
         "ptmtools.pipeline.validation": "validate",
         "ptmtools.scene": "IngestOptions Scene ingest",
+        "ptmtools.site.content": "Site SiteOptions site_of",
+        "ptmtools.site.published": "Published PublishOptions",
+        "ptmtools.site.publishing": "publish",
+        "ptmtools.site.serving": "serving",
         "ptmtools.store.folder": "DatabaseFolder",
         "ptmtools.texture": (
             "Description EncodeOptions Limits Picture PtmHeader PtmReader decode encode "
@@ -96,5 +117,6 @@ __getattr__ = lazy_exports(
         "ptmtools.visibility.model": "Pvs",
         "ptmtools.visibility.options": "PvsOptions",
         "ptmtools.visibility.pvs": "compute_pvs",
+        "ptmtools.walk": "Walk read_walk",
     },
 )

@@ -172,7 +172,7 @@ class SubdivideOptions:
                 "pass, open, closed or hidden",
             ),
             (
-                len(self.walker) == 3
+                len(self.walker) == 3  # type: ignore[redundant-expr]  # may be a plain tuple
                 and all(0 < length <= GIANT for length in self.walker)
                 and self.walker[1] < self.walker[2],
                 f"radius, step and height of {self.walker} metres are out of range",

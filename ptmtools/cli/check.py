@@ -44,7 +44,7 @@ SHOWN = 20
 
 
 def _print_codes(context: click.Context, option: click.Option, given: bool) -> None:
-    if given:
+    if given and not context.resilient_parsing:  # a shell completes a line
         from ptmtools.output.validation.findings import CODES
 
         for code, (severity, meaning) in sorted({**CODES, **FOLDER_CODES}.items()):

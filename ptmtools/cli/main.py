@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from ptmtools.cli.console import BROKEN_PIPE, Console, abandon_stdout, report
 from ptmtools.progress import listen
@@ -111,6 +112,15 @@ class Commands(click.Group):
         from ptmtools.cli.build import stage_command
 
         return stage_command(stage)
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """The commands and options that begin so; imports no command."""
+        abouts = {name: entry.about for name, entry in COMMANDS.items() if not entry.hidden}
+        abouts |= {name: stage.about for name, stage in _stages().items()}
+        return [
+            *(CompletionItem(n, help=a) for n, a in abouts.items() if n.startswith(incomplete)),
+            *click.Command.shell_complete(self, ctx, incomplete),
+        ]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         tables = {

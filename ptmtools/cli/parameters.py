@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, get_args, get_or
 
 import click
 from click.core import ParameterSource
+from click.shell_completion import CompletionItem
 
 from ptmtools.cli.console import Console
 from ptmtools.options import Option as Declared, default_of, degrees_text, option_name, option_of
@@ -34,7 +35,7 @@ Decorator = Callable[[Function], Function]
 GENERAL = "General"
 #: Values of an option that its help explains; more are listed under a heading.
 INLINE_VALUES = 5
-_ALL = "ptmtools.cli.help_all"
+HELP_ALL = "ptmtools.cli.help_all"
 _ADDRESS = re.compile(r"\w+://.+:\d+")
 _METAVARS = {"integer": "N", "integer range": "N", "float": "X", "float range": "X"}
 
@@ -105,7 +106,7 @@ class Command(click.Command):
             record = each.get_help_record(ctx) if isinstance(each, click.Option) else None
             if record is None:
                 continue
-            if ctx.meta.get(_ALL) or getattr(each, "basic", True):
+            if ctx.meta.get(HELP_ALL) or getattr(each, "basic", True):
                 sections.setdefault(getattr(each, "heading", GENERAL), []).append(record)
             else:
                 omitted += 1
@@ -123,8 +124,8 @@ class Command(click.Command):
 
 
 def _print_all_help(context: click.Context, parameter: click.Parameter, given: bool) -> None:
-    if given:
-        context.meta[_ALL] = True
+    if given and not context.resilient_parsing:  # a shell completes a line
+        context.meta[HELP_ALL] = True
         click.echo(context.get_help())
         context.exit()
 
@@ -149,7 +150,7 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]  # generic only in new
             numbers = ()
         if len(numbers) not in self.counts:
             wanted = " or ".join(str(count) for count in self.counts)
-            whole = "whole " if self.kind is int else ""
+            whole = "whole " if issubclass(self.kind, int) else ""
             self.fail(f"{value!r} is not {wanted} {whole}numbers separated by commas", param, ctx)
         return numbers
 
@@ -168,6 +169,16 @@ class Named(click.ParamType):  # type: ignore[type-arg]  # generic only in newer
             if name not in self.table:
                 self.fail(f"{name!r} is not one of {', '.join(self.table)}", param, ctx)
         return str(value)
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        given, comma, last = incomplete.rpartition(",") if self.several else ("", "", incomplete)
+        return [
+            CompletionItem(given + comma + name, help=about)
+            for name, about in self.explained
+            if name.startswith(last) and name not in given.split(",")
+        ]
 
     @property
     def explained(self) -> list[tuple[str, str]]:
@@ -364,6 +375,8 @@ def local_copy(context: click.Context, parameter: click.Parameter, value: str) -
     """The folder of a database to read; of one at a URL that of its copy."""
     from ptmtools.store.objects import is_url, plain_path
 
+    if context.resilient_parsing:  # a shell completes a line
+        return value
     if not is_url(plain_path(value)):
         return os.fspath(plain_path(value))
     from ptmtools.store.remote import fetch_database

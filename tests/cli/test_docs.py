@@ -32,7 +32,8 @@ LINK = re.compile(r"\]\(([^()\s]+)\)")
 #: A page or a picture that a file of the code names.
 NAMED_PAGE = re.compile(r"\b(docs/[\w/-]+\.(?:md|png|jpg))(#[\w-]+)?")
 #: A file or a folder of the project.
-NAMED_FILE = re.compile(r"(?<![\w/.])((?:ptmtools|web|tests|benchmarks|sample_data)/[\w./-]*[\w/])")
+TOPS = "ptmtools", "web", "tests", "benchmarks", "release", "sample_data"
+NAMED_FILE = re.compile(rf"(?<![\w/.])((?:{'|'.join(TOPS)})/[\w./-]*[\w/])")
 SOURCES = {".py", ".js", ".mjs", ".c", ".h", ".json", ".md"}
 #: Code in a line, and a line of code.
 CODE = re.compile(r"`([^`\n]+)`|^ {4,}(\S.*)$", re.MULTILINE)
@@ -122,8 +123,7 @@ def test_links_resolve(page: Path) -> None:
 
 
 def test_pages_that_the_code_names_exist() -> None:
-    tops = "ptmtools", "web", "tests", "benchmarks", "sample_data"
-    files = [f for top in tops for f in (ROOT / top).rglob("*") if f.suffix in SOURCES]
+    files = [f for top in TOPS for f in (ROOT / top).rglob("*") if f.suffix in SOURCES]
     missing = []
     for file in [*files, ROOT / "Makefile"]:
         if "node_modules" in file.parts:

@@ -20,6 +20,8 @@ from pathlib import Path
 
 import pytest
 
+from release.man_page import man_page
+
 ROOT = Path(__file__).resolve().parents[2]
 #: Largest size of the wheel, bytes.
 LARGEST = 3_000_000
@@ -65,6 +67,8 @@ def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
             target = source / name
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes((ROOT / name).read_bytes())
+    (source / "release/man").mkdir()
+    (source / "release/man/ptm.1").write_text(man_page(), "utf-8")
     run(sys.executable, "-m", "build", "--no-isolation", "-o", folder / "dist", source, cwd=folder)
     return folder / "dist"
 
@@ -100,6 +104,7 @@ def test_the_wheel_is_small_and_holds_the_page_the_decoder_and_the_schemas(wheel
     assert "ptmtools/site/page/decoder.wasm" in names
     foreign = {name for name in names if not re.match(r"ptmtools[/-]", name)}
     assert not foreign
+    assert any(name.endswith(".data/data/share/man/man1/ptm.1") for name in names)
 
 
 def test_the_sdist_has_the_sources_of_the_page(dist: Path) -> None:

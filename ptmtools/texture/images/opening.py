@@ -155,7 +155,7 @@ def pillow_faults() -> Iterator[None]:
             "PTM-L104", f"has too many texels ({error})", remedy="scale it down first"
         ) from None
     except Exception as error:  # a damaged file can make its parsers raise nearly anything
-        raise damaged_image(error or type(error).__name__) from None
+        raise damaged_image(str(error) or type(error).__name__) from None
 
 
 def described(image: Image) -> Description:
