@@ -237,11 +237,15 @@ def _shape(file: Any, element: Any) -> Shape:
     local = np.frombuffer(geometry.verts_buffer, dtype=np.float64).reshape(-1, 3)
     triangles = np.frombuffer(geometry.faces_buffer, dtype=np.int32).reshape(-1, 3)
     style = np.frombuffer(geometry.material_ids_buffer, dtype=np.int32)  # -1 for none
+    product = file.by_id(element.id)
+    materials = UNSTYLED, *(material_of(file, one) for one in geometry.materials)
+    if shines(product):
+        materials = tuple(replace(material, glow=GLOW) for material in materials)
     return Shape(
-        file.by_id(element.id),
+        product,
         local @ placed[:3, :3].T + placed[:3, 3],
         triangles.astype(np.int64),
-        (UNSTYLED, *(material_of(file, one) for one in geometry.materials)),
+        materials,
         style.astype(np.int64) + 1,
     )
 
@@ -300,6 +304,9 @@ _KINDS: tuple[tuple[Kind, str], ...] = (
         IfcSurfaceFeature""",
     ),
 )
+#: Their surfaces glow, housings included: files seldom tell these apart. The luminance has no
+#: effect, if it is that of all lamps (`ptmtools.light.lamps`).
+_LAMPS, GLOW = ("IfcLightFixture", "IfcLamp"), 1.0
 _PART, _STOREY = "IfcBuildingElementPart", "IfcBuildingStorey"
 
 
@@ -311,6 +318,17 @@ def drawn(is_a: Callable[[str], bool]) -> bool:
 def kind_of(is_a: Callable[[str], bool]) -> Kind:
     """The role of products of a class."""
     return next((kind for kind, classes in _KINDS if any(map(is_a, classes.split()))), "")
+
+
+def shines(product: Any) -> bool:
+    """Whether a product is a lamp or a light fixture, by its class or, in IFC2X3, by its type."""
+    if any(map(product.is_a, _LAMPS)):
+        return True
+    with suppress(*FAULTS):
+        for relation in product.IsDefinedBy:
+            if relation.is_a("IfcRelDefinesByType"):
+                return any(relation.RelatingType.is_a(f"{name}Type") for name in _LAMPS)
+    return False
 
 
 def length_unit(file: Any) -> tuple[str, float | None]:

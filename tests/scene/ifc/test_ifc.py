@@ -160,6 +160,29 @@ def test_kinds_by_class(tmp_path: Path, schema: str, classes: list[tuple[str, Ki
     assert list(zip(classed, source.kinds, strict=True)) == classes
 
 
+@pytest.mark.parametrize("schema", ["IFC2X3", "IFC4"])
+def test_light_fixtures_glow(tmp_path: Path, schema: str) -> None:
+    from ifcopenshell.api import type as types
+
+    made = Ifc(schema)
+    made.box("IfcWall", "wall", (0, 0, 0), (1, 1, 1))
+    made.box("IfcFlowTerminal", "tap", (2, 0, 0), (3, 1, 1))
+    fixture = "IfcFlowTerminal" if schema == "IFC2X3" else "IfcLightFixture"
+    made.box(fixture, "panel", (4, 0, 0), (5, 1, 1))
+    (panel,) = (each for each in made.file.by_type(fixture) if each.Name == "panel")
+    if schema == "IFC2X3":
+        kind = made.entity("IfcLightFixtureType", "panel type")
+        types.assign_type(made.file, related_objects=[panel], relating_type=kind)
+    source, _ = read(made.write(tmp_path / "lamps.ifc"))
+    glow = {
+        name.split()[-1]: source.materials[
+            source.triangle_material[source.triangle_object == number][0]
+        ].glow
+        for number, name in enumerate(source.objects)
+    }
+    assert glow == {"wall": 0, "tap": 0, "panel": ifc_products.GLOW}
+
+
 def test_a_part_is_what_it_is_a_part_of(tmp_path: Path) -> None:
     made = Ifc()
     for i, whole in enumerate(("IfcWall", "IfcColumn", "IfcDoor")):
