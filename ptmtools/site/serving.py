@@ -102,6 +102,8 @@ def running(app: ASGIApp, *, host: str = "127.0.0.1", port: int = 0) -> Iterator
     Raises InputError: PTM-I920 the port is taken, or the address does not exist or is not
     permitted.
     """
+    import asyncio
+
     import uvicorn
 
     config = uvicorn.Config(
@@ -115,17 +117,25 @@ def running(app: ASGIApp, *, host: str = "127.0.0.1", port: int = 0) -> Iterator
         access_log=False,
         server_header=False,
         timeout_keep_alive=_KEPT,
-        timeout_graceful_shutdown=0,
     )
     with _listening(host, port) as listener:
-        server = uvicorn.Server(config)
+        server, ended = uvicorn.Server(config), threading.Event()
         url = url_of(listener)
-        thread = threading.Thread(target=server.run, args=([listener],), daemon=True)
+
+        async def serve() -> None:
+            under_way = asyncio.create_task(server.serve(sockets=[listener]))
+            await asyncio.to_thread(ended.wait)
+            # At `should_exit`, uvicorn would look at its next tick, and wait again for connections.
+            for connection in server.server_state.connections:
+                connection.transport.abort()
+            under_way.cancel()
+
+        thread = threading.Thread(target=asyncio.run, args=(serve(),), daemon=True)
         thread.start()
         try:
             yield url
         finally:
-            server.should_exit = True
+            ended.set()
             thread.join()
 
 
