@@ -34,6 +34,15 @@ def absent(what: str, remedy: str) -> None:
     pytest.skip(f"{what} is missing; {remedy}")
 
 
+@pytest.fixture(scope="session", autouse=True)
+def alone() -> Iterator[None]:
+    """Builds in this process take no more processors than they are asked to: the run of the tests
+    has as many workers, and processes take longer to start than most builds here."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("ptmtools.parallel.processors", lambda: 1)
+        yield
+
+
 @pytest.fixture(scope="session")
 def require() -> Callable[[str, str], None]:
     """``require(what, remedy)``: report a missing component (skip, or fail with CI=true)."""
