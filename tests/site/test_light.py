@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from browser import hurried
 from PIL import Image
 
 from ptmtools.arrays import Floats
