@@ -54,6 +54,13 @@ COUNTING = """
   }
 })();
 """
+#: Pauses between requests, and the patience with a host, are a tenth.
+HURRY = """
+{
+  const wait = window.setTimeout;
+  window.setTimeout = (call, ms, ...more) => wait(call, ms >= 500 ? ms / 10 : ms, ...more);
+}
+"""
 FRAMES = """
 async (count) => { while (count--) await new Promise(requestAnimationFrame); }
 """
@@ -157,6 +164,11 @@ def image_of(png: bytes) -> NDArray[np.uint8]:
     """(height, width, 3)."""
     with Image.open(io.BytesIO(png)) as image:
         return np.asarray(image.convert("RGB"))
+
+
+def hurried(page: Any) -> None:
+    """For `visiting`: a page whose files fail gives up soon."""
+    page.add_init_script(HURRY)
 
 
 @contextmanager

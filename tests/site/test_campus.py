@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser import Visitor, visiting
+from browser import Visitor, hurried, visiting
 
 from ptmtools.cli.main import main
 from ptmtools.errors import InputError
@@ -317,6 +317,6 @@ def test_damaged_files_give_a_message(
         with pytest.raises(InputError, match="PTM-I122"):
             opened(folder)
         return
-    with opened(folder) as visitor:
+    with opened(folder, prepare=hurried) as visitor:
         visitor.page.wait_for_selector("#error:not([hidden])", timeout=60_000)
         assert visitor.page.text_content("#error-code") == "PTM-V105"
