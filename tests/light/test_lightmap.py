@@ -31,15 +31,16 @@ SIZES = (512, 1024, 2048)
 
 def test_thin_faces_show_their_own_light() -> None:
     """The undersides of shelves are dark, their tops are light."""
-    corner = ledges(40)
-    atlas = unwrap(*indexed(corner), SIZES)
+    sizes = (256, 512)
+    corner = ledges(10)
+    atlas = unwrap(*indexed(corner), sizes)
     where = surroundings(corner, GROUND)
     face, point, at = samples(corner, atlas.uv, 4000)
     light = Rays(where, corner, 256, 0.2)
     wanted = light(face, point, np.zeros(len(face)))
     assert np.ptp(wanted) > 0.5
-    maps = bake(light, corner, atlas, light.grain, SIZES)
-    for actual, most in zip(maps, (0.08, 0.04, 0.03), strict=True):
+    maps = bake(light, corner, atlas, light.grain, sizes)
+    for actual, most in zip(maps, (0.08, 0.04), strict=True):
         assert (np.abs(bilinear(actual.value, at)[0] - wanted) > 0.1)[face >= 2].mean() < most
 
 
