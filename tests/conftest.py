@@ -35,12 +35,16 @@ def absent(what: str, remedy: str) -> None:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def alone() -> Iterator[None]:
-    """Builds in this process take no more processors than they are asked to: the run of the tests
-    has as many workers, and processes take longer to start than most builds here."""
+def one_processor() -> Iterator[Callable[[], int]]:
+    """Builds in this process have one worker, unless asked for more: the run of the tests has as
+    many as processors, and processes take longer to start than most builds here. Yields what
+    counts the processors."""
+    from ptmtools import parallel
+
+    count = parallel.processors
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("ptmtools.parallel.processors", lambda: 1)
-        yield
+        patch.setattr(parallel, "processors", lambda: 1)
+        yield count
 
 
 @pytest.fixture(scope="session")
