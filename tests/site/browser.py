@@ -100,7 +100,7 @@ class Visitor:
 
     def until(self, condition: str, seconds: float = 120) -> dict[str, Any]:
         """Waits for a condition, an expression of ``s``, the state; TimeoutError if it never is."""
-        late = time.monotonic() + seconds
+        late, pause = time.monotonic() + seconds, 0.01
         while True:
             state = "window.ptm?.state() ?? {}"
             holds = self.page.evaluate(f"((s) => Boolean({condition}))({state})")
@@ -108,7 +108,8 @@ class Visitor:
                 return self.state()
             if time.monotonic() > late:
                 raise TimeoutError(f"never {condition}: {self.state()}; {self.messages}")
-            time.sleep(0.1)
+            time.sleep(pause)
+            pause = min(0.1, 1.5 * pause)
 
     def complete(self) -> dict[str, Any]:
         """Waits until nothing is missing for the present view."""
