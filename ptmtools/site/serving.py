@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 #: Seconds for which an idle connection is kept: browsers that pause find it open.
 _KEPT = 75
+#: Seconds that responses may take to end once their connections are closed.
+_LATE = 0.1
 
 
 @dataclass(frozen=True)
@@ -128,6 +130,9 @@ def running(app: ASGIApp, *, host: str = "127.0.0.1", port: int = 0) -> Iterator
             # At `should_exit`, uvicorn would look at its next tick, and wait again for connections.
             for connection in server.server_state.connections:
                 connection.transport.abort()
+            # Most responses end with their connection.
+            if responses := server.server_state.tasks:
+                await asyncio.wait(responses, timeout=_LATE)
             under_way.cancel()
 
         thread = threading.Thread(target=asyncio.run, args=(serve(),), daemon=True)
