@@ -25,6 +25,8 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from ptmtools.cli.main import main as ptm
+
 #: Events of Python's audit hooks that change names on the disk.
 NAMES = frozenset({"os.rename", "os.link", "os.remove", "os.mkdir", "os.rmdir"})
 UPDATE = ("--samples", "3", "--profile", "raw", "--title", "updated")
@@ -100,7 +102,7 @@ class Trial:
             shutil.copytree(self.old, db)
         if not kill(db, more):
             return None
-        if (status := self.build(db, more)) != 0:
+        if (status := ptm(self.arguments(db, more))) != 0:
             return f"the next run ends with {status}"
         actual = state(db)
         wrong = [n for n in {**actual, **self.wanted} if actual.get(n) != self.wanted.get(n)]
@@ -139,8 +141,6 @@ def main() -> int:
     parser.add_argument("arguments", nargs="*", help=argparse.SUPPRESS)
     asked = parser.parse_args()
     if asked.child is not None:
-        from ptmtools.cli.main import main as ptm
-
         dying(asked.child, asked.below)
         return ptm([str(asked.model), *asked.arguments])
 

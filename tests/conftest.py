@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +24,10 @@ from ptmtools.scene.orientation import tolerance_of
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
 
+# Many tests start processes, each of which would compile the package.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = Path(os.environ.get("PTM_SHARED", ROOT.parent / "shared"))
 
@@ -32,6 +37,19 @@ def absent(what: str, remedy: str) -> None:
     if os.environ.get("CI", "").lower() == "true":
         pytest.fail(f"{what} is missing; {remedy}", pytrace=False)
     pytest.skip(f"{what} is missing; {remedy}")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_processor() -> Iterator[Callable[[], int]]:
+    """Builds in this process have one worker, unless asked for more: the run of the tests has as
+    many as processors, and processes take longer to start than most builds here. Yields what
+    counts the processors."""
+    from ptmtools import parallel
+
+    count = parallel.processors
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(parallel, "processors", lambda: 1)
+        yield count
 
 
 @pytest.fixture(scope="session")

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles, areas
+from ptmtools.jit import kernel
 from ptmtools.light.atlas import Atlas, claim, cover, nearest
 from ptmtools.light.looks import Look
 from ptmtools.light.occlusion import SPREAD, hemisphere, turns
@@ -30,7 +31,6 @@ from ptmtools.tolerance import INWARD_SHARE, TIE_SHARE
 AGREE = 8 / 255
 #: Least share of the bilinear weight of texels of the same chart.
 _ENOUGH = 0.5
-_KERNEL = ((-1, 0.25), (0, 0.5), (1, 0.25))
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def bake(
         point = _positions(atlas.uv, corner, face, row, column, size)
         turn = (column * SPREAD[0] + row * SPREAD[1]) % 1.0
         value[row, column] = look(face, point, turn)
-        value[row, column] = _smoothed(value, chart, row, column, grain)
+        value[row, column] = smoothed(value, chart, row, column, np.float32(grain))
         below = value, chart, centre >= 0
         if size > sizes[0]:
             read = owner >= 0
@@ -116,46 +116,69 @@ def _enlarged(
     """A lightmap of twice the size by bilinear filtering, and the texels in which it is valid:
     enough of the four texels belong to the chart of the one between them, these agree, and a face
     holds the centre of one of them."""
-    size = len(larger)
-    place = (np.arange(size) + 0.5) / 2 - 0.5
+    place = (np.arange(len(larger)) + 0.5) / 2 - 0.5
     first = np.clip(np.floor(place).astype(np.int64), 0, len(value) - 2)
-    share = np.clip(place - first, 0, 1).astype(np.float32)
-    rows, columns = (first, first + 1), (first, first + 1)
-    mean = np.zeros((size, size), np.float32)
-    least, most = np.full_like(mean, np.inf), np.full_like(mean, -np.inf)
-    weight, known = np.zeros_like(mean), np.zeros((size, size), np.bool_)
-    for i, row in enumerate(rows):
-        for j, column in enumerate(columns):
-            four = value[row[:, None], column]
-            same = chart[row[:, None], column] == larger
-            part = np.where(same, np.abs(1 - i - share)[:, None] * np.abs(1 - j - share), 0)
-            weight += part
-            known |= same & centred[row[:, None], column]
-            mean += part * four
-            np.minimum(least, four, out=least, where=same)
-            np.maximum(most, four, out=most, where=same)
-    believed = (larger >= 0) & (weight >= _ENOUGH) & known
-    believed[believed] = (most - least)[believed] <= AGREE
-    mean /= np.maximum(weight, np.finfo(np.float32).tiny)
+    second = np.clip(place - first, 0, 1).astype(np.float32)
+    return interpolated(value, chart, centred, larger, first, np.stack([1 - second, second]))
+
+
+@kernel
+def interpolated(
+    value: Singles,
+    chart: NDArray[np.int32],
+    centred: Bools,
+    larger: NDArray[np.int32],
+    first: Ints,
+    share: Singles,
+) -> tuple[Singles, Bools]:
+    """See `_enlarged`; ``first``: (size,) the first of the two rows or columns for each of the
+    larger lightmap, ``share``: (2, size) the shares of both."""
+    size = len(larger)
+    mean, believed = np.zeros((size, size), np.float32), np.zeros((size, size), np.bool_)
+    for row in range(size):
+        for column in range(size):
+            own, known = larger[row, column], False
+            weight, total = np.float32(0), np.float32(0)
+            least, most = np.float32(np.inf), np.float32(-np.inf)
+            for i in range(2):
+                for j in range(2):
+                    r, c = first[row] + i, first[column] + j
+                    if chart[r, c] != own:
+                        continue
+                    part = share[i, row] * share[j, column]
+                    weight += part
+                    total += part * value[r, c]
+                    least, most = min(least, value[r, c]), max(most, value[r, c])
+                    known |= centred[r, c]
+            if weight > 0:
+                mean[row, column] = total / weight
+            agree = most - least <= np.float32(AGREE)
+            believed[row, column] = own >= 0 and weight >= _ENOUGH and known and agree
     return mean, believed
 
 
-def _smoothed(
-    value: Singles, chart: NDArray[np.int32], row: Ints, column: Ints, grain: float
+@kernel
+def smoothed(
+    value: Singles, chart: NDArray[np.int32], row: Ints, column: Ints, grain: np.float32
 ) -> Singles:
     """(n,) the binomial mean of some texels and of those neighbours on the same chart that differ
     from them by no more than ``grain``."""
-    held, charts = np.pad(value, 1), np.pad(chart, 1, constant_values=-2)
-    total, weight = np.zeros(len(row), np.float32), np.zeros(len(row), np.float32)
-    here, own = chart[row, column], value[row, column]
-    for i, down in _KERNEL:
-        for j, across in _KERNEL:
-            place = row + 1 + i, column + 1 + j
-            alike = (charts[place] == here) & (np.abs(held[place] - own) <= grain)
-            share = np.where(alike, np.float32(down * across), np.float32(0))
-            total += share * held[place]
-            weight += share
-    return np.asarray(total / weight)
+    height, width = value.shape
+    result = np.empty(len(row), np.float32)
+    for n in range(len(row)):
+        own, here = value[row[n], column[n]], chart[row[n], column[n]]
+        weight, total = np.float32(0), np.float32(0)
+        for i in range(-1, 2):
+            for j in range(-1, 2):
+                r, c = row[n] + i, column[n] + j
+                if not (0 <= r < height and 0 <= c < width) or chart[r, c] != here:
+                    continue
+                if abs(value[r, c] - own) <= grain:
+                    share = np.float32((2 - abs(i)) * (2 - abs(j)) / 16)
+                    weight += share
+                    total += share * value[r, c]
+        result[n] = total / weight
+    return result
 
 
 #: Number of points of a face at which its light is computed.

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 _KEPT = 75
 #: Addresses that only this machine can reach.
 LOCAL = ("127.0.0.1", "::1")
+#: Seconds that responses may take to end once their connections are closed.
+_LATE = 0.1
 
 
 @dataclass(frozen=True)
@@ -125,6 +127,8 @@ def running(app: ASGIApp, *, host: str = "127.0.0.1", port: int = 0) -> Iterator
     Raises InputError: PTM-I920 the port is taken, or the address does not exist or is not
     permitted.
     """
+    import asyncio
+
     import uvicorn
 
     config = uvicorn.Config(
@@ -138,17 +142,28 @@ def running(app: ASGIApp, *, host: str = "127.0.0.1", port: int = 0) -> Iterator
         access_log=False,
         server_header=False,
         timeout_keep_alive=_KEPT,
-        timeout_graceful_shutdown=0,
     )
     with _listening(host, port) as listener:
-        server = uvicorn.Server(config)
+        server, ended = uvicorn.Server(config), threading.Event()
         url = url_of(listener)
-        thread = threading.Thread(target=server.run, args=([listener],), daemon=True)
+
+        async def serve() -> None:
+            under_way = asyncio.create_task(server.serve(sockets=[listener]))
+            await asyncio.to_thread(ended.wait)
+            # At `should_exit`, uvicorn would look at its next tick, and wait again for connections.
+            for connection in server.server_state.connections:
+                connection.transport.abort()
+            # Most responses end with their connection.
+            if responses := server.server_state.tasks:
+                await asyncio.wait(responses, timeout=_LATE)
+            under_way.cancel()
+
+        thread = threading.Thread(target=asyncio.run, args=(serve(),), daemon=True)
         thread.start()
         try:
             yield url
         finally:
-            server.should_exit = True
+            ended.set()
             thread.join()
 
 

@@ -70,10 +70,10 @@ def real(
     return Database.open(folder / "db")
 
 
-def compared(database: Database, album: Album, browser: str) -> list[Likeness]:
-    """The pictures of the first viewpoints, beside ours."""
+def compared(database: Database, album: Album, browser: str, first: int = 0) -> list[Likeness]:
+    """The pictures of viewpoints from ``first`` on, beside ours."""
     actual = []
-    for viewpoint, picture in enumerate(album.pictures):
+    for viewpoint, picture in enumerate(album.pictures, first):
         what = outline(database.scene, database.view(viewpoint, SIZE))
         own = database.own(viewpoint, SIZE, browser)
         actual.append(likeness(picture, own, what, LOOKS[browser]))
@@ -268,8 +268,13 @@ def test_what_is_bent_is_not_alike(castle: Any, museum: Path, tmp_path: Path, be
     database = Database.open(museum)
     bent = replace(database, www=Path(shutil.copytree(database.www, tmp_path / "www")))
     bend(bent)
-    album = by_view3dscene(bent, first_rooms(database), SIZE)
-    assert not all(alike(each) for each in compared(database, album, "view3dscene"))
+    albums = ((room, by_view3dscene(bent, [room], SIZE)) for room in first_rooms(database))
+    # The first that differs suffices.
+    assert any(
+        not alike(each)
+        for room, album in albums
+        for each in compared(database, album, "view3dscene", room)
+    )
 
 
 @pytest.mark.parametrize("museum", ["room"], indirect=True)

@@ -18,7 +18,15 @@ from benchmarks.fuzz.runner import run  # noqa: E402
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="memory is measured on Linux only")
 
 #: Inputs of a kind: as many as a few seconds of one processor allow.
-COUNT = {"manifest": 200, "apo": 150, "staged": 60, "campus": 60, "served": 25}
+COUNT = {
+    "ptm": 250,
+    "manifest": 200,
+    "list": 100,
+    "apo": 150,
+    "staged": 60,
+    "campus": 60,
+    "served": 25,
+}
 
 
 @pytest.mark.parametrize("kind", KINDS)

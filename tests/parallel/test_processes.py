@@ -181,7 +181,8 @@ def test_what_is_only_asked_for_is_not_done_before(tmp_path):
     assert list(tmp_path.iterdir())
 
 
-def test_which_executor():
+def test_which_executor(one_processor, monkeypatch):
+    monkeypatch.setattr("ptmtools.parallel.processors", one_processor)
     assert isinstance(open_executor(1), Executor)
     with open_executor(3) as three, open_executor() as all_:
         assert three.workers == 3

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack
@@ -23,6 +22,7 @@ from engines import Engine, launched, missing  # noqa: E402
 from samples import campus, pictures, statue  # noqa: E402
 
 from tests.builds import once  # noqa: E402
+from tests.e2e.conftest import make_museum  # noqa: E402
 from tests.lab.conftest import Ptm, ptm, two_rooms  # noqa: E402
 from tests.neighbours.apo.statues import write_rooms  # noqa: E402
 
@@ -69,12 +69,8 @@ def museum_db(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A museum of four rooms and stairs, with twelve small textures."""
 
     def of(folder: Path) -> None:
-        words = ["-o", folder / "model", "--rooms", 4, "--textures", 12, "--size", 256]
-        command = [sys.executable, "-m", "ptmtools", "sample", "museum", *words]
-        subprocess.run(
-            [str(word) for word in command], check=True, capture_output=True, timeout=300
-        )
-        build(folder / "model" / "museum.obj", folder / "museum.db")
+        model = make_museum(folder / "model", rooms=4, textures=12, size=256)
+        build(model, folder / "museum.db")
 
     return once(tmp_path_factory, "museum", of) / "museum.db"
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser import Visitor, visiting
+from browser import Visitor, hurried, visiting
 
 from ptmtools.cli.main import main
 from ptmtools.errors import InputError
@@ -29,6 +29,17 @@ from .test_recording import AT_ONCE
 Open = Callable[..., AbstractContextManager[Visitor]]
 #: `near` of the client.
 NEAREST = 8
+#: Draws of five frames.
+DRAWS = """
+async () => {
+  const { gl } = ptm.files, { drawElements } = gl;
+  let count = 0;
+  gl.drawElements = (...given) => (count++, drawElements.apply(gl, given));
+  for (let k = 0; k < 5; k++) await new Promise(requestAnimationFrame);
+  delete gl.drawElements;
+  return count;
+}
+"""
 
 
 @pytest.fixture
@@ -131,10 +142,13 @@ def test_it_is_drawn_and_walked_on(opened: Open, campus: Path) -> None:
         picture = visitor.picture()
         sky = picture[2, 2]
         assert (np.abs(picture.astype(int) - sky).sum(axis=2) > 30).mean() > 0.2
+        visitor.frames(30)
+        assert visitor.page.evaluate(DRAWS) == 0  # nothing changes any more
         eye = visitor.state()["pose"]["eye"]
         visitor.page.focus("canvas")
         visitor.page.keyboard.down("w")
         visitor.until(f"Math.hypot(s.pose.eye[0] - {eye[0]}, s.pose.eye[2] - {eye[2]}) > 1")
+        assert visitor.page.evaluate(DRAWS) > 0
         visitor.page.keyboard.up("w")
         assert abs(visitor.state()["pose"]["eye"][1] - eye[1]) < 2
 
@@ -303,6 +317,6 @@ def test_damaged_files_give_a_message(
         with pytest.raises(InputError, match="PTM-I122"):
             opened(folder)
         return
-    with opened(folder) as visitor:
+    with opened(folder, prepare=hurried) as visitor:
         visitor.page.wait_for_selector("#error:not([hidden])", timeout=60_000)
         assert visitor.page.text_content("#error-code") == "PTM-V105"

@@ -11,23 +11,23 @@ import numpy as np
 import pytest
 
 from ptmtools.cli.main import main
-from tests.e2e.conftest import make_museum
 from tests.web import node
 
 HERE = Path(__file__).resolve().parent
-QUICK = ["--samples", "1", "--face", "8", "--pvs", "fast", "--need", "0", "-j", "1"]
 
 
 @pytest.fixture(scope="module")
-def followed(tmp_path_factory: pytest.TempPathFactory, require: Callable[[str, str], None]) -> Any:
+def followed(
+    museum_db: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+    require: Callable[[str, str], None],
+) -> Any:
     """What `follow.mjs` tells of a walk through every room."""
     if remedy := node.missing():
         require("node", remedy)
-    folder = tmp_path_factory.mktemp("museum")
-    model, database, walk = make_museum(folder, rooms=4), folder / "db", folder / "walk.json"
-    assert main(["-q", "build-scene", str(model), "-o", str(database), *QUICK]) == 0
-    assert main(["path", str(database), "-o", str(walk)]) == 0
-    return json.loads(node.run(HERE / "follow.mjs", database / "www", walk))
+    walk = tmp_path_factory.mktemp("walk") / "walk.json"
+    assert main(["path", str(museum_db), "-o", str(walk)]) == 0
+    return json.loads(node.run(HERE / "follow.mjs", museum_db / "www", walk))
 
 
 def test_a_walk_can_be_followed(followed: Any) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser import Visitor, visiting
+from browser import Visitor, hurried, visiting
 from PIL import Image
 
 from ptmtools.cli.main import main
@@ -98,7 +98,7 @@ def test_levels_come_when_they_are_visible(opened: Open, statue: Path) -> None:
 
 def test_parts_of_levels_are_shown_at_time_steps(opened: Open, statue: Path) -> None:
     """The paper's second update: texels of a level before all of it is there."""
-    slow = Throttle(4e5, 0)
+    slow = Throttle(2e6, 0)
     with opened(statue, "?update=steps&step=0.1#0,0,0.55", throttle=slow) as visitor:
         visitor.until("s.partial")
         partial = visitor.picture()
@@ -290,7 +290,7 @@ def test_damaged_files_give_a_message(
         with pytest.raises(InputError, match="PTM-I122"):
             opened(folder)
         return
-    with opened(folder, "#0,0,0.55") as visitor:
+    with opened(folder, "#0,0,0.55", prepare=hurried) as visitor:
         visitor.page.wait_for_selector("#error:not([hidden])", timeout=60_000)
         # A file that is too short is refused by the server, or cannot be downloaded.
         codes = {"PTM-V103", "PTM-V104", "PTM-V105"} if fault in SHORT else {"PTM-V105"}

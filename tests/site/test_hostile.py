@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
-from browser import Visitor, visiting
+from browser import HURRY, Visitor, hurried, visiting
 from engines import PACKAGES, visiting_by
 
 from ptmtools.site.content import Site
@@ -71,6 +71,8 @@ def opening(
     sizes = {"width": 512, "height": 384}
     if engine == "chromium":
         browser = request.getfixturevalue("chromium")
-        return lambda entries, query: visiting(browser, entries, query=query, **sizes)
+        return lambda entries, query: visiting(
+            browser, entries, query=query, prepare=hurried, **sizes
+        )
     page = request.getfixturevalue("engines")(engine)
-    return lambda entries, query: visiting_by(page, entries, query=query, **sizes)
+    return lambda entries, query: visiting_by(page, entries, query=query, prepare=HURRY, **sizes)

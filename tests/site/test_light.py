@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from browser import hurried
 from PIL import Image
 
 from ptmtools.arrays import Floats
@@ -29,9 +30,9 @@ WIDTH, HEIGHT = 320, 240
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A database with light, and the same one without; the second statue has no texture."""
     folder = tmp_path_factory.mktemp("light")
-    model = write_rooms(folder / "model", 5)
+    model = write_rooms(folder / "model", 4)
     options = ["--format", "gltf", "--no-fallback", "-j", "1", "--backend", "embree"]
-    for name, more in (("lit", ["--light", "bake"]), ("plain", [])):
+    for name, more in (("lit", ["--light", "bake", "--light-samples", "16"]), ("plain", [])):
         command = ["-q", "build-scene", str(model), "-o", str(folder / name), *options, *more]
         assert main(command) == 0
     return folder
@@ -107,7 +108,8 @@ def test_a_lightmap_that_is_damaged_or_missing(visit: Visiting, site: Site) -> N
     entries[first] = Entry(first, entries[first].read()[:40], entries[first].media)
     for name in set(names) - {first}:
         del entries[name]
-    with visit(Site(entries, site.index), width=WIDTH, height=HEIGHT) as visitor:
+    damaged = Site(entries, site.index)
+    with visit(damaged, width=WIDTH, height=HEIGHT, prepare=hurried) as visitor:
         visitor.page.wait_for_function("window.ptm?.errors.length > 0", timeout=90_000)
         visitor.page.wait_for_function("ptm.walk.begun", timeout=90_000)
         images = "ptm.walk.index.textures.flatMap((row, t) => row.light === undefined ? [t] : [])"

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from browser import hurried
 
 from ptmtools.site import opening
 from ptmtools.site.content import Site, SiteOptions, site_of
@@ -92,6 +93,7 @@ def test_a_missing_opening_costs_only_time(visit: Visiting, site: Site) -> None:
 def test_an_opening_that_never_arrives_costs_only_time(visit: Visiting, site: Site) -> None:
     def prepare(page: Any) -> None:
         page.route("**/opening-*", lambda route: None)
+        hurried(page)
 
     with visit(site, prepare=prepare) as visitor:
         assert visitor.complete()["exact"]

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from browser import hurried
 
 from ptmtools.lab.allocation import best_step
 from ptmtools.output.served import read_served
@@ -120,7 +121,8 @@ def test_a_damaged_octree_leaves_the_walk(
         del entries[name]
     else:
         entries[name] = Entry(name, changed[damage], entries[name].media)
-    with visit(Site(entries, site.index), query=address(eye, yaw)) as visitor:
+    damaged = Site(entries, site.index)
+    with visit(damaged, query=address(eye, yaw), prepare=hurried) as visitor:
         visitor.page.wait_for_function("window.ptm?.errors.length > 0", timeout=90_000)
         assert visitor.page.evaluate("window.ptm.errors[0].code") == CODES[damage]
         visitor.until("s.complete")

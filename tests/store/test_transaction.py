@@ -18,9 +18,10 @@ from ptmtools.store.writer import DatabaseWriter
 from tests.conftest import files_below
 
 ROOT = Path(__file__).resolve().parents[2]
-#: Replaces the outputs of one stage: one stays as it is, one changes, one goes, one is new.
+#: Replaces the outputs of one stage: one stays as it is, one changes, one goes, one is new. Each
+#: database is a copy; its process is a fork of one that has imported everything.
 UPDATE = """
-import sys
+import os, shutil, sys
 from pathlib import Path
 sys.path.insert(0, {benchmarks!r})
 from kills import dying
@@ -30,12 +31,21 @@ from ptmtools.store.writer import DatabaseWriter
 
 lists.INLINE, lists.MEAN = {limits!r}
 
-dying({n}, Path({db!r}))
-with DatabaseWriter.open_for_model({db!r}, "m.obj") as writer:
-    staged = writer.begin("some")
-    for name, data in {files!r}.items():
-        staged.put(name, data)
-    staged.commit({{"cells": StageRecord(2, {{}}, {{}}, staged.pending())}})
+for n in range(1, 100):
+    db = shutil.copytree({db!r}, f"{{{db!r}}}-{{n}}")
+    child = os.fork()
+    if not child:
+        dying(n, Path(db))
+        with DatabaseWriter.open_for_model(db, "m.obj") as writer:
+            staged = writer.begin("some")
+            for name, data in {files!r}.items():
+                staged.put(name, data)
+            staged.commit({{"cells": StageRecord(2, {{}}, {{}}, staged.pending())}})
+        break
+    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    print(status, flush=True)
+    if status == 0:
+        break
 """
 BEFORE = {"www/same": b"0", "www/a": b"1", "www/gone/x": b"1"}
 AFTER = {"www/same": b"0", "www/a": b"2", "www/deep/new": b"2"}
@@ -73,18 +83,20 @@ def test_killed_at_any_change_of_a_name(
     before, after = files_below(first), files_below(second)
     assert without(after) == AFTER
     assert bool(list(second.glob("stages/lists/*"))) == (limits[0] < len(AFTER))
+    template = tmp_path / "db"
+    write(template, BEFORE, 1)
+    (template / "www/mine.txt").write_text("mine")
+    script = UPDATE.format(
+        benchmarks=str(ROOT / "benchmarks"), db=str(template), files=AFTER, limits=limits
+    )
+    command = [sys.executable, "-c", script]
+    printed = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    *killed, end = map(int, printed.split())
+    assert set(killed) == {-signal.SIGKILL}
+    assert end == 0, "it never came to its end"
     outcomes = []
-    for n in range(1, 100):
-        db = tmp_path / f"{n}"
-        write(db, BEFORE, 1)
-        (db / "www/mine.txt").write_text("mine")
-        script = UPDATE.format(
-            benchmarks=str(ROOT / "benchmarks"), n=n, db=str(db), files=AFTER, limits=limits
-        )
-        status = subprocess.run([sys.executable, "-c", script], cwd=ROOT).returncode
-        if status == 0:
-            break
-        assert status == -signal.SIGKILL
+    for n in range(1, len(killed) + 1):
+        db = tmp_path / f"db-{n}"
         with DatabaseWriter.open_for_model(db, "m.obj"):
             pass
         actual = files_below(db)
@@ -93,8 +105,6 @@ def test_killed_at_any_change_of_a_name(
         outcomes.append(actual == after)
         write(db, AFTER, 2)
         assert files_below(db) == {**after, "www/mine.txt": b"mine"}, n
-    else:
-        pytest.fail("it never came to its end")
     # First the old state, from the commit on the new one.
     assert outcomes == sorted(outcomes)
     assert False in outcomes

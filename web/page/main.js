@@ -3,6 +3,7 @@
 import { DecoderWorkers, hasSimd, loadViewDecoder } from "../ptm/src/index.js";
 import { App } from "./app.js";
 import { readConfig, Site } from "./data/site.js";
+import { contextOf } from "./gl/context.js";
 import { loadEmbedding, loadSets, loadTour } from "./load-later.js";
 import { PageError } from "./net/errors.js";
 import { clock, Fetcher } from "./net/fetcher.js";
@@ -33,14 +34,6 @@ function decodersOf(config) {
   const geometry = wasm.then(loadViewDecoder);
   geometry.catch(() => {}); // the first cell reports it
   return { workers: new DecoderWorkers({ wasm, create }), geometry: () => geometry };
-}
-
-/** Smooth edges cost too much without a graphics card. @param {HTMLCanvasElement} canvas */
-function contextOf(canvas) {
-  const options = { antialias: true, failIfMajorPerformanceCaveat: true };
-  const plain = { antialias: false };
-  const gl = canvas.getContext("webgl2", options) ?? canvas.getContext("webgl2", plain);
-  return /** @type {WebGL2RenderingContext | null} */ (gl);
 }
 
 async function main() {

@@ -39,10 +39,11 @@ def octree_of(root: Node, low: tuple[float, ...] = (0, 0, 0), side: float = 1.0)
                 continue
             present = sum(1 << c for c in below)
             inner = sum(1 << c for c in below if below[c][1])
-            first = end + sum(2 if node[1] else 1 for node in following)
             texels.append([*color, present])
-            texels.append([first & 255, first >> 8 & 255, first >> 16, inner])
-            following += [below[c] for c in sorted(below)]
+            texels.append([end & 255, end >> 8 & 255, end >> 16, inner])
+            children = [below[c] for c in sorted(below)]
+            end += sum(2 if node[1] else 1 for node in children)
+            following += children
         start.append(len(texels))
         level = following
     return Octree(

@@ -124,6 +124,8 @@ export class CampusFiles {
   #shown = new Map();
   /** Images that are decoded again, once even if they are freed and shown meanwhile. @type {Set<string>} */
   #decoding = new Set();
+  /** Number of changes on the graphics card. */
+  changes = 0;
 
   /** @param {WebGL2RenderingContext} gl @param {import("./index.js").CampusIndex} index
    * @param {(file: string) => string} urlOf @param {import("../net/fetcher.js").Fetcher} fetcher */
@@ -162,6 +164,7 @@ export class CampusFiles {
   #upload(name, bitmap) {
     this.#shown.get(name)?.delete();
     this.#shown.set(name, new Image(this.gl, bitmap, this.index.files.get(name)?.channel === "a"));
+    this.changes++;
     bitmap.close();
   }
 
@@ -201,6 +204,7 @@ export class CampusFiles {
       if (names.has(name)) continue;
       shown?.delete();
       this.#shown.delete(name);
+      this.changes++;
     }
   }
 

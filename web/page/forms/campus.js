@@ -123,7 +123,13 @@ runForm(async (gl, config, fetcher, fail) => {
   /** Sizes up to one, the largest first. @param {number} most */
   const fitting = (most) => sizes.filter((size) => size <= Math.max(most, LEAST));
 
-  let memory = 0;
+  /** All that a picture depends on. */
+  const pictureOf = () => {
+    const { pose: { eye, yaw, pitch } } = walker, { loaded, preset } = client;
+    return [canvas.width, canvas.height, ...eye, yaw, pitch, loaded.size, preset.name, files.changes].join();
+  };
+
+  let memory = 0, drawn = "";
   return {
     frame(dt) {
       const until = performance.now() + 1000 * TIME;
@@ -147,8 +153,11 @@ runForm(async (gl, config, fetcher, fail) => {
         }
       }
       files.keep(kept);
-      drawing.draw(camera, shown, textureOf);
-      labels.place(camera, canvas.clientWidth, canvas.clientHeight);
+      if (pictureOf() !== drawn) {
+        drawing.draw(camera, shown, textureOf);
+        labels.place(camera, canvas.clientWidth, canvas.clientHeight);
+        drawn = pictureOf();
+      }
       memory = files.bytes;
       const full = client.near.filter((k) => client.full(k)).length;
       const loading = client.begun ? `${full} of ${client.near.length} near objects complete` : "loading";

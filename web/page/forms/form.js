@@ -1,5 +1,6 @@
 // Shared by the pages of single objects: settings, the drawing context, frames, errors, the status line.
 
+import { contextOf } from "../gl/context.js";
 import { PageError } from "../net/errors.js";
 import { clock, Fetcher } from "../net/fetcher.js";
 import { find } from "../ui/elements.js";
@@ -38,7 +39,7 @@ export async function runForm(create) {
   try {
     const canvas = /** @type {HTMLCanvasElement} */ (find(document, "canvas"));
     const config = JSON.parse(find(document, "#site").textContent ?? "");
-    const gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: false });
+    const gl = contextOf(canvas);
     if (!gl) throw new PageError("PTM-V101", "This browser cannot draw with WebGL 2.");
     /** @type {View | null} */
     let view = null;
