@@ -124,7 +124,7 @@ def _convert(
 @file_option(
     "records",
     "Folder with an HTML file for each object that a visitor can read about, named after the "
-    "object: Library.html.",
+    "object: Library.html; places.json in it has icons and ranks of the menu.",
     CampusOptions.heading,
     metavar="DIR",
 )

@@ -30,11 +30,16 @@ def rounded(images: int) -> int:
     return 1 << images.bit_length() - 1 if images else 0
 
 
+def expected_bytes(pieces: Sequence[Piece], density: float) -> float:
+    """The bytes that lightmaps are expected to have; ``density``: texels to the metre."""
+    flat = (each.corner[~each.dense & ~each.glass] for each in pieces)
+    area = sum(float(areas(corner.astype(np.float64)).sum()) for corner in flat)
+    return area / FILLED * density**2 * _TEXEL_BYTES
+
+
 def affordable(pieces: Sequence[Piece], density: float, images: int) -> float:
     """The texels to the metre of lightmaps beside images of a number of bytes (`rounded`), at most
     ``density``; 0 if light would cost too much."""
-    flat = (each.corner[~each.dense & ~each.glass] for each in pieces)
-    area = sum(float(areas(corner.astype(np.float64)).sum()) for corner in flat)
-    cost = area / FILLED * density**2 * _TEXEL_BYTES
+    cost = expected_bytes(pieces, density)
     fitting = min(1.0, math.sqrt(SHARE * images / cost)) if cost else 0.0
     return density * fitting if fitting >= LEAST else 0.0

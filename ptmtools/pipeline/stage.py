@@ -78,6 +78,8 @@ class Stage(Generic[A]):
     job: the class that runs it.
     optional: it may have nothing to write. Then it is not reported; databases of earlier releases
         lack its record.
+    telling: whether a run of an optional stage that wrote nothing is reported all the same, from
+        its counts.
     joined: it has no command of its own, and its outputs are committed with those of the next
         stage: a model that cannot be cut into cells leaves no database behind.
     from_model: its command takes a model, and runs the stages before it too.
@@ -102,6 +104,7 @@ class Stage(Generic[A]):
     fits: Mapping[Stage[Any], Callable[[A, Any], str]] = field(default_factory=dict)
     job: type[Job] = field(default_factory=lambda: Job)
     optional: bool = False
+    telling: Callable[[Counts], bool] = field(default=lambda counts: False)
     joined: bool = False
     from_model: bool = False
     one_thread: bool = False
@@ -171,6 +174,13 @@ class Artifacts:
         return cast(A, self._artifacts[stage])
 
     def _read(self, stage: Stage[A]) -> A:
+        self.check_recipe(stage)
+        arrays = self.db.read_arrays(stage.name)
+        with self.reading(arrays_of(stage.name)):
+            return cast(A, stage.job.load(self, stage, arrays))
+
+    def check_recipe(self, stage: Stage[Any]) -> None:
+        """Raises PTM-D008 if another release of ptmtools ran a stage."""
         if self.record(stage).recipe != stage.recipe:
             raise DatabaseError(
                 "PTM-D008",
@@ -178,9 +188,6 @@ class Artifacts:
                 file=self.db.path,
                 remedy=Rebuild("run {} to bring the database up to date"),
             )
-        arrays = self.db.read_arrays(stage.name)
-        with self.reading(arrays_of(stage.name)):
-            return cast(A, stage.job.load(self, stage, arrays))
 
     def keep(self, stage: Stage[A], artifact: A) -> None:
         """Sets the artifact that a stage has just computed."""
@@ -369,7 +376,8 @@ class Run(Artifacts):
     ) -> None:
         """Ends the turn of a stage: commits, unless it is `Stage.joined` to the next, and reports.
 
-        An optional stage that has written nothing, and had not, is not reported.
+        An optional stage that has written nothing, and had not, is not reported, unless its counts
+        are `Stage.telling`.
         """
         record = self.record(stage)
         committed = self.db.manifest.stages.get(stage.name)
@@ -377,7 +385,7 @@ class Run(Artifacts):
             self._joint.commit(self._uncommitted)
             self._joint, self._uncommitted = None, {}
         idle = not record.outputs and not record.notes and not (committed and committed.outputs)
-        if not (stage.optional and idle):
+        if not (stage.optional and idle) or stage.telling(record.counts):
             notes, warnings = tuple(record.notes), tuple(record.warnings)
             self.reports.append(
                 StageReport(

@@ -47,8 +47,12 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the model, a database without light, and one with it."""
     folder = tmp_path_factory.mktemp("light")
     model = write_rooms(folder / "model", 4)
-    assert LIGHT.name not in built(model, folder / "plain.db")
+    built(model, folder / "plain.db")
+    assert not list((folder / "plain.db/www").rglob("light~*"))
     assert LIGHT.name in built(model, folder / "lit.db", BAKE)
+    shown = database_status(folder / "lit.db").stages
+    (counts,) = (each.counts for each in shown if each.stage == LIGHT.name)
+    assert "lightmaps of" in LIGHT.summarize(counts)
     return folder
 
 
@@ -190,7 +194,8 @@ def test_a_database_of_an_earlier_release(folder: Path) -> None:
     (db / "manifest.json").write_text(json.dumps(manifest))
     assert {s.state for s in database_status(db).stages} == {"done"}
     assert validate(db).issues == ()
-    assert built(folder / "model/two_rooms.obj", db) == []
+    # It writes nothing, and says why.
+    assert built(folder / "model/two_rooms.obj", db) == [LIGHT.name]
 
 
 @pytest.mark.parametrize("options", [{"light_density": 0.0}, {"light_samples": 0}])

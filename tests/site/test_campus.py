@@ -173,6 +173,28 @@ def test_places_and_presets(opened: Open, campus: Path) -> None:
         assert "preset=Ultra" in page.url
 
 
+def test_icons_and_ranks(opened: Open, campus: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(campus, tmp_path / "campus"))
+    file = folder / "campus.json"
+    index = json.loads(file.read_text())
+    small = next(o for o in index["objects"] if len(o["parts"]) > 1)
+    small["rank"] = 1
+    house = next(o for o in index["objects"] if o["label"] == "building_01_rectorate")
+    house |= {"rank": 0, "icon": "books"}
+    file.write_text(json.dumps(index))
+    with opened(folder, width=800, height=600) as visitor:
+        visitor.until("s.begun")
+        page = visitor.page
+        page.click("nav button")
+        menu = page.locator("#places > li > button")
+        assert menu.nth(0).text_content() == "Building 01 rectorate"
+        assert menu.nth(1).text_content().casefold() == small["label"].replace("_", " ").casefold()
+        assert menu.nth(0).locator("svg.icon path").count() == 1
+        assert page.locator("#places svg").count() == 1
+        menu.nth(0).locator("svg").click()
+        page.wait_for_selector("#record iframe")
+
+
 def test_a_record_is_beside_its_object(opened: Open, campus: Path) -> None:
     with opened(campus, width=800, height=600) as visitor:
         visitor.until("s.begun")

@@ -11,6 +11,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ from ptmtools.neighbours.campus.model import (
 )
 from ptmtools.neighbours.campus.objects import notes_on, parts_of
 from ptmtools.neighbours.campus.options import CampusOptions
+from ptmtools.neighbours.campus.places import read_places
 from ptmtools.neighbours.campus.records import files_of, read_records
 from ptmtools.neighbours.campus.second_set import model_light, model_masks
 from ptmtools.neighbours.campus.textures import BaseImage, Mask, texture_files
@@ -78,7 +80,8 @@ def make_campus(
     model: as for `ptmtools.scene.ingest`, with ``reading`` its options.
     folder: new, or with ``force`` one that holds a campus.
     executor: does the objects and textures; one after the other without.
-    records: folder with HTML files named after objects (`read_records`).
+    records: folder with HTML files named after objects (`read_records`), and a table of icons and
+        ranks (`read_places`).
 
     Raises
     ------
@@ -107,9 +110,11 @@ def make_campus(
     materials, material = _materials(scene, of_image, bases)
     tasks = [(names.take(part.label, "object"), part) for part in parts]
     rows = {}
+    places: dict[str, dict[str, Any]] = {}
     if records is not None:
         pages, more = read_records(records, [(name, part.label) for name, part in tasks])
-        rows, notes = files_of(pages), [*notes, *more]
+        places, strange = read_places(records, [(name, part.label) for name, part in tasks])
+        rows, notes = files_of(pages), [*notes, *more, *strange]
     work = Work(
         scene.points,
         scene.triangles,
@@ -144,7 +149,7 @@ def make_campus(
             row, page = rows.get(each.record.name, (None, b""))
             if row is not None:
                 put(row.file, page)
-            objects.append(replace(each.record, record=row))
+            objects.append(replace(each.record, record=row, **places.get(each.record.name, {})))
             notes += each.notes
             covered, computed = covered + each.covered, computed + each.computed
         progress(len(tasks), len(tasks), "objects")

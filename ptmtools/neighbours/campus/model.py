@@ -24,6 +24,9 @@ LIGHT_SIZES = (512, 1024, 2048)
 #: Channels of a material: diffuse, alpha, mask; and of an object, light.
 DIFFUSE, ALPHA, MASK, LIGHT = "d", "a", "m", "l"
 CHANNELS = (DIFFUSE, ALPHA, MASK)
+#: Icons of points of interest that the page draws.
+ICONS = ("books", "entrance", "food", "garden", "info", "parking")
+HIGHEST_RANK = 9999
 
 Vector = tuple[float, float, float]
 Box = tuple[float, float, float, float, float, float]
@@ -85,6 +88,8 @@ class CampusObject:
     lightmap: base name of its lightmaps, or None.
     meshes: from the coarsest to the finest.
     record: further information for visitors, or None.
+    icon: the picture before its name, one of `ICONS`, or None.
+    rank: its place in the menu, before those with greater ranks or none.
     """
 
     name: str
@@ -97,6 +102,8 @@ class CampusObject:
     lightmap: str | None
     meshes: tuple[MeshFile, ...]
     record: RecordFile | None = None
+    icon: str | None = None
+    rank: int | None = None
 
 
 @dataclass(frozen=True)
@@ -238,11 +245,10 @@ def _object_document(each: CampusObject) -> dict[str, Any]:
         "viewpoint": dict(zip(("position", "direction"), each.viewpoint, strict=True)),
         "meshes": [vars(mesh) for mesh in each.meshes],
     }
-    if each.record is None:
-        del result["record"]
-    else:
+    if each.record is not None:
         result["record"] = vars(each.record)
-    return result
+    absent = [name for name in ("record", "icon", "rank") if result[name] is None]
+    return {name: value for name, value in result.items() if name not in absent}
 
 
 def _material_document(material: CampusMaterial) -> dict[str, Any]:

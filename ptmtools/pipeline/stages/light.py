@@ -98,19 +98,9 @@ class LightJob(Job):
             )
         if self.options.light == "none":
             return described(work, _NO_LIGHT, ())
-        if self.options.light == "auto":
-            try:
-                _check_component()
-            except MissingComponentError as fault:
-                left_out = f"lightmaps are left out: {fault.message}"
-                remedy = f"{fault.remedy}, then build again" if fault.remedy else "build again"
-                work = replace(work, inputs={**work.inputs, _ABSENT: ""})
-                warned = has_maps or image_bytes(run)
-                notes = (Warned(f"{left_out}; {remedy}"),) if warned else ()
-                return described(work, _NO_LIGHT, notes)
         import numpy as np
 
-        from ptmtools.light.budget import affordable, rounded
+        from ptmtools.light.budget import LEAST, affordable, expected_bytes, rounded
         from ptmtools.light.model import Light
         from ptmtools.output.content import Geometry
         from ptmtools.output.pieces import pieces_of
@@ -123,8 +113,17 @@ class LightJob(Job):
         if options.light == "auto" and not own:
             density = affordable(pieces, options.light_density, rounded(image_bytes(run)))
             if not density:
-                return described(work, _NO_LIGHT, ())
+                least = round(expected_bytes(pieces, LEAST * options.light_density))
+                return described(work, {**_NO_LIGHT, "too_many_bytes": least}, ())
             options = replace(options, light_density=density)
+        if options.light == "auto":
+            try:
+                _check_component()
+            except MissingComponentError as fault:
+                left_out = f"lightmaps are left out: {fault.message}"
+                remedy = f"{fault.remedy}, then build again" if fault.remedy else "build again"
+                work = replace(work, inputs={**work.inputs, _ABSENT: ""})
+                return described(work, _NO_LIGHT, (Warned(f"{left_out}; {remedy}"),))
         baking = self._baking(options, own, lights, pieces)
         shared = LitCells(baking, run.recorded(TEXTURES))
         tasks = list(enumerate(pieces))
@@ -138,6 +137,8 @@ class LightJob(Job):
         run.keep(LIGHT, artifact)
         transaction.put_arrays(LIGHT.name, artifact.to_arrays())
         counts = {**_counts(artifact), "ptm_bytes": total, **_about(shared.baking)}
+        if options.light_density < self.options.light_density:
+            counts["reduced_density"] = options.light_density
         return described(work, counts, _notes(cell_lights))
 
     def _baking(
@@ -258,13 +259,25 @@ def _counts(light: Light) -> Mapping[str, Any]:
 
 def _summary(n: Mapping[str, Any]) -> str:
     if not n["lightmaps"]:
-        return "no light"
+        if not n.get("too_many_bytes"):
+            return "no light"
+        least = size(n["too_many_bytes"])
+        return (
+            f"no light: lightmaps would add {least} or more, too much beside the images "
+            "(--light bake adds them)"
+        )
+    reduced = n.get("reduced_density", 0.0)
     parts = [("of the model", n.get("light") == "model"), ("with lamps", n.get("lamps")),
-             ("with the sky", n.get("sky"))]  # fmt: skip
+             ("with the sky", n.get("sky")),
+             (f"only {reduced:.1f} texels to the metre beside these images", reduced)]  # fmt: skip
     return (
         f"{count(n['lightmaps'], 'lightmap')} of {count(n['texels'], 'texel')}, "
         f"{size(n['ptm_bytes'])}" + "".join(f", {text}" for text, given in parts if given)
     )
+
+
+def _telling(n: Mapping[str, Any]) -> bool:
+    return bool(n.get("too_many_bytes"))
 
 
 def _fits_cells(light: Light, cells: Cells) -> str:
@@ -286,4 +299,5 @@ LIGHT: Stage[Light] = Stage(
     fits={CELLS: _fits_cells},
     job=LightJob,
     optional=True,
+    telling=_telling,
 )

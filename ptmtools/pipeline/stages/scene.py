@@ -41,7 +41,7 @@ def image_rows(artifacts: Artifacts) -> list[Mapping[str, Any]]:
     bytes.
 
     Names and digests become file names, so only the form that ingest writes is accepted. Raises
-    PTM-D004 to PTM-D006.
+    PTM-D004 to PTM-D006, and PTM-D008 if another release of ptmtools wrote it.
     """
 
     def read() -> list[Mapping[str, Any]]:
@@ -59,6 +59,7 @@ def image_rows(artifacts: Artifacts) -> list[Mapping[str, Any]]:
             raise ValueError("two images whose textures would have the same name")
         return rows
 
+    artifacts.check_recipe(SCENE)
     return artifacts.cached(IMAGE_LIST, read)
 
 
@@ -134,7 +135,8 @@ def _repainted(artifacts: Artifacts, work: StageRecord) -> dict[int, str] | None
 
 
 def lights_of(artifacts: Artifacts) -> Lights | None:
-    """The lights of the scene; None if it has none. Raises PTM-D004 to PTM-D006."""
+    """The lights of the scene; None if it has none. Raises PTM-D004 to PTM-D006, PTM-D008."""
+    artifacts.check_recipe(SCENE)
     name = arrays_of(LIGHTS)
     if name not in artifacts.outputs(SCENE):
         return None
@@ -183,10 +185,13 @@ class ReadingJob(Job):
             return False
         assert artifacts.model
         folder = artifacts.model.parent
-        new = {
-            i: {"sha256": work.inputs[name], "bytes": (folder / name).stat().st_size}
-            for i, name in repainted.items()
-        }
+        try:
+            new = {
+                i: {"sha256": work.inputs[name], "bytes": (folder / name).stat().st_size}
+                for i, name in repainted.items()
+            }
+        except OSError:  # an image is missing: the model has to be read
+            return False
         rows = [{**row, **new.get(i, {})} for i, row in enumerate(image_rows(artifacts))]
         artifacts.cache(IMAGE_LIST, rows)
         return True

@@ -26,6 +26,8 @@ const LONGEST = 2 ** 20;
  * @typedef {object} CampusObject
  * @property {string} name
  * @property {string} label
+ * @property {string} [icon]
+ * @property {number} [rank]
  * @property {string[]} parts
  * @property {number[]} box
  * @property {number[]} barycentre
@@ -96,8 +98,10 @@ export class CampusIndex {
   }
 
   /** @param {CampusObject} one */
-  #checkObject({ name, label, parts, box, barycentre, viewpoint, materials, lightmap, meshes, record }) {
+  #checkObject({ name, label, parts, box, barycentre, viewpoint, materials, lightmap, meshes, record, icon, rank }) {
     demand(NAME.test(name) && typeof label === "string" && Array.isArray(parts), "an object without name");
+    demand(icon === undefined || typeof icon === "string", "an icon that is not a name");
+    demand(rank === undefined || isWhole(rank, 0, MOST), "an impossible rank");
     demand(isVector(box, 6) && isVector(barycentre, 3), "an object without place");
     demand(isVector(viewpoint?.position, 3) && isVector(viewpoint?.direction, 3), "an object without viewpoint");
     demand(Array.isArray(materials) && materials.every((m) => this.materials[m]), "a material that is not there");

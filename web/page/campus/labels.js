@@ -1,6 +1,7 @@
 // Points of interest: names over the objects in view, larger when near, and a menu of all of them.
 
 import { find, make } from "../ui/elements.js";
+import { iconOf } from "./icons.js";
 
 /** Names in view at a time, and the farthest, m. */
 const MOST = 12, FARTHEST = 200;
@@ -29,7 +30,7 @@ export class Labels {
   constructor(root, objects, visit) {
     const layer = find(root, "#labels"), canvas = find(root, "canvas");
     this.#labels = objects.map((object) => {
-      const button = make("button", { textContent: nameOf(object), hidden: true, tabIndex: -1 });
+      const button = make("button", { hidden: true, tabIndex: -1 }, ...iconOf(object.icon), nameOf(object));
       // Clicks of a pointer are the canvas's, see below.
       button.onclick = (/** @type {MouseEvent} */ { detail }) => detail || visit(object);
       layer.append(button);
@@ -39,7 +40,7 @@ export class Labels {
     let pressed = null;
     // A press of a name may be the begin of a drag, which the canvas captures.
     layer.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
-      const one = this.#labels.find(({ button }) => button === event.target);
+      const one = this.#labels.find(({ button }) => button.contains(/** @type {Node} */ (event.target)));
       if (!one || event.button !== 0) return;
       event.preventDefault();
       pressed = { object: one.object, id: event.pointerId, x: event.clientX, y: event.clientY };
@@ -56,18 +57,20 @@ export class Labels {
     this.#menu(find(root, "#places"), objects, visit);
   }
 
-  /** A list of all objects; those that differ by a number are one entry that opens.
+  /** A list of all objects by their ranks, then of those without by their names. Of these,
+   * those that differ by a number are one entry that opens.
    * @param {HTMLElement} list @param {CampusObject[]} objects @param {(object: CampusObject) => void} visit */
   #menu(list, objects, visit) {
     /** @type {Map<string, CampusObject[]>} */
     const groups = new Map();
-    const sorted = [...objects].sort((a, b) => nameOf(a).localeCompare(nameOf(b), undefined, { numeric: true }));
+    const rankOf = (/** @type {CampusObject} */ { rank }) => rank ?? Number.MAX_SAFE_INTEGER;
+    const sorted = [...objects].sort((a, b) => rankOf(a) - rankOf(b) || nameOf(a).localeCompare(nameOf(b), undefined, { numeric: true }));
     for (const object of sorted) {
-      const group = groupOf(nameOf(object));
+      const group = object.rank === undefined ? groupOf(nameOf(object)) : ` ${object.name}`;
       groups.set(group, [...(groups.get(group) ?? []), object]);
     }
     const entry = (/** @type {CampusObject} */ object) =>
-      make("li", {}, make("button", { textContent: nameOf(object), onclick: () => visit(object) }));
+      make("li", {}, make("button", { onclick: () => visit(object) }, ...iconOf(object.icon), nameOf(object)));
     for (const [group, some] of groups) {
       if (some.length === 1) list.append(entry(some[0]));
       else list.append(make("li", {}, make("details", {}, make("summary", {}, `${group} (${some.length})`), make("ul", {}, ...some.map(entry)))));

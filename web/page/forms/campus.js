@@ -57,7 +57,7 @@ runForm(async (gl, config, fetcher, fail) => {
   visit(index.objects.reduce((best, one) => (heightOf(one) > heightOf(best) ? one : best)));
   const linked = poseOf(location.hash);
   if (linked) walker.place(linked);
-  const named = index.objects.filter((one) => one.parts.length === 1 && heightOf(one) >= LOWEST);
+  const named = index.objects.filter((one) => isPlace(one) || (one.parts.length === 1 && heightOf(one) >= LOWEST));
   const records = new Records(document, files);
   const labels = new Labels(document, named, (object) => {
     visit(object);
@@ -187,6 +187,9 @@ runForm(async (gl, config, fetcher, fail) => {
 /** @param {import("../campus/index.js").CampusObject} object */
 const heightOf = ({ box }) => box[4] - box[1];
 
+/** Whether an object was made a point of interest. @param {import("../campus/index.js").CampusObject} object */
+const isPlace = ({ icon, rank }) => icon !== undefined || rank !== undefined;
+
 /** Metres on the ground to a box. @param {number[]} eye @param {number[]} box */
 const outside = (eye, box) =>
   Math.hypot(...[0, 2].map((k) => Math.max(box[k] - eye[k], eye[k] - box[k + 3], 0)));
@@ -198,7 +201,7 @@ function attachPanels(client, index, here) {
   const presets = index.presets.filter(({ diffuse, light }, k) =>
     index.presets.findIndex((one) => one.diffuse === diffuse && one.light === light) === k);
   const nav = find(document, "nav"), places = find(document, "#places");
-  const toggle = make("button", { textContent: "Places", onclick: () => (places.hidden = !places.hidden) });
+  const toggle = make("button", { textContent: "Places", hidden: !places.children.length, onclick: () => (places.hidden = !places.hidden) });
   const select = make("select", { ariaLabel: "Detail of near objects" },
     ...presets.map(({ name }) => make("option", { textContent: name, selected: name === client.preset.name })));
   select.onchange = () => {
