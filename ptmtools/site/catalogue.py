@@ -16,6 +16,7 @@ from html import escape
 from itertools import groupby
 from typing import Any, TypeVar
 
+from ptmtools.site.words import words_of
 from ptmtools.tour.markdown import html_of, plain_text
 from ptmtools.tour.model import Texts, in_language
 
@@ -37,23 +38,6 @@ nav li { display: inline-block; margin-inline-end: 1rem; }
 .skip:not(:focus) { position: absolute; left: -999px; }
 @media (prefers-color-scheme: dark) { a { color: #9cc7ff; } }
 """
-#: Words of the page by language; others are in English.
-WORDS: dict[str, dict[str, str]] = {
-    "en": {
-        "catalogue": "Catalogue",
-        "walk": "Walk through the building",
-        "here": "See it in the walk",
-        "about": "More about it",
-        "captions": "Text of the recording",
-        "image": "Description of the picture",
-        "elsewhere": "Other works",
-        "contents": "Contents",
-        "skip": "Skip to the content",
-        "languages": "Languages",
-        "access": "This page has the content of the walk as text and pictures. It works without "
-        "scripts, by keyboard and with screen readers, and can be enlarged to 400 %.",
-    }
-}
 
 
 @dataclass(frozen=True)
@@ -94,7 +78,7 @@ class _Page:
 
     def __init__(self, content: Content, language: str) -> None:
         self._content, self._tour, self._language = content, content.tour, language
-        self._words = WORDS["en"] | WORDS.get(language.split("-")[0], {})
+        self._words = words_of(language)["catalogue"]
         own = self._plain(content.tour.get("title")) or content.title
         self._title = f"{own}: {self._words['catalogue']}"
 

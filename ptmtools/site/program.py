@@ -13,13 +13,17 @@ from typing import Any
 from ptmtools.errors import InputError
 from ptmtools.site.entry import DIGITS, Entry
 from ptmtools.site.security import secured
+from ptmtools.site.words import LANGUAGES, words_of
 from ptmtools.store.layout import sha256
 
 INDEX = "index.html"
 PAGE = Path(__file__).parent / "page"
 HTML, JAVASCRIPT = "text/html; charset=utf-8", "text/javascript; charset=utf-8"
 #: Scripts that few visits need.
-LATER = ("later.js", "compare.js", "statues.js", "reliefs.js", "sets.js", "tour.js", "embedded.js")
+LATER = (
+    *("later.js", "compare.js", "statues.js", "reliefs.js", "sets.js", "tour.js", "embedded.js"),
+    *(f"words-{language}.js" for language in LANGUAGES if language != "en"),
+)
 #: The media type of each file.
 PROGRAM = {
     "viewer.js": JAVASCRIPT,
@@ -97,12 +101,10 @@ def page(
             f'<link id="opening" rel="next" as="fetch" href="{next(iter(openings))}" '
             f'data-views="{views}" crossorigin>'
         )
-    catalogue = settings.get("catalogue")
+    catalogue, works = settings.get("catalogue"), words_of("en")["markup"]["works"]
     fields = {
         "poster": html.escape(str(settings.get("poster") or "")),
-        "catalogue": f'<p><a href="{catalogue}">The works as text and pictures</a></p>'
-        if catalogue
-        else "",
+        "catalogue": f'<p><a href="{catalogue}">{html.escape(works)}</a></p>' if catalogue else "",
     }
     return _filled(INDEX, settings, script, links, fields)
 

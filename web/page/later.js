@@ -8,6 +8,7 @@ export { WholeMemory } from "./gl/whole-memory.js";
 export { measureBudget } from "./measuring.js";
 export { Paper } from "./policy/paper.js";
 export { Whole } from "./policy/whole.js";
+export { attachHelp } from "./ui/help.js";
 export { attachMenu } from "./ui/menu.js";
 export { attachMinimap } from "./ui/minimap.js";
 export { attachOverlay } from "./ui/overlay.js";

@@ -2,6 +2,7 @@
 
 import { frame, Load } from "./gl/load.js";
 import { largestBudget } from "./policy/budget.js";
+import { panels } from "./words/english.js";
 
 /** Seconds of a frame at 30 a second; the least budget, bytes; pictures whose fastest counts. */
 const LONGEST = 1 / 30, LEAST = 4 << 20, PICTURES = 12;
@@ -43,7 +44,7 @@ export async function measureBudget(app) {
       return seconds;
     });
     if (bytes) app.setBudget(bytes);
-    else app.emit("notice", { message: "No texture memory keeps 30 pictures a second here: the default stays." });
+    else app.emit("notice", { message: panels.noBudget });
     return { bytes, picture, tried };
   } finally {
     load.delete();

@@ -2,6 +2,7 @@
 
 import { find, make } from "./elements.js";
 import { showNotice } from "./errors.js";
+import { page } from "../words/english.js";
 
 /** @typedef {import("../walk/walker.js").Pose} Pose */
 
@@ -46,10 +47,10 @@ export function attachAddress(root, app) {
     const link = here();
     try {
       await navigator.clipboard.writeText(link);
-      showNotice(root, "The link to this place is copied.");
+      showNotice(root, page.copied);
     } catch {
-      const field = make("input", { value: link, readOnly: true, ariaLabel: "Link to this place" });
-      showNotice(root, "Copy the link to this place:", field);
+      const field = make("input", { value: link, readOnly: true, ariaLabel: page.link });
+      showNotice(root, page.copy, field);
       field.select();
     }
   };
