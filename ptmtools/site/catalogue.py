@@ -52,6 +52,7 @@ class Content:
     pictures: label → URL of its picture, relative to the page.
     transcripts: label → texts of its captions.
     base: URL of the folder of the tour's files, relative to the page, with a slash.
+    address: URL of the folder of the site with a slash, or "" if it is unknown.
     """
 
     tour: Mapping[str, Any]
@@ -60,6 +61,7 @@ class Content:
     pictures: Mapping[int, str]
     transcripts: Mapping[int, Texts]
     base: str
+    address: str = ""
 
 
 def page_name(language: str, languages: Sequence[str]) -> str:
@@ -203,7 +205,7 @@ class _Page:
 
     def _linked_data(self) -> str:
         """The works as schema.org data, which search engines read."""
-        works = []
+        works, address = [], self._content.address
         for number in self._order():
             label = self._tour["labels"][number]
             nodes, _ = self._version(label.get("text"))
@@ -213,8 +215,9 @@ class _Page:
                 "creator": self._plain(label.get("maker")),
                 "dateCreated": self._plain(label.get("date")),
                 "description": re.sub(r"\s+", " ", plain_text(nodes or ())).strip(),
-                "image": self._content.pictures.get(number, ""),
-                "url": f"{INDEX}?label={label['id']}",
+                "image": number in self._content.pictures
+                and f"{address}{self._content.pictures[number]}",
+                "url": f"{address}{INDEX}?label={label['id']}",
             }
             works.append({name: value for name, value in fields.items() if value})
         data = {

@@ -80,6 +80,7 @@ def page(
     script: str,
     preload: Sequence[str],
     openings: Mapping[str, Sequence[float]],
+    about: Sequence[str] = (),
 ) -> Entry:
     """The page, filled in.
 
@@ -88,6 +89,7 @@ def page(
     settings: the JSON that its script reads (docs/guide/publish.md).
     script: URL of its script. preload: URLs of the files that it fetches first.
     openings: URLs, which differ in their last number, and the addresses of their views.
+    about: elements of the head for other programs (`ptmtools.site.about`).
 
     Raises InputError: PTM-I122 the template is missing.
     """
@@ -101,6 +103,7 @@ def page(
             f'<link id="opening" rel="next" as="fetch" href="{next(iter(openings))}" '
             f'data-views="{views}" crossorigin>'
         )
+    links += about
     catalogue, works = settings.get("catalogue"), words_of("en")["markup"]["works"]
     fields = {
         "poster": html.escape(str(settings.get("poster") or "")),

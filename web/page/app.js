@@ -134,7 +134,7 @@ export class App {
   /** Measures the budget of texture memory. */
   #measure() {
     loadLater().then(async ({ measureBudget }) => (this.measured = await measureBudget(this)))
-      .catch(() => this.emit("notice", { message: page.unmeasured }));
+      .catch(() => this.emit("notice", { message: page.unloaded }));
   }
 
   /** @param {number} seconds that a level may take while one moves: §6.2's δt */

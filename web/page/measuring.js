@@ -20,7 +20,7 @@ const MOST = 4;
  * Sets the budget to the largest one that keeps 30 pictures a second: those of the walk, and drawing
  * once from each texture of the budget. Without such a budget, the default stays.
  * @param {import("./app.js").App} app
- * @returns {Promise<Measured>}
+ * @returns {Promise<Measured | null>} null, with a notice, if it fails
  */
 export async function measureBudget(app) {
   const { walk } = app, { T, K, memory, whole } = walk.catalogue;
@@ -46,6 +46,9 @@ export async function measureBudget(app) {
     if (bytes) app.setBudget(bytes);
     else app.emit("notice", { message: panels.noBudget });
     return { bytes, picture, tried };
+  } catch {
+    app.emit("notice", { message: panels.unmeasured });
+    return null;
   } finally {
     load.delete();
   }

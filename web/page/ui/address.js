@@ -1,6 +1,7 @@
 // A pose as the fragment of the URL: #x,y,z,yaw and optionally pitch, metres and degrees.
 
-import { find, make } from "./elements.js";
+import { loadLater } from "../load-later.js";
+import { find } from "./elements.js";
 import { showNotice } from "./errors.js";
 import { page } from "../words/english.js";
 
@@ -49,9 +50,7 @@ export function attachAddress(root, app) {
       await navigator.clipboard.writeText(link);
       showNotice(root, page.copied);
     } catch {
-      const field = make("input", { value: link, readOnly: true, ariaLabel: page.link });
-      showNotice(root, page.copy, field);
-      field.select();
+      loadLater().then(({ showLink }) => showLink(root, link), () => showNotice(root, page.unloaded));
     }
   };
 }

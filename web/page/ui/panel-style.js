@@ -1,6 +1,11 @@
-// The style of the panels, which are loaded when one is first opened.
+// The style of the panels, and of what else is loaded when it is first needed.
 
 export const PANEL_STYLE = `
+#notices input { font: 13px ui-monospace, monospace; width: 100%; min-height: 36px; margin-top: 6px; padding: 0 8px; color: inherit; background: #0006; border: 1px solid var(--line); border-radius: 6px; pointer-events: auto; }
+#halves { position: fixed; inset: 0; margin: 0; display: flex; direction: ltr; pointer-events: none; text-align: center; }
+#halves b { flex: 1; padding-top: max(14px, env(safe-area-inset-top)); font-weight: 600; text-shadow: 0 0 4px #000, 0 1px 8px #000; }
+#halves b + b { border-left: 2px solid var(--warm); }
+
 dl { display: grid; grid-template-columns: auto 1fr; gap: 6px 14px; margin: 0; }
 dt { color: var(--dim); }
 dd { margin: 0; }

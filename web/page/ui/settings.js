@@ -57,9 +57,11 @@ export function attachSettings(root, app) {
     return button;
   };
   const freeze = toggle(panels.freeze, (on) => app.freeze(on));
+  const halves = make("p", { id: "halves", hidden: true }, make("b", {}, panels.streamed), make("b", {}, panels.full));
+  find(document, "#panels").before(halves);
   const compare = toggle(panels.compare, (on) => {
     app.compare(on);
-    find(document, "#halves").hidden = !on;
+    halves.hidden = !on;
   });
   root.append(
     make("h3", {}, panels.settings),

@@ -13,8 +13,6 @@ export const markup = /* @__PURE__ */ own("markup", {
   "copyLink": "Copy link",
   "details": "Details",
   "help": "Help",
-  "streamed": "streamed",
-  "full": "full resolution",
   "noWalk": "The walk cannot be shown",
   "noForm": "This cannot be shown",
   "reload": "Reload",
@@ -25,11 +23,8 @@ export const page = /* @__PURE__ */ own("page", {
   "room": "Loading the room",
   "textures": "Loading textures",
   "outside": "The link leads to a place outside of the building.",
-  "unmeasured": "Texture memory could not be measured.",
   "unloaded": "A part of this page cannot be loaded now.",
   "copied": "The link to this place is copied.",
-  "copy": "Copy the link to this place:",
-  "link": "Link to this place",
   "slow": "Textures load slowly here: the server does not support range requests.",
   "noSimd": "This browser cannot run WebAssembly with SIMD.",
   "noWebgl": "This browser cannot draw with WebGL 2.",
@@ -93,7 +88,12 @@ export const panels = /* @__PURE__ */ own("panels", {
   "oneFinger": "One finger",
   "dragWalk": "drag up or down to walk, left or right to turn",
   "twoFingers": "Two fingers",
-  "close": "close"
+  "close": "close",
+  "streamed": "streamed",
+  "full": "full resolution",
+  "copy": "Copy the link to this place:",
+  "link": "Link to this place",
+  "unmeasured": "Texture memory could not be measured."
 });
 
 export const tour = /* @__PURE__ */ own("tour", {
