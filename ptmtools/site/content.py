@@ -309,7 +309,7 @@ class _Builder:
             for size in ICONS
         }
         data = manifest_of(self._title, icons)
-        self._entries[MANIFEST] = Entry(MANIFEST, data, MANIFEST_MEDIA, compressed=True)
+        self._entries[MANIFEST] = Entry(MANIFEST, data, MANIFEST_MEDIA)
 
     def _cells(self) -> Iterator[dict[str, Any]]:
         index = self._served.index
