@@ -39,6 +39,7 @@ from ptmtools.store.objects import is_url
 if TYPE_CHECKING:
     from ptmtools.site.edit_requests import Editing
 
+_ADDRESS = re.compile(r"https?://[^\s/?#@]+(/[^\s?#]*)?")
 _ORIGIN = re.compile(r"\*|https?://[^\s/?#@]+")
 
 
@@ -157,6 +158,11 @@ def publish(
     """
     target = _only_target(target, output)
     site_options, options = take(SiteOptions, values), take(PublishOptions, values)
+    if site_options.address and not _ADDRESS.fullmatch(site_options.address):
+        raise click.UsageError(
+            f"--address {site_options.address!r} is not the address of a folder, such as "
+            "https://example.org/walk/"
+        )
     form = form_of(Path(db))
     if form and site_options != SiteOptions(title=site_options.title):
         raise click.UsageError(

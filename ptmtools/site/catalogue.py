@@ -16,6 +16,7 @@ from html import escape
 from itertools import groupby
 from typing import Any, TypeVar
 
+from ptmtools.site.words import words_of
 from ptmtools.tour.markdown import html_of, plain_text
 from ptmtools.tour.model import Texts, in_language
 
@@ -37,23 +38,6 @@ nav li { display: inline-block; margin-inline-end: 1rem; }
 .skip:not(:focus) { position: absolute; left: -999px; }
 @media (prefers-color-scheme: dark) { a { color: #9cc7ff; } }
 """
-#: Words of the page by language; others are in English.
-WORDS: dict[str, dict[str, str]] = {
-    "en": {
-        "catalogue": "Catalogue",
-        "walk": "Walk through the building",
-        "here": "See it in the walk",
-        "about": "More about it",
-        "captions": "Text of the recording",
-        "image": "Description of the picture",
-        "elsewhere": "Other works",
-        "contents": "Contents",
-        "skip": "Skip to the content",
-        "languages": "Languages",
-        "access": "This page has the content of the walk as text and pictures. It works without "
-        "scripts, by keyboard and with screen readers, and can be enlarged to 400 %.",
-    }
-}
 
 
 @dataclass(frozen=True)
@@ -68,6 +52,7 @@ class Content:
     pictures: label → URL of its picture, relative to the page.
     transcripts: label → texts of its captions.
     base: URL of the folder of the tour's files, relative to the page, with a slash.
+    address: URL of the folder of the site with a slash, or "" if it is unknown.
     """
 
     tour: Mapping[str, Any]
@@ -76,6 +61,7 @@ class Content:
     pictures: Mapping[int, str]
     transcripts: Mapping[int, Texts]
     base: str
+    address: str = ""
 
 
 def page_name(language: str, languages: Sequence[str]) -> str:
@@ -94,7 +80,7 @@ class _Page:
 
     def __init__(self, content: Content, language: str) -> None:
         self._content, self._tour, self._language = content, content.tour, language
-        self._words = WORDS["en"] | WORDS.get(language.split("-")[0], {})
+        self._words = words_of(language)["catalogue"]
         own = self._plain(content.tour.get("title")) or content.title
         self._title = f"{own}: {self._words['catalogue']}"
 
@@ -219,7 +205,7 @@ class _Page:
 
     def _linked_data(self) -> str:
         """The works as schema.org data, which search engines read."""
-        works = []
+        works, address = [], self._content.address
         for number in self._order():
             label = self._tour["labels"][number]
             nodes, _ = self._version(label.get("text"))
@@ -229,8 +215,9 @@ class _Page:
                 "creator": self._plain(label.get("maker")),
                 "dateCreated": self._plain(label.get("date")),
                 "description": re.sub(r"\s+", " ", plain_text(nodes or ())).strip(),
-                "image": self._content.pictures.get(number, ""),
-                "url": f"{INDEX}?label={label['id']}",
+                "image": number in self._content.pictures
+                and f"{address}{self._content.pictures[number]}",
+                "url": f"{address}{INDEX}?label={label['id']}",
             }
             works.append({name: value for name, value in fields.items() if value})
         data = {

@@ -28,6 +28,16 @@ from ptmtools.output.served import FORM, Served, read_served
 from ptmtools.pipeline.command import naming_command, open_database
 from ptmtools.pipeline.stages.emit import EMIT
 from ptmtools.progress import Progress, silent
+from ptmtools.site.about import (
+    ICONS,
+    MANIFEST,
+    MANIFEST_MEDIA,
+    About,
+    described,
+    folder_of,
+    icon,
+    manifest_of,
+)
 from ptmtools.site.catalogue import ANGLE, Content, catalogue_of
 from ptmtools.site.entry import DIGITS, Entry, state_of
 from ptmtools.site.geometry import lean_glb
@@ -73,6 +83,16 @@ class SiteOptions:
         "Picture (JPEG, PNG or WebP) to show while the building loads. Default: a rendered image "
         "from the first viewpoint.",
         metavar="FILE",
+    )
+    description: str = option(
+        "",
+        "Description of the site for search engines and link previews. Default: the first places.",
+    )
+    address: str = option(
+        "",
+        "Address of the site, such as https://example.org/walk/: link previews and search engines "
+        "get absolute URLs.",
+        metavar="URL",
     )
     pictures: bool = option(True, "Render a poster and images of the viewpoints.")
     exact: Literal["built", "never"] = option(
@@ -245,7 +265,10 @@ class _Builder:
         rooms: dict[int, str] = {}
         for viewpoint in self._served.index["viewpoints"]:
             rooms.setdefault(viewpoint["cell"], viewpoint["description"])
-        return Content(tour.document, self._title, rooms, pictures, tour.transcripts, f"{DATA}/")
+        address = folder_of(self._options.address)
+        return Content(
+            tour.document, self._title, rooms, pictures, tour.transcripts, f"{DATA}/", address
+        )
 
     def _page(
         self,
@@ -270,7 +293,23 @@ class _Builder:
             first = index["cells"][index["viewpoints"][0]["cell"]]
             preload += [f"{DATA}/{first[kind]}" for kind in ("record", "geometry")]
         views = dict(zip(openings, map(address_of, index["viewpoints"]), strict=False))
-        self._entries[INDEX] = page(settings, program["viewer.js"].name, preload, views)
+        about = About(
+            self._title,
+            self._options.description or described(index["viewpoints"]),
+            poster or "",
+            self._options.address,
+        )
+        script = program["viewer.js"].name
+        self._entries[INDEX] = page(settings, script, preload, views, [*about.lines()])
+        self._manifest()
+
+    def _manifest(self) -> None:
+        icons = {
+            size: f"{DATA}/{self._add(f'icon-{size}', '.png', 'image/png', icon(size))}"
+            for size in ICONS
+        }
+        data = manifest_of(self._title, icons)
+        self._entries[MANIFEST] = Entry(MANIFEST, data, MANIFEST_MEDIA)
 
     def _cells(self) -> Iterator[dict[str, Any]]:
         index = self._served.index

@@ -13,13 +13,17 @@ from typing import Any
 from ptmtools.errors import InputError
 from ptmtools.site.entry import DIGITS, Entry
 from ptmtools.site.security import secured
+from ptmtools.site.words import LANGUAGES, words_of
 from ptmtools.store.layout import sha256
 
 INDEX = "index.html"
 PAGE = Path(__file__).parent / "page"
 HTML, JAVASCRIPT = "text/html; charset=utf-8", "text/javascript; charset=utf-8"
 #: Scripts that few visits need.
-LATER = ("later.js", "compare.js", "statues.js", "reliefs.js", "sets.js", "tour.js", "embedded.js")
+LATER = (
+    *("later.js", "compare.js", "statues.js", "reliefs.js", "sets.js", "tour.js", "embedded.js"),
+    *(f"words-{language}.js" for language in LANGUAGES if language != "en"),
+)
 #: The media type of each file.
 PROGRAM = {
     "viewer.js": JAVASCRIPT,
@@ -76,6 +80,7 @@ def page(
     script: str,
     preload: Sequence[str],
     openings: Mapping[str, Sequence[float]],
+    about: Sequence[str] = (),
 ) -> Entry:
     """The page, filled in.
 
@@ -84,6 +89,7 @@ def page(
     settings: the JSON that its script reads (docs/guide/publish.md).
     script: URL of its script. preload: URLs of the files that it fetches first.
     openings: URLs, which differ in their last number, and the addresses of their views.
+    about: elements of the head for other programs (`ptmtools.site.about`).
 
     Raises InputError: PTM-I122 the template is missing.
     """
@@ -97,12 +103,11 @@ def page(
             f'<link id="opening" rel="next" as="fetch" href="{next(iter(openings))}" '
             f'data-views="{views}" crossorigin>'
         )
-    catalogue = settings.get("catalogue")
+    links += about
+    catalogue, works = settings.get("catalogue"), words_of("en")["markup"]["works"]
     fields = {
         "poster": html.escape(str(settings.get("poster") or "")),
-        "catalogue": f'<p><a href="{catalogue}">The works as text and pictures</a></p>'
-        if catalogue
-        else "",
+        "catalogue": f'<p><a href="{catalogue}">{html.escape(works)}</a></p>' if catalogue else "",
     }
     return _filled(INDEX, settings, script, links, fields)
 

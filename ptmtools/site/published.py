@@ -13,6 +13,7 @@ from urllib.parse import unquote
 from ptmtools.files import open_regular
 from ptmtools.options import option
 from ptmtools.output.emission import compressed
+from ptmtools.site.about import MANIFEST, MANIFEST_MEDIA
 from ptmtools.site.content import Site
 from ptmtools.site.entry import Entry
 from ptmtools.site.program import INDEX
@@ -71,6 +72,7 @@ def _headers(entries: Iterable[Entry]) -> bytes:
     forever = "\n  Cache-Control: public, max-age=31536000, immutable\n"
     parts = [f"{folder}{forever}" for folder in folders]
     parts += [f"{page}\n  Cache-Control: no-cache\n" for page in ("/", f"/{INDEX}")]
+    parts.append(f"/{MANIFEST}\n  Content-Type: {MANIFEST_MEDIA}\n  Cache-Control: no-cache\n")
     parts.append("/data/*.glb\n  Content-Type: model/gltf-binary\n")
     return "".join(parts).encode()
 

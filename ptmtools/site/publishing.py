@@ -53,6 +53,8 @@ from ptmtools.store.objects import is_url, plain_path
 COARSE = 64
 #: Format of the list of our files.
 FORMAT, SCHEMA = "ptmtools site files", 1
+#: Data that the walk does not show.
+_NOT_OF_WALK = (f"{DATA}/work-", f"{DATA}/icon-")
 
 
 def publish(
@@ -238,7 +240,7 @@ def _walked(name: str, used: Collection[str]) -> bool:
     """Whether every walk may need a file; of scripts that are loaded later those ``used``."""
     script = name.rpartition("/")[2]
     later = (script in LATER and script not in used) or is_of_sets(name)
-    walked = name.startswith(("viewer-", f"{DATA}/")) and not name.startswith(f"{DATA}/work-")
+    walked = name.startswith(("viewer-", f"{DATA}/")) and not name.startswith(_NOT_OF_WALK)
     return name == INDEX or (walked and not later)
 
 

@@ -35,6 +35,8 @@ def policy_of(page: str) -> str:
     rules["style-src"] = styles
     rules["img-src"] = ["'self'", "data:", "blob:"]
     rules["media-src"] = ["'self'"]
+    if '<link rel="manifest"' in page:
+        rules["manifest-src"] = ["'self'"]
     rules["base-uri"] = rules["form-action"] = ["'none'"]
     return "; ".join(f"{name} {' '.join(values)}" for name, values in rules.items() if values)
 

@@ -98,7 +98,12 @@ def test_the_wheel_is_small_and_holds_the_page_the_decoder_and_the_schemas(wheel
     assert wheel.stat().st_size < LARGEST
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
-    for folder, pattern in (("site/page", "*"), ("schemas", "*.json"), ("", "py.typed")):
+    for folder, pattern in (
+        ("site/page", "*"),
+        ("site/words", "*.json"),
+        ("schemas", "*.json"),
+        ("", "py.typed"),
+    ):
         for file in (ROOT / "ptmtools" / folder).glob(pattern):
             assert f"ptmtools/{file.relative_to(ROOT / 'ptmtools').as_posix()}" in names
     assert "ptmtools/site/page/decoder.wasm" in names

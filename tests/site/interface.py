@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import re
 import struct
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+from ptmtools.site.words import words_of
 
 HERE = Path(__file__).resolve().parent
 PAGE = HERE.parents[1] / "web" / "page"
@@ -34,7 +37,8 @@ PNG = b"".join(
 
 def page_text(script: str = "/fake.mjs") -> str:
     """The page as it is sent."""
-    text = (PAGE / "index.html").read_text()
+    words = words_of("en")["markup"]
+    text = re.sub(r"\[\[(\w+)\]\]", lambda m: words[m[1]], (PAGE / "index.html").read_text())
     filled = {
         "title": SITE["title"],
         "preload": "",

@@ -13,6 +13,7 @@ import pytest
 
 from ptmtools.errors import DatabaseError, OutputError
 from ptmtools.site import publishing
+from ptmtools.site.about import MANIFEST
 from ptmtools.site.content import Site, SiteOptions, site_of
 from ptmtools.site.published import HEADERS, LIST, PublishOptions
 from ptmtools.site.publishing import publish
@@ -66,7 +67,7 @@ def test_again_only_what_changed(site: Site, other: Site, tmp_path: Path) -> Non
     assert all(file.stat().st_mtime_ns == time for file, time in times.items())
     done = publish(other, tmp_path)
     gone = site.entries.keys() - other.entries.keys()
-    assert set(done.written) == {"index.html", "data/new-0123456789.json"}
+    assert set(done.written) == {"index.html", MANIFEST, "data/new-0123456789.json"}
     assert set(done.removed) == gone
     assert len(gone) == 1
     assert not any((tmp_path / name).exists() for name in gone)

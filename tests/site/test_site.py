@@ -20,6 +20,7 @@ from ptmtools import schemas
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.output.emission import compressed
 from ptmtools.site import pictures as drawing
+from ptmtools.site.about import MANIFEST
 from ptmtools.site.content import DATA, Site, SiteOptions, site_of, title_of
 from ptmtools.site.entry import link_bytes
 from ptmtools.site.geometry import lean_glb
@@ -72,7 +73,7 @@ def test_names_are_hashes(site: Site, two_rooms: Path) -> None:
     assert previews
     for name, entry in site.entries.items():
         assert entry.name == name
-        assert entry.forever is (name not in ("index.html", ELEMENT))
+        assert entry.forever is (name not in ("index.html", ELEMENT, MANIFEST))
         if name.startswith(DATA) and name not in previews and "/opening-" not in name:
             digest = hashlib.sha256(entry.read()).hexdigest()
             assert re.fullmatch(rf"data/[\w-]+-{digest[:10]}\.\w+", name)
@@ -328,7 +329,7 @@ def test_weight(site: Site) -> None:
     weight = weight_of(site)
     sizes = {name: link_bytes(entry) for name, entry in site.entries.items()}
     needed = [name for name in sizes if not name.endswith(tuple(f"/{each}" for each in LATER))]
-    needed.remove(ELEMENT)
+    needed = [n for n in needed if n not in (ELEMENT, MANIFEST) and not n.startswith("data/icon-")]
     assert weight.page == sum(sizes[name] for name in needed if not name.startswith("data/"))
     assert weight.whole == sum(sizes[name] for name in needed)
     row = site.index["cells"][site.index["viewpoints"][0]["cell"]]

@@ -9,6 +9,7 @@ import { poseOf } from "./ui/address.js";
 import { Solids } from "./walk/solids.js";
 import { Walker } from "./walk/walker.js";
 import { Walkthrough } from "./walkthrough.js";
+import { page } from "./words/english.js";
 
 /** Default bytes of texture memory: on desks, and on phones. */
 const BUDGET = 256 << 20, SMALL_BUDGET = 64 << 20;
@@ -81,7 +82,7 @@ export class App {
         return this.goTo(pose);
       }
     }
-    this.emit("notice", { message: "The link leads to a place outside of the building." });
+    this.emit("notice", { message: page.outside });
   }
 
   /**
@@ -133,7 +134,7 @@ export class App {
   /** Measures the budget of texture memory. */
   #measure() {
     loadLater().then(async ({ measureBudget }) => (this.measured = await measureBudget(this)))
-      .catch(() => this.emit("notice", { message: "Texture memory could not be measured." }));
+      .catch(() => this.emit("notice", { message: page.unloaded }));
   }
 
   /** @param {number} seconds that a level may take while one moves: §6.2's δt */
@@ -145,7 +146,7 @@ export class App {
   async setPolicy(name) {
     this.#wanted = name;
     const known = await loadPolicy(name).catch(() => {
-      this.emit("notice", { message: "The policy could not be loaded." });
+      this.emit("notice", { message: page.unloaded });
     });
     if (known && this.#wanted === name) this.walk.choose(name);
   }

@@ -1,5 +1,7 @@
 // Progress until the first picture: the room, then the coarse levels of its visible textures.
 
+import { page } from "./words/english.js";
+
 /** Share of the pixels that need them; what few others show may come much later. */
 const ENOUGH = 0.95;
 /** Steps of the progress that textures make; the room makes two. */
@@ -19,7 +21,7 @@ export function beginningOf(walk) {
   const room = parts < 2 || total === 0;
   return {
     progress: {
-      stage: room ? "Loading the room" : "Loading textures",
+      stage: room ? page.room : page.textures,
       loaded: parts + (room ? 0 : STEPS * share / total),
       total: 2 + STEPS,
     },

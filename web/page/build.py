@@ -4,16 +4,22 @@ the worker, bundled and minified by esbuild, the template with its style, and th
     python web/page/build.py            writes it
     python web/page/build.py FOLDER     writes it elsewhere
 
+The words of the page come from ``ptmtools/site/words``: the English ones as a module, of which each
+bundle takes the sections that it uses (``web/page/words/english.js``, written here), every other
+language as a script of its own.
+
 The result is committed, so that `ptm publish` and `ptm serve` need no node. Bundles, since forty
 modules would be forty requests, each found only in the one before it.
 """
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -24,22 +30,66 @@ from benchmarks.web_rivals.packages import ESBUILD  # noqa: E402
 PTM = ROOT / "web" / "ptm" / "src"
 #: The page of octree textures, interlaced images and campuses.
 FORMS = HERE / "forms"
+#: Words by language, and the module of the English ones.
+WORDS, ENGLISH = ROOT / "ptmtools" / "site" / "words", HERE / "words" / "english.js"
 OUTPUT = ROOT / "ptmtools" / "site" / "page"
 #: Scripts that the page loads when it needs them.
 LATER = ("later.js", "compare.js", "statues.js", "reliefs.js", "sets.js", "tour.js", "embedded.js")
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+_WORD = re.compile(r"\[\[(\w+)\]\]")
 _LINE_END = re.compile(r"\s*\n\s*")
 #: Template strings with shaders, and what esbuild leaves in them.
 _SHADER = re.compile(r"`[^`]*\b(?:uniform|gl_Position)\b[^`]*`")
 _SHADER_REMARK = re.compile(r"\s*//[^\n]*")
 
 
-def minified(source: Path) -> bytes:
-    """A module with all that it imports, or a style sheet. CalledProcessError if esbuild fails."""
+def bundled(folder: Path, source: list[str], text: str = "") -> bytes:
+    """What esbuild makes of a file of a folder, or of a text; CalledProcessError if it fails."""
     options = ["--bundle", "--minify", "--format=esm", "--target=es2022", "--charset=utf8"]
     options += [f"--external:./{name}" for name in LATER]
-    command = [ESBUILD.folder / "bin/esbuild", source.name, *options, "--log-level=warning"]
-    return subprocess.run(command, cwd=source.parent, stdout=subprocess.PIPE, check=True).stdout
+    command = [ESBUILD.folder / "bin/esbuild", *source, *options, "--log-level=warning"]
+    done = subprocess.run(
+        command, cwd=folder, input=text.encode(), stdout=subprocess.PIPE, check=True
+    )
+    return done.stdout
+
+
+def minified(source: Path) -> bytes:
+    """A module with all that it imports, or a style sheet. CalledProcessError if esbuild fails."""
+    return bundled(source.parent, [source.name])
+
+
+def words_of(language: str) -> Any:
+    """The words of a language, section → name → text."""
+    return json.loads((WORDS / f"{language}.json").read_text(encoding="utf-8"))
+
+
+def english() -> str:
+    """The module of the English words; a script that is loaded after those of another language has
+    these from the beginning."""
+    lines = [
+        "// Written by web/page/build.py from ptmtools/site/words/en.json.",
+        "",
+        "/** @template {Record<string, string>} T @param {string} name @param {T} words */",
+        "const own = (name, words) =>",
+        '  Object.assign(words, Reflect.get(globalThis, "ptmWords")?.[name]);',
+    ]
+    for name, texts in words_of("en").items():
+        if isinstance(texts, dict) and name != "catalogue":
+            text = json.dumps(texts, ensure_ascii=False, indent=2)
+            lines += ["", f'export const {name} = /* @__PURE__ */ own("{name}", {text});']
+    return "\n".join(lines) + "\n"
+
+
+def language_script(language: str) -> bytes:
+    """The script of a language, with all words but those of the catalogue."""
+    words = {name: texts for name, texts in words_of(language).items() if name != "catalogue"}
+    text = (
+        'import { translate } from "./words/translate.js";\n'
+        f"export const words = {json.dumps(words, ensure_ascii=False)};\n"
+        f'translate("{language}", words);\n'
+    )
+    return bundled(HERE, ["--loader=js"], text)
 
 
 def plain_shader(shader: re.Match[str]) -> str:
@@ -57,18 +107,27 @@ def page(folder: Path) -> bytes:
     """The template of a page with its style."""
     template = _COMMENT.sub("", (folder / "index.html").read_text(encoding="utf-8"))
     style = minified(folder / "style.css").decode().strip()
-    return _LINE_END.sub("\n", template).replace("{{style}}", style).encode()
+    words = words_of("en")["markup"]
+    template = _WORD.sub(lambda match: words[match[1]], _LINE_END.sub("\n", template))
+    return template.replace("{{style}}", style).encode()
 
 
 def build(folder: Path) -> None:
     """Writes the page to a folder. SystemExit without esbuild."""
     ESBUILD.require()
+    if folder == OUTPUT:
+        ENGLISH.write_text(english(), encoding="utf-8")
     files = {
         "index.html": page(HERE),
         "form.html": page(FORMS),
         **{f"{name}.js": script(FORMS / f"{name}.js") for name in ("apo", "interlace", "campus")},
         "viewer.js": script(HERE / "main.js"),
         **{name: script(HERE / name) for name in LATER},
+        **{
+            f"words-{file.stem}.js": language_script(file.stem)
+            for file in sorted(WORDS.glob("*.json"))
+            if file.stem != "en"
+        },
         # Of `ptm serve --edit` alone.
         "editor.js": script(HERE / "editor.js"),
         "ptm-walk.js": minified(ROOT / "web" / "embed" / "ptm-walk.js"),

@@ -11,6 +11,8 @@ import { Opening } from "./net/opening.js";
 import { loadPolicy } from "./policy/policies.js";
 import { attachUi } from "./ui/all.js";
 import { showError } from "./ui/errors.js";
+import { page } from "./words/english.js";
+import { speak } from "./words/language.js";
 
 /** The site of the page. @param {import("./data/site.js").SiteConfig} config */
 async function siteOf(config) {
@@ -40,15 +42,18 @@ async function main() {
   const canvas = /** @type {HTMLCanvasElement} */ (document.querySelector("canvas"));
   const config = readConfig();
   try {
+    const speaking = speak();
     if (!hasSimd()) {
-      throw new PageError("PTM-V102", "This browser cannot run WebAssembly with SIMD.");
+      await speaking;
+      throw new PageError("PTM-V102", page.noSimd);
     }
     const decoders = decodersOf(config), site = siteOf(config);
     // The page knows whether there is one of the view that its address leads to.
     const preload = /** @type {HTMLLinkElement | null} */ (document.querySelector("#opening[rel=preload]"));
     const opening = preload ? new Opening(preload.href) : null;
     const gl = contextOf(canvas);
-    if (!gl) throw new PageError("PTM-V101", "This browser cannot draw with WebGL 2.");
+    await speaking;
+    if (!gl) throw new PageError("PTM-V101", page.noWebgl);
     const query = new URLSearchParams(location.search), policy = query.get("policy") ?? "best";
     const known = await loadPolicy(policy).catch(() => false);
     const options = { opening, policy: known ? policy : "best" };

@@ -2,6 +2,7 @@
 
 import { frame, Load } from "./gl/load.js";
 import { largestBudget } from "./policy/budget.js";
+import { panels } from "./words/english.js";
 
 /** Seconds of a frame at 30 a second; the least budget, bytes; pictures whose fastest counts. */
 const LONGEST = 1 / 30, LEAST = 4 << 20, PICTURES = 12;
@@ -19,7 +20,7 @@ const MOST = 4;
  * Sets the budget to the largest one that keeps 30 pictures a second: those of the walk, and drawing
  * once from each texture of the budget. Without such a budget, the default stays.
  * @param {import("./app.js").App} app
- * @returns {Promise<Measured>}
+ * @returns {Promise<Measured | null>} null, with a notice, if it fails
  */
 export async function measureBudget(app) {
   const { walk } = app, { T, K, memory, whole } = walk.catalogue;
@@ -43,8 +44,11 @@ export async function measureBudget(app) {
       return seconds;
     });
     if (bytes) app.setBudget(bytes);
-    else app.emit("notice", { message: "No texture memory keeps 30 pictures a second here: the default stays." });
+    else app.emit("notice", { message: panels.noBudget });
     return { bytes, picture, tried };
+  } catch {
+    app.emit("notice", { message: panels.unmeasured });
+    return null;
   } finally {
     load.delete();
   }

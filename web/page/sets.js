@@ -6,10 +6,7 @@ import { JoinedMemory } from "./sets/joined-memory.js";
 import { piecesOf } from "./sets/pieces.js";
 import { rowOf, setsIn } from "./sets/sets.js";
 import { showNotice } from "./ui/errors.js";
-
-const NONE = "This site has no interlaced images, so you see its own textures. "
-  + "`ptm emit DB --format vrml,gltf,interlace` writes some for a database.";
-const FIXED = "The policy and the comparison are those of other textures than interlaced images.";
+import { objects } from "./words/english.js";
 
 /** @typedef {import("./sets/sets.js").TextureSet} TextureSet */
 
@@ -24,7 +21,7 @@ const FIXED = "The policy and the comparison are those of other textures than in
 export async function setsOf(site, gl, options, fetcher) {
   const { index } = site;
   if (!index.sets) {
-    showNotice(document, NONE);
+    showNotice(document, objects.noSets);
     return null;
   }
   const address = site.of(index.sets), urlOf = (/** @type {string} */ file) => new URL(file, address).href;
@@ -64,7 +61,7 @@ function attach(walk, sets) {
   walk.memory.delete();
   walk.memory = /** @type {any} */ (new JoinedMemory(gl, sets));
   if (walk.renderer) walk.renderer.memory = walk.memory;
-  walk.choose = walk.compare = () => walk.emit("notice", { message: FIXED });
+  walk.choose = walk.compare = () => walk.emit("notice", { message: objects.fixed });
 }
 
 /** The requests of steps become requests of files. @param {import("./walkthrough.js").Walkthrough} walk

@@ -8,6 +8,8 @@ import { clock } from "./net/fetcher.js";
 import { previewsOf } from "./net/preview-file.js";
 import { TextureFile } from "./net/texture-file.js";
 import { EXACT, NO_SOURCE } from "./policy/downloads.js";
+import { page } from "./words/english.js";
+import { fill } from "./words/language.js";
 
 /** @typedef {import("./policy/downloads.js").Request} Request */
 /** @typedef {import("./data/site.js").CellRecord} CellRecord */
@@ -285,7 +287,7 @@ export class Stream {
       client.losePreview(number, again ? Infinity : 0);
       if (!again) {
         this.#spoilt.add(number);
-        const message = `${file.row.file} is not shown: ${fault.message}`;
+        const message = fill(page.unshown, { file: file.row.file, reason: fault.message });
         this.report(new PageError("PTM-V105", message), "preview", number);
       }
       throw fault;
@@ -296,7 +298,7 @@ export class Stream {
   #reportDecoder(fault) {
     if (this.#cannotDecode || !this.workers.failed) return;
     this.#cannotDecode = true;
-    this.report(new PageError("PTM-V106", `Textures cannot be decoded: ${fault}`), "decoder", 0);
+    this.report(new PageError("PTM-V106", fill(page.undecoded, { reason: String(fault) })), "decoder", 0);
     this.files.forEach((_, t) => this.client.lose(t, 0, Infinity));
   }
 
@@ -324,14 +326,14 @@ export class Stream {
       const kept = level > 0 ? file.row.ends[level - 1] : 0;
       if (fault.code.startsWith("PTM-L")) {
         this.client.lose(texture, kept, Infinity);
-        const message = `${file.row.file} is not shown with all of its levels: ${fault.message}`;
+        const message = fill(page.partial, { file: file.row.file, reason: fault.message });
         this.report(new PageError("PTM-V106", message), "texture", texture);
         throw fault;
       }
       file.cut(kept);
       this.client.lose(texture, kept, this.#suspect.get(texture) === level ? Infinity : 0);
       this.#suspect.set(texture, level);
-      const message = `${file.row.file} is damaged: ${fault.message}`;
+      const message = fill(page.damaged, { file: file.row.file, reason: fault.message });
       this.report(new PageError("PTM-V105", message), "texture", texture);
       throw fault;
     }
@@ -347,7 +349,7 @@ export class Stream {
 async function readShapes(body, cell, textures, decoder) {
   const loaded = () =>
     decoder().catch((fault) => {
-      throw new PageError("PTM-V106", `The geometry cannot be decoded: ${fault}`);
+      throw new PageError("PTM-V106", fill(page.noGeometry, { reason: String(fault) }));
     });
   const read = await readGlb(body.buffer, textures, loaded);
   if (read.cell !== cell) throw new Error("is of another cell");

@@ -24,6 +24,7 @@ import { Stream } from "./stream.js";
 import { inView } from "./walk/in-view.js";
 import { Stillness } from "./walk/stillness.js";
 import { losses, previewed, settled, shares } from "./walk/textures.js";
+import { page } from "./words/english.js";
 
 /** Seconds between item buffers, and between looks of the client. */
 const ITEM_EVERY = 0.1, LOOK_EVERY = 0.2;
@@ -189,7 +190,7 @@ export class Walkthrough {
       this.#loading = true;
       (relieved ? loadReliefs() : loadStatues())
         .then(({ show }) => show(this, (error) => this.#report(error, "octree", 0)))
-        .catch(() => this.emit("notice", { message: "Relief could not be loaded." }))
+        .catch(() => this.emit("notice", { message: page.unloaded }))
         .finally(() => (this.#loading = false));
     }
     this.items = new ItemBuffer(gl);
@@ -340,7 +341,7 @@ export class Walkthrough {
     const script = await loadComparison().catch(() => null);
     if (!script) {
       this.comparing = false;
-      return this.emit("notice", { message: "The comparison could not be loaded." });
+      return this.emit("notice", { message: page.unloaded });
     }
     const { Comparison } = script;
     if (!this.comparing || this.comparison || this.gl.isContextLost()) return;

@@ -6,6 +6,7 @@
 import { make } from "../ui/elements.js";
 import { showNotice } from "../ui/errors.js";
 import { nameOf } from "./labels.js";
+import { form } from "../words/english.js";
 
 const POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; media-src data:; font-src data:";
 const HEAD = `<!doctype html><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="${POLICY}">
@@ -20,8 +21,8 @@ export class Records {
     this.root = root;
     this.files = files;
     this.title = make("h2");
-    const close = make("button", { textContent: "Close", onclick: () => this.close() });
-    this.panel = make("aside", { id: "record", hidden: true, ariaLabel: "Record" }, make("header", {}, this.title, close));
+    const close = make("button", { textContent: form.close, onclick: () => this.close() });
+    this.panel = make("aside", { id: "record", hidden: true, ariaLabel: form.record }, make("header", {}, this.title, close));
     root.body.append(this.panel);
     addEventListener("keydown", ({ key }) => {
       if (key === "Escape") this.close();

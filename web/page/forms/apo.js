@@ -11,6 +11,8 @@ import { showNotice } from "../ui/errors.js";
 import { indexOf, runForm } from "./form.js";
 import { meshOf, OctreeDrawing } from "./octree-drawing.js";
 import { ANGLE, Orbit } from "./orbit.js";
+import { form } from "../words/english.js";
+import { fill } from "../words/language.js";
 
 /** What the page needs of `apo.json`, checked. @param {any} index */
 function checkedIndex(index) {
@@ -42,7 +44,7 @@ runForm(async (gl, config, fetcher, fail) => {
   // What is there stays when a finer level cannot be fetched.
   const report = (/** @type {import("../net/errors.js").PageError} */ fault) =>
     octree.levels ? showNotice(document, fault.message) : fail(fault);
-  find(document, "#keys").textContent = "Drag or use the arrow keys to turn; wheel, two fingers, + and − to zoom";
+  find(document, "#keys").textContent = form.orbit;
   return {
     frame(dt) {
       orbit.step(dt);
@@ -56,8 +58,9 @@ runForm(async (gl, config, fetcher, fail) => {
       if (picture !== drawn) drawing.draw(octree, camera, { bare, levels });
       drawn = picture;
       shown = octree.levels;
-      const rest = octree.complete || octree.levels >= levels ? "" : paused ? "; finer ones when you come closer" : " …";
-      return `${octree.levels} of ${index.levels.length} levels, ${inBytes(octree.fetched)} of ${inBytes(total)}${rest}`;
+      const rest = octree.complete || octree.levels >= levels ? "" : paused ? `; ${form.closer}` : " …";
+      const numbers = { count: octree.levels, total: index.levels.length, bytes: inBytes(octree.fetched), all: inBytes(total) };
+      return fill(form.levels, numbers) + rest;
     },
     state: () => ({
       levels: octree.levels,

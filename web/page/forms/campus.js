@@ -18,6 +18,8 @@ import { fragmentOf, poseOf } from "../ui/address.js";
 import { Solids } from "../walk/solids.js";
 import { Walker } from "../walk/walker.js";
 import { indexOf, runForm } from "./form.js";
+import { form } from "../words/english.js";
+import { fill } from "../words/language.js";
 
 /** Vertical field of view, radians; radius, height of the eye and highest step of the visitor, m. */
 const ANGLE = Math.PI / 3, BODY = [0.25, 1.6, 0.5];
@@ -66,7 +68,7 @@ runForm(async (gl, config, fetcher, fail) => {
     canvas.focus();
   });
   attachPanels(client, index, () => fragmentOf(walker.pose));
-  find(document, "#keys").textContent = "WASD or the arrow keys to walk, drag to look around, Shift to run";
+  find(document, "#keys").textContent = form.campus;
 
   /** One of the threads. @param {string} first @param {string[]} thread */
   const run = async (first, thread) => {
@@ -160,8 +162,8 @@ runForm(async (gl, config, fetcher, fail) => {
       }
       memory = files.bytes;
       const full = client.near.filter((k) => client.full(k)).length;
-      const loading = client.begun ? `${full} of ${client.near.length} near objects complete` : "loading";
-      return `${loading}; ${inBytes(fetcher.bytes)} received, ${inBytes(memory)} of graphics memory`;
+      const loading = client.begun ? fill(form.near, { count: full, total: client.near.length }) : form.loading;
+      return `${loading}; ${fill(form.memory, { bytes: inBytes(fetcher.bytes), all: inBytes(memory) })}`;
     },
     state: () => ({
       begun: client.begun,
@@ -201,8 +203,8 @@ function attachPanels(client, index, here) {
   const presets = index.presets.filter(({ diffuse, light }, k) =>
     index.presets.findIndex((one) => one.diffuse === diffuse && one.light === light) === k);
   const nav = find(document, "nav"), places = find(document, "#places");
-  const toggle = make("button", { textContent: "Places", hidden: !places.children.length, onclick: () => (places.hidden = !places.hidden) });
-  const select = make("select", { ariaLabel: "Detail of near objects" },
+  const toggle = make("button", { textContent: form.places, hidden: !places.children.length, onclick: () => (places.hidden = !places.hidden) });
+  const select = make("select", { ariaLabel: form.detail },
     ...presets.map(({ name }) => make("option", { textContent: name, selected: name === client.preset.name })));
   select.onchange = () => {
     client.choose(presets[select.selectedIndex]);

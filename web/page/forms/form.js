@@ -6,6 +6,8 @@ import { clock, Fetcher } from "../net/fetcher.js";
 import { find } from "../ui/elements.js";
 import { showError, showNotice } from "../ui/errors.js";
 import { Track } from "./track.js";
+import { form, objects, page } from "../words/english.js";
+import { speak } from "../words/language.js";
 
 /** Seconds until a lost context must be back, and that a page shows before it is loaded anew for another loss. */
 const BACK = 15, STEADY = 5;
@@ -37,17 +39,18 @@ export async function runForm(create) {
     showError(document, known ? fault : new PageError("PTM-V107", String(fault)));
   };
   try {
+    await speak({ page, form, objects });
     const canvas = /** @type {HTMLCanvasElement} */ (find(document, "canvas"));
     const config = JSON.parse(find(document, "#site").textContent ?? "");
     const gl = contextOf(canvas);
-    if (!gl) throw new PageError("PTM-V101", "This browser cannot draw with WebGL 2.");
+    if (!gl) throw new PageError("PTM-V101", page.noWebgl);
     /** @type {View | null} */
     let view = null;
     const begun = clock();
     canvas.addEventListener("webglcontextlost", (event) => {
       event.preventDefault();
       lost = true;
-      const end = () => fail(new PageError("PTM-V107", "The graphics card has reset the page."));
+      const end = () => fail(new PageError("PTM-V107", form.reset));
       // A card that cannot hold the view would lose it again and again.
       if (clock() - begun < STEADY) end();
       else setTimeout(end, 1000 * BACK);

@@ -7,6 +7,8 @@ import { find, inBytes } from "../ui/elements.js";
 import { indexOf, runForm } from "./form.js";
 import { checkedSet, Joining } from "./joining.js";
 import { Panning } from "./panning.js";
+import { form } from "../words/english.js";
+import { fill } from "../words/language.js";
 
 const VERTEX = `#version 300 es
 uniform vec4 box;
@@ -47,7 +49,7 @@ runForm(async (gl, config, fetcher, fail) => {
   const panning = new Panning(canvas, width, height), all = new URLSearchParams(location.search).has("all");
   const { program, at } = programOf(gl, "picture", [VERTEX, FRAGMENT]), array = gl.createVertexArray();
   const total = index.files.reduce((sum, { bytes }) => sum + bytes, 0);
-  find(document, "#keys").textContent = "Drag or use the arrow keys to move; wheel, two fingers, + and − to zoom";
+  find(document, "#keys").textContent = form.pan;
   let needed = true, drawn = "";
   const draw = () => {
     gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
@@ -75,11 +77,14 @@ runForm(async (gl, config, fetcher, fail) => {
       drawn = picture;
       const there = index.files.slice(0, joining.steps).reduce((sum, { bytes }) => sum + bytes, 0);
       const end = joining.steps === index.files.length ? "" :
-        joining.steps === joining.most ? "; more than this graphics card can hold" :
-        needed ? " …" : "; finer ones when you zoom in";
-      const part = `${joining.steps} of ${index.files.length} files, ${size.width} × ${size.height} of ${index.width} × ${index.height}`;
-      const depth = index.kind === "uint16" ? "; shown in 8 bits" : "";
-      return `${part}, ${inBytes(there)} of ${inBytes(total)}${end}${depth}`;
+        joining.steps === joining.most ? `; ${form.tooLarge}` :
+        needed ? " …" : `; ${form.zoom}`;
+      const part = fill(form.files, {
+        count: joining.steps, total: index.files.length, size: `${size.width} × ${size.height}`,
+        whole: `${index.width} × ${index.height}`, bytes: inBytes(there), all: inBytes(total),
+      });
+      const depth = index.kind === "uint16" ? `; ${form.eightBits}` : "";
+      return `${part}${end}${depth}`;
     },
     state: () => ({
       steps: joining.steps,

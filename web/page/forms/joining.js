@@ -5,6 +5,7 @@ import { programOf } from "../gl/program.js";
 import { PageError } from "../net/errors.js";
 import { checksum } from "../octree/checksum.js";
 import { demand, isWhole } from "../octree/octree.js";
+import { objects } from "../words/english.js";
 
 const MEDIA = /** @type {Record<string, string>} */ ({ png: "image/png", jpg: "image/jpeg", webp: "image/webp" });
 const WIDEST = 1 << 16;
@@ -234,7 +235,7 @@ export class Joining {
     this.running = false;
     /** Steps that the graphics card can hold. */
     this.most = mostSteps(gl, index);
-    if (!this.most) throw new PageError("PTM-V101", "The image is larger than this graphics card's textures.");
+    if (!this.most) throw new PageError("PTM-V101", objects.largeImage);
   }
 
   /** Size of the image so far. */

@@ -2,6 +2,8 @@
 // again, with growing pauses.
 
 import { PageError } from "./errors.js";
+import { page } from "../words/english.js";
+import { fill, spoken } from "../words/language.js";
 
 /** Tries, and the pause before the second one, s; each pause is twice the one before. */
 const TRIES = 6, FIRST_WAIT = 0.5;
@@ -49,14 +51,14 @@ export class Fetcher {
   whole(url, read, progress, cache = "default") {
     return this.#persist(url, cache, progress, async (cache) => {
       const { response, body } = await this.#get(url, { cache }, progress);
-      if (response.status !== 200) throw refused(url, response.status);
+      if (response.status !== 200) throw await refused(url, response.status);
       try {
         return await read(body);
       } catch (fault) {
         if (fault instanceof PageError) throw fault;
         const message = /** @type {Error} */ (fault).message;
         if (cache === "default") throw new Passing(message, true);
-        throw new PageError("PTM-V105", `${nameOf(url)} is damaged: ${message}`);
+        throw new PageError("PTM-V105", fill(page.damaged, { file: nameOf(url), reason: message }));
       }
     });
   }
@@ -79,7 +81,7 @@ export class Fetcher {
         this.#reportRanges();
         return { begin: 0, body };
       }
-      if (response.status !== 206) throw refused(url, response.status);
+      if (response.status !== 206) throw await refused(url, response.status);
       // Hosts of other origins may hide the header.
       const answered = response.headers.get("content-range") ?? `bytes ${begin}-${end - 1}/${size}`;
       if (answered !== `bytes ${begin}-${end - 1}/${size}` || body.length !== end - begin) {
@@ -93,7 +95,7 @@ export class Fetcher {
     if (this.ignoresRanges) return;
     this.ignoresRanges = true;
     console.warn("This host ignores byte ranges: each texture is downloaded whole before it is seen.");
-    this.notice("Textures load slowly here: the server does not support range requests.");
+    this.notice(page.slow);
   }
 
   /**
@@ -125,7 +127,8 @@ export class Fetcher {
         this.pending--;
       }
     }
-    throw new PageError("PTM-V104", `${nameOf(url)} cannot be downloaded: ${reason}`);
+    await spoken;
+    throw new PageError("PTM-V104", fill(page.offline, { file: nameOf(url), reason }));
   }
 
   /**
@@ -179,10 +182,11 @@ function joined(parts) {
  * @param {string} url
  * @param {number} status
  */
-function refused(url, status) {
+async function refused(url, status) {
   if (status >= 500 || status === 429 || status === 408) return new Passing(`status ${status}`);
-  const reason = status === 404 ? "is missing" : `is refused with status ${status}`;
-  return new PageError("PTM-V103", `${nameOf(url)} ${reason} on this site`);
+  await spoken;
+  const text = status === 404 ? page.missing : page.refused;
+  return new PageError("PTM-V103", fill(text, { file: nameOf(url), reason: status }));
 }
 
 /** @param {string} url */

@@ -4,6 +4,8 @@
 import { PageError } from "../net/errors.js";
 import { clock } from "../net/fetcher.js";
 import { checksum } from "./checksum.js";
+import { objects } from "../words/english.js";
+import { fill } from "../words/language.js";
 
 /** Texels in a row of the texture, and the most in all. */
 export const WIDTH = 4096, MOST = 2 ** 24;
@@ -134,7 +136,7 @@ export class Octree {
     for (const count of index.levels) this.starts.push((this.starts.at(-1) ?? 0) + count);
     this.count = /** @type {number} */ (this.starts.at(-1));
     if (gl.getParameter(gl.MAX_TEXTURE_SIZE) < WIDTH) {
-      throw new PageError("PTM-V101", "This graphics card has no textures of 4,096 texels.");
+      throw new PageError("PTM-V101", objects.largeTexture);
     }
     this.streams = index.streams;
     this.texels = this.streams.map(() => new Texels(gl, this.count));
@@ -233,7 +235,7 @@ export class Octree {
       this.#whole[number] = null;
       await this.#attempt(number, from, to, "no-store").catch((again) => {
         if (isKnown(again)) throw again;
-        throw new PageError("PTM-V105", `${this.streams[number].file} is damaged: ${again.message}`);
+        throw new PageError("PTM-V105", fill(objects.damaged, { file: this.streams[number].file, reason: again.message }));
       });
     }
   }

@@ -9,6 +9,8 @@ import { distance } from "../space/frustum.js";
 import { LIT } from "./lamp.js";
 import { LOOK_UP } from "./look-up.js";
 import { checkOctree, Octree, followingOf } from "./octree.js";
+import { objects } from "../words/english.js";
+import { fill } from "../words/language.js";
 
 /** Bytes of octrees on the graphics card, at most. */
 const MOST = 128 << 20;
@@ -79,7 +81,7 @@ export class Statues {
         checkOctree(index);
         return index;
       } catch (fault) {
-        report(new PageError("PTM-V105", `The index has a wrong octree: ${/** @type {Error} */ (fault).message}`));
+        report(new PageError("PTM-V105", fill(objects.octree, { reason: /** @type {Error} */ (fault).message })));
         return null;
       }
     });

@@ -11,6 +11,8 @@ import { PageError } from "../net/errors.js";
 import { LIT } from "../octree/lamp.js";
 import { distance } from "../space/frustum.js";
 import { weigh } from "./weight.js";
+import { objects } from "../words/english.js";
+import { fill } from "../words/language.js";
 
 /** What a shape has for each vertex: u, v in the normal map, from the top left; a normal; a tangent with the sign
  * of the bitangent. */
@@ -124,7 +126,7 @@ export class Reliefs {
     const row = this.walk.index.textures[relief];
     if (aligned && frames?.length === needed && row && (needed === 1 || row.relief !== undefined)) return true;
     this.#wrong.add(shape);
-    this.report(new PageError("PTM-V105", `The relief of ${shape.name || "an object"} does not fit the index.`));
+    this.report(new PageError("PTM-V105", fill(objects.relief, { name: shape.name || objects.object })));
     return false;
   }
 

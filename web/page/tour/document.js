@@ -1,6 +1,7 @@
 // The document of a tour, as `ptm publish` writes it, and its texts in the visitor's language.
 
 import { PageError } from "../net/errors.js";
+import { tour as words } from "../words/english.js";
 
 /**
  * @typedef {Record<string, string>} Texts by language; "" is for all
@@ -46,7 +47,7 @@ export function checked(tour) {
       && numbers(row.marker, 3) && numbers(row.box, 6) && Number.isInteger(row.cell))
     && tour.stops.every((/** @type {any} */ row) => numbers(row?.position, 3) && numbers(row.direction, 3)
       && (row.label === undefined || row.label in tour.labels));
-  if (!right) throw new PageError("PTM-V105", "The tour is damaged.");
+  if (!right) throw new PageError("PTM-V105", words.damaged);
   return tour;
 }
 

@@ -2,6 +2,7 @@
 
 import { make } from "../ui/elements.js";
 import { elementsOf, isSafe } from "./markup.js";
+import { tour as words } from "../words/english.js";
 
 /** @typedef {import("./document.js").Label} Label */
 /** @typedef {<T>(texts: Record<string, T> | undefined) => {text: T, tag: string} | null} Choose */
@@ -28,16 +29,16 @@ export function fillLabel(root, label, { choose, urlOf, close, ways }) {
   const text = choose(label.text), image = choose(label.image), link = choose(label.link);
   const heading = make("h2", { tabIndex: -1, lang: title.tag, dir: "auto" }, String(title.text));
   root.replaceChildren(
-    make("button", { className: "close", ariaLabel: "Close", onclick: close }, "×"),
+    make("button", { className: "close", ariaLabel: words.close, onclick: close }, "×"),
     heading,
     ...(by.length ? [make("p", { className: "by" }, ...separated(by))] : []),
     ...(text ? [make("div", { lang: text.tag, dir: "auto" }, ...elementsOf(text.text))] : []),
     ...soundOf(label, choose, urlOf),
     ...(image
-      ? [make("details", {}, make("summary", {}, "Description of the picture"), ...line("p", image))]
+      ? [make("details", {}, make("summary", {}, words.image), ...line("p", image))]
       : []),
     ...(link && isSafe(link.text)
-      ? [make("p", {}, make("a", { href: link.text, target: "_blank", rel: "noopener" }, "More about it"))]
+      ? [make("p", {}, make("a", { href: link.text, target: "_blank", rel: "noopener" }, words.more))]
       : []),
     make("p", { className: "row" }, ...ways.map(({ text: name, go }) => make("button", { onclick: go }, name))),
   );

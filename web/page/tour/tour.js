@@ -6,6 +6,8 @@ import { checked, inLanguage, languageFor } from "./document.js";
 import { fillLabel } from "./label.js";
 import { Markers } from "./markers.js";
 import { STYLE } from "./style.js";
+import { tour as words } from "../words/english.js";
+import { fill } from "../words/language.js";
 
 /** Greatest movement of a click, pixels, and its longest time, ms. */
 const STILL = 6, SHORT = 500;
@@ -26,7 +28,7 @@ export async function attachTour(app, address) {
   } catch (fault) {
     const code = fault instanceof PageError ? fault.code : "PTM-V105";
     app.walk.faults.push({ code, message: String(fault) });
-    app.emit("notice", { message: "The labels of the tour could not be loaded." });
+    app.emit("notice", { message: words.unloaded });
     return null;
   }
 }
@@ -53,10 +55,10 @@ export class Tour {
     this.url = url;
     const query = new URLSearchParams(location.search), asked = query.get("lang");
     this.language = languageFor(tour.languages, [...(asked ? [asked] : []), ...navigator.languages]);
-    this.panel = make("section", { id: "label", ariaLabel: "Label", hidden: true });
-    this.list = make("section", { id: "tour", ariaLabel: "Tour", tabIndex: 0, hidden: true });
+    this.panel = make("section", { id: "label", ariaLabel: words.label, hidden: true });
+    this.list = make("section", { id: "tour", ariaLabel: words.tour, tabIndex: 0, hidden: true });
     find(document, "#panels").append(this.list, this.panel);
-    this.button = make("button", { "aria-controls": "tour", "aria-expanded": "false" }, "Tour");
+    this.button = make("button", { "aria-controls": "tour", "aria-expanded": "false" }, words.tour);
     this.button.onclick = () => this.#showList(this.list.hidden);
     find(document, "nav").prepend(this.button);
     this.markers = new Markers(app.walk, tour.labels, {
@@ -83,7 +85,7 @@ export class Tour {
   /** @param {number} stop */
   #titleOf(stop) {
     const { title, label } = this.tour.stops[stop];
-    return this.choose(title)?.text ?? (label === undefined ? `Stop ${stop + 1}` : this.nameOf(label));
+    return this.choose(title)?.text ?? (label === undefined ? fill(words.stop, { number: stop + 1 }) : this.nameOf(label));
   }
 
   #listen() {
@@ -120,20 +122,20 @@ export class Tour {
   #fillList() {
     const { languages, stops, title } = this.tour;
     const chosen = this.choose(title);
-    const heading = make("h2", { lang: chosen?.tag ?? "", dir: "auto" }, chosen?.text ?? "Tour");
+    const heading = make("h2", { lang: chosen?.tag ?? "", dir: "auto" }, chosen?.text ?? words.tour);
     const rows = stops.map((_, stop) => {
       const button = make("button", { dir: "auto", onclick: () => this.go(stop) }, this.#titleOf(stop));
       if (stop === this.stop) button.setAttribute("aria-current", "true");
       return make("li", {}, button);
     });
     const options = languages.map((tag) => make("option", { value: tag, selected: tag === this.language }, named(tag)));
-    const select = make("select", { ariaLabel: "Language", onchange: () => this.speak(select.value) }, ...options);
+    const select = make("select", { ariaLabel: words.language, onchange: () => this.speak(select.value) }, ...options);
     const { catalogue = "" } = this.app.config;
     this.list.replaceChildren(
       heading,
       ...(languages.length > 1 ? [select] : []),
       make("ol", {}, ...rows),
-      ...(catalogue ? [make("p", {}, make("a", { href: catalogue }, "As a page of text and pictures"))] : []),
+      ...(catalogue ? [make("p", {}, make("a", { href: catalogue }, words.catalogue))] : []),
     );
   }
 
@@ -180,7 +182,7 @@ export class Tour {
     panel.hidden = false;
     if (matchMedia("(max-width: 640px)").matches) this.#showList(false);
     const ways = tour.stops.length > 1
-      ? [{ text: "Previous", go: () => this.step(-1) }, { text: "Next", go: () => this.step(1) }]
+      ? [{ text: words.previous, go: () => this.step(-1) }, { text: words.next, go: () => this.step(1) }]
       : [];
     const heading = fillLabel(panel, tour.labels[label], {
       choose: this.choose,

@@ -1,7 +1,9 @@
 // A pose as the fragment of the URL: #x,y,z,yaw and optionally pitch, metres and degrees.
 
-import { find, make } from "./elements.js";
+import { loadLater } from "../load-later.js";
+import { find } from "./elements.js";
 import { showNotice } from "./errors.js";
+import { page } from "../words/english.js";
 
 /** @typedef {import("../walk/walker.js").Pose} Pose */
 
@@ -46,11 +48,9 @@ export function attachAddress(root, app) {
     const link = here();
     try {
       await navigator.clipboard.writeText(link);
-      showNotice(root, "The link to this place is copied.");
+      showNotice(root, page.copied);
     } catch {
-      const field = make("input", { value: link, readOnly: true, ariaLabel: "Link to this place" });
-      showNotice(root, "Copy the link to this place:", field);
-      field.select();
+      loadLater().then(({ showLink }) => showLink(root, link), () => showNotice(root, page.unloaded));
     }
   };
 }

@@ -6,6 +6,7 @@ import { attachControls } from "./controls.js";
 import { find } from "./elements.js";
 import { attachErrors, showNotice } from "./errors.js";
 import { attachLoading } from "./loading.js";
+import { page } from "../words/english.js";
 
 /**
  * The parts of the application that the interface uses.
@@ -68,6 +69,7 @@ import { attachLoading } from "./loading.js";
 const PANELS = {
   places: async (panel, app) => (await loadLater()).attachMenu(panel, app),
   map: async (panel, app) => (await loadLater()).attachMinimap(panel, app),
+  help: async (panel, app) => (await loadLater()).attachHelp(panel, app),
   details: async (panel, app) => (await loadLater()).attachOverlay(panel, app),
 };
 
@@ -88,7 +90,7 @@ function attachPanels(root, app) {
       await filled.get(name);
     } catch {
       filled.delete(name);
-      return showNotice(root, "This panel cannot be loaded now.");
+      return showNotice(root, page.unloaded);
     }
     panel.dispatchEvent(new Event(panel.hidden ? "close" : "open"));
   };

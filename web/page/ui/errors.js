@@ -1,19 +1,8 @@
 // Shows errors, with their remedies, and notices.
 
 import { find, make } from "./elements.js";
+import { page } from "../words/english.js";
 
-const TELL = "Tell the owner of this site: publishing it again should repair it.";
-const BROWSER = "Use a current Chrome, Edge or Firefox, or Safari 16.4 or newer";
-/** Remedies, by the code of the error. @type {Record<string, string>} */
-const REMEDIES = {
-  "PTM-V101": `${BROWSER}, with hardware acceleration on.`,
-  "PTM-V102": `${BROWSER}.`,
-  "PTM-V103": TELL,
-  "PTM-V104": "Check your connection and reload the page.",
-  "PTM-V106": "Update the browser, or allow this page to use web workers and more memory.",
-  "PTM-V105": TELL,
-};
-const OTHERWISE = "Reload the page. If that does not help, tell the owner of this site.";
 /** Duration of a notice, ms. */
 const STAYS = 8000;
 
@@ -25,7 +14,7 @@ const BEHIND = ["nav", "#panels", "#view"];
 export function showError(root, { code, message }) {
   const panel = find(root, "#error"), again = find(root, "#again");
   find(root, "#error-text").textContent = message;
-  find(root, "#error-remedy").textContent = REMEDIES[code] ?? OTHERWISE;
+  find(root, "#error-remedy").textContent = /** @type {Record<string, string>} */ (page)[code] ?? page.otherwise;
   find(root, "#error-code").textContent = code;
   find(root, "#loading").hidden = true;
   panel.hidden = false;

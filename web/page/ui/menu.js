@@ -1,6 +1,7 @@
 // The menu of viewpoints.
 
 import { calm, make } from "./elements.js";
+import { panels } from "../words/english.js";
 
 /** @param {HTMLElement} root the panel @param {import("./all.js").App} app */
 export function attachMenu(root, app) {
@@ -18,5 +19,5 @@ export function attachMenu(root, app) {
     };
     return make("li", {}, button);
   });
-  root.append(make("h2", {}, "Places"), make("ol", {}, ...rows));
+  root.append(make("h2", {}, panels.places), make("ol", {}, ...rows));
 }

@@ -2,6 +2,8 @@
 
 import { footprintOf } from "../space/footprint.js";
 import { make } from "./elements.js";
+import { panels } from "../words/english.js";
+import { fill } from "../words/language.js";
 
 /** @typedef {import("./all.js").App} App */
 
@@ -14,10 +16,10 @@ const HERE = "#ffc766", SEEN = "#7fa8d8", REST = "#ffffff24", WALLS = "#f4f1ea8c
 export function attachMinimap(root, app) {
   const plan = make("canvas", { role: "img" });
   const storey = make("span"), key = make("p", { className: "key" });
-  for (const [name, color] of [["you are here", HERE], ["visible from here", SEEN]]) {
+  for (const [name, color] of [[panels.here, HERE], [panels.visible, SEEN]]) {
     key.append(make("span", { style: `--color:${color}` }, name), " ");
   }
-  root.append(make("h2", {}, "Map", storey), plan, key);
+  root.append(make("h2", {}, panels.map, storey), plan, key);
   const paint = plan.getContext("2d");
   let timer = 0, last = "";
 
@@ -30,8 +32,8 @@ export function attachMinimap(root, app) {
 
     const storeys = storeysOf(cells);
     const number = Math.max(1, storeys.filter((floor) => floor < eye[1]).length);
-    storey.textContent = storeys.length > 1 ? `storey ${number} of ${storeys.length}` : "";
-    plan.ariaLabel = `Plan of storey ${number}, you are in cell ${here}`;
+    storey.textContent = storeys.length > 1 ? fill(panels.storey, { number, count: storeys.length }) : "";
+    plan.ariaLabel = fill(panels.plan, { number, cell: here });
 
     const [left, top] = [0, 2].map((k) => Math.min(...cells.map(({ low }) => low[k])));
     const [right, bottom] = [0, 2].map((k) => Math.max(...cells.map(({ high }) => high[k])));

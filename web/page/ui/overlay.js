@@ -2,6 +2,8 @@
 
 import { inBytes, inMemory, make } from "./elements.js";
 import { attachSettings } from "./settings.js";
+import { panels } from "../words/english.js";
+import { fill } from "../words/language.js";
 
 /** @typedef {import("./all.js").State} State */
 
@@ -10,35 +12,36 @@ const OFTEN = 250;
 
 /** @type {[string, (state: State) => string][]} */
 const ROWS = [
-  ["Frame rate", ({ fps }) => `${fps.toFixed(0)} fps`],
-  ["With 3 bytes for RGB", ({ paperBytes }) => inMemory(paperBytes)],
-  ["Received", ({ bytes, requests }) => `${inBytes(bytes)}, ${requests} requests`],
-  ["Connection", ({ bandwidth, latency }) =>
+  [panels.frames, ({ fps }) => fill(panels.frameRate, { number: fps.toFixed(0) })],
+  [panels.paper, ({ paperBytes }) => inMemory(paperBytes)],
+  [panels.received, ({ bytes, requests }) => `${inBytes(bytes)}, ${fill(panels.requests, { count: requests })}`],
+  [panels.connection, ({ bandwidth, latency }) =>
     `${(bandwidth / 1e6).toFixed(2)} Mbit/s, ${(1000 * latency).toFixed(0)} ms`],
-  ["Cell", ({ cell, drawnCells }) => `${cell < 0 ? "none" : cell} (${drawnCells.length} drawn)`],
-  ["Pending", ({ pending, complete }) => (complete ? "nothing for this view" : `${pending} requests`)],
+  [panels.cell, ({ cell, drawnCells }) =>
+    fill(panels.drawn, { cell: cell < 0 ? panels.none : cell, count: drawnCells.length })],
+  [panels.pending, ({ pending, complete }) => (complete ? panels.nothing : fill(panels.requests, { count: pending }))],
 ];
 
 /** @param {HTMLElement} root the panel @param {import("./all.js").App} app */
 export function attachOverlay(root, app) {
   const memory = make("p", { id: "memory" });
-  const fill = make("progress", { "aria-labelledby": "memory" });
+  const gauge = make("progress", { "aria-labelledby": "memory" });
   const values = ROWS.map(() => make("dd"));
   const bars = make("p", { className: "bars", role: "img" });
   root.append(
-    make("h2", {}, "Details"), memory, fill,
+    make("h2", {}, panels.details), memory, gauge,
     make("dl", {}, ...ROWS.flatMap(([name], k) => [make("dt", {}, name), values[k]])),
-    make("h3", {}, "Textures by finest level loaded"), bars,
+    make("h3", {}, panels.levels), bars,
   );
   attachSettings(root, app);
 
   let timer = 0;
   const show = () => {
     const state = app.state(), { residentBytes, budgetBytes, levels } = state;
-    const how = app.measured?.bytes === budgetBytes ? ", measured" : "";
-    memory.textContent = `Texture memory: ${inMemory(residentBytes)} of ${inMemory(budgetBytes)}${how}`;
-    fill.max = budgetBytes;
-    fill.value = residentBytes;
+    const text = app.measured?.bytes === budgetBytes ? panels.measured : panels.used;
+    memory.textContent = fill(text, { bytes: inMemory(residentBytes), most: inMemory(budgetBytes) });
+    gauge.max = budgetBytes;
+    gauge.value = residentBytes;
     ROWS.forEach(([, textOf], k) => {
       const text = textOf(state);
       if (values[k].textContent !== text) values[k].textContent = text;
@@ -50,7 +53,7 @@ export function attachOverlay(root, app) {
       bars.children[k].textContent = k ? k - 1 : "–";
     });
     bars.ariaLabel = levels
-      .flatMap((count, k) => (count ? [`${count} ${k ? `to level ${k - 1}` : "with none"}`] : []))
+      .flatMap((count, k) => (count ? [fill(k ? panels.toLevel : panels.withNone, { count, level: k - 1 })] : []))
       .join(", ");
   };
   root.addEventListener("open", () => {

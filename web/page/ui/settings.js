@@ -1,6 +1,7 @@
 // The settings: data saver, texture memory, patience, policy, freezing and comparing.
 
 import { find, inMemory, make } from "./elements.js";
+import { panels } from "../words/english.js";
 
 /** @typedef {import("./all.js").App} App */
 
@@ -35,7 +36,7 @@ export function attachSettings(root, app) {
   const policies = POLICIES.map((one) => make("option", { selected: one === policy }, one));
   const choice = make("select", {}, ...policies);
   const seconds = (/** @type {number} */ value) => `${value.toPrecision(2)} s`;
-  const waiting = slider(root, "Patience, δt", [0.0625, 4], () => app.state().patience ?? 0.5, seconds,
+  const waiting = slider(root, panels.patience, [0.0625, 4], () => app.state().patience ?? 0.5, seconds,
     (s) => app.setPatience(s));
   // Only the paper's policy uses it.
   waiting.hidden = policy !== "paper";
@@ -55,17 +56,19 @@ export function attachSettings(root, app) {
     };
     return button;
   };
-  const freeze = toggle("Freeze loading", (on) => app.freeze(on));
-  const compare = toggle("Compare", (on) => {
+  const freeze = toggle(panels.freeze, (on) => app.freeze(on));
+  const halves = make("p", { id: "halves", hidden: true }, make("b", {}, panels.streamed), make("b", {}, panels.full));
+  find(document, "#panels").before(halves);
+  const compare = toggle(panels.compare, (on) => {
     app.compare(on);
-    find(document, "#halves").hidden = !on;
+    halves.hidden = !on;
   });
   root.append(
-    make("h3", {}, "Settings"),
-    make("label", { className: "switch" }, "Data saver: only what is in view", saver),
-    slider(root, "Texture memory", [4 * MIB, 4096 * MIB], () => app.state().budgetBytes, inMemory,
+    make("h3", {}, panels.settings),
+    make("label", { className: "switch" }, panels.saver, saver),
+    slider(root, panels.memory, [4 * MIB, 4096 * MIB], () => app.state().budgetBytes, inMemory,
       (bytes) => app.setBudget(bytes)),
-    make("label", {}, "Policy", choice),
+    make("label", {}, panels.policy, choice),
     waiting,
     make("p", { className: "row" }, freeze, compare),
   );

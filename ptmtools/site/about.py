@@ -1,0 +1,121 @@
+"""A site for other programs: what link previews and search engines read, and the manifest with the
+icons of a site that a visitor installs.
+
+Open Graph (https://ogp.me) and the web application manifest (https://www.w3.org/TR/appmanifest).
+Programs that show links need absolute URLs, so the address of the site is an option. Nothing in a
+site keeps search engines away.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from html import escape
+from typing import Any
+
+import numpy as np
+
+MANIFEST, MANIFEST_MEDIA = "manifest.webmanifest", "application/manifest+json"
+#: Pixels of a side of the icons.
+ICONS = (192, 512)
+#: The colours of the page: background, wall, light; 0 to 255.
+_GROUND, _WALL, _LIGHT = (22, 23, 27), (58, 61, 70), (255, 199, 102)
+#: Samples of a pixel, each way.
+_FINER = 2
+#: Places that a description names.
+_PLACES = 6
+
+
+@dataclass(frozen=True)
+class About:
+    """A site for other programs.
+
+    Attributes
+    ----------
+    title: of the site. description: one sentence, or "".
+    picture: URL of a picture relative to the page, or "".
+    address: URL of the folder of the site, or "" if it is unknown.
+    """
+
+    title: str
+    description: str = ""
+    picture: str = ""
+    address: str = ""
+
+    def lines(self) -> Iterator[str]:
+        """The elements in the head of the page."""
+        base = folder_of(self.address)
+        if base:
+            yield f'<link rel="canonical" href="{escape(base)}">'
+            yield _property("url", base)
+        yield _property("title", self.title)
+        if self.description:
+            both = 'name="description" property="og:description"'
+            yield f"<meta {both} {_content(self.description)}>"
+        if self.picture:
+            yield _property("image", base + self.picture)
+        yield f'<link rel="manifest" href="{MANIFEST}">'
+
+
+def folder_of(address: str) -> str:
+    """An address with a slash at its end; "" stays."""
+    return f"{address.rstrip('/')}/" if address else ""
+
+
+def described(viewpoints: Sequence[Mapping[str, Any]]) -> str:
+    """The places of a building as a description."""
+    names = dict.fromkeys(str(row["description"]) for row in viewpoints if row["description"])
+    return ", ".join([*names][:_PLACES])
+
+
+def manifest_of(title: str, icons: Mapping[int, str]) -> bytes:
+    """The manifest of a site; ``icons``: pixels of a side → URL."""
+    color = "#{:02x}{:02x}{:02x}".format(*_GROUND)
+    document = {
+        "name": title,
+        "start_url": ".",
+        "scope": ".",
+        "display": "standalone",
+        "theme_color": color,
+        "background_color": color,
+        "icons": [
+            {"src": url, "sizes": f"{size}x{size}", "type": "image/png", "purpose": "any maskable"}
+            for size, url in icons.items()
+        ],
+    }
+    return json.dumps(document, ensure_ascii=False, separators=(",", ":")).encode()
+
+
+@cache
+def icon(size: int) -> bytes:
+    """A PNG of ``size`` pixels a side: a lit doorway with an arch, and its light on the floor. It
+    lies in the middle 80 %, so that a system may cut the icon to any form."""
+    from PIL import Image
+
+    side = size * _FINER
+    place = (np.arange(side) + 0.5) / side
+    x, y = np.abs(place[None, :] - 0.5), place[:, None]
+    floor, spring, half = 0.66, 0.40, 0.15
+    wall = (x < 0.34) & (y > 0.17) & (y < floor)
+    arch = (np.hypot(x, y - spring) < half) | ((x < half) & (y > spring) & (y < floor))
+    glow = (y >= floor) & (y < 0.84) & (x < half + (y - floor) * 0.9)
+    pixels = np.empty((side, side, 3), np.uint8)
+    pixels[:] = _GROUND
+    pixels[np.broadcast_to(wall, (side, side))] = _WALL
+    pixels[glow] = np.add(_GROUND, np.subtract(_LIGHT, _GROUND) * 0.45).astype(np.uint8)
+    pixels[arch] = _LIGHT
+    out = io.BytesIO()
+    image = Image.fromarray(pixels).resize((size, size), Image.Resampling.BOX)
+    image.save(out, "PNG", optimize=True)
+    return out.getvalue()
+
+
+def _property(name: str, text: str) -> str:
+    return f'<meta property="og:{name}" {_content(text)}>'
+
+
+def _content(text: str) -> str:
+    return f'content="{escape(text)}"'
