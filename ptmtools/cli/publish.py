@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import re
 import sys
 import threading
@@ -28,9 +27,12 @@ from ptmtools.cli.parameters import (
 )
 from ptmtools.pipeline.validation import check_folder
 from ptmtools.quantities import count, size
+from ptmtools.site.about import folder_of
 from ptmtools.site.content import Site, SiteOptions, site_of, title_of
+from ptmtools.site.embedding import element_tags, frame_tag
 from ptmtools.site.forms import form_of, form_site, form_weight
 from ptmtools.site.lookup import files_of
+from ptmtools.site.program import ELEMENT
 from ptmtools.site.published import PublishOptions
 from ptmtools.site.publishing import COARSE, publish as write, weight_of
 from ptmtools.site.serving import ServeOptions, serving
@@ -184,17 +186,18 @@ def publish(
         f"{len(done.unchanged):,} unchanged{removed}"
     )
     weight, lines = _weight_of_form(site) if form else _weight_of_walk(site)
-    frame = _frame(site_options.title or title_of(Path(db)))
-    document = {**changed, "notes": list(site.notes), "bytes": weight, "embed": frame}
-    console.result(document, (first, *lines, f"embed: {frame}"))
+    embed = _embedding(site, site_options.title or title_of(Path(db)), site_options.address)
+    document = {**changed, "notes": list(site.notes), "bytes": weight, **embed}
+    console.result(document, (first, *lines, *(f"{name}: {tags}" for name, tags in embed.items())))
 
 
-def _frame(title: str) -> str:
-    """The HTML that shows a site in another page, where SITE is its address."""
-    return (
-        f'<iframe src="https://SITE/" title="{html.escape(title)}" allow="fullscreen" '
-        'loading="lazy" width="960" height="540"></iframe>'
-    )
+def _embedding(site: Site, title: str, address: str) -> dict[str, str]:
+    """The HTML that shows a site in another page; the element only for a walk."""
+    folder = folder_of(address)
+    tags = {"embed": frame_tag(title, folder)}
+    if script := site.entries.get(ELEMENT):
+        tags["element"] = element_tags(title, ELEMENT, script.read(), folder)
+    return tags
 
 
 def _weight_of_form(site: Site) -> tuple[dict[str, int], tuple[str, ...]]:

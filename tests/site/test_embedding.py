@@ -13,14 +13,15 @@ from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.site.content import Site, SiteOptions, site_of
+from ptmtools.site.embedding import element_tags
 from ptmtools.site.entry import Entry
+from ptmtools.site.program import ELEMENT, element
 from ptmtools.site.serving import serving
 from ptmtools.tour.starting import first_tour
 
 #: The page of a museum, with the element and a list of its events.
 HOST = """<!doctype html><title>Host</title>
-<script type="module" src="{site}ptm-walk.js"></script>
-<ptm-walk src="{site}" title="The museum" {more} style="width:640px;height:480px"></ptm-walk>
+{tags}
 <script>
   window.events = [];
   for (const name of ["ready", "room", "label"]) {{
@@ -45,8 +46,10 @@ def served(toured: Site) -> Iterator[str]:
 
 
 def host(chromium: Any, site: str, more: str = "") -> Any:
-    """A context manager of the host's page, of another origin."""
-    text = HOST.format(site=site, more=more).encode()
+    """A context manager of the host's page, of another origin; ``more`` are attributes."""
+    tags = element_tags("The museum", ELEMENT, element().read(), site)
+    tags = tags.replace("<ptm-walk ", f'<ptm-walk {more} style="width:640px;height:480px" ')
+    text = HOST.format(tags=tags).encode()
     return serving({"index.html": Entry("index.html", text, "text/html; charset=utf-8")})
 
 
@@ -121,6 +124,17 @@ def test_a_frame_without_an_interface_that_begins_at_a_label(
         assert not frame.locator("nav").is_visible()
         assert frame.evaluate("ptm.tour.open") == 2
         assert page.locator("iframe").get_attribute("title") == "The museum"
+        page.context.close()
+
+
+def test_a_script_of_other_contents_does_not_run(chromium: Any, served: str) -> None:
+    tags = element_tags("The museum", ELEMENT, element().read() + b" ", served)
+    text = HOST.format(tags=tags).encode()
+    with serving({"index.html": Entry("index.html", text, "text/html; charset=utf-8")}) as url:
+        page = chromium.new_context().new_page()
+        with page.expect_console_message(lambda message: "integrity" in message.text):
+            page.goto(url)
+        assert page.locator("iframe").count() == 0
         page.context.close()
 
 
