@@ -138,6 +138,22 @@ def test_a_script_of_other_contents_does_not_run(chromium: Any, served: str) -> 
         page.context.close()
 
 
+def test_a_kiosk_returns_to_its_beginning(chromium: Any, served: str) -> None:
+    page = chromium.new_context(bypass_csp=True).new_page()
+    page.goto(f"{served}?ui=kiosk&rest=0.7")
+    page.wait_for_function("window.ptm?.tour && ptm.walk.complete")
+    first = page.evaluate("ptm.state().pose.eye")
+    page.evaluate("ptm.goTo(3)")
+    page.locator("button[aria-controls=tour]").click()
+    assert page.evaluate("ptm.state().pose.eye") != first
+    page.wait_for_function(
+        "(eye) => String(ptm.state().pose.eye) === String(eye) && "
+        "!document.querySelector('#panels section:not([hidden])')",
+        arg=first,
+    )
+    page.context.close()
+
+
 def test_the_page_alone_loads_no_script_of_frames(chromium: Any, served: str) -> None:
     page = chromium.new_context(bypass_csp=True).new_page()
     names: list[str] = []

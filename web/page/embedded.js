@@ -1,6 +1,7 @@
-// The script of a walk in a frame of another page, and of walks without an interface (`?ui=none`): it tells
+// The script of a walk in a frame of another page, of walks without an interface (`?ui=none`) and kiosks: it tells
 // that page about the visit, and lets it lead the visitor. See docs/formats/embedding.md.
 
+import { attachKiosk } from "./kiosk.js";
 import { addStyle } from "./ui/elements.js";
 
 const FORMAT = "ptm-walk";
@@ -9,7 +10,9 @@ const isOf = (list, number) => Number.isInteger(number) && number in list;
 
 /** @param {import("./app.js").App} app */
 export function attachEmbedding(app) {
-  if (new URLSearchParams(location.search).get("ui") === "none") addStyle("nav { display: none; }");
+  const query = new URLSearchParams(location.search), ui = query.get("ui");
+  if (ui === "none") addStyle("nav { display: none; }");
+  if (ui === "kiosk") attachKiosk(app, query);
   if (parent === window) return;
   /** @param {string} event @param {Record<string, any>} [detail] nothing about the visitor but where he is */
   const tell = (event, detail = {}) => parent.postMessage({ format: FORMAT, event, ...detail }, "*");
