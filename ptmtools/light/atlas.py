@@ -21,6 +21,7 @@ from ptmtools.arrays import Floats, Ints, Singles, areas
 from ptmtools.cells.search import connected
 from ptmtools.jit import kernel
 from ptmtools.lazy import component
+from ptmtools.light.packing import pack
 
 #: Half the size of an unwrapped mesh, in a unit of its own. (With 64 xatlas takes faces of some
 #: centimetres in a kilometre for empty.)
@@ -68,7 +69,7 @@ def unwrap(
 
     Raises MissingComponentError: PTM-M100 xatlas is not installed.
     """
-    xatlas = component("xatlas", "PTM-M100", f"{purpose} needs xatlas", "light")
+    component("xatlas", "PTM-M100", f"{purpose} needs xatlas", "light")
     # Far from the origin float32 has no texels, and xatlas drops faces that it takes for empty.
     near = points - points.mean(axis=0)
     largest = float(np.abs(near).max(initial=0.0))
@@ -78,7 +79,7 @@ def unwrap(
     area = max(areas(moved[triangles].astype(np.float64)).sum(), np.finfo(np.float32).tiny)
     for side in sizes:
         wanted = side * math.sqrt(FILLED / area)
-        packed, density = _packed(xatlas, moved, triangles, parts, side, wanted, padding)
+        packed, density = _packed(moved, triangles, parts, side, wanted, padding)
         if density >= _WORTH * wanted or _longest(packed) >= _LONG * side:
             break
     placed = packed.texel / max(packed.size, side)
@@ -93,7 +94,7 @@ def _parts(group: Ints) -> list[Ints]:
     return np.split(order, np.flatnonzero(np.diff(group[order])) + 1)
 
 
-class _Packed(NamedTuple):
+class _Layout(NamedTuple):
     """(T, 3, 2) the corners of faces, texels from the upper left; (T,) the chart of each; the
     larger side of the atlas."""
 
@@ -103,27 +104,23 @@ class _Packed(NamedTuple):
 
 
 def _packed(
-    xatlas: Any,
     points: Singles,
     triangles: NDArray[np.integer[Any]],
     parts: list[Ints],
     side: int,
     density: float,
     padding: int,
-) -> tuple[_Packed, float]:
+) -> tuple[_Layout, float]:
     """An atlas for a lightmap of that side, a mesh for each part, and its texels to the metre,
     ``density`` at most."""
     before: tuple[float, int] | None = None
+    meshes = []
+    for faces in parts:
+        used, index = np.unique(triangles[faces], return_inverse=True)
+        meshes.append((points[used], index.reshape(-1, 3).astype(np.uint32)))
     for _ in range(_TRIES):
-        atlas = xatlas.Atlas()
-        for faces in parts:
-            used, index = np.unique(triangles[faces], return_inverse=True)
-            atlas.add_mesh(points[used], index.reshape(-1, 3).astype(np.uint32))
-        packing = xatlas.PackOptions()
-        packing.padding, packing.bilinear = padding, True
-        packing.texels_per_unit = density
-        atlas.generate(xatlas.ChartOptions(), packing)
-        got = max(atlas.width, atlas.height)
+        packed = pack(meshes, density, padding)
+        got = max(packed.width, packed.height)
         if got <= side:
             break
         less = _AIM * side / got * density
@@ -135,16 +132,14 @@ def _packed(
         density = max(less, _STEP * density)
     texel, chart = np.zeros((len(triangles), 3, 2)), np.zeros(len(triangles), np.int64)
     charts = 0
-    for k, faces in enumerate(parts):
-        _, index, uv = atlas.get_mesh(k)
-        index = index.astype(np.int64)
-        texel[faces] = uv.astype(np.float64)[index] * [atlas.width, atlas.height]
+    for faces, uv, index in zip(parts, packed.uv, packed.index, strict=True):
+        texel[faces] = uv.astype(np.float64)[index] * [packed.width, packed.height]
         chart[faces] = charts + connected(len(uv), index)[index[:, 0]]
         charts += len(uv)
-    return _Packed(texel, chart, got), density
+    return _Layout(texel, chart, got), density
 
 
-def _longest(packed: _Packed) -> float:
+def _longest(packed: _Layout) -> float:
     """The longest side of the box of a chart, texels."""
     _, chart = np.unique(packed.chart, return_inverse=True)
     low, high = (np.full((int(chart.max()) + 1, 2), end) for end in (np.inf, -np.inf))

@@ -1,0 +1,168 @@
+"""Charts by xatlas, in a process of its own.
+
+xatlas 0.0.11 begins to prepare a mesh while others are added, and its threads may read a task in a
+list that has moved meanwhile: on a busy machine one build in hundreds crashed. So it runs in a
+child, ``python -P -m ptmtools.light.packing``, and a crash costs a second attempt. The result does
+not depend on threads.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+import subprocess
+import sys
+import threading
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import ptmtools
+from ptmtools.arrays import Ints, Singles
+from ptmtools.errors import WorkerError
+from ptmtools.store.archive import pack_arrays, unpack_arrays
+
+#: Attempts at one atlas.
+_ATTEMPTS = 3
+_LENGTH = struct.Struct("<Q")
+Mesh = tuple[Singles, NDArray[np.uint32]]
+
+
+@dataclass(frozen=True)
+class Packed:
+    """An atlas.
+
+    Attributes
+    ----------
+    width, height: texels.
+    uv: of each mesh (n, 2) in [0, 1], from the upper left.
+    index: of each mesh (T, 3) into its `uv`.
+    """
+
+    width: int
+    height: int
+    uv: list[Singles]
+    index: list[Ints]
+
+
+def pack(meshes: Sequence[Mesh], density: float, padding: int) -> Packed:
+    """The atlas of some meshes, (V, 3) points and (T, 3) faces, that share no chart.
+
+    density: texels to the unit of the points. padding: texels between charts beyond those that are
+    read.
+
+    Raises WorkerError PTM-W004: xatlas ended the process in all attempts.
+    """
+    points, faces = zip(*meshes, strict=True)
+    request = {**_joined("points", points), **_joined("faces", faces)}
+    request["options"] = np.array([density, padding], np.float64)
+    reply = unpack_arrays(_ask(pack_arrays(request)), file="xatlas")
+    width, height = reply["size"].tolist()
+    return Packed(width, height, _parted(reply, "uv"), _parted(reply, "index"))
+
+
+def _joined(name: str, arrays: Sequence[NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Arrays as one: a message of many is slow."""
+    rows = np.array([len(array) for array in arrays], np.int64)
+    return {name: np.concatenate(arrays), f"{name}_rows": rows}
+
+
+def _parted(message: Mapping[str, NDArray[Any]], name: str) -> list[Any]:
+    """Inverse of `_joined`."""
+    return np.split(message[name], np.cumsum(message[f"{name}_rows"])[:-1])
+
+
+#: The child of a process, by the number of that process: a fork has none.
+_child: tuple[int, subprocess.Popen[bytes]] | None = None
+_asking = threading.Lock()
+
+
+def _ask(request: bytes) -> bytes:
+    """The reply of the child, which is started at the first request and after a crash."""
+    global _child
+    with _asking:
+        for _ in range(_ATTEMPTS):
+            if _child is None or _child[0] != os.getpid():
+                _child = os.getpid(), _started()
+            process = _child[1]
+            assert process.stdin
+            assert process.stdout
+            with suppress(OSError):
+                _send(process.stdin, request)
+                if (reply := _received(process.stdout)) is not None:
+                    return reply
+            _child = None
+            process.kill()
+            process.communicate()
+    raise WorkerError(
+        "PTM-W004",
+        "xatlas crashes while it lays out lightmaps",
+        remedy="build with --light none",
+    )
+
+
+def _started() -> subprocess.Popen[bytes]:
+    root = os.fspath(Path(ptmtools.__file__).parent.parent)
+    search = os.environ.get("PYTHONPATH")
+    return subprocess.Popen(
+        [sys.executable, "-P", "-m", "ptmtools.light.packing"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "PYTHONPATH": f"{root}{os.pathsep}{search}" if search else root},
+    )
+
+
+def _send(stream: IO[bytes], message: bytes) -> None:
+    stream.write(_LENGTH.pack(len(message)))
+    stream.write(message)
+    stream.flush()
+
+
+def _received(stream: IO[bytes]) -> bytes | None:
+    """The next message; None at the end of a stream."""
+    head = stream.read(_LENGTH.size)
+    if len(head) < _LENGTH.size:
+        return None
+    (length,) = _LENGTH.unpack(head)
+    message = stream.read(length)
+    return message if len(message) == length else None
+
+
+def _serve() -> None:
+    """Replies to requests until there are no more."""
+    import signal
+
+    # Ctrl-C is for the parent, whose end ends this process.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    requests, replies = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what a library prints is no reply
+    while (request := _received(requests)) is not None:
+        _send(replies, _reply(request))
+
+
+def _reply(request: bytes) -> bytes:
+    import xatlas
+
+    held = unpack_arrays(request, file="request")
+    density, padding = held["options"].tolist()
+    meshes = list(zip(_parted(held, "points"), _parted(held, "faces"), strict=True))
+    atlas: Any = xatlas.Atlas()
+    for points, faces in meshes:
+        atlas.add_mesh(points, faces)
+    packing = xatlas.PackOptions()
+    packing.padding, packing.bilinear = int(padding), True
+    packing.texels_per_unit = density
+    atlas.generate(xatlas.ChartOptions(), packing)
+    _, index, uv = zip(*(atlas.get_mesh(k) for k in range(len(meshes))), strict=True)
+    reply = {**_joined("uv", uv), **_joined("index", [each.astype(np.int64) for each in index])}
+    return pack_arrays({**reply, "size": np.array([atlas.width, atlas.height], np.int64)})
+
+
+if __name__ == "__main__":
+    _serve()

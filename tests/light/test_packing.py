@@ -1,0 +1,66 @@
+"""xatlas in a process of its own, which may crash."""
+
+from __future__ import annotations
+
+import os
+import signal
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ptmtools.errors import WorkerError
+from ptmtools.light import packing
+from ptmtools.light.packing import Mesh, pack
+
+pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
+
+SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
+FACES = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
+MESHES: list[Mesh] = [(SQUARE + 3 * k, FACES) for k in range(3)]
+
+
+def the_child() -> Any:
+    assert packing._child
+    return packing._child[1]
+
+
+def test_meshes_share_no_place() -> None:
+    packed = pack(MESHES, 16.0, 1)
+    assert len(packed.uv) == len(packed.index) == 3
+    size = [packed.width, packed.height]
+    low, high = (
+        np.array([end(uv[index].reshape(-1, 2) * size, axis=0)
+                  for uv, index in zip(packed.uv, packed.index, strict=True)])
+        for end in (np.min, np.max)
+    )  # fmt: skip
+    for a in range(3):
+        for b in range(a):
+            assert (low[a] > high[b]).any() or (low[b] > high[a]).any()
+    assert (high - low).min() == pytest.approx(16, abs=2)
+
+
+def test_a_crash_costs_another_attempt(monkeypatch: pytest.MonkeyPatch) -> None:
+    first = pack(MESHES, 16.0, 1)
+    before = the_child()
+    send = packing._send
+
+    def crashing(stream: Any, message: bytes) -> None:
+        if the_child() is before:
+            os.kill(before.pid, getattr(signal, "SIGKILL", signal.SIGTERM))
+            before.wait()
+        send(stream, message)
+
+    monkeypatch.setattr(packing, "_send", crashing)
+    again = pack(MESHES, 16.0, 1)
+    assert the_child() is not before
+    assert (again.width, again.height) == (first.width, first.height)
+    for one, other in zip(first.uv + first.index, again.uv + again.index, strict=True):
+        assert np.array_equal(one, other)
+
+
+def test_crashes_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(packing, "_received", lambda stream: None)
+    with pytest.raises(WorkerError, match="xatlas crashes") as refused:
+        pack(MESHES, 16.0, 1)
+    assert refused.value.code == "PTM-W004"
