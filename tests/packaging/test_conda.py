@@ -42,6 +42,8 @@ def test_commands_and_requirements(recipe: dict[str, Any]) -> None:
     python = f"python {project['requires-python']}"
     scripts = [f"{name} = {place}" for name, place in project["scripts"].items()]
     assert recipe["build"]["python"]["entry_points"] == scripts
-    assert {*recipe["requirements"]["run"]} == {python, *conda(project["dependencies"])}
+    # One with a marker is left out where it has no wheel: xatlas, without which there is no light.
+    everywhere = [each for each in project["dependencies"] if ";" not in each]
+    assert {*recipe["requirements"]["run"]} == {python, *conda(everywhere)}
     build = conda(PROJECT["build-system"]["requires"])
     assert {*recipe["requirements"]["host"]} == {python, "pip", *build}

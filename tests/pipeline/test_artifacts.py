@@ -255,7 +255,7 @@ def test_as_it_was_built(database: Path) -> None:
     opened(database)
 
 
-ROW = {"name": "a.png", "sha256": "ab" * 32, "files": ["a.png"], "plain": True}
+ROW = {"name": "a.png", "sha256": "ab" * 32, "files": ["a.png"], "plain": True, "bytes": 3}
 
 
 @pytest.mark.parametrize(
@@ -278,6 +278,8 @@ ROW = {"name": "a.png", "sha256": "ab" * 32, "files": ["a.png"], "plain": True}
         {"files": "a.png"},
         {"files": [5]},
         {"plain": 1},
+        {"bytes": -1},
+        {"bytes": "3"},
     ],
 )
 def test_names_and_digests_of_images(database: Path, row: dict[str, Any]) -> None:

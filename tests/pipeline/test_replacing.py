@@ -15,6 +15,7 @@ from PIL import Image
 from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
 from ptmtools.errors import DatabaseError
+from ptmtools.light.options import LightOptions
 from ptmtools.neighbours.apo.options import ReplaceOptions
 from ptmtools.output.gltf import pack, unpack
 from ptmtools.output.names import HINTS
@@ -36,7 +37,7 @@ STATUES = ReplaceOptions(apo=("statue_*",), apo_faces=500, apo_error=0.2, apo_de
 
 def built(model: Path, db: Path, *options: Any) -> list[str]:
     """The stages that a build runs."""
-    report = build_scene(model, db, QUICK, *options, workers=1)
+    report = build_scene(model, db, QUICK, LightOptions("none"), *options, workers=1)
     return [stage.stage for stage in report.stages if stage.ran]
 
 
@@ -170,7 +171,7 @@ def test_a_database_of_an_earlier_release(folder: Path, capsys: pytest.CaptureFi
         name, *options = command.split()
         assert main([name, str(db), *(str(db / o) if "." in o else o for o in options)]) == 0
     assert "PTM-" not in capsys.readouterr().err
-    assert [p.plan for p in plan_build(model, db, QUICK)] == [
+    assert [p.plan for p in plan_build(model, db, QUICK, LightOptions("none"))] == [
         "run" if name == APO.name else "current" for name in STAGES
     ]
     assert built(model, db) == []

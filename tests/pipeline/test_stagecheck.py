@@ -58,7 +58,9 @@ def written(db: Path, stages: Arrays, damage: Callable[[bytes], bytes] = bytes) 
     """A database of these stages; of the arrays of the PVS the bytes are changed."""
     (db / "stages/images").mkdir(parents=True)
     picture = b"a picture"
-    rows = [{"name": "a.png", "sha256": sha256(picture), "files": ["a.png"], "plain": True}]
+    rows = [
+        {"name": "a.png", "sha256": sha256(picture), "files": ["a.png"], "plain": True, "bytes": 9}
+    ]
     listed = json.dumps({"images": rows}).encode()
     images = {f"stages/images/{sha256(picture)}": picture, "stages/images.json": listed}
     records = {}
@@ -209,7 +211,7 @@ def test_what_the_hash_tells_is_not_told_again(stages: Arrays, tmp_path: Path) -
         ("D720", b"[" * 100_000),
         (
             "D720",
-            b'{"images": [{"name": "b.png", "sha256": "%s", "files": [], "plain": true}]}'
+            b'{"images": [{"name": "b.png", "sha256": "%s", "files": [], "plain": true, "bytes": 1}]}'
             % (b"0" * 64),
         ),
         ("D699 D720", b'{"images": []}'),
