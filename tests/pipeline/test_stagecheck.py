@@ -211,8 +211,8 @@ def test_what_the_hash_tells_is_not_told_again(stages: Arrays, tmp_path: Path) -
         ("D720", b"[" * 100_000),
         (
             "D720",
-            b'{"images": [{"name": "b.png", "sha256": "%s", "files": [], "plain": true, "bytes": 1}]}'
-            % (b"0" * 64),
+            b'{"images": [{"name": "b.png", "sha256": "%s", "files": [], "plain": true,'
+            b' "bytes": 1}]}' % (b"0" * 64),
         ),
         ("D699 D720", b'{"images": []}'),
     ],
