@@ -135,7 +135,11 @@ def test_only_what_changed_is_done_again(tmp_path: Path, ptm: Ptm, build: Build)
     assert {p: p.stat().st_mtime_ns for p in db.rglob("*")} == stamps
 
     assert ran(build(model, db, "--samples", 4)) == ["ach", "emit"]
-    assert ran(build(model, db, "--samples", 4, "--profile", "raw")) == ["textures", "light", "emit"]
+    assert ran(build(model, db, "--samples", 4, "--profile", "raw")) == [
+        "textures",
+        "light",
+        "emit",
+    ]
     assert ran(build(model, db)) == ["ach", "textures", "light", "emit"]
     assert listing(db) == before
 
