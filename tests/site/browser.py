@@ -103,7 +103,10 @@ class Visitor:
         late, pause = time.monotonic() + seconds, 0.01
         while True:
             state = "window.ptm?.state() ?? {}"
-            holds = self.page.evaluate(f"((s) => Boolean({condition}))({state})")
+            # Before the page has begun there is no `ptm`.
+            tried = f"try {{ return Boolean({condition}) }}"
+            failed = "catch (fault) { if (window.ptm) throw fault }"
+            holds = self.page.evaluate(f"((s) => {{ {tried} {failed} }})({state})")
             if holds:
                 return self.state()
             if time.monotonic() > late:
