@@ -20,6 +20,8 @@ from ptmtools.light.cells import Piece
 SHARE = 0.1
 #: The least share of the texels to the metre.
 LEAST = 0.5
+#: Texels of the smallest lightmap: a building with fewer shows no light, but is of another scale.
+_SMALLEST = 16**2
 #: Bytes of a texel (0.24 in a hospital, 0.25 in an office, 0.38 in a museum).
 _TEXEL_BYTES = 0.3
 
@@ -39,7 +41,9 @@ def expected_bytes(pieces: Sequence[Piece], density: float) -> float:
 
 def affordable(pieces: Sequence[Piece], density: float, images: int) -> float:
     """The texels to the metre of lightmaps beside images of a number of bytes (`rounded`), at most
-    ``density``; 0 if light would cost too much."""
+    ``density``; 0 if light would cost too much, or there is no surface for it."""
     cost = expected_bytes(pieces, density)
-    fitting = min(1.0, math.sqrt(SHARE * images / cost)) if cost else 0.0
+    if cost < _SMALLEST * _TEXEL_BYTES:
+        return 0.0
+    fitting = min(1.0, math.sqrt(SHARE * images / cost))
     return density * fitting if fitting >= LEAST else 0.0

@@ -45,6 +45,7 @@ def test_lightmaps_fit_the_images() -> None:
     assert fewer == pytest.approx(10 * (whole / 2 / _enough(pieces)) ** 0.5, rel=1e-6)
     assert affordable(pieces, 10.0, whole // 16) == 0
     assert affordable(pieces, 10.0, 0) == 0
+    assert affordable([floor(1e-5)], 10.0, 1 << 20) == 0
     assert affordable([floor(10.0, glass=True), floor(10.0, dense=True)], 10.0, 1 << 30) == 0
 
 
