@@ -27,7 +27,7 @@ AUTO = LightOptions(light_samples=4)
 
 
 def floor(side: float, **kind: bool) -> Piece:
-    """A square of so many metres."""
+    """A square, `side` metres long."""
     corner = np.array([[[0, 0, 0], [0, 0, 1], [1, 0, 1]], [[0, 0, 0], [1, 0, 1], [1, 0, 0]]])
     none, zero = np.zeros(2, np.bool_), np.zeros(2, np.int64)
     flags = {name: ~none if kind.get(name) else none for name in ("glass", "dense")}

@@ -57,8 +57,8 @@ def barriers(page: Any) -> list[list[str]]:
     page.evaluate(SCRIPT.read_text())
     passes, violations = page.evaluate(_RUN, _RULES)
     assert passes > 10, "the page was examined"
-    found: list[list[str]] = violations
-    return found
+    rules: list[list[str]] = violations
+    return rules
 
 
 def contrasts(page: Any) -> list[tuple[float, str]]:
