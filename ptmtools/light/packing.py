@@ -16,14 +16,13 @@ import threading
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-import ptmtools
 from ptmtools.arrays import Ints, Singles
+from ptmtools.child import module_process
 from ptmtools.errors import WorkerError
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 
@@ -107,14 +106,11 @@ def _ask(request: bytes) -> bytes:
 
 
 def _started() -> subprocess.Popen[bytes]:
-    root = os.fspath(Path(ptmtools.__file__).parent.parent)
-    search = os.environ.get("PYTHONPATH")
     return subprocess.Popen(
-        [sys.executable, "-P", "-m", "ptmtools.light.packing"],
+        **module_process("ptmtools.light.packing"),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
-        env={**os.environ, "PYTHONPATH": f"{root}{os.pathsep}{search}" if search else root},
     )
 
 

@@ -21,7 +21,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import ptmtools
+from ptmtools.child import module_process
 from ptmtools.errors import InputError, LimitError, MissingComponentError, PtmError
 
 #: Memory in bytes and time in seconds: for any model, and per byte of its files.
@@ -48,16 +48,13 @@ def run_in_sandbox(
     crashes or exceeds its time.
     """
     size = model.stat().st_size + other_bytes
-    root = os.fspath(Path(ptmtools.__file__).parent.parent)
-    search = os.environ.get("PYTHONPATH")
-    command = [sys.executable, "-P", "-m", module, str(_MEMORY + _MEMORY_PER_BYTE * size)]
+    memory = str(_MEMORY + _MEMORY_PER_BYTE * size)
     try:
         run = subprocess.run(
-            command + [os.fspath(argument) for argument in arguments],
+            **module_process(module, memory, *arguments),
             stdin=subprocess.DEVNULL,
             capture_output=True,
             timeout=_SECONDS + _SECONDS_PER_BYTE * size,
-            env={**os.environ, "PYTHONPATH": f"{root}{os.pathsep}{search}" if search else root},
         )
     except subprocess.TimeoutExpired as error:
         reply = _last_reply(error.stdout or b"")
