@@ -23,7 +23,7 @@ from ptmtools.output.emission import compressed
 from ptmtools.site.entry import Entry, link_bytes
 
 #: What of a site's data is neither geometry nor texture: first letters of names.
-_PICTURES = ("poster-", "vp-")
+_PICTURES = ("poster-", "vp-", "icon-")
 
 
 @dataclass(frozen=True)

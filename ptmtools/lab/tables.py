@@ -86,22 +86,24 @@ def look(
     *,
     forms: Sequence[Shows] = (),
     full: Pyramids | None = None,
+    same_maps: bool = False,
     relief: Relief | None = None,
     lossy: Lossy | None = None,
 ) -> list[Views]:
     """The tables of (F, 3) eyes and unit directions of view: of ``pyramids`` and their ``lossy``
     previews, and of the same textures in other ``forms``; with octrees and other relief, if any.
     The reference is ``full``, which holds the same textures in other quality, or ``pyramids``; of
-    lightmaps and normal maps it is always that."""
+    lightmaps and normal maps it is ``full`` only with ``same_maps``: their layouts agree."""
     triangles, caster, seen = triangles_of(surfaces), Caster(surfaces), camera.sparse
     full = pyramids if full is None else full
     lossy = no_previews(len(pyramids.levels)) if lossy is None else lossy
     shown: list[Pyramids | Shows] = [pyramids, *forms]
+    whole = full if same_maps else pyramids
     tallies = [_Tally(triangles, textures, lossy, full, seen) for textures in shown]
     others = [
         (
             weight,
-            [_Tally(triangles_of(maps), textures, lossy, pyramids, seen) for textures in shown],
+            [_Tally(triangles_of(maps), textures, lossy, whole, seen) for textures in shown],
         )
         for maps, weight in ((surfaces.light, 1.0), (surfaces.bumped, NORMALS))
         if maps is not None

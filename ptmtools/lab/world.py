@@ -167,6 +167,7 @@ def prepare(
     pixels: tuple[int, int] = PIXELS,
     progress: Progress = silent,
     full: Pyramids | None = None,
+    same_maps: bool = False,
     views: Views | None = None,
     forms: Mapping[str, Shows] | None = None,
     relief: Relief | None = None,
@@ -178,7 +179,7 @@ def prepare(
     ----------
     pyramids: those of this database, if already read.
     rate: frames a second. pixels: of the item buffer, across and down.
-    full: another reference of pictures; see `look`.
+    full, same_maps: another reference of pictures; see `look`.
     views: those of this walk, if already made.
     forms: other forms of textures, as read by `read_forms`.
     relief: octrees and another reference database (`relief_of`).
@@ -225,7 +226,7 @@ def prepare(
         shows = [*(forms or {}).values()]
         views, *others = look(
             served.surfaces, textures, camera, eyes, looks, progress, forms=shows, full=full,
-            relief=relief, lossy=lossy,
+            same_maps=same_maps, relief=relief, lossy=lossy,
         )  # fmt: skip
     catalogue = catalogue_of(served, textures.differences, textures.mean)
     catalogue = catalogue.with_browser_sizes(browser) if browser else catalogue

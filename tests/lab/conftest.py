@@ -63,7 +63,7 @@ def _build_interlaced(folder: Path) -> None:
         Image.fromarray(texels.astype(np.uint8)).save(folder / f"model/{name}.png")
     model, formats = folder / "model" / "two_rooms.obj", "vrml,gltf,interlace"
     words = ["-q", "build-scene", str(model), "-o", str(folder / "db"), "-j", "1"]
-    assert main([*words, "--format", formats]) == 0
+    assert main([*words, "--format", formats, "--light", "none"]) == 0
 
 
 @pytest.fixture(scope="session")

@@ -127,7 +127,9 @@ def test_a_context_that_is_lost(visit: Visiting, site: Site) -> None:
         visitor.restore_context()
         visitor.complete()
         # A preview may be on the screen in place of exact levels.
-        assert np.abs(visitor.picture().astype(int) - before).max() <= 8
+        apart = np.abs(visitor.picture().astype(int) - before)
+        assert apart.mean() < 0.5
+        assert apart.max() <= 24
 
 
 def test_posters_are_lit(folder: Path) -> None:

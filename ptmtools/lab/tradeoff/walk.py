@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -252,10 +253,10 @@ def compared(served: Served, walk: Walk, original: World) -> World:
     """
     own, lossy, full = read_pyramids(served), read_lossy(served), original.pyramids
     coarse = begins_with(full, own)
+    same = _same(served.surfaces, original.served.surfaces)
     if not coarse or len(lossy.state):
         own = full if coarse and (own.levels == full.levels).all() else own
-        return prepare(served, walk, own, full=full, lossy=lossy)
-    same = _same(served.surfaces, original.served.surfaces)
+        return prepare(served, walk, own, full=full, same_maps=same, lossy=lossy)
     views = original.views if same else None
     world = prepare(served, walk, full, views=views, lossy=lossy)
     return replace(
@@ -280,11 +281,11 @@ def begins_with(full: Pyramids, few: Pyramids) -> bool:
     return True
 
 
-def _same(one: Surfaces, other: Surfaces) -> bool:
-    return all(
-        np.array_equal(getattr(one, each.name), getattr(other, each.name))
-        for each in fields(Surfaces)
-    )
+def _same(one: Any, other: Any) -> bool:
+    """Whether two values are equal: arrays, or dataclasses of them such as `Surfaces`."""
+    if is_dataclass(one) and type(one) is type(other):
+        return all(_same(getattr(one, f.name), getattr(other, f.name)) for f in fields(one))
+    return np.array_equal(one, other)
 
 
 def _longest(served: Served) -> int:
