@@ -144,7 +144,12 @@ def nginx(files: Mapping[str, Entry], http: str, own: Certificate) -> Iterator[S
             yield Server(port, folder / "access.log")
         finally:
             process.terminate()
-            process.wait()
+            try:
+                process.wait(30)
+            except subprocess.TimeoutExpired:
+                # A signal that comes while it starts its worker can be lost.
+                process.kill()
+                process.wait()
 
 
 def _write(files: Mapping[str, Entry], folder: Path) -> None:
