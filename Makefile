@@ -11,7 +11,7 @@
 #                    (a day; it continues where it was stopped)
 # make fuzz    100,000 damaged and hostile files for every reader, 1,000 damaged buildings (an hour)
 # make page    bundle the page of web/page into the package, with esbuild
-# make dist    a wheel and an sdist in build/dist
+# make dist    a wheel and an sdist in build/dist, with a bill of materials
 # make man     the manual page of ptm, in release/man (make dist packs it)
 # make sample  only the sample museum
 # make setup   only the virtual environment
@@ -70,6 +70,7 @@ sample: build/museum/.made
 dist: $(VENV)/.installed-dev man
 	@rm -rf build/dist
 	$(BIN)/python -m build --no-isolation -o build/dist .
+	$(BIN)/python release/bill.py -o build/dist
 
 man: $(VENV)/.installed-dev
 	$(BIN)/python release/man_page.py -o release/man/ptm.1
