@@ -99,7 +99,7 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	@.ci/test-components
-	$(BIN)/python tests/web/checked_types.py
+	$(BIN)/python -m tests.web.checked_types
 	$(BIN)/mypy --config-file benchmarks/mypy.ini
 	$(BIN)/mypy --config-file benchmarks/mypy.ini -p benchmarks.fuzz -p benchmarks.web_rivals
 	@large=$$(git ls-files -z | xargs -0 stat -c '%s %n' | awk '$$1 > 1048576 { print $$2 }'); \

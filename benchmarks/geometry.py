@@ -29,9 +29,9 @@ from typing import Any
 import numpy as np
 import trimesh
 from emission import best
+from npm import GLTF_TRANSFORM, Package
 from PIL import Image
 from scenes import MODELS, MUSEUM, ROOT, model_file
-from web_rivals.packages import GLTF_TRANSFORM, Package
 
 from ptmtools.cells import subdivide
 from ptmtools.meshopt.encoding import encode_attributes, encode_triangles

@@ -39,10 +39,10 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
+from benchmarks.npm import ESBUILD, GLTF_TRANSFORM, KTX2, NEEDLE, THREE
 from benchmarks.web_rivals.images import MEDIA, in_form
 from benchmarks.web_rivals.models import whole_glb
 from benchmarks.web_rivals.optimized import OPTIMIZE, gltf_transform
-from benchmarks.web_rivals.packages import ESBUILD, GLTF_TRANSFORM, KTX2, NEEDLE, THREE
 from benchmarks.web_rivals.progressive import progressive
 from ptmtools.scene.model import Scene
 from ptmtools.site.entry import Entry

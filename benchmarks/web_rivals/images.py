@@ -17,7 +17,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from benchmarks.web_rivals.packages import KTX2, ROOT
+from benchmarks.npm import KTX2, ROOT
 from ptmtools.scene.model import SourceImage
 
 KEPT = ROOT / "build/bench/rivals"

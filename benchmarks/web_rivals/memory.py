@@ -25,8 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from benchmarks.npm import KTX2
 from benchmarks.web_rivals.images import in_form
-from benchmarks.web_rivals.packages import KTX2
 from ptmtools.lab.allocation import allocate
 from ptmtools.lab.measures import flip
 from ptmtools.lab.renderer import Renderer

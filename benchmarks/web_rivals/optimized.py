@@ -7,8 +7,8 @@ import subprocess
 import tempfile
 from pathlib import Path
 
+from benchmarks.npm import GLTF_TRANSFORM
 from benchmarks.web_rivals.images import KEPT, keep
-from benchmarks.web_rivals.packages import GLTF_TRANSFORM
 
 #: Of `optimize`, as its documentation recommends for the web.
 OPTIMIZE = ("--compress", "meshopt", "--texture-compress", "webp", "--texture-size", "1024")

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.npm import ROOT
 from benchmarks.web_rivals.entrants import Entrant
 from benchmarks.web_rivals.link import Traffic, shaped
 from benchmarks.web_rivals.nginx import Certificate, nginx
-from benchmarks.web_rivals.packages import ROOT
 from ptmtools.lab.measures import flip
 from ptmtools.site.throttle import Throttle
 

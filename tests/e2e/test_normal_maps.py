@@ -16,6 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests" / "e2e"), str(ROOT / "benchmarks")]
 from browsers import gltf_validator  # noqa: E402
 
+from benchmarks.npm import GLTF_VALIDATOR  # noqa: E402
 from ptmtools.cli.main import main  # noqa: E402
 from ptmtools.output.served import read_served  # noqa: E402
 from ptmtools.rendering.drawing import ViewOptions, draw_view  # noqa: E402
@@ -54,7 +55,7 @@ def test_the_package_shows_them(three: Any, database: Path) -> None:
 
 
 def test_the_cells_are_valid(database: Path, require: Any) -> None:
-    if remedy := gltf_validator.missing():
+    if remedy := GLTF_VALIDATOR.remedy():
         require("the glTF validator", remedy)
     for name, said in gltf_validator.validate(database / "www" / "gltf").items():
         # Tangents would be further bytes; clients derive them.

@@ -17,6 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests" / "e2e"), str(ROOT / "benchmarks")]
 from browsers import gltf_validator  # noqa: E402
 
+from benchmarks.npm import GLTF_VALIDATOR  # noqa: E402
 from ptmtools.cli.main import main  # noqa: E402
 from ptmtools.neighbours.apo.normal_map import axes_of, looked_up  # noqa: E402
 from ptmtools.output.served import Served, read_served  # noqa: E402
@@ -155,7 +156,7 @@ def test_frames_are_as_gltf_demands(database: Path) -> None:
 
 
 def test_the_validator_finds_no_fault(database: Path, require: Any) -> None:
-    if remedy := gltf_validator.missing():
+    if remedy := GLTF_VALIDATOR.remedy():
         require("the glTF validator", remedy)
     for name, said in gltf_validator.validate(database / "www" / "gltf").items():
         assert said.complaints == (), name

@@ -31,6 +31,12 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "e2e"), str(ROOT / "benchmarks")
 from likeness import likeness, outline  # noqa: E402
 from render import Look, View, load, render  # noqa: E402
 
+from benchmarks.npm import (  # noqa: E402
+    ESBUILD,
+    GLTF_TRANSFORM,
+    NEEDLE,
+    THREE,
+)
 from benchmarks.web_rivals import (  # noqa: E402
     bytes as weights,
     images,
@@ -48,12 +54,6 @@ from benchmarks.web_rivals.nginx import (  # noqa: E402
     certificate,
     nginx,
     program_of,
-)
-from benchmarks.web_rivals.packages import (  # noqa: E402
-    ESBUILD,
-    GLTF_TRANSFORM,
-    NEEDLE,
-    THREE,
 )
 from benchmarks.web_rivals.progressive import progressive  # noqa: E402
 from benchmarks.web_rivals.results import Conditions, kept  # noqa: E402

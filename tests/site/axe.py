@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
-VERSION = "4.14.1"
-ROOT = Path(__file__).resolve().parents[2]
-PREFIX = "build/browsers/axe"
-INSTALL = (
-    "npm install --no-save --no-package-lock --ignore-scripts --no-audit --no-fund "
-    f"--prefix {PREFIX} axe-core@{VERSION}"
-)
-SCRIPT = ROOT / PREFIX / "node_modules/axe-core/axe.min.js"
+from benchmarks.npm import AXE
+
+SCRIPT = AXE.folder / "axe.min.js"
 #: Levels A and AA of WCAG 2.2.
 _RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"]
 _RUN = """(rules) => axe.run(document, { runOnly: rules, resultTypes: ["violations", "passes"] })

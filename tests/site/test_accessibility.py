@@ -9,12 +9,13 @@ from typing import Any
 
 import pytest
 
+from benchmarks.npm import AXE
 from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.site.content import Site, SiteOptions, site_of
 from ptmtools.tour.starting import first_tour
-from tests.site.axe import SCRIPT, VERSION, barriers, contrasts
+from tests.site.axe import barriers, contrasts
 from tests.site.browser import Visitor, visiting
 
 #: Level AA of text.
@@ -24,8 +25,8 @@ PANELS = ("tour", "places", "map", "details", "help")
 
 @pytest.fixture(scope="module", autouse=True)
 def axe(require: Callable[[str, str], None]) -> None:
-    if not SCRIPT.is_file():
-        require(f"axe-core {VERSION}", "make test, with npm installed")
+    if remedy := AXE.remedy():
+        require("axe-core", remedy)
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.web_rivals.packages import ESBUILD
+from benchmarks.npm import ESBUILD
 from ptmtools.errors import InputError
 from ptmtools.site import program
 from ptmtools.site.program import FORM_SCRIPTS, PAGE, PROGRAM, program_files

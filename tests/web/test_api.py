@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 
+from benchmarks.npm import TYPESCRIPT
 from ptmtools.texture import EncodeOptions, decode_levels, encode, read_header
 from tests.texture.coding import textured
 from tests.web import checked_types
@@ -116,13 +117,13 @@ def test_the_compiler_is_the_one_that_dev_installs() -> None:
 
 def test_types(require: Callable[[str, str], None]) -> None:
     """`tsc --checkJs`, strict."""
-    if remedy := checked_types.missing():
+    if remedy := TYPESCRIPT.remedy():
         require("tsc", remedy)
     assert checked_types.complaints() == ""
 
 
 def test_a_wrong_type_is_a_complaint(require: Callable[[str, str], None], tmp_path: Path) -> None:
-    if remedy := checked_types.missing():
+    if remedy := TYPESCRIPT.remedy():
         require("tsc", remedy)
     shutil.copytree(PACKAGE / "src", tmp_path / "src")
     shutil.copy(PACKAGE / "tsconfig.json", tmp_path)

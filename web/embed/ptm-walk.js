@@ -18,7 +18,10 @@ class PtmWalk extends HTMLElement {
     const style = document.createElement("style");
     style.textContent = ":host{display:block;aspect-ratio:16/9;min-height:240px}";
     this.attachShadow({ mode: "open" }).append(style, this.frame);
-    this.hear = (event) => {
+    /** @type {Promise<void> | undefined} */
+    this.pending = undefined;
+    this.origin = "*";
+    this.hear = (/** @type {MessageEvent} */ event) => {
       const { source, data } = event;
       if (source !== this.frame.contentWindow || data?.format !== "ptm-walk") return;
       const { event: name, ...detail } = data;
@@ -34,15 +37,17 @@ class PtmWalk extends HTMLElement {
     removeEventListener("message", this.hear);
   }
 
+  /** @param {string} name */
   attributeChangedCallback(name) {
     this.frame.title = this.title || "Walk through a building";
     if (name === "title" || !this.hasAttribute("src")) return;
     // Several attributes change at once: the frame is set once.
     this.pending ??= Promise.resolve().then(() => {
       this.pending = undefined;
-      const url = new URL(this.getAttribute("src"), document.baseURI);
+      const url = new URL(this.getAttribute("src") ?? "", document.baseURI);
       for (const field of FIELDS) {
-        if (this.hasAttribute(field)) url.searchParams.set(field, this.getAttribute(field));
+        const value = this.getAttribute(field);
+        if (value !== null) url.searchParams.set(field, value);
       }
       if (!/^https?:$/.test(url.protocol)) return;
       this.origin = url.origin;
@@ -50,9 +55,12 @@ class PtmWalk extends HTMLElement {
     });
   }
 
-  /** Leads the visitor to a label by its id, a stop of the tour or a viewpoint by its number. */
+  /**
+   * Leads the visitor to a label by its id, a stop of the tour or a viewpoint by its number.
+   * @param {{ label?: string, stop?: number, place?: number }} target
+   */
   goTo(target) {
-    this.frame.contentWindow?.postMessage({ format: "ptm-walk", goTo: target }, this.origin ?? "*");
+    this.frame.contentWindow?.postMessage({ format: "ptm-walk", goTo: target }, this.origin);
   }
 }
 

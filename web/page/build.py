@@ -25,7 +25,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 sys.path.insert(0, str(ROOT))
 
-from benchmarks.web_rivals.packages import ESBUILD  # noqa: E402
+from benchmarks.npm import ESBUILD  # noqa: E402
 
 PTM = ROOT / "web" / "ptm" / "src"
 #: The page of octree textures, interlaced images and campuses.

@@ -8,21 +8,15 @@ from __future__ import annotations
 
 import base64
 import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from benchmarks.npm import THREE
 from browsers import web
 
-VERSION = "0.187.0"
 ROOT = Path(__file__).resolve().parents[3]
-PREFIX = "build/browsers/three"
-INSTALL = (
-    "npm install --no-save --no-package-lock --ignore-scripts --no-audit --no-fund "
-    f"--prefix {PREFIX} three@{VERSION}"
-)
 ADAPTER = ROOT / "web" / "three-ptm"
 #: `gpu.bytes` and `gpu.most` are of all storage in sRGB that there is and that there was at once.
 #: `levelsOf` reads a texture back: SHA-256 of its levels, coarsest first.
@@ -154,26 +148,19 @@ class Walked:
     messages: tuple[str, ...]
 
 
-def package() -> Path | None:
-    """three.js' folder: named by PTM_THREE, else installed under ``build``."""
-    folder = Path(os.environ.get("PTM_THREE", ROOT / PREFIX / "node_modules" / "three"))
-    return folder if (folder / "build" / "three.module.js").is_file() else None
-
-
 def missing() -> str | None:
     """What to install first, or None."""
     lacking = [] if web.chromium() else ["apt install chromium"]
-    lacking += [] if package() else [f"in the checkout: {INSTALL}"]
+    lacking += [remedy] if (remedy := THREE.remedy()) else []
     return "; ".join(lacking) or None
 
 
 def folders() -> dict[str, Path]:
     """What the names in the page's import map stand for."""
-    three = package()
-    if three is None:
-        raise FileNotFoundError(missing())
+    if remedy := missing():
+        raise FileNotFoundError(remedy)
     web_packages = {"client": ROOT / "web" / "client", "decoder": ROOT / "web" / "ptm"}
-    return {"three": three, "adapter": ADAPTER, **web_packages}
+    return {"three": THREE.folder, "adapter": ADAPTER, **web_packages}
 
 
 def run(

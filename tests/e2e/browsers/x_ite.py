@@ -15,23 +15,17 @@ from __future__ import annotations
 
 import base64
 import json
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
+from benchmarks.npm import X_ITE
 from browsers import web
 
 #: The viewpoint after the bound one, as by Page Down.
 NEXT = ">"
-X_ITE_VERSION = "15.0.1"
 ROOT = Path(__file__).resolve().parents[3]
-DIST = Path("build/browsers/node_modules/x_ite/dist")
-INSTALL = (
-    "npm install --no-save --no-package-lock --ignore-scripts --no-audit --no-fund "
-    f"--prefix build/browsers x_ite@{X_ITE_VERSION}"
-)
 
 PAGE = """\
 <style>x3d-canvas {{ display: block; width: {width}px; height: {height}px }}</style>
@@ -95,16 +89,10 @@ class Shots:
     messages: tuple[str, ...]
 
 
-def dist() -> Path | None:
-    """The folder of X_ITE's files: named by PTM_X_ITE, else installed under ``build``."""
-    folder = Path(os.environ.get("PTM_X_ITE", ROOT / DIST))
-    return folder if (folder / "x_ite.min.js").is_file() else None
-
-
 def missing() -> str | None:
     """What to install first, or None."""
     lacking = [] if web.chromium() else ["apt install chromium"]
-    lacking += [] if dist() else [f"in the checkout: {INSTALL}"]
+    lacking += [remedy] if (remedy := X_ITE.remedy()) else []
     return "; ".join(lacking) or None
 
 
@@ -123,9 +111,8 @@ def show(
     ``smooth`` is X_ITE's antialiasing, on unless a page turns it off.
     Raises FileNotFoundError without Chromium or X_ITE, TimeoutError if no pictures come.
     """
-    library = dist()
-    if library is None:
-        raise FileNotFoundError(missing())
+    if remedy := missing():
+        raise FileNotFoundError(remedy)
     page = web.REPORTING + PAGE.format(
         width=width,
         height=height,
@@ -133,7 +120,7 @@ def show(
         url=json.dumps(f"/db/{quote(path.name)}"),
         names=json.dumps(list(viewpoints)),
     )
-    folders = {"x_ite": library, "db": path.parent}
+    folders = {"x_ite": X_ITE.folder / "dist", "db": path.parent}
     seen = web.visit(page, folders, width=width, height=height, seconds=seconds)
     answer = json.loads(seen.body)
     return Shots(

@@ -1,12 +1,20 @@
-"""npm packages of the rivals, in a folder each, since npm removes other content of a folder."""
+"""npm packages of the tests, of the benchmarks and of the bundler of the page.
+
+    python benchmarks/npm.py    installs those of the tests that are missing
+
+Each has a folder of its own, since npm removes other content of a folder.
+"""
 
 from __future__ import annotations
 
+import json
 import shutil
+import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[1]
 
 
 @dataclass(frozen=True)
@@ -30,6 +38,12 @@ class Package:
         return ROOT / "build/browsers" / self.prefix / "node_modules"
 
     @property
+    def missing(self) -> bool:
+        """Whether it is not installed in this version."""
+        about = self.folder / "package.json"
+        return not about.is_file() or json.loads(about.read_text())["version"] != self.version
+
+    @property
     def command(self) -> str:
         """What installs it, in the checkout."""
         options = "--no-save --no-package-lock --ignore-scripts --no-audit --no-fund"
@@ -42,9 +56,7 @@ class Package:
         """What to install first, or None."""
         if shutil.which("node") is None:
             return "apt install nodejs npm"
-        if (self.folder / "package.json").is_file():
-            return None
-        return f"in the checkout: {self.command}"
+        return f"in the checkout: {self.command}" if self.missing else None
 
     def require(self) -> None:
         """Raises SystemExit with the remedy."""
@@ -70,6 +82,23 @@ GLTF_TRANSFORM = Package(
 NEEDLE = Package("@needle-tools/gltf-progressive", "3.3.5", "needle")
 #: Joins and shortens the modules of a page, as those who use three.js do.
 ESBUILD = Package("esbuild", "0.28.2", "esbuild")
-#: Those that tests need and others do not install.
-INSTALL = ESBUILD.command
-INSTALL_GLTF_TRANSFORM, INSTALL_NEEDLE = GLTF_TRANSFORM.command, NEEDLE.command
+AXE = Package("axe-core", "4.14.1", "axe")
+GLTF_VALIDATOR = Package("gltf-validator", "2.0.0-dev.3.10", "gltf")
+TYPESCRIPT = Package("typescript", "5.9.3", "typescript")
+X_ITE = Package("x_ite", "15.0.1", "x_ite")
+#: Those that tests need.
+TESTED = (THREE, GLTF_TRANSFORM, NEEDLE, ESBUILD, AXE, GLTF_VALIDATOR, TYPESCRIPT, X_ITE)
+
+
+def main() -> None:
+    """Never fails: tests report what is missing."""
+    for package in TESTED:
+        if package.missing:
+            print(f"Installing {package.name} for the tests …", flush=True)
+            done = subprocess.run(package.command.split(), cwd=ROOT, stdout=sys.stderr)
+            if done.returncode:
+                print(f"Could not install {package.name}; a test will be skipped.")
+
+
+if __name__ == "__main__":
+    main()
