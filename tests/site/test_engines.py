@@ -31,8 +31,9 @@ from .test_forms import OCTREE_FAULTS, SET_FAULTS, check_texels
 from .test_page import LEVELS, as_held, read
 from .test_previews import KINDS, shown_by
 from .test_statues import LEVELS as OCTREE_LEVELS, address, pose
+from .test_tour import tour_file, toured
 
-__all__ = ["walk_file", "world"]
+__all__ = ["tour_file", "toured", "walk_file", "world"]
 
 WIDTH, HEIGHT = 512, 384
 #: What follows the address of each form's page.
@@ -126,6 +127,28 @@ def test_keys(engine: Engine, museum: Site) -> None:
             names.append(name)
             engine.press("Tab")
     assert len(names) > 5
+    assert visitor.messages == []
+
+
+def test_a_tour_by_keyboard(engine: Engine, toured: Site) -> None:
+    """To the next stop and back, whose label has the focus; a marker opens it again."""
+    label = "document.querySelector('#label')"
+    with visiting_by(engine, toured.entries, query="?lang=en") as visitor:
+        visitor.until("window.ptm.tour")
+        visitor.complete()
+        engine.evaluate("document.querySelector('#view').focus()")
+        for key, stop in (("n", 0), ("n", 1), ("p", 0)):
+            engine.press(key)
+            visitor.until(f"window.ptm.tour.stop === {stop}")
+            visitor.complete()
+        visitor.until("document.activeElement.textContent === 'Night'")
+        engine.press("Escape")
+        visitor.until(f"{label}.hidden && document.activeElement.id === 'view'")
+        visitor.until("window.ptm.tour.markers.shown.includes(0)")
+        engine.evaluate("document.querySelector('#markers button').focus()")
+        engine.press("Enter")
+        visitor.until(f"!{label}.hidden")
+        assert engine.evaluate("window.broken === undefined")
     assert visitor.messages == []
 
 
