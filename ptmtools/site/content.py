@@ -41,7 +41,16 @@ from ptmtools.site.about import (
 from ptmtools.site.catalogue import ANGLE, Content, catalogue_of
 from ptmtools.site.entry import DIGITS, Entry, state_of
 from ptmtools.site.geometry import lean_glb
-from ptmtools.site.program import HTML, INDEX, address_of, element, page, program_files
+from ptmtools.site.program import (
+    HTML,
+    INDEX,
+    address_of,
+    element,
+    page,
+    program_files,
+    registration,
+    worker,
+)
 from ptmtools.site.security import secured
 from ptmtools.site.sets import has_sets, is_of_sets, set_entries
 from ptmtools.site.textures import web_texture, without_exact
@@ -114,6 +123,11 @@ class SiteOptions:
         "Labels and stops (docs/formats/tour.md), or none. Default: tour.json in the folder that "
         "contains the database, if it exists.",
         metavar="FILE",
+    )
+    offline: bool = option(
+        False,
+        "Let browsers keep what a visitor has seen, so that the walk works without a network "
+        "(docs/formats/offline.md). The host needs https.",
     )
     clients: Literal["page", "vrml"] = option(
         "page",
@@ -300,7 +314,12 @@ class _Builder:
             self._options.address,
         )
         script = program["viewer.js"].name
-        self._entries[INDEX] = page(settings, script, preload, views, [*about.lines()])
+        head = [*about.lines()]
+        if self._options.offline:
+            own = worker()
+            self._entries[own.name] = own
+            head.append(registration(program))
+        self._entries[INDEX] = page(settings, script, preload, views, head)
         self._manifest()
 
     def _manifest(self) -> None:

@@ -22,6 +22,7 @@ HTML, JAVASCRIPT = "text/html; charset=utf-8", "text/javascript; charset=utf-8"
 #: Scripts that few visits need.
 LATER = (
     *("later.js", "compare.js", "statues.js", "reliefs.js", "sets.js", "tour.js", "embedded.js"),
+    "register.js",
     *(f"words-{language}.js" for language in LANGUAGES if language != "en"),
 )
 #: The media type of each file.
@@ -33,6 +34,8 @@ PROGRAM = {
 }
 #: Defines the element for pages that embed a walk.
 ELEMENT = "ptm-walk.js"
+#: The service worker of sites that work without a network: its folder is what it serves.
+WORKER = "offline.js"
 #: The page of other forms, and their scripts (`ptmtools.site.forms`).
 FORM_PAGE, FORM_SCRIPTS = "form.html", ("apo.js", "interlace.js", "campus.js")
 _FIELD = re.compile(r"\{\{(\w+)\}\}")
@@ -115,6 +118,17 @@ def page(
 def element() -> Entry:
     """The script of ``<ptm-walk>``, for pages that embed the walk; its name never changes."""
     return Entry(ELEMENT, _built(ELEMENT), JAVASCRIPT, compressed=True)
+
+
+def worker() -> Entry:
+    """The service worker; browsers look for a new one under the same name."""
+    return Entry(WORKER, _built(WORKER), JAVASCRIPT, compressed=True)
+
+
+def registration(program: Mapping[str, Entry]) -> str:
+    """The element of the head that installs the service worker, after the page itself."""
+    url = program["register.js"].name
+    return f'<script>addEventListener("load", () => import("./{url}"))</script>'
 
 
 def form_script(name: str) -> Entry:

@@ -34,7 +34,10 @@ FORMS = HERE / "forms"
 WORDS, ENGLISH = ROOT / "ptmtools" / "site" / "words", HERE / "words" / "english.js"
 OUTPUT = ROOT / "ptmtools" / "site" / "page"
 #: Scripts that the page loads when it needs them.
-LATER = ("later.js", "compare.js", "statues.js", "reliefs.js", "sets.js", "tour.js", "embedded.js")
+LATER = (
+    *("later.js", "compare.js", "statues.js", "reliefs.js", "sets.js", "tour.js", "embedded.js"),
+    "register.js",
+)
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _WORD = re.compile(r"\[\[(\w+)\]\]")
 _LINE_END = re.compile(r"\s*\n\s*")
@@ -130,6 +133,7 @@ def build(folder: Path) -> None:
         },
         # Of `ptm serve --edit` alone.
         "editor.js": script(HERE / "editor.js"),
+        "offline.js": script(HERE / "offline.js"),
         "ptm-walk.js": minified(ROOT / "web" / "embed" / "ptm-walk.js"),
         "worker.js": minified(PTM / "worker.js"),
         "decoder.wasm": (PTM / "decoder.wasm").read_bytes(),

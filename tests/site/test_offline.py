@@ -1,0 +1,214 @@
+"""Sites of `ptm publish --offline`: visited once, they work without a network."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from browser import Visitor, image_of
+from numpy.typing import NDArray
+
+from ptmtools.cli.main import main
+from ptmtools.site.about import MANIFEST
+from ptmtools.site.content import Site, SiteOptions, site_of
+from ptmtools.site.program import INDEX, WORKER
+from ptmtools.site.publishing import weight_of
+from ptmtools.site.serving import serving
+from ptmtools.site.throttle import Visits
+from ptmtools.store.layout import sha256
+
+#: Whether the browser keeps the page and every byte of the textures that it has received.
+KEPT = """
+async () => {
+  const names = await caches.keys(), cache = names.length === 1 && await caches.open(names[0]);
+  if (!cache || !(await cache.match("./"))) return false;
+  const keys = (await cache.keys()).map(({ url }) => url), { stream } = ptm.walk;
+  const has = (url, byte) => keys.some((key) => {
+    const [, begin, end] = key.match(/^.*[?]bytes=([0-9]+)-([0-9]+)/) ?? [];
+    return key.startsWith(url) && Number(begin) <= byte && byte <= Number(end);
+  });
+  const { cells } = ptm.index, received = stream.files.map(({ length }) => length);
+  const keeps = (kind, c) => keys.includes(stream.site.cell(kind, c));
+  return received.every((length, t) => !length || (has(stream.url("texture", t), 0)
+      && has(stream.url("texture", t), length - 1)))
+    && cells.every((_, c) => !stream.records.has(c) || keeps("record", c))
+    && cells.every((_, c) => !stream.shapes.has(c) || keeps("geometry", c));
+}
+"""
+#: Everything of the site is here.
+ALL = "ptm.walk.exact && s.pending === 0 && ptm.walk.client.next(ptm.walk.estimate) === null"
+
+
+#: The names that the browser keeps.
+NAMES = """
+async () => {
+  const keys = [];
+  for (const name of await caches.keys()) keys.push(...(await (await caches.open(name)).keys()));
+  return keys.map(({ url }) => new URL(url).pathname.slice(1));
+}
+"""
+GONE = """
+async () => {
+  const registrations = await navigator.serviceWorker.getRegistrations();
+  return registrations.length + (await caches.keys()).length === 0;
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def site(two_rooms: Path) -> Site:
+    return site_of(two_rooms, SiteOptions(pictures=False, offline=True))
+
+
+@contextmanager
+def browsing(chromium: Any) -> Iterator[Any]:
+    """A browser whose pages keep their policies."""
+    context = chromium.new_context(viewport={"width": 320, "height": 240}, reduced_motion="reduce")
+    try:
+        yield context
+    finally:
+        context.close()
+
+
+@contextmanager
+def open_page(context: Any, url: str) -> Iterator[Visitor]:
+    page = context.new_page()
+    visitor = Visitor(page, url, Visits())
+    page.on("console", lambda said: visitor.hear(f"{said.type}: {said.text}"))
+    page.on("pageerror", lambda fault: visitor.messages.append(f"error: {fault}"))
+    page.goto(url)
+    yield visitor
+    page.close()
+
+
+def picture_of(visitor: Visitor) -> NDArray[np.uint8]:
+    """The window: the policy of the page forbids the style of `Visitor.picture`."""
+    return image_of(visitor.page.screenshot())
+
+
+def forget(visitor: Visitor) -> None:
+    """Empties the cache of HTTP, not that of service workers."""
+    session = visitor.page.context.new_cdp_session(visitor.page)
+    session.send("Network.clearBrowserCache")
+
+
+def port_of(url: str) -> int:
+    return int(url.rstrip("/").rpartition(":")[2])
+
+
+def wait_for(visitor: Visitor, condition: str) -> None:
+    """Of an asynchronous function of the page."""
+    late = time.monotonic() + 60
+    while not visitor.page.evaluate(condition):
+        assert time.monotonic() < late, condition
+        visitor.frames(5)
+
+
+def keeps(visitor: Visitor) -> None:
+    """Waits until the browser keeps what the page has received."""
+    visitor.until(ALL)
+    wait_for(visitor, KEPT)
+
+
+def test_a_visited_walk_without_a_network(chromium: Any, site: Site) -> None:
+    """The same picture, at the beginning and at another place; a second visit downloads documents
+    alone."""
+    last = len(site.index["viewpoints"]) - 1
+    visits, again = Visits(), Visits()
+    with browsing(chromium) as context, ExitStack() as running:
+        url = running.enter_context(serving(site.entries, visits=visits))
+        with open_page(context, url) as visitor:
+            keeps(visitor)
+            pictures = [picture_of(visitor)]
+            visitor.page.evaluate("(place) => ptm.goTo(place)", last)
+            visitor.frames(2)
+            visitor.until(ALL)
+            keeps(visitor)
+            pictures.append(picture_of(visitor))
+            forget(visitor)
+        assert visitor.messages == []
+        running.close()
+        with serving(site.entries, port=port_of(url), visits=again), open_page(context, url) as one:
+            one.until(ALL)
+        names = {visit.path.lstrip("/") for visit in again}
+        assert names <= {"", WORKER, MANIFEST}, names
+        with open_page(context, url) as visitor:
+            visitor.until(ALL)
+            assert np.array_equal(picture_of(visitor), pictures[0])
+            visitor.page.evaluate("(place) => ptm.goTo(place)", last)
+            visitor.frames(2)
+            visitor.until(ALL)
+            assert np.array_equal(picture_of(visitor), pictures[1])
+            assert visitor.page.evaluate("ptm.errors") == []
+        assert visitor.messages == []
+
+
+def exchanged(site: Site) -> Site:
+    """A later version of a site: two textures have changed places."""
+    (old,) = (name for name in site.entries if name.startswith("data/index-"))
+    index = json.loads(site.entries[old].read())
+    rows = index["textures"]
+    places = [k for k, row in enumerate(rows) if "room_" in row["file"]]
+    rows[places[0]], rows[places[1]] = rows[places[1]], rows[places[0]]
+    data = json.dumps(index).encode()
+    new = f"data/index-{sha256(data)[:10]}.json"
+    entries = {name: entry for name, entry in site.entries.items() if name != old}
+    entries[new] = replace(site.entries[old], name=new, source=data)
+    text = entries[INDEX].read().decode().replace(old, new)
+    entries[INDEX] = replace(entries[INDEX], source=text.encode())
+    return Site(entries, index)
+
+
+def test_a_new_version_takes_the_place_of_the_old(chromium: Any, two_rooms: Path) -> None:
+    """Also without a network; what it does not name is removed. Published without `--offline`, the
+    site leaves nothing in the browser."""
+    plain = SiteOptions(pictures=False, opening=False)
+    before = site_of(two_rooms, replace(plain, offline=True))
+    after = exchanged(before)
+    (old,) = before.entries.keys() - after.entries.keys()
+    with browsing(chromium) as context:
+        with serving(before.entries) as url, open_page(context, url) as visitor:
+            keeps(visitor)
+            first = picture_of(visitor)
+            assert old in visitor.page.evaluate(NAMES)
+        port = port_of(url)
+        with serving(after.entries, port=port), open_page(context, url) as visitor:
+            keeps(visitor)
+            second = picture_of(visitor)
+            assert not np.array_equal(first, second)
+            wait_for(visitor, f"async () => !(await ({NAMES})()).includes('{old}')")
+            kept = visitor.page.evaluate(NAMES)
+            assert any(name.endswith(".ptm") for name in kept)
+            assert all(name in after.entries for name in kept if name)
+            forget(visitor)
+        with open_page(context, url) as visitor:
+            visitor.until(ALL)
+            assert np.array_equal(picture_of(visitor), second)
+        entries = site_of(two_rooms, plain).entries
+        with serving(entries, port=port), open_page(context, url) as visitor:
+            visitor.until(ALL)
+            wait_for(visitor, GONE)
+            assert np.array_equal(picture_of(visitor), first)
+        assert visitor.messages == []
+
+
+def test_other_sites_do_not_grow(site: Site, two_rooms: Path) -> None:
+    plain = site_of(two_rooms, SiteOptions(pictures=False))
+    assert site.entries.keys() - plain.entries.keys() == {WORKER}
+    assert "register.js" not in plain.entries[INDEX].read().decode()
+    assert weight_of(site).whole - weight_of(plain).whole < 200
+
+
+def test_the_command_writes_and_removes_the_script(two_rooms: Path, tmp_path: Path) -> None:
+    words = ["-q", "publish", str(two_rooms), "-o", str(tmp_path / "site"), "--no-pictures"]
+    assert main([*words, "--offline"]) == 0
+    assert (tmp_path / "site" / WORKER).exists()
+    assert main(words) == 0
+    assert not (tmp_path / "site" / WORKER).exists()

@@ -1,0 +1,116 @@
+// What a site keeps of files that come in ranges (web/page/offline): a line of JSON for each case.
+// node store.mjs PAGE
+
+import { pathToFileURL } from "node:url";
+
+const { Store } = await import(pathToFileURL(`${process.argv[2]}/offline/store.js`));
+const URL_OF = "https://site.test/data/a-0123456789.ptm", SIZE = 1000;
+const FILE = Uint8Array.from({ length: SIZE }, (_, k) => k % 251);
+
+/** A cache; `room` bytes fit into it. */
+function shelf(room = Infinity) {
+  const rows = new Map();
+  return {
+    rows,
+    keys: async () => [...rows.keys()].map((url) => ({ url })),
+    match: async (key) => rows.get(key)?.clone(),
+    delete: async (key) => rows.delete(key),
+    put: async (key, response) => {
+      const body = await response.arrayBuffer();
+      room -= body.byteLength;
+      if (room < 0) throw new DOMException("no room", "QuotaExceededError");
+      rows.set(key, new Response(body));
+    },
+  };
+}
+
+/** A host of the file, and the ranges that it was asked for. */
+function host({ ranges = true, file = FILE, status = 0 } = {}) {
+  const asked = [];
+  return {
+    asked,
+    ask: async (request) => {
+      const [, begin, last] = /bytes=(\d+)-(\d+)/.exec(request.headers.get("range") ?? "bytes=0-999").map(Number);
+      asked.push([begin, last + 1]);
+      if (status) return new Response("no", { status });
+      if (!ranges) return new Response(file);
+      const headers = { "content-range": `bytes ${begin}-${last}/${SIZE}` };
+      return new Response(file.slice(begin, last + 1), { status: 206, headers });
+    },
+  };
+}
+
+/** The answer to a range, after what goes on behind it. */
+async function read(store, begin, end, cache = "default") {
+  const work = [];
+  const request = new Request(URL_OF, { headers: { range: `bytes=${begin}-${end - 1}` }, cache });
+  const response = await store.answer(request, URL_OF, (one) => work.push(one));
+  const body = new Uint8Array(await response.arrayBuffer());
+  await Promise.all(work);
+  const { status } = response, range = response.headers.get("content-range");
+  const from = status === 200 ? 0 : begin;
+  return { status, range, length: body.length, right: body.every((byte, k) => byte === FILE[from + k]) };
+}
+
+const print = (name, row) => console.log(JSON.stringify({ name, ...row }));
+
+/** Reads ranges from a good host with a cache. */
+async function reads(name, ranges, options = {}) {
+  const { asked, ask } = host(options), cache = shelf(options.room);
+  const answers = [];
+  for (const [begin, end] of ranges) {
+    // Browsers end a worker when they like.
+    answers.push(await read(new Store(async () => cache, ask), begin, end));
+  }
+  print(name, { asked, answers, kept: [...cache.rows.keys()].map((key) => key.split("?")[1]) });
+}
+
+await reads("twice", [[0, 100], [0, 100]]);
+await reads("within", [[0, 100], [100, 300], [50, 250]]);
+await reads("longer", [[0, 100], [0, 300]]);
+await reads("between", [[0, 100], [200, 300], [0, 300], [0, 300]]);
+await reads("whole", [[0, 100], [500, 600]], { ranges: false });
+await reads("full", [[0, 100], [100, 200], [0, 200]], { room: 150 });
+await reads("down", [[0, 100]], { status: 503 });
+
+{
+  // Damaged on the way; the page notices it, and asks past caches.
+  const cache = shelf(), bad = host({ file: FILE.map((byte) => byte ^ 1) }), good = host();
+  const first = await read(new Store(async () => cache, bad.ask), 0, 300);
+  const second = await read(new Store(async () => cache, good.ask), 100, 200, "no-store");
+  const third = await read(new Store(async () => cache, good.ask), 100, 200);
+  print("damaged", { answers: [first, second, third], asked: good.asked, kept: [...cache.rows.keys()].length });
+}
+{
+  // The browser has emptied the cache meanwhile.
+  const cache = shelf(), { asked, ask } = host(), store = new Store(async () => cache, ask);
+  await read(store, 0, 100);
+  cache.rows.clear();
+  print("emptied", { answers: [await read(store, 0, 100), await read(store, 0, 100)], asked });
+}
+{
+  // Without a network.
+  const cache = shelf(), { ask } = host();
+  await read(new Store(async () => cache, ask), 0, 100);
+  const lost = new Store(async () => cache, async () => Promise.reject(new TypeError("no network")));
+  const beyond = await read(lost, 50, 150).catch((fault) => String(fault));
+  print("lost", { answers: [await read(lost, 20, 80)], beyond });
+}
+{
+  // Any ranges in any order: the answers are right, and no byte that is kept is asked for at an end of a range.
+  let seed = 1;
+  const random = (n) => (seed = (seed * 48271) % 2147483647) % n;
+  const has = new Set(), cache = shelf(), { asked, ask } = host();
+  let wrong = 0, needless = 0;
+  for (let k = 0; k < 400; k++) {
+    const begin = random(SIZE - 1), end = begin + 1 + random(Math.min(200, SIZE - begin - 1) + 1);
+    const before = asked.length;
+    const answer = await read(new Store(async () => cache, ask), begin, Math.min(end, SIZE));
+    wrong += !answer.right || answer.length !== Math.min(end, SIZE) - begin;
+    for (const [a, b] of asked.slice(before)) {
+      needless += has.has(a) || has.has(b - 1);
+      for (let byte = a; byte < b; byte++) has.add(byte);
+    }
+  }
+  print("random", { wrong, needless, requests: asked.length });
+}

@@ -1,0 +1,91 @@
+"""What a browser keeps of a site for visits without a network: files that come in ranges; run by
+node. `tests/site/test_offline.py` has it in a browser."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.web.node import HERE, missing, run
+
+PAGE = Path(__file__).resolve().parents[2] / "web" / "page"
+
+
+@pytest.fixture(scope="module")
+def rows(require: Callable[[str, str], None]) -> dict[str, dict[str, Any]]:
+    """By the name of a case: the ranges that the host was asked for, the answers to the page, and
+    what is kept in the end."""
+    if remedy := missing():
+        require("node", remedy)
+    lines = run(HERE / "store.mjs", PAGE).splitlines()
+    return {row["name"]: row for row in map(json.loads, lines)}
+
+
+def test_a_range_is_asked_for_once(rows: dict[str, dict[str, Any]]) -> None:
+    row = rows["twice"]
+    assert row["asked"] == [[0, 100]]
+    expected = {"status": 206, "range": "bytes 0-99/1000", "length": 100, "right": True}
+    assert row["answers"] == [expected, expected]
+
+
+@pytest.mark.parametrize(
+    ("case", "asked", "kept"),
+    [
+        ("within", [[0, 100], [100, 300]], ["bytes=0-99/1000", "bytes=100-299/1000"]),
+        ("longer", [[0, 100], [100, 300]], ["bytes=0-99/1000", "bytes=100-299/1000"]),
+        ("between", [[0, 100], [200, 300], [100, 200]], None),
+    ],
+)
+def test_of_ranges_only_what_is_missing(
+    rows: dict[str, dict[str, Any]], case: str, asked: list[list[int]], kept: list[str] | None
+) -> None:
+    row = rows[case]
+    assert row["asked"] == asked
+    assert all(answer["right"] and answer["status"] == 206 for answer in row["answers"])
+    assert kept is None or row["kept"] == kept
+
+
+def test_a_host_that_ignores_ranges_sends_a_file_once(rows: dict[str, dict[str, Any]]) -> None:
+    row = rows["whole"]
+    assert [(answer["status"], answer["length"]) for answer in row["answers"]] == [
+        (200, 1000),
+        (206, 100),
+    ]
+    assert (len(row["asked"]), row["kept"]) == (1, ["bytes=0-999/1000"])
+
+
+def test_without_room_or_a_host_the_page_gets_its_answer(
+    rows: dict[str, dict[str, Any]],
+) -> None:
+    full = rows["full"]
+    assert all(answer["right"] and answer["status"] == 206 for answer in full["answers"])
+    assert full["kept"] == ["bytes=0-99/1000"]
+    assert [answer["status"] for answer in rows["down"]["answers"]] == [503]
+    assert rows["down"]["kept"] == []
+
+
+def test_damaged_bytes_are_replaced(rows: dict[str, dict[str, Any]]) -> None:
+    row = rows["damaged"]
+    assert [answer["right"] for answer in row["answers"]] == [False, True, True]
+    assert (row["asked"], row["kept"]) == ([[100, 200]], 1)
+
+
+def test_what_the_browser_removed_is_asked_for_again(rows: dict[str, dict[str, Any]]) -> None:
+    assert all(answer["right"] for answer in rows["emptied"]["answers"])
+    assert rows["emptied"]["asked"] == [[0, 100], [0, 100]]
+
+
+def test_without_a_network(rows: dict[str, dict[str, Any]]) -> None:
+    """The page learns what is not here as it does otherwise."""
+    assert [answer["right"] for answer in rows["lost"]["answers"]] == [True]
+    assert rows["lost"]["beyond"] == "TypeError: no network"
+
+
+def test_any_ranges_in_any_order(rows: dict[str, dict[str, Any]]) -> None:
+    row = rows["random"]
+    assert (row["wrong"], row["needless"]) == (0, 0)
+    assert 20 < row["requests"] < 200

@@ -1,0 +1,29 @@
+// The service worker of sites that were published with `--offline`: a walk that was visited works without a
+// network. Documents come from the host if it answers; files with a hash in their name are fetched once.
+
+import { Store } from "./offline/store.js";
+import { Visits } from "./offline/visits.js";
+
+const worker = /** @type {any} */ (globalThis);
+const { scope } = worker.registration;
+/** Sites of one origin share its storage. */
+const NAME = `ptm-walk ${scope}`;
+
+const visits = new Visits(
+  new Store(() => caches.open(NAME), (request) => fetch(request)),
+  scope,
+  async () => {
+    await worker.registration.unregister();
+    await caches.delete(NAME);
+  },
+);
+/** @param {any} event */
+const laterOf = (event) => (/** @type {Promise<unknown>} */ work) => event.waitUntil(work.catch(() => {}));
+
+worker.oninstall = () => worker.skipWaiting();
+worker.onactivate = (/** @type {any} */ event) => event.waitUntil(worker.clients.claim());
+worker.onfetch = (/** @type {any} */ event) => {
+  const answer = visits.answer(event.request, laterOf(event));
+  if (answer) event.respondWith(answer);
+};
+worker.onmessage = (/** @type {any} */ event) => laterOf(event)(visits.keep(event.data));

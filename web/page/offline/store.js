@@ -1,0 +1,170 @@
+// The files of a site that a browser keeps: whole ones, and spans of those that come in ranges. Names change with
+// contents, so what is kept is right for ever; a file that was damaged is asked for with `no-store` and replaced.
+
+import { answeredSpan, askedSpan, bytesOf, coverOf, keyOf, missingOf, rangeOf, spanOfKey } from "./spans.js";
+
+/** @typedef {import("./spans.js").Span} Span */
+/** @typedef {Span & {total: number, key: string}} Kept */
+/** @typedef {(work: Promise<unknown>) => void} Later what goes on after the answer */
+/** The part of a browser's `Cache` that is used.
+ * @typedef {object} Shelf
+ * @property {(key: string, options?: CacheQueryOptions) => Promise<Response | undefined>} match
+ * @property {(key: string, response: Response) => Promise<void>} put
+ * @property {(key: string) => Promise<boolean>} delete
+ * @property {() => Promise<readonly {url: string}[]>} keys
+ */
+
+const PAST = ["no-store", "reload"];
+/** What hosts say `Vary` about does not differ for one page. */
+const ANY = { ignoreVary: true };
+
+export class Store {
+  /** The spans of files, by URL. @type {Promise<Map<string, Kept[]>> | null} */
+  #spans = null;
+  /** Whether nothing is kept any more. */
+  closed = false;
+
+  /** @param {() => Promise<Shelf>} open @param {(request: Request | string) => Promise<Response>} ask the host */
+  constructor(open, ask) {
+    this.open = open;
+    this.ask = ask;
+  }
+
+  /** Keeps an answer; without room, nothing happens. @param {string} key @param {Response} response */
+  async put(key, response) {
+    try {
+      if (this.closed) return false;
+      await (await this.open()).put(key, response);
+      return true;
+    } catch {
+      return false;
+    }
+  }
+
+  /** @param {string} key */
+  async match(key) {
+    return (await this.open()).match(key, ANY);
+  }
+
+  /** @param {string} key */
+  async delete(key) {
+    const span = spanOfKey(key);
+    if (span) {
+      const spans = await this.#all(), rows = spans.get(span.url) ?? [];
+      spans.set(span.url, rows.filter((row) => row.key !== key));
+    }
+    return (await this.open()).delete(key);
+  }
+
+  async keys() {
+    return (await (await this.open()).keys()).map(({ url }) => url);
+  }
+
+  #all() {
+    const read = async () => {
+      /** @type {Map<string, Kept[]>} */
+      const spans = new Map();
+      for (const key of await this.keys()) {
+        const span = spanOfKey(key);
+        if (span) spans.set(span.url, [...(spans.get(span.url) ?? []), { ...span, key }]);
+      }
+      return spans;
+    };
+    return (this.#spans ??= read());
+  }
+
+  /** @param {string} url */
+  async spans(url) {
+    return (await this.#all()).get(url) ?? [];
+  }
+
+  /**
+   * Keeps bytes of a file, in place of spans that they have.
+   * @param {string} url @param {number} begin @param {Uint8Array<ArrayBuffer>} bytes
+   * @param {number} total bytes of the file
+   */
+  async keep(url, begin, bytes, total) {
+    const span = { begin, end: begin + bytes.length }, key = keyOf(url, span, total);
+    if (!bytes.length || !(await this.put(key, new Response(bytes)))) return;
+    const all = await this.#all(), rows = all.get(url) ?? [];
+    const within = rows.filter((row) => row.key !== key && row.begin >= begin && row.end <= span.end);
+    all.set(url, [...rows.filter((row) => row.key !== key && !within.includes(row)), { ...span, total, key }]);
+    for (const row of within) await (await this.open()).delete(row.key);
+  }
+
+  /**
+   * The answer to a request for a file, or a range of it: of what is kept, and of the host what is missing.
+   * Rejects as the host does.
+   * @param {Request} request @param {string} url without a query @param {Later} later
+   */
+  async answer(request, url, later) {
+    const header = request.headers.get("range"), span = askedSpan(header);
+    const past = PAST.includes(request.cache);
+    if (span) return this.#range(request, url, span, past, later);
+    const kept = past || header ? null : await this.match(url);
+    if (kept) return kept;
+    const response = await this.ask(request);
+    if (response.status === 200) later(this.put(url, response.clone()));
+    return response;
+  }
+
+  /** @param {Request} request @param {string} url @param {Span} span @param {boolean} past @param {Later} later */
+  async #range(request, url, span, past, later) {
+    const gap = missingOf(past ? [] : await this.spans(url), span);
+    const none = gap?.begin === span.begin && gap.end === span.end;
+    if (gap && !none) {
+      /** @type {Promise<unknown>[]} */
+      const work = [];
+      const rest = new Request(request, { headers: { range: rangeOf(gap) } });
+      const response = await this.#fetched(rest, url, past, (one) => later((work.push(one), one)));
+      if (response.status !== 206) return response;
+      await Promise.all(work);
+    }
+    return (none ? null : await this.#composed(url, span)) ?? this.#fetched(request, url, past, later);
+  }
+
+  /** The host's answer, of which the bytes are kept. Hosts that ignore ranges send the file.
+   * @param {Request} request @param {string} url @param {boolean} past @param {Later} later */
+  async #fetched(request, url, past, later) {
+    const response = await this.ask(request), whole = response.status === 200;
+    const answered = answeredSpan(response.headers.get("content-range"));
+    if (whole || (response.status === 206 && answered)) {
+      later(this.#store(response.clone(), url, whole ? null : answered, past));
+    }
+    return response;
+  }
+
+  /**
+   * @param {Response} response @param {string} url
+   * @param {Span & {total: number} | null} span null for the file; @param {boolean} past whether others are wrong
+   */
+  async #store(response, url, span, past) {
+    const bytes = new Uint8Array(await response.arrayBuffer());
+    const { begin, end, total } = span ?? { begin: 0, end: bytes.length, total: bytes.length };
+    if (bytes.length !== end - begin) return;
+    if (past) {
+      const wrong = (await this.spans(url)).filter((row) => row.begin < end && row.end > begin);
+      for (const row of wrong) await this.delete(row.key);
+    }
+    await this.keep(url, begin, bytes, total);
+  }
+
+  /** A range of what is kept; null if bytes of it have gone. @param {string} url @param {Span} span */
+  async #composed(url, span) {
+    const cover = coverOf(await this.spans(url), span), parts = [];
+    for (const { key, begin } of cover) {
+      const kept = await this.match(key);
+      if (!kept) {
+        await this.delete(key);
+        return null;
+      }
+      parts.push({ begin, bytes: new Uint8Array(await kept.arrayBuffer()) });
+    }
+    if (!cover.length) return null;
+    const headers = {
+      "content-range": `bytes ${span.begin}-${span.end - 1}/${cover[0].total}`,
+      "content-length": String(span.end - span.begin),
+    };
+    return new Response(bytesOf(parts, span), { status: 206, headers });
+  }
+}

@@ -1,0 +1,131 @@
+// The visits of a site: its page as it was last, what the visitor has seen of it, and what goes with a new version.
+
+import { isDocument, isFile, isList, markOf, marksIn, nameOf, neededBy } from "./names.js";
+import { missingOf } from "./spans.js";
+
+/** @typedef {import("./store.js").Store} Store */
+/** @typedef {import("./store.js").Later} Later */
+/** What a page has received, part of it before this script.
+ * @typedef {object} Received
+ * @property {string} index URL of the index
+ * @property {string[]} files URLs of whole files
+ * @property {[string, number][]} textures URLs, and the bytes received of each
+ */
+
+/** Of a page of `ptm publish`, and of one with `--offline`. */
+const PAGE = 'id="site"', HOOK = /viewer-[0-9a-f]{10}\/register\.js/;
+
+export class Visits {
+  /**
+   * @param {Store} store @param {string} scope URL of the site, with a slash at its end
+   * @param {() => Promise<unknown>} leave ends all of this: the site is no longer published so
+   */
+  constructor(store, scope, leave) {
+    this.store = store;
+    this.scope = scope;
+    this.leave = leave;
+  }
+
+  /**
+   * The answer to a request; null for one that is not the site's.
+   * @param {Request} request @param {Later} later @returns {Promise<Response> | null}
+   */
+  answer(request, later) {
+    const name = request.method === "GET" && !this.store.closed ? nameOf(request.url, this.scope) : null;
+    if (name === null) return null;
+    if (isFile(name)) return this.store.answer(request, this.scope + name, later);
+    return isDocument(name) ? this.#document(request, name === "index.html" ? "" : name, later) : null;
+  }
+
+  /** As the host has it now, or else as it was. @param {Request} request @param {string} name @param {Later} later */
+  async #document(request, name, later) {
+    const key = this.scope + name;
+    let response;
+    try {
+      response = await this.store.ask(request);
+    } catch (fault) {
+      const kept = await this.store.match(key);
+      if (kept) return kept;
+      throw fault;
+    }
+    if (response.status === 404 || response.status === 410) later(this.store.delete(key));
+    else if (response.status === 200) later(name ? this.store.put(key, response.clone()) : this.#learn(response.clone()));
+    return response;
+  }
+
+  /** Takes a page as the last one, once its files are here. @param {Response} response */
+  async #learn(response) {
+    const html = await response.text(), { store, scope } = this;
+    // Networks that ask for a password answer for the host.
+    if (!html.includes(PAGE)) return;
+    if (!HOOK.test(html)) {
+      store.closed = true;
+      return void (await this.leave());
+    }
+    const before = await (await store.match(scope))?.text();
+    for (const name of neededBy(html)) await this.#hold(scope + name);
+    if (before === html) return;
+    await store.put(scope, new Response(html, { headers: { "content-type": "text/html; charset=utf-8" } }));
+    if (before) await this.#tidy(html);
+  }
+
+  /** Fetches a file unless it is kept; rejects if it cannot be had. @param {string} url @param {number} [length] */
+  async #hold(url, length) {
+    if (length && !missingOf(await this.store.spans(url), { begin: 0, end: length })) return;
+    /** @type {Promise<unknown>[]} */
+    const work = [];
+    const headers = length ? { range: `bytes=0-${length - 1}` } : undefined;
+    const response = await this.store.answer(new Request(url, { headers }), url, (one) => work.push(one));
+    await response.body?.cancel();
+    if (!response.ok) throw new Error(`status ${response.status}`);
+    await Promise.all(work);
+  }
+
+  /** Removes the files that the page and its documents do not name. @param {string} html */
+  async #tidy(html) {
+    const { store, scope } = this, named = new Set(marksIn(html));
+    const kept = (await store.keys()).map((key) => ({ key, name: nameOf(key, scope) ?? "" }));
+    // The index comes first, which names the others.
+    for (const { key, name } of kept.sort((a, b) => (a.name < b.name ? -1 : 1))) {
+      if (!isList(name) || (isFile(name) && !named.has(markOf(name)))) continue;
+      for (const mark of marksIn((await (await store.match(key))?.text()) ?? "")) named.add(mark);
+    }
+    for (const { key, name } of kept) if (isFile(name) && !named.has(markOf(name))) await store.delete(key);
+  }
+
+  /** Keeps what a page has received. @param {Received} received */
+  async keep({ index, files, textures }) {
+    const { store, scope } = this;
+    const own = files.filter((url) => isFile(nameOf(url, scope) ?? ""));
+    for (const url of own) await this.#hold(url).catch(() => {});
+    for (const url of own) if (url.includes("/data/opening-")) await this.#unpack(url, index).catch(() => {});
+    for (const [url, length] of textures) await this.#hold(url, length).catch(() => {});
+    if (!(await store.match(scope))) await this.#learn(await store.ask(scope));
+  }
+
+  /**
+   * Keeps the parts of an opening as the files that they are: another view needs them, too
+   * (docs/formats/hints.md). @param {string} url @param {string} index
+   */
+  async #unpack(url, index) {
+    const { store } = this;
+    const bytes = new Uint8Array(await (await store.match(url))?.arrayBuffer() ?? new ArrayBuffer(0));
+    const { cells, textures } = await (await store.match(index))?.json();
+    const length = new DataView(bytes.buffer).getUint32(0, true);
+    const { parts } = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + length)));
+    const previews = textures.flatMap((/** @type {any} */ row) => row.previews ?? []);
+    let at = 4 + length;
+    for (const [kind, number, size] of parts) {
+      const part = bytes.slice(at, (at += size));
+      const row = kind === "texture" ? textures[number] : kind === "preview" ? previews[number] : null;
+      const file = new URL(row ? row.file : cells[number][kind], index).href;
+      if (kind === "texture") {
+        const span = { begin: 0, end: size };
+        if (missingOf(await store.spans(file), span)) await store.keep(file, 0, part, row.ends.at(-1));
+      } else if (!(await store.match(file))) {
+        const body = new Blob([part]).stream();
+        await store.put(file, new Response(row ? body : body.pipeThrough(new DecompressionStream("gzip"))));
+      }
+    }
+  }
+}
