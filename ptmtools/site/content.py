@@ -16,10 +16,10 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Literal, TypeVar
+from typing import Any, ClassVar, Literal
 from urllib.parse import quote, unquote
 
-from ptmtools.errors import DatabaseError, InputError, LimitError, Rebuild
+from ptmtools.errors import DatabaseError, InputError, Rebuild
 from ptmtools.files import open_regular
 from ptmtools.options import option
 from ptmtools.output.emission import compressed
@@ -28,40 +28,17 @@ from ptmtools.output.served import FORM, Served, read_served
 from ptmtools.pipeline.command import naming_command, open_database
 from ptmtools.pipeline.stages.emit import EMIT
 from ptmtools.progress import Progress, silent
-from ptmtools.site.about import (
-    ICONS,
-    MANIFEST,
-    MANIFEST_MEDIA,
-    About,
-    described,
-    folder_of,
-    icon,
-    manifest_of,
-)
-from ptmtools.site.catalogue import ANGLE, Content, catalogue_of
-from ptmtools.site.entry import DIGITS, Entry, state_of
+from ptmtools.site.entry import Entry
+from ptmtools.site.files import DATA, Files
+from ptmtools.site.front import Front
 from ptmtools.site.geometry import lean_glb
-from ptmtools.site.program import (
-    HTML,
-    INDEX,
-    address_of,
-    element,
-    page,
-    program_files,
-    registration,
-    worker,
-)
-from ptmtools.site.security import secured
 from ptmtools.site.sets import has_sets, is_of_sets, set_entries
 from ptmtools.site.textures import web_texture, without_exact
-from ptmtools.site.tours import SiteTour, site_tour
 from ptmtools.store.folder import DatabaseFolder, damaged
 from ptmtools.store.layout import SERVED, sha256
 from ptmtools.texture.previews import FORMATS
 
-T = TypeVar("T")
 FORMAT = "ptmtools site"
-DATA = "data"
 JSON, JPEG = "application/json", "image/jpeg"
 GLB, PTM = "model/gltf-binary", "application/octet-stream"
 OPENING = "application/octet-stream"
@@ -77,7 +54,6 @@ _MAGIC = (
 )
 #: Fields of a texture that the hints of earlier releases lack.
 _NEEDED = {"gpuTexelBytes", "differences", "color"}
-_STRANGE = re.compile(r"[^A-Za-z0-9_-]+")
 
 
 @dataclass(frozen=True)
@@ -187,8 +163,7 @@ class _Builder:
         self._progress = progress
         self._title = options.title or title_of(folder.path)
         self._digests = folder.manifest.outputs()
-        self._entries: dict[str, Entry] = {}
-        self._notes: list[str] = []
+        self._files = Files()
 
     def site(self) -> Site:
         """The whole site."""
@@ -209,13 +184,22 @@ class _Builder:
         if self._options.clients == "vrml":
             self._vrml()
         text = json.dumps(index, ensure_ascii=False, separators=(",", ":")).encode()
-        name = self._add("index", ".json", JSON, text, compressed=True)
-        body, notes = self._entries, self._notes
+        name = self._files.add("index", ".json", JSON, text, compressed=True)
+        front = Front(
+            self._folder,
+            self._served,
+            self._options,
+            self._title,
+            index,
+            f"{DATA}/{name}",
+            poster,
+            openings,
+        )
 
         def toured() -> Site:
-            self._entries, self._notes = dict(body), list(notes)
-            self._page(index, f"{DATA}/{name}", poster, openings, self._tour())
-            return Site(self._entries, index, tuple(self._notes), toured)
+            files = Files(dict(self._files.entries), list(self._files.notes))
+            front.add(files)
+            return Site(files.entries, index, tuple(files.notes), toured)
 
         return toured()
 
@@ -232,9 +216,9 @@ class _Builder:
                 url = index["textures"][number]["file"]
             else:
                 url = index["cells"][number][kind]
-            return self._entries[f"{DATA}/{url}"].read(end)
+            return self._files.entries[f"{DATA}/{url}"].read(end)
 
-        entries = (entry for entry in self._entries.values() if not is_of_sets(entry.name))
+        entries = (entry for entry in self._files.entries.values() if not is_of_sets(entry.name))
         size = sum(entry.state[2] if entry.state else len(entry.read()) for entry in entries)
         try:
             data = list(openings_of(self._served, index, read, size))
@@ -242,93 +226,9 @@ class _Builder:
             return ()
         mark = sha256("".join(map(sha256, data)).encode())
         return tuple(
-            f"{DATA}/{self._add('opening', f'-{number}.bin', OPENING, one, mark=mark)}"
+            f"{DATA}/{self._files.add('opening', f'-{number}.bin', OPENING, one, mark=mark)}"
             for number, one in enumerate(data)
         )
-
-    def _tour(self) -> dict[str, str]:
-        """The settings of the page for the tour: its URL and that of its catalogue; none without a
-        tour."""
-        tour, note = site_tour(
-            self._folder,
-            self._options.tour,
-            lambda file, media: self._add(file.stem, file.suffix, media, file.read_bytes()),
-        )
-        if note:
-            self._notes.append(note)
-        if tour is None:
-            return {}
-        text = json.dumps(tour.document, ensure_ascii=False, separators=(",", ":")).encode()
-        url = f"{DATA}/{self._add('tour', '.json', JSON, text, compressed=True)}"
-        pages = catalogue_of(self._catalogue(tour))
-        for name, html in pages.items():
-            self._entries[name] = Entry(name, secured(html).encode(), HTML, compressed=True)
-        return {"tour": url, "catalogue": next(iter(pages))}
-
-    def _catalogue(self, tour: SiteTour) -> Content:
-        stops: dict[int, Mapping[str, Any]] = {}
-        for stop in tour.document["stops"]:
-            if "label" in stop:
-                stops.setdefault(stop["label"], stop | {"fieldOfView": ANGLE})
-        pictures: dict[int, str] = {}
-        if self._options.pictures and stops:
-            drawn = self._rendered(lambda: _works(self._served, [*stops.values()]))
-            for number, data in zip(stops, drawn or (), strict=False):
-                id = tour.document["labels"][number]["id"]
-                pictures[number] = f"{DATA}/{self._add(f'work-{id}', '.jpg', JPEG, data)}"
-        rooms: dict[int, str] = {}
-        for viewpoint in self._served.index["viewpoints"]:
-            rooms.setdefault(viewpoint["cell"], viewpoint["description"])
-        address = folder_of(self._options.address)
-        return Content(
-            tour.document, self._title, rooms, pictures, tour.transcripts, f"{DATA}/", address
-        )
-
-    def _page(
-        self,
-        index: Mapping[str, Any],
-        url: str,
-        poster: str | None,
-        openings: Sequence[str],
-        tour: Mapping[str, str],
-    ) -> None:
-        program = program_files()
-        self._entries |= {entry.name: entry for entry in (*program.values(), element())}
-        settings = {
-            "index": url,
-            "worker": program["worker.js"].name,
-            "wasm": program["decoder.wasm"].name,
-            "poster": poster,
-            "title": self._title,
-            **tour,
-        }
-        preload = [url, program["decoder.wasm"].name]
-        if not openings:
-            first = index["cells"][index["viewpoints"][0]["cell"]]
-            preload += [f"{DATA}/{first[kind]}" for kind in ("record", "geometry")]
-        views = dict(zip(openings, map(address_of, index["viewpoints"]), strict=False))
-        about = About(
-            self._title,
-            self._options.description or described(index["viewpoints"]),
-            poster or "",
-            self._options.address,
-        )
-        script = program["viewer.js"].name
-        head = [*about.lines()]
-        if self._options.offline:
-            own = worker()
-            self._entries[own.name] = own
-            head.append(registration(program))
-        self._entries[INDEX] = page(settings, script, preload, views, head)
-        self._manifest()
-
-    def _manifest(self) -> None:
-        icons = {
-            size: f"{DATA}/{self._add(f'icon-{size}', '.png', 'image/png', icon(size))}"
-            for size in ICONS
-        }
-        data = manifest_of(self._title, icons)
-        self._entries[MANIFEST] = Entry(MANIFEST, data, MANIFEST_MEDIA)
 
     def _cells(self) -> Iterator[dict[str, Any]]:
         index = self._served.index
@@ -357,13 +257,13 @@ class _Builder:
         differences = level_differences(self._served.surfaces, octrees).round(3).tolist()
         for row, steps in zip(self._served.index["octrees"], differences, strict=True):
             file, digest = self._place(row["file"])
-            name = self._add(file.stem, ".bin", PTM, file, digest=digest)
+            name = self._files.add(file.stem, ".bin", PTM, file, digest=digest)
             yield row | {"file": name, "differences": steps[: len(row["levels"])]}
 
     def _sets(self) -> str:
         """The URL of the document of all interlaced images."""
         entries = list(set_entries(self._served.index, self._place))
-        self._entries |= {entry.name: entry for entry in entries}
+        self._files.entries |= {entry.name: entry for entry in entries}
         return entries[-1].name.removeprefix(f"{DATA}/")
 
     def _data(self, url: str, stem: str, suffix: str, media: str) -> tuple[str, int]:
@@ -376,7 +276,7 @@ class _Builder:
                 source = data = lean_glb(data)
             except FileError as fault:
                 raise damaged(file, str(fault)) from None
-        name = self._add(stem, suffix, media, source, digest=digest, compressed=True)
+        name = self._files.add(stem, suffix, media, source, digest=digest, compressed=True)
         return name, min(len(data), len(compressed(data)))
 
     def _textures(self) -> Iterator[Mapping[str, Any]]:
@@ -393,13 +293,13 @@ class _Builder:
             file, digest = self._place(row["file"])
             texture = web_texture(file, row)
             if texture.note:
-                self._notes.append(texture.note)
+                self._files.note(texture.note)
             if self._options.exact == "never":
                 texture = without_exact(file, texture)
             source = file if texture.data is None else texture.data
             changed = dict(texture.row)
             changed |= {
-                "file": self._add(file.stem, ".ptm", PTM, source, digest=digest),
+                "file": self._files.add(file.stem, ".ptm", PTM, source, digest=digest),
                 "fallback": None,
                 "fallbackLevel": None,
             }
@@ -421,38 +321,25 @@ class _Builder:
             if not file.is_file() or file.stat().st_size != row["bytes"]:
                 raise damaged(file, "is not the preview that the index has")
             media = _IMAGE_MEDIA[file.suffix]
-            name = self._add(file.stem, file.suffix, media, file, digest=digest, mark=mark)
+            name = self._files.add(file.stem, file.suffix, media, file, digest=digest, mark=mark)
             yield {key: value for key, value in row.items() if key != "error"} | {"file": name}
 
-    def _pictures(self) -> tuple[list[dict[str, Any]], str | None]:
-        """The viewpoints, and the URL of the poster."""
+    def _pictures(self) -> tuple[list[dict[str, Any]], str]:
+        """The viewpoints, and the URL of the poster, "" without one."""
         rows = [dict(row) for row in self._served.index["viewpoints"]]
-        poster = None
+        poster = ""
         if self._options.poster:
             media, suffix, data = _picture_file(self._options.poster)
-            poster = self._add("poster", suffix, media, data)
+            poster = self._files.add("poster", suffix, media, data)
         if self._options.pictures:
-            drawn, small = self._rendered(lambda: _viewpoints(self._served)) or (b"", [])
+            self._progress(0, 1, "pictures")
+            both = self._files.rendered(lambda: _viewpoints(self._served), self._folder.path)
+            drawn, small = both or (b"", [])
             if drawn and not poster:
-                poster = self._add("poster", ".jpg", JPEG, drawn)
+                poster = self._files.add("poster", ".jpg", JPEG, drawn)
             for number, (row, data) in enumerate(zip(rows, small, strict=False)):
-                row["thumbnail"] = self._add(f"vp-{number:03}", ".jpg", JPEG, data)
+                row["thumbnail"] = self._files.add(f"vp-{number:03}", ".jpg", JPEG, data)
         return rows, poster and f"{DATA}/{poster}"
-
-    def _rendered(self, render: Callable[[], T]) -> T | None:
-        """Pictures; None where Embree is missing."""
-        self._progress(0, 1, "pictures")
-        try:
-            return render()
-        except ImportError:
-            note = "no pictures: embreex, which renders them, is not installed"
-            if note not in self._notes:
-                self._notes.append(note)
-            return None
-        except LimitError:
-            raise
-        except InputError as fault:
-            raise damaged(Path(fault.file or self._folder.path), fault.message) from None
 
     def _vrml(self) -> None:
         """The files of VRML, under the names that they have in the database."""
@@ -467,7 +354,7 @@ class _Builder:
             media = _VRML_MEDIA.get(Path(name).suffix)
             if media and name.startswith(f"{SERVED}/"):
                 own = quote(name.removeprefix(f"{SERVED}/"))
-                self._entries[own] = Entry(
+                self._files.entries[own] = Entry(
                     own, self._folder.path / name, media, compressed=own.endswith(".wrl")
                 )
 
@@ -479,39 +366,11 @@ class _Builder:
             raise damaged(file, "the manifest does not list it")
         return file, self._digests[name]
 
-    def _add(
-        self,
-        stem: str,
-        suffix: str,
-        media: str,
-        source: Path | bytes,
-        *,
-        compressed: bool = False,
-        digest: str = "",
-        mark: str = "",
-    ) -> str:
-        """Adds a file of the data; returns its URL relative to the index. ``digest``: of a file;
-        ``mark``: what its name has of that instead."""
-        digest = sha256(source) if isinstance(source, bytes) else digest
-        # Names with a mark differ in their ends.
-        own = _STRANGE.sub("_", stem)[: None if mark else 64]
-        name = f"{own}-{(mark or digest)[:DIGITS]}{suffix}"
-        state = state_of(source.stat()) if isinstance(source, Path) else None
-        entry = Entry(f"{DATA}/{name}", source, media, True, compressed, state, digest)
-        self._entries[entry.name] = entry
-        return name
-
 
 def _viewpoints(served: Served) -> tuple[bytes, list[bytes]]:
     from ptmtools.site.pictures import pictures
 
     return pictures(served)
-
-
-def _works(served: Served, views: Sequence[Mapping[str, Any]]) -> list[bytes]:
-    from ptmtools.site.pictures import WORK, pictures_of
-
-    return list(pictures_of(served, [(WORK, view) for view in views]))
 
 
 def _picture_file(file: str) -> tuple[str, str, bytes]:

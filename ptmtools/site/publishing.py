@@ -30,8 +30,9 @@ from ptmtools.files import (
     writing,
 )
 from ptmtools.progress import Progress, silent
-from ptmtools.site.content import DATA, Site
+from ptmtools.site.content import Site
 from ptmtools.site.entry import Entry, link_bytes
+from ptmtools.site.files import DATA
 from ptmtools.site.program import INDEX, LATER
 from ptmtools.site.published import (
     LIST,

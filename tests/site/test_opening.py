@@ -16,7 +16,8 @@ import pytest
 
 from ptmtools.output.served import Served, read_served
 from ptmtools.site import opening
-from ptmtools.site.content import DATA, Site, SiteOptions, site_of
+from ptmtools.site.content import Site, SiteOptions, site_of
+from ptmtools.site.files import DATA
 from ptmtools.site.opening import (
     FEW,
     SMALL,

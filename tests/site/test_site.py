@@ -21,8 +21,9 @@ from ptmtools.errors import DatabaseError, InputError
 from ptmtools.output.emission import compressed
 from ptmtools.site import pictures as drawing
 from ptmtools.site.about import MANIFEST
-from ptmtools.site.content import DATA, Site, SiteOptions, site_of, title_of
+from ptmtools.site.content import Site, SiteOptions, site_of, title_of
 from ptmtools.site.entry import link_bytes
+from ptmtools.site.files import DATA
 from ptmtools.site.geometry import lean_glb
 from ptmtools.site.program import ELEMENT, LATER, PROGRAM
 from ptmtools.site.publishing import weight_of

@@ -1,0 +1,70 @@
+"""The files of a site while it is made, with hashes in their names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeVar
+
+from ptmtools.errors import InputError, LimitError
+from ptmtools.site.entry import DIGITS, Entry, state_of
+from ptmtools.store.folder import damaged
+from ptmtools.store.layout import sha256
+
+T = TypeVar("T")
+#: The folder of the files whose names have a hash.
+DATA = "data"
+_STRANGE = re.compile(r"[^A-Za-z0-9_-]+")
+
+
+@dataclass
+class Files:
+    """The files so far, by name, and remarks for the user."""
+
+    entries: dict[str, Entry] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    def put(self, entry: Entry) -> None:
+        """Adds a file under its own name."""
+        self.entries[entry.name] = entry
+
+    def note(self, text: str) -> None:
+        """Adds a remark, once."""
+        if text not in self.notes:
+            self.notes.append(text)
+
+    def add(
+        self,
+        stem: str,
+        suffix: str,
+        media: str,
+        source: Path | bytes,
+        *,
+        compressed: bool = False,
+        digest: str = "",
+        mark: str = "",
+    ) -> str:
+        """Adds a file of the data; returns its URL relative to the index. ``digest``: of a file;
+        ``mark``: what its name has of that instead."""
+        digest = sha256(source) if isinstance(source, bytes) else digest
+        # Names with a mark differ in their ends.
+        own = _STRANGE.sub("_", stem)[: None if mark else 64]
+        name = f"{own}-{(mark or digest)[:DIGITS]}{suffix}"
+        state = state_of(source.stat()) if isinstance(source, Path) else None
+        self.put(Entry(f"{DATA}/{name}", source, media, True, compressed, state, digest))
+        return name
+
+    def rendered(self, render: Callable[[], T], database: Path) -> T | None:
+        """Pictures of a database; None, and a note, where Embree is missing. Raises DatabaseError
+        in place of InputError."""
+        try:
+            return render()
+        except ImportError:
+            self.note("no pictures: embreex, which renders them, is not installed")
+            return None
+        except LimitError:
+            raise
+        except InputError as fault:
+            raise damaged(Path(fault.file or database), fault.message) from None

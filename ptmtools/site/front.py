@@ -1,0 +1,135 @@
+"""The page of a walk with what leads to it: the tour, its catalogue, and the web application
+manifest. They are made anew when the tour changes; the walk's data are not.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from ptmtools.output.served import Served
+from ptmtools.site.about import (
+    ICONS,
+    MANIFEST,
+    MANIFEST_MEDIA,
+    About,
+    described,
+    folder_of,
+    icon,
+    manifest_of,
+)
+from ptmtools.site.catalogue import ANGLE, Content, catalogue_of
+from ptmtools.site.entry import Entry
+from ptmtools.site.files import DATA, Files
+from ptmtools.site.program import (
+    HTML,
+    address_of,
+    element,
+    page,
+    program_files,
+    registration,
+    worker,
+)
+from ptmtools.site.security import secured
+from ptmtools.site.tours import SiteTour, site_tour
+from ptmtools.store.folder import DatabaseFolder
+
+if TYPE_CHECKING:
+    from ptmtools.site.content import SiteOptions
+
+
+@dataclass(frozen=True)
+class Front:
+    """The page of a database.
+
+    Attributes
+    ----------
+    title: of the site.
+    index: the document that the page reads first. url: its URL.
+    poster: the URL of the poster, "" without one. openings: those of the openings.
+    """
+
+    folder: DatabaseFolder
+    served: Served
+    options: SiteOptions
+    title: str
+    index: Mapping[str, Any]
+    url: str
+    poster: str
+    openings: Sequence[str]
+
+    def add(self, files: Files) -> None:
+        """Adds the files. Raises as `site_tour`; InputError PTM-I122: the program is incomplete."""
+        program = program_files()
+        for entry in (*program.values(), element()):
+            files.put(entry)
+        settings = {
+            "index": self.url,
+            "worker": program["worker.js"].name,
+            "wasm": program["decoder.wasm"].name,
+            "poster": self.poster or None,
+            "title": self.title,
+            **self._tour(files),
+        }
+        preload = [self.url, program["decoder.wasm"].name]
+        viewpoints = self.index["viewpoints"]
+        if not self.openings:
+            first = self.index["cells"][viewpoints[0]["cell"]]
+            preload += [f"{DATA}/{first[kind]}" for kind in ("record", "geometry")]
+        views = dict(zip(self.openings, map(address_of, viewpoints), strict=False))
+        description = self.options.description or described(viewpoints)
+        head = [*About(self.title, description, self.poster, self.options.address).lines()]
+        if self.options.offline:
+            files.put(worker())
+            head.append(registration(program))
+        files.put(page(settings, program["viewer.js"].name, preload, views, head))
+        icons = {
+            size: f"{DATA}/{files.add(f'icon-{size}', '.png', 'image/png', icon(size))}"
+            for size in ICONS
+        }
+        files.put(Entry(MANIFEST, manifest_of(self.title, icons), MANIFEST_MEDIA))
+
+    def _tour(self, files: Files) -> dict[str, str]:
+        """The settings of the page for the tour: its URL and that of its catalogue; none without a
+        tour."""
+        tour, note = site_tour(
+            self.folder,
+            self.options.tour,
+            lambda file, media: files.add(file.stem, file.suffix, media, file.read_bytes()),
+        )
+        if note:
+            files.note(note)
+        if tour is None:
+            return {}
+        text = json.dumps(tour.document, ensure_ascii=False, separators=(",", ":")).encode()
+        name = files.add("tour", ".json", "application/json", text, compressed=True)
+        pages = catalogue_of(self._catalogue(tour, files))
+        for own, html in pages.items():
+            files.put(Entry(own, secured(html).encode(), HTML, compressed=True))
+        return {"tour": f"{DATA}/{name}", "catalogue": next(iter(pages))}
+
+    def _catalogue(self, tour: SiteTour, files: Files) -> Content:
+        stops: dict[int, Mapping[str, Any]] = {}
+        for stop in tour.document["stops"]:
+            if "label" in stop:
+                stops.setdefault(stop["label"], stop | {"fieldOfView": ANGLE})
+        pictures: dict[int, str] = {}
+        if self.options.pictures and stops:
+            works = files.rendered(lambda: self._works([*stops.values()]), self.folder.path)
+            for number, data in zip(stops, works or (), strict=False):
+                id = tour.document["labels"][number]["id"]
+                pictures[number] = f"{DATA}/{files.add(f'work-{id}', '.jpg', 'image/jpeg', data)}"
+        rooms: dict[int, str] = {}
+        for viewpoint in self.served.index["viewpoints"]:
+            rooms.setdefault(viewpoint["cell"], viewpoint["description"])
+        address = folder_of(self.options.address)
+        return Content(
+            tour.document, self.title, rooms, pictures, tour.transcripts, f"{DATA}/", address
+        )
+
+    def _works(self, views: Sequence[Mapping[str, Any]]) -> list[bytes]:
+        from ptmtools.site.pictures import WORK, pictures_of
+
+        return list(pictures_of(self.served, [(WORK, view) for view in views]))
