@@ -30,7 +30,7 @@ from ptmtools.quantities import count, size
 from ptmtools.site.about import folder_of
 from ptmtools.site.content import Site, SiteOptions, site_of, title_of
 from ptmtools.site.embedding import element_tags, frame_tag
-from ptmtools.site.forms import form_of, form_site, form_weight
+from ptmtools.site.forms import OPTIONS, form_of, form_site, form_weight
 from ptmtools.site.lookup import files_of
 from ptmtools.site.program import ELEMENT
 from ptmtools.site.published import PublishOptions
@@ -166,14 +166,16 @@ def publish(
             "https://example.org/walk/"
         )
     form = form_of(Path(db))
-    if form and site_options != SiteOptions(title=site_options.title):
+    own = {name: getattr(site_options, name) for name in OPTIONS}
+    if form and site_options != SiteOptions(**own):
+        names = ", ".join(f"--{name}" for name in OPTIONS)
         raise click.UsageError(
-            f"of the options of a site, a folder with {form.index} has --title only"
+            f"of the options of a site, a folder with {form.index} has {names} only"
         )
     with console.progress() as progress:
         if form:
             check_folder(Path(db), form.index)
-            site = form_site(Path(db), form, site_options.title)
+            site = form_site(Path(db), form, site_options)
         else:
             site = site_of(db, site_options, progress)
         done = write(site, target, options, force=force, progress=progress)

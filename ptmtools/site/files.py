@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from ptmtools.errors import InputError, LimitError
+from ptmtools.site.about import ICONS, MANIFEST, MANIFEST_MEDIA, icon, manifest_of
 from ptmtools.site.entry import DIGITS, Entry, state_of
 from ptmtools.store.folder import damaged
 from ptmtools.store.layout import sha256
@@ -68,3 +69,12 @@ class Files:
             raise
         except InputError as fault:
             raise damaged(Path(fault.file or database), fault.message) from None
+
+
+def add_manifest(files: Files, title: str) -> None:
+    """Adds the web application manifest of a site, and its icons."""
+    icons = {
+        size: f"{DATA}/{files.add(f'icon-{size}', '.png', 'image/png', icon(size))}"
+        for size in ICONS
+    }
+    files.put(Entry(MANIFEST, manifest_of(title, icons), MANIFEST_MEDIA))

@@ -18,11 +18,15 @@ from urllib.parse import quote
 from ptmtools import schemas
 from ptmtools.errors import InputError
 from ptmtools.files import open_below
-from ptmtools.site.content import Site, title_of
+from ptmtools.site.about import About
+from ptmtools.site.content import Site, SiteOptions, title_of
 from ptmtools.site.entry import DIGITS, Entry, link_bytes, state_of
+from ptmtools.site.files import DATA, Files, add_manifest
 from ptmtools.site.program import form_page, form_script
 from ptmtools.store.layout import sha256
 
+#: The options of a site that a form has.
+OPTIONS = ("title", "description", "address")
 #: Largest index, bytes.
 _LONGEST = 1 << 26
 _MEDIA = {
@@ -61,18 +65,20 @@ class Form:
     ----------
     index: the file that describes the others. schema: its name. script: of the page.
     files: of an index: the other files that the page fetches.
+    records: whether the page shows HTML of others in frames.
     """
 
     index: str
     schema: str
     script: str
     files: Callable[[Mapping[str, Any]], Iterator[str]]
+    records: bool = False
 
 
 _LIST = (
     Form("apo.json", schemas.APO, "apo.js", _of_octree),
     Form("interlace.json", schemas.INTERLACE, "interlace.js", _of_set),
-    Form("campus.json", schemas.CAMPUS, "campus.js", _of_campus),
+    Form("campus.json", schemas.CAMPUS, "campus.js", _of_campus, records=True),
 )
 #: By the name of the index.
 FORMS = {form.index: form for form in _LIST}
@@ -83,8 +89,9 @@ def form_of(folder: Path) -> Form | None:
     return next((form for form in FORMS.values() if (folder / form.index).is_file()), None)
 
 
-def form_site(folder: Path, form: Form, title: str = "") -> Site:
-    """The site of a folder. Checks its index alone: the page checks what it fetches.
+def form_site(folder: Path, form: Form, options: SiteOptions | None = None) -> Site:
+    """The site of a folder. Checks its index alone: the page checks what it fetches. Of the options
+    `OPTIONS` apply.
 
     Raises InputError PTM-I122: a file is missing or cannot be read, or the index is none.
     """
@@ -100,23 +107,29 @@ def form_site(folder: Path, form: Form, title: str = "") -> Site:
             remedy="write the folder again",
         ) from fault
     place = f"data-{sha256(data)[:DIGITS]}"
-    entries = [Entry(f"{place}/{form.index}", data, _MEDIA[".json"], True, compressed=True)]
+    options = options or SiteOptions()
+    title = options.title or title_of(folder)
+    files = Files()
+    files.put(Entry(f"{place}/{form.index}", data, _MEDIA[".json"], True, compressed=True))
     for name in form.files(index):
         file = folder / name
         _, state = _read(folder, name, 0)
         media = _MEDIA.get(file.suffix, "application/octet-stream")
         packed = file.suffix in (".glb", ".txt")
-        entries.append(Entry(f"{place}/{quote(name)}", file, media, True, packed, state))
+        files.put(Entry(f"{place}/{quote(name)}", file, media, True, packed, state))
     script = form_script(form.script)
-    settings = {"title": title or title_of(folder), "index": f"{place}/{form.index}"}
-    entries += [script, form_page(settings, script.name)]
-    return Site({entry.name: entry for entry in entries}, index)
+    files.put(script)
+    settings = {"title": title, "index": f"{place}/{form.index}"}
+    about = About(title, options.description, address=options.address)
+    files.put(form_page(settings, script.name, [*about.lines()], framed=form.records))
+    add_manifest(files, title)
+    return Site(files.entries, index)
 
 
 def form_weight(site: Site) -> tuple[int, int]:
     """Bytes that a visitor downloads: of the page with its script, and of everything."""
     sizes = {name: link_bytes(entry) for name, entry in site.entries.items()}
-    page = sum(size for name, size in sizes.items() if not name.startswith("data-"))
+    page = sum(size for name, size in sizes.items() if not name.startswith(("data-", f"{DATA}/")))
     return page, sum(sizes.values())
 
 

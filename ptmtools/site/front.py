@@ -10,19 +10,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ptmtools.output.served import Served
-from ptmtools.site.about import (
-    ICONS,
-    MANIFEST,
-    MANIFEST_MEDIA,
-    About,
-    described,
-    folder_of,
-    icon,
-    manifest_of,
-)
+from ptmtools.site.about import About, described, folder_of
 from ptmtools.site.catalogue import ANGLE, Content, catalogue_of
 from ptmtools.site.entry import Entry
-from ptmtools.site.files import DATA, Files
+from ptmtools.site.files import DATA, Files, add_manifest
 from ptmtools.site.program import (
     HTML,
     address_of,
@@ -85,11 +76,7 @@ class Front:
             files.put(worker())
             head.append(registration(program))
         files.put(page(settings, program["viewer.js"].name, preload, views, head))
-        icons = {
-            size: f"{DATA}/{files.add(f'icon-{size}', '.png', 'image/png', icon(size))}"
-            for size in ICONS
-        }
-        files.put(Entry(MANIFEST, manifest_of(self.title, icons), MANIFEST_MEDIA))
+        add_manifest(files, self.title)
 
     def _tour(self, files: Files) -> dict[str, str]:
         """The settings of the page for the tour: its URL and that of its catalogue; none without a

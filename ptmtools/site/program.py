@@ -137,10 +137,12 @@ def form_script(name: str) -> Entry:
     return Entry(f"viewer-{sha256(data)[:DIGITS]}/{name}", data, JAVASCRIPT, True, compressed=True)
 
 
-def form_page(settings: Mapping[str, Any], script: str) -> Entry:
-    """The page of a single object, filled in; raises as `page`."""
-    links = [f'<link rel="preload" as="fetch" href="{settings["index"]}" crossorigin>']
-    return _filled(FORM_PAGE, settings, script, links, {})
+def form_page(
+    settings: Mapping[str, Any], script: str, about: Sequence[str], *, framed: bool
+) -> Entry:
+    """The page of a single object, filled in; raises as `page`. ``framed``: see `secured`."""
+    links = [f'<link rel="preload" as="fetch" href="{settings["index"]}" crossorigin>', *about]
+    return _filled(FORM_PAGE, settings, script, links, {}, framed=framed)
 
 
 def _filled(
@@ -149,6 +151,8 @@ def _filled(
     script: str,
     links: Sequence[str],
     fields: Mapping[str, str],
+    *,
+    framed: bool = False,
 ) -> Entry:
     """A page, filled in."""
     text = json.dumps(settings, ensure_ascii=False, separators=(",", ":"))
@@ -161,6 +165,4 @@ def _filled(
         **fields,
     }
     filled = _FIELD.sub(lambda match: values[match[1]], _built(template).decode())
-    if template == INDEX:
-        filled = secured(filled)
-    return Entry(INDEX, filled.encode(), HTML, compressed=True)
+    return Entry(INDEX, secured(filled, framed=framed).encode(), HTML, compressed=True)

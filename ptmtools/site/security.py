@@ -16,14 +16,16 @@ _STYLE = re.compile(r"<style>(.*?)</style>", re.DOTALL)
 _CHARSET = '<meta charset="utf-8">\n'
 
 
-def secured(page: str) -> str:
-    """A page with its policy, at the beginning of its head."""
+def secured(page: str, *, framed: bool = False) -> str:
+    """A page with its policy, at the beginning of its head. ``framed``: it shows documents of
+    others in frames, which inherit the policy; their styles, fonts and sounds are in them."""
     begin, charset, rest = page.partition(_CHARSET)
-    policy = f'<meta http-equiv="Content-Security-Policy" content="{policy_of(page)}">\n'
-    return begin + charset + policy + rest
+    policy = policy_of(page, framed=framed)
+    meta = f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
+    return begin + charset + meta + rest
 
 
-def policy_of(page: str) -> str:
+def policy_of(page: str, *, framed: bool = False) -> str:
     """The policy of a page. One without scripts of its own runs none."""
     scripts, styles = (
         [f"'sha256-{_digest(text)}'" for text in kind.findall(page)] for kind in (_SCRIPT, _STYLE)
@@ -32,9 +34,11 @@ def policy_of(page: str) -> str:
     if '<script type="module"' in page:
         rules["script-src"] = ["'self'", "'wasm-unsafe-eval'", *scripts]
         rules["worker-src"] = rules["connect-src"] = ["'self'"]
-    rules["style-src"] = styles
+    rules["style-src"] = ["'unsafe-inline'"] if framed else styles
     rules["img-src"] = ["'self'", "data:", "blob:"]
-    rules["media-src"] = ["'self'"]
+    rules["media-src"] = ["'self'", "data:"] if framed else ["'self'"]
+    if framed:
+        rules["font-src"] = ["data:"]
     if '<link rel="manifest"' in page:
         rules["manifest-src"] = ["'self'"]
     rules["base-uri"] = rules["form-action"] = ["'none'"]

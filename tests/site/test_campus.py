@@ -215,8 +215,10 @@ def test_a_record_is_beside_its_object(opened: Open, campus: Path) -> None:
         assert page.locator("#record iframe").count() == 0
 
 
-def test_a_hostile_record_does_nothing(opened: Open, campus: Path) -> None:
-    with opened(campus, width=800, height=600) as visitor:
+@pytest.mark.parametrize("bypass_csp", [True, False])
+def test_a_hostile_record_does_nothing(opened: Open, campus: Path, bypass_csp: bool) -> None:
+    """Without and with the policy of the page, which leaves the record its styles."""
+    with opened(campus, width=800, height=600, bypass_csp=bypass_csp) as visitor:
         visitor.until("s.complete")
         page = visitor.page
         before, seen = page.url.partition("#")[0], len(visitor.visits)

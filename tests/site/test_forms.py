@@ -19,11 +19,12 @@ from ptmtools.errors import InputError
 from ptmtools.neighbours.apo.files import read_mesh, read_octree
 from ptmtools.neighbours.apo.picture import RenderOptions, render
 from ptmtools.neighbours.interlace import deinterlace
+from ptmtools.site.content import SiteOptions
 from ptmtools.site.forms import FORMS, form_of, form_site
 from ptmtools.site.lookup import files_of
 from ptmtools.site.throttle import Throttle
 
-from .test_page_faults import strict
+from .test_page_faults import ATTACK
 
 SIDE = 320
 Open = Callable[..., AbstractContextManager[Visitor]]
@@ -203,10 +204,17 @@ def check_texels(texels: np.ndarray, expected: np.ndarray) -> None:
     assert (actual[seen] == full[seen]).all()
 
 
-def test_alpha_under_a_strict_policy(opened: Open, pictures: dict[str, Path]) -> None:
-    with opened(pictures["rgba-webp"], "?all", prepare=strict, bypass_csp=False) as visitor:
-        visitor.until("s.complete")
-    assert visitor.messages == []
+def test_the_pages_need_nothing_that_their_policies_refuse(
+    opened: Open, pictures: dict[str, Path], statue: Path, campus: Path
+) -> None:
+    for folder, query in ((pictures["rgba-webp"], "?all"), (statue, ""), (campus, "")):
+        with opened(folder, query, bypass_csp=False) as visitor:
+            visitor.until("s.complete")
+            assert visitor.messages == []
+            visitor.page.evaluate(ATTACK)
+            visitor.frames(5)
+            assert visitor.page.evaluate("window.broken") is None
+        assert any("Content Security Policy" in message for message in visitor.messages)
 
 
 def test_files_come_as_far_as_they_are_needed(opened: Open, pictures: dict[str, Path]) -> None:
@@ -302,10 +310,12 @@ def test_every_form_has_a_page(statue: Path, pictures: dict[str, Path]) -> None:
     folders = {"apo.json": statue, "interlace.json": pictures["rgb-png"]}
     for name, folder in folders.items():
         form = FORMS[name]
-        site = form_site(folder, form, title="A <title>")
+        site = form_site(folder, form, SiteOptions("A <title>", address="https://example.org/x"))
         page = site.entries["index.html"].read().decode()
         assert "<title>A &lt;title&gt;</title>" in page
         assert form.script in page
+        assert '<link rel="canonical" href="https://example.org/x/">' in page
+        assert "manifest.webmanifest" in site.entries
         (index,) = (e for n, e in site.entries.items() if n.endswith(name))
         assert index.forever
 

@@ -7,14 +7,12 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
-from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
 from browser import FRAMES
 
 from ptmtools.site.content import Site
-from ptmtools.site.security import policy_of
 from ptmtools.site.throttle import Throttle
 
 TEXTURES = re.compile(r"\.ptm$")
@@ -302,17 +300,6 @@ def test_links_and_questions_that_mean_nothing(visit: Callable[..., Any], museum
     assert state["cell"] == museum.index["viewpoints"][0]["cell"]
     assert state["budgetBytes"] == 4096 << 20
     assert visitor.messages == []
-
-
-def strict(page: Any) -> None:
-    """The page comes with its policy as a header."""
-
-    def handle(route: Any) -> None:
-        answer = route.fetch()
-        headers = {**answer.headers, "content-security-policy": policy_of(answer.text())}
-        route.fulfill(response=answer, headers=headers)
-
-    page.route(lambda url: urlsplit(url).path == "/", handle)
 
 
 ATTACK = """() => {
