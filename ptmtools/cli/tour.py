@@ -56,7 +56,10 @@ def init(console: Console, db: str, output: str | None, force: bool) -> None:
         )
     console.result(
         {"tour": str(file), "pictures": pictures, "rooms": rooms},
-        [f"{file}: labels of {count(pictures, 'picture')} and {count(rooms, 'room')}"],
+        [
+            f"{file}: labels of {count(pictures, 'picture')} and {count(rooms, 'room')}",
+            "write their texts into the file, or on the page with `ptm serve DB --edit`",
+        ],
     )
 
 
