@@ -209,6 +209,19 @@ def test_the_browsers_language_and_a_link_to_a_label(chromium: Any, toured: Site
         assert visitor.page.evaluate("ptm.tour.language") == "en"
 
 
+def test_a_label_ends_above_two_rows_of_buttons(chromium: Any, toured: Site) -> None:
+    with visiting(chromium, toured.entries, query="?lang=de", width=390) as visitor:
+        visitor.until("window.ptm.tour")
+        visitor.page.evaluate("ptm.tour.go(0)")
+        page = visitor.page
+        page.locator("#label").wait_for()
+        tops = {round(each.bounding_box()["y"]) for each in page.locator("nav button").all()}
+        assert len(tops) == 2
+        visitor.until("document.querySelector('#panels').style.bottom")
+        label = page.locator("#label").bounding_box()
+        assert label["y"] + label["height"] < min(tops)
+
+
 def test_a_sound_is_fetched_by_a_click_only_and_has_captions(visitor: Visitor) -> None:
     page = visitor.page
     page.evaluate("ptm.tour.go(0)")

@@ -1,6 +1,7 @@
 // The tour of a walk: markers of labels, their panel, and the list of stops.
 
 import { PageError } from "../net/errors.js";
+import { keepPanelsAboveButtons } from "../ui/above.js";
 import { addStyle, calm, find, make } from "../ui/elements.js";
 import { checked, inLanguage, languageFor } from "./document.js";
 import { fillLabel } from "./label.js";
@@ -33,7 +34,10 @@ export async function attachTour(app, address) {
   }
 }
 
-export const addTourStyle = () => addStyle(STYLE);
+export function addTourStyle() {
+  addStyle(STYLE);
+  keepPanelsAboveButtons(document);
+}
 
 export class Tour {
   /** The label that is open, and the stop of the visitor; -1 for none. */
