@@ -161,3 +161,5 @@ def test_a_headset_sees_two_pictures(visit: Callable[..., Any], museum: Site) ->
         page.evaluate("(pose) => ptm.goTo(pose)", start)
         visitor.complete()
         assert np.array_equal(visitor.picture(), alone)
+        page.set_viewport_size({"width": 300, "height": 240})
+        visitor.until("ptm.canvas.width === 300", 20)

@@ -5,7 +5,5 @@ export const loadComparison = () => import("./compare.js");
 export const loadStatues = () => import("./statues.js");
 export const loadReliefs = () => import("./reliefs.js");
 export const loadEmbedding = () => import("./embedded.js");
-export const loadGamepad = () => import("./gamepad.js");
-export const loadXr = () => import("./xr.js");
 export const loadTour = () => import("./tour.js");
 export const loadSets = () => import("./sets.js");

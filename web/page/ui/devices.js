@@ -1,6 +1,6 @@
 // Gamepads and headsets: their scripts are loaded when one is there.
 
-import { loadGamepad, loadXr } from "../load-later.js";
+import { loadGamepad, loadXr } from "../load-devices.js";
 import { devices } from "../words/english.js";
 import { fill } from "../words/language.js";
 import { find, make } from "./elements.js";
