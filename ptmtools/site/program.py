@@ -22,7 +22,7 @@ HTML, JAVASCRIPT = "text/html; charset=utf-8", "text/javascript; charset=utf-8"
 #: Scripts that few visits need.
 LATER = (
     *("later.js", "compare.js", "statues.js", "reliefs.js", "sets.js", "tour.js", "embedded.js"),
-    "register.js",
+    *("register.js", "gamepad.js", "xr.js"),
     *(f"words-{language}.js" for language in LANGUAGES if language != "en"),
 )
 #: The media type of each file.

@@ -36,7 +36,7 @@ OUTPUT = ROOT / "ptmtools" / "site" / "page"
 #: Scripts that the page loads when it needs them.
 LATER = (
     *("later.js", "compare.js", "statues.js", "reliefs.js", "sets.js", "tour.js", "embedded.js"),
-    "register.js",
+    *("register.js", "gamepad.js", "xr.js"),
 )
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _WORD = re.compile(r"\[\[(\w+)\]\]")

@@ -1,7 +1,8 @@
-// The script of a walk in a frame of another page, of walks without an interface (`?ui=none`) and kiosks: it tells
-// that page about the visit, and lets it lead the visitor. See docs/formats/embedding.md.
+// The script of a walk in a frame of another page, of walks without an interface (`?ui=none`), kiosks, gamepads and
+// headsets: it tells that page about the visit, and lets it lead the visitor. See docs/formats/embedding.md.
 
 import { attachKiosk } from "./kiosk.js";
+import { attachDevices } from "./ui/devices.js";
 import { addStyle } from "./ui/elements.js";
 
 const FORMAT = "ptm-walk";
@@ -10,9 +11,10 @@ const isOf = (list, number) => Number.isInteger(number) && number in list;
 
 /** @param {import("./app.js").App} app */
 export function attachEmbedding(app) {
-  const query = new URLSearchParams(location.search), ui = query.get("ui");
-  if (ui === "none") addStyle("nav { display: none; }");
-  if (ui === "kiosk") attachKiosk(app, query);
+  const query = new URLSearchParams(location.search), ui = (query.get("ui") ?? "").split(",");
+  if (ui.includes("none")) addStyle("nav { display: none; }");
+  if (ui.includes("kiosk")) attachKiosk(app, query);
+  attachDevices(app, ui);
   if (parent === window) return;
   /** @param {string} event @param {Record<string, any>} [detail] nothing about the visitor but where he is */
   const tell = (event, detail = {}) => parent.postMessage({ format: FORMAT, event, ...detail }, "*");

@@ -1,7 +1,8 @@
 // A walk that nobody holds (`?ui=kiosk`): a minute after the last touch it is at its beginning again, with
 // nothing open, for the next visitor. `&rest=20` is another number of seconds.
 
-const TOUCHES = ["pointerdown", "pointermove", "wheel", "keydown"];
+/** The last one is of the script of gamepads. */
+const TOUCHES = ["pointerdown", "pointermove", "wheel", "keydown", "gamepadused"];
 
 /** @param {import("./app.js").App} app @param {URLSearchParams} query */
 export function attachKiosk(app, query) {
@@ -16,6 +17,6 @@ export function attachKiosk(app, query) {
       app.goTo(0);
     }, 1000 * rest);
   };
-  for (const touch of TOUCHES) addEventListener(touch, (event) => event.isTrusted && wait(), { capture: true, passive: true });
+  for (const touch of TOUCHES) addEventListener(touch, (event) => (event.isTrusted || touch === "gamepadused") && wait(), { capture: true, passive: true });
   wait();
 }

@@ -2,12 +2,15 @@
 // network. Documents come from the host if it answers; files with a hash in their name are fetched once.
 
 import { Store } from "./offline/store.js";
+import { watchDownloads } from "./offline/timings.js";
 import { Visits } from "./offline/visits.js";
 
 const worker = /** @type {any} */ (globalThis);
 const { scope } = worker.registration;
 /** Sites of one origin share its storage. */
 const NAME = `ptm-walk ${scope}`;
+/** Downloads whose timings are remembered. */
+const MOST = 64;
 
 const visits = new Visits(
   new Store(() => caches.open(NAME), (request) => fetch(request)),
@@ -26,4 +29,15 @@ worker.onfetch = (/** @type {any} */ event) => {
   const answer = visits.answer(event.request, laterOf(event));
   if (answer) event.respondWith(answer);
 };
-worker.onmessage = (/** @type {any} */ event) => laterOf(event)(visits.keep(event.data));
+/** The last downloads: a page that begins has not heard of its first ones.
+ * @type {import("./offline/timings.js").Timing[]} */
+let recent = [];
+watchDownloads(async (timings) => {
+  recent = [...recent, ...timings].slice(-MOST);
+  for (const client of await worker.clients.matchAll()) client.postMessage(timings);
+});
+worker.onmessage = (/** @type {any} */ event) => {
+  const { data, source } = event;
+  if ("index" in data) return laterOf(event)(visits.keep(data));
+  source.postMessage(recent.filter(({ asked }) => asked >= data.since));
+};

@@ -9,7 +9,7 @@ import { missingOf } from "./spans.js";
  * @typedef {object} Received
  * @property {string} index URL of the index
  * @property {string[]} files URLs of whole files
- * @property {[string, number][]} textures URLs, and the bytes received of each
+ * @property {{url: string, length: number}[]} ranged files that come in ranges, and the bytes received of each
  */
 
 /** Of a page of `ptm publish`, and of one with `--offline`. */
@@ -94,12 +94,12 @@ export class Visits {
   }
 
   /** Keeps what a page has received. @param {Received} received */
-  async keep({ index, files, textures }) {
+  async keep({ index, files, ranged }) {
     const { store, scope } = this;
     const own = files.filter((url) => isFile(nameOf(url, scope) ?? ""));
     for (const url of own) await this.#hold(url).catch(() => {});
     for (const url of own) if (url.includes("/data/opening-")) await this.#unpack(url, index).catch(() => {});
-    for (const [url, length] of textures) await this.#hold(url, length).catch(() => {});
+    for (const { url, length } of ranged) await this.#hold(url, length).catch(() => {});
     if (!(await store.match(scope))) await this.#learn(await store.ask(scope));
   }
 

@@ -7,7 +7,7 @@ import { make } from "./elements.js";
 const ROWS = /** @type {const} */ ([
   ["W S/↑ ↓", "forward"], ["A D/← →", "turn"], ["Q E/Shift ← →", "sideways"],
   ["PageUp PageDown", "look"], ["Shift", "run"], ["mouse", "drag"], ["oneFinger", "dragWalk"],
-  ["twoFingers", "drag"], ["`", "details"], ["Esc", "close"],
+  ["twoFingers", "drag"], ["gamepad", "pad"], ["`", "details"], ["Esc", "close"],
 ]);
 
 /** Names of keys as they are written on keyboards. @type {Record<string, string>} */

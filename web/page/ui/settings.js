@@ -1,9 +1,11 @@
 // The settings: data saver, texture memory, patience, policy, freezing and comparing.
 
+import { attachPads, attachVr } from "./devices.js";
 import { find, inMemory, make } from "./elements.js";
 import { panels } from "../words/english.js";
 
 /** @typedef {import("./all.js").App} App */
+/** @typedef {import("../app.js").App} Walk */
 
 const MIB = 2 ** 20, POLICIES = ["best", "paper", "whole"];
 
@@ -63,6 +65,7 @@ export function attachSettings(root, app) {
     app.compare(on);
     halves.hidden = !on;
   });
+  const row = make("p", { className: "row" }, freeze, compare);
   root.append(
     make("h3", {}, panels.settings),
     make("label", { className: "switch" }, panels.saver, saver),
@@ -70,6 +73,9 @@ export function attachSettings(root, app) {
       (bytes) => app.setBudget(bytes)),
     make("label", {}, panels.policy, choice),
     waiting,
-    make("p", { className: "row" }, freeze, compare),
+    row,
   );
+  const walk = /** @type {Walk} */ (/** @type {unknown} */ (app));
+  attachPads(walk);
+  attachVr(row, walk);
 }

@@ -88,12 +88,19 @@ export const panels = /* @__PURE__ */ own("panels", {
   "oneFinger": "One finger",
   "dragWalk": "drag up or down to walk, left or right to turn",
   "twoFingers": "Two fingers",
+  "gamepad": "Gamepad",
+  "pad": "left stick to walk, right stick to turn, shoulder buttons for the places",
   "close": "close",
   "streamed": "streamed",
   "full": "full resolution",
   "copy": "Copy the link to this place:",
   "link": "Link to this place",
   "unmeasured": "Texture memory could not be measured."
+});
+
+export const devices = /* @__PURE__ */ own("devices", {
+  "enterVr": "Enter VR",
+  "noVr": "VR cannot start: {reason}"
 });
 
 export const tour = /* @__PURE__ */ own("tour", {

@@ -1,0 +1,116 @@
+// The script of headsets: a session of WebXR, in which the walk is drawn once for each eye
+// (docs/formats/devices.md).
+
+import { Body } from "./xr/body.js";
+import { cameraOfEye, headingOf, unionOf } from "./xr/eyes.js";
+
+/** Metres to the near plane, as that of the page. */
+const NEAR = 0.1;
+
+/**
+ * Draws the walk for the eyes in place of the page's view.
+ * @param {import("./walkthrough.js").Walkthrough} walk
+ * @param {() => {eyes: import("./xr/eyes.js").Eye[], viewports: {x: number, y: number, width: number, height: number}[]}} look
+ * @param {any} layer of WebXR
+ * @returns {() => void} ends it
+ */
+function drawingBoth(walk, look, layer) {
+  const { frame, sharpness } = walk;
+  const own = /** @type {any} */ (walk);
+  let view = { tall: walk.tall, aspect: walk.aspect, lines: sharpness.lines };
+  own.sharpness = { full: true, settle: () => false, get lines() { return view.lines; } };
+  for (const name of /** @type {const} */ (["tall", "aspect"])) {
+    Object.defineProperty(walk, name, { get: () => view[name], configurable: true });
+  }
+  walk.frame = () => {
+    const { eyes, viewports } = look(), { gl, renderer } = walk;
+    const middle = [0, 1, 2].map((k) => eyes.reduce((sum, { place }) => sum + place[k], 0) / eyes.length);
+    const union = unionOf(eyes, { eye: middle, ...headingOf(eyes[0].axes) });
+    view = union;
+    // The view of the page is chosen from, not drawn.
+    if (renderer) renderer.draw = () => false;
+    try {
+      frame.call(walk, union.pose);
+    } finally {
+      Reflect.deleteProperty(renderer ?? {}, "draw");
+    }
+    if (!renderer || gl.isContextLost()) return;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, layer.framebuffer);
+    gl.enable(gl.SCISSOR_TEST);
+    eyes.forEach((eye, k) => {
+      const { x, y, width, height } = viewports[k];
+      gl.viewport(x, y, width, height);
+      gl.scissor(x, y, width, height);
+      renderer.draw(cameraOfEye(eye), walk.drawn, performance.now() / 1000);
+    });
+    gl.disable(gl.SCISSOR_TEST);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+  };
+  return () => {
+    for (const name of ["tall", "aspect", "frame"]) Reflect.deleteProperty(walk, name);
+    walk.sharpness = sharpness;
+    walk.turn();
+  };
+}
+
+/**
+ * Enters the building with a headset; resolved at the end of the session. Rejects if there can be none.
+ * @param {import("./app.js").App} app
+ */
+export async function enterVr(app) {
+  const { walk, walker } = app, { gl } = walk, { xr } = /** @type {any} */ (navigator);
+  const session = await xr.requestSession("immersive-vr", { optionalFeatures: ["local-floor"] });
+  const over = new Promise((resolve) => session.addEventListener("end", resolve));
+  /** @type {any} */
+  let space;
+  let floored = true, leave = () => {};
+  try {
+    await (/** @type {any} */ (gl)).makeXRCompatible();
+    const layer = new (/** @type {any} */ (globalThis)).XRWebGLLayer(session, gl);
+    session.updateRenderState({ baseLayer: layer, depthNear: NEAR, depthFar: walk.far });
+    space = await session.requestReferenceSpace("local-floor").catch(() => null);
+    floored = Boolean(space);
+    space ??= await session.requestReferenceSpace("local");
+    const body = new Body(walker, floored), { frame } = app;
+    /** @type {any[]} */
+    let views = [], place = 0, before = 0;
+    const look = () => {
+      const viewports = views.map((view) => layer.getViewport(view));
+      return { eyes: views.map((view, k) => body.eye(view, viewports[k].height)), viewports };
+    };
+    const stop = drawingBoth(walk, look, layer);
+    // The page has no frames of its own meanwhile.
+    app.frame = () => {};
+    leave = () => {
+      app.frame = frame;
+      stop();
+    };
+    session.addEventListener("selectstart", () => (body.pressed = true));
+    session.addEventListener("selectend", () => (body.pressed = false));
+    session.addEventListener("squeeze", () => {
+      place = (place + 1) % app.index.viewpoints.length;
+      app.goTo(place);
+      body.face();
+    });
+    const paint = (/** @type {number} */ now, /** @type {any} */ seen) => {
+      session.requestAnimationFrame(paint);
+      const viewer = seen.getViewerPose(space), time = before ? (now - before) / 1000 : 0;
+      before = now;
+      if (!viewer?.views.length) return;
+      ({ views } = viewer);
+      const wishes = body.follow(viewer.transform.matrix, session.inputSources);
+      try {
+        frame.call(app, time, wishes);
+      } catch (fault) {
+        session.end();
+        throw fault;
+      }
+    };
+    session.requestAnimationFrame(paint);
+  } catch (fault) {
+    session.end();
+    throw fault;
+  }
+  await over;
+  leave();
+}
