@@ -272,3 +272,23 @@ def test_all_levels_come_by_worth(visit: Visiting, site: Site, database: Path) -
         visitor.until("s.complete")
         asked = [v.range for v in visitor.visits if "statue_01" in v.path]
     assert asked[0] == f"bytes=2-{row['ends'][6] - 1}"
+
+
+def test_glass_is_drawn_beside_them(visit: Visiting, tmp_path: Path) -> None:
+    """In a building with lightmaps; glass has none."""
+    pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
+    model = write_rooms(tmp_path / "model", 3)
+    (model.parent / "two_rooms.mtl").open("a").write("newmtl glass\nKd 1 0 0\nd 0.5\n")
+    count = sum(line.startswith("v ") for line in model.read_text().splitlines())
+    pane = [f"v {x} {y} 0.3" for x, y in ((0.2, 0.1), (3.8, 0.1), (3.8, 2.9), (0.2, 2.9))]
+    pane += ["o pane", "usemtl glass", "f " + " ".join(str(count + 1 + k) for k in range(4))]
+    model.open("a").write("\n".join(pane) + "\n")
+    light = ["--light", "bake", "--light-samples", "4", "--light-density", "4"]
+    database = build(model, tmp_path / "db", *OCTREES, *light)
+    query = address(*pose(database, 0, 0.9))
+    with visit(site_of(database, PLAIN), query=query, width=WIDTH, height=HEIGHT) as visitor:
+        visitor.until(f"({LEVELS})[0] > 0")
+        visitor.complete()
+        red, green, _ = visitor.picture()[20, 20].tolist()
+        assert red > 2 * green
+        assert visitor.messages == []
