@@ -285,10 +285,14 @@ def test_glass_is_drawn_beside_them(visit: Visiting, tmp_path: Path) -> None:
     model.open("a").write("\n".join(pane) + "\n")
     light = ["--light", "bake", "--light-samples", "4", "--light-density", "4"]
     database = build(model, tmp_path / "db", *OCTREES, *light)
-    query = address(*pose(database, 0, 0.9))
+    (eye, yaw), served = pose(database, 0, 2.0), read_served(database)
+    angle = float(np.degrees(served.index["viewpoints"][0]["fieldOfView"]))
+    view = ViewOptions(eye=(*eye, yaw), field_of_view=angle, width=WIDTH, height=HEIGHT)
+    expected = draw_view(served, view)[60, 250].astype(int)
+    assert expected[0] > 2 * expected[1]
+    query = address(eye, yaw)
     with visit(site_of(database, PLAIN), query=query, width=WIDTH, height=HEIGHT) as visitor:
         visitor.until(f"({LEVELS})[0] > 0")
         visitor.complete()
-        red, green, _ = visitor.picture()[20, 20].tolist()
-        assert red > 2 * green
+        assert np.abs(visitor.picture()[60, 250] - expected).max() <= 3
         assert visitor.messages == []

@@ -34,7 +34,7 @@ from ptmtools.lab.tradeoff.knobs import (
 )
 from ptmtools.lab.world import World, prepare
 from ptmtools.options import option
-from ptmtools.output.served import Served, Surfaces, read_served
+from ptmtools.output.served import Served, read_served
 from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.warm_up import warm_building
 from ptmtools.progress import Progress, silent
