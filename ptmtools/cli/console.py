@@ -63,7 +63,9 @@ class Console:
             self.print(line)
 
     def warn(self, text: str) -> None:
-        """Prints a line on stderr about a problem that does not stop the command."""
+        """Prints a line on stderr about a problem that does not stop the command, unless quiet."""
+        if self.quiet:
+            return
         with self.above_progress():
             click.echo(f"ptm: {printable(text)}", err=True)
 

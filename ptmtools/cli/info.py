@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import asdict
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -34,8 +34,17 @@ _OLD = "computed by another release of ptmtools"
 _SHOWN = 5
 
 
+def _copy(context: click.Context, parameter: click.Parameter, value: str) -> str:
+    """As `local_copy`, but the URL of a model stays one."""
+    return (
+        value
+        if PurePath(value).suffix.lower() in SUFFIXES
+        else local_copy(context, parameter, value)
+    )
+
+
 @click.command("info", cls=Command)
-@click.argument("target", metavar="MODEL|FILE|DB", type=click.Path(), callback=local_copy)
+@click.argument("target", metavar="MODEL|FILE|DB", type=click.Path(), callback=_copy)
 @options_of(IngestOptions)
 @json_option
 @with_console
@@ -200,9 +209,10 @@ def _info_model(console: Console, target: str, options: IngestOptions) -> None:
     from ptmtools.cells.open_doors import enclosure
     from ptmtools.parallel import processors
     from ptmtools.scene.inspection import inspect
+    from ptmtools.store.remote import model_file
 
-    with console.progress() as progress:
-        model = inspect(Path(target), options, progress, workers=processors())
+    with console.progress() as progress, model_file(target) as (file, _):
+        model = inspect(file, options, progress, workers=processors())
     around = enclosure(model.scene)
     by = f", written by {model.generator}" if model.generator else ""
     head = f"{target}: {model.format}, {size(model.bytes)}{by}"

@@ -11,7 +11,7 @@ import math
 import os
 import re
 import typing
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import Field, fields
 from functools import partial, wraps
 from types import NoneType, UnionType
@@ -215,10 +215,13 @@ class Degrees(click.ParamType):  # type: ignore[type-arg]  # generic only in new
         return angle
 
 
-def options_of(*classes: type, layered: bool = False, hidden: bool = False) -> Decorator:
-    """A decorator that adds the options of all fields of ``classes``, under the ``heading`` of each
-    class; with ``layered``, ``--help`` lists the basic ones only, with ``hidden``, none. Fields of
-    several classes that have the same option share it."""
+def options_of(
+    *classes: type, layered: bool = False, hidden: bool = False, without: Container[str] = ()
+) -> Decorator:
+    """A decorator that adds the options of all fields of ``classes``, but for the fields
+    ``without``, under the ``heading`` of each class; with ``layered``, ``--help`` lists the basic
+    ones only, with ``hidden``, none. Fields of several classes that have the same option share
+    it."""
     options: dict[str, Decorator] = {}
     former: dict[str, str] = {}
     deprecated: dict[str, tuple[Any, str]] = {}
@@ -226,7 +229,7 @@ def options_of(*classes: type, layered: bool = False, hidden: bool = False) -> D
         hints, heading = typing.get_type_hints(cls), getattr(cls, "heading", "Options")
         for field in fields(cls):
             name, about = option_name(field), option_of(field)
-            if name in options:
+            if name in options or field.name in without:
                 continue
             settings: dict[str, Any] = {"heading": heading, "hidden": hidden}
             settings["basic"] = about.basic or not layered

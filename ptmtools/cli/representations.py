@@ -32,6 +32,9 @@ from ptmtools.neighbours.campus.reading import record, summary
 from ptmtools.quantities import count, size
 from ptmtools.scene.options import IngestOptions
 
+#: Fields of `IngestOptions` that these commands do not have: they draw no normal maps.
+NOT_READ = ("normal_maps",)
+
 
 @click.command("apo", cls=Command)
 @click.argument("mesh", metavar="MESH", type=click.Path())
@@ -40,7 +43,7 @@ from ptmtools.scene.options import IngestOptions
     "folder",
     metavar="DIR",
 )
-@options_of(ApoOptions, IngestOptions)
+@options_of(ApoOptions, IngestOptions, without=NOT_READ)
 @option("--render", "view", type=click.Path(), hidden=True, help="Now `ptm render`.")
 @options_of(RenderOptions, hidden=True)
 @force_option("Replace a folder that ptm apo wrote.")
@@ -104,7 +107,7 @@ def _convert(
     from ptmtools.scene import ingest
     from ptmtools.scene.notes import exterior_notes, warnings
 
-    options, read = take(ApoOptions, values), take(IngestOptions, values)
+    options, read = take(ApoOptions, values), _reading(values)
     FORM.check(folder, force=force)
     with console.progress() as progress, open_executor(workers) as executor:
         scene = ingest(model, read, progress, workers=workers or processors(), ask=False)
@@ -118,6 +121,11 @@ def _convert(
         console.warn(warning)
 
 
+def _reading(values: dict[str, Any]) -> IngestOptions:
+    """How the model is read: without normal maps."""
+    return replace(take(IngestOptions, values), normal_maps="none")
+
+
 @click.command("campus", cls=Command)
 @click.argument("model", type=click.Path())
 @output_option("Folder of the campus to write.", "folder", required=True)
@@ -128,7 +136,7 @@ def _convert(
     CampusOptions.heading,
     metavar="DIR",
 )
-@options_of(CampusOptions, IngestOptions)
+@options_of(CampusOptions, IngestOptions, without=NOT_READ)
 @force_option("Replace a folder that ptm campus wrote.")
 @jobs_option
 @json_option
@@ -149,7 +157,7 @@ def campus(
     """
     if not model or not folder or records_file == "":
         raise click.UsageError("a name is empty")
-    options, reading = take(CampusOptions, values), take(IngestOptions, values)
+    options, reading = take(CampusOptions, values), _reading(values)
     from ptmtools.neighbours.campus.building import make_campus
     from ptmtools.parallel import open_executor
     from ptmtools.scene.notes import exterior_notes, line, warnings

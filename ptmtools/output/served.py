@@ -174,6 +174,7 @@ class Surfaces:
     lightmap, spot: (n,) int32, the lightmap in the hints' textures, -1 without; (n, 3, 2) float64
         coordinates in it, origin at the upper left. None if there are no lightmaps.
     relief: the normal maps of objects, if there are any. bumps: those of materials.
+    opacity: (n,) of the factor, 0 to 1; None of surfaces that are all opaque.
     """
 
     corner: Floats
@@ -191,6 +192,7 @@ class Surfaces:
     spot: Floats | None = None
     relief: MappedRelief | None = None
     bumps: Bumps | None = None
+    opacity: Floats | None = None
 
     @property
     def light(self) -> Surfaces | None:
@@ -473,6 +475,7 @@ def _surfaces(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
         spot=spot if max(lightmap, default=-1) >= 0 else None,
         relief=_relief([p for _, p in shapes]),
         bumps=bumps_of([p for _, p in shapes], count),
+        opacity=spread([m.factor[3] for m in materials], np.float64),
     )
 
 

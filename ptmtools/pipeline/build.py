@@ -18,7 +18,7 @@ from ptmtools.pipeline.command import naming_command
 from ptmtools.pipeline.records import StageReport
 from ptmtools.pipeline.report import BuildReport, Visitor, peak_memory
 from ptmtools.pipeline.stage import Options, Run, Stage
-from ptmtools.pipeline.stages import EMIT, STAGES
+from ptmtools.pipeline.stages import EMIT, SCENE, STAGES
 from ptmtools.progress import Progress, silent
 from ptmtools.store.remote import folder_to_build, model_file
 from ptmtools.store.writer import DatabaseWriter
@@ -151,6 +151,9 @@ def _run(
             for report in run.reports[reported:]:
                 tell(report)
             finished.add(job.stage)
+            if job.stage is SCENE:
+                for later in jobs[i + 1 :]:
+                    later.check_model()
     except BaseException:
         with ExitStack() as abandoned:
             for job in jobs:

@@ -26,7 +26,7 @@ O = TypeVar("O")
 #: Files that a reason lists by name.
 _NAMED = 3
 #: The reason of a stage's first run.
-NEVER_RUN = ("has not been run",)
+NEVER_RUN = ("it has not been run",)
 
 
 @dataclass(frozen=True)

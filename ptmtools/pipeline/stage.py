@@ -428,6 +428,10 @@ class Job:
         """The tasks that a run would do, for a stage that consists of tasks."""
         return []
 
+    def check_model(self) -> None:
+        """Raises the error of a model that the options do not suit, once it has been read: before
+        stages that take long."""
+
     def begin(self) -> None:
         """Begins in the background, once all inputs are known, while a stage of one thread runs."""
 

@@ -142,6 +142,7 @@ def draw_view(
     InputError: PTM-I111 the viewpoint does not exist.
     DatabaseError, LimitError: see `read_pyramids` and `read_octrees`.
     """
+    from ptmtools.rendering.glass import Glass
     from ptmtools.rendering.kernels import shade
     from ptmtools.rendering.light import lamps, lit
     from ptmtools.rendering.normal_maps import show_bumps, show_relief
@@ -196,6 +197,8 @@ def draw_view(
         mapped = mapped[light.texture[sight.triangle[mapped]] >= 0]
         shown[mapped] *= to_srgb(linear[mapped] / 255)
     shown[sight.triangle < 0] = _SKY
+    glow = 1.0 if options.lit else GLOW if light is None else LIT_GLOW
+    Glass(surfaces, glow).blend(sight, shown)
     each = (options.height, samples, options.width, samples, 3)
     return as_bytes(shown.reshape(each).mean(axis=(1, 3)))
 

@@ -1,6 +1,7 @@
 """Camera rays: the first surface along each, by Embree, and frustum tests of boxes and hulls.
 
-A ray passes through one-sided surfaces from behind, and through glass always.
+A ray passes through one-sided surfaces from behind, and through glass always, which
+`ptmtools.rendering.glass` blends over pictures.
 """
 
 from __future__ import annotations

@@ -27,6 +27,7 @@ from ptmtools.output.served import Served
 from ptmtools.parallel import ordered
 from ptmtools.rendering.drawing import GLOW, LIT_GLOW
 from ptmtools.rendering.footprints import detail_of_pixels, footprints
+from ptmtools.rendering.glass import Glass
 from ptmtools.rendering.previews import read_preview
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.rendering.records import Sight, Triangles, triangles_of
@@ -86,9 +87,10 @@ def pictures_of(served: Served, views: Sequence[tuple[Kind, Mapping[str, Any]]])
     """
     caster, triangles = Caster(served.surfaces), triangles_of(served.surfaces)
     light = None if served.surfaces.light is None else triangles_of(served.surfaces.light)
+    glass = Glass(served.surfaces, GLOW if light is None else LIT_GLOW)
     rays = np.cumsum([math.prod(_rays(kind.size)) for kind, _ in views])
     for _, group in groupby(zip(rays // _TOGETHER, views, strict=True), lambda each: each[0]):
-        yield from _drawn(served, caster, triangles, light, [view for _, view in group])
+        yield from _drawn(served, caster, triangles, light, glass, [view for _, view in group])
 
 
 def _drawn(
@@ -96,6 +98,7 @@ def _drawn(
     caster: Caster,
     triangles: Triangles,
     light: Triangles | None,
+    glass: Glass,
     views: Sequence[tuple[Kind, Mapping[str, Any]]],
 ) -> Iterator[bytes]:
     """The pictures of some views, with the textures that they show in memory."""
@@ -107,7 +110,8 @@ def _drawn(
     # The lock of the interpreter is free while levels are decoded and numpy is at work.
     finest = max(kind.finest for kind, _ in views)
     levels = ordered(partial(_levels, served, finest), textures, _THREADS)
-    draw = partial(_jpeg_of, triangles, light, dict(zip(textures, levels, strict=True)))
+    texels = dict(zip(textures, levels, strict=True))
+    draw = partial(_jpeg_of, triangles, light, glass, texels)
     kinds = [kind for kind, _ in views]
     yield from ordered(draw, zip(sights, kinds, strict=True), _THREADS)
 
@@ -115,11 +119,14 @@ def _drawn(
 def _jpeg_of(
     triangles: Triangles,
     light: Triangles | None,
+    glass: Glass,
     textures: Mapping[int, Levels],
     shown: tuple[Sight, Kind],
 ) -> bytes:
     sight, kind = shown
-    return jpeg(_colors(sight, triangles, light, textures), kind.size, kind.most)
+    colors = _colors(sight, triangles, light, textures)
+    glass.blend(sight, colors)
+    return jpeg(colors, kind.size, kind.most)
 
 
 def jpeg(colors: Floats, size: tuple[int, int], most: int) -> bytes:
@@ -185,9 +192,7 @@ def _colors(
     normal = triangles.normal[triangle]
     facing = np.einsum("ij,ij->i", normal, ray)
     length = np.linalg.norm(normal, axis=1) * np.linalg.norm(ray, axis=1)
-    glow = np.full(len(hit), GLOW)
-    if light is not None:
-        glow[light.texture[triangle] >= 0] = LIT_GLOW
+    glow = np.full(len(hit), GLOW if light is None else LIT_GLOW)
     glow += (1 - glow) * np.abs(facing) / np.maximum(length, 1e-300)
     lit = np.repeat(255.0 * glow[:, None], 3, axis=1)
     _paint(lit, sight, hit, triangles, textures)

@@ -116,6 +116,8 @@ _S3 = Kind(
 _GS = Kind(_gs_arguments, lambda row: str(row.get("generation", "")), _gs_md5, _gs_condition)
 #: Stores whose objects have headers, by the protocol of their URLs.
 KINDS = {"s3": _S3, "s3a": _S3, "gs": _GS, "gcs": _GS}
+#: Protocols of web servers, which list no files.
+_OF_PAGES = ("http", "https")
 
 
 def is_url(target: str | os.PathLike[str]) -> bool:
@@ -139,17 +141,25 @@ class Objects:
 
     Raises
     ------
-    InputError: PTM-I111 the URL names no bucket, or fsspec does not know its protocol.
+    InputError: PTM-I111 the URL names no bucket or is that of a web server, or fsspec does not know
+        its protocol.
     MissingComponentError: PTM-M100 a package is not installed.
     """
 
     def __init__(self, url: str, *, reading: bool = False) -> None:
         self.url = url.rstrip("/")
         self._reading = reading
-        fsspec = component("fsspec", "PTM-M100", f"{url}: object stores need fsspec", "cloud")
         protocol, _, place = url.partition("://")
+        if protocol.lower() in _OF_PAGES:
+            raise InputError(
+                "PTM-I111",
+                "a web server does not list its files",
+                file=url,
+                remedy="use a folder, or an object store such as s3://BUCKET/PREFIX",
+            )
         if not place.strip("/"):
             raise InputError("PTM-I111", "the URL names no bucket", file=url)
+        fsspec = component("fsspec", "PTM-M100", f"{url}: object stores need fsspec", "cloud")
         self.kind = KINDS.get(protocol.lower())
         with self._asking("cannot be opened"):
             try:

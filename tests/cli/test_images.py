@@ -377,7 +377,7 @@ def test_a_damaged_description_is_reported_and_left_out(
     data = bytearray(encode(RGB, RAW, description=Description(b"a profile", orientation=6)))
     data[data.index(b"a profile")] ^= 1
     (folder / "x.ptm").write_bytes(data)
-    assert main(["-q", "decode", "x.ptm"]) == 0
+    assert main(["decode", "x.ptm"]) == 0
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("ptm: x.ptm: written without colour and orientation")
     assert line.endswith("[PTM-I108]")

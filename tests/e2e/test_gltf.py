@@ -13,6 +13,7 @@ import pytest
 
 from benchmarks.npm import GLTF_VALIDATOR
 from ptmtools.cli.main import main
+from ptmtools.output.gltf import unpack
 from ptmtools.site.geometry import lean_glb
 from tests.output.agreement import disagreements
 
@@ -69,6 +70,28 @@ def test_two_rooms(khronos: Any, database: Path, ptm: Any) -> None:
     assert not (www / "root.wrl").exists()
     assert ptm("emit", database).status == 0
     assert {p: p.read_bytes() for p in www.rglob("*") if p.is_file()} == before
+
+
+def test_lit_rooms(khronos: Any, ptm: Any, tmp_path: Path) -> None:
+    """glTF has no second coordinates without first ones: those of a surface with a lightmap alone
+    are unused, and cost an entry of the JSON, but no bytes of the buffer."""
+    pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
+    model, db = ROOT / "sample_data/two_rooms/two_rooms.obj", tmp_path / "db"
+    light = ["--light", "bake", "--light-samples", "4", "--light-density", "4"]
+    assert ptm("build-scene", model, "-o", db, "--plain-gltf", *light).status == 0
+    remarks = REMARKS | {"UNUSED_OBJECT", "IMAGE_NPOT_DIMENSIONS"}
+    assert clean(khronos, db, remarks) == counts(db)["triangles"] > 0
+    shared = 0
+    for file in (db / "www/gltf").iterdir():
+        document = unpack(file.read_bytes())[0]
+        for mesh in document["meshes"]:
+            for shape in mesh["primitives"]:
+                material, place = document["materials"][shape["material"]], shape["attributes"]
+                assert "occlusionTexture" in material
+                alike = place["TEXCOORD_0"] == place["TEXCOORD_1"]
+                assert alike is ("baseColorTexture" not in material["pbrMetallicRoughness"])
+                shared += alike
+    assert shared > 0
 
 
 def test_museum(khronos: Any, gltf_museum: Path) -> None:

@@ -498,6 +498,12 @@ def test_urls_of_files_are_paths(rooms: Path, tmp_path: Path, ptm: Ptm) -> None:
     assert ptm("validate", url).status == 0
 
 
+@pytest.mark.parametrize("target", ["museum.db", "museum.obj"])
+def test_a_web_server_is_no_store(target: str, ptm: Ptm) -> None:
+    done = ptm("info", f"http://127.0.0.1:9/{target}")
+    assert (done.status, "PTM-I111" in done.err) == (3, True)
+
+
 def test_what_is_no_database_or_model(store: Store, bucket: str, rooms: Path, ptm: Ptm) -> None:
     store.client().put_object(Bucket=bucket, Key="site/index.html", Body=b"mine")
     with pytest.raises(OutputError, match="PTM-O010"):
@@ -543,6 +549,8 @@ def test_the_commands(
     assert (done.status, done.out.startswith(f"{url}: ")) == (0, True), done.err
     done = ptm("info", url)
     assert (done.status, done.out.startswith(f"{url}: database of two_rooms.obj")) == (0, True)
+    done = ptm("info", f"s3://{bucket}/m/two_rooms.obj")
+    assert (done.status, ": Wavefront OBJ, " in done.out.splitlines()[0]) == (0, True), done.err
     copy = fetch_model(f"s3://{bucket}/m/two_rooms.obj").parent
     assert files_below(copy) == files_below(rooms.parent)
     build = ("build-scene", f"s3://{bucket}/m/two_rooms.obj", "-o", url)

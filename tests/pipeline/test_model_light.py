@@ -113,6 +113,9 @@ def test_the_choice_follows_from_the_model(made: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no lightmaps") as refused:
         built(model, tmp_path / "tiled", LightOptions("model"))
     assert refused.value.code == "PTM-I701"
+    with pytest.raises(InputError, match="no lightmaps"):
+        built(model, tmp_path / "new", LightOptions("model"))
+    assert not (tmp_path / "new").exists(), "refused before any stage was done"
     assert "light" not in built(made / "lit.glb", tmp_path / "none", LightOptions("none"))
 
 

@@ -272,3 +272,27 @@ def test_all_levels_come_by_worth(visit: Visiting, site: Site, database: Path) -
         visitor.until("s.complete")
         asked = [v.range for v in visitor.visits if "statue_01" in v.path]
     assert asked[0] == f"bytes=2-{row['ends'][6] - 1}"
+
+
+def test_glass_is_drawn_beside_them(visit: Visiting, tmp_path: Path) -> None:
+    """In a building with lightmaps; glass has none."""
+    pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
+    model = write_rooms(tmp_path / "model", 3)
+    (model.parent / "two_rooms.mtl").open("a").write("newmtl glass\nKd 1 0 0\nd 0.5\n")
+    count = sum(line.startswith("v ") for line in model.read_text().splitlines())
+    pane = [f"v {x} {y} 0.3" for x, y in ((0.2, 0.1), (3.8, 0.1), (3.8, 2.9), (0.2, 2.9))]
+    pane += ["o pane", "usemtl glass", "f " + " ".join(str(count + 1 + k) for k in range(4))]
+    model.open("a").write("\n".join(pane) + "\n")
+    light = ["--light", "bake", "--light-samples", "4", "--light-density", "4"]
+    database = build(model, tmp_path / "db", *OCTREES, *light)
+    (eye, yaw), served = pose(database, 0, 2.0), read_served(database)
+    angle = float(np.degrees(served.index["viewpoints"][0]["fieldOfView"]))
+    view = ViewOptions(eye=(*eye, yaw), field_of_view=angle, width=WIDTH, height=HEIGHT)
+    expected = draw_view(served, view)[60, 250].astype(int)
+    assert expected[0] > 2 * expected[1]
+    query = address(eye, yaw)
+    with visit(site_of(database, PLAIN), query=query, width=WIDTH, height=HEIGHT) as visitor:
+        visitor.until(f"({LEVELS})[0] > 0")
+        visitor.complete()
+        assert np.abs(visitor.picture()[60, 250] - expected).max() <= 3
+        assert visitor.messages == []

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
-from ptmtools.site.content import Site
+from ptmtools.site.content import Site, SiteOptions, site_of
 from tests.web import node
 
 HERE = Path(__file__).parent
@@ -92,3 +93,15 @@ def test_whole_textures_are_uploaded_for_each_picture(
             visitor.until("s.policy === 'whole' && s.complete")
             assert np.abs(visitor.picture().astype(int) - full).max() <= 2
             assert visitor.messages == []
+
+
+def test_a_walk_begins_behind_a_poster(
+    visit: Callable[..., Any], museum_db: Path, tmp_path: Path
+) -> None:
+    """Nothing is drawn before the walk begins."""
+    poster = tmp_path / "poster.png"
+    Image.new("RGB", (64, 36)).save(poster)
+    site = site_of(museum_db, SiteOptions(poster=str(poster), pictures=False, opening=False))
+    with visit(site, query="?policy=whole") as visitor:
+        visitor.page.wait_for_function("window.ptm?.walk.begun", timeout=30_000)
+        visitor.complete()

@@ -22,7 +22,7 @@ def table(runs: Sequence[CampusRun]) -> list[str]:
         ("time until all coarsest meshes are loaded, s", lambda r: _or(r.begun, "{:.1f}")),
         ("graphics memory of these meshes, MB", lambda r: _mega(r.floor)),
         ("maximum graphics memory, MB", lambda r: _mega(int(r.memory.max()))),
-        ("received, MB", lambda r: _mega(r.body + r.overhead)),
+        ("received with headers, MB", lambda r: _mega(r.body + r.overhead)),
         ("requests", lambda r: f"{r.requests:,}"),
         ("link idle", lambda r: f"{r.idle_share:.0%}"),
         (f"pauses of {PAUSE:g} s or more", lambda r: f"{r.pauses}"),
@@ -36,11 +36,11 @@ def table(runs: Sequence[CampusRun]) -> list[str]:
 
 
 def received(runs: Sequence[CampusRun]) -> list[str]:
-    """MB received by time, a column for each preset; in brackets the increase since the row
-    before."""
+    """MB of files received by time, a column for each preset; in brackets the increase since the
+    row before."""
     time = runs[0].time
     instants = [*np.arange(EVERY, time[-1], EVERY).tolist(), float(time[-1])]
-    lines, before = _head("s", runs), [0.0] * len(runs)
+    lines, before = _head("MB of files after, s", runs), [0.0] * len(runs)
     for instant in instants:
         at = int(np.searchsorted(time, instant, "right")) - 1
         now = [float(run.fetched[at]) for run in runs]

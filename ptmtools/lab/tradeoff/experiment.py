@@ -49,7 +49,7 @@ class Measurement:
     seconds: of one process, for the whole database.
     work: in the units that the experiment names; does not depend on the machine.
     error: as the experiment defines it; the mean over the trials.
-    worst: the greatest error of the trials.
+    worst: the greatest error of the trials, or the 95th percentile of rays, points or frames.
     more: other figures, by name.
     note: the method, where it may differ.
     """

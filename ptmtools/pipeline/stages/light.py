@@ -84,18 +84,25 @@ class LightJob(Job):
         if options.light in ("bake", "model"):
             _check_component()
 
-    def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
+    def check_model(self) -> None:
         """Raises InputError PTM-I701: the model has no lightmaps, which the options ask for."""
-        run = self.run
-        lights = None if self.options.light == "none" else lights_of(run)
-        has_maps = lights is not None and bool(lights.maps)
-        if self.options.light == "model" and not has_maps:
+        if self.options.light != "model":
+            return
+        lights = lights_of(self.run)
+        if lights is None or not lights.maps:
             raise InputError(
                 "PTM-I701",
                 "the model has no lightmaps",
-                file=run.model,
+                file=self.run.model or self.run.db.path,
                 remedy="use --light bake, or a glTF with occlusion textures that do not repeat",
             )
+
+    def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
+        """Raises as `check_model`."""
+        self.check_model()
+        run = self.run
+        lights = None if self.options.light == "none" else lights_of(run)
+        has_maps = lights is not None and bool(lights.maps)
         if self.options.light == "none":
             return described(work, _NO_LIGHT, ())
         import numpy as np

@@ -115,7 +115,7 @@ def _counts(reliefs: Reliefs) -> Mapping[str, Any]:
 
 def _summary(n: Mapping[str, Any]) -> str:
     if not n["maps"]:
-        return "no normal maps"
+        return "no object replaced by one with a normal map"
     return (
         f"{count(n['maps'], 'normal map')} of {count(n['texels'], 'texel')}, "
         f"{size(n['ptm_bytes'])}, normals off by {n['error']:.2g} at most"

@@ -71,16 +71,18 @@ export class WholeMemory {
   }
 
   /**
-   * Decodes what the last pictures lacked, and what has a better source.
+   * Decodes what the last pictures lacked, what is in view, and what has a better source.
    * @param {Int32Array} want columns
    * @param {Float64Array} priority
    * @param {Float64Array} loss of the best source of each
    */
   settle(want, priority, loss) {
     this.#lru.shrink(this.budget);
-    for (const t of this.#decoded.keys()) {
-      if (want[t] > 0 && loss[t] < this.loss[t]) this.#lacking.add(t);
-    }
+    want.forEach((levels, t) => {
+      // Behind a poster nothing is drawn until what is in view has been decoded.
+      const news = this.#decoded.has(t) ? loss[t] < this.loss[t] : priority[t] > 0;
+      if (levels > 0 && news) this.#lacking.add(t);
+    });
     const lacking = [...this.#lacking].sort((a, b) => priority[b] - priority[a]);
     this.#lacking.clear();
     for (const t of lacking) {

@@ -88,10 +88,10 @@ class Texels {
     });
   }
 
-  /** Other programs look floats up in unit 0. @param {() => void} call */
+  /** Other programs look floats up in units 0 to 2. @param {() => void} call */
   #bound(call) {
     const { gl } = this;
-    gl.activeTexture(gl.TEXTURE1);
+    gl.activeTexture(gl.TEXTURE3);
     gl.bindTexture(gl.TEXTURE_2D, this.texture);
     call();
     gl.activeTexture(gl.TEXTURE0);

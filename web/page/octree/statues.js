@@ -226,12 +226,12 @@ export class Statues {
   draw(camera, batches, paint) {
     const { gl, program } = this, { at } = program;
     aim(gl, program, camera);
-    gl.uniform1i(at.octree, 1);
+    gl.uniform1i(at.octree, 3);
     let fading = false;
     for (const { buffers, batch } of batches) {
       const octree = /** @type {Octree} */ (this.#octrees[batch.look.octree]);
       const { cube: { low, side } } = octree.index;
-      gl.activeTexture(gl.TEXTURE1);
+      gl.activeTexture(gl.TEXTURE3);
       gl.bindTexture(gl.TEXTURE_2D, octree.texels[0].texture);
       gl.activeTexture(gl.TEXTURE0);
       gl.uniform3fv(at.low, low);
