@@ -183,9 +183,8 @@ def try_settings(
         preparing + sum(seconds[s.name] for s in concerned(setting.knob.stage, own))
         for setting in chosen
     )
-    tell(
-        f"{count(len(chosen), 'setting')} on a walk of {walk.duration:.0f} s; about {minutes(least)}"
-    )
+    number = count(len(chosen), "setting")
+    tell(f"{number} on a walk of {walk.duration:.0f} s; about {minutes(least)}")
     walker = _Walker(walk, original, options)
     others = list(dict.fromkeys(s.knob.policy for s in chosen if s.knob.policy))
     seen = [s for policy in ("", *others) for s in walker.walks(original, policy)]
