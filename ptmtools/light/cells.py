@@ -120,9 +120,9 @@ class Baking:
         mapped[piece.shape[flat]] = True
         uv = np.zeros((len(corner), 3, 2), np.float32)
         vertex = np.full((len(corner), 3), 255, np.uint8)
-        side = self._sides(corner, piece.side)
+        side = self.sides(corner, piece.side)
         for own in _objects(piece.object, dense):
-            look = self._look(corner[own], side[own], piece.face[own])
+            look = self.look(corner[own], side[own], piece.face[own])
             vertex[own] = self._encoded(vertex_light(look, corner[own], normals(corner[own])))
         if not flat.any():
             return CellLight(mapped, uv, vertex, None, False)
@@ -139,7 +139,7 @@ class Baking:
             padding=_PADDING,
             group=_groups(corner[own], side[own]),
         )
-        look = self._look(corner[own], side[own], piece.face[own])
+        look = self.look(corner[own], side[own], piece.face[own])
         size = atlas.side or sizes[-1]
         least = COVERED if self.painted is None else 0.0
         (lit,) = bake(look, corner[own], atlas, look.grain, (size,), least=least)
@@ -149,7 +149,8 @@ class Baking:
         texels = self._encoded(lit.value)
         return CellLight(mapped, uv, vertex, texels, atlas.side is None, min(reached, 1.0))
 
-    def _sides(self, corner: Floats, side: NDArray[np.int8]) -> Floats:
+    def sides(self, corner: Floats, side: NDArray[np.int8]) -> Floats:
+        """(n,) 1 where the front of (n, 3, 3) faces is lit, -1 the back; ``side``: see `Piece`."""
         either = side == 0
         result = np.where(side < 0, -1.0, 1.0)
         if either.any() and self.painted is None:
@@ -159,7 +160,8 @@ class Baking:
             )
         return result
 
-    def _look(self, corner: Floats, side: Floats, face: Ints) -> Rays | Mixed | Painted:
+    def look(self, corner: Floats, side: Floats, face: Ints) -> Rays | Mixed | Painted:
+        """The light of (n, 3, 3) faces on their (n,) `sides`; (n,) ``face``: see `Piece`."""
         if self.painted is not None:
             return replace(self.painted, source=self.painted.source[face])
         samples, reach = self.options.light_samples, self.options.light_reach

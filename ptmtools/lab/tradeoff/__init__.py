@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ptmtools.lazy import Lazy
-from ptmtools.pipeline.stages import ACH, CELLS, PVS, TEXTURES
+from ptmtools.pipeline.stages import ACH, CELLS, LIGHT, PVS, TEXTURES
 
 if TYPE_CHECKING:
     from ptmtools.lab.tradeoff.experiment import Experiment, Subject
@@ -22,9 +22,10 @@ EXPERIMENTS: dict[str, Lazy[Callable[[Subject], Experiment]]] = {
     ACH.name: Lazy("ptmtools.lab.tradeoff.stages:prepare_coverage"),
     TEXTURES.name: Lazy("ptmtools.lab.tradeoff.stages:prepare_textures"),
 }
-#: Experiments beside those of the stages, which are only run if they are named: the client of the
-#: paper, octree textures, interlaced images and campuses.
+#: Experiments which are only run if they are named: baked light, the client of the paper, octree
+#: textures, interlaced images and campuses.
 FURTHER: dict[str, Lazy[Callable[[Subject], Experiment]]] = {
+    LIGHT.name: Lazy("ptmtools.lab.tradeoff.light:prepare_lightmaps"),
     "client": Lazy("ptmtools.lab.tradeoff.visitor:prepare_client"),
     "apo": Lazy("ptmtools.lab.tradeoff.forms:prepare_octree"),
     "interlace": Lazy("ptmtools.lab.tradeoff.forms:prepare_interlaced"),

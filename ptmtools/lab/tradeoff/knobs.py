@@ -21,7 +21,7 @@ from ptmtools.lab.tradeoff.experiment import timed
 from ptmtools.options import option_name
 from ptmtools.pipeline.build import run_stage
 from ptmtools.pipeline.stage import Artifacts, Options, Stage
-from ptmtools.pipeline.stages import ACH, CELLS, EMIT, PVS, STAGES, TEXTURES
+from ptmtools.pipeline.stages import ACH, CELLS, EMIT, LIGHT, PVS, STAGES, TEXTURES
 
 
 @dataclass(frozen=True)
@@ -78,6 +78,7 @@ KNOBS = (
     Knob(TEXTURES, "max_error", (2, 4), coarser=True),
     Knob(TEXTURES, "max_side", (1 / 2, 1 / 4), of_longest=True),
     Knob(TEXTURES, "trim", (True,), coarser=True),
+    Knob(LIGHT, "light_samples", (16, 256)),
     Knob(EMIT, "need", (16, 0)),
 )
 
@@ -115,6 +116,8 @@ def settings(
     ``quick``, one value of each."""
     for knob in KNOBS:
         if named and knob.option.removeprefix("--") not in named:
+            continue
+        if knob.stage not in own:  # an optional one, which has stored nothing
             continue
         options = own[knob.stage]
         current = getattr(options, knob.own or knob.field)

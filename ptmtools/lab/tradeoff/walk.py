@@ -38,6 +38,7 @@ from ptmtools.output.served import Served, read_served
 from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.warm_up import warm_building
 from ptmtools.progress import Progress, silent
+from ptmtools.quantities import count
 from ptmtools.rendering.lossy import read_lossy
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.records import Pyramids
@@ -182,7 +183,8 @@ def try_settings(
         preparing + sum(seconds[s.name] for s in concerned(setting.knob.stage, own))
         for setting in chosen
     )
-    tell(f"{len(chosen)} settings on a walk of {walk.duration:.0f} s; about {minutes(least)}")
+    number = count(len(chosen), "setting")
+    tell(f"{number} on a walk of {walk.duration:.0f} s; about {minutes(least)}")
     walker = _Walker(walk, original, options)
     others = list(dict.fromkeys(s.knob.policy for s in chosen if s.knob.policy))
     seen = [s for policy in ("", *others) for s in walker.walks(original, policy)]
@@ -271,10 +273,10 @@ def begins_with(full: Pyramids, few: Pyramids) -> bool:
     """Whether the textures of ``few`` are the coarsest levels of those of ``full``."""
     if len(few.levels) != len(full.levels) or (few.levels > full.levels).any():
         return False
-    for t, count in enumerate(few.levels.tolist()):
-        if (few.size[t, :count] != full.size[t, :count]).any():
+    for t, levels in enumerate(few.levels.tolist()):
+        if (few.size[t, :levels] != full.size[t, :levels]).any():
             return False
-        length = 3 * int(few.size[t, :count].prod(axis=1).sum())
+        length = 3 * int(few.size[t, :levels].prod(axis=1).sum())
         a, b = int(few.start[t, 0]), int(full.start[t, 0])
         if (few.texel[a : a + length] != full.texel[b : b + length]).any():
             return False

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from ptmtools.light.looks import Painted
     from ptmtools.light.model import Light
     from ptmtools.scene.lights import Lights
+    from ptmtools.scene.model import Scene
     from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
 
@@ -114,7 +115,7 @@ class LightJob(Job):
 
         scene, cells = run[APO], run[CELLS]
         own = lights if has_maps and self.options.light != "bake" else None
-        unlit = _unlit(run, lights, painted=own is not None)
+        unlit = unlit_materials(scene, lights, painted=own is not None)
         options, texel = self.options, 1 / self.options.light_density
         pieces = pieces_of(Geometry(scene, cells), cells, unlit, texel, replaced_objects(run))
         if options.light == "auto" and not own:
@@ -178,14 +179,13 @@ def _has_component() -> bool:
     return True
 
 
-def _unlit(run: Run, lights: Lights | None, *, painted: bool) -> NDArray[np.bool_]:
+def unlit_materials(scene: Scene, lights: Lights | None, *, painted: bool) -> NDArray[np.bool_]:
     """(M,) the materials without light: those seen through, those whose colours contain it, and
     those without a lightmap of the model, or that glow."""
     import numpy as np
 
     from ptmtools.light.lamps import glowing
 
-    scene = run[APO]
     glass = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials], np.bool_)
     if lights is None:
         return glass

@@ -1,0 +1,36 @@
+"""The experiment of baked light, and its option on a walk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from ptmtools.lab.tradeoff.experiment import Subject
+from ptmtools.lab.tradeoff.knobs import own_options, settings
+from ptmtools.lab.tradeoff.light import prepare_lightmaps
+from ptmtools.light.options import LightOptions
+from ptmtools.pipeline.command import open_database
+from ptmtools.pipeline.stage import Artifacts
+from ptmtools.pipeline.stages import LIGHT
+
+pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
+
+
+def test_more_texels_and_rays_are_nearer_to_the_light(two_rooms: Path) -> None:
+    artifacts = Artifacts(open_database(two_rooms))
+    experiment = prepare_lightmaps(Subject(artifacts, 1, 1), most=256)
+    tried = {setting.name: setting for setting in experiment.settings}
+    names = "samples 4", "samples 64", "density 2.5", "density 10"
+    few, many, coarse, fine = (experiment.measure(tried[f"--light-{name}"]) for name in names)
+    assert few.error > 2 * many.error > 2 * experiment.reference_error > 0
+    assert few.work == many.work
+    assert coarse.error > 2 * fine.error
+    assert coarse.work < fine.work
+
+
+def test_rays_are_an_option_of_a_database_with_light(two_rooms: Path) -> None:
+    own = {k: v for k, v in own_options(Artifacts(open_database(two_rooms))).items() if k != LIGHT}
+    assert list(settings(own, 64, ("light-samples",))) == []
+    lit = {**own, LIGHT: LightOptions()}
+    assert [s.value for s in settings(lit, 64, ("light-samples",))] == [16, 256]
