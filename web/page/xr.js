@@ -61,6 +61,8 @@ export async function enterVr(app) {
   const { walk, walker } = app, { gl } = walk, { xr } = /** @type {any} */ (navigator);
   const session = await xr.requestSession("immersive-vr", { optionalFeatures: ["local-floor"] });
   const over = new Promise((resolve) => session.addEventListener("end", resolve));
+  // It may have ended by itself.
+  const end = () => session.end().catch(() => {});
   /** @type {any} */
   let space;
   let floored = true, leave = () => {};
@@ -79,10 +81,15 @@ export async function enterVr(app) {
       return { eyes: views.map((view, k) => body.eye(view, viewports[k].height)), viewports };
     };
     const stop = drawingBoth(walk, look, layer);
-    // The page has no frames of its own meanwhile.
-    app.frame = () => {};
+    // The page has no frames of its own meanwhile. A gamepad that is connected now keeps this one.
+    let left = false;
+    const still = (/** @type {Parameters<typeof frame>} */ ...words) => {
+      if (left) frame.apply(app, words);
+    };
+    app.frame = still;
     leave = () => {
-      app.frame = frame;
+      left = true;
+      if (app.frame === still) app.frame = frame;
       stop();
     };
     session.addEventListener("selectstart", () => (body.pressed = true));
@@ -102,15 +109,16 @@ export async function enterVr(app) {
       try {
         frame.call(app, time, wishes);
       } catch (fault) {
-        session.end();
+        end();
         throw fault;
       }
     };
     session.requestAnimationFrame(paint);
+    await over;
   } catch (fault) {
-    session.end();
+    end();
     throw fault;
+  } finally {
+    leave();
   }
-  await over;
-  leave();
 }
