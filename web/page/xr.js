@@ -10,7 +10,8 @@ const NEAR = 0.1;
 /**
  * Draws the walk for the eyes in place of the page's view.
  * @param {import("./walkthrough.js").Walkthrough} walk
- * @param {() => {eyes: import("./xr/eyes.js").Eye[], viewports: {x: number, y: number, width: number, height: number}[]}} look
+ * @param {() => {axes: number[][], eyes: import("./xr/eyes.js").Eye[],
+ *   viewports: {x: number, y: number, width: number, height: number}[]}} look the axes are of the head
  * @param {any} layer of WebXR
  * @returns {() => void} ends it
  */
@@ -23,9 +24,9 @@ function drawingBoth(walk, look, layer) {
     Object.defineProperty(walk, name, { get: () => view[name], configurable: true });
   }
   walk.frame = () => {
-    const { eyes, viewports } = look(), { gl, renderer } = walk;
+    const { axes, eyes, viewports } = look(), { gl, renderer } = walk;
     const middle = [0, 1, 2].map((k) => eyes.reduce((sum, { place }) => sum + place[k], 0) / eyes.length);
-    const union = unionOf(eyes, { eye: middle, ...headingOf(eyes[0].axes) });
+    const union = unionOf(eyes, { eye: middle, ...headingOf(axes) });
     view = union;
     // The view of the page is chosen from, not drawn.
     if (renderer) renderer.draw = () => false;
@@ -78,7 +79,7 @@ export async function enterVr(app) {
     let views = [], place = 0, before = 0;
     const look = () => {
       const viewports = views.map((view) => layer.getViewport(view));
-      return { eyes: views.map((view, k) => body.eye(view, viewports[k].height)), viewports };
+      return { axes: body.axes, eyes: views.map((view, k) => body.eye(view, viewports[k].height)), viewports };
     };
     const stop = drawingBoth(walk, look, layer);
     // The page has no frames of its own meanwhile. A gamepad that is connected now keeps this one.
