@@ -69,7 +69,8 @@ export class Store {
    * @param {(shelf: Shelf) => Promise<T>} work @param {T} otherwise */
   async #tried(work, otherwise) {
     try {
-      return await work(await this.open());
+      // Opening makes a cache anew.
+      return this.closed ? otherwise : await work(await this.open());
     } catch {
       return otherwise;
     }
