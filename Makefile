@@ -48,7 +48,8 @@ $(VENV)/.made:
 	$(PYTHON) -m venv $(VENV)
 	@touch $@
 
-$(VENV)/.installed: $(VENV)/.made pyproject.toml
+# The version is part of what pip records, which the bill of materials reads.
+$(VENV)/.installed: $(VENV)/.made pyproject.toml ptmtools/version.py
 	@echo "Installing ptmtools and what it needs into $(VENV) …"
 	$(PIP) install --editable '.[plot]'
 	@touch $@

@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,8 +39,11 @@ class Package:
     @property
     def missing(self) -> bool:
         """Whether it is not installed in this version."""
-        about = self.folder / "package.json"
-        return not about.is_file() or json.loads(about.read_text())["version"] != self.version
+        try:
+            about = json.loads((self.folder / "package.json").read_text("utf-8"))
+        except (OSError, ValueError):
+            return True
+        return about.get("version") != self.version
 
     @property
     def command(self) -> str:
@@ -95,8 +97,8 @@ def main() -> None:
     for package in TESTED:
         if package.missing:
             print(f"Installing {package.name} for the tests …", flush=True)
-            done = subprocess.run(package.command.split(), cwd=ROOT, stdout=sys.stderr)
-            if done.returncode:
+            command = [*package.command.split(), "--loglevel=error"]
+            if subprocess.run(command, cwd=ROOT, stdout=subprocess.DEVNULL).returncode:
                 print(f"Could not install {package.name}; a test will be skipped.")
 
 

@@ -3,7 +3,7 @@
     python release/fixture.py
 
 The archive ``tests/releases/VERSION.zip`` has the model of the two rooms, its database and the
-site published from it. Run it when a release is made, and do not change the archive afterwards.
+site published from it. Run it when a release is made; it changes no archive that exists.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ def main() -> None:
     from ptmtools.version import __version__
 
     archive = ROOT / "tests/releases" / f"{__version__}.zip"
+    if archive.exists():
+        raise SystemExit(f"{archive.relative_to(ROOT)} exists and is not changed")
     with tempfile.TemporaryDirectory(prefix="release-") as name:
         folder = Path(name)
         shutil.copytree(ROOT / "sample_data/two_rooms", folder / "model")

@@ -58,6 +58,7 @@ class Glass:
         place, normal = (each[sight.triangle[hit]] for each in self._all)
         end[hit] = _distance(sight.eye, ray[hit], place, normal)
         waiting, gone = np.arange(len(ray)), np.zeros(len(ray))
+        last = np.full(len(ray), -1)
         for _ in range(_MOST):
             start = sight.eye - self._middle + ray[waiting] * gone[waiting][:, None]
             rays = start.astype(np.float32), ray[waiting].astype(np.float32)
@@ -70,7 +71,9 @@ class Glass:
             if not len(waiting):
                 break
             turn = np.einsum("ij,ij->i", self._normal[pane], ray[waiting])
-            seen = ~self._one_sided[pane] | (turn <= 0)
+            # A ray that grazes a pane may meet it again after the step.
+            seen = (~self._one_sided[pane] | (turn <= 0)) & (pane != last[waiting])
+            last[waiting] = pane
             layers.append((waiting[seen], pane[seen]))
             gone[waiting] = np.maximum(far, gone[waiting]) + self._step
         return layers

@@ -155,7 +155,7 @@ class Objects:
                 "PTM-I111",
                 "a web server does not list its files",
                 file=url,
-                remedy="use a folder, or an object store such as s3://BUCKET/PREFIX",
+                remedy="use a local path, or an object store such as s3://BUCKET/PREFIX",
             )
         if not place.strip("/"):
             raise InputError("PTM-I111", "the URL names no bucket", file=url)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -55,6 +57,17 @@ def test_panes_blend_the_farthest_first(count: int) -> None:
     behind_red = 0.5 * np.array([200, 200, 200]) + 0.5 * np.array([0, 255, 0])
     expected = 0.75 * behind_red + 0.25 * np.array([255, 0, 0])
     np.testing.assert_allclose(shown, np.repeat(expected[None], 24, axis=0))
+
+
+def test_a_pane_counts_once_for_rays_that_graze_it() -> None:
+    turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
+    floor = np.array([[-1000, 0, 1000], [1000, 0, 1000], [0, 0, -3000]]) @ turn.T
+    surfaces = replace(panes(1), corner=floor[None], two_sided=np.array([True]))
+    eye, ahead = turn @ [0, 0.2, 600], turn @ [0, 0, -1]
+    sight = Caster(surfaces).look(Camera(320, 180, 1.2, 1.78), eye, ahead)
+    shown = np.full((len(sight.ray), 3), 255.0)
+    Glass(surfaces).blend(sight, shown)
+    assert {*shown[:, 1].tolist()} == {255.0, 0.75 * 255}
 
 
 def test_light_falls_with_the_angle() -> None:

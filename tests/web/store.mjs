@@ -3,7 +3,8 @@
 
 import { pathToFileURL } from "node:url";
 
-const { Store } = await import(pathToFileURL(`${process.argv[2]}/offline/store.js`));
+const load = (name) => import(pathToFileURL(`${process.argv[2]}/offline/${name}.js`));
+const { Store } = await load("store"), { Visits } = await load("visits");
 const URL_OF = "https://site.test/data/a-0123456789.ptm", SIZE = 1000;
 const FILE = Uint8Array.from({ length: SIZE }, (_, k) => k % 251);
 
@@ -95,6 +96,41 @@ await reads("down", [[0, 100]], { status: 503 });
   const lost = new Store(async () => cache, async () => Promise.reject(new TypeError("no network")));
   const beyond = await read(lost, 50, 150).catch((fault) => String(fault));
   print("lost", { answers: [await read(lost, 20, 80)], beyond });
+}
+{
+  // Storage that fails altogether.
+  const { ask } = host(), broken = async () => Promise.reject(new DOMException("broken", "UnknownError"));
+  const store = new Store(broken, ask);
+  const answers = [await read(store, 0, 100), await read(store, 0, 100)];
+  const whole = await store.answer(new Request(URL_OF), URL_OF, () => {});
+  print("broken", { answers, whole: whole.status });
+}
+{
+  // A host that answers with a page for a file that it lacks.
+  const cache = shelf(), headers = { "content-type": "text/html; charset=utf-8" }, work = [];
+  const store = new Store(async () => cache, async () => new Response("<html>", { headers }));
+  await read(store, 0, 6);
+  await store.answer(new Request(URL_OF), URL_OF, (one) => work.push(one));
+  await Promise.all(work);
+  print("page", { kept: cache.rows.size });
+}
+{
+  // A new version whose files do not fit, and one that does.
+  const scope = "https://site.test/", kept = {};
+  for (const room of [300, 3000]) {
+    const cache = shelf(room);
+    for (const mark of ["0123456789", "abcdefabcd"]) {
+      const html = `<p id="site">data/index-${mark}.json viewer-${mark}/register.js`;
+      const ask = async (request) => new Response((request.url ?? request) === scope ? html : " ".repeat(50));
+      const work = [];
+      await new Visits(new Store(async () => cache, ask), scope, async () => {})
+        .answer(new Request(scope), (one) => work.push(one));
+      await Promise.all(work);
+    }
+    const [last] = (await cache.match(scope).then((one) => one.text())).match(/[0-9a-f]{10}/);
+    kept[room] = [last, cache.rows.has(`${scope}data/index-${last}.json`)];
+  }
+  print("versions", { kept });
 }
 {
   // Any ranges in any order: the answers are right, and no byte that is kept is asked for at an end of a range.

@@ -79,6 +79,22 @@ def test_what_the_browser_removed_is_asked_for_again(rows: dict[str, dict[str, A
     assert rows["emptied"]["asked"] == [[0, 100], [0, 100]]
 
 
+def test_storage_that_fails_does_not_stop_the_walk(rows: dict[str, dict[str, Any]]) -> None:
+    row = rows["broken"]
+    assert all(answer["right"] and answer["status"] == 206 for answer in row["answers"])
+    assert row["whole"] == 206, "the host's answer, of this one for any request"
+
+
+def test_a_page_in_place_of_a_file_is_not_kept(rows: dict[str, dict[str, Any]]) -> None:
+    assert rows["page"]["kept"] == 0
+
+
+def test_a_version_that_does_not_fit_leaves_the_former(rows: dict[str, dict[str, Any]]) -> None:
+    """The version of the page, and whether its index is kept: without and with room."""
+    former, new = rows["versions"]["kept"].values()
+    assert (former, new) == (["0123456789", True], ["abcdefabcd", True])
+
+
 def test_without_a_network(rows: dict[str, dict[str, Any]]) -> None:
     """The page learns what is not here as it does otherwise."""
     assert [answer["right"] for answer in rows["lost"]["answers"]] == [True]

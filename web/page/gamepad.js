@@ -30,7 +30,7 @@ export function joinedWishes(wishes, { axes, buttons, mapping }) {
     right: limited(wishes.right + right),
     turn: limited(wishes.turn - turn),
     look: limited(wishes.look - down),
-    run: wishes.run || (mapping === "standard" && buttons[RUN].pressed),
+    run: wishes.run || (mapping === "standard" && Boolean(buttons[RUN]?.pressed)),
   };
 }
 
@@ -41,7 +41,9 @@ export function attachGamepad(app) {
   if (attached) return;
   attached = true;
   const { frame } = app, count = app.index.viewpoints.length;
-  let place = 0, held = new Set();
+  let place = 0;
+  /** Of all gamepads together. @type {Set<number>} */
+  let held = new Set();
   /** @param {number} button */
   const press = (button) => {
     if (button === BEFORE || button === NEXT) {
@@ -58,17 +60,17 @@ export function attachGamepad(app) {
   addEventListener("gamepadconnected", look);
   addEventListener("gamepaddisconnected", look);
   app.frame = (time, wishes) => {
+    const before = wishes, pressed = new Set();
     for (const pad of connected ? navigator.getGamepads() : []) {
       if (!pad?.connected) continue;
-      const pressed = new Set(pad.mapping === "standard" ? pad.buttons.flatMap((b, k) => (b.pressed ? [k] : [])) : []);
-      for (const button of pressed) if (!held.has(button)) press(button);
-      held = pressed;
-      const before = wishes;
+      if (pad.mapping === "standard") pad.buttons.forEach((one, k) => one.pressed && pressed.add(k));
       wishes = joinedWishes(wishes, pad);
-      // A kiosk waits for a visitor's rest.
-      const moves = /** @type {const} */ (["forward", "right", "turn", "look"]).some((k) => wishes[k] !== before[k]);
-      if (moves || pressed.size) dispatchEvent(new Event("gamepadused"));
     }
+    for (const button of pressed) if (!held.has(button)) press(button);
+    held = pressed;
+    // A kiosk waits for a visitor's rest.
+    const moves = /** @type {const} */ (["forward", "right", "turn", "look"]).some((k) => wishes[k] !== before[k]);
+    if (moves || pressed.size) dispatchEvent(new Event("gamepadused"));
     frame.call(app, time, wishes);
   };
 }

@@ -10,7 +10,8 @@ const NEAR = 0.1;
 /**
  * Draws the walk for the eyes in place of the page's view.
  * @param {import("./walkthrough.js").Walkthrough} walk
- * @param {() => {eyes: import("./xr/eyes.js").Eye[], viewports: {x: number, y: number, width: number, height: number}[]}} look
+ * @param {() => {axes: number[][], eyes: import("./xr/eyes.js").Eye[],
+ *   viewports: {x: number, y: number, width: number, height: number}[]}} look the axes are of the head
  * @param {any} layer of WebXR
  * @returns {() => void} ends it
  */
@@ -23,9 +24,9 @@ function drawingBoth(walk, look, layer) {
     Object.defineProperty(walk, name, { get: () => view[name], configurable: true });
   }
   walk.frame = () => {
-    const { eyes, viewports } = look(), { gl, renderer } = walk;
+    const { axes, eyes, viewports } = look(), { gl, renderer } = walk;
     const middle = [0, 1, 2].map((k) => eyes.reduce((sum, { place }) => sum + place[k], 0) / eyes.length);
-    const union = unionOf(eyes, { eye: middle, ...headingOf(eyes[0].axes) });
+    const union = unionOf(eyes, { eye: middle, ...headingOf(axes) });
     view = union;
     // The view of the page is chosen from, not drawn.
     if (renderer) renderer.draw = () => false;
@@ -61,6 +62,8 @@ export async function enterVr(app) {
   const { walk, walker } = app, { gl } = walk, { xr } = /** @type {any} */ (navigator);
   const session = await xr.requestSession("immersive-vr", { optionalFeatures: ["local-floor"] });
   const over = new Promise((resolve) => session.addEventListener("end", resolve));
+  // It may have ended by itself.
+  const end = () => session.end().catch(() => {});
   /** @type {any} */
   let space;
   let floored = true, leave = () => {};
@@ -76,13 +79,18 @@ export async function enterVr(app) {
     let views = [], place = 0, before = 0;
     const look = () => {
       const viewports = views.map((view) => layer.getViewport(view));
-      return { eyes: views.map((view, k) => body.eye(view, viewports[k].height)), viewports };
+      return { axes: body.axes, eyes: views.map((view, k) => body.eye(view, viewports[k].height)), viewports };
     };
     const stop = drawingBoth(walk, look, layer);
-    // The page has no frames of its own meanwhile.
-    app.frame = () => {};
+    // The page has no frames of its own meanwhile. A gamepad that is connected now keeps this one.
+    let left = false;
+    const still = (/** @type {Parameters<typeof frame>} */ ...words) => {
+      if (left) frame.apply(app, words);
+    };
+    app.frame = still;
     leave = () => {
-      app.frame = frame;
+      left = true;
+      if (app.frame === still) app.frame = frame;
       stop();
     };
     session.addEventListener("selectstart", () => (body.pressed = true));
@@ -102,15 +110,16 @@ export async function enterVr(app) {
       try {
         frame.call(app, time, wishes);
       } catch (fault) {
-        session.end();
+        end();
         throw fault;
       }
     };
     session.requestAnimationFrame(paint);
+    await over;
   } catch (fault) {
-    session.end();
+    end();
     throw fault;
+  } finally {
+    leave();
   }
-  await over;
-  leave();
 }

@@ -18,6 +18,10 @@ const PAST = ["no-store", "reload"];
 /** What hosts say `Vary` about does not differ for one page. */
 const ANY = { ignoreVary: true };
 
+/** Whether an answer is a file: hosts of applications answer with their page for files that they lack.
+ * @param {Response} response */
+const isOwn = ({ status, headers }) => status === 200 && !headers.get("content-type")?.startsWith("text/html");
+
 export class Store {
   /** The spans of files, by URL. @type {Promise<Map<string, Kept[]>> | null} */
   #spans = null;
@@ -43,7 +47,7 @@ export class Store {
 
   /** @param {string} key */
   async match(key) {
-    return (await this.open()).match(key, ANY);
+    return this.#tried((shelf) => shelf.match(key, ANY), undefined);
   }
 
   /** @param {string} key */
@@ -53,11 +57,23 @@ export class Store {
       const spans = await this.#all(), rows = spans.get(span.url) ?? [];
       spans.set(span.url, rows.filter((row) => row.key !== key));
     }
-    return (await this.open()).delete(key);
+    return this.#tried((shelf) => shelf.delete(key), false);
   }
 
   async keys() {
-    return (await (await this.open()).keys()).map(({ url }) => url);
+    return (await this.#tried((shelf) => shelf.keys(), [])).map(({ url }) => url);
+  }
+
+  /** Storage that fails is as good as empty: the host has it all.
+   * @template T
+   * @param {(shelf: Shelf) => Promise<T>} work @param {T} otherwise */
+  async #tried(work, otherwise) {
+    try {
+      // Opening makes a cache anew.
+      return this.closed ? otherwise : await work(await this.open());
+    } catch {
+      return otherwise;
+    }
   }
 
   #all() {
@@ -89,7 +105,7 @@ export class Store {
     const all = await this.#all(), rows = all.get(url) ?? [];
     const within = rows.filter((row) => row.key !== key && row.begin >= begin && row.end <= span.end);
     all.set(url, [...rows.filter((row) => row.key !== key && !within.includes(row)), { ...span, total, key }]);
-    for (const row of within) await (await this.open()).delete(row.key);
+    for (const row of within) await this.#tried((shelf) => shelf.delete(row.key), false);
   }
 
   /**
@@ -104,7 +120,7 @@ export class Store {
     const kept = past || header ? null : await this.match(url);
     if (kept) return kept;
     const response = await this.ask(request);
-    if (response.status === 200) later(this.put(url, response.clone()));
+    if (isOwn(response)) later(this.put(url, response.clone()));
     return response;
   }
 
@@ -126,7 +142,7 @@ export class Store {
   /** The host's answer, of which the bytes are kept. Hosts that ignore ranges send the file.
    * @param {Request} request @param {string} url @param {boolean} past @param {Later} later */
   async #fetched(request, url, past, later) {
-    const response = await this.ask(request), whole = response.status === 200;
+    const response = await this.ask(request), whole = isOwn(response);
     const answered = answeredSpan(response.headers.get("content-range"));
     if (whole || (response.status === 206 && answered)) {
       later(this.#store(response.clone(), url, whole ? null : answered, past));

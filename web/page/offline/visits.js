@@ -63,10 +63,14 @@ export class Visits {
       return void (await this.leave());
     }
     const before = await (await store.match(scope))?.text();
-    for (const name of neededBy(html)) await this.#hold(scope + name);
+    for (const name of neededBy(html)) {
+      await this.#hold(scope + name);
+      // Without room, what is kept of the former version stays.
+      if (!(await store.match(scope + name))) return;
+    }
     if (before === html) return;
-    await store.put(scope, new Response(html, { headers: { "content-type": "text/html; charset=utf-8" } }));
-    if (before) await this.#tidy(html);
+    const page = new Response(html, { headers: { "content-type": "text/html; charset=utf-8" } });
+    if (await store.put(scope, page) && before) await this.#tidy(html);
   }
 
   /** Fetches a file unless it is kept; rejects if it cannot be had. @param {string} url @param {number} [length] */
@@ -96,10 +100,11 @@ export class Visits {
   /** Keeps what a page has received. @param {Received} received */
   async keep({ index, files, ranged }) {
     const { store, scope } = this;
-    const own = files.filter((url) => isFile(nameOf(url, scope) ?? ""));
+    const isHere = (/** @type {string} */ url) => isFile(nameOf(url, scope) ?? "");
+    const own = files.filter(isHere);
     for (const url of own) await this.#hold(url).catch(() => {});
     for (const url of own) if (url.includes("/data/opening-")) await this.#unpack(url, index).catch(() => {});
-    for (const { url, length } of ranged) await this.#hold(url, length).catch(() => {});
+    for (const { url, length } of ranged) if (isHere(url)) await this.#hold(url, length).catch(() => {});
     if (!(await store.match(scope))) await this.#learn(await store.ask(scope));
   }
 

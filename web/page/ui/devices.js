@@ -23,6 +23,8 @@ export function attachPads(app) {
 export async function attachVr(root, app) {
   const { xr } = /** @type {any} */ (navigator);
   if (!(await xr?.isSessionSupported("immersive-vr").catch(() => false))) return;
+  // Browsers forget a click while a slow link brings the script.
+  loadXr().catch(() => {});
   const button = make("button", { className: "vr" }, devices.enterVr);
   button.onclick = async () => {
     button.disabled = true;

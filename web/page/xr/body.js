@@ -28,6 +28,8 @@ export class Body {
   #faces = true;
   /** Of the head in the room. @type {number[]} */
   #place = [0, 0, 0];
+  /** @type {number[][]} */
+  #axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 
   /** @param {import("../walk/walker.js").Walker} walker @param {boolean} floored whether heights are above the floor */
   constructor(walker, floored) {
@@ -46,7 +48,9 @@ export class Body {
    * @param {Iterable<{handedness: string, gamepad?: any}>} sources
    */
   follow(head, sources) {
-    const { walker: { pose, locate } } = this, before = this.#place, { yaw } = headingOf(axesOf(head));
+    const { walker: { pose, locate } } = this, before = this.#place;
+    this.#axes = axesOf(head);
+    const { yaw } = headingOf(this.#axes);
     this.#place = [head[12], head[13], head[14]];
     if (this.#faces) this.yaw = pose.yaw - yaw;
     else {
@@ -76,6 +80,11 @@ export class Body {
   get head() {
     const { pose: { eye }, height } = this.walker;
     return [eye[0], eye[1] + this.#place[1] - (this.floored ? height : 0), eye[2]];
+  }
+
+  /** The axes of the head in the building; those of eyes may be canted. @returns {number[][]} */
+  get axes() {
+    return this.#axes.map((axis) => turned(axis, this.yaw));
   }
 
   /** An eye in the building. @param {{transform: {matrix: ArrayLike<number>}, projectionMatrix: ArrayLike<number>}} view
