@@ -15,7 +15,9 @@ import pytest
 
 from tests.e2e.conftest import listing, make_museum
 
-PTM = [sys.executable, "-m", "ptmtools"]
+#: Stages after those that are disturbed are as quick as they can be.
+QUICK = ["--light", "none", "--samples", "1"]
+BUILD = [sys.executable, "-m", "ptmtools", "build-scene", *QUICK]
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +53,7 @@ def disturbed(
     museum: Path, db: Path, moment: Callable[[Build], bool], deed: Callable[[Build], object]
 ) -> tuple[int, str]:
     """The status of a build to which something is done at a moment, and what it has printed."""
-    command = [*PTM, "build-scene", museum, "-o", db, "-j", "2", "-q"]
+    command = [*BUILD, museum, "-o", db, "-j", "2", "-q"]
     with subprocess.Popen(
         command,
         stderr=subprocess.PIPE,
@@ -82,7 +84,7 @@ def test_all_end_at_once_and_only_the_parent_speaks(tmp_path: Path, museum: Path
         )
         assert status == 130
         assert printed == "ptm: interrupted; run the same command again to resume [PTM-X130]\n"
-    again = [*PTM, "build-scene", museum, "-q", "-o"]
+    again = [*BUILD, museum, "-q", "-o"]
     subprocess.run([*again, db, "-j", "2"], check=True)
     subprocess.run([*again, tmp_path / "whole", "-j", "1"], check=True)
     assert listing(db) == listing(tmp_path / "whole")
@@ -102,7 +104,7 @@ def test_a_lost_worker_ends_the_build_and_leaves_what_is_finished(
     status, printed = disturbed(museum, db, lambda _: any(staged.rglob("*.ptm")), kill_the_workers)
     assert (status, printed.count("\n")) == (9, 1), printed
     assert "PTM-W004" in printed
-    again = [*PTM, "build-scene", museum, "-o", db, "--json"]
+    again = [*BUILD, museum, "-o", db, "--json"]
     done = subprocess.run(again, check=True, stdout=subprocess.PIPE)
     (textures,) = (s for s in json.loads(done.stdout)["stages"] if s["stage"] == "textures")
     _, kept, resumed = textures["tasks"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -195,20 +195,57 @@ def visiting(
     prepare: called with the page before it is opened.
     context: options of playwright's context.
     """
-    visits = Visits()
+    page = new_page(browser, width, height, prepare, **context)
+    with _visiting(page, entries, query, throttle, page.context.close) as visitor:
+        yield visitor
+
+
+def new_page(
+    browser: Any, width: int = 640, height: int = 480, prepare: Any = None, **context: Any
+) -> Any:
+    """A page with a context of its own, for `visiting_in`; the rest as for `visiting`."""
     # Conditions of playwright are texts, which a page with a policy does not run.
     options = {"viewport": {"width": width, "height": height}, "bypass_csp": True, **context}
+    page = browser.new_context(**options).new_page()
+    page.add_init_script(COUNTING)
+    if prepare:
+        prepare(page)
+    return page
+
+
+def visiting_in(
+    page: Any, entries: Mapping[str, Entry], *, query: str = ""
+) -> AbstractContextManager[Visitor]:
+    """Leads a page to a site, and away from it in the end: a page takes longer to start than a
+    small site to come. Each site has another origin, so that nothing of the one before is left."""
+    return _visiting(page, entries, query, None, lambda: page.goto("about:blank"))
+
+
+@contextmanager
+def _visiting(
+    page: Any,
+    entries: Mapping[str, Entry],
+    query: str,
+    throttle: Throttle | None,
+    leave: Callable[[], object],
+) -> Iterator[Visitor]:
+    visits = Visits()
     with serving(entries, throttle=throttle, visits=visits) as url:
-        fresh = browser.new_context(**options)
-        page = fresh.new_page()
         visitor = Visitor(page, url, visits)
-        page.on("console", lambda said: visitor.hear(f"{said.type}: {said.text}"))
-        page.on("pageerror", lambda fault: visitor.messages.append(f"error: {fault}"))
-        page.add_init_script(COUNTING)
-        if prepare:
-            prepare(page)
-        page.goto(url + query)
+
+        def hear(said: Any) -> None:
+            visitor.hear(f"{said.type}: {said.text}")
+
+        def fail(fault: Any) -> None:
+            visitor.messages.append(f"error: {fault}")
+
+        page.on("console", hear)
+        page.on("pageerror", fail)
         try:
+            page.goto(url + query)
             yield visitor
         finally:
-            fresh.close()
+            leave()
+            if not page.is_closed():
+                page.remove_listener("console", hear)
+                page.remove_listener("pageerror", fail)

@@ -69,16 +69,41 @@ def _answer(route: Any) -> None:
 @contextmanager
 def visit(browser: Any, path: str = "/", *, size: tuple[int, int], **options: Any) -> Iterator[Any]:
     """A page of its own; AssertionError if the console says anything."""
+    with own_page(browser, size=size, **options) as page, visit_by(page, path):
+        yield page
+
+
+@contextmanager
+def own_page(browser: Any, *, size: tuple[int, int], **options: Any) -> Iterator[Any]:
+    """A page for one visit after the other."""
     width, height = size
     context = browser.new_context(viewport={"width": width, "height": height}, **options)
+    context.route("**/*", _answer)
     try:
-        page = context.new_page()
-        printed: list[str] = []
-        page.on("console", lambda message: printed.append(message.text))
-        page.on("pageerror", lambda error: printed.append(str(error)))
-        context.route("**/*", _answer)
-        page.goto(HOST + path)
-        yield page
-        assert printed == []
+        yield context.new_page()
     finally:
         context.close()
+
+
+@contextmanager
+def visit_by(page: Any, path: str = "/") -> Iterator[None]:
+    """As `visit`; nothing is kept for the next one."""
+    printed: list[str] = []
+
+    def hear(message: Any) -> None:
+        printed.append(message.text)
+
+    def fail(error: Any) -> None:
+        printed.append(str(error))
+
+    page.on("console", hear)
+    page.on("pageerror", fail)
+    try:
+        page.goto(HOST + path)
+        yield
+        page.evaluate("localStorage.clear()")
+        page.goto("about:blank")
+        assert printed == []
+    finally:
+        page.remove_listener("console", hear)
+        page.remove_listener("pageerror", fail)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from browser import Visitor, hurried, visiting
+from browser import Visitor, hurried, new_page, visiting, visiting_in
 
 from ptmtools.cli.main import main
 from ptmtools.errors import InputError
@@ -42,12 +42,23 @@ async () => {
 """
 
 
+@pytest.fixture(scope="module")
+def pages(chromium: Any) -> Iterator[dict[Any, Any]]:
+    """One for sound campuses, and one that gives up soon."""
+    own = {how: new_page(chromium, 320, 240, how) for how in (None, hurried)}
+    yield own
+    for page in own.values():
+        page.context.close()
+
+
 @pytest.fixture
-def opened(chromium: Any) -> Open:
+def opened(chromium: Any, pages: dict[Any, Any]) -> Open:
     def of(folder: Path, query: str = "", **options: Any) -> AbstractContextManager[Visitor]:
-        site = form_site(folder, FORMS["campus.json"])
+        entries = form_site(folder, FORMS["campus.json"]).entries
+        if options.keys() <= {"prepare"} and (how := options.get("prepare")) in pages:
+            return visiting_in(pages[how], entries, query=query)
         sizes = {"width": 320, "height": 240, **options}
-        return visiting(chromium, site.entries, query=query, **sizes)
+        return visiting(chromium, entries, query=query, **sizes)
 
     return of
 
@@ -155,7 +166,7 @@ def test_it_is_drawn_and_walked_on(opened: Open, campus: Path) -> None:
 
 def test_places_and_presets(opened: Open, campus: Path) -> None:
     index = json.loads((campus / "campus.json").read_text())
-    with opened(campus, width=800, height=600) as visitor:
+    with opened(campus, width=480, height=360) as visitor:
         visitor.until("s.begun")
         page = visitor.page
         page.click("nav button")
@@ -182,7 +193,7 @@ def test_icons_and_ranks(opened: Open, campus: Path, tmp_path: Path) -> None:
     house = next(o for o in index["objects"] if o["label"] == "building_01_rectorate")
     house |= {"rank": 0, "icon": "books"}
     file.write_text(json.dumps(index))
-    with opened(folder, width=800, height=600) as visitor:
+    with opened(folder, width=480, height=360) as visitor:
         visitor.until("s.begun")
         page = visitor.page
         page.click("nav button")
@@ -218,7 +229,7 @@ def test_a_record_is_beside_its_object(opened: Open, campus: Path) -> None:
 @pytest.mark.parametrize("bypass_csp", [True, False])
 def test_a_hostile_record_does_nothing(opened: Open, campus: Path, bypass_csp: bool) -> None:
     """Without and with the policy of the page, which leaves the record its styles."""
-    with opened(campus, width=800, height=600, bypass_csp=bypass_csp) as visitor:
+    with opened(campus, width=480, height=360, bypass_csp=bypass_csp) as visitor:
         visitor.until("s.complete")
         page = visitor.page
         before, seen = page.url.partition("#")[0], len(visitor.visits)
@@ -248,7 +259,7 @@ def test_a_hostile_record_does_nothing(opened: Open, campus: Path, bypass_csp: b
 def test_a_damaged_record_is_a_notice(opened: Open, campus: Path, tmp_path: Path) -> None:
     folder = Path(shutil.copytree(campus, tmp_path / "folder"))
     (folder / "records/building_01_rectorate.txt").write_text("<p>Built in 1904</p>")
-    with opened(folder, width=800, height=600) as visitor:
+    with opened(folder, width=480, height=360) as visitor:
         visitor.until("s.begun")
         page = visitor.page
         page.click("nav button")
@@ -260,7 +271,7 @@ def test_a_damaged_record_is_a_notice(opened: Open, campus: Path, tmp_path: Path
 
 def test_a_name_is_pressed_or_dragged(opened: Open, campus: Path) -> None:
     """A drag that begins on a name turns the visitor; a click leads to the object."""
-    with opened(campus, width=800, height=600) as visitor:
+    with opened(campus, width=480, height=360) as visitor:
         visitor.until("s.begun")
         page = visitor.page
         label = page.locator("#labels button:visible").first

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from browser import Visitor, hurried, visiting
+from browser import Visitor, hurried, new_page, visiting, visiting_in
 from PIL import Image
 
 from ptmtools.cli.main import main
@@ -30,13 +30,25 @@ SIDE = 320
 Open = Callable[..., AbstractContextManager[Visitor]]
 
 
+@pytest.fixture(scope="module")
+def pages(chromium: Any) -> Iterator[dict[Any, Any]]:
+    """One for sound files, and one that gives up soon."""
+    own = {how: new_page(chromium, SIDE, SIDE, how) for how in (None, hurried)}
+    yield own
+    for page in own.values():
+        page.context.close()
+
+
 @pytest.fixture
-def opened(chromium: Any) -> Open:
+def opened(chromium: Any, pages: dict[Any, Any]) -> Open:
     def of(folder: Path, query: str = "", **options: Any) -> AbstractContextManager[Visitor]:
         form = form_of(folder)
         assert form
+        entries = form_site(folder, form).entries
+        if options.keys() <= {"prepare"}:
+            return visiting_in(pages[options.get("prepare")], entries, query=query)
         sizes = {"width": SIDE, "height": SIDE, **options}
-        return visiting(chromium, form_site(folder, form).entries, query=query, **sizes)
+        return visiting(chromium, entries, query=query, **sizes)
 
     return of
 

@@ -1,6 +1,7 @@
 """Hostile files on the pages, in each engine: a message or a picture, and no crash.
 
-Each engine stays the same process throughout, so that one that ends or hangs fails the tests after.
+Each engine stays the same process throughout, and a page of Chromium is the same for all sites of a
+form, so that one that ends or hangs fails the tests after.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
-from browser import HURRY, Visitor, hurried, visiting
+from browser import HURRY, Visitor, hurried, new_page, visiting_in
 from engines import PACKAGES, visiting_by
 
 from ptmtools.site.content import Site
@@ -68,11 +69,10 @@ def opening(
     request: pytest.FixtureRequest, engine: str
 ) -> Callable[..., AbstractContextManager[Visitor]]:
     """What opens a site in an engine."""
-    sizes = {"width": 512, "height": 384}
+    sizes = {"width": 160, "height": 120}
     if engine == "chromium":
-        browser = request.getfixturevalue("chromium")
-        return lambda entries, query: visiting(
-            browser, entries, query=query, prepare=hurried, **sizes
-        )
+        own = new_page(request.getfixturevalue("chromium"), prepare=hurried, **sizes)
+        request.addfinalizer(own.context.close)
+        return lambda entries, query: visiting_in(own, entries, query=query)
     page = request.getfixturevalue("engines")(engine)
     return lambda entries, query: visiting_by(page, entries, query=query, prepare=HURRY, **sizes)

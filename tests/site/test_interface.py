@@ -10,18 +10,25 @@ from typing import Any
 import pytest
 
 from tests.site.browser import FRAMES
-from tests.site.interface import visit
+from tests.site.interface import own_page, visit, visit_by
 
 DESKTOP, PHONE = (1280, 720), (390, 844)
 Pose = dict[str, Any]
 
 
-@pytest.fixture
-def desk(chromium: Any) -> Iterator[Any]:
-    with visit(chromium, size=DESKTOP) as page:
-        page.wait_for_function("window.fake")
-        page.evaluate("fake.emit('first-picture')")
+@pytest.fixture(scope="module")
+def window(chromium: Any) -> Iterator[Any]:
+    """The page of all visits by `desk`."""
+    with own_page(chromium, size=DESKTOP) as page:
         yield page
+
+
+@pytest.fixture
+def desk(window: Any) -> Iterator[Any]:
+    with visit_by(window):
+        window.wait_for_function("window.fake")
+        window.evaluate("fake.emit('first-picture')")
+        yield window
 
 
 @pytest.fixture
