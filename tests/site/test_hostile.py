@@ -69,10 +69,9 @@ def opening(
     request: pytest.FixtureRequest, engine: str
 ) -> Callable[..., AbstractContextManager[Visitor]]:
     """What opens a site in an engine."""
-    sizes = {"width": 160, "height": 120}
     if engine == "chromium":
-        own = new_page(request.getfixturevalue("chromium"), prepare=hurried, **sizes)
+        own = new_page(request.getfixturevalue("chromium"), 160, 120, hurried)
         request.addfinalizer(own.context.close)
         return lambda entries, query: visiting_in(own, entries, query=query)
-    page = request.getfixturevalue("engines")(engine)
+    page, sizes = request.getfixturevalue("engines")(engine), {"width": 512, "height": 384}
     return lambda entries, query: visiting_by(page, entries, query=query, prepare=HURRY, **sizes)
