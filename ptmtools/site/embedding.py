@@ -8,6 +8,8 @@ from hashlib import sha384
 
 #: Stands for the address of a site that is unknown.
 UNKNOWN = "https://SITE/"
+#: What a page in a frame of another origin may use only with permission.
+ALLOWED = "fullscreen; gamepad; xr-spatial-tracking; clipboard-write"
 
 
 def frame_tag(title: str, address: str = "") -> str:
@@ -15,7 +17,7 @@ def frame_tag(title: str, address: str = "") -> str:
     the end."""
     return (
         f'<iframe src="{html.escape(address or UNKNOWN)}" title="{html.escape(title)}" '
-        'allow="fullscreen" loading="lazy" width="960" height="540"></iframe>'
+        f'allow="{ALLOWED}" loading="lazy" width="960" height="540"></iframe>'
     )
 
 
