@@ -133,6 +133,7 @@ bench-walk: build/museum/.made $(VENV)/.installed-dev
 
 bench-web: build/museum/.made $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/scenes.py museum rooms hospital office web_gallery atrium
+	$(BIN)/python benchmarks/page_weight.py
 	$(BIN)/python -m benchmarks.web_rivals.bytes
 	$(BIN)/python -m benchmarks.web_rivals
 	$(BIN)/python -m benchmarks.web_rivals --memory --scene museum,rooms
