@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ptmtools.errors import PtmError
+from ptmtools.errors import InputError, PtmError
 from ptmtools.lab.catalogue import Catalogue, catalogue_of
 from ptmtools.lab.comparing import SimulateOptions, budget_of, counted, play, require_hints
 from ptmtools.lab.forms import PTM
@@ -166,12 +166,20 @@ def try_settings(
     ------
     DatabaseError: PTM-D004, PTM-D008 a stage has not run, or not by this release; those of
         `read_served`.
-    InputError: PTM-I700 the walk leads elsewhere; PTM-I701 a policy's hints are missing.
+    InputError: PTM-I700 the walk leads elsewhere; PTM-I701 a policy's hints are missing, or none of
+        the ``knobs`` has another setting.
     """
     served = read_served(db)
     require_hints(served, options.policies)
     own = own_options(artifacts)
     chosen = list(settings(own, _longest(served), knobs, quick=quick))
+    if knobs and not chosen:
+        raise InputError(
+            "PTM-I701",
+            f"has nothing to try for {', '.join(f'--option {name}' for name in knobs)}",
+            file=db,
+            remedy="build it with what these options change, such as --light bake",
+        )
     begin = time.perf_counter()
     original = prepare(served, walk, progress=progress)
     preparing = time.perf_counter() - begin

@@ -298,3 +298,10 @@ def test_a_walk_elsewhere_is_refused(db, tmp_path, capsys) -> None:
     file.write_text(json.dumps({**document, "samples": rows}))
     assert main(["tradeoff", str(db), "--stage", "walk", "--walk", str(file)]) == 3
     assert "PTM-I700" in capsys.readouterr().err
+
+
+def test_an_option_without_another_setting_is_refused(two_rooms, capsys) -> None:
+    """The small rooms have no light."""
+    words = ["tradeoff", str(two_rooms), "--stage", "walk", "--option", "light-samples"]
+    assert main(words) == 3
+    assert "nothing to try for --option light-samples" in capsys.readouterr().err
