@@ -23,7 +23,8 @@ from ptmtools.arrays import Bools, Floats, Ints, normals
 from ptmtools.lab.meshes import Meshes, meshes_of
 from ptmtools.lab.previews import LEAST, Previews, no_previews, previews_of
 from ptmtools.output.model import sizes_of
-from ptmtools.output.served import Document, Served, Surfaces
+from ptmtools.output.served import Document, Served
+from ptmtools.output.surfaces import Surfaces
 from ptmtools.scene.colors import gradients
 from ptmtools.texture.model import gpu_texel_bytes
 from ptmtools.walk import Browser

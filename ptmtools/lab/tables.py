@@ -28,7 +28,7 @@ from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.lab.catalogue import NORMALS
 from ptmtools.lab.relief.tables import Relief, Tally as ReliefTally
 from ptmtools.lab.rows import Rows, RowSums
-from ptmtools.output.served import Surfaces
+from ptmtools.output.surfaces import Surfaces
 from ptmtools.progress import Progress, silent
 from ptmtools.rendering.lossy import Lossy, no_previews
 from ptmtools.rendering.rays import Camera, Caster

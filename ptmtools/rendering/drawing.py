@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats
 from ptmtools.errors import InputError
 from ptmtools.options import option
-from ptmtools.output.served import Served, Surfaces
+from ptmtools.output.served import Served
+from ptmtools.output.surfaces import Surfaces
 from ptmtools.progress import Progress, silent
 from ptmtools.rendering.light import as_bytes
 from ptmtools.rendering.rays import Camera, Caster

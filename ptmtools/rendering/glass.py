@@ -12,7 +12,7 @@ import numpy as np
 
 from ptmtools.arrays import Floats, Ints, normals
 from ptmtools.embree import ray_tree
-from ptmtools.output.served import Surfaces
+from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.records import Sight
 
 #: Most panes along a ray; those behind them are left out.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ptmtools.arrays import Floats, areas
-from ptmtools.output.served import Surfaces
+from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.octrees import Octrees
 
 #: Number of points of each object at which the levels of its octree are compared, and the seed of

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.output.names import HINTS
-from ptmtools.output.served import BUILD, Served, Surfaces
+from ptmtools.output.served import BUILD, Served
+from ptmtools.output.surfaces import Surfaces
 
 
 class Octrees(NamedTuple):

@@ -14,7 +14,7 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints, normals
 from ptmtools.embree import ray_tree
-from ptmtools.output.served import Surfaces
+from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.records import Sight
 
 #: Lines of the target screen.

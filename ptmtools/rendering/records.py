@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, normals
-from ptmtools.output.served import Surfaces
+from ptmtools.output.surfaces import Surfaces
 from ptmtools.scene.colors import gradients
 
 

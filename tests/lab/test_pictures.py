@@ -17,7 +17,7 @@ from ptmtools.lab.comparing import SimulateOptions, play
 from ptmtools.lab.figures import frames, strip
 from ptmtools.lab.renderer import Renderer
 from ptmtools.lab.world import World
-from ptmtools.output.served import Surfaces
+from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.lossy import no_previews
 from ptmtools.rendering.rays import Camera
 from ptmtools.rendering.records import Pyramids

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from ptmtools.arrays import Floats
-from ptmtools.output.served import Locator, sides
+from ptmtools.output.locating import Locator
+from ptmtools.output.surfaces import sides
 from tests.lab.worlds import leaf
 
 #: In the plane x = 1, of which the normal points to +x.

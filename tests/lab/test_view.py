@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.lab.tables import look
-from ptmtools.output.served import Locator, Surfaces
+from ptmtools.output.locating import Locator
+from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.kernels import GREY, level_of_detail
 from ptmtools.rendering.rays import LINES, Camera, Frustum
 from ptmtools.rendering.records import Pyramids

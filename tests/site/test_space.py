@@ -14,7 +14,7 @@ import pytest
 from ptmtools.arrays import Floats
 from ptmtools.lab.policies.paper import _crossing
 from ptmtools.lab.world import World
-from ptmtools.output.served import SLACK
+from ptmtools.output.locating import SLACK
 from ptmtools.rendering.rays import Frustum, axes
 from tests.lab.conftest import two_rooms, walk_file, world
 from tests.site.watching import called

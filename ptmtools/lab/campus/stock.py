@@ -42,7 +42,8 @@ from ptmtools.neighbours.campus.model import (
     texture_file,
 )
 from ptmtools.neighbours.campus.reading import LONGEST, read_campus
-from ptmtools.output.served import Surfaces, on_link
+from ptmtools.output.served import on_link
+from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.pyramids import mip_levels, packed
 from ptmtools.rendering.records import Pyramids
 from ptmtools.scene.colors import to_srgb

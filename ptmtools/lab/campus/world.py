@@ -31,7 +31,8 @@ from ptmtools.errors import InputError
 from ptmtools.lab.campus.stock import Stock, read_stock, read_surfaces, read_textures
 from ptmtools.lab.world import PIXELS, RATE, frame_times
 from ptmtools.neighbours.campus.model import SIZES
-from ptmtools.output.served import Served, Surfaces
+from ptmtools.output.served import Served
+from ptmtools.output.surfaces import Surfaces
 from ptmtools.progress import Progress, silent
 from ptmtools.rendering.pyramids import full_colors, read_pyramids
 from ptmtools.rendering.rays import Camera, Caster, Frustum

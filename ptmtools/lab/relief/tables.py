@@ -17,7 +17,7 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats
 from ptmtools.lab.rows import RowSums
-from ptmtools.output.served import Surfaces
+from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.light import lamps
 from ptmtools.rendering.octrees import Octrees
 from ptmtools.rendering.pyramids import full_colors
