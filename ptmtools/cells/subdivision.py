@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, normals
+from ptmtools.cells.building import Building
 from ptmtools.cells.ceilings import ROOFED, roofed_share
 from ptmtools.cells.diagnostics import (
     NO_PLACES,
@@ -31,7 +32,7 @@ from ptmtools.cells.diagnostics import (
     unrecognised_door_notes,
     viewpoint_notes,
 )
-from ptmtools.cells.division import Building, Space, divide, divide_inside
+from ptmtools.cells.division import Space, divide, divide_inside
 from ptmtools.cells.doors import THICK
 from ptmtools.cells.joining import joined
 from ptmtools.cells.model import OUTSIDE, Cells, descend

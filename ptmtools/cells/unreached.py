@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints, summed
 from ptmtools.cells.bsp import Tree
+from ptmtools.cells.building import Building
 from ptmtools.cells.doors import THICK
 from ptmtools.cells.model import descend
 from ptmtools.cells.places import spread
@@ -23,9 +23,6 @@ from ptmtools.cells.portals import Portal
 from ptmtools.cells.search import connected
 from ptmtools.cells.structure import LOOKS, Surroundings, spread_over
 from ptmtools.tolerance import ranked
-
-if TYPE_CHECKING:
-    from ptmtools.cells.division import Building
 
 #: A group of leaves with less walkable floor than this, m², is dropped without a note,
 LEAST_PLACE = 0.05
