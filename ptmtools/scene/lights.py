@@ -9,15 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.store.archive import Stored
-
-if TYPE_CHECKING:
-    from ptmtools.scene.model import Scene
 
 LampKind = Literal["point", "spot", "sun"]
 KINDS: tuple[LampKind, ...] = get_args(LampKind)
@@ -101,11 +98,11 @@ class Lights:
     def __bool__(self) -> bool:
         return bool(self.lamps or self.maps or self.glow.any() or self.unlit.any())
 
-    def check(self, scene: Scene) -> None:
-        """Raises ValueError if they are those of another scene."""
-        if len(self.glow) != len(scene.materials):
+    def check(self, materials: int, triangles: int) -> None:
+        """Raises ValueError if they are those of a scene with other numbers of these."""
+        if len(self.glow) != materials:
             raise ValueError("the lights are those of other materials")
-        if self.maps and len(self.uv) != len(scene.triangles):
+        if self.maps and len(self.uv) != triangles:
             raise ValueError("the lightmaps are those of other triangles")
 
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:

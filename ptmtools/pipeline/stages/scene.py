@@ -147,7 +147,8 @@ def lights_of(artifacts: Artifacts) -> Lights | None:
 
         data = artifacts.db.read_output(SCENE.name, name)
         lights = Lights.from_arrays(unpack_arrays(data, file=artifacts.db.path / name))
-        lights.check(artifacts[SCENE])
+        scene = artifacts[SCENE]
+        lights.check(len(scene.materials), len(scene.triangles))
         return lights
 
     return artifacts.cached(name, read)
