@@ -33,8 +33,9 @@ from ptmtools import AchOptions, compute_ach
 from ptmtools.cells import Cells, subdivide
 from ptmtools.coverage.model import Ach
 from ptmtools.output import EmitOptions, TextureRecord, emit
-from ptmtools.output.content import Content, Geometry
+from ptmtools.output.content import Content
 from ptmtools.output.emission import compressed
+from ptmtools.output.geometry import Geometry
 from ptmtools.output.gltf import gltf_files
 from ptmtools.output.numbers import row_texts
 from ptmtools.output.vrml import field

@@ -41,7 +41,7 @@ from ptmtools.light.looks import LightImage, Painted, Rays, lookup
 from ptmtools.light.mixing import Mix, mixed
 from ptmtools.light.occlusion import Surroundings, light, normals, points_on, spread_over, turns
 from ptmtools.light.options import LightOptions
-from ptmtools.output.content import Geometry
+from ptmtools.output.geometry import Geometry
 from ptmtools.output.gltf import pack
 from ptmtools.output.pieces import pieces_of
 from ptmtools.output.served import on_link

@@ -1,32 +1,22 @@
-"""The input of all emitters: artifacts, textures, viewpoints, and the geometry derived from them.
-
-The geometry of a cell is indexed shapes: one for each object, material and sidedness. Positions
-and texture coordinates are rounded to float32 once for the whole scene and welded by equality, so
-that a vertex shared by two pieces is one vertex in the file, and a corner shared by two cells has
-the same text in both. Pieces of which two corners become one in that rounding have no area left;
-they are dropped and counted.
-"""
+"""The input of all emitters: artifacts, textures, viewpoints, and what is derived from them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from copy import copy
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import areas, summed
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
-from ptmtools.errors import DatabaseError
 from ptmtools.output.emitter import Emitter
+from ptmtools.output.geometry import Geometry
 from ptmtools.output.model import OctreeRecord, TextureRecord, Viewpoint, WriterOptions
-from ptmtools.output.numbers import shares_of, single
+from ptmtools.output.numbers import shares_of
 from ptmtools.progress import Progress, silent
-from ptmtools.scene.colors import gradients, to_linear, to_srgb
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
 
@@ -35,235 +25,6 @@ if TYPE_CHECKING:
     from ptmtools.light.model import Light
     from ptmtools.neighbours.apo.reliefs import Reliefs
     from ptmtools.output.mesh_levels import MeshLevels
-
-
-#: The step of coordinates in normal maps, far below a texel.
-_RELIEF_STEP = 2.0**-20
-
-
-@dataclass(frozen=True)
-class Shape:
-    """Triangles of one object with one material, all of them solid or all two-sided.
-
-    Attributes
-    ----------
-    object, material: indices into the scene's.
-    two_sided: whether both sides are seen.
-    point, uv: (n,), (k,) rows of `Geometry.point` and `Geometry.uv`.
-    triangle, uv_triangle: (m, 3) indices into `point` and `uv`.
-    color: (m, 3, 3) uint8 sRGB of the corners, None where all are white.
-    light: (m, 3, 2) float32 coordinates of the corners in the lightmap of the cell, origin at the
-        lower left; None where it does not light the shape.
-    relief: (m, 3, 9) float32 coordinates of the corners in the normal map of the object, likewise,
-        and the frames there, see `NormalMap`; None without one.
-    normal: (m, 3, 2) float32 coordinates of the corners in the normal map of the material,
-        likewise, if that has its own; else None.
-    """
-
-    object: int
-    material: int
-    two_sided: bool
-    point: NDArray[np.int64]
-    uv: NDArray[np.int64]
-    triangle: NDArray[np.int64]
-    uv_triangle: NDArray[np.int64]
-    color: NDArray[np.uint8] | None = None
-    light: NDArray[np.float32] | None = None
-    relief: NDArray[np.float32] | None = None
-    normal: NDArray[np.float32] | None = None
-
-
-class Geometry:
-    """All shapes of all cells, by cell, object, material and sidedness.
-
-    Lists of varying length are CSR, as in `Cells`.
-
-    Attributes
-    ----------
-    point, uv: (n, 3), (k, 2) float32, the distinct positions and texture coordinates.
-    cell_start: (C + 1,) the shapes of each cell.
-    object, material, two_sided: (S,) of each shape.
-    triangle, uv_triangle: (M, 3) corners as indices into `shape_point` and `shape_uv`, counted
-        from the shape's first.
-    triangle_start: (S + 1,) the triangles of each shape.
-    shape_point, point_start: (P,) rows of `point`, ascending; (S + 1,) those of each shape.
-    shape_uv, uv_start: the same for `uv`.
-    color: (M, 3, 3) uint8 sRGB of the corners of triangles; None if the scene has no colours.
-    normal: (M, 3, 2) float32 as in `Shape`; None if no normal map has its own coordinates.
-    piece: (M,) the piece of `Cells` that each triangle is.
-    collapsed: pieces dropped by the rounding, over all cells.
-    light: the light of the cells, or None.
-    relief: (M, 3, 9) as in `Shape`, 0 of objects without a normal map; relieved: (S,) whether a
-        shape has one.
-    """
-
-    light: Light | None = None
-    relief: NDArray[np.float32] | None = None
-    relieved: NDArray[np.bool_]
-
-    def __init__(self, scene: Scene, cells: Cells) -> None:
-        piece, cell = cells.emitted(scene.two_sided)
-        self.point, point_of = _welded(single(cells.vertex, "vertices"))
-        self.uv, uv_of = _welded(single(cells.vertex_uv, "texture coordinates"))
-        corner = point_of[cells.triangle[piece]].reshape(-1, 3)
-        flat = (corner == np.roll(corner, 1, axis=1)).any(axis=1)
-        self.collapsed = int(flat.sum())
-        piece, cell, corner = piece[~flat], cell[~flat], corner[~flat]
-        source = cells.triangle_source[piece]
-        thing, material = scene.triangle_object[source], scene.triangle_material[source]
-        things, materials = max(len(scene.objects), 1), max(len(scene.materials), 1)
-        key = cell.astype(np.int64) * things + thing
-        key = (key * materials + material) * 2 + scene.two_sided[source]
-        order = np.argsort(key, kind="stable")
-        key = key[order]
-        change = np.ones(len(order), dtype=np.bool_)
-        change[1:] = key[1:] != key[:-1]
-        first = np.flatnonzero(change)
-        shape = np.cumsum(change) - 1
-        one = order[first]
-        self.object, self.material = thing[one], material[one]
-        self.two_sided = scene.two_sided[source[one]]
-        self.triangle_start = np.append(first, len(order))
-        self.cell_start = np.searchsorted(cell[one], np.arange(cells.cell_count + 1))
-        self.shape_point, self.point_start, self.triangle = _indexed(
-            corner[order], shape, len(first), len(self.point)
-        )
-        self.piece = piece[order]
-        self.color = _corner_colors(scene, cells, self.piece)
-        self.normal = _normal_coordinates(scene, cells, self.piece)
-        own = [m.normal is not None and m.normal.own for m in scene.materials]
-        self._own_normal = np.array(own, np.bool_)[self.material]
-        uv_corner = uv_of[cells.triangle[self.piece]].reshape(-1, 3)
-        self.shape_uv, self.uv_start, self.uv_triangle = _indexed(
-            uv_corner, shape, len(first), len(self.uv)
-        )
-
-    def lit_by(self, light: Light) -> Geometry:
-        """The same geometry with a light: lightmaps, and colours where that is at vertices.
-
-        Raises DatabaseError PTM-D008 if it is that of other geometry.
-        """
-        if len(light.uv) != len(self.triangle) or len(light.mapped) != len(self.object):
-            raise DatabaseError(
-                "PTM-D008",
-                "the stages do not belong together: the light is that of other geometry",
-                remedy="run the stage `light` again",
-            )
-        result = copy(self)
-        result.light = light
-        if (light.vertex < 255).any():
-            color = np.full((*light.vertex.shape, 3), 255, np.uint8)
-            color = color if self.color is None else self.color
-            linear = to_linear(color / 255) * (light.vertex[..., None] / 255)
-            result.color = np.rint(255 * to_srgb(linear)).astype(np.uint8)
-        return result
-
-    def relieved_by(self, reliefs: Reliefs, scene: Scene, cells: Cells) -> Geometry:
-        """The same geometry with the normal maps of objects."""
-        result = copy(self)
-        result.relieved = np.isin(self.object, reliefs.objects)
-        row = np.full(len(scene.triangles), -1)
-        row[np.isin(scene.triangle_object, reliefs.objects)] = np.arange(len(reliefs.uv))
-        own = np.repeat(result.relieved, np.diff(self.triangle_start))
-        source = row[cells.triangle_source[self.piece[own]]]
-        uv = np.zeros((len(scene.triangles), 3, 2))
-        uv[row >= 0] = reliefs.uv
-        uv = np.clip(_carried(scene, cells, self.piece[own], uv), 0, 1)
-        result.relief = np.zeros((len(self.triangle), 3, 9), np.float32)
-        # Pieces of one triangle, and neighbours, have the same numbers at a corner.
-        result.relief[own, :, :2] = np.rint(uv / _RELIEF_STEP) * _RELIEF_STEP
-        result.relief[own, :, 2:] = reliefs.frame[source][:, None]
-        return result
-
-    def areas(self) -> NDArray[np.float64]:
-        """(S,) m² of each shape."""
-        count = np.diff(self.triangle_start)
-        first = np.repeat(self.point_start[:-1], count)[:, None]
-        corners = self.point[self.shape_point[first + self.triangle]].astype(np.float64)
-        return summed(np.repeat(np.arange(len(count)), count), areas(corners), len(count))
-
-    def shape(self, s: int) -> Shape:
-        """One shape."""
-        points, uvs, rows = (
-            slice(*start[s : s + 2].tolist())
-            for start in (self.point_start, self.uv_start, self.triangle_start)
-        )
-        return Shape(
-            int(self.object[s]),
-            int(self.material[s]),
-            bool(self.two_sided[s]),
-            self.shape_point[points],
-            self.shape_uv[uvs],
-            self.triangle[rows],
-            self.uv_triangle[rows],
-            None if self.color is None or (self.color[rows] == 255).all() else self.color[rows],
-            self.light.uv[rows] if self.light is not None and self.light.mapped[s] else None,
-            self.relief[rows] if self.relief is not None and self.relieved[s] else None,
-            self.normal[rows] if self.normal is not None and self._own_normal[s] else None,
-        )
-
-    def shapes(self, cell: int) -> Iterator[Shape]:
-        """The shapes of a cell."""
-        return map(self.shape, range(*self.cell_start[cell : cell + 2].tolist()))
-
-
-def _corner_colors(
-    scene: Scene, cells: Cells, piece: NDArray[np.integer]
-) -> NDArray[np.uint8] | None:
-    """(M, 3, 3) the colours of pieces' corners, interpolated over their source triangles; None if
-    the scene has none."""
-    if scene.colors is None:
-        return None
-    interpolated = _carried(scene, cells, piece, scene.colors)
-    return np.asarray(np.clip(np.rint(interpolated), 0, 255).astype(np.uint8))
-
-
-def _normal_coordinates(
-    scene: Scene, cells: Cells, piece: NDArray[np.integer]
-) -> NDArray[np.float32] | None:
-    """(M, 3, 2) the coordinates of pieces' corners in the normal maps that have their own."""
-    if scene.normal_uv is None:
-        return None
-    uv = _carried(scene, cells, piece, scene.normal_uv)
-    return (np.rint(uv / _RELIEF_STEP) * _RELIEF_STEP).astype(np.float32)
-
-
-def _carried(
-    scene: Scene, cells: Cells, piece: NDArray[np.integer], values: NDArray[Any]
-) -> NDArray[np.float64]:
-    """(M, 3, k) at the corners of pieces, interpolated between the (T, 3, k) values of the corners
-    of the scene's triangles."""
-    source = cells.triangle_source[piece]
-    corners, own = scene.corners[source], values[source].astype(np.float64)
-    away = cells.vertex[cells.triangle[piece]] - corners[:, :1]
-    return np.asarray(own[:, :1] + np.einsum("mkx,mcx->mck", gradients(corners, own), away))
-
-
-def _indexed(
-    corner: NDArray[np.int64], shape: NDArray[np.int64], shapes: int, count: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """The rows used by the triangles of each shape, the start of each shape among them, and the
-    (m, 3) corners as indices into them, counted from the shape's first."""
-    used, place = np.unique(shape[:, None] * count + corner, return_inverse=True)
-    start = np.searchsorted(used, np.arange(shapes + 1) * count)
-    return used % max(count, 1), start, place.reshape(-1, 3) - start[shape][:, None]
-
-
-def _welded(rows: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    """The distinct rows of (n, 2 or more) in lexical order, and the place of each row among them.
-
-    Floats become integers of the same order, two of which are sorted as one.
-    """
-    bits = np.ascontiguousarray(rows.T).view(np.uint32)
-    negative = bits >> np.uint32(31) == 1
-    columns = np.where(negative, ~bits, bits | np.uint32(1 << 31)).astype(np.uint64)
-    rank = columns[0]
-    for column in columns[1:]:
-        _, place = np.unique((rank << np.uint64(32)) | column, return_inverse=True)
-        rank = place.astype(np.uint64)
-    welded = np.empty((int(place.max(initial=-1)) + 1, rows.shape[1]), dtype=np.float32)
-    welded[place] = rows
-    return welded, place.astype(np.int64)
 
 
 @dataclass(frozen=True)
@@ -323,8 +84,10 @@ class Content:
         """The levels of objects with many triangles, by cell and object."""
         from ptmtools.output.mesh_levels import mesh_levels
 
-        has_files = any(emitter.has_meshes for emitter in self.emitters)
-        return mesh_levels(self) if has_files and self.options.lods == "auto" else ()
+        if self.options.lods != "auto" or not any(one.has_meshes for one in self.emitters):
+            return ()
+        replaced = self.octree_of.keys() | self.relief_of.keys()
+        return mesh_levels(self.lit, replaced, self.progress)
 
     @cached_property
     def mesh_of(self) -> Mapping[tuple[int, int], int]:

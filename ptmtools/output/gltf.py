@@ -33,7 +33,8 @@ import numpy as np
 from ptmtools import schemas
 from ptmtools.errors import LimitError
 from ptmtools.glb import BINARY, JSON, glb, glb_chunks
-from ptmtools.output.content import Content, Shape
+from ptmtools.output.content import Content
+from ptmtools.output.geometry import Shape
 from ptmtools.output.gltf_compressed import CompressedBuffer
 from ptmtools.output.gltf_shapes import PlainBuffer, Tables, vertices_of
 from ptmtools.output.model import FileError, TextureRecord, shaped

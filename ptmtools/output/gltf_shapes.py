@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ptmtools.glb import COMPONENTS, FLOAT, INT, ITEMS, SHORT, BufferWriter
 from ptmtools.meshopt.encoding import by_first_use
-from ptmtools.output.content import Shape
+from ptmtools.output.geometry import Shape
 from ptmtools.scene.colors import packed, to_linear, unpacked
 
 #: Whole numbers below this are written without the ".0" that Python gives them.

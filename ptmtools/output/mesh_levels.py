@@ -23,9 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Ints
+from ptmtools.output.geometry import Geometry, Shape
+from ptmtools.progress import Progress, silent
 
 if TYPE_CHECKING:
-    from ptmtools.output.content import Content, Geometry, Shape
     from ptmtools.simplification import Mesh
 
 #: Triangles of an object in a cell from which it has levels.
@@ -85,13 +86,16 @@ class MeshLevels:
         return [*(level.error for level in self.levels), 0.0]
 
 
-def mesh_levels(content: Content) -> tuple[MeshLevels, ...]:
-    """The levels of all objects that have some, by cell and object."""
+def mesh_levels(
+    geometry: Geometry, left_out: Collection[int] = (), progress: Progress = silent
+) -> tuple[MeshLevels, ...]:
+    """The levels of all objects that have some, except of those ``left_out``, by cell and object;
+    ``progress`` is called for every object."""
     meshes: list[MeshLevels] = []
-    geometry, first = content.lit, 0
-    heavy = list(_heavy(geometry, content.octree_of.keys() | content.relief_of.keys()))
+    first = 0
+    heavy = list(_heavy(geometry, left_out))
     for done, (cell, rows) in enumerate(heavy):
-        content.progress(done, len(heavy), "simplifying objects")
+        progress(done, len(heavy), "simplifying objects")
         shapes = [geometry.shape(s) for s in rows]
         if levels := _levels(geometry, shapes):
             point = geometry.point[np.concatenate([shape.point for shape in shapes])]
@@ -155,8 +159,6 @@ def _joined(geometry: Geometry, shapes: Sequence[Shape]) -> Mesh:
 
 
 def _level(mesh: Mesh, shapes: Sequence[Shape], error: float) -> Level:
-    from ptmtools.output.content import Shape
-
     uv = np.zeros((len(mesh.triangles), 3, 2)) if mesh.uv is None else mesh.uv
     table, corner = np.unique(uv.reshape(-1, 2).astype(np.float32), axis=0, return_inverse=True)
     corner = corner.reshape(-1, 3)

@@ -15,7 +15,7 @@ from ptmtools.output.mesh_levels import MANY
 
 if TYPE_CHECKING:
     from ptmtools.cells.model import Cells
-    from ptmtools.output.content import Geometry
+    from ptmtools.output.geometry import Geometry
 
 #: The sides of a piece are examined this far off it, in units of the tolerance of planes.
 _OFF = 4.0

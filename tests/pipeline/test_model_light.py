@@ -18,7 +18,7 @@ from ptmtools.light.looks import LightImage, lookup, red_texels
 from ptmtools.light.occlusion import points_on
 from ptmtools.light.options import LightOptions
 from ptmtools.neighbours.apo.options import ReplaceOptions
-from ptmtools.output.content import Geometry
+from ptmtools.output.geometry import Geometry
 from ptmtools.output.gltf_reader import read_glb
 from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.stage import Artifacts

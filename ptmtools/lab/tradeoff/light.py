@@ -26,7 +26,7 @@ from ptmtools.light.lamps import lamps_of
 from ptmtools.light.looks import LightImage, lookup
 from ptmtools.light.mixing import mixed
 from ptmtools.light.occlusion import Surroundings
-from ptmtools.output.content import Geometry
+from ptmtools.output.geometry import Geometry
 from ptmtools.output.pieces import pieces_of
 from ptmtools.pipeline.stages import APO, CELLS, LIGHT
 from ptmtools.pipeline.stages.apo import replaced_objects

@@ -110,7 +110,7 @@ class LightJob(Job):
 
         from ptmtools.light.budget import LEAST, affordable, expected_bytes, rounded
         from ptmtools.light.model import Light
-        from ptmtools.output.content import Geometry
+        from ptmtools.output.geometry import Geometry
         from ptmtools.output.pieces import pieces_of
 
         scene, cells = run[APO], run[CELLS]
