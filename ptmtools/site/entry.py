@@ -10,6 +10,8 @@ from ptmtools.output.emission import compressed
 
 #: Hex digits of a SHA-256 that make a name unique.
 DIGITS = 10
+#: Values of ``Cache-Control``: of contents that never change, and of those revalidated before use.
+FOREVER, FRESH = "public, max-age=31536000, immutable", "no-cache"
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,11 @@ class Entry:
     compressed: bool = False
     state: tuple[int, int, int] | None = None
     digest: str = ""
+
+    @property
+    def caching(self) -> str:
+        """The value of ``Cache-Control``."""
+        return FOREVER if self.forever else FRESH
 
     def read(self, end: int | None = None) -> bytes:
         """All bytes, or those up to an end."""

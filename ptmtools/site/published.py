@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,10 +13,10 @@ from urllib.parse import unquote
 from ptmtools.files import open_regular
 from ptmtools.options import option
 from ptmtools.output.emission import compressed
-from ptmtools.site.about import MANIFEST, MANIFEST_MEDIA
-from ptmtools.site.content import Site
+from ptmtools.site.about import MANIFEST
+from ptmtools.site.content import GLB, Site
 from ptmtools.site.entry import Entry
-from ptmtools.site.program import INDEX
+from ptmtools.site.program import ELEMENT, INDEX
 from ptmtools.store.folder import damaged, unreadable
 from ptmtools.store.layout import sha256
 
@@ -49,9 +49,11 @@ class Published:
     removed: tuple[str, ...]
 
 
-def in_order(names: Iterable[str]) -> list[str]:
-    """Names in the order of writing: the page last, after the files that it names."""
-    return [*sorted(set(names) - {INDEX}), INDEX]
+def in_order(files: Mapping[str, Entry]) -> list[str]:
+    """The names of files in the order of writing: those whose contents never change, those that
+    replace others under their names, and the page. So an interrupted run leaves all that each
+    version of a replaced file names."""
+    return sorted(files, key=lambda name: (not files[name].forever, name == INDEX, name))
 
 
 def plain_files(site: Site, options: PublishOptions) -> Iterator[tuple[str, Entry]]:
@@ -62,19 +64,36 @@ def plain_files(site: Site, options: PublishOptions) -> Iterator[tuple[str, Entr
             data = entry.read()
             packed = compressed(data)
             if len(packed) < len(data):
-                yield f"{unquote(name)}.gz", Entry(f"{name}.gz", packed, "application/gzip")
+                yield (
+                    f"{unquote(name)}.gz",
+                    Entry(f"{name}.gz", packed, "application/gzip", entry.forever),
+                )
     yield HEADERS, Entry(HEADERS, _headers(site.entries.values()), "text/plain")
 
 
 def _headers(entries: Iterable[Entry]) -> bytes:
-    """Types and caching for Netlify and Cloudflare Pages, by folder and suffix."""
-    folders = sorted({f"/{e.name.partition('/')[0]}/*" for e in entries if e.forever})
-    forever = "\n  Cache-Control: public, max-age=31536000, immutable\n"
-    parts = [f"{folder}{forever}" for folder in folders]
-    parts += [f"{page}\n  Cache-Control: no-cache\n" for page in ("/", f"/{INDEX}")]
-    parts.append(f"/{MANIFEST}\n  Content-Type: {MANIFEST_MEDIA}\n  Cache-Control: no-cache\n")
-    parts.append("/data/*.glb\n  Content-Type: model/gltf-binary\n")
-    return "".join(parts).encode()
+    """Types and caching for Netlify and Cloudflare Pages, and who may load the element. Where
+    several rules match, Cloudflare joins their values: each address has one rule of each header."""
+    rules: dict[str, list[str]] = {}
+    for entry in sorted(entries, key=lambda entry: entry.name):
+        caching = f"Cache-Control: {entry.caching}"
+        folder, within, _ = entry.name.partition("/")
+        for path in [f"/{folder}/*"] if within else _addresses(entry.name):
+            rules[path] = [caching]
+        if entry.name == ELEMENT:
+            rules[f"/{ELEMENT}"].append("Access-Control-Allow-Origin: *")
+        if entry.name == MANIFEST:
+            rules[f"/{MANIFEST}"].append(f"Content-Type: {entry.media}")
+        if entry.media == GLB:
+            rules[f"/{folder}/*.glb"] = [f"Content-Type: {GLB}"]
+    lines = (f"{path}\n" + "".join(f"  {one}\n" for one in rules[path]) for path in rules)
+    return "".join(lines).encode()
+
+
+def _addresses(name: str) -> list[str]:
+    """Those of a file beside the page: these hosts remove `.html`."""
+    stem = name.removesuffix(".html")
+    return [f"/{name}"] if stem == name else [f"/{name}", "/" if name == INDEX else f"/{stem}"]
 
 
 def digest_of(entry: Entry) -> str:

@@ -1,9 +1,10 @@
 """Writes a site to a folder or a URL, for any static host, and counts what its visitors download.
 
-A visitor during publication gets the old site or the new one: the files of the new page are written
-first, then the page; files of the old page alone are removed last. A list in the folder names our
-files; nothing else is changed or removed. The list is written before the first file and after the
-last, so that publishing again completes an interrupted run.
+A visitor during publication gets the old page or the new one: the files whose contents never change
+are written first, then those that replace others, then the page; files of the old page alone are
+removed last. A list in the folder names our files; nothing else is changed or removed. The list is
+written before the first file and after the last, so that publishing again completes an interrupted
+run.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ from starlette.routing import Route
 
 from ptmtools.files import open_regular
 from ptmtools.output.emission import compressed
-from ptmtools.site.entry import Entry, state_of
+from ptmtools.site.entry import FRESH, Entry, state_of
 from ptmtools.site.lookup import Lookup, name_of
 from ptmtools.site.throttle import Paced, Throttle, Visits
 from ptmtools.store.layout import sha256
@@ -33,9 +33,6 @@ from ptmtools.store.layout import sha256
 #: Name of a file → its tag, and its gzip copy.
 Copies = dict[str, tuple[str, bytes]]
 
-FOREVER = "public, max-age=31536000, immutable"
-#: May be kept, and is revalidated before each use.
-FRESH = "no-cache"
 #: Permissions of pages of another origin, and the fields that they may read.
 _SHARED = {
     "Access-Control-Allow-Methods": "GET, HEAD",
@@ -106,7 +103,7 @@ def _response(request: Request, entry: Entry, copies: Copies, common: dict[str, 
     file, size, tag = opened(entry)
     headers = common | {
         "Content-Type": entry.media,
-        "Cache-Control": FOREVER if entry.forever else FRESH,
+        "Cache-Control": entry.caching,
         "Accept-Ranges": "bytes",
     }
     part = None

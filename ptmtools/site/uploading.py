@@ -2,14 +2,15 @@
 
 Object stores send what they hold with the headers that they hold: they compress nothing. So files
 that are worth compressing are stored as gzip with ``Content-Encoding``, which all browsers accept;
-textures, which are read in ranges, are stored as they are. The page is revalidated before each use,
-all other files are immutable. A store whose objects have no headers gets the files of a folder.
+textures, which are read in ranges, are stored as they are. Files that are replaced under their
+names are revalidated before each use, all others are immutable. A store whose objects have no
+headers gets the files of a folder.
 
-The order is that of a folder: the list, the new files, the page, removal, the list. Each object
-appears whole, so an interrupted upload leaves the former site, and the next run sends only what is
-missing. The list has for each object the SHA-256 of its contents and headers, the MD5 of its bytes
-and the version that the store gave it; an object counts as ours while one of the last two is that
-of the store's listing.
+The order is that of a folder: the list, the new files, those that replace others, the page,
+removal, the list. Each object appears whole, so an interrupted upload leaves the former page with
+all that it names, and the next run sends only what is missing. The list has for each object the
+SHA-256 of its contents and headers, the MD5 of its bytes and the version that the store gave it; an
+object counts as ours while one of the last two is that of the store's listing.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -28,7 +30,7 @@ from ptmtools.output.emission import compressed
 from ptmtools.parallel import ordered
 from ptmtools.progress import Progress
 from ptmtools.site.content import Site
-from ptmtools.site.entry import Entry, state_of
+from ptmtools.site.entry import FRESH, Entry, state_of
 from ptmtools.site.program import INDEX
 from ptmtools.site.published import (
     LIST,
@@ -45,7 +47,6 @@ from ptmtools.store.layout import sha256
 from ptmtools.store.objects import Headers, Held, Objects
 
 FORMAT, SCHEMA = "ptmtools site objects", 1
-FOREVER, FRESH = "public, max-age=31536000, immutable", "no-cache"
 #: Objects that are sent at a time: each waits for the network.
 AT_ONCE = 16
 
@@ -126,11 +127,15 @@ def upload(
             if item.entry.state not in (None, state):
                 raise damaged(item.body, "it changed while it was copied")
 
-    first = [name for name in written if name != INDEX]
-    for number, _ in enumerate(ordered(send, first, AT_ONCE)):
+    # What replaces a former object waits for the new ones that it names, and the page for all.
+    steps = [
+        [name for name in written if files[name].forever],
+        [name for name in written if not files[name].forever and name != INDEX],
+        [name for name in written if name == INDEX],
+    ]
+    sent = chain.from_iterable(ordered(send, step, AT_ONCE) for step in steps)
+    for number, _ in enumerate(sent):
         progress(number, len(written), "files")
-    if INDEX in written:
-        send(INDEX)
     removed: tuple[str, ...] = ()
     if not options.keep:
         removed = tuple(name for name, row in old.items() if row.is_of(held.get(name)))
@@ -152,7 +157,7 @@ def _item(entry: Entry, *, encode: bool) -> Item:
     """The object of a file; its contents are checked."""
     digest = digest_of(entry)
     body = entry.source
-    headers = Headers(entry.media, FOREVER if entry.forever else FRESH)
+    headers = Headers(entry.media, entry.caching)
     if encode and entry.compressed:
         data = entry.read()
         if sha256(data) != digest:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
+import wave
 from pathlib import Path
 
 import numpy as np
@@ -68,6 +70,25 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
             command = ["interlace", str(folder / f"{name}.png"), "-o", str(target), "--min", "32"]
             assert main(["-q", *command, "--format", container]) == 0
     return sets
+
+
+def write_tour(folder: Path) -> str:
+    """A tour of two languages for the two rooms, with a sound and its captions; its file."""
+    with wave.open(str(folder / "night.wav"), "wb") as sound:
+        sound.setparams((1, 1, 8000, 0, "NONE", ""))
+        sound.writeframes(bytes([128]) * 8000)
+    (folder / "night.vtt").write_text("WEBVTT\n\n00:00.000 --> 00:01.000\nSilence.\n")
+    label = {
+        "id": "night",
+        "at": [1, 1.5, 1],
+        "title": {"en": "Night", "de": "Nacht"},
+        "sound": "night.wav",
+        "captions": "night.vtt",
+    }
+    document = {"format": "ptmtools tour", "schema": 1, "model": "two_rooms.obj"}
+    text = json.dumps(document | {"languages": ["en", "de"], "labels": [label], "stops": []})
+    (folder / "tour.json").write_text(text)
+    return str(folder / "tour.json")
 
 
 @pytest.fixture(scope="session")

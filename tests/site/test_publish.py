@@ -5,16 +5,20 @@ from __future__ import annotations
 import gzip
 import json
 import os
+import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from samples import write_tour
 
 from ptmtools.errors import DatabaseError, OutputError
 from ptmtools.site import publishing
-from ptmtools.site.about import MANIFEST
+from ptmtools.site.about import MANIFEST, MANIFEST_MEDIA
 from ptmtools.site.content import Site, SiteOptions, site_of
+from ptmtools.site.program import ELEMENT
 from ptmtools.site.published import HEADERS, LIST, PublishOptions
 from ptmtools.site.publishing import publish
 from tests.conftest import files_below
@@ -51,11 +55,43 @@ def test_all_of_a_site_and_nothing_else(site: Site, tmp_path: Path) -> None:
     assert sorted(done.written) == sorted([*wanted, HEADERS])
     assert not done.unchanged
     assert not done.removed
-    text = actual[HEADERS].decode()
-    assert "/data/*\n  Cache-Control: public, max-age=31536000, immutable\n" in text
-    assert "/index.html\n  Cache-Control: no-cache\n" in text
     publish(site, tmp_path / "b")
     assert files_below(tmp_path / "b") == actual
+
+
+def fields_of(rules: str, path: str) -> dict[str, str]:
+    """What a file of rules adds to the response at a path: as Cloudflare Pages reads it, values of
+    a name in several rules are joined."""
+    fields: dict[str, str] = {}
+    for block in re.split(r"\n(?=/)", rules.strip()):
+        pattern, *lines = block.splitlines()
+        if re.fullmatch(".*".join(map(re.escape, pattern.split("*"))), path):
+            for name, value in (line.strip().split(": ", 1) for line in lines):
+                fields[name] = f"{fields[name]}, {value}" if name in fields else value
+    return fields
+
+
+def test_headers_of_hosts_that_read_them_from_a_file(two_rooms: Path, tmp_path: Path) -> None:
+    """All files are cached as by `ptm serve`, also at addresses without `.html`; pages of other
+    origins may load the element alone."""
+    options = replace(PLAIN, tour=write_tour(tmp_path), offline=True, clients="vrml")
+    site = site_of(two_rooms, options)
+    publish(site, tmp_path / "site")
+    rules = (tmp_path / "site" / HEADERS).read_text()
+    addresses = {f"/{name}": entry for name, entry in site.entries.items()}
+    addresses |= {path[:-5]: entry for path, entry in addresses.items() if path.endswith(".html")}
+    addresses["/"] = addresses.pop("/index")
+    assert {"/offline.js", "/catalogue", "/catalogue-de.html", "/root.wrl"} <= addresses.keys()
+    for path, entry in addresses.items():
+        fields = fields_of(rules, path)
+        assert fields.pop("Cache-Control", None) == entry.caching, path
+        assert fields.pop("Content-Type", entry.media) == entry.media, path
+        assert fields == ({"Access-Control-Allow-Origin": "*"} if path == f"/{ELEMENT}" else {})
+    assert fields_of(rules, f"/{MANIFEST}")["Content-Type"] == MANIFEST_MEDIA
+    glb = next(path for path in addresses if path.endswith(".glb"))
+    assert "Content-Type" in fields_of(rules, glb)
+    # Cloudflare reads 100 rules.
+    assert rules.count("\n/") < 30
 
 
 def test_again_only_what_changed(site: Site, other: Site, tmp_path: Path) -> None:
@@ -103,7 +139,7 @@ def test_the_page_comes_last(
     """Whenever it stops, all that the page in the folder names is there; and the next run mends."""
     publish(site, tmp_path / "site")
     write = publishing._write
-    for stop in range(3):
+    for stop in range(4):
         folder = tmp_path / f"stopped-{stop}"
         shutil.copytree(tmp_path / "site", folder)
         left = [stop]
@@ -115,12 +151,12 @@ def test_the_page_comes_last(
             write(*arguments)
 
         monkeypatch.setattr(publishing, "_write", some)
-        if stop < 2:
+        if stop < 3:
             with pytest.raises(KeyboardInterrupt):
                 publish(other, folder)
-            page = (folder / "index.html").read_bytes()
-            assert page == site.entries["index.html"].read()
-            assert all((folder / name).exists() for name in site.entries)
+            now = files_below(folder)
+            changed = {name for name, entry in site.entries.items() if now[name] != entry.read()}
+            assert changed == ({MANIFEST} if stop == 2 else set())
         monkeypatch.setattr(publishing, "_write", write)
         publish(other, folder)
         publish(other, tmp_path / f"fresh-{stop}")
