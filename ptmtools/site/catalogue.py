@@ -26,6 +26,8 @@ INDEX = "index.html"
 PICTURE, ANGLE = (480, 360), math.pi / 3
 #: Right-to-left scripts, by the languages that are usually written in them.
 _RIGHT_TO_LEFT = {"ar", "fa", "he", "ur", "yi", "ps", "sd", "ug", "dv", "ku"}
+#: By which the service worker knows a catalogue (web/page/offline/visits.js).
+GENERATOR = '<meta name="generator" content="ptmtools">'
 _STYLE = """
 :root { color-scheme: light dark; font: 17px/1.55 system-ui, sans-serif; }
 body { max-width: 46rem; margin: 0 auto; padding: 1rem; }
@@ -107,7 +109,7 @@ class _Page:
         return (
             f'<!doctype html>\n<html lang="{escape(language)}" dir="{direction}">\n<head>\n'
             '<meta charset="utf-8">\n<meta name="viewport" content="width=device-width, '
-            f'initial-scale=1">\n<title>{escape(self._title)}</title>\n{alternates}'
+            f'initial-scale=1">\n{GENERATOR}\n<title>{escape(self._title)}</title>\n{alternates}'
             f'<link rel="icon" href="data:,">\n<style>{_STYLE}</style>\n'
             f"{self._linked_data()}</head>\n<body>\n"
             f'<a class="skip" href="#content">{escape(words["skip"])}</a>\n'

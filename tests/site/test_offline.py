@@ -14,13 +14,17 @@ import numpy as np
 import pytest
 from browser import Visitor, image_of
 from numpy.typing import NDArray
+from samples import write_tour
+from starlette.responses import PlainTextResponse, RedirectResponse
 
 from ptmtools.cli.main import main
 from ptmtools.site.about import MANIFEST
 from ptmtools.site.content import Site, SiteOptions, site_of
+from ptmtools.site.lookup import among
 from ptmtools.site.program import INDEX, WORKER
 from ptmtools.site.publishing import weight_of
-from ptmtools.site.serving import serving
+from ptmtools.site.responses import app_of
+from ptmtools.site.serving import running, serving
 from ptmtools.site.throttle import Visits
 from ptmtools.store.layout import sha256
 
@@ -62,9 +66,48 @@ async () => {
 """
 
 
+#: Loads a sound to its end: whether it can be played.
+PLAYED = """
+(url) => new Promise((done) => {
+  const sound = Object.assign(new Audio(url), { preload: "auto" });
+  sound.oncanplaythrough = () => done(true);
+  sound.onerror = () => done(false);
+})
+"""
+#: The folder of a site that is not at the root of its host.
+FOLDER = "walk"
+
+
+class Host:
+    """A host of a site in a folder, which removes ``.html`` from addresses, as Cloudflare Pages
+    does; with ``fault``, its answers have the status 503."""
+
+    def __init__(self, site: Site) -> None:
+        self.visits, self.fault = Visits(), False
+        self._files = app_of(among(site.entries), visits=self.visits)
+
+    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
+        path = scope["path"].removeprefix(f"/{FOLDER}")
+        query = f"?{text}" if (text := scope["query_string"].decode()) else ""
+        app: Any = self._files
+        if self.fault:
+            app = PlainTextResponse("busy", 503)
+        elif path.endswith(".html"):
+            app = RedirectResponse(f"/{FOLDER}{path[:-5].removesuffix('index')}{query}", 308)
+        elif "." not in path and path != "/":
+            path += ".html"
+        await app({**scope, "raw_path": path.encode()}, receive, send)
+
+
 @pytest.fixture(scope="module")
-def site(two_rooms: Path) -> Site:
-    return site_of(two_rooms, SiteOptions(pictures=False, offline=True))
+def toured(tmp_path_factory: pytest.TempPathFactory) -> SiteOptions:
+    """The options of a site with a tour of one sound."""
+    return SiteOptions(pictures=False, tour=write_tour(tmp_path_factory.mktemp("tour")))
+
+
+@pytest.fixture(scope="module")
+def site(two_rooms: Path, toured: SiteOptions) -> Site:
+    return site_of(two_rooms, replace(toured, offline=True))
 
 
 @contextmanager
@@ -119,34 +162,52 @@ def keeps(visitor: Visitor) -> None:
 
 def test_a_visited_walk_without_a_network(chromium: Any, site: Site) -> None:
     """The same picture, at the beginning and at another place; a second visit downloads documents
-    alone."""
+    alone. The catalogue and a sound are kept as well, whatever the host makes of addresses."""
     last = len(site.index["viewpoints"]) - 1
-    visits, again = Visits(), Visits()
-    with browsing(chromium) as context, ExitStack() as running:
-        url = running.enter_context(serving(site.entries, visits=visits))
+    (sound,) = (name for name in site.entries if name.endswith(".wav"))
+    first, again = Host(site), Host(site)
+    with browsing(chromium) as context, ExitStack() as serving_first:
+        root = serving_first.enter_context(running(first))
+        url = f"{root}{FOLDER}/"
         with open_page(context, url) as visitor:
             keeps(visitor)
             pictures = [picture_of(visitor)]
+            assert visitor.page.evaluate(PLAYED, sound)
             visitor.page.evaluate("(place) => ptm.goTo(place)", last)
             visitor.frames(2)
             visitor.until(ALL)
             keeps(visitor)
             pictures.append(picture_of(visitor))
+            # No navigation may be answered with a response that was redirected.
+            visitor.page.evaluate("fetch('catalogue-de.html').then((answer) => answer.text())")
+            visitor.page.goto(f"{url}catalogue.html")
+            assert visitor.page.url == f"{url}catalogue"
+            for name in ("catalogue.html", "catalogue-de.html"):
+                wait_for(visitor, f"async () => Boolean(await caches.match('{name}'))")
+            assert visitor.messages == []
+            first.fault = True
+            visitor.page.goto(f"{url}catalogue")
+            assert visitor.page.locator("h3").inner_text() == "Night"
+            visitor.page.goto(f"{url}?ui=none")
+            assert visitor.page.title() == "Db"
             forget(visitor)
-        assert visitor.messages == []
-        running.close()
-        with serving(site.entries, port=port_of(url), visits=again), open_page(context, url) as one:
+        serving_first.close()
+        with running(again, port=port_of(root)), open_page(context, url) as one:
             one.until(ALL)
-        names = {visit.path.lstrip("/") for visit in again}
+        names = {visit.path.lstrip("/") for visit in again.visits}
         assert names <= {"", WORKER, MANIFEST}, names
-        with open_page(context, url) as visitor:
+        with open_page(context, f"{url}index.html?lang=en") as visitor:
             visitor.until(ALL)
             assert np.array_equal(picture_of(visitor), pictures[0])
+            assert visitor.page.evaluate(PLAYED, sound)
             visitor.page.evaluate("(place) => ptm.goTo(place)", last)
             visitor.frames(2)
             visitor.until(ALL)
             assert np.array_equal(picture_of(visitor), pictures[1])
             assert visitor.page.evaluate("ptm.errors") == []
+            for address, title in {"catalogue": "Night", "catalogue-de.html": "Nacht"}.items():
+                visitor.page.goto(f"{url}{address}")
+                assert visitor.page.locator("h3").inner_text() == title
         assert visitor.messages == []
 
 
@@ -201,8 +262,8 @@ def test_a_new_version_takes_the_place_of_the_old(chromium: Any, two_rooms: Path
         assert visitor.messages == []
 
 
-def test_other_sites_do_not_grow(site: Site, two_rooms: Path) -> None:
-    plain = site_of(two_rooms, SiteOptions(pictures=False))
+def test_other_sites_do_not_grow(site: Site, two_rooms: Path, toured: SiteOptions) -> None:
+    plain = site_of(two_rooms, toured)
     assert site.entries.keys() - plain.entries.keys() == {WORKER}
     assert "register.js" not in plain.entries[INDEX].read().decode()
     assert weight_of(site).whole - weight_of(plain).whole < 200

@@ -20,23 +20,25 @@ function shelf(room = Infinity) {
       const body = await response.arrayBuffer();
       room -= body.byteLength;
       if (room < 0) throw new DOMException("no room", "QuotaExceededError");
-      rows.set(key, new Response(body));
+      rows.set(key, new Response(body, { headers: response.headers }));
     },
   };
 }
 
 /** A host of the file, and the ranges that it was asked for. */
 function host({ ranges = true, file = FILE, status = 0 } = {}) {
-  const asked = [];
+  const asked = [], total = file.length;
   return {
     asked,
     ask: async (request) => {
-      const [, begin, last] = /bytes=(\d+)-(\d+)/.exec(request.headers.get("range") ?? "bytes=0-999").map(Number);
-      asked.push([begin, last + 1]);
+      const [, begin, last] = /bytes=(\d+)-(\d*)/.exec(request.headers.get("range") ?? "bytes=0-");
+      const span = [Number(begin), last ? Number(last) + 1 : total];
+      asked.push(span);
       if (status) return new Response("no", { status });
-      if (!ranges) return new Response(file);
-      const headers = { "content-range": `bytes ${begin}-${last}/${SIZE}` };
-      return new Response(file.slice(begin, last + 1), { status: 206, headers });
+      const type = { "content-type": "audio/wav" };
+      if (!ranges) return new Response(file, { headers: type });
+      const headers = { "content-range": `bytes ${span[0]}-${span[1] - 1}/${total}`, ...type };
+      return new Response(file.slice(...span), { status: 206, headers });
     },
   };
 }
@@ -44,13 +46,14 @@ function host({ ranges = true, file = FILE, status = 0 } = {}) {
 /** The answer to a range, after what goes on behind it. */
 async function read(store, begin, end, cache = "default") {
   const work = [];
-  const request = new Request(URL_OF, { headers: { range: `bytes=${begin}-${end - 1}` }, cache });
+  const range = `bytes=${begin}-${end === Infinity ? "" : end - 1}`;
+  const request = new Request(URL_OF, { headers: { range }, cache });
   const response = await store.answer(request, URL_OF, (one) => work.push(one));
   const body = new Uint8Array(await response.arrayBuffer());
   await Promise.all(work);
-  const { status } = response, range = response.headers.get("content-range");
-  const from = status === 200 ? 0 : begin;
-  return { status, range, length: body.length, right: body.every((byte, k) => byte === FILE[from + k]) };
+  const { status } = response, from = status === 200 ? 0 : begin;
+  const right = body.every((byte, k) => byte === FILE[from + k]);
+  return { status, range: response.headers.get("content-range"), length: body.length, right };
 }
 
 const print = (name, row) => console.log(JSON.stringify({ name, ...row }));
@@ -73,6 +76,14 @@ await reads("between", [[0, 100], [200, 300], [0, 300], [0, 300]]);
 await reads("whole", [[0, 100], [500, 600]], { ranges: false });
 await reads("full", [[0, 100], [100, 200], [0, 200]], { room: 150 });
 await reads("down", [[0, 100]], { status: 503 });
+await reads("played", [[0, Infinity], [0, Infinity], [700, Infinity], [0, 2]]);
+await reads("long", [[0, Infinity]], { file: new Uint8Array(9 * 2 ** 20) });
+{
+  const cache = shelf(), { ask } = host(), store = new Store(async () => cache, ask);
+  await read(store, 0, Infinity);
+  const request = new Request(URL_OF, { headers: { range: "bytes=5-" } });
+  print("type", { type: (await store.answer(request, URL_OF, () => {})).headers.get("content-type") });
+}
 
 {
   // Damaged on the way; the page notices it, and asks past caches.
@@ -131,6 +142,44 @@ await reads("down", [[0, 100]], { status: 503 });
     kept[room] = [last, cache.rows.has(`${scope}data/index-${last}.json`)];
   }
   print("versions", { kept });
+}
+{
+  // Documents: what the visitor gets in turn, and what is kept in the end.
+  const scope = "https://site.test/walk/", page = (text) => `<meta name="generator" content="ptmtools">${text}`;
+  const site = (text) => `<p id="site">viewer-0123456789/register.js ${text}`;
+  // Address, status (0: no network) and text of the host.
+  const visit = async (visits) => {
+    const cache = shelf(), texts = [];
+    for (const [address, status, text, method] of visits) {
+      const ask = async () => {
+        if (!status) throw new TypeError("no network");
+        return new Response(text, { status, headers: { "content-type": "text/html" } });
+      };
+      // Files that the page names are here.
+      const store = new Store(async () => cache, async (request) =>
+        String(request.url ?? request).includes("viewer-") ? new Response("js") : ask());
+      const work = [], request = new Request(scope + address, { method });
+      const answer = new Visits(store, scope, async () => {}).answer(request, (one) => work.push(one));
+      texts.push(answer && await answer.then((one) => one.text(), String));
+      await Promise.all(work);
+    }
+    const kept = [...cache.rows].filter(([key]) => !key.includes("viewer-"));
+    return { texts, kept: Object.fromEntries(await Promise.all(kept.map(async ([key, row]) =>
+      [key.slice(scope.length), await row.text()]))) };
+  };
+  const cases = {
+    fault: [["", 200, site(1)], ["", 500, "fault"], ["index.html?ui=none", 503, "busy"], ["index", 0], ["?lang=de", 0]],
+    unknown: [["", 500, "fault"], ["catalogue.html", 0]],
+    removed: [["catalogue", 200, page(1)], ["catalogue.html", 0], ["catalogue?x", 0], ["catalogue-de", 0]],
+    stays: [["catalogue.html", 200, page(1)], ["", 200, site(1)], ["catalogue", 404, "none"], ["index", 404, "none"],
+      ["catalogue", 200, "login"], ["index", 200, site(2)], ["index", 200, '<p id="site">']],
+    gone: [["catalogue-de.html", 200, page(1)], ["catalogue-de.html", 410, "gone"]],
+    login: [["catalogue.html", 200, page(1)], ["catalogue.html", 200, "login"], ["", 200, "login"],
+      ["manifest.webmanifest", 200, "login"], ["catalogue.html", 500, page("fault")]],
+    others: [["other.html", 200, page(1)], ["catalogue.html.html", 200, page(1)], ["catalogue/", 200, page(1)],
+      ["inner/index.html", 200, site(1)], ["", 200, site(1), "HEAD"]],
+  };
+  for (const [name, visits] of Object.entries(cases)) print(`document ${name}`, await visit(visits));
 }
 {
   // Any ranges in any order: the answers are right, and no byte that is kept is asked for at an end of a range.

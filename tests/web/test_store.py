@@ -101,6 +101,52 @@ def test_without_a_network(rows: dict[str, dict[str, Any]]) -> None:
     assert rows["lost"]["beyond"] == "TypeError: no network"
 
 
+def test_a_sound_that_was_played(rows: dict[str, dict[str, Any]]) -> None:
+    """Players ask for ranges without an end. A long sound is not kept."""
+    row = rows["played"]
+    assert row["asked"] == [[0, 1000]]
+    assert all(answer["right"] and answer["status"] == 206 for answer in row["answers"])
+    assert [answer["range"] for answer in row["answers"]][1:] == [
+        "bytes 0-999/1000",
+        "bytes 700-999/1000",
+        "bytes 0-1/1000",
+    ]
+    assert rows["type"]["type"] == "audio/wav"
+    assert (rows["long"]["answers"][0]["length"], rows["long"]["kept"]) == (9 * 2**20, [])
+
+
+SITE = '<p id="site">viewer-0123456789/register.js '
+CATALOGUE = '<meta name="generator" content="ptmtools">'
+NONE = "TypeError: no network"
+
+
+@pytest.mark.parametrize(
+    ("case", "texts", "kept"),
+    [
+        ("fault", [SITE + "1"] * 5, {"": SITE + "1"}),
+        ("unknown", ["fault", NONE], {}),
+        ("removed", [CATALOGUE + "1"] * 3 + [NONE], {"catalogue.html": CATALOGUE + "1"}),
+        ("stays", None, {"": SITE + "1", "catalogue.html": CATALOGUE + "1"}),
+        ("gone", [CATALOGUE + "1", "gone"], {}),
+        (
+            "login",
+            [CATALOGUE + "1", "login", "login", "login", CATALOGUE + "1"],
+            {"catalogue.html": CATALOGUE + "1"},
+        ),
+        ("others", [None] * 5, {}),
+    ],
+)
+def test_documents(
+    rows: dict[str, dict[str, Any]], case: str, texts: list[str] | None, kept: dict[str, str]
+) -> None:
+    """What visitors get, and what is kept: while the host has a fault or there is no network; of a
+    host that removes `.html` from addresses; after pages of others at addresses of ours; and of
+    documents that are not ours."""
+    row = rows[f"document {case}"]
+    assert texts is None or row["texts"] == texts
+    assert row["kept"] == kept
+
+
 def test_any_ranges_in_any_order(rows: dict[str, dict[str, Any]]) -> None:
     row = rows["random"]
     assert (row["wrong"], row["needless"]) == (0, 0)

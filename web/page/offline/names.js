@@ -1,7 +1,7 @@
 // The names of a site's files: which of them a visitor keeps, and which files a document names.
 
 /** Documents, whose names stay; files whose names change with their contents. */
-const DOCUMENT = /^(?:index\.html|catalogue(?:-[\w-]+)?\.html|manifest\.webmanifest)?$/;
+const DOCUMENT = /^(?:index\.html|catalogue(?:-[\w-]+)?\.html|manifest\.webmanifest)$/;
 const FILE = /^(?:data\/[\w/-]*|viewer)-[0-9a-f]{10}[./-][\w./-]*$/;
 /** Documents among the files, which name others. */
 const LIST = /^data\/(?:index|tour|sets\/sets)-/;
@@ -15,12 +15,16 @@ export function nameOf(url, scope) {
   return place.startsWith(scope) ? place.slice(scope.length) : null;
 }
 
-/** @param {string} name */
-export const isDocument = (name) => DOCUMENT.test(name);
+/** The document at an address of a site, "" for the page; null of any other. Hosts may remove `.html`.
+ * @param {string} address */
+export function documentOf(address) {
+  const name = [address || "index.html", `${address}.html`].find((one) => DOCUMENT.test(one));
+  return name === "index.html" ? "" : name ?? null;
+}
 /** @param {string} name */
 export const isFile = (name) => FILE.test(name);
 /** @param {string} name */
-export const isList = (name) => LIST.test(name) || (DOCUMENT.test(name) && name !== "");
+export const isList = (name) => LIST.test(name) || Boolean(documentOf(name));
 
 /** What a text names. @param {string} text @returns {string[]} */
 export const marksIn = (text) => text.match(MARK) ?? [];

@@ -2,13 +2,13 @@
 
 /** Bytes of a file from `begin` to `end`, which is excluded. @typedef {{begin: number, end: number}} Span */
 
-const ASKED = /^bytes=(\d+)-(\d+)$/, ANSWERED = /^bytes (\d+)-(\d+)\/(\d+)$/;
+const ASKED = /^bytes=(\d+)-(\d*)$/, ANSWERED = /^bytes (\d+)-(\d+)\/(\d+)$/;
 const KEY = /^(.*)\?bytes=(\d+)-(\d+)\/(\d+)$/;
 
-/** The span that a request asks for; null for the whole file, or other ranges. @param {string | null} header */
+/** The span that a request asks for, without an end if it has none; null for the whole file, or other ranges. @param {string | null} header */
 export function askedSpan(header) {
   const parts = ASKED.exec(header ?? "");
-  return parts && { begin: Number(parts[1]), end: Number(parts[2]) + 1 };
+  return parts && { begin: Number(parts[1]), end: parts[2] ? Number(parts[2]) + 1 : Infinity };
 }
 
 /** The header of a request for a span. @param {Span} span */

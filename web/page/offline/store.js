@@ -15,12 +15,14 @@ import { answeredSpan, askedSpan, bytesOf, coverOf, keyOf, missingOf, rangeOf, s
  */
 
 const PAST = ["no-store", "reload"];
+/** Bytes of the longest sound that is kept: players ask for a file without an end, and read it as they play. */
+const LONGEST = 8 * 2 ** 20;
 /** What hosts say `Vary` about does not differ for one page. */
 const ANY = { ignoreVary: true };
 
 /** Whether an answer is a file: hosts of applications answer with their page for files that they lack.
  * @param {Response} response */
-const isOwn = ({ status, headers }) => status === 200 && !headers.get("content-type")?.startsWith("text/html");
+export const isOwn = ({ status, headers }) => status === 200 && !headers.get("content-type")?.startsWith("text/html");
 
 export class Store {
   /** The spans of files, by URL. @type {Promise<Map<string, Kept[]>> | null} */
@@ -97,11 +99,12 @@ export class Store {
   /**
    * Keeps bytes of a file, in place of spans that they have.
    * @param {string} url @param {number} begin @param {Uint8Array<ArrayBuffer>} bytes
-   * @param {number} total bytes of the file
+   * @param {number} total bytes of the file @param {string | null} [type] of the file
    */
-  async keep(url, begin, bytes, total) {
+  async keep(url, begin, bytes, total, type) {
     const span = { begin, end: begin + bytes.length }, key = keyOf(url, span, total);
-    if (!bytes.length || !(await this.put(key, new Response(bytes)))) return;
+    const response = new Response(bytes, { headers: type ? { "content-type": type } : {} });
+    if (!bytes.length || !(await this.put(key, response))) return;
     const all = await this.#all(), rows = all.get(url) ?? [];
     const within = rows.filter((row) => row.key !== key && row.begin >= begin && row.end <= span.end);
     all.set(url, [...rows.filter((row) => row.key !== key && !within.includes(row)), { ...span, total, key }]);
@@ -124,14 +127,16 @@ export class Store {
     return response;
   }
 
-  /** @param {Request} request @param {string} url @param {Span} span @param {boolean} past @param {Later} later */
-  async #range(request, url, span, past, later) {
-    const gap = missingOf(past ? [] : await this.spans(url), span);
-    const none = gap?.begin === span.begin && gap.end === span.end;
+  /** @param {Request} request @param {string} url @param {Span} asked @param {boolean} past @param {Later} later */
+  async #range(request, url, asked, past, later) {
+    const spans = past ? [] : await this.spans(url), open = asked.end === Infinity;
+    const span = { begin: asked.begin, end: Math.min(asked.end, spans[0]?.total ?? Infinity) };
+    const gap = missingOf(spans, span), none = gap && (open || (gap.begin === span.begin && gap.end === span.end));
     if (gap && !none) {
       /** @type {Promise<unknown>[]} */
       const work = [];
-      const rest = new Request(request, { headers: { range: rangeOf(gap) } });
+      // Requests of players have a mode in which the header cannot be set.
+      const rest = new Request(request, { mode: "same-origin", headers: { range: rangeOf(gap) } });
       const response = await this.#fetched(rest, url, past, (one) => later((work.push(one), one)));
       if (response.status !== 206) return response;
       await Promise.all(work);
@@ -144,7 +149,8 @@ export class Store {
   async #fetched(request, url, past, later) {
     const response = await this.ask(request), whole = isOwn(response);
     const answered = answeredSpan(response.headers.get("content-range"));
-    if (whole || (response.status === 206 && answered)) {
+    const most = askedSpan(request.headers.get("range"))?.end === Infinity ? LONGEST : Infinity;
+    if (whole || (response.status === 206 && answered && answered.end - answered.begin <= most)) {
       later(this.#store(response.clone(), url, whole ? null : answered, past));
     }
     return response;
@@ -162,24 +168,26 @@ export class Store {
       const wrong = (await this.spans(url)).filter((row) => row.begin < end && row.end > begin);
       for (const row of wrong) await this.delete(row.key);
     }
-    await this.keep(url, begin, bytes, total);
+    await this.keep(url, begin, bytes, total, response.headers.get("content-type"));
   }
 
   /** A range of what is kept; null if bytes of it have gone. @param {string} url @param {Span} span */
   async #composed(url, span) {
     const cover = coverOf(await this.spans(url), span), parts = [];
+    let type = "";
     for (const { key, begin } of cover) {
       const kept = await this.match(key);
       if (!kept) {
         await this.delete(key);
         return null;
       }
+      type = kept.headers.get("content-type") ?? "";
       parts.push({ begin, bytes: new Uint8Array(await kept.arrayBuffer()) });
     }
     if (!cover.length) return null;
     const headers = {
       "content-range": `bytes ${span.begin}-${span.end - 1}/${cover[0].total}`,
-      "content-length": String(span.end - span.begin),
+      "content-length": String(span.end - span.begin), "content-type": type,
     };
     return new Response(bytesOf(parts, span), { status: 206, headers });
   }

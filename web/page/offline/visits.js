@@ -1,7 +1,8 @@
 // The visits of a site: its page as it was last, what the visitor has seen of it, and what goes with a new version.
 
-import { isDocument, isFile, isList, markOf, marksIn, nameOf, neededBy } from "./names.js";
+import { documentOf, isFile, isList, markOf, marksIn, nameOf, neededBy } from "./names.js";
 import { missingOf } from "./spans.js";
+import { isOwn } from "./store.js";
 
 /** @typedef {import("./store.js").Store} Store */
 /** @typedef {import("./store.js").Later} Later */
@@ -14,6 +15,13 @@ import { missingOf } from "./spans.js";
 
 /** Of a page of `ptm publish`, and of one with `--offline`. */
 const PAGE = 'id="site"', HOOK = /viewer-[0-9a-f]{10}\/register\.js/;
+/** Of a catalogue. */
+const CATALOGUE = '<meta name="generator" content="ptmtools">';
+/** The first status of a fault of the host. */
+const FAULT = 500;
+
+/** A page of ours. No navigation may be answered with a response that was redirected. @param {string} html */
+const pageOf = (html) => new Response(html, { headers: { "content-type": "text/html; charset=utf-8" } });
 
 export class Visits {
   /**
@@ -34,29 +42,37 @@ export class Visits {
     const name = request.method === "GET" && !this.store.closed ? nameOf(request.url, this.scope) : null;
     if (name === null) return null;
     if (isFile(name)) return this.store.answer(request, this.scope + name, later);
-    return isDocument(name) ? this.#document(request, name === "index.html" ? "" : name, later) : null;
+    const document = documentOf(name);
+    return document === null ? null : this.#document(request, name, document, later);
   }
 
-  /** As the host has it now, or else as it was. @param {Request} request @param {string} name @param {Later} later */
-  async #document(request, name, later) {
-    const key = this.scope + name;
-    let response;
-    try {
-      response = await this.store.ask(request);
-    } catch (fault) {
-      const kept = await this.store.match(key);
-      if (kept) return kept;
-      throw fault;
-    }
-    if (response.status === 404 || response.status === 410) later(this.store.delete(key));
-    else if (response.status === 200) later(name ? this.store.put(key, response.clone()) : this.#learn(response.clone()));
+  /**
+   * As the host has it now; as it was, if the host does not answer or fails. An address without `.html` may also be
+   * that of another file: it leaves the page, and removes nothing.
+   * @param {Request} request @param {string} name in the address @param {string} document @param {Later} later
+   */
+  async #document(request, name, document, later) {
+    const { store, scope } = this, key = scope + document, asked = store.ask(request);
+    const status = await asked.then((response) => response.status, () => FAULT);
+    if (status >= FAULT) return (await store.match(key)) ?? asked;
+    const response = await asked, own = !name || name.includes(".");
+    if (status === 404 || status === 410) own && later(store.delete(key));
+    else if (document) later(this.#take(key, response.clone()));
+    else if (own) later(this.#learn(response.clone()));
     return response;
+  }
+
+  /** Takes a document besides the page. Networks that ask for a password answer for the host.
+   * @param {string} key @param {Response} response */
+  async #take(key, response) {
+    if (!key.endsWith(".html")) return void (isOwn(response) && await this.store.put(key, response));
+    const html = response.status === 200 ? await response.text() : "";
+    if (html.includes(CATALOGUE)) await this.store.put(key, pageOf(html));
   }
 
   /** Takes a page as the last one, once its files are here. @param {Response} response */
   async #learn(response) {
-    const html = await response.text(), { store, scope } = this;
-    // Networks that ask for a password answer for the host.
+    const html = response.status === 200 ? await response.text() : "", { store, scope } = this;
     if (!html.includes(PAGE)) return;
     if (!HOOK.test(html)) {
       store.closed = true;
@@ -69,8 +85,7 @@ export class Visits {
       if (!(await store.match(scope + name))) return;
     }
     if (before === html) return;
-    const page = new Response(html, { headers: { "content-type": "text/html; charset=utf-8" } });
-    if (await store.put(scope, page) && before) await this.#tidy(html);
+    if (await store.put(scope, pageOf(html)) && before) await this.#tidy(html);
   }
 
   /** Fetches a file unless it is kept; rejects if it cannot be had. @param {string} url @param {number} [length] */
