@@ -26,17 +26,28 @@ from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.site.content import Site, site_of
 from ptmtools.site.entry import Entry
 from ptmtools.site.publishing import weight_of
+from ptmtools.site.serving import serving
 from ptmtools.site.sets import is_of_sets
 from ptmtools.site.throttle import Throttle
 from ptmtools.walk import parse_walk
 from tests.scene.bumpy import write_bumpy
 from tests.site.conftest import PLAIN, Visiting, build
 from tests.site.test_forms import check_texels
+from tests.site.test_offline import browsing, forget, open_page, picture_of, wait_for
 from tests.site.test_recording import AT_ONCE
 
 GPUII = "?form=gpuii"
 #: Whether texture memory is as the client wants it.
 SETTLED = "s.complete && s.held.every((held, t) => held === ptm.walk.client.column[t])"
+#: Whether the browser keeps the page and the data that it has requested.
+KEPT = """
+async () => {
+  const files = performance.getEntriesByType("resource").map(({ name }) => name);
+  const data = files.filter((name) => name.includes("/data/"));
+  const kept = await Promise.all(["./", ...data].map((name) => caches.match(name)));
+  return data.some((name) => name.includes("/sets/0")) && kept.every(Boolean);
+}
+"""
 #: The texels of an image, and how many steps make it.
 TEXELS = """(t) => {
   const { memory } = window.ptm.walk, { texels } = memory.texels(t);
@@ -134,6 +145,23 @@ def test_normal_maps_come_after_the_colours_of_a_room(visit: Visiting, tmp_path:
     first = min(asked.index(t) for t in seen)
     assert first > 0
     assert set(asked[:first]).isdisjoint(bumps)
+
+
+def test_without_a_network(chromium: Any, hall_db: Path) -> None:
+    """The same images and picture as on the visit before."""
+    site = site_of(hall_db, replace(PLAIN, offline=True))
+    with browsing(chromium) as context:
+        with serving(site.entries) as url, open_page(context, url + GPUII) as visitor:
+            held = visitor.until(SETTLED)["held"]
+            before = picture_of(visitor)
+            assert max(held) > 1
+            wait_for(visitor, KEPT)
+            forget(visitor)
+        with open_page(context, url + GPUII) as visitor:
+            visitor.until(f"{SETTLED} && s.held.join() === '{','.join(map(str, held))}'")
+            assert np.array_equal(picture_of(visitor), before)
+            assert visitor.page.evaluate("ptm.errors") == []
+        assert visitor.messages == []
 
 
 def test_a_site_without_sets(visit: Visiting, museum: Site) -> None:
