@@ -44,7 +44,7 @@ _MEDIA = {
 }
 _OTHER = ("application/octet-stream", False)
 #: The hash that `ptm publish` puts into names that change with the content.
-_HASH = re.compile(r"-[0-9a-f]{10}(?=[./])")
+_HASH = re.compile(r"-[0-9a-f]{10}(?=[./-])")
 
 
 def name_of(path: bytes) -> str | None:
