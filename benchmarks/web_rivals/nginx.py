@@ -1,4 +1,5 @@
-"""Debian's nginx as the server of the benchmark: static files as public hosts send them.
+"""Debian's nginx as the server of the benchmark: static files as public hosts send them. The tests
+also run the lines of the guide by it.
 
 HTTP/1.1 comes without TLS, HTTP/2 with TLS 1.3 and a certificate of our own. Files that compress
 have a ``.gz`` beside them (``gzip_static``). The server runs in a temporary folder with a
@@ -34,8 +35,6 @@ pid {folder}/pid;
 error_log {folder}/error.log;
 events {{ worker_connections 512; }}
 http {{
-  types {{ {types} }}
-  default_type application/octet-stream;
   log_format short '$status $request';
   access_log {folder}/access.log short;
   client_body_temp_path {folder}/body;
@@ -43,6 +42,12 @@ http {{
   fastcgi_temp_path {folder}/fastcgi;
   uwsgi_temp_path {folder}/uwsgi;
   scgi_temp_path {folder}/scgi;
+{servers}
+}}
+"""
+_SERVERS = """\
+  types {{ {types} }}
+  default_type application/octet-stream;
   tcp_nodelay on;
   keepalive_timeout 75;
   keepalive_requests 100000;
@@ -56,7 +61,6 @@ http {{
     root {folder}/files;
     add_header Cache-Control "public, max-age=31536000";
   }}
-}}
 """
 
 
@@ -126,8 +130,8 @@ def nginx(files: Mapping[str, Entry], http: str, own: Certificate) -> Iterator[S
     with TemporaryDirectory(prefix="nginx-") as name:
         folder = Path(name)
         _write(files, folder / "files")
-        port = _free_port()
-        text = _CONFIGURATION.format(
+        port = free_port()
+        servers = _SERVERS.format(
             folder=folder,
             types=" ".join(f'"{media}" {suffix};' for suffix, media in _types(files).items()),
             certificate=own.file,
@@ -136,20 +140,29 @@ def nginx(files: Mapping[str, Entry], http: str, own: Certificate) -> Iterator[S
             buffer=BUFFER,
             secure=" ssl http2" if http == "2" else "",
         )
-        (folder / "nginx.conf").write_text(text)
-        command = [program_of("nginx") or "nginx", "-p", name, "-c", str(folder / "nginx.conf")]
-        process = subprocess.Popen([*command, "-e", str(folder / "error.log")])
+        with running(servers, port, folder) as server:
+            yield server
+
+
+@contextmanager
+def running(servers: str, port: int, folder: Path) -> Iterator[Server]:
+    """Runs nginx with directives of its block ``http``, of which one listens on a port; its own
+    files are in a folder. RuntimeError with its log if it does not start."""
+    configuration, log = folder / "nginx.conf", folder / "error.log"
+    configuration.write_text(_CONFIGURATION.format(folder=folder, servers=servers))
+    command = [program_of("nginx") or "nginx", "-p", str(folder), "-c", str(configuration)]
+    process = subprocess.Popen([*command, "-e", str(log)])
+    try:
+        _wait_for(port, process, log)
+        yield Server(port, folder / "access.log")
+    finally:
+        process.terminate()
         try:
-            _wait_for(port, process, folder / "error.log")
-            yield Server(port, folder / "access.log")
-        finally:
-            process.terminate()
-            try:
-                process.wait(30)
-            except subprocess.TimeoutExpired:
-                # A signal that comes while it starts its worker can be lost.
-                process.kill()
-                process.wait()
+            process.wait(30)
+        except subprocess.TimeoutExpired:
+            # A signal that comes while it starts its worker can be lost.
+            process.kill()
+            process.wait()
 
 
 def _write(files: Mapping[str, Entry], folder: Path) -> None:
@@ -170,7 +183,8 @@ def _types(files: Mapping[str, Entry]) -> dict[str, str]:
     return {name.rsplit(".", 1)[-1]: entry.media for name, entry in files.items() if "." in name}
 
 
-def _free_port() -> int:
+def free_port() -> int:
+    """A port of this machine that nothing listens on."""
     with socket.create_server(("127.0.0.1", 0)) as one:
         return int(one.getsockname()[1])
 
