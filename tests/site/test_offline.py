@@ -99,6 +99,15 @@ class Host:
         await app({**scope, "raw_path": path.encode()}, receive, send)
 
 
+#: Fetches a file; it would be kept by the second time. Whether a service worker answers.
+FETCHED = """
+async (name) => {
+  for (const _ of [1, 2]) await (await fetch(name)).arrayBuffer();
+  return navigator.serviceWorker.controller !== null;
+}
+"""
+
+
 @pytest.fixture(scope="module")
 def toured(tmp_path_factory: pytest.TempPathFactory) -> SiteOptions:
     """The options of a site with a tour of one sound."""
@@ -229,7 +238,7 @@ def exchanged(site: Site) -> Site:
 
 def test_a_new_version_takes_the_place_of_the_old(chromium: Any, two_rooms: Path) -> None:
     """Also without a network; what it does not name is removed. Published without `--offline`, the
-    site leaves nothing in the browser."""
+    site leaves nothing in the browser, even if a page of before is open."""
     plain = SiteOptions(pictures=False, opening=False)
     before = site_of(two_rooms, replace(plain, offline=True))
     after = exchanged(before)
@@ -255,10 +264,19 @@ def test_a_new_version_takes_the_place_of_the_old(chromium: Any, two_rooms: Path
             visitor.until(ALL)
             assert np.array_equal(picture_of(visitor), second)
         entries = site_of(two_rooms, plain).entries
-        with serving(entries, port=port), open_page(context, url) as visitor:
-            visitor.until(ALL)
-            wait_for(visitor, GONE)
-            assert np.array_equal(picture_of(visitor), first)
+        with open_page(context, url) as former, serving(entries, port=port):
+            former.until(ALL)
+            with open_page(context, url) as visitor:
+                visitor.until(ALL)
+                wait_for(visitor, GONE)
+                assert np.array_equal(picture_of(visitor), first)
+            # Browsers end a worker when they like; for a page that is open they start it again.
+            session = context.new_cdp_session(former.page)
+            for command in ("enable", "stopAllWorkers"):
+                session.send(f"ServiceWorker.{command}")
+            name = next(name for name in entries if name.endswith(".glb"))
+            assert former.page.evaluate(FETCHED, name), "a worker answers"
+            assert former.page.evaluate(GONE)
         assert visitor.messages == []
 
 

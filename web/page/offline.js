@@ -12,8 +12,15 @@ const NAME = `ptm-walk ${scope}`;
 /** Downloads whose timings are remembered. */
 const MOST = 64;
 
+const make = () => caches.open(NAME);
+/** A worker that a later version has removed still answers for a page that is open: it makes no storage again. */
+async function shelf() {
+  if (!(await caches.has(NAME))) throw new Error("removed");
+  return make();
+}
+
 const visits = new Visits(
-  new Store(() => caches.open(NAME), (request) => fetch(request)),
+  new Store(shelf, (request) => fetch(request)),
   scope,
   async () => {
     await worker.registration.unregister();
@@ -23,7 +30,10 @@ const visits = new Visits(
 /** @param {any} event */
 const laterOf = (event) => (/** @type {Promise<unknown>} */ work) => event.waitUntil(work.catch(() => {}));
 
-worker.oninstall = () => worker.skipWaiting();
+worker.oninstall = (/** @type {any} */ event) => {
+  worker.skipWaiting();
+  event.waitUntil(make());
+};
 worker.onactivate = (/** @type {any} */ event) => event.waitUntil(worker.clients.claim());
 worker.onfetch = (/** @type {any} */ event) => {
   const answer = visits.answer(event.request, laterOf(event));
@@ -38,6 +48,7 @@ watchDownloads(async (timings) => {
 });
 worker.onmessage = (/** @type {any} */ event) => {
   const { data, source } = event;
-  if ("index" in data) return laterOf(event)(visits.keep(data));
+  // Browsers may have removed the storage alone.
+  if ("index" in data) return laterOf(event)(make().then(() => visits.keep(data)));
   source.postMessage(recent.filter(({ asked }) => asked >= data.since));
 };
