@@ -5,10 +5,12 @@
 // hold it: so a visitor placed inside an object can walk out of it, but not through others. A part of
 // a step is shorter than the radius, so no wall is too thin.
 
+import { letThrough, pushed } from "./obstacles.js";
 import { BLOCKS, CARRIES } from "./solids.js";
 import { Outline } from "./outline.js";
 
 /** @typedef {import("./solids.js").Solids} Solids */
+/** @typedef {import("./obstacles.js").Obstacle} Obstacle */
 /** @typedef {{eye: number[], yaw: number, pitch: number}} Pose world metres and radians */
 /**
  * The visitor's input: −1 to 1, and the pointer's turns since the last time, radians.
@@ -38,8 +40,6 @@ const NONE = 1e-4;
 const FOOT = 0.5;
 /** Share of the height of the eye below which it is furniture that the body may stand in. */
 const FURNITURE = 0.75;
-/** Passes in which walls push the body; m that they push too far, and that count as 0. */
-const PUSHES = 6, AWAY = 1e-6, SAME = 1e-9;
 
 /** @param {number} value */
 const whole = (value) => (Math.abs(value) < NONE ? 0 : value);
@@ -145,15 +145,19 @@ export class Walker {
     return this.#outline.cut(corners, at, bottom, top).distance(x, z);
   }
 
+  /** The body with its feet at a height. @param {number} feet */
+  #body(feet) {
+    const { radius } = this, outline = this.#outline;
+    /** @type {import("./obstacles.js").Cylinder["distance"]} */
+    const distance = (one, x, z) => this.#distance(one, x, z, feet);
+    return { radius, outline, distance };
+  }
+
   /** @param {number} dt @param {number} dx @param {number} dz */
   #part(dt, dx, dz) {
     const { eye } = this.pose, [x0, , z0] = eye, feet = this.#feet;
     const obstacles = this.#around(x0, z0, feet, Math.hypot(dx, dz));
-    let x = x0 + dx, z = z0 + dz;
-    for (let push = 0; push < PUSHES && this.#pushed(obstacles, x, z); push++) {
-      x = this.#outline.x;
-      z = this.#outline.z;
-    }
+    const [x, z] = pushed(this.#body(feet), obstacles, x0 + dx, z0 + dz);
     if (!this.#settle(dt, x, z, obstacles) && (dx || dz)) this.#settle(dt, x0, z0, obstacles);
     this.#lift = whole(this.#lift * Math.exp(-dt / GLIDE));
     eye[1] = this.#feet + this.height + this.#lift;
@@ -181,25 +185,6 @@ export class Walker {
     return near.filter(({ top }) => top > inside);
   }
 
-  /** Whether an obstacle is too near; the outline's nearest point then gives the place to go instead.
-   * @param {Obstacle[]} obstacles @param {number} x @param {number} z */
-  #pushed(obstacles, x, z) {
-    let worst = AWAY / 2, u = x, w = z;
-    for (const one of obstacles) {
-      const far = this.#distance(one, x, z, this.#feet);
-      const lacks = Math.min(this.radius, one.now) - far;
-      if (lacks <= worst || far === 0) continue;
-      worst = lacks;
-      const share = (lacks + AWAY) / far;
-      u = x + share * (x - this.#outline.x);
-      w = z + share * (z - this.#outline.z);
-    }
-    if (u === x && w === z) return false;
-    this.#outline.x = u;
-    this.#outline.z = w;
-    return true;
-  }
-
   /** Moves to a point, up or down to the floor; false if that is impossible.
    * @param {number} dt @param {number} x @param {number} z @param {Obstacle[]} obstacles */
   #settle(dt, x, z, obstacles) {
@@ -224,11 +209,8 @@ export class Walker {
 
   /** @param {number} x @param {number} z @param {number} feet @param {Obstacle[]} obstacles */
   #fits(x, z, feet, obstacles) {
-    const [u, , w] = this.pose.eye, way = Math.hypot(x - u, z - w);
-    return obstacles.every((one) => {
-      if (this.#distance(one, x, z, feet) < Math.min(this.radius, one.now) - SAME) return false;
-      return one.now === 0 || one.now > way || !this.#outline.crosses(u, w, x, z);
-    });
+    const [u, , w] = this.pose.eye;
+    return letThrough(this.#body(feet), obstacles, u, w, x, z);
   }
 
   /** Whether the known geometry around a place is loaded.
@@ -241,7 +223,3 @@ export class Walker {
     return true;
   }
 }
-
-/** A triangle, its highest point, and how far it is from the axis now.
- * @typedef {{corners: Float32Array, at: number, kind: number, top: number, now: number}} Obstacle
- */
