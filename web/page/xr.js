@@ -55,13 +55,19 @@ function drawingBoth(walk, look, layer) {
 }
 
 /**
- * Enters the building with a headset; resolved at the end of the session. Rejects if there can be none.
+ * Enters the building with a headset; resolved at the end of the session. Rejects if there can be none, or if a
+ * picture of it fails.
  * @param {import("./app.js").App} app
  */
 export async function enterVr(app) {
   const { walk, walker } = app, { gl } = walk, { xr } = /** @type {any} */ (navigator);
   const session = await xr.requestSession("immersive-vr", { optionalFeatures: ["local-floor"] });
-  const over = new Promise((resolve) => session.addEventListener("end", resolve));
+  /** @type {(fault: unknown) => void} */
+  let fail = () => {};
+  const over = new Promise((resolve, reject) => {
+    session.addEventListener("end", resolve);
+    fail = reject;
+  });
   // It may have ended by itself.
   const end = () => session.end().catch(() => {});
   /** @type {any} */
@@ -100,18 +106,19 @@ export async function enterVr(app) {
       app.goTo(place);
       body.face();
     });
-    const paint = (/** @type {number} */ now, /** @type {any} */ seen) => {
-      session.requestAnimationFrame(paint);
+    const draw = (/** @type {number} */ now, /** @type {any} */ seen) => {
       const viewer = seen.getViewerPose(space), time = before ? (now - before) / 1000 : 0;
       before = now;
       if (!viewer?.views.length) return;
       ({ views } = viewer);
-      const wishes = body.follow(viewer.transform.matrix, session.inputSources);
+      frame.call(app, time, body.follow(viewer.transform.matrix, session.inputSources));
+    };
+    const paint = (/** @type {number} */ now, /** @type {any} */ seen) => {
       try {
-        frame.call(app, time, wishes);
+        draw(now, seen);
+        session.requestAnimationFrame(paint);
       } catch (fault) {
-        end();
-        throw fault;
+        fail(fault);
       }
     };
     session.requestAnimationFrame(paint);

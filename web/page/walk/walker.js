@@ -5,9 +5,8 @@
 // hold it: so a visitor placed inside an object can walk out of it, but not through others. A part of
 // a step is shorter than the radius, so no wall is too thin.
 
-import { letThrough, pushed } from "./obstacles.js";
+import { letThrough, outline, pushed } from "./obstacles.js";
 import { BLOCKS, CARRIES } from "./solids.js";
-import { Outline } from "./outline.js";
 
 /** @typedef {import("./solids.js").Solids} Solids */
 /** @typedef {import("./obstacles.js").Obstacle} Obstacle */
@@ -58,7 +57,6 @@ export class Walker {
   /** Whether it was placed outside all cells: then nothing holds it until it is in one. */
   #astray = false;
   #velocity = [0, 0];
-  #outline = new Outline();
 
   /**
    * @param {object} world
@@ -120,7 +118,7 @@ export class Walker {
   /** Heights of the floors under the feet, at most `top`.
    * @param {number} x @param {number} z @param {number} top */
   #floors(x, z, top) {
-    const foot = FOOT * this.radius, outline = this.#outline;
+    const foot = FOOT * this.radius;
     /** @type {number[]} */
     const heights = [];
     const low = [x - foot, top - DEEP, z - foot], high = [x + foot, top, z + foot];
@@ -142,22 +140,20 @@ export class Walker {
   #distance({ corners, at, kind }, x, z, feet, slack = this.radius) {
     const bottom = feet + this.climb + (kind & CARRIES ? slack : 0);
     const top = feet + this.height + Math.max(0, this.#lift) + FOREHEAD;
-    return this.#outline.cut(corners, at, bottom, top).distance(x, z);
+    return outline.cut(corners, at, bottom, top).distance(x, z);
   }
 
-  /** The body with its feet at a height. @param {number} feet */
-  #body(feet) {
-    const { radius } = this, outline = this.#outline;
-    /** @type {import("./obstacles.js").Cylinder["distance"]} */
-    const distance = (one, x, z) => this.#distance(one, x, z, feet);
-    return { radius, outline, distance };
+  /** The distances of a body with its feet at a height. @param {number} feet
+   * @returns {import("./obstacles.js").Distance} */
+  #from(feet) {
+    return (one, x, z) => this.#distance(one, x, z, feet);
   }
 
   /** @param {number} dt @param {number} dx @param {number} dz */
   #part(dt, dx, dz) {
     const { eye } = this.pose, [x0, , z0] = eye, feet = this.#feet;
     const obstacles = this.#around(x0, z0, feet, Math.hypot(dx, dz));
-    const [x, z] = pushed(this.#body(feet), obstacles, x0 + dx, z0 + dz);
+    const [x, z] = pushed(obstacles, this.radius, this.#from(feet), x0 + dx, z0 + dz);
     if (!this.#settle(dt, x, z, obstacles) && (dx || dz)) this.#settle(dt, x0, z0, obstacles);
     this.#lift = whole(this.#lift * Math.exp(-dt / GLIDE));
     eye[1] = this.#feet + this.height + this.#lift;
@@ -210,7 +206,7 @@ export class Walker {
   /** @param {number} x @param {number} z @param {number} feet @param {Obstacle[]} obstacles */
   #fits(x, z, feet, obstacles) {
     const [u, , w] = this.pose.eye;
-    return letThrough(this.#body(feet), obstacles, u, w, x, z);
+    return letThrough(obstacles, this.radius, this.#from(feet), u, w, x, z);
   }
 
   /** Whether the known geometry around a place is loaded.

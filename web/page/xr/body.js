@@ -1,8 +1,9 @@
 // The body of a visitor with a headset. It stands under the head: steps in the room are steps in the building, as
-// long as these stay inside; sticks walk with the collisions of the page and turn by 30 degrees at once, since
-// turning smoothly makes many people sick.
+// long as walls let the head through; sticks walk with the collisions of the page and turn by 30 degrees at once,
+// since turning smoothly makes many people sick.
 
 import { axesOf, headingOf, turned } from "./eyes.js";
+import { stepOf } from "./head.js";
 
 /** @typedef {import("./eyes.js").Eye} Eye */
 
@@ -48,15 +49,14 @@ export class Body {
    * @param {Iterable<{handedness: string, gamepad?: any}>} sources
    */
   follow(head, sources) {
-    const { walker: { pose, locate } } = this, before = this.#place;
+    const { walker: { pose } } = this, before = this.#place;
     this.#axes = axesOf(head);
     const { yaw } = headingOf(this.#axes);
     this.#place = [head[12], head[13], head[14]];
     if (this.#faces) this.yaw = pose.yaw - yaw;
     else {
-      const [x, , z] = turned(this.#place.map((at, k) => at - before[k]), this.yaw), { eye } = pose;
-      // Beyond a wall of the building the room slides along.
-      if (locate([eye[0] + x, eye[1], eye[2] + z]) >= 0) Object.assign(eye, { 0: eye[0] + x, 2: eye[2] + z });
+      const [x, , z] = turned(this.#place.map((at, k) => at - before[k]), this.yaw);
+      this.#step(x, z);
     }
     this.#faces = false;
     let forward = +this.pressed, right = 0, turns = 0;
@@ -74,6 +74,15 @@ export class Body {
     pose.yaw = this.yaw + yaw;
     pose.pitch = 0;
     return { forward: Math.min(1, forward), right, turn: 0, look: 0, run: false };
+  }
+
+  /** Takes a step of the room in the building; what walls stop of it moves the room along.
+   * @param {number} dx @param {number} dz */
+  #step(dx, dz) {
+    const { solids, locate, pose: { eye } } = this.walker;
+    const [x, z] = stepOf(solids, this.head, eye[1], dx, dz), cell = locate([x, eye[1], z]);
+    // As with sticks, not out of the building, nor where the walls are still missing.
+    if (cell >= 0 && solids.has(cell)) Object.assign(eye, { 0: x, 2: z });
   }
 
   /** The head in the building. @returns {number[]} */
