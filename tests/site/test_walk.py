@@ -17,6 +17,8 @@ from tests.web import node
 
 HERE = Path(__file__).resolve().parent
 RADIUS, EYE, STEP = 0.25, 1.6, 0.5
+#: What walls keep from the head of a visitor with a headset, m.
+HEAD = 0.2
 BERTH = 0.31
 Quad = list[list[float]]
 AHEAD = {"forward": 1}
@@ -53,12 +55,17 @@ def cell(number: int, quads: list[Quad], box: Sequence[float], **more: Any) -> d
     return {"cell": number, "quads": quads, "box": list(box), "portals": [], **more}
 
 
-def walked(folder: Path, *cases: dict[str, Any]) -> list[Floats]:
+def walked(folder: Path, *cases: dict[str, Any], script: str = "walk.mjs") -> list[Floats]:
     """The eyes of each case after each of its steps, (n, 3)."""
     plain = {"avatar": [RADIUS, EYE, STEP], "eye": [0, EYE, 0], "yaw": 0}
     file = folder / "cases.json"
     file.write_text(json.dumps([plain | case for case in cases]))
-    return [np.array(path) for path in json.loads(node.run(HERE / "walk.mjs", file))]
+    return [np.array(path) for path in json.loads(node.run(HERE / script, file))]
+
+
+def stepped(folder: Path, *cases: dict[str, Any]) -> list[Floats]:
+    """The heads in the building of visitors with headsets, (n, 3)."""
+    return walked(folder, *cases, script="heads.mjs")
 
 
 def hall(quads: list[Quad], **case: Any) -> dict[str, Any]:
@@ -99,6 +106,8 @@ def plan(distance: float, angle: float, start: float, length: float) -> tuple[fl
     return tuple(float(value) for value in np.concatenate(ends))
 
 
+#: The walls of a crooked room.
+OUTER = [(-4, -3, 3, -4), (3, -4, 4, 4), (4, 4, -3, 3), (-3, 3, -4, -3)]
 PLAN = st.builds(
     plan, st.floats(0, 3), st.floats(-math.pi, math.pi), st.floats(-3, 3), st.floats(0.06, 5)
 )
@@ -121,19 +130,94 @@ MOVES = st.tuples(
 )
 def test_walls_hold(tmp_path: Path, rooms: list[Any]) -> None:
     """At any angle, in any corner, at any frame rate: no wall comes nearer than the radius."""
-    outer = [(-4, -3, 3, -4), (3, -4, 4, 4), (4, 4, -3, 3), (-3, 3, -4, -3)]
     cases = []
     for lines, moves in rooms:
         steps = [
             [int(min(2 / dt, 100)) + 1, dt, {"forward": a, "right": b, "turn": c, "run": run}]
             for dt, a, b, c, run in moves
         ]
-        cases.append(hall([wall(*line) for line in [*outer, *lines]], steps=steps))
+        cases.append(hall([wall(*line) for line in [*OUTER, *lines]], steps=steps))
     for (lines, _), path in zip(rooms, walked(tmp_path, *cases), strict=True):
-        for line in [*outer, *lines]:
+        for line in [*OUTER, *lines]:
             assert off(path, line).min() > RADIUS - 1e-5
         assert abs(path[:, [0, 2]]).max() < 4
         assert np.allclose(path[:, 1], EYE, atol=1e-9)
+
+
+#: Steps of a head in its room, and the push of a stick.
+HEADS = st.tuples(
+    st.floats(-0.9, 0.9),
+    st.floats(0.3, 2),
+    st.floats(-0.9, 0.9),
+    st.floats(-math.pi, math.pi),
+    st.sampled_from([0, 0, 1]),
+)
+
+
+@settings(max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(
+        st.tuples(st.lists(PLAN, max_size=8), st.lists(HEADS, min_size=4, max_size=16)),
+        min_size=8,
+        max_size=8,
+    )
+)
+def test_walls_stop_a_head(tmp_path: Path, rooms: list[Any]) -> None:
+    """Leaps and steps at any height, beside a stick: no wall comes nearer than that."""
+    cases = []
+    for lines, heads in rooms:
+        ways = np.array([(0, EYE, 0, 0, 0), *heads], float)
+        ways[:, [0, 2]] = ways[:, [0, 2]].cumsum(axis=0)
+        walls = [wall(*line) for line in [*OUTER, *lines]]
+        cases.append(hall(walls, heads=ways.tolist()))
+    for (lines, heads), path in zip(rooms, stepped(tmp_path, *cases), strict=True):
+        for line in [*OUTER, *lines]:
+            assert off(path, line).min() > HEAD - 1e-5
+        assert abs(path[:, [0, 2]]).max() < 4
+        assert np.allclose(path[1:, 1], [head[1] for head in heads], atol=1e-9)
+
+
+def test_a_head_leans_and_kneels(tmp_path: Path) -> None:
+    """Over a table, not into it; from one that it has come down into, out again; beside a wall."""
+    table = [*block((-2, 0, -2), (2, 0.75, -0.5)), level(-2, -2, 2, -0.5, 0.1), wall(-9, -2, 9, -2)]
+    beam = [*block((-2, 1.7, -1), (2, 2, -0.5)), level(-2, -1, 2, -0.5, 1.7)]
+    begin = [0, EYE, 0, 0, 0]
+    into = [begin, [0, EYE, -0.8, 0, 0], [0, 0.4, -0.8, 0, 0]]
+    over, low, out, along, tall, under, leap, slides = stepped(
+        tmp_path,
+        hall(table, heads=[begin, [0, EYE, -0.9, 0, 0]]),
+        hall(table, heads=[begin, [0, 0.4, 0, 0, 0], [0, 0.4, -0.9, 0, 0]]),
+        hall(table, heads=[*into, [0, 0.4, -0.1, 0, 0]]),
+        hall(table, heads=[*into, [0, 0.4, -1.7, 0, 0], [0, 0.4, -2.6, 0, 0]]),
+        hall(beam, heads=[begin, [0, 1.85, 0, 0, 0], [0, 1.85, -0.9, 0, 0]]),
+        hall(beam, heads=[begin, [0, 1.3, -0.8, 0, 0], [0, 1.85, -0.8, 0, 0], [0, 1.85, 0, 0, 0]]),
+        hall([], heads=[begin, [0, EYE, -1.5, 0, 0], [0, EYE, -1.6, 0, 0]]),
+        hall(
+            table, heads=[begin, [0, EYE, -0.9, 0, 0], [0, EYE, -1.8, 0, 0], [0.9, EYE, -2, 0, 0]]
+        ),
+    )
+    assert over[-1] == pytest.approx([0, EYE, -0.9])
+    assert low[-1] == pytest.approx([0, 0.4, -0.5 + HEAD], abs=1e-5)
+    assert out[-1] == pytest.approx([0, 0.4, -0.1])
+    assert along[-1] == pytest.approx([0, 0.4, -2 + HEAD], abs=1e-5)
+    assert tall[-1] == pytest.approx([0, 1.85, -0.5 + HEAD], abs=1e-5)
+    assert under[-1] == pytest.approx([0, 1.85, 0])
+    assert leap[-1] == pytest.approx([0, EYE, -0.1])
+    assert slides[-1] == pytest.approx([0.9, EYE, -2 + HEAD], abs=1e-5)
+
+
+def test_a_head_stays_where_geometry_is(tmp_path: Path) -> None:
+    """Before a cell has come, and in the building."""
+    heads = [[0, EYE, -0.5 * k, 0, 0] for k in range(9)]
+    missing, there, outside = stepped(
+        tmp_path,
+        {**doorway([], portal=True, beyond=True), "heads": heads},
+        {**doorway([], portal=True), "heads": heads},
+        {"cells": doorway([], portal=True)["cells"][:1], "heads": heads},
+    )
+    for path in (missing, outside):
+        assert -2 <= path[-1][2] <= -1.5
+    assert there[-1][2] == pytest.approx(-4)
 
 
 def test_walls_are_slid_along(tmp_path: Path) -> None:
