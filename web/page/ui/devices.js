@@ -8,7 +8,8 @@ import { showNotice } from "./errors.js";
 
 /** @typedef {import("../app.js").App} Walk */
 
-/** Lets a gamepad walk, as soon as a button of it is pressed. @param {Walk} app */
+/** Lets a gamepad walk, as soon as a button of it is pressed; without a walk it answers the message of an error.
+ * @param {Walk} [app] */
 export function attachPads(app) {
   const attach = () => loadGamepad().then((script) => script.attachGamepad(app), () => {});
   addEventListener("gamepadconnected", attach, { once: true });

@@ -89,7 +89,7 @@ export const panels = /* @__PURE__ */ own("panels", {
   "dragWalk": "drag up or down to walk, left or right to turn",
   "twoFingers": "Two fingers",
   "gamepad": "Gamepad",
-  "pad": "left stick to walk, right stick to turn, shoulder buttons for the places",
+  "pad": "left stick to walk, right stick to turn, shoulder buttons for the places; D-pad to choose, A or ✕ to use, B or ○ to close",
   "close": "close",
   "streamed": "streamed",
   "full": "full resolution",
@@ -100,7 +100,8 @@ export const panels = /* @__PURE__ */ own("panels", {
 
 export const devices = /* @__PURE__ */ own("devices", {
   "enterVr": "Enter VR",
-  "noVr": "VR cannot start: {reason}"
+  "noVr": "VR cannot start: {reason}",
+  "refused": "The browser does not let a gamepad do this. Use a mouse, a key or a finger."
 });
 
 export const tour = /* @__PURE__ */ own("tour", {
