@@ -99,6 +99,16 @@ def test_cameras_of_eyes_and_their_union() -> None:
     assert actual["widest"] < 0.1, "no farther behind the eyes than they are apart"
 
 
+def test_sessions_that_fail_and_canted_displays() -> None:
+    """A session that cannot begin or draw says why, ends, and leaves the page as it was; the view of
+    the policy looks where the head does, whatever the displays do."""
+    actual = json.loads(node.run(HERE / "sessions.mjs", PAGE, seconds=30))
+    for step, after in actual["failures"].items():
+        assert after == {"message": step, "same": True, "ended": True}
+    assert set(actual["failures"]) == {"session", "card", "layer", "space", "frame"}
+    assert actual["off"] < 1e-12
+
+
 def halves(visitor: Visitor) -> list[NDArray[np.float64]]:
     """The pictures of both eyes, grey."""
     grey = visitor.picture().mean(axis=2)
