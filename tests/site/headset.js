@@ -1,8 +1,9 @@
 // A headset for tests, in place of the browser's: two eyes `ptmHeadset.apart` metres apart, whose pictures are the
-// halves of the canvas. `ptmHeadset` has the head (metres above the floor, radians), and the controllers.
+// halves of the canvas. `ptmHeadset` has the head (metres above the floor, radians), the controllers, and why no
+// session begins.
 
 (() => {
-  const rig = { head: [0, 1.7, 0], yaw: 0, apart: 0.2, sources: [], session: null, frames: 0, slopes: [1, 1] };
+  const rig = { head: [0, 1.7, 0], yaw: 0, apart: 0.2, sources: [], session: null, frames: 0, slopes: [1, 1], fails: "" };
   window.ptmHeadset = rig;
   /** 4 x 4, by columns, of a place beside the head. */
   const matrix = (aside) => {
@@ -42,7 +43,10 @@
   }
   Object.defineProperty(navigator, "xr", { value: {
     isSessionSupported: async (mode) => mode === "immersive-vr",
-    requestSession: async () => (rig.session = new Session()),
+    requestSession: async () => {
+      if (rig.fails) throw new Error(rig.fails);
+      return (rig.session = new Session());
+    },
   } });
   window.XRWebGLLayer = class {
     framebuffer = null;

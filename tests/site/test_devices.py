@@ -9,11 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from browser import Visitor
 from numpy.typing import NDArray
 
 from ptmtools.site.content import Site
+from tests.site.interface import own_page, visit_by
+from tests.site.test_tour import tour_file, toured
 from tests.web import node
+
+__all__ = ["tour_file", "toured"]
 
 HERE = Path(__file__).parent
 PAGE = HERE.parents[1] / "web" / "page"
@@ -34,6 +39,29 @@ window.unplug = () => {
 };
 """
 EYE = "ptm.state().pose.eye"
+#: A button is pressed for two frames.
+PRESS = """
+async (button) => {
+  const frame = () => new Promise(requestAnimationFrame);
+  for (const pressed of [true, false]) {
+    pad.buttons[button].pressed = pressed;
+    await frame();
+    await frame();
+  }
+}
+"""
+#: Steps of a head, each in a picture of its own.
+STRIDE = """
+async ([count, metres]) => {
+  while (count--) {
+    const { frames } = ptmHeadset;
+    ptmHeadset.head[2] -= metres;
+    while (ptmHeadset.frames < frames + 2) await new Promise(requestAnimationFrame);
+  }
+}
+"""
+USE, CLOSE, TOUR, STICK, MAP, PLACES, UP, DOWN, LEFT, RIGHT = 0, 1, 3, 10, 8, 9, 12, 13, 14, 15
+FOCUS = "document.activeElement"
 
 
 @contextmanager
@@ -47,18 +75,30 @@ def with_script(visit: Callable[..., Any], museum: Site, script: str, query: str
     assert visitor.messages == []
 
 
-def press(visitor: Visitor, button: int) -> None:
-    for pressed in ("true", "false"):
-        visitor.page.evaluate(f"pad.buttons[{button}].pressed = {pressed}")
-        visitor.frames(3)
+def press(page: Any, *buttons: int) -> None:
+    for button in buttons:
+        page.evaluate(PRESS, button)
 
 
-def test_a_gamepad_walks_and_leads_to_places(visit: Callable[..., Any], museum: Site) -> None:
-    with with_script(visit, museum, PAD, "?ui=gamepad,xr") as visitor:
+def reach(page: Any, selector: str) -> None:
+    """Down to an element; presses before it scroll its panel."""
+    for _ in range(12):
+        press(page, DOWN)
+        if page.evaluate(f"{FOCUS}.matches({selector!r})"):
+            return
+    raise AssertionError(f"{selector}: {page.evaluate(f'{FOCUS}.outerHTML')}")
+
+
+def plug(page: Any) -> None:
+    page.evaluate("plug()")
+    page.wait_for_function("window.looks > 3")
+
+
+def test_a_gamepad_walks_and_tours(visit: Callable[..., Any], toured: Site) -> None:
+    with with_script(visit, toured, PAD, "?ui=gamepad,xr&lang=en") as visitor:
         page = visitor.page
         assert page.locator(".vr").count() == 0, "no headset"
-        page.evaluate("plug()")
-        visitor.until("window.looks > 3")
+        plug(page)
         before = np.array(page.evaluate(EYE))
         page.evaluate("pad.axes = [0.1, -0.1, 0.1, 0.05]")
         visitor.frames(5)
@@ -73,21 +113,184 @@ def test_a_gamepad_walks_and_leads_to_places(visit: Callable[..., Any], museum: 
         visitor.until(f"s.pose.yaw < {yaw} - 0.2")
         page.evaluate("pad.axes = [0, 0, 0, 0]")
         visitor.frames(3)
-        places = [row["position"] for row in museum.index["viewpoints"]]
-        press(visitor, 5)
+        places = [row["position"] for row in toured.index["viewpoints"]]
+        press(page, 5)
         assert np.allclose(page.evaluate(EYE), places[1])
-        press(visitor, 4)
-        press(visitor, 4)
+        press(page, 4, 4)
         assert np.allclose(page.evaluate(EYE), places[-1])
-        press(visitor, 9)
-        page.wait_for_selector("#places:not([hidden])")
-        press(visitor, 1)
-        assert not page.locator("#places").is_visible()
+        use_the_tour(visitor)
         page.evaluate("unplug()")
         visitor.frames(2)
         looks = page.evaluate("looks")
         visitor.frames(5)
         assert page.evaluate("looks") == looks
+
+
+def use_the_tour(visitor: Visitor) -> None:
+    """List, label, language, sound, and the way back to the walk."""
+    page, text = visitor.page, f"{FOCUS}.textContent"
+    visitor.until("window.ptm.tour")
+    press(page, TOUR)
+    assert page.evaluate(f"{FOCUS}.matches('#tour select')")
+    press(page, RIGHT)
+    assert page.evaluate("ptm.tour.language") == "de"
+    press(page, LEFT)
+    assert page.evaluate("ptm.tour.language") == "en"
+    reach(page, "li button")
+    press(page, USE)
+    assert page.evaluate(text) == "Night", "the heading of its label"
+    # As with keys, nobody walks from a panel.
+    before = page.evaluate(EYE)
+    page.evaluate("pad.axes = [0, 1, 0, 0]")
+    visitor.frames(5)
+    assert page.evaluate(EYE) == before
+    press(page, STICK)
+    visitor.until(f"s.pose.eye.join() !== '{','.join(map(repr, before))}'")
+    page.evaluate("pad.axes = [0, 0, 0, 0]")
+    assert page.locator("#label").is_visible()
+    page.evaluate(
+        """() => {
+          const { prototype } = HTMLMediaElement, fault = new DOMException("", "NotAllowedError");
+          window.play = prototype.play;
+          prototype.play = () => Promise.reject(fault);
+          document.querySelector("#label h2").focus();
+        }"""
+    )
+    reach(page, "audio")
+    press(page, USE)
+    page.get_by_text("The browser does not let a gamepad do this").wait_for()
+    page.evaluate("void (HTMLMediaElement.prototype.play = play)")
+    press(page, USE)
+    page.wait_for_function("!document.querySelector('#label audio').paused")
+    press(page, USE)
+    assert page.evaluate(f"{FOCUS}.paused")
+    reach(page, "summary")
+    press(page, USE)
+    assert page.locator("#label details[open]").count() == 1
+    # A link, which opens another page, and the next stop.
+    page.evaluate(
+        """addEventListener("click", (event) => {
+          event.preventDefault();
+          window.left = event.target.href;
+        })"""
+    )
+    reach(page, "a")
+    press(page, USE)
+    assert page.evaluate("left") == "https://example.org/night"
+    reach(page, ".row button")
+    press(page, RIGHT, USE)
+    assert page.evaluate("ptm.tour.stop") == 1
+    press(page, CLOSE)
+    assert page.locator("#label").is_hidden()
+    assert page.evaluate(f"{FOCUS}.id") == "view"
+
+
+@pytest.fixture
+def desk(chromium: Any) -> Iterator[Any]:
+    """The interface without a museum, with a gamepad and open details: too low for its panels."""
+    with own_page(chromium, size=(1280, 420)) as page:
+        page.add_init_script(PAD)
+        with visit_by(page):
+            page.wait_for_function("window.fake")
+            page.evaluate("fake.emit('first-picture')")
+            page.keyboard.press("Backquote")
+            page.wait_for_selector("#details select")
+            plug(page)
+            yield page
+
+
+def test_a_gamepad_reaches_what_keys_do(desk: Any) -> None:
+    """All controls in the order of the Tab key; texts are scrolled before the focus leaves them."""
+    for name in ("Places", "Map", "Help"):
+        desk.get_by_role("button", name=name, exact=True).press("Enter")
+    for place in ("#places ol button", "#map canvas", "#help dl"):
+        desk.locator(place).first.wait_for(state="visible")
+    desk.evaluate("window.tabs = []; document.querySelector('#view').focus()")
+    while desk.evaluate(f"!tabs.includes({FOCUS}) && {FOCUS} !== document.body"):
+        desk.evaluate(f"tabs.push({FOCUS})")
+        desk.keyboard.press("Tab")
+    press(desk, STICK, UP)
+    assert desk.evaluate(f"{FOCUS} === tabs.at(-1)")
+    press(desk, STICK)
+    desk.evaluate(f"window.steps = [{{ active: {FOCUS} }}]")
+    # Held, the cross goes on by itself.
+    desk.evaluate(f"pad.buttons[{DOWN}].pressed = true")
+    desk.wait_for_function(
+        """() => {
+          const active = document.activeElement, panel = active.closest("section");
+          const last = steps.at(-1);
+          const { clientHeight, scrollHeight, scrollTop } = last.panel ?? {};
+          if (last.panel && last.panel !== panel) {
+            last.left = scrollHeight - clientHeight - scrollTop;
+          }
+          if (last.active !== active) steps.push({ active, panel });
+          return steps.length > tabs.length;
+        }""",
+        polling="raf",
+    )
+    desk.evaluate(f"pad.buttons[{DOWN}].pressed = false")
+    assert desk.evaluate("tabs.length") > 15
+    assert desk.evaluate("tabs.every((one, k) => one === steps[k].active)")
+    left = desk.evaluate("steps.flatMap(({ left = [] }) => left)")
+    assert len(left) == 4
+    assert max(left) < 1
+    assert desk.evaluate("document.querySelector('#help').scrollTop") > 0
+
+
+def test_a_gamepad_uses_what_it_reaches(desk: Any) -> None:
+    """Fields, panels, neighbours at the sides; and an error, behind whose message all rests."""
+    desk.evaluate("fake.calls.length = 0")
+    for field, button in (
+        ("switch", USE),
+        ("slider", RIGHT),
+        ("combobox", RIGHT),
+        ("combobox", USE),
+    ):
+        desk.locator("#details").get_by_role(field).first.focus()
+        press(desk, button)
+    calls = desk.evaluate("fake.calls")
+    assert calls == [
+        ["setDataSaver", True],
+        ["setBudget", pytest.approx(2**26.5)],
+        ["setPolicy", "paper"],
+        ["setPolicy", "whole"],
+    ]
+    press(desk, CLOSE)
+    assert desk.locator("#details").is_hidden()
+    press(desk, MAP)
+    desk.wait_for_selector("#map canvas")
+    assert desk.evaluate(f"{FOCUS}.id") == "view", "in the map there is nothing to use"
+    press(desk, PLACES)
+    desk.wait_for_function(f"{FOCUS}.closest('#places li')")
+    press(desk, DOWN, USE)
+    assert desk.evaluate("fake.calls.at(-1)") == ["goTo", 1]
+    assert desk.evaluate(f"getComputedStyle({FOCUS}).outlineStyle") == "solid"
+    press(desk, PLACES, MAP)
+    assert desk.locator("#panels section:not([hidden])").count() == 0
+    desk.get_by_role("button", name="Map").focus()
+    press(desk, RIGHT, RIGHT, LEFT)
+    assert desk.evaluate(f"{FOCUS}.id") == "link"
+    desk.evaluate("fake.emit('error', { code: 'PTM-V104', message: 'No line' }); window.before = 1")
+    press(desk, PLACES, STICK, DOWN)
+    assert desk.locator("#places").is_hidden()
+    assert desk.evaluate(f"{FOCUS}.closest('#error') !== null")
+    desk.locator("#again").focus()
+    with desk.expect_navigation():
+        desk.evaluate(f"pad.buttons[{USE}].pressed = true")
+    desk.wait_for_function("window.fake && !window.before")
+
+
+def test_a_gamepad_answers_an_error_without_a_walk(visit: Callable[..., Any], museum: Site) -> None:
+    def refuse(page: Any) -> None:
+        page.add_init_script(PAD)
+        page.route("**/index-*.json", lambda route: route.fulfill(status=404))
+
+    with visit(museum, query="?ui=gamepad", prepare=refuse) as visitor:
+        page = visitor.page
+        page.wait_for_selector("#error:not([hidden])")
+        plug(page)
+        with page.expect_navigation():
+            page.evaluate(f"pad.buttons[{USE}].pressed = true")
 
 
 def test_cameras_of_eyes_and_their_union() -> None:
@@ -100,8 +303,8 @@ def test_cameras_of_eyes_and_their_union() -> None:
 
 
 def test_sessions_that_fail_and_canted_displays() -> None:
-    """A session that cannot begin or draw says why, ends, and leaves the page as it was; the view of
-    the policy looks where the head does, whatever the displays do."""
+    """A session that cannot begin or draw says why, ends, and leaves the page as it was; the view
+    of the policy looks where the head does, whatever the displays do."""
     actual = json.loads(node.run(HERE / "sessions.mjs", PAGE, seconds=30))
     for step, after in actual["failures"].items():
         assert after == {"message": step, "same": True, "ended": True}
@@ -135,6 +338,10 @@ def test_a_headset_sees_two_pictures(visit: Callable[..., Any], museum: Site) ->
         page = visitor.page
         start = visitor.state()["pose"]
         alone = visitor.picture()
+        page.evaluate("ptmHeadset.fails = 'it lies in its box'")
+        page.click("nav .vr")
+        page.get_by_text("VR cannot start: it lies in its box").wait_for()
+        page.evaluate("ptmHeadset.fails = ''")
         page.click("nav .vr")
         visitor.until("ptmHeadset.frames > 3")
         left, right = halves(visitor)
@@ -168,6 +375,12 @@ def test_a_headset_sees_two_pictures(visit: Callable[..., Any], museum: Site) ->
         page.evaluate(push, ["left", 0, -1])
         x, _, z = stepped["eye"]
         visitor.until(f"Math.hypot(s.pose.eye[0] - {x}, s.pose.eye[2] - {z}) > 0.3")
+        # Twenty metres ahead there are walls.
+        page.evaluate(push, ["left", 0, 0])
+        x, _, z = page.evaluate(head)["eye"]
+        page.evaluate(STRIDE, [80, 0.25])
+        u, _, w = page.evaluate(head)["eye"]
+        assert 0.5 < np.hypot(u - x, w - z) < 15
         page.evaluate("ptmHeadset.session.end()")
         visitor.frames(2)
         page.evaluate("(pose) => ptm.goTo(pose)", start)

@@ -42,7 +42,7 @@ function scrolls(panel, next, by) {
   if (left < 1) return false;
   if (next && panel.contains(next)) {
     const all = panel.getBoundingClientRect(), one = next.getBoundingClientRect();
-    if ((by > 0 ? one.bottom - all.bottom : all.top - one.top) <= step) return false;
+    if ((by > 0 ? one.top - all.bottom : all.top - one.bottom) <= step) return false;
   }
   panel.scrollBy(0, by * step);
   return true;
