@@ -3,7 +3,6 @@
 
 import { aside, focus, focused, move, reachable, use } from "./pad/focus.js";
 import { OWN } from "./ui/controls.js";
-import { addStyle } from "./ui/elements.js";
 
 /** @typedef {import("./walk/walker.js").Wishes} Wishes */
 /** @typedef {Pick<Gamepad, "axes" | "buttons" | "mapping">} Pad */
@@ -18,8 +17,6 @@ const USE = 0, BACK = 1, BEFORE = 4, NEXT = 5, RUN = 7, STICKS = [10, 11];
 const PANELS = { 3: "tour", 8: "map", 9: "places" };
 /** Of the cross. @type {Record<number, () => void>} */
 const CROSS = { 12: () => move(-1), 13: () => move(1), 14: () => aside(-1), 15: () => aside(1) };
-/** The focus is seen also after a mouse was used. */
-const STYLE = "[data-pad] :focus { outline: 3px solid var(--warm); outline-offset: 2px; }";
 
 /** A stick beyond its rest, at most of length 1. @param {number} x @param {number} y */
 export function pushed(x = 0, y = 0) {
@@ -78,7 +75,6 @@ class Buttons {
 
   /** @param {number} button */
   #press(button) {
-    document.documentElement.dataset.pad = "";
     const view = canvas();
     if (button in CROSS) CROSS[button]();
     else if (button === USE) use();
@@ -128,8 +124,6 @@ let attached = false;
 export function attachGamepad(app) {
   if (attached) return;
   attached = true;
-  addStyle(STYLE);
-  addEventListener("pointerdown", () => delete document.documentElement.dataset.pad);
   const buttons = new Buttons(app);
   let reads = false, before = 0;
   const connected = () => (reads ? [...navigator.getGamepads()].filter((pad) => pad?.connected) : []);

@@ -26,9 +26,10 @@ export function focused() {
   return /** @type {HTMLElement} */ (held);
 }
 
-/** @param {HTMLElement | undefined} element */
+/** Gives the focus to an element, where it is seen. @param {HTMLElement | undefined} element */
 export function focus(element) {
-  element?.focus({ preventScroll: true });
+  // Browsers may not show it after a click.
+  element?.focus(/** @type {FocusOptions} */ ({ preventScroll: true, focusVisible: true }));
   element?.scrollIntoView({ block: "nearest" });
 }
 
