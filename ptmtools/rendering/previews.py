@@ -21,8 +21,9 @@ from ptmtools.texture.pyramid import build_pyramid
 Texels = NDArray[np.uint8]
 
 
-def read_preview(served: Served, texture: int, number: int) -> list[Texels]:
-    """The levels of a preview, the coarsest first, as (h, w, 3) RGB, without offsets.
+def read_preview(served: Served, texture: int, number: int, *, alpha: bool = False) -> list[Texels]:
+    """The levels of a preview, the coarsest first, as (h, w, 3) RGB, or with ``alpha`` (h, w, 4),
+    without offsets.
 
     Raises DatabaseError: PTM-D005, D006 it is missing, damaged or does not match the index.
     """
@@ -30,16 +31,16 @@ def read_preview(served: Served, texture: int, number: int) -> list[Texels]:
     preview = row["previews"][number]
     file = served.file(preview["file"])
     sizes = sizes_of(row)[: preview["level"] + 1]
-    levels = build_pyramid(_decoded(file, served.read(preview["file"])))[-len(sizes) :]
+    levels = build_pyramid(_decoded(file, served.read(preview["file"]), 3 + alpha))[-len(sizes) :]
     if [level.shape[1::-1] for level in levels] != sizes:
         raise _damaged(file, "does not match the index")
     return [np.ascontiguousarray(level) for level in levels]
 
 
-def _decoded(file: Path, data: bytes) -> Texels:
-    """(h, w, 3) the texels of an image."""
+def _decoded(file: Path, data: bytes, components: int) -> Texels:
+    """(h, w, components) the texels of an image."""
     try:
-        return decoded_preview(data, 3)
+        return decoded_preview(data, components)
     except (OSError, ValueError, SyntaxError) as fault:
         raise _damaged(file, f"cannot be decoded ({fault})") from None
 

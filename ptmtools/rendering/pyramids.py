@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from ptmtools.errors import DatabaseError, InputError, LimitError
 from ptmtools.output.model import offsets_of, sizes_of
 from ptmtools.output.served import BUILD, Served
 from ptmtools.progress import Progress, silent
-from ptmtools.rendering.previews import read_preview
+from ptmtools.rendering.previews import Texels, read_preview
 from ptmtools.rendering.records import Pyramids, Sight, Triangles, own_levels
 from ptmtools.texture import reader
 from ptmtools.texture.detail import difference_between, with_offset
@@ -26,48 +27,22 @@ _LIMITS = Limits(decoded_bytes=1 << 33)
 
 
 def read_pyramids(
-    served: Served, progress: Progress = silent, only: Collection[int] | None = None
+    served: Served,
+    progress: Progress = silent,
+    only: Collection[int] | None = None,
+    decoded: Mapping[int, Sequence[Texels]] = MappingProxyType({}),
 ) -> Pyramids:
-    """Decodes all textures, or only those whose number is in ``only``; the others get no levels.
-    Levels that are finer than those of the `.ptm` come from the finest preview.
-
-    Raises
-    ------
-    DatabaseError: PTM-D005, D006 a texture is missing, damaged or does not match the index.
-    LimitError: see `ptmtools.texture.open` and `PtmReader.levels`.
-    """
-    try:
-        return _pyramids(served, progress, only)
-    except LimitError:
-        raise
-    except InputError as fault:
-        code = "PTM-D005" if fault.code == "PTM-I120" else "PTM-D006"
-        raise DatabaseError(
-            code, fault.message, file=fault.file, place=fault.place, remedy=BUILD
-        ) from None
-
-
-def _pyramids(served: Served, progress: Progress, only: Collection[int] | None = None) -> Pyramids:
+    """The colours of all textures, or only of those whose number is in ``only``; the others get no
+    levels. ``decoded``: levels of some, as of `read_levels`. Raises as `read_levels`."""
     rows = served.index["textures"]
-    chains: list[list[NDArray[np.uint8]]] = [[] for _ in rows]
+    chains: list[list[Texels]] = [[] for _ in rows]
     mean, differences = np.zeros((len(rows), 3)), [[0.0] for _ in rows]
     for t in range(len(rows)):
         if only is not None and t not in only:
             continue
         progress(t, len(rows), "decoding textures")
-        file = served.texture_file(t)
-        with reader.open(file, limits=_LIMITS) as ptm:
-            held = [level.end for level in ptm.header.levels[: ptm.whole]]
-            finest = ptm.header.levels[-1]
-            if (held, finest.width, finest.height) != (
-                rows[t]["ends"], rows[t]["width"], rows[t]["height"],
-            ):  # fmt: skip
-                raise DatabaseError(
-                    "PTM-D006", "is not the texture that the index has", file=file, remedy=BUILD
-                )
-            chains[t] = [rgb(samples) for samples in ptm.levels()]
-        if (count := len(sizes_of(rows[t]))) > len(held):
-            chains[t] += read_preview(served, t, -1)[len(held) : count]
+        levels = decoded[t] if t in decoded else read_levels(served, t)
+        chains[t] = [np.ascontiguousarray(level[..., :3]) for level in levels]
         for below, level in pairwise(chains[t]):
             texels = level.shape[0] * level.shape[1]
             differences[t].append(difference_between(level, below) / texels)
@@ -78,6 +53,47 @@ def _pyramids(served: Served, progress: Progress, only: Collection[int] | None =
     for row, values in zip(result.differences, differences, strict=True):
         row[: len(values)] = values
     return result._replace(mean=mean)
+
+
+def read_levels(served: Served, texture: int) -> list[Texels]:
+    """Decodes a texture: its levels, the coarsest first, (h, w, 3) RGB or (h, w, 4) with alpha,
+    without offsets. Levels that are finer than those of the `.ptm` come from the finest preview.
+
+    Raises
+    ------
+    DatabaseError: PTM-D005, D006 it is missing, damaged or does not match the index.
+    LimitError: see `ptmtools.texture.open` and `PtmReader.levels`.
+    """
+    try:
+        return _levels(served, texture)
+    except LimitError:
+        raise
+    except InputError as fault:
+        code = "PTM-D005" if fault.code == "PTM-I120" else "PTM-D006"
+        raise DatabaseError(
+            code, fault.message, file=fault.file, place=fault.place, remedy=BUILD
+        ) from None
+
+
+def _levels(served: Served, texture: int) -> list[Texels]:
+    row, file = served.index["textures"][texture], served.texture_file(texture)
+    with reader.open(file, limits=_LIMITS) as ptm:
+        held = [level.end for level in ptm.header.levels[: ptm.whole]]
+        finest = ptm.header.levels[-1]
+        if (held, finest.width, finest.height) != (row["ends"], row["width"], row["height"]):
+            raise DatabaseError(
+                "PTM-D006", "is not the texture that the index has", file=file, remedy=BUILD
+            )
+        levels = [in_colors(samples) for samples in ptm.levels()]
+        alpha = ptm.header.components in (2, 4)
+    if (count := len(sizes_of(row))) > len(held):
+        levels += read_preview(served, texture, -1, alpha=alpha)[len(held) : count]
+    return levels
+
+
+def alpha_of(levels: Sequence[Texels]) -> Pyramids:
+    """The alpha of the (h, w, 4) levels of a texture, as the colours of another."""
+    return packed([[np.repeat(level[..., 3:], 3, axis=2) for level in levels]])
 
 
 def packed(chains: list[list[NDArray[np.uint8]]]) -> Pyramids:
@@ -133,8 +149,14 @@ def mip_levels(image: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
     return levels[::-1]
 
 
-def rgb(samples: NDArray[Any]) -> NDArray[np.uint8]:
+def in_colors(samples: NDArray[Any]) -> Texels:
+    """Converts (h, w, c) samples of any type to (h, w, 3) RGB, or (h, w, 4) with alpha."""
+    shown, components = in_eight_bits(samples), samples.shape[2]
+    if components < 3:
+        return shown[..., [0, 0, 0, 1][: components + 2]]
+    return shown[..., : 3 + (components == 4)]
+
+
+def rgb(samples: NDArray[Any]) -> Texels:
     """Converts (h, w, c) samples of any type to (h, w, 3) RGB."""
-    shown = in_eight_bits(samples)
-    color = shown[:, :, :3] if shown.shape[2] >= 3 else np.repeat(shown[:, :, :1], 3, axis=2)
-    return np.ascontiguousarray(color)
+    return np.ascontiguousarray(in_colors(samples)[..., :3])
