@@ -31,9 +31,12 @@ class Bumps:
 
 
 def bumps_of(shapes: list[ReadPrimitive], count: list[int]) -> Bumps | None:
-    if all(p.normal is None for p in shapes):
+    """Those of shapes with ``count`` triangles each, except those that blend, which the page shows
+    without; None if there are none."""
+    drawn = [p.normal is not None and not _blends(p) for p in shapes]
+    if not any(drawn):
         return None
-    number = [-1 if p.normal is None else p.material.normal for p in shapes]
+    number = [p.material.normal if has else -1 for p, has in zip(shapes, drawn, strict=True)]
     clamped = [[wrap == WRAPS["clamp"] for wrap in p.material.normal_wrap] for p in shapes]
     return Bumps(
         np.repeat(np.array(number, np.int32), count),
@@ -41,6 +44,10 @@ def bumps_of(shapes: list[ReadPrimitive], count: list[int]) -> Bumps | None:
         np.repeat([float(p.material.scale) for p in shapes], count),
         np.repeat(np.array(clamped, np.bool_), count, axis=0),
     )
+
+
+def _blends(shape: ReadPrimitive) -> bool:
+    return shape.material.blends and shape.material.cutoff is None
 
 
 def corners_of(uv: NDArray[np.float32] | None, triangle: Ints) -> Floats:

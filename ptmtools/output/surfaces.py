@@ -20,6 +20,9 @@ from ptmtools.output.gltf_reader import ReadGlb, ReadPrimitive
 from ptmtools.output.locating import SLACK, Locator
 from ptmtools.scene.colors import to_srgb
 
+#: Alpha below which the page draws nothing.
+LEAST_ALPHA = 0.004
+
 
 @dataclass(frozen=True)
 class MappedRelief:
@@ -55,7 +58,10 @@ class Surfaces:
     lightmap, spot: (n,) int32, the lightmap in the hints' textures, -1 without; (n, 3, 2) float64
         coordinates in it, origin at the upper left. None if there are no lightmaps.
     relief: the normal maps of objects, if there are any. bumps: those of materials.
-    opacity: (n,) of the factor, 0 to 1; None of surfaces that are all opaque.
+    opacity: (n,) of the factor, 0 to 1.
+    sheer: (n,) whether it, and the alpha of the texture, count. cutoff: (n,) of sheer surfaces
+        whose texels of less alpha are not drawn, and all others opaque; 0 of those that blend.
+        These three are None of surfaces that are all opaque.
     """
 
     corner: Floats
@@ -74,6 +80,8 @@ class Surfaces:
     relief: MappedRelief | None = None
     bumps: Bumps | None = None
     opacity: Floats | None = None
+    sheer: Bools | None = None
+    cutoff: Floats | None = None
 
     @property
     def light(self) -> Surfaces | None:
@@ -198,6 +206,10 @@ def surfaces_of(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
         relief=_relief([p for _, p in shapes]),
         bumps=bumps_of([p for _, p in shapes], count),
         opacity=spread([m.factor[3] for m in materials], np.float64),
+        sheer=spread([m.blends for m in materials], np.bool_),
+        cutoff=spread(
+            [0 if m.cutoff is None else max(m.cutoff, LEAST_ALPHA) for m in materials], np.float64
+        ),
     )
 
 

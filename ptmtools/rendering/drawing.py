@@ -1,9 +1,10 @@
 """Draws a view of a served database with the finest levels of its textures.
 
-Embree finds the surface of each ray, and the kernels of the simulator sample the textures. A lit
-picture has the lamp of `ptmtools.rendering.light`, and the relief of octree textures and of the
-normal maps of objects. Others have lightmaps, and shade surfaces without texture by the angle to
-the viewer, like the web page. All have the normal maps of materials.
+Embree finds the surface of each ray and the layers before it (`ptmtools.rendering.layers`), and the
+kernels of the simulator sample the textures. A lit picture has the lamp of
+`ptmtools.rendering.light`, and the relief of octree textures and of the normal maps of objects.
+Others have lightmaps, and shade surfaces without texture by the angle to the viewer, like the web
+page. All have the normal maps of materials.
 """
 
 from __future__ import annotations
@@ -19,12 +20,9 @@ from ptmtools.arrays import Floats
 from ptmtools.errors import InputError
 from ptmtools.options import option
 from ptmtools.output.served import Served
-from ptmtools.output.surfaces import Surfaces
 from ptmtools.progress import Progress, silent
 from ptmtools.rendering.light import as_bytes
 from ptmtools.rendering.rays import Camera, Caster
-from ptmtools.rendering.records import Sight, Triangles, own_levels, triangles_of
-from ptmtools.scene.colors import to_srgb
 
 #: Maximum side of a picture, pixels.
 MAX_SIDE = 4096
@@ -33,10 +31,6 @@ FIELD_OF_VIEW = 60.0
 #: Rays per pixel along each axis, and the largest picture, in pixels, that has several; larger
 #: pictures have one.
 _SAMPLES, _MANY_PIXELS = 2, 1 << 22
-#: Colour of the sky, 0 to 255, as on the web page.
-_SKY = (0.16 * 255, 0.17 * 255, 0.19 * 255)
-#: Least share of their colour that surfaces without texture have, and such with baked light.
-GLOW, LIT_GLOW = 0.25, 0.7
 
 
 @dataclass(frozen=True)
@@ -143,12 +137,9 @@ def draw_view(
     InputError: PTM-I111 the viewpoint does not exist.
     DatabaseError, LimitError: see `read_pyramids` and `read_octrees`.
     """
-    from ptmtools.rendering.glass import Glass
-    from ptmtools.rendering.kernels import shade
-    from ptmtools.rendering.light import lamps, lit
-    from ptmtools.rendering.normal_maps import show_bumps, show_relief
-    from ptmtools.rendering.octrees import read_octrees
-    from ptmtools.rendering.pyramids import read_pyramids
+    from ptmtools.rendering.layers import Layers, blend, seen_of, sheer_of
+    from ptmtools.rendering.light import lit
+    from ptmtools.rendering.painting import Painter
 
     eye = eye_of(served, options)
     if options.lit:
@@ -162,44 +153,14 @@ def draw_view(
         options.width / options.height,
         options.height,
     )
-    triangles = triangles_of(surfaces)
-    sight = Caster(surfaces).look(camera, eye.position, eye.direction)
-    hit = sight.triangle[sight.triangle >= 0]
-    light = None if options.lit else surfaces.light
-    used = set(surfaces.texture[hit].tolist())
-    if light is not None:
-        used |= set(light.texture[hit].tolist())
-    if options.lit and surfaces.relief:
-        used |= set(surfaces.relief.number[hit].tolist())
-    if surfaces.bumps:
-        used |= set(surfaces.bumps.number[hit].tolist())
-    pyramids = read_pyramids(served, progress, only=used)
-    column = pyramids.levels
-    if options.max_side:
-        within = (pyramids.size.max(axis=2) <= options.max_side) & (pyramids.size[:, :, 0] > 0)
-        column = np.minimum(np.maximum(within.sum(axis=1), 1), column)
-    shown = np.empty((len(sight.ray), 3))
-    loaded = np.ones(served.cell_count, dtype=np.bool_)
-    levels = own_levels(pyramids)
-    shade(sight, triangles, levels, loaded, column, shown)
-    if options.lit:
-        from ptmtools.rendering.relief import relieve
-
-        octrees, lamp = read_octrees(served), lamps(surfaces.corner)
-        relieve(sight, triangles, lamp, octrees, loaded, octrees.levels, shown)
-        show_relief(sight, surfaces, levels, loaded, column, lamp, shown)
-    else:
-        _shade_plain(sight, triangles, light, shown)
-    show_bumps(sight, surfaces, levels, loaded, column, shown)
-    if light is not None:
-        linear = np.empty_like(shown)
-        shade(sight, triangles_of(light), levels, loaded, column, linear)
-        mapped = np.flatnonzero(sight.triangle >= 0)
-        mapped = mapped[light.texture[sight.triangle[mapped]] >= 0]
-        shown[mapped] *= to_srgb(linear[mapped] / 255)
-    shown[sight.triangle < 0] = _SKY
-    glow = 1.0 if options.lit else GLOW if light is None else LIT_GLOW
-    Glass(surfaces, glow).blend(sight, shown)
+    painter = Painter(served, max_side=options.max_side, lit=options.lit, progress=progress)
+    sight = Caster(surfaces, sheer_of(surfaces)).look(camera, eye.position, eye.direction)
+    sight, layers = Layers(surfaces).before(sight, painter.alpha)
+    blended = seen_of(layers, sight)
+    painter.load(sight, blended)
+    shown = painter.colors(sight)
+    if layers:
+        blend(layers, painter.colors(blended), shown)
     each = (options.height, samples, options.width, samples, 3)
     return as_bytes(shown.reshape(each).mean(axis=(1, 3)))
 
@@ -210,19 +171,6 @@ def _vertical(degrees: float, options: ViewOptions) -> float:
         return degrees
     half = math.tan(math.radians(degrees) / 2) * options.height / options.width
     return 2 * math.degrees(math.atan(half))
-
-
-def _shade_plain(sight: Sight, triangles: Triangles, light: Surfaces | None, shown: Floats) -> None:
-    """Multiplies the colours of surfaces without texture by the cosine to the viewer, less where
-    light is baked: in lightmaps, or in the colours of vertices."""
-    plain = np.flatnonzero(sight.triangle >= 0)
-    plain = plain[triangles.texture[sight.triangle[plain]] < 0]
-    glow = GLOW if light is None else LIT_GLOW
-    normal, ray = triangles.normal[sight.triangle[plain]], sight.ray[plain]
-    length = np.linalg.norm(normal, axis=1) * np.linalg.norm(ray, axis=1)
-    along = np.abs(np.einsum("ij,ij->i", normal, ray))
-    facing = np.divide(along, length, out=np.zeros(len(along)), where=length > 0)
-    shown[plain] *= (glow + (1 - glow) * facing)[:, None]
 
 
 def _refused(problem: str, remedy: str | None = None) -> InputError:

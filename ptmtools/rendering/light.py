@@ -1,4 +1,4 @@
-"""Light of lit pictures: a distant lamp and ambient light.
+"""Light of pictures: what shows without light, and the distant lamp and ambient light of lit ones.
 
 The lamp wraps around objects (half Lambert, squared), so relief is visible on all sides of a
 statue. It multiplies sRGB values, like the rest of the simulator.
@@ -14,6 +14,10 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, normals
 from ptmtools.output.served import Served
 
+#: Colour of the sky, 0 to 255, as on the web page.
+SKY = (0.16 * 255, 0.17 * 255, 0.19 * 255)
+#: Least share of their colour that surfaces without texture have, and such with baked light.
+GLOW, LIT_GLOW = 0.25, 0.7
 #: Share of ambient light, and unit vector towards the lamp.
 AMBIENT = 0.3
 LAMP = tuple(float(v) for v in np.array([0.5, 0.7, 0.6]) / np.linalg.norm([0.5, 0.7, 0.6]))

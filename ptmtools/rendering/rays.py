@@ -1,7 +1,7 @@
 """Camera rays: the first surface along each, by Embree, and frustum tests of boxes and hulls.
 
-A ray passes through one-sided surfaces from behind, and through glass always, which
-`ptmtools.rendering.glass` blends over pictures.
+A ray passes through one-sided surfaces from behind, and through glass always. Pictures show glass
+and textures with alpha as layers before the surfaces (`ptmtools.rendering.layers`).
 """
 
 from __future__ import annotations
@@ -81,9 +81,10 @@ def axes(direction: Floats) -> tuple[Floats, Floats]:
 class Caster:
     """Ray caster over the surfaces of a scene."""
 
-    def __init__(self, surfaces: Surfaces) -> None:
+    def __init__(self, surfaces: Surfaces, passed: Bools | None = None) -> None:
+        """``passed``: (T,) surfaces that all rays pass through, glass by default."""
         corner = surfaces.corner
-        self._which = np.flatnonzero(~surfaces.glass)
+        self._which = np.flatnonzero(~(surfaces.glass if passed is None else passed))
         self._corner = corner
         self._normal = normals(corner)
         self._one_sided, self._seen = ~surfaces.two_sided, surfaces.seen
@@ -135,6 +136,12 @@ class Caster:
             start[waiting] += along[waiting] * (2 * step)[:, None]
             waiting = waiting[met < 0]
         return result
+
+    def faced(self, start: Floats, along: Floats, far: float, triangle: Ints) -> Ints:
+        """(n,) the visible triangle in the place of each of ``triangle``, which rays pass through
+        from behind, -1 for none; start, along: (n, 3) of the rays, far: their ends."""
+        ends = np.full(len(start), far)
+        return self._coincident(start - self._middle, along, ends, self._way[triangle])
 
     def _coincident(self, start: Floats, along: Floats, far: Floats, way: Ints) -> Ints:
         """(n,) the visible triangle in the place of a face that a ray passes through, -1 for none:

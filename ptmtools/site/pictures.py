@@ -1,9 +1,10 @@
 """Pictures of views, as the page draws them: a poster, a small one for each viewpoint in the menu,
 and one for each work in the catalogue.
 
-Rays find the surfaces of the pixels (`ptmtools.rendering.rays`), and textures are sampled at the
-level nearest to the size of a pixel, up to a number of texels a side: textures that no picture
-shows are not read, and only the first bytes of the others. (Tried: the compiled sampling of
+Rays find the surfaces of the pixels (`ptmtools.rendering.rays`) and the layers before them
+(`ptmtools.rendering.layers`), and textures are sampled at the level nearest to the size of a pixel,
+up to a number of texels a side: textures that no picture shows are not read, and only the first
+bytes of the others. (Tried: the compiled sampling of
 `ptmtools.rendering`, trilinear: the two look the same at this size, and where it is not compiled
 yet that takes four seconds.)
 """
@@ -12,7 +13,7 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import groupby, islice
@@ -25,17 +26,17 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.output.model import offsets_of, sizes_of
 from ptmtools.output.served import Served
 from ptmtools.parallel import ordered
-from ptmtools.rendering.drawing import GLOW, LIT_GLOW
 from ptmtools.rendering.footprints import detail_of_pixels, footprints
-from ptmtools.rendering.glass import Glass
+from ptmtools.rendering.layers import Layer, Layers, blend, seen_of, sheer_of
+from ptmtools.rendering.light import GLOW, LIT_GLOW, SKY
 from ptmtools.rendering.previews import read_preview
+from ptmtools.rendering.pyramids import in_colors
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.rendering.records import Sight, Triangles, triangles_of
 from ptmtools.scene.colors import to_srgb
 from ptmtools.site.catalogue import PICTURE
 from ptmtools.texture.detail import with_offset
 from ptmtools.texture.model import Limits
-from ptmtools.texture.samples import in_eight_bits
 
 
 @dataclass(frozen=True)
@@ -58,13 +59,11 @@ _FINER = 1.5
 MOST = 32
 #: Rays in memory, 50 bytes each.
 _TOGETHER = 1 << 22
-#: The background, 0 to 1, as in the page.
-_SKY = (0.16, 0.17, 0.19)
 _LIMITS = Limits(decoded_bytes=1 << 33)
 _THREADS = 4
 _QUALITIES = (80, 72, 64, 56, 48, 40, 32, 24, 16, 8)
 
-#: The levels of a texture: (h, w, 3) each, coarsest first.
+#: The levels of a texture: (h, w, 3) each, or (h, w, 4) with alpha, coarsest first.
 Levels = Sequence[NDArray[np.uint8]]
 
 
@@ -85,48 +84,70 @@ def pictures_of(served: Served, views: Sequence[tuple[Kind, Mapping[str, Any]]])
     ImportError: Embree is missing.
     InputError, LimitError: those of `ptmtools.texture.open` and `PtmReader.levels`.
     """
-    caster, triangles = Caster(served.surfaces), triangles_of(served.surfaces)
-    light = None if served.surfaces.light is None else triangles_of(served.surfaces.light)
-    glass = Glass(served.surfaces, GLOW if light is None else LIT_GLOW)
+    scene = _Scene(served)
     rays = np.cumsum([math.prod(_rays(kind.size)) for kind, _ in views])
     for _, group in groupby(zip(rays // _TOGETHER, views, strict=True), lambda each: each[0]):
-        yield from _drawn(served, caster, triangles, light, glass, [view for _, view in group])
+        yield from scene.drawn([view for _, view in group])
 
 
-def _drawn(
-    served: Served,
-    caster: Caster,
-    triangles: Triangles,
-    light: Triangles | None,
-    glass: Glass,
-    views: Sequence[tuple[Kind, Mapping[str, Any]]],
-) -> Iterator[bytes]:
-    """The pictures of some views, with the textures that they show in memory."""
-    sights = [_look(caster, kind.size, view) for kind, view in views]
-    shown = np.unique(np.concatenate([np.unique(sight.triangle) for sight in sights]))
-    seen = (each.texture[shown[shown >= 0]].tolist() for each in (triangles, light) if each)
-    used = {texture for textures in seen for texture in textures} - {-1}
-    textures = sorted(used)
-    # The lock of the interpreter is free while levels are decoded and numpy is at work.
-    finest = max(kind.finest for kind, _ in views)
-    levels = ordered(partial(_levels, served, finest), textures, _THREADS)
-    texels = dict(zip(textures, levels, strict=True))
-    draw = partial(_jpeg_of, triangles, light, glass, texels)
-    kinds = [kind for kind, _ in views]
-    yield from ordered(draw, zip(sights, kinds, strict=True), _THREADS)
+@dataclass(frozen=True)
+class _Seen:
+    """The surfaces of a picture, the layers before them, and the surfaces of these."""
+
+    kind: Kind
+    sight: Sight
+    layers: Sequence[Layer]
+    blended: Sight
 
 
-def _jpeg_of(
-    triangles: Triangles,
-    light: Triangles | None,
-    glass: Glass,
-    textures: Mapping[int, Levels],
-    shown: tuple[Sight, Kind],
-) -> bytes:
-    sight, kind = shown
-    colors = _colors(sight, triangles, light, textures)
-    glass.blend(sight, colors)
-    return jpeg(colors, kind.size, kind.most)
+class _Textures(dict[int, Levels]):
+    """Textures up to a number of texels a side, which are read once they are asked for."""
+
+    def __init__(self, served: Served, finest: int) -> None:
+        self._served, self._finest = served, finest
+
+    def __missing__(self, texture: int) -> Levels:
+        self[texture] = _levels(self._served, self._finest, texture)
+        return self[texture]
+
+    def read(self, textures: Iterable[int]) -> None:
+        """Reads several, by threads: the lock of the interpreter is free while levels are
+        decoded."""
+        for _ in ordered(self.__getitem__, sorted(textures), _THREADS):
+            pass
+
+
+class _Scene:
+    """What the pictures of a database share."""
+
+    def __init__(self, served: Served) -> None:
+        surfaces = served.surfaces
+        self._served, self._triangles = served, triangles_of(surfaces)
+        self._light = None if surfaces.light is None else triangles_of(surfaces.light)
+        self._caster, self._layers = Caster(surfaces, sheer_of(surfaces)), Layers(surfaces)
+
+    def drawn(self, views: Sequence[tuple[Kind, Mapping[str, Any]]]) -> Iterator[bytes]:
+        """The pictures of some views, with the textures that they show in memory."""
+        textures = _Textures(self._served, max(kind.finest for kind, _ in views))
+        seen = [self._seen(kind, view, textures) for kind, view in views]
+        sights = [sight for each in seen for sight in (each.sight, each.blended)]
+        shown = np.unique(np.concatenate([np.unique(sight.triangle) for sight in sights]))
+        drawn = [each for each in (self._triangles, self._light) if each]
+        numbers = (each.texture[shown[shown >= 0]].tolist() for each in drawn)
+        textures.read({number for each in numbers for number in each} - {-1})
+        yield from ordered(partial(self._jpeg, textures), seen, _THREADS)
+
+    def _seen(self, kind: Kind, view: Mapping[str, Any], textures: _Textures) -> _Seen:
+        sight = _look(self._caster, kind.size, view)
+        sight, layers = self._layers.before(sight, partial(_alpha, self._triangles, textures))
+        return _Seen(kind, sight, layers, seen_of(layers, sight))
+
+    def _jpeg(self, textures: _Textures, seen: _Seen) -> bytes:
+        colors = _colors(seen.sight, self._triangles, self._light, textures)
+        if seen.layers:
+            over = _colors(seen.blended, self._triangles, self._light, textures)
+            blend(seen.layers, over, colors)
+        return jpeg(colors, seen.kind.size, seen.kind.most)
 
 
 def jpeg(colors: Floats, size: tuple[int, int], most: int) -> bytes:
@@ -168,12 +189,12 @@ def _levels(served: Served, finest: int, texture: int) -> Levels:
     count = max(1, sum(max(size) <= finest for size in sizes_of(row)))
     if count > len(row["ends"]):
         fine = (n for n, preview in enumerate(row["previews"]) if preview["level"] >= count - 1)
-        return _shown(row, read_preview(served, texture, next(fine))[:count])
+        alpha = row["components"] in (2, 4)
+        return _shown(row, read_preview(served, texture, next(fine), alpha=alpha)[:count])
     colors: list[NDArray[np.uint8]] = []
     with open_ptm(served.texture_file(texture), limits=_LIMITS) as ptm:
         for samples in islice(ptm.levels(), count):
-            texels = in_eight_bits(samples)
-            colors.append(texels[:, :, :3] if texels.shape[2] >= 3 else texels[:, :, [0, 0, 0]])
+            colors.append(in_colors(samples))
     return _shown(row, colors)
 
 
@@ -186,7 +207,7 @@ def _colors(
 ) -> Floats:
     """(n, 3) colours of the rays, 0 to 255; ``light``: the triangles with lightmaps as textures."""
     shown = np.empty((len(sight.ray), 3))
-    shown[:] = np.multiply(_SKY, 255)
+    shown[:] = SKY
     hit = np.flatnonzero(sight.triangle >= 0)
     triangle, ray = sight.triangle[hit], sight.ray[hit]
     normal = triangles.normal[triangle]
@@ -212,18 +233,28 @@ def _paint(
     for number, levels in textures.items():
         rows = np.flatnonzero(texture == number)
         if len(rows):
-            colors[rows] = _sampled(sight, hit[rows], triangles, levels)
+            colors[rows] = _sampled(sight, hit[rows], triangles, levels)[:, :3]
+
+
+def _alpha(triangles: Triangles, textures: _Textures, sight: Sight) -> Floats:
+    """(n,) alpha, 0 to 1, of the textures of pixels that show one."""
+    result, texture = np.ones(len(sight.triangle)), triangles.texture[sight.triangle]
+    for number in np.unique(texture).tolist():
+        if textures[number][0].shape[2] > 3:
+            rows = np.flatnonzero(texture == number)
+            result[rows] = _sampled(sight, rows, triangles, textures[number])[:, 3] / 255
+    return result
 
 
 def _sampled(sight: Sight, pixel: Ints, triangles: Triangles, levels: Levels) -> Floats:
-    """(n, 3) colours that some pixels show of a texture."""
+    """(n, 3) colours that some pixels show of a texture, or (n, 4) with alpha."""
     uv, moves = footprints(sight, pixel, triangles)
     height, width = levels[-1].shape[:2]
     finest = len(levels) - 1
     detail = np.rint(detail_of_pixels(moves, width, height))
     coarser = np.clip(detail, 0, finest).astype(np.int64)
     clamped = triangles.clamped[sight.triangle[pixel]]
-    colors = np.empty((len(pixel), 3))
+    colors = np.empty((len(pixel), levels[0].shape[2]))
     for step in np.unique(coarser):
         rows = np.flatnonzero(coarser == step)
         colors[rows] = _bilinear(levels[finest - step], uv[rows], clamped[rows])
@@ -231,7 +262,7 @@ def _sampled(sight: Sight, pixel: Ints, triangles: Triangles, levels: Levels) ->
 
 
 def _bilinear(level: NDArray[np.uint8], uv: Floats, clamped: NDArray[np.bool_]) -> Floats:
-    """(n, 3) of a level at (n, 2) texture coordinates."""
+    """(n, c) of a level at (n, 2) texture coordinates."""
     size = np.array([level.shape[1], level.shape[0]])
     place = uv * size - 0.5
     low = np.floor(place)

@@ -1,0 +1,158 @@
+"""Layers before the surfaces of a view: glass and textures with alpha, as on the web page.
+
+The rays of `ptmtools.rendering.rays` pass through them. Here they meet them on their way to the
+surface behind, the nearest first. Where a material has a cutoff, texels of less alpha are not drawn
+and all others are opaque; other layers blend as their colours are encoded, the farthest first. A
+ray ends at an opaque texel, so that foliage costs no more than the leaves before the first.
+
+Each ray has its own order. The page draws whole batches by the distance of the middles of their
+boxes, so it differs where layers of several batches reach around each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ptmtools.arrays import Bools, Floats, Ints, normals
+from ptmtools.embree import ray_tree
+from ptmtools.output.surfaces import LEAST_ALPHA, Surfaces
+from ptmtools.rendering.rays import Caster
+from ptmtools.rendering.records import Sight
+
+#: Most layers that a ray meets, those without effect included; it misses what follows, and shows
+#: the surface behind.
+MOST = 64
+
+#: (m,) alpha of the textures at the pixels of a sight, 0 to 1.
+Alpha = Callable[[Sight], Floats]
+
+
+class Layer(NamedTuple):
+    """The surfaces that some rays meet at one place in their order.
+
+    Attributes
+    ----------
+    ray: (m,) numbers of the rays. triangle: (m,) that they meet. share: (m,) of its colour.
+    """
+
+    ray: Ints
+    triangle: Ints
+    share: Floats
+
+
+def sheer_of(surfaces: Surfaces) -> Bools:
+    """(T,) the surfaces that are layers."""
+    return surfaces.glass if surfaces.sheer is None else surfaces.sheer
+
+
+class Layers:
+    """The layers of a scene."""
+
+    def __init__(self, surfaces: Surfaces) -> None:
+        self._which = which = np.flatnonzero(sheer_of(surfaces))
+        corner = surfaces.corner[which]
+        self._surfaces = surfaces
+        self._one_sided = ~surfaces.two_sided[which]
+        self._place, self._normal = corner[:, 0], normals(corner)
+        self._all = surfaces.corner[:, 0], normals(surfaces.corner)
+        low, high = corner.min(axis=(0, 1), initial=0), corner.max(axis=(0, 1), initial=0)
+        self._middle = (low + high) / 2
+        #: From the front of a layer to the origin of the ray behind it, metres.
+        self._step = 1e-6 * max(1.0, float((high - low).max()))
+        self._tree: Any = ray_tree(corner - self._middle) if len(which) else None
+        #: Finds the front of a leaf of two one-sided faces, of which Embree returns either.
+        self._fronts = Caster(surfaces, ~sheer_of(surfaces)) if self._one_sided.any() else None
+
+    def before(self, sight: Sight, alpha: Alpha) -> tuple[Sight, list[Layer]]:
+        """The sight with opaque texels of layers in place of the surfaces behind them, and the
+        layers that blend, the first that each ray meets, the second, and so on."""
+        layers: list[Layer] = []
+        if self._tree is None:
+            return sight, layers
+        triangle = sight.triangle.copy()
+        ray = sight.ray / np.linalg.norm(sight.ray, axis=1, keepdims=True)
+        end = np.full(len(ray), np.inf)
+        hit = np.flatnonzero(triangle >= 0)
+        place, normal = (each[triangle[hit]] for each in self._all)
+        end[hit] = _distance(sight.eye, ray[hit], place, normal)
+        waiting, gone = np.arange(len(ray)), np.zeros(len(ray))
+        last = np.full(len(ray), -1)
+        for _ in range(MOST):
+            start = sight.eye - self._middle + ray[waiting] * gone[waiting][:, None]
+            rays = start.astype(np.float32), ray[waiting].astype(np.float32)
+            pane = self._tree.run(*rays, query="INTERSECT")
+            waiting, pane = waiting[pane >= 0], pane[pane >= 0]
+            along, normal = ray[waiting], self._normal[pane]
+            far = _distance(sight.eye, along, self._place[pane], normal)
+            before = far < end[waiting] - self._step
+            waiting, pane, far = waiting[before], pane[before], far[before]
+            if not len(waiting):
+                break
+            met = self._faced(sight.eye, ray[waiting], pane, far)
+            # A ray that grazes a pane may meet it again after the step.
+            met = np.where(pane == last[waiting], -1, met)
+            last[waiting] = pane
+            gone[waiting] = np.maximum(far, gone[waiting]) + self._step
+            share = self._shares(sight, waiting, met, alpha)
+            opaque, blends = share == 1, (share > 0) & (share < 1)
+            triangle[waiting[opaque]] = met[opaque]
+            if blends.any():
+                layers.append(Layer(waiting[blends], met[blends], share[blends]))
+            waiting = waiting[~opaque]
+        return sight._replace(triangle=triangle), layers
+
+    def _faced(self, eye: Floats, along: Floats, pane: Ints, far: Floats) -> Ints:
+        """(m,) the triangles at the panes that rays meet, -1 for one seen from behind."""
+        met = self._which[pane]
+        if self._fronts is None:
+            return met
+        turn = np.einsum("ij,ij->i", self._normal[pane], along)
+        back = np.flatnonzero(self._one_sided[pane] & (turn > 0))
+        start = eye + along[back] * (far[back] - self._step)[:, None]
+        met[back] = self._fronts.faced(start, along[back], 2 * self._step, met[back])
+        return met
+
+    def _shares(self, sight: Sight, ray: Ints, met: Ints, alpha: Alpha) -> Floats:
+        """(m,) the shares of triangles, 0 for -1, at the rays that meet them."""
+        surfaces, share = self._surfaces, np.zeros(len(met))
+        drawn = np.flatnonzero(met >= 0)
+        own = met[drawn]
+        share[drawn] = 1.0 if surfaces.opacity is None else surfaces.opacity[own]
+        textured = drawn[surfaces.texture[own] >= 0]
+        if len(textured):
+            shown = sight._replace(triangle=met[textured], ray=sight.ray[ray[textured]])
+            share[textured] *= alpha(shown)
+        cutoff = np.zeros(len(met))
+        if surfaces.cutoff is not None:
+            cutoff[drawn] = surfaces.cutoff[own]
+        share[share < np.maximum(cutoff, LEAST_ALPHA)] = 0
+        share[(share > 0) & (cutoff > 0)] = 1
+        return share
+
+
+def seen_of(layers: Sequence[Layer], sight: Sight) -> Sight:
+    """A sight of the surfaces of layers, one layer after another."""
+    none = np.zeros(0, np.int64)
+    ray = np.concatenate([none, *(layer.ray for layer in layers)])
+    triangle = np.concatenate([none, *(layer.triangle for layer in layers)])
+    return sight._replace(triangle=triangle, ray=sight.ray[ray])
+
+
+def blend(layers: Sequence[Layer], colors: Floats, shown: Floats) -> None:
+    """Blends layers, of the ``colors`` of the pixels of `seen_of`, over (n, 3) ``shown``."""
+    end = len(colors)
+    for ray, _, share in reversed(layers):
+        own, end = colors[end - len(ray) : end], end - len(ray)
+        part = share[:, None]
+        shown[ray] = shown[ray] * (1 - part) + own * part
+
+
+def _distance(eye: Floats, along: Floats, place: Floats, normal: Floats) -> Floats:
+    """(n,) distances to planes through (n, 3) places along (n, 3) unit rays from a point (3,)."""
+    turn = np.einsum("ij,ij->i", along, normal)
+    flat = np.where(turn == 0, 1.0, turn)
+    far = np.einsum("ij,ij->i", place - eye, normal) / flat
+    return np.asarray(np.where(turn == 0, np.inf, far))

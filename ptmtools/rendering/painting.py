@@ -1,0 +1,129 @@
+"""Paints the surfaces of a view with the finest levels of their textures, by compiled kernels.
+
+The pictures of sites have a painter of their own, without compiled code (`ptmtools.site.pictures`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ptmtools.arrays import Floats, Ints
+from ptmtools.output.served import Served
+from ptmtools.output.surfaces import Surfaces
+from ptmtools.progress import Progress
+from ptmtools.rendering.kernels import shade
+from ptmtools.rendering.light import GLOW, LIT_GLOW, SKY, lamps
+from ptmtools.rendering.normal_maps import show_bumps, show_relief
+from ptmtools.rendering.octrees import read_octrees
+from ptmtools.rendering.previews import Texels
+from ptmtools.rendering.pyramids import alpha_of, read_levels, read_pyramids
+from ptmtools.rendering.records import Shows, Sight, Triangles, own_levels, triangles_of
+from ptmtools.scene.colors import to_srgb
+
+
+class Painter:
+    """The surfaces of a database; textures are decoded once their pixels are asked for."""
+
+    def __init__(self, served: Served, *, max_side: int, lit: bool, progress: Progress) -> None:
+        """``max_side``: of the levels, 0 for all. ``lit``: by a lamp, instead of baked light."""
+        self._served, self._surfaces, self._lit = served, served.surfaces, lit
+        self._triangles = triangles_of(served.surfaces)
+        self._light = None if lit else served.surfaces.light
+        self._max_side, self._progress = max_side, progress
+        self._loaded = np.ones(served.cell_count, dtype=np.bool_)
+        #: Textures that were decoded for their alpha, and that.
+        self._decoded: dict[int, list[Texels]] = {}
+        self._alpha: dict[int, Shows | None] = {}
+
+    def alpha(self, sight: Sight) -> Floats:
+        """(n,) alpha, 0 to 1, of the textures of pixels that show one."""
+        texture = self._triangles.texture[sight.triangle]
+        result = np.ones(len(texture))
+        for number in np.unique(texture).tolist():
+            if number not in self._alpha:
+                self._alpha[number] = self._read_alpha(number)
+            shows = self._alpha[number]
+            if shows is None:
+                continue
+            rows = np.flatnonzero(texture == number)
+            own = Triangles(*(each[sight.triangle[rows]] for each in self._triangles))
+            alike = np.zeros(len(rows), np.int32)
+            own = own._replace(texture=alike, color=np.ones_like(own.color))
+            part = sight._replace(triangle=np.arange(len(rows)), ray=sight.ray[rows])
+            value = np.empty((len(rows), 3))
+            shade(part, own, shows, self._loaded, self._columns(shows), value)
+            result[rows] = value[:, 0] / 255
+        return result
+
+    def load(self, *sights: Sight) -> None:
+        """Decodes the textures of all pixels that `colors` will be asked for."""
+        maps = [self._surfaces.texture]
+        if self._light is not None:
+            maps.append(self._light.texture)
+        if self._lit and self._surfaces.relief:
+            maps.append(self._surfaces.relief.number)
+        if self._surfaces.bumps:
+            maps.append(self._surfaces.bumps.number)
+        used: set[int] = set()
+        for sight in sights:
+            hit = sight.triangle[sight.triangle >= 0]
+            used.update(*(number[hit].tolist() for number in maps))
+        pyramids = read_pyramids(self._served, self._progress, used, self._decoded)
+        self._decoded.clear()
+        self._shows = own_levels(pyramids)
+        self._column = self._columns(self._shows)
+        if self._lit:
+            self._octrees, self._lamps = read_octrees(self._served), lamps(self._surfaces.corner)
+
+    def colors(self, sight: Sight) -> Floats:
+        """(n, 3) colours of pixels, 0 to 255; of the sky where they show nothing."""
+        surfaces, triangles = self._surfaces, self._triangles
+        shows, loaded, column = self._shows, self._loaded, self._column
+        shown = np.empty((len(sight.ray), 3))
+        shade(sight, triangles, shows, loaded, column, shown)
+        if self._lit:
+            from ptmtools.rendering.relief import relieve
+
+            octrees, lamp = self._octrees, self._lamps
+            relieve(sight, triangles, lamp, octrees, loaded, octrees.levels, shown)
+            show_relief(sight, surfaces, shows, loaded, column, lamp, shown)
+        else:
+            _shade_plain(sight, triangles, self._light, shown)
+        show_bumps(sight, surfaces, shows, loaded, column, shown)
+        if self._light is not None:
+            linear = np.empty_like(shown)
+            shade(sight, triangles_of(self._light), shows, loaded, column, linear)
+            mapped = np.flatnonzero(sight.triangle >= 0)
+            mapped = mapped[self._light.texture[sight.triangle[mapped]] >= 0]
+            shown[mapped] *= to_srgb(linear[mapped] / 255)
+        shown[sight.triangle < 0] = SKY
+        return shown
+
+    def _read_alpha(self, texture: int) -> Shows | None:
+        rows = self._served.index["textures"]
+        if rows[texture]["components"] not in (2, 4):
+            return None
+        self._progress(texture, len(rows), "decoding textures")
+        levels = self._decoded[texture] = read_levels(self._served, texture)
+        return own_levels(alpha_of(levels))
+
+    def _columns(self, shows: Shows) -> Ints:
+        """(T,) the columns of the finest levels of at most the allowed side."""
+        size, column = shows.pyramids.size, shows.pyramids.levels
+        if not self._max_side:
+            return column
+        within = (size.max(axis=2) <= self._max_side) & (size[:, :, 0] > 0)
+        return np.minimum(np.maximum(within.sum(axis=1), 1), column)
+
+
+def _shade_plain(sight: Sight, triangles: Triangles, light: Surfaces | None, shown: Floats) -> None:
+    """Multiplies the colours of surfaces without texture by the cosine to the viewer, less where
+    light is baked: in lightmaps, or in the colours of vertices."""
+    plain = np.flatnonzero(sight.triangle >= 0)
+    plain = plain[triangles.texture[sight.triangle[plain]] < 0]
+    glow = GLOW if light is None else LIT_GLOW
+    normal, ray = triangles.normal[sight.triangle[plain]], sight.ray[plain]
+    length = np.linalg.norm(normal, axis=1) * np.linalg.norm(ray, axis=1)
+    along = np.abs(np.einsum("ij,ij->i", normal, ray))
+    facing = np.divide(along, length, out=np.zeros(len(along)), where=length > 0)
+    shown[plain] *= (glow + (1 - glow) * facing)[:, None]
