@@ -1,10 +1,11 @@
-"""The texture coordinates of the pixels of a view, and how far these move from pixel to pixel."""
+"""The texture coordinates of the pixels of a view, how far these move from pixel to pixel, and the
+colours of vertices there."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ptmtools.arrays import Floats, Ints
+from ptmtools.arrays import Floats, Ints, cross
 from ptmtools.rendering.records import Sight, Triangles
 
 
@@ -13,11 +14,7 @@ def footprints(sight: Sight, pixel: Ints, triangles: Triangles) -> tuple[Floats,
     movement to the next pixel, u and v in the rows, across the screen and up it in the columns."""
     triangle, ray = sight.triangle[pixel], sight.ray[pixel]
     normal, gradient = triangles.normal[triangle], triangles.gradient[triangle]
-    facing = np.einsum("ij,ij->i", normal, ray)
-    facing = np.where(facing == 0, 1e-300, facing)
-    offset = triangles.corner[triangle, 0] - sight.eye
-    depth = np.einsum("ij,ij->i", normal, offset) / facing
-    at = ray * depth[:, None] - offset
+    facing, depth, at = _met(sight, pixel, triangles)
     uv = triangles.uv[triangle, 0] + np.einsum("ikj,ij->ik", gradient, at)
     slope = np.einsum("ij,kj->ik", normal, sight.axes) / facing[:, None]
     move = sight.axes[None] - slope[:, :, None] * ray[:, None]
@@ -31,3 +28,38 @@ def detail_of_pixels(moves: Floats, width: int, height: int) -> Floats:
     which it moves more, as in OpenGL; ``moves`` as `footprints` returns them."""
     texels = np.linalg.norm(moves * np.array([width, height])[:, None], axis=1).max(axis=1)
     return np.asarray(np.log2(np.maximum(texels, 1.0)))
+
+
+def show_colors(sight: Sight, triangles: Triangles, paint: Floats | None, shown: Floats) -> None:
+    """Multiplies pixels ``shown`` (n, 3) by the colours ``paint`` (T, 3, 3) between the corners of
+    their triangles, instead of the means of these."""
+    if paint is None:
+        return
+    pixel = np.flatnonzero(sight.triangle >= 0)
+    own = paint[sight.triangle[pixel]]
+    uneven = (own != own[:, :1]).any(axis=(1, 2))
+    pixel, own = pixel[uneven], own[uneven]
+    triangle = sight.triangle[pixel]
+    corner, normal = triangles.corner[triangle], triangles.normal[triangle]
+    _, _, at = _met(sight, pixel, triangles)
+    one, other = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    whole = np.einsum("ij,ij->i", normal, normal)
+    second, third = (
+        np.clip(np.einsum("ij,ij->i", cross(*each), normal) / whole, 0, 1)
+        for each in ((at, other), (one, at))
+    )
+    weight = np.stack([1 - second - third, second, third], axis=1)
+    here, mean = np.einsum("nk,nkj->nj", weight, own), own.mean(axis=1)
+    shown[pixel] *= np.divide(here, mean, out=np.zeros_like(here), where=mean > 0)
+
+
+def _met(sight: Sight, pixel: Ints, triangles: Triangles) -> tuple[Floats, Floats, Floats]:
+    """Of some pixels, which show a triangle: (n,) component of the ray along its normal, (n,) depth
+    of its plane, and (n, 3) where the ray meets that, from the first corner."""
+    triangle, ray = sight.triangle[pixel], sight.ray[pixel]
+    normal = triangles.normal[triangle]
+    facing = np.einsum("ij,ij->i", normal, ray)
+    facing = np.where(facing == 0, 1e-300, facing)
+    offset = triangles.corner[triangle, 0] - sight.eye
+    depth = np.einsum("ij,ij->i", normal, offset) / facing
+    return facing, depth, ray * depth[:, None] - offset

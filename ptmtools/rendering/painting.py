@@ -11,6 +11,7 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.output.served import Served
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.progress import Progress
+from ptmtools.rendering.footprints import show_colors
 from ptmtools.rendering.kernels import shade
 from ptmtools.rendering.light import GLOW, LIT_GLOW, SKY, lamps
 from ptmtools.rendering.normal_maps import show_bumps, show_relief
@@ -90,6 +91,7 @@ class Painter:
         else:
             _shade_plain(sight, triangles, self._light, shown)
         show_bumps(sight, surfaces, shows, loaded, column, shown)
+        show_colors(sight, triangles, surfaces.paint, shown)
         if self._light is not None:
             linear = np.empty_like(shown)
             shade(sight, triangles_of(self._light), shows, loaded, column, linear)

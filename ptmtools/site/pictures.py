@@ -26,7 +26,7 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.output.model import offsets_of, sizes_of
 from ptmtools.output.served import Served
 from ptmtools.parallel import ordered
-from ptmtools.rendering.footprints import detail_of_pixels, footprints
+from ptmtools.rendering.footprints import detail_of_pixels, footprints, show_colors
 from ptmtools.rendering.layers import Layer, Layers, blend, seen_of, sheer_of
 from ptmtools.rendering.light import GLOW, LIT_GLOW, SKY
 from ptmtools.rendering.previews import read_preview
@@ -124,6 +124,7 @@ class _Scene:
         surfaces = served.surfaces
         self._served, self._triangles = served, triangles_of(surfaces)
         self._light = None if surfaces.light is None else triangles_of(surfaces.light)
+        self._paint = surfaces.paint
         self._caster, self._layers = Caster(surfaces, sheer_of(surfaces)), Layers(surfaces)
 
     def drawn(self, views: Sequence[tuple[Kind, Mapping[str, Any]]]) -> Iterator[bytes]:
@@ -143,11 +144,15 @@ class _Scene:
         return _Seen(kind, sight, layers, seen_of(layers, sight))
 
     def _jpeg(self, textures: _Textures, seen: _Seen) -> bytes:
-        colors = _colors(seen.sight, self._triangles, self._light, textures)
+        colors = self._colors(textures, seen.sight)
         if seen.layers:
-            over = _colors(seen.blended, self._triangles, self._light, textures)
-            blend(seen.layers, over, colors)
+            blend(seen.layers, self._colors(textures, seen.blended), colors)
         return jpeg(colors, seen.kind.size, seen.kind.most)
+
+    def _colors(self, textures: _Textures, sight: Sight) -> Floats:
+        colors = _colors(sight, self._triangles, self._light, textures)
+        show_colors(sight, self._triangles, self._paint, colors)
+        return colors
 
 
 def jpeg(colors: Floats, size: tuple[int, int], most: int) -> bytes:
