@@ -35,11 +35,10 @@ def show_colors(sight: Sight, triangles: Triangles, paint: Floats | None, shown:
     their triangles, instead of the means of these."""
     if paint is None:
         return
-    pixel = np.flatnonzero(sight.triangle >= 0)
-    own = paint[sight.triangle[pixel]]
-    uneven = (own != own[:, :1]).any(axis=(1, 2))
-    pixel, own = pixel[uneven], own[uneven]
+    uneven = (paint != paint[:, :1]).any(axis=(1, 2))
+    pixel = np.flatnonzero((sight.triangle >= 0) & uneven[sight.triangle])
     triangle = sight.triangle[pixel]
+    own = paint[triangle]
     corner, normal = triangles.corner[triangle], triangles.normal[triangle]
     _, _, at = _met(sight, pixel, triangles)
     one, other = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]

@@ -25,6 +25,8 @@ from ptmtools.rendering.records import Sight
 #: Most layers that a ray meets, those without effect included; it misses what follows, and shows
 #: the surface behind.
 MOST = 64
+#: Rays that are followed at a time.
+_BATCH = 1 << 18
 
 #: (m,) alpha of the textures at the pixels of a sight, 0 to 1.
 Alpha = Callable[[Sight], Floats]
@@ -73,6 +75,17 @@ class Layers:
         if self._tree is None:
             return sight, layers
         triangle = sight.triangle.copy()
+        for begin in range(0, len(triangle), _BATCH):
+            rows = slice(begin, begin + _BATCH)
+            part = sight._replace(triangle=triangle[rows], ray=sight.ray[rows])
+            own = self._march(part, alpha)
+            layers += [each._replace(ray=each.ray + begin) for each in own]
+        return sight._replace(triangle=triangle), layers
+
+    def _march(self, sight: Sight, alpha: Alpha) -> list[Layer]:
+        """The layers that blend; writes the opaque ones to the triangles of the sight."""
+        layers: list[Layer] = []
+        triangle = sight.triangle
         ray = sight.ray / np.linalg.norm(sight.ray, axis=1, keepdims=True)
         end = np.full(len(ray), np.inf)
         hit = np.flatnonzero(triangle >= 0)
@@ -102,7 +115,7 @@ class Layers:
             if blends.any():
                 layers.append(Layer(waiting[blends], met[blends], share[blends]))
             waiting = waiting[~opaque]
-        return sight._replace(triangle=triangle), layers
+        return layers
 
     def _faced(self, eye: Floats, along: Floats, pane: Ints, far: Floats) -> Ints:
         """(m,) the triangles at the panes that rays meet, -1 for one seen from behind."""

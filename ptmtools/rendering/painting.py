@@ -35,6 +35,11 @@ class Painter:
         #: Textures that were decoded for their alpha, and that.
         self._decoded: dict[int, list[Texels]] = {}
         self._alpha: dict[int, Shows | None] = {}
+        #: The triangles with one texture, in its own colours.
+        self._alike = self._triangles._replace(
+            texture=np.zeros_like(self._triangles.texture),
+            color=np.ones_like(self._triangles.color),
+        )
 
     def alpha(self, sight: Sight) -> Floats:
         """(n,) alpha, 0 to 1, of the textures of pixels that show one."""
@@ -47,12 +52,9 @@ class Painter:
             if shows is None:
                 continue
             rows = np.flatnonzero(texture == number)
-            own = Triangles(*(each[sight.triangle[rows]] for each in self._triangles))
-            alike = np.zeros(len(rows), np.int32)
-            own = own._replace(texture=alike, color=np.ones_like(own.color))
-            part = sight._replace(triangle=np.arange(len(rows)), ray=sight.ray[rows])
+            part = sight._replace(triangle=sight.triangle[rows], ray=sight.ray[rows])
             value = np.empty((len(rows), 3))
-            shade(part, own, shows, self._loaded, self._columns(shows), value)
+            shade(part, self._alike, shows, self._loaded, self._columns(shows), value)
             result[rows] = value[:, 0] / 255
         return result
 
