@@ -23,7 +23,8 @@ from ptmtools.scene.colors import to_srgb
 
 
 class Painter:
-    """The surfaces of a database; textures are decoded once their pixels are asked for."""
+    """The surfaces of a database. Each texture is decoded once: by `alpha`, or by `load`, which comes
+    before `colors`."""
 
     def __init__(self, served: Served, *, max_side: int, lit: bool, progress: Progress) -> None:
         """``max_side``: of the levels, 0 for all. ``lit``: by a lamp, instead of baked light."""
@@ -117,7 +118,7 @@ class Painter:
         if not self._max_side:
             return column
         within = (size.max(axis=2) <= self._max_side) & (size[:, :, 0] > 0)
-        return np.minimum(np.maximum(within.sum(axis=1), 1), column)
+        return np.asarray(np.minimum(np.maximum(within.sum(axis=1), 1), column))
 
 
 def _shade_plain(sight: Sight, triangles: Triangles, light: Surfaces | None, shown: Floats) -> None:

@@ -16,6 +16,8 @@ from ptmtools.lab.renderer import Renderer
 from ptmtools.lab.simulation import simulate
 from ptmtools.lab.world import World, prepare, relief_of
 from ptmtools.link import Conditions
+from ptmtools.output.bumps import bumps_of
+from ptmtools.output.gltf_reader import read_glb
 from ptmtools.output.served import Served, read_served
 from ptmtools.pipeline.build import build_scene
 from ptmtools.rendering.drawing import ViewOptions, draw_view
@@ -53,6 +55,17 @@ def world(folder: Path, served: Served) -> World:
 def picture(served: Served, *, lit: bool = False) -> np.ndarray:
     view = ViewOptions(eye=EYE, look=WALL, width=200, height=150, lit=lit)
     return draw_view(served, view).astype(np.float64)
+
+
+def test_surfaces_that_blend_show_none(folder: Path) -> None:
+    """As on the page; those with a cutoff show theirs."""
+    files = sorted(folder.glob("db/www/gltf/*.glb"))
+    shapes = [p for file in files for p in read_glb(file.read_bytes()).primitives]
+    shape = next(p for p in shapes if p.normal is not None)
+    for blends, cutoff in ((False, None), (True, 0.5), (True, None)):
+        material = replace(shape.material, blends=blends, cutoff=cutoff)
+        bumps = bumps_of([replace(shape, material=material)], [len(shape.triangle)])
+        assert (bumps is None) == (blends and cutoff is None)
 
 
 def plain(served: Served) -> Served:

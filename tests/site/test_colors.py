@@ -16,6 +16,7 @@ from ptmtools.glb import glb_chunks
 from ptmtools.output import validate_database
 from ptmtools.output.gltf_reader import ReadPrimitive, read_glb
 from ptmtools.output.served import Served, read_served
+from ptmtools.rendering import pyramids
 from ptmtools.rendering.drawing import ViewOptions, draw_view
 from ptmtools.rendering.light import light_on
 from ptmtools.scene.colors import to_linear, to_srgb
@@ -185,9 +186,17 @@ def test_the_page_shows_them(visit: Callable[..., Any], colored: Site, database:
 
 
 @pytest.mark.parametrize("lit", [False, True])
-def test_renders_show_them(database: Path, lit: bool) -> None:
-    served = read_served(database)
+def test_renders_show_them(database: Path, lit: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No texture is decoded twice."""
+    served, real, decoded = read_served(database), pyramids._levels, list[int]()
+
+    def levels(served: Served, texture: int) -> list[Any]:
+        decoded.append(texture)
+        return real(served, texture)
+
+    monkeypatch.setattr(pyramids, "_levels", levels)
     check(render(served, lit), place_of(served.index), lit)
+    assert sorted(decoded) == [0, 1, 2]
 
 
 def place_of(index: Mapping[str, Any]) -> dict[str, Any]:
