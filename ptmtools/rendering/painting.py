@@ -23,8 +23,8 @@ from ptmtools.scene.colors import to_srgb
 
 
 class Painter:
-    """The surfaces of a database. Each texture is decoded once: by `alpha`, or by `load`, which comes
-    before `colors`."""
+    """The surfaces of a database. Each texture is decoded once: by `alpha`, or by `load`, which
+    comes before `colors`."""
 
     def __init__(self, served: Served, *, max_side: int, lit: bool, progress: Progress) -> None:
         """``max_side``: of the levels, 0 for all. ``lit``: by a lamp, instead of baked light."""
