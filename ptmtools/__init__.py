@@ -16,6 +16,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ptmtools.lazy import lazy_exports
+from ptmtools.sources import watch
 from ptmtools.version import __version__ as __version__
 
 if TYPE_CHECKING:
@@ -83,6 +84,8 @@ if TYPE_CHECKING:
     from ptmtools.visibility.options import PvsOptions as PvsOptions
     from ptmtools.visibility.pvs import compute_pvs as compute_pvs
     from ptmtools.walk import Walk as Walk, read_walk as read_walk
+
+watch()
 
 __getattr__ = lazy_exports(
     __name__,

@@ -2,10 +2,11 @@
 
 Numba's cache notices a change of the file of a kernel only, but machine code also contains the
 kernels that it calls and the constants of other modules. So each file has a cache folder named by
-the digest of its source and of all modules of the package that it imports, directly or not. They
-are read off the source text (`_imports`): constants of a kernel must not come from modules that
-are imported in another way. A digest of the whole package would be simpler, but any edit would
-compile everything again: 14 s of processor time, 50 s on a busy machine.
+the digest of its source and of all modules of the package that it imports, directly or not, as
+they were when this process imported them (`sources`). They are read off the source text
+(`_imports`): constants of a kernel must not come from modules that are imported in another way. A
+digest of the whole package would be simpler, but any edit would compile everything again: 14 s of
+processor time, 50 s on a busy machine.
 
 Called from Python, a kernel is numba's cached dispatcher. Called from another kernel it is an
 `overload`, compiled without a wrapper for Python and once for all literals: all kernels together
@@ -35,14 +36,14 @@ import numba.core.event
 import numba.extending
 
 from ptmtools.progress import announce
+from ptmtools.sources import PACKAGE, module_file, source
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-_PACKAGE = Path(__file__).parent
 #: An import of the package anywhere in a file: a module, and the names taken from it.
 _IMPORT = re.compile(
-    rf"^ *(?:from +({_PACKAGE.name}[\w.]*) +import +(\([^)]*\)|[^\n]*)"
-    rf"|import +({_PACKAGE.name}[\w.]*))",
+    rf"^ *(?:from +({PACKAGE.name}[\w.]*) +import +(\([^)]*\)|[^\n]*)"
+    rf"|import +({PACKAGE.name}[\w.]*))",
     re.MULTILINE,
 )
 
@@ -156,7 +157,7 @@ def cache_folder(file: Path) -> str:
 def _root() -> str:
     # Not Path.expanduser, which raises for a user without a home.
     caches = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
-    for folder in (_PACKAGE / "__pycache__" / "kernels", caches / "ptmtools" / "kernels"):
+    for folder in (PACKAGE / "__pycache__" / "kernels", caches / "ptmtools" / "kernels"):
         try:
             folder.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=folder):
@@ -173,7 +174,7 @@ def _digest(file: Path) -> str:
         more = _imports(waiting.pop()) - files
         files |= more
         waiting += more
-    sources = (sha256(one.read_bytes()).digest() for one in sorted(files))
+    sources = (sha256(source(one)).digest() for one in sorted(files))
     return sha256(b"".join(sources)).hexdigest()[:12]
 
 
@@ -181,15 +182,8 @@ def _digest(file: Path) -> str:
 def _imports(file: Path) -> frozenset[Path]:
     """The modules of the package that a module imports."""
     modules = set()
-    for module, names, whole in _IMPORT.findall(file.read_text()):
+    for module, names, whole in _IMPORT.findall(source(file).decode()):
         # A name may be a module of a package, or defined in a module.
         for name in re.findall(r"\w+", re.sub(r"#.*| as \w+", "", names)) or [""]:
-            modules.add(_module(f"{module}.{name}") or _module(module or whole))
+            modules.add(module_file(f"{module}.{name}") or module_file(module or whole))
     return frozenset(one for one in modules if one)
-
-
-@cache
-def _module(name: str) -> Path | None:
-    path = _PACKAGE.parent.joinpath(*name.split("."))
-    files = (path.with_suffix(".py"), path / "__init__.py")
-    return next((file for file in files if file.is_file()), None)

@@ -14,6 +14,7 @@ import pytest
 
 import ptmtools
 from ptmtools import jit
+from ptmtools.sources import module_file
 
 ROOT = Path(ptmtools.__file__).parent
 PROGRAM = """
@@ -24,7 +25,7 @@ print(outer(1))
 """
 #: A package of two kernels and a table, of which the program calls the one that uses all.
 SOURCES = {
-    "__init__": "",
+    "__init__": "from ptmtools.sources import watch\nwatch()\n",
     "one": """
 from ptmtools.jit import kernel
 from ptmtools.two import (  # what it calls
@@ -75,7 +76,7 @@ def package(tmp_path: Path) -> Path:
     package.mkdir()
     for name, source in SOURCES.items():
         (package / f"{name}.py").write_text(source)
-    for name in ("errors", "jit", "progress"):
+    for name in ("errors", "jit", "progress", "sources"):
         shutil.copy(ROOT / f"{name}.py", package)
     return package
 
@@ -96,6 +97,26 @@ def test_what_a_kernel_sees_decides_about_its_machine_code(package: Path, chosen
         *announced, actual = run(PROGRAM, package.parent, NUMBA_CACHE_DIR=chosen)
         assert int(actual) == result
         assert len(announced) == fresh
+
+
+def test_sources_that_change_under_a_process(package: Path) -> None:
+    """It computes with what it has imported, and leaves machine code of that."""
+    tables = package / "tables.py"
+    upgraded = package / "upgraded.py"
+    upgraded.write_text("FACTOR = 20\n")
+    # As files that `rsync -a` or a wheel brings.
+    os.utime(upgraded, (0, 0))
+    meanwhile = f"import os\nos.replace({str(upgraded)!r}, {str(tables)!r})\n"
+    for program, result, fresh in (
+        (f"import ptmtools.tables\n{meanwhile}{PROGRAM}", 12, True),
+        (PROGRAM, 22, True),
+        (PROGRAM, 22, False),
+    ):
+        *announced, actual = run(program, package.parent, NUMBA_CACHE_DIR="")
+        assert int(actual) == result
+        assert len(announced) == fresh
+    tables.write_text(SOURCES["tables"])
+    assert run(PROGRAM, package.parent, NUMBA_CACHE_DIR="") == ["12"]
 
 
 def test_two_processes_that_start_together(package: Path) -> None:
@@ -148,7 +169,7 @@ def test_without_a_place_to_keep_it_code_still_runs(tmp_path: Path) -> None:
     program = (
         "import os; os.environ.pop('HOME', None)\n"
         "from pathlib import Path; from ptmtools import jit\n"
-        f"jit._PACKAGE = Path({str(tmp_path / 'file')!r})\n"
+        f"jit.PACKAGE = Path({str(tmp_path / 'file')!r})\n"
         "assert jit._root() == ''\n"
         "print(jit.kernel(lambda x: x + 1)(41))"
     )
@@ -168,6 +189,6 @@ def test_no_import_is_overlooked() -> None:
                 names = [f"{node.module}.{name.name}" for name in node.names]
             for name in names:
                 if name.split(".")[0] == ROOT.name:
-                    own = jit._module(name)
-                    actual.add(own or jit._module(name.rpartition(".")[0]))
+                    own = module_file(name)
+                    actual.add(own or module_file(name.rpartition(".")[0]))
         assert actual <= jit._imports(file), file

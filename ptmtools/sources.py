@@ -1,0 +1,45 @@
+"""The sources of this package as this process imported them.
+
+An upgrade or an edit may replace them while a process runs. It then computes with the old modules,
+but reads new files. Python keeps no trace of the sources of a module: a finder that never finds
+anything reads each of them just before Python does (30 µs a module).
+
+Times decide nothing: files that `rsync -a` or a wheel brings, and those of a renamed folder, may be
+older than the process; clocks are set back; and modules are imported late.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib.abc import MetaPathFinder
+from pathlib import Path
+from typing import Any
+
+PACKAGE = Path(__file__).parent
+_imported: dict[Path, bytes] = {}
+
+
+class _Reader(MetaPathFinder):
+    def find_spec(self, name: str, path: Any, target: Any = None) -> None:
+        file = module_file(name) if name.startswith(f"{PACKAGE.name}.") else None
+        if file:
+            # A module that is imported again leaves the names that others took from the first.
+            _imported.setdefault(file, file.read_bytes())
+
+
+def watch() -> None:
+    """Reads the sources of all modules of the package that are imported from now on."""
+    if not any(isinstance(finder, _Reader) for finder in sys.meta_path):
+        sys.meta_path.insert(0, _Reader())
+
+
+def source(file: Path) -> bytes:
+    """What was imported from a file of the package; what it holds now, if nothing was."""
+    return _imported[file] if file in _imported else file.read_bytes()
+
+
+def module_file(name: str) -> Path | None:
+    """The file of a module of the package, such as "ptmtools.light.model"; None without one."""
+    path = PACKAGE.parent.joinpath(*name.split("."))
+    files = (path.with_suffix(".py"), path / "__init__.py")
+    return next((file for file in files if file in _imported or file.is_file()), None)
