@@ -73,6 +73,8 @@ class Experiment:
     measure: runs the stage with a setting.
     reference_error: the standard error of the reference itself, 0 where it is exact.
     by_work: whether the work is the cost, such as bytes, and not the seconds.
+    units: "work", "error" and the names of further figures → their units, if any; counts and
+        shares have none.
     """
 
     work: str
@@ -81,6 +83,7 @@ class Experiment:
     measure: Callable[[Setting], Measurement]
     reference_error: float = 0.0
     by_work: bool = False
+    units: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -99,7 +102,7 @@ class Trade:
     Attributes
     ----------
     stage: its name.
-    work, error, reference_error: as in `Experiment`.
+    work, error, reference_error, units: as in `Experiment`.
     trials: by cost.
     rates: family → exponent b of error ∝ work^b, by least squares over the logarithms of trials
         with more than twice the error of the reference.
@@ -111,6 +114,7 @@ class Trade:
     reference_error: float
     trials: tuple[Trial, ...]
     rates: Mapping[str, float]
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def cheapest(self, error: float) -> Trial | None:
         """The cheapest trial with at most this error; None if there is none."""
@@ -131,6 +135,7 @@ def run(stage: str, experiment: Experiment, progress: Progress = silent) -> Trad
         experiment.reference_error,
         pareto(trials, by_work=experiment.by_work),
         rates(trials, 2 * experiment.reference_error),
+        experiment.units,
     )
 
 

@@ -110,7 +110,10 @@ def octree_experiment(scene: Scene) -> Experiment:
         if name != "faces" or value >= 4
     ]
     error = "mean angle of normals to those of the model, degrees"
-    return Experiment("bytes of mesh and octree", error, settings, measure, by_work=True)
+    units = {"work": "B", "error": "°", "memory": "B"}
+    return Experiment(
+        "bytes of mesh and octree", error, settings, measure, by_work=True, units=units
+    )
 
 
 def prepare_interlaced(subject: Subject) -> Experiment:
@@ -141,14 +144,17 @@ def interlaced_experiment(images: Sequence[NDArray[np.uint8]]) -> Experiment:
             more={
                 "bytes": float(sum(written.interlaced.bytes for written in sets)),
                 "files": float(sum(len(written.files) for written in sets)),
-                "dB": decibels(error),
+                "PSNR": decibels(error),
             },
         )
 
     settings = [Setting(f"--min {side}", {"min": side}, "min") for side in (256, 128, 64, 32, 16)]
     error = "RMS error of the first file's picture, of 255"
     settings = settings if images else []
-    return Experiment("bytes of the first file", error, settings, measure, by_work=True)
+    units = {"work": "B", "bytes": "B", "PSNR": "dB"}
+    return Experiment(
+        "bytes of the first file", error, settings, measure, by_work=True, units=units
+    )
 
 
 def prepare_coarse(subject: Subject) -> Experiment:
@@ -194,7 +200,10 @@ def coarse_experiment(scene: Scene, parts: Sequence[Part]) -> Experiment:
         for value in values
     ]
     error = "mean distance along rays to the model's own surface, m"
-    return Experiment("triangles of the coarse meshes", error, settings, measure, by_work=True)
+    units = {"error": "m"}
+    return Experiment(
+        "triangles of the coarse meshes", error, settings, measure, by_work=True, units=units
+    )
 
 
 def prepare_light(subject: Subject) -> Experiment:
@@ -267,13 +276,14 @@ def jpeg_experiment(images: Sequence[NDArray[np.uint8]]) -> Experiment:
             work=float(sum(map(len, files))),
             error=error,
             worst=math.sqrt(max(square, default=0.0)),
-            more={"dB": decibels(error)},
+            more={"PSNR": decibels(error)},
         )
 
     settings = [Setting(f"--quality {q}", {"quality": q}, "quality") for q in (30, 50, 70, 85, 95)]
     error = f"RMS error of textures of {JPEG_SIDE}², of 255"
     settings = settings if images else []
-    return Experiment("bytes", error, settings, measure, by_work=True)
+    units = {"work": "B", "PSNR": "dB"}
+    return Experiment("bytes", error, settings, measure, by_work=True, units=units)
 
 
 def _colors(texels: NDArray[np.uint8]) -> Image.Image:

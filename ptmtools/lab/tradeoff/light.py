@@ -96,7 +96,7 @@ def lightmap_experiment(
             work=float(sum(0 if k.texels is None else k.texels.size for k in made)),
             error=error,
             worst=float(np.percentile(off, 95)),
-            more={"dB": decibels(error)},
+            more={"PSNR": decibels(error)},
         )
 
     values = {"density": (2.5, 5.0, 10.0, 20.0), "samples": (4, 16, 64, 256)}
@@ -112,6 +112,7 @@ def lightmap_experiment(
         settings if cells else [],
         measure,
         float(np.sqrt(np.square(noise).mean() / 2)) if cells else 0.0,
+        units={"PSNR": "dB"},
     )
 
 

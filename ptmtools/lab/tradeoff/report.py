@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from itertools import groupby
 from typing import Any
@@ -35,16 +35,19 @@ def table(trade: Trade, wanted: float | None = None) -> list[str]:
         f"{trade.stage}: error is the {trade.error}; work counts {trade.work}; seconds of one core",
         f"  {'setting':<{wide}}  {'seconds':>9} {'work':>11} {'error':>8} {'worst':>8}",
     ]
+    units = trade.units
     for trial in trade.trials:
         m = trial.measured
         star = "*" if trial.best else " "
-        more = "".join(f"  {k} {v:.3g}" for k, v in m.more.items() if v)
+        more = "".join(f"  {k} {amount(v, units.get(k, ''))}" for k, v in m.more.items() if v)
+        work = amount(round(m.work), units.get("work", ""))
+        error, worst = (_error(value, trade) for value in (m.error, m.worst))
         lines.append(
-            f"{star} {trial.setting.name:<{wide}}  {m.seconds:9.2f} {m.work:11,.0f} "
-            f"{m.error:8.4f} {m.worst:8.4f}{more}  {m.note}".rstrip()
+            f"{star} {trial.setting.name:<{wide}}  {m.seconds:7.2f} s {work:>11} {error:>8} "
+            f"{worst:>8}{more}  {m.note}".rstrip()
         )
     if trade.reference_error:
-        lines.append(f"  standard error of the reference: {trade.reference_error:.4f}")
+        lines.append(f"  standard error of the reference: {_error(trade.reference_error, trade)}")
     for family, rate in trade.rates.items():
         lines.append(f"  {family}: error ∝ work^{rate:.2f}")
     if wanted is not None:
@@ -58,20 +61,42 @@ def table(trade: Trade, wanted: float | None = None) -> list[str]:
     return lines
 
 
+def amount(value: float, unit: str) -> str:
+    """A figure with its unit: ``12.3 MB``, ``41.2 dB``; whole numbers in full."""
+    if unit == "B":
+        return size(round(value))
+    number = f"{value:,.0f}" if float(value).is_integer() else f"{value:.3g}"
+    return _joined(number, unit)
+
+
+def _joined(number: str, unit: str) -> str:
+    return f"{number}{unit}" if unit in ("", "°") else f"{number} {unit}"
+
+
+def _error(value: float, trade: Trade) -> str:
+    return _joined(f"{value:.4f}", trade.units.get("error", ""))
+
+
 def as_csv(trades: Sequence[Trade]) -> str:
     """All trials of all stages as CSV: the fields of `Measurement`, further figures as
-    ``name=value``."""
+    ``name=value``, or ``name[unit]=value``."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(COLUMNS)
     for trade in trades:
         for trial in trade.trials:
             m = trial.measured
-            more = " ".join([*(f"{k}={v:.6g}" for k, v in m.more.items()), m.note]).strip()
+            more = " ".join([*_pairs_of(m, trade.units), m.note]).strip()
             cost = [f"{m.seconds:.4f}", f"{m.work:.6g}", trade.work]
             error = [f"{m.error:.6g}", f"{m.worst:.6g}", trade.error]
             rows.writerow([trade.stage, trial.setting.name, *cost, *error, int(trial.best), more])
     return text.getvalue()
+
+
+def _pairs_of(measured: Measurement, units: Mapping[str, str]) -> Iterator[str]:
+    for name, value in measured.more.items():
+        unit = f"[{units[name]}]" if name in units else ""
+        yield f"{name}{unit}={value:.6g}"
 
 
 def picture(trades: Sequence[Trade]) -> bytes:
@@ -274,4 +299,5 @@ def _trade(trade: WalkTrade, case: Case) -> Trade:
             setting = Setting(tried.name or _AS_IS, {})
             measured = Measurement(tried.build, tried.served, seen.e, seen.p95, more)
             trials.append(Trial(setting, measured))
-    return Trade("walk", "bytes served", f"e ({where})", 0.0, pareto(trials), {})
+    units = {"work": "B", "fetched": "B", "first": "s"}
+    return Trade("walk", "bytes served", f"e ({where})", 0.0, pareto(trials), {}, units)

@@ -271,14 +271,15 @@ def textures_experiment(images: Sequence[SourceImage], own: EncodeOptions) -> Ex
             error=error,
             worst=math.sqrt(square.max(initial=0.0)),
             more={
-                "dB": decibels(error),
+                "PSNR": decibels(error),
                 "ratio": sum(map(len, files)) / max(raw, 1),
                 "inexact": other / max(size.sum(), 1),
             },
         )
 
     error = f"RMS error of the picture in 1/{PREFIX} of the uncompressed bytes, of 255"
-    return Experiment("bytes of all levels", error, settings, measure)
+    units = {"work": "B", "PSNR": "dB"}
+    return Experiment("bytes of all levels", error, settings, measure, units=units)
 
 
 def _at_prefix(data: bytes, pixels: NDArray[Any]) -> NDArray[np.float64]:

@@ -55,5 +55,6 @@ def client_experiment(world: World) -> Experiment:
         )
         for value in values
     ]
-    error = f"e of a walk of {world.time[-1]:.0f} s at {BANDWIDTH}bit/s, memory {MEMORY}"
-    return Experiment("bytes received", error, settings, measure, by_work=True)
+    error = f"e, of 255, of a walk of {world.time[-1]:.0f} s at {BANDWIDTH}bit/s, memory {MEMORY}"
+    units = {"work": "B", "memory": "B"}
+    return Experiment("bytes received", error, settings, measure, by_work=True, units=units)

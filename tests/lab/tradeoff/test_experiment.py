@@ -112,6 +112,25 @@ def test_the_table_names_the_best_and_the_cheapest():
     assert "none of these" in table(run("made", MADE), 1e-9)[-1]
 
 
+def test_figures_have_units():
+    """Bytes, errors and further figures; counts have none."""
+
+    def weighed(setting):
+        more = {"memory": 12_300_000.0, "PSNR": 41.25, "cells": 1234.0, "first": 1.5, "lost": 0.0}
+        return replace(measure(setting), more=more)
+
+    units = {"work": "B", "error": "m", "memory": "B", "PSNR": "dB", "first": "s"}
+    made = replace(MADE, measure=weighed, units=units, settings=[Setting("--one", {"steps": 4})])
+    trade = run("made", made)
+    _, _, line, reference = table(trade)
+    assert " ".join(line.split()) == (
+        "* --one 4.00 s 4 B 0.5000 m 1.0000 m memory 12.3 MB PSNR 41.2 dB cells 1,234 first 1.5 s"
+    )
+    assert reference.endswith(": 0.0100 m")
+    (row,) = csv.DictReader(io.StringIO(as_csv([trade])))
+    assert row["more"] == "memory[B]=1.23e+07 PSNR[dB]=41.25 cells=1234 first[s]=1.5 lost=0"
+
+
 def test_the_csv_has_every_trial():
     rows = list(csv.DictReader(io.StringIO(as_csv([run("made", MADE), run("made", MADE)]))))
     assert len(rows) == 12

@@ -110,11 +110,11 @@ def test_larger_first_files_show_more() -> None:
     whole = rows[0]  # --min 256
     assert whole.error == 0
     assert whole.more["files"] == 2
-    assert math.isinf(whole.more["dB"])
+    assert math.isinf(whole.more["PSNR"])
     # Of a ramp, every second row stands for the next: half of the texels are off by one.
     half = measured(interlaced_experiment([SMOOTH]), "--min 128")["--min 128"]
     assert half.error == pytest.approx(math.sqrt(0.5))
-    assert half.more["dB"] == pytest.approx(decibels(math.sqrt(0.5)))
+    assert half.more["PSNR"] == pytest.approx(decibels(math.sqrt(0.5)))
 
 
 def test_jpeg_files_against_their_sources() -> None:
@@ -155,7 +155,7 @@ def test_textures_are_compared_at_a_prefix() -> None:
     # Raw, the prefix has 64² of 256²; compressed, a ramp is there whole.
     assert raw.error == pytest.approx(np.sqrt(np.square(np.arange(4) - 1).mean()))
     assert (fast.error, fast.more["inexact"], raw.more["inexact"]) == (0, 0, 0)
-    assert math.isinf(fast.more["dB"])
+    assert math.isinf(fast.more["PSNR"])
     assert fast.more["ratio"] < raw.more["ratio"]
     image = io.BytesIO()
     Image.fromarray(NOISE).save(image, "png")
