@@ -4,9 +4,9 @@ Numba's cache notices a change of the file of a kernel only, but machine code al
 kernels that it calls and the constants of other modules. So each file has a cache folder named by
 the digest of its source and of all modules of the package that it imports, directly or not, as
 they were when this process imported them (`sources`). They are read off the source text
-(`_imports`): constants of a kernel must not come from modules that are imported in another way. A
-digest of the whole package would be simpler, but any edit would compile everything again: 14 s of
-processor time, 50 s on a busy machine.
+(`_imports`): constants of a kernel must not come from modules that are imported in another way.
+Classes of arguments may (`_classes`). A digest of the whole package would be simpler, but any edit
+would compile everything again: 14 s of processor time, 50 s on a busy machine.
 
 Called from Python, a kernel is numba's cached dispatcher. Called from another kernel it is an
 `overload`, compiled without a wrapper for Python and once for all literals: all kernels together
@@ -23,8 +23,8 @@ from __future__ import annotations
 import os
 import re
 import tempfile
-from collections.abc import Callable
-from functools import cache, cached_property, update_wrapper
+from collections.abc import Callable, Iterator
+from functools import cache, update_wrapper
 from hashlib import sha256
 from pathlib import Path
 from threading import Lock
@@ -103,14 +103,20 @@ class _Kernel:
         overload: Any = numba.extending.overload
         overload(self, jit_options=inner, strict=False)(lambda *_: function)
 
+        self._entry: Any = None
+
     def __call__(self, *arguments: Any) -> Any:
+        if self._entry is None:
+            self._entry = self._dispatcher(arguments)
         return self._entry(*arguments)
 
-    @cached_property
-    def _entry(self) -> Any:
+    def _dispatcher(self, arguments: tuple[Any, ...]) -> Any:
         settings: Any = numba.config
         compiled: Any = numba.njit
-        folder = cache_folder(Path(self.py_func.__code__.co_filename))
+        classes = (module_file(each.__module__) for each in _classes(arguments))
+        folder = cache_folder(
+            Path(self.py_func.__code__.co_filename), *(file for file in classes if file)
+        )
         with _setting:
             before = settings.CACHE_DIR
             settings.CACHE_DIR = folder
@@ -118,6 +124,15 @@ class _Kernel:
                 return compiled(cache=bool(folder), **self._options)(self.py_func)
             finally:
                 settings.CACHE_DIR = before
+
+
+def _classes(argument: Any) -> Iterator[type]:
+    """The classes of named tuples in an argument, whose fields machine code knows by number. It is
+    kept beside their names, which fail if a class has moved."""
+    if isinstance(argument, tuple):
+        yield type(argument)
+        for each in argument:
+            yield from _classes(each)
 
 
 #: Guards numba's folder, a setting of the whole process: several threads may call kernels.
@@ -147,10 +162,10 @@ def compilations() -> int:
     return _compilation.count
 
 
-def cache_folder(file: Path) -> str:
-    """The folder for machine code of the functions in ``file``; "" if none can be written."""
+def cache_folder(*files: Path) -> str:
+    """The folder for machine code that depends on ``files``; "" if none can be written."""
     root = os.environ.get("NUMBA_CACHE_DIR") or _root()
-    return root and os.path.join(root, _digest(file))
+    return root and os.path.join(root, _digest(frozenset(files)))
 
 
 @cache
@@ -168,8 +183,8 @@ def _root() -> str:
 
 
 @cache
-def _digest(file: Path) -> str:
-    files, waiting = {file}, [file]
+def _digest(first: frozenset[Path]) -> str:
+    files, waiting = set(first), list(first)
     while waiting:
         more = _imports(waiting.pop()) - files
         files |= more

@@ -119,6 +119,18 @@ def test_sources_that_change_under_a_process(package: Path) -> None:
     assert run(PROGRAM, package.parent, NUMBA_CACHE_DIR="") == ["12"]
 
 
+def test_the_class_of_an_argument(package: Path) -> None:
+    """A kernel reads the fields of a named tuple by number, and need not import its class."""
+    pair = package / "pair.py"
+    (package / "one.py").write_text(SOURCES["one"].replace("called(x) + 1", "x.a - x.b"))
+    program = PROGRAM.replace("outer(1)", "outer(Pair(a=3, b=1))")
+    for fields in (("a", "b"), ("b", "a")):
+        lines = "".join(f"    {name}: int\n" for name in fields)
+        pair.write_text(f"from typing import NamedTuple\nclass Pair(NamedTuple):\n{lines}")
+        imports = "from ptmtools.pair import Pair\n"
+        assert run(imports + program, package.parent, NUMBA_CACHE_DIR="")[-1] == "2"
+
+
 def test_two_processes_that_start_together(package: Path) -> None:
     """Both may compile; what they leave is whole."""
     with ThreadPoolExecutor(2) as pool:
