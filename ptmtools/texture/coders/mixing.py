@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.texture.coder import PLAIN, Coding, Data, Shape
-from ptmtools.texture.coders import mixing_decisions as decisions, mixing_kernels as kernels
+from ptmtools.texture.coders import mixing_decisions as decisions, mixing_strips as strips
 from ptmtools.texture.coders.group import Reader, damaged, pack_varints, plane_order
 from ptmtools.texture.coders.mixing_decisions import BATCH, FEATURES, LOGIT_TOP, SAMPLE, SQUASH
-from ptmtools.texture.coders.mixing_kernels import (
+from ptmtools.texture.coders.mixing_strips import (
     MAGNITUDE,
     MAGNITUDES,
     POSITIONS,
@@ -202,7 +202,7 @@ class _Pass:
         height, width, _ = self.shape
         stream = self.streams[c if len(self.streams) > 1 else 0]
         end = min((strip + 1) * STRIP, width // 2)
-        kernels.code_strip(
+        strips.code_strip(
             self.encoding, height, width, strip * STRIP, end, self.step, min(c, 2),
             self.places[c], self.canvas, self.memory[c], self.tables[c],
             stream.coder, stream.buffer,
@@ -246,7 +246,7 @@ def _canvas(
         goal = wanted.reshape(-1)
     planes, tall, stride = texels.shape
     size, across = tall * stride, stride // 2
-    lists = (kernels.TEXELS_AT, kernels.PARENTS_AT, kernels.COLOUR_AT)
+    lists = (strips.TEXELS_AT, strips.PARENTS_AT, strips.COLOUR_AT)
     offsets = np.zeros((len(lists), POSITIONS, 8), np.int64)
     for row, positions in enumerate(lists):
         for k, near in enumerate(positions):
