@@ -1,6 +1,6 @@
 """Measures what light costs: bytes of lightmaps and seconds of baking, and what accuracy costs.
 
-    python benchmarks/light.py [MODEL…] [--jobs 2] [--accuracy | --parts | --model]
+    python benchmarks/light.py [MODEL…] [--jobs 2] [--accuracy | --parts | --model | --vertices]
 
 Each model is built without light and with `--light bake`. *Textures* are the bytes of the model's
 `.ptm`s; *lightmaps* those of the lightmaps' `.ptm`s, and *geometry* by how much more the GLBs have
@@ -14,6 +14,10 @@ bytes of the lightmaps' `.ptm`s. The lamps are panels of 0.6 m below the ceiling
 With `--model`, each model becomes a glTF with one lightmap of `SIDE` texels, and a database of it
 has default options: the bytes of the lightmaps' `.ptm`s against those of the PNG in the glTF, and
 the error of the light at points of the surfaces, of 255.
+
+With `--vertices`, what the rays of objects with light at vertices cost: seconds of one processor,
+and the root mean square, of 255, of interpolated light from the light by `REFERENCE` rays, at
+points spread evenly over these objects. The last row of each model is the default.
 """
 
 from __future__ import annotations
@@ -21,20 +25,20 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-import time
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import pairwise
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scenes import model_file
 
-from ptmtools.arrays import Floats, areas
+from ptmtools.arrays import Bools, Floats, areas
 from ptmtools.cells.model import Cells
 from ptmtools.light.atlas import unwrap
-from ptmtools.light.cells import ABOVE, COVERED, WHITE, Baking, encoded, exposed
+from ptmtools.light.cells import ABOVE, COVERED, WHITE, Baking, Piece, encoded, exposed
 from ptmtools.light.lamps import lamps_of
 from ptmtools.light.lightmap import bake
 from ptmtools.light.looks import LightImage, Painted, Rays, lookup
@@ -62,6 +66,8 @@ REFERENCE, POINTS = 1024, 2000
 #: Texels of the lightmap of a glTF.
 SIDE = 2048
 DENSITIES, SAMPLES = (2.5, 5.0, 10.0, 20.0), (16, 64, 256)
+#: Points of a building at which light at vertices is examined.
+ON_OBJECTS = 20_000
 
 
 def main() -> None:
@@ -71,11 +77,13 @@ def main() -> None:
     parser.add_argument("--accuracy", action="store_true")
     parser.add_argument("--parts", action="store_true")
     parser.add_argument("--model", action="store_true")
+    parser.add_argument("--vertices", action="store_true")
     arguments = parser.parse_args()
     for chosen, table in (
         (arguments.accuracy, accuracy),
         (arguments.parts, parts),
         (arguments.model, of_the_model),
+        (arguments.vertices, at_vertices),
     ):
         if chosen:
             for model in arguments.models:
@@ -126,9 +134,9 @@ def accuracy(model: Path) -> None:
     for density in DENSITIES:
         for samples in SAMPLES:
             options = LightOptions("bake", density, samples)
-            began, texels, square, count = time.process_time(), 0, 0.0, 0
+            began, texels, square, count = process_time(), 0, 0.0, 0
             results = [Baking(around, options).light(piece) for piece in pieces]
-            seconds = time.process_time() - began
+            seconds = process_time() - began
             for piece, result in zip(pieces, results, strict=True):
                 if result.texels is None:
                     continue
@@ -158,12 +166,12 @@ def parts(model: Path) -> None:
     print("|---|--:|--:|--:|--:|--:|")
     least = 0.0
     for name, of, glowing in (("ambient", scene, None), ("+ sky", scene, None), ("+ lamps", *lit)):
-        around, began = Surroundings.of(of), time.process_time()
+        around, began = Surroundings.of(of), process_time()
         mix = Mix()
         if name != "ambient":
             mix = mixed(around, pieces, lamps_of(of, glowing), options, ABOVE, WHITE)
         results = [Baking(around, options, mix).light(piece) for piece in pieces]
-        seconds = time.process_time() - began
+        seconds = process_time() - began
         least = least or seconds
         size = sum(ptm_bytes(r.texels) for r in results if r.texels is not None)
         lamps = 0 if mix.lamps is None else len(mix.lamps)
@@ -251,6 +259,51 @@ def of_the_model(model: Path) -> None:
     size = stage.counts["ptm_bytes"]
     print(f"| {model.stem} | {stage.counts['lightmaps']} | {len(image) / 1e3:,.0f} "
           f"| {size / 1e3:,.0f} | {size / len(image):.2f} | {error:.2f} |", flush=True)  # fmt: skip
+
+
+def at_vertices(model: Path) -> None:
+    """The fifth table."""
+    scene, cells = cut(model)
+    glass = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials])
+    pieces = pieces_of(Geometry(scene, cells), cells, glass, 1 / LightOptions().light_density)
+    around, options = Surroundings.of(scene), LightOptions("bake")
+    mix = mixed(around, pieces, lamps_of(scene, None), options, ABOVE, WHITE)
+    objects = [part(piece, piece.dense & ~piece.glass) for piece in pieces]
+    objects = [piece for piece in objects if len(piece.corner)]
+    print("| model | triangles | rays from a texel | s, one processor | error |")
+    print("|---|--:|--:|--:|--:|")
+    if not objects:
+        print(f"| {model.stem} | 0 | – | – | – |", flush=True)
+        return
+    exact = Baking(around, replace(options, light_samples=REFERENCE), mix)
+    count = np.array([len(piece.corner) for piece in objects])
+    area = areas(np.concatenate([piece.corner for piece in objects]).astype(np.float64))
+    face = spread_over(area, np.zeros(len(area), np.int64), np.array([0]), ON_OBJECTS)[0]
+    start = np.cumsum([0, *count.tolist()])
+    shares = points_on(np.broadcast_to(np.eye(3), (ON_OBJECTS, 3, 3)), np.arange(ON_OBJECTS))
+    places = []
+    for piece, (a, b) in zip(objects, pairwise(start.tolist()), strict=True):
+        here = (face >= a) & (face < b)
+        own, share = face[here] - a, shares[here]
+        corner = piece.corner.astype(np.float64)
+        look = exact.look(corner, exact.sides(corner, piece.side), piece.face)
+        point = np.einsum("nk,nkx->nx", share, corner[own])
+        places.append((own, share, exposed(look(own, point, turns(len(own))))))
+    for samples in (2 * options.light_samples, options.light_samples):
+        baking, began = Baking(around, replace(options, light_samples=samples), mix), process_time()
+        results = [baking.light(piece) for piece in objects]
+        seconds, square = process_time() - began, 0.0
+        for result, (own, share, truth) in zip(results, places, strict=True):
+            seen = np.einsum("nk,nk->n", share, result.vertex[own] / 255)
+            square += float(((seen - truth) ** 2).sum())
+        error = 255 * np.sqrt(square / ON_OBJECTS)
+        print(f"| {model.stem} | {count.sum():,} | {samples} | {seconds:.1f} | {error:.2f} |",
+              flush=True)  # fmt: skip
+
+
+def part(piece: Piece, chosen: Bools) -> Piece:
+    """The chosen surfaces of a piece."""
+    return Piece(*(getattr(piece, field.name)[chosen] for field in fields(Piece)))
 
 
 def lit_glb(corner: Floats, uv: Floats, image: bytes) -> bytes:

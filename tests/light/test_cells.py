@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from ptmtools.arrays import Floats
-from ptmtools.light.cells import ABOVE, Baking, CellLight, Piece, exposed
+from ptmtools.light.cells import ABOVE, Baking, CellLight, Piece, encoded, exposed
+from ptmtools.light.lightmap import vertex_light
+from ptmtools.light.looks import Rays
 from ptmtools.light.occlusion import light, normals, turns
 from ptmtools.light.options import LightOptions
 from tests.light.shapes import bilinear, quad, surroundings
@@ -115,12 +117,15 @@ def test_dense_objects_have_light_at_vertices() -> None:
     halves = [np.stack(k, axis=2).reshape(-1, 3, 3) for k in ((a, b, c), (a, c, d))]
     floor = np.concatenate(halves)
     box = quad((3, 0, 3), (3, 0, 6), (3, 3, 6), (3, 3, 3))
-    result = Baking(surroundings(floor, box), LightOptions("bake")).light(piece(floor, dense=True))
+    around, options = surroundings(floor, box), LightOptions("bake")
+    result = Baking(around, options).light(piece(floor, dense=True))
     assert result.texels is None
     assert not result.mapped.any()
     near = np.abs(floor[..., 0] - 3.05) < 0.1
     assert result.vertex[near & (floor[..., 2] > 3.5)].mean() < 200
     assert result.vertex[floor[..., 0] < 0.1].mean() > 230
+    half = Rays(around, floor, options.light_samples // 2, options.light_reach, above=ABOVE)
+    assert (result.vertex == encoded(vertex_light(half, floor, normals(floor)))).all()
 
 
 def test_a_cell_without_surfaces() -> None:

@@ -93,7 +93,7 @@ def test_small_images_have_no_light_and_large_ones_have_it(tmp_path: Path) -> No
     assert (lit["light"], lit["lightmaps"]) == ("bake", 2)
     # Lightmaps of so few texels, with the noise of few rays, have more bytes a texel than expected.
     assert 0 < lit["ptm_bytes"] <= 1.2 * SHARE * total
-    assert "9.1 texels to the metre" in LIGHT.summarize(lit)
+    assert "reduced to 9.1 texels per metre, to save bytes" in LIGHT.summarize(lit)
     assert lit["ran"] >= {TEXTURES.name, LIGHT.name}
     # As many bytes as before, but for the noise.
     texels = np.random.default_rng(99).integers(0, 256, (96, 96, 3), dtype=np.uint8)

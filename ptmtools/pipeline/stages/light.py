@@ -276,7 +276,7 @@ def _summary(n: Mapping[str, Any]) -> str:
     reduced = n.get("reduced_density", 0.0)
     parts = [("of the model", n.get("light") == "model"), ("with lamps", n.get("lamps")),
              ("with the sky", n.get("sky")),
-             (f"only {reduced:.1f} texels to the metre beside these images", reduced)]  # fmt: skip
+             (f"reduced to {reduced:.1f} texels per metre, to save bytes", reduced)]  # fmt: skip
     return (
         f"{count(n['lightmaps'], 'lightmap')} of {count(n['texels'], 'texel')}, "
         f"{size(n['ptm_bytes'])}" + "".join(f", {text}" for text, given in parts if given)
@@ -294,8 +294,11 @@ def _fits_cells(light: Light, cells: Cells) -> str:
 LIGHT: Stage[Light] = Stage(
     name="light",
     about="Bake the light of the surfaces into lightmaps.",
-    recipe=3,
-    changed="light is baked by default if it costs little beside the images",
+    recipe=4,
+    changed=(
+        "light is baked by default if it costs little beside the images, and light at vertices "
+        "takes half of the rays"
+    ),
     options=LightOptions,
     reads=_reads,
     inputs=_inputs,
