@@ -148,3 +148,30 @@ def package(root: Path, to: Path) -> Path:
     """A .usdz of a layer and all that it names."""
     assert UsdUtils.CreateNewUsdzPackage(str(root), str(to))
     return to
+
+
+def two_rooms(path: Path) -> Any:
+    """Two rooms of 6 x 3 x 5 m with an opening between them, textured."""
+    on = stage(path)
+    quad = [(0, 0, 0), (0, 0, 5), (6, 0, 5), (6, 0, 0)]
+    up = [(x, 3, z) for x, _, z in quad]
+    image = texture(on, "/World/paint/image", "./maps/brick.png")
+    paint = material(on, "/World/paint", diffuseColor=rgb(image))
+    for n in range(2):
+        below = f"/World/room_{n}"
+        at = UsdGeom.Xform.Define(on, below)
+        at.AddTranslateOp().Set((6.0 * n, 0, 0))
+        mesh(on, f"{below}/floor", quad, st=CORNERS)
+        mesh(on, f"{below}/ceiling", up[::-1], st=CORNERS)
+        for name, a, b in (("front", 0, 1), ("back", 2, 3), ("side", 1, 2), ("other", 3, 0)):
+            if (n, name) in ((0, "back"), (1, "front")):
+                continue
+            mesh(on, f"{below}/{name}", [quad[a], up[a], up[b], quad[b]], st=CORNERS)
+    # Between the two, with an opening in its middle.
+    wall = [(6, 0, 0), (6, 3, 0), (6, 3, 2), (6, 0, 2)]
+    half = [(6, 0, 3), (6, 3, 3), (6, 3, 5), (6, 0, 5)]
+    for name, points in (("wall_a", wall), ("wall_b", half)):
+        mesh(on, f"/World/{name}", points, st=CORNERS).CreateDoubleSidedAttr(True)
+    bind(on.GetPrimAtPath("/World"), paint)
+    on.GetRootLayer().Save()
+    return on
