@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -15,15 +13,9 @@ from ptmtools.cells import SubdivideOptions, subdivide
 from ptmtools.cli.main import main
 from ptmtools.scene import Scene, ingest, sandbox
 from tests.scene.ifc.ifc_house import DEEP, HIGH, STOREY, THICK, WIDE, Ifc, house, office
+from tests.scene.ifc.reading import SCHEMAS
 
-SCHEMAS = ("IFC2X3", "IFC4", "IFC4X3")
 LOW, TOP = (0, 0, 0), (4, 3, 2.5)
-
-
-@pytest.fixture(autouse=True)
-def ifcopenshell(require: Callable[[str, str], None]) -> None:
-    if find_spec("ifcopenshell") is None:
-        require("ifcopenshell", "pip install 'ptmtools[ifc]'")
 
 
 def walled(schema: str = "IFC4", unit: str = "MILLIMETERS", metres: float = 1e-3) -> Ifc:
