@@ -10,8 +10,8 @@ import pytest
 from ptmtools.cells import SubdivideOptions, structural_triangles, subdivide
 from ptmtools.cells.roles import Designated
 from ptmtools.scene.model import Kind, Scene
+from tests.cells.doored_rooms import found, leaf, rooms, scene, solid
 from tests.cells.test_detail import ball
-from tests.cells.test_doors import found, leaf, rooms, scene, solid
 from tests.conftest import scene_of
 
 

@@ -1,5 +1,5 @@
 """Door leaves that hide what is behind them and let visitors pass (`--doors pass`). The buildings
-are those of `test_doors`; expectations follow from docs/design/cells.md."""
+are those of `doored_rooms`; expectations follow from docs/design/cells.md."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ptmtools.visibility import check_conservative, compute_pvs
 from ptmtools.visibility.segments import Blockers
 from tests.cells.buildings import BuildingCase, carved, room
 from tests.cells.conftest import box, panel
-from tests.cells.test_doors import (
+from tests.cells.doored_rooms import (
     HOLE,
     OPEN,
     PAIR,
