@@ -18,6 +18,8 @@ from typing import Any
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from ptmtools.version import __version__
+
 ROOT = "ptmtools"
 
 
@@ -27,6 +29,7 @@ def main() -> None:
     parser.add_argument("-o", dest="folder", type=Path, default=Path("build/dist"))
     folder = parser.parse_args().folder
     libraries = installed(ROOT)
+    check_version(libraries[ROOT])
     text = bill_of(libraries)
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / f"{ROOT}-{libraries[ROOT].version}.cdx.json"
@@ -46,6 +49,16 @@ def installed(root: str) -> dict[str, Distribution]:
             known[name] = distribution(name)
             left += requirements(known[name])
     return known
+
+
+def check_version(of: Distribution) -> None:
+    """Raises SystemExit if the package was installed as another version than it now has: its
+    requirements may be those of that version, too."""
+    if of.version != __version__:
+        raise SystemExit(
+            f"{ROOT} {of.version} is installed, but ptmtools/version.py has {__version__}; "
+            "install it again: pip install --editable ."
+        )
 
 
 def requirements(of: Distribution) -> Iterator[str]:
