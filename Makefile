@@ -10,7 +10,7 @@
 # make bench-web     how soon a view is there, by the walk page and by what people do otherwise
 #                    (a day; it continues where it was stopped)
 # make fuzz    100,000 damaged and hostile files for every reader, 1,000 damaged buildings (an hour)
-# make page    bundle the page of web/page into the package, with esbuild
+# make page    bundle the page of web/page into the package, with esbuild; print its table of sizes
 # make dist    a wheel and an sdist in build/dist, with a bill of materials
 # make man     the manual page of ptm, in release/man (make dist packs it)
 # make sample  only the sample museum
@@ -182,6 +182,7 @@ docs-pictures: build/museum/.made
 page: $(VENV)/.installed-dev
 	@.ci/test-components
 	$(BIN)/python web/page/build.py
+	$(BIN)/python benchmarks/docs_tables.py page
 
 clean:
 	rm -rf build dist release/man *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

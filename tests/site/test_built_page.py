@@ -11,11 +11,25 @@ from pathlib import Path
 import pytest
 
 from benchmarks.npm import ESBUILD
+from benchmarks.page_weight import sent
 from ptmtools.errors import InputError
 from ptmtools.site import program
 from ptmtools.site.program import FORM_SCRIPTS, PAGE, PROGRAM, program_files
 
-BUILD = Path(__file__).parents[2] / "web" / "page" / "build.py"
+ROOT = Path(__file__).parents[2]
+BUILD = ROOT / "web" / "page" / "build.py"
+#: Sizes in kB that pages of the documentation quote, and the script.
+QUOTED = {
+    "devices.md": {
+        "gamepad.js": r"([\d.]+) kB \(`gamepad\.js`\)",
+        "xr.js": r"([\d.]+) kB \(`xr\.js`\)",
+    },
+    "offline.md": {
+        "offline.js": r"service worker, ([\d.]+) kB compressed",
+        "register.js": r"/register\.js` \| ([\d.]+) kB",
+    },
+    "embedding.md": {"ptm-walk.js": r"The element has less than (\d+) kB"},
+}
 
 
 def test_the_sources_give_the_page(require: Callable[[str, str], None], tmp_path: Path) -> None:
@@ -28,6 +42,19 @@ def test_the_sources_give_the_page(require: Callable[[str, str], None], tmp_path
     assert built.keys() == committed.keys()
     changed = [name for name in built if built[name] != committed[name]]
     assert changed == [], "run: python web/page/build.py"
+
+
+@pytest.mark.parametrize("page", QUOTED)
+def test_sizes_in_the_docs(page: str) -> None:
+    """Within 0.1 kB; benchmarks/docs_tables.py checks the table of all exact sizes."""
+    text = (ROOT / "docs/formats" / page).read_text("utf-8")
+    for script, pattern in QUOTED[page].items():
+        (quote,) = re.findall(pattern, text)
+        size = sent(PAGE / script) / 1000
+        if "less than" in pattern:
+            assert size < float(quote), script
+        else:
+            assert abs(size - float(quote)) < 0.1, script
 
 
 def test_scripts_import_nothing_at_once() -> None:
