@@ -129,7 +129,9 @@ def test_a_wrong_type_is_a_complaint(require: Callable[[str, str], None], tmp_pa
     shutil.copy(PACKAGE / "tsconfig.json", tmp_path)
     with (tmp_path / "src" / "crc32.js").open("a") as source:
         source.write('crc32("text");\n')
-    assert "crc32.js" in checked_types.complaints(tmp_path)
+    assert "crc32.js" in checked_types.complaints(tmp_path, tmp_path)
+    assert (tmp_path / f"{tmp_path.name}.tsbuildinfo").is_file()
+    assert "crc32.js" in checked_types.complaints(tmp_path, tmp_path), "a known one, again"
 
 
 def test_without_a_compiler_the_build_says_what_to_install(tmp_path: Path) -> None:
