@@ -95,21 +95,39 @@ test: $(VENV)/.installed-dev
 	@.ci/test-components
 	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal $(PYTEST_ARGS)
 
+# Groups of checks, the longest first. They run beside each other; the output of each is printed at its end.
+LINTS := lint-types lint-tables lint-scripts lint-docs lint-repository
+.PHONY: $(LINTS)
+
 lint: $(VENV)/.installed-dev
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
-	$(BIN)/mypy
 	@.ci/test-components
-	$(BIN)/python -m tests.web.checked_types
+	@$(MAKE) --no-print-directory --jobs=$(JOBS) --output-sync=target --keep-going $(LINTS)
+
+$(LINTS): $(VENV)/.installed-dev
+
+# One after the other: they share a cache.
+lint-types:
+	$(BIN)/mypy
 	$(BIN)/mypy --config-file benchmarks/mypy.ini
 	$(BIN)/mypy --config-file benchmarks/mypy.ini -p benchmarks.fuzz -p benchmarks.web_rivals
+
+lint-tables:
+	$(BIN)/python benchmarks/docs_tables.py --check
+
+lint-scripts:
+	$(BIN)/python -m tests.web.checked_types
+
+lint-docs:
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
+
+lint-repository:
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
 	@large=$$(git ls-files -z | xargs -0 stat -c '%s %n' | awk '$$1 > 1048576 { print $$2 }'); \
 	  [ -z "$$large" ] || { echo "Tracked files over 1 MiB: $$large" >&2; exit 1; }
 	$(BIN)/python benchmarks/house.py --check
-	$(BIN)/python benchmarks/docs_tables.py --check
 	$(BIN)/repo-review . --show err
 	$(BIN)/zizmor --offline --quiet .github
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
 
 bench-codec: $(VENV)/.installed-dev
 	@mkdir -p build/bench
