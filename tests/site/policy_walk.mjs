@@ -1,7 +1,11 @@
-// Prints what a client answers to a walk as Python's simulation wrote it down.
+// Prints what a client answers to walks, each a file, as Python's simulation wrote them down.
 
 import { readFileSync } from "node:fs";
 
 import { replay } from "./replay.mjs";
 
-console.log(JSON.stringify(await replay(JSON.parse(readFileSync(process.argv[2], "utf8")))));
+const answers = [];
+for (const file of process.argv.slice(2)) {
+  answers.push(await replay(JSON.parse(readFileSync(file, "utf8"))));
+}
+console.log(JSON.stringify(answers));

@@ -108,12 +108,14 @@ class Witness:
         own = {"policy": self.policy, "budget": self.budget, "events": self.events}
         return {**documents(self.world), **own}
 
-    def in_javascript(self, folder: Path) -> list[Any]:
-        """What the viewer's client answers to the same events."""
-        file = folder / "walk.json"
-        write(file, self.document())
-        answers: list[Any] = json.loads(run(HERE / "policy_walk.mjs", file))
-        return answers
+
+def in_javascript(folder: Path, *witnesses: Witness) -> list[list[Any]]:
+    """What the viewer's client answers to the events of each, in one process of node."""
+    files = [folder / f"walk-{k}.json" for k in range(len(witnesses))]
+    for file, witness in zip(files, witnesses, strict=True):
+        write(file, witness.document())
+    answers: list[list[Any]] = json.loads(run(HERE / "policy_walk.mjs", *files))
+    return answers
 
 
 def _seen(client: Client) -> Event:
