@@ -253,5 +253,6 @@ def _page(files: Lookup) -> Response:
         return match[1] + document.replace("<", "\\u003c") + match[3]
 
     text = _SETTINGS.sub(without_tour, text)
-    editor = rf'\g<0>\n<script type="module" src="\1/{SCRIPT}"></script>'
+    # Before that of the page, which writes the place of the visitor over the token in the address.
+    editor = rf'<script type="module" src="\1/{SCRIPT}"></script>\n\g<0>'
     return Response(_VIEWER.sub(editor, text), 200, _PAGE_HEADERS, HTML)
