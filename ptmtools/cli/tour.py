@@ -32,8 +32,10 @@ def commands() -> None:
 @json_option
 @with_console
 def init(console: Console, db: str, output: str | None, force: bool) -> None:
-    """Write a tour with a label for each picture and each named room of DB, and a view of it."""
+    """Write a tour with a label for each picture and each named room of DB, a view of it, and the
+    names of the places."""
     from ptmtools.files import refuse_existing, write_bytes
+    from ptmtools.output.served import place_names
     from ptmtools.pipeline.command import naming_command, open_database
     from ptmtools.pipeline.stage import Artifacts
     from ptmtools.pipeline.stages import APO, CELLS
@@ -46,20 +48,21 @@ def init(console: Console, db: str, output: str | None, force: bool) -> None:
     with naming_command(db):
         folder = open_database(db)
         artifacts = Artifacts(folder)
-        scene, cells = artifacts[APO], artifacts[CELLS]
-    text, pictures, rooms = first_tour(scene, cells, folder.manifest.model)
+        scene, cells, places = artifacts[APO], artifacts[CELLS], place_names(db)
+    text, pictures, rooms = first_tour(scene, cells, folder.manifest.model, places)
     write_bytes(file, text.encode(), force=force)
-    if not pictures + rooms:
-        console.warn(
-            "note: no object is a picture: upright, flat, with an image of its own, above the "
-            "floor (docs/formats/tour.md); place labels by hand with `ptm serve DB --edit`"
+    if pictures + rooms:
+        labels = f"labels of {count(pictures, 'picture')} and {count(rooms, 'room')}"
+        remedy = "write their texts into the file, or on the page with `ptm serve DB --edit`"
+    else:
+        labels = "no label yet: no object is a picture, and the model names no room"
+        remedy = (
+            "place labels with `ptm serve DB --edit`; a picture is upright, flat, with an image of "
+            "its own, above the floor (docs/formats/tour.md)"
         )
     console.result(
-        {"tour": str(file), "pictures": pictures, "rooms": rooms},
-        [
-            f"{file}: labels of {count(pictures, 'picture')} and {count(rooms, 'room')}",
-            "write their texts into the file, or on the page with `ptm serve DB --edit`",
-        ],
+        {"tour": str(file), "pictures": pictures, "rooms": rooms, "places": len(places)},
+        [f"{file}: {labels}; names of {count(len(places), 'place')}", remedy],
     )
 
 
@@ -76,7 +79,8 @@ def init(console: Console, db: str, output: str | None, force: bool) -> None:
 @json_option
 @with_console
 def check(console: Console, db: str, choice: str) -> None:
-    """Check a tour against DB: its form, its files, and the objects and rooms that it names."""
+    """Check a tour against DB: its form, its files, and the objects, rooms and places that it
+    names."""
     from ptmtools.errors import InputError
     from ptmtools.pipeline.command import naming_command, open_database
     from ptmtools.site.tours import site_tour

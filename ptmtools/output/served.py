@@ -161,6 +161,17 @@ def read_served(database: str | os.PathLike[str]) -> Served:
     )
 
 
+def place_names(database: str | os.PathLike[str]) -> tuple[str, ...]:
+    """The names of the viewpoints of a database, each once; none without hints. Raises
+    DatabaseError: PTM-D006 the hints are damaged."""
+    file = Path(database) / SERVED / HINTS
+    if not file.exists():
+        return ()
+    index, _ = _document(file, schemas.HINTS)
+    names = dict.fromkeys(str(row["description"]) for row in index["viewpoints"])
+    return tuple(filter(None, names))
+
+
 def _of(folder: Path, template: str, name: str) -> Path:
     return _inside(folder, template.replace("{name}", name))
 

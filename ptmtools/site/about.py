@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from html import escape
@@ -51,13 +51,17 @@ class About:
         if base:
             yield f'<link rel="canonical" href="{escape(base)}">'
             yield _property("url", base)
+        yield from self.texts()
+        if self.picture:
+            yield _property("image", base + self.picture)
+        yield f'<link rel="manifest" href="{MANIFEST}">'
+
+    def texts(self) -> Iterator[str]:
+        """Those of title and description."""
         yield _property("title", self.title)
         if self.description:
             both = 'name="description" property="og:description"'
             yield f"<meta {both} {_content(self.description)}>"
-        if self.picture:
-            yield _property("image", base + self.picture)
-        yield f'<link rel="manifest" href="{MANIFEST}">'
 
 
 def folder_of(address: str) -> str:
@@ -65,9 +69,12 @@ def folder_of(address: str) -> str:
     return f"{address.rstrip('/')}/" if address else ""
 
 
-def described(viewpoints: Sequence[Mapping[str, Any]]) -> str:
-    """The places of a building as a description."""
-    names = dict.fromkeys(str(row["description"]) for row in viewpoints if row["description"])
+def described(
+    viewpoints: Sequence[Mapping[str, Any]], rename: Callable[[str], str] = lambda name: name
+) -> str:
+    """The places of a building as a description; ``rename``: their names in the model → those that
+    visitors see."""
+    names = dict.fromkeys(rename(row["description"]) for row in viewpoints if row["description"])
     return ", ".join([*names][:_PLACES])
 
 

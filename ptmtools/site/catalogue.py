@@ -16,6 +16,7 @@ from html import escape
 from itertools import groupby
 from typing import Any, TypeVar
 
+from ptmtools.site.about import About
 from ptmtools.site.words import words_of
 from ptmtools.tour.markdown import html_of, plain_text
 from ptmtools.tour.model import Texts, in_language
@@ -109,21 +110,32 @@ class _Page:
         return (
             f'<!doctype html>\n<html lang="{escape(language)}" dir="{direction}">\n<head>\n'
             '<meta charset="utf-8">\n<meta name="viewport" content="width=device-width, '
-            f'initial-scale=1">\n{GENERATOR}\n<title>{escape(self._title)}</title>\n{alternates}'
+            f'initial-scale=1">\n{GENERATOR}\n<title>{escape(self._title)}</title>\n'
+            f"{self._about()}{alternates}"
             f'<link rel="icon" href="data:,">\n<style>{_STYLE}</style>\n'
             f"{self._linked_data()}</head>\n<body>\n"
             f'<a class="skip" href="#content">{escape(words["skip"])}</a>\n'
             f"<header>\n<h1>{escape(self._title)}</h1>\n"
+            f"{self._paragraph(self._tour.get('description'))}"
             f'<p><a href="{INDEX}">{escape(words["walk"])}</a></p>\n{nav}</header>\n'
             f'<main id="content">\n{"".join(self._sections())}</main>\n'
             f"<footer>\n<p>{escape(words['access'])}</p>\n</footer>\n</body>\n</html>\n"
         )
 
+    def _about(self) -> str:
+        """What link previews and search engines read."""
+        about = About(self._title, self._plain(self._tour.get("description")))
+        return "".join(f"{line}\n" for line in about.texts())
+
+    def _paragraph(self, texts: Texts | None) -> str:
+        text = self._span(texts)
+        return f"<p>{text}</p>\n" if text else ""
+
     def _sections(self) -> Iterator[str]:
         """Works under the names of their rooms."""
         for room, group in groupby(self._order(), self._room):
             articles = "".join(self._article(number) for number in group)
-            yield f"<section>\n<h2>{escape(room)}</h2>\n{articles}</section>\n"
+            yield f"<section>\n<h2>{self._room_heading(room)}</h2>\n{articles}</section>\n"
 
     def _order(self) -> list[int]:
         """Labels: rooms by their first stop, in them the order of the tour."""
@@ -135,6 +147,10 @@ class _Page:
     def _room(self, number: int) -> str:
         cell = self._tour["labels"][number]["cell"]
         return self._content.rooms.get(cell, self._words["elsewhere"])
+
+    def _room_heading(self, room: str) -> str:
+        """Its name in the language of the page, where the tour has one."""
+        return self._span(self._tour.get("places", {}).get(room)) or escape(room)
 
     def _article(self, number: int) -> str:
         label, words = self._tour["labels"][number], self._words
@@ -226,8 +242,11 @@ class _Page:
             "@context": "https://schema.org",
             "@type": "Collection",
             "name": self._title,
+            "description": self._plain(self._tour.get("description")),
+            "inLanguage": self._language,
             "hasPart": works,
         }
+        data = {name: value for name, value in data.items() if value}
         # Nothing in it ends the element that holds it.
         text = json.dumps(data, ensure_ascii=False).replace("<", "\\u003c")
         return f'<script type="application/ld+json">{text}</script>\n'

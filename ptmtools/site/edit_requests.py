@@ -165,6 +165,7 @@ class Editing:
             "shown": self.editor.shown(json.dumps(document).encode()),
             "file": str(self.editor.file),
             "rooms": self.editor.rooms(),
+            "places": self.editor.places(),
             "sounds": self.editor.sounds(),
             "captions": self.editor.captions(),
         }

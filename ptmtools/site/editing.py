@@ -166,6 +166,10 @@ class TourEditor:
         rooms = self._current().scene.rooms
         return list(dict.fromkeys(room.name for room in rooms if room.name and len(room.points)))
 
+    def places(self) -> list[str]:
+        """The names of places that a tour may change."""
+        return [*self._current().place_names()]
+
     def sounds(self) -> list[str]:
         """Recordings in the folder of the tour and below, relative to it."""
         return sorted(self._files(SOUNDS))

@@ -37,7 +37,7 @@ class Front:
 
     Attributes
     ----------
-    title: of the site.
+    title: of the site, if its tour has none.
     index: the document that the page reads first. url: its URL.
     poster: the URL of the poster, "" without one. openings: those of the openings.
     """
@@ -56,13 +56,15 @@ class Front:
         program = program_files()
         for entry in (*program.values(), element()):
             files.put(entry)
+        tour = self._tour(files)
+        title = self.options.title or (tour and tour.text("title")) or self.title
         settings = {
             "index": self.url,
             "worker": program["worker.js"].name,
             "wasm": program["decoder.wasm"].name,
             "poster": self.poster or None,
-            "title": self.title,
-            **self._tour(files),
+            "title": title,
+            **(self._tour_files(tour, title, files) if tour else {}),
         }
         preload = [self.url, program["decoder.wasm"].name]
         viewpoints = self.index["viewpoints"]
@@ -70,17 +72,17 @@ class Front:
             first = self.index["cells"][viewpoints[0]["cell"]]
             preload += [f"{DATA}/{first[kind]}" for kind in ("record", "geometry")]
         views = dict(zip(self.openings, map(address_of, viewpoints), strict=False))
-        description = self.options.description or described(viewpoints)
-        head = [*About(self.title, description, self.poster, self.options.address).lines()]
+        own = self.options.description or (tour and tour.text("description"))
+        description = own or described(viewpoints, *([tour.place] if tour else []))
+        head = [*About(title, description, self.poster, self.options.address).lines()]
         if self.options.offline:
             files.put(worker())
             head.append(registration(program))
         files.put(page(settings, program["viewer.js"].name, preload, views, head))
-        add_manifest(files, self.title)
+        add_manifest(files, title)
 
-    def _tour(self, files: Files) -> dict[str, str]:
-        """The settings of the page for the tour: its URL and that of its catalogue; none without a
-        tour."""
+    def _tour(self, files: Files) -> SiteTour | None:
+        """The tour, None without one and with one that a visitor would see nothing of."""
         tour, note = site_tour(
             self.folder,
             self.options.tour,
@@ -88,16 +90,25 @@ class Front:
         )
         if note:
             files.note(note)
-        if tour is None:
-            return {}
+        if tour and tour.empty:
+            files.note("the tour is empty: the site has none")
+            return None
+        return tour
+
+    def _tour_files(self, tour: SiteTour, title: str, files: Files) -> dict[str, str]:
+        """Adds the tour and its catalogue; returns the settings of the page for them: their URLs. A
+        tour without labels has no catalogue."""
         text = json.dumps(tour.document, ensure_ascii=False, separators=(",", ":")).encode()
         name = files.add("tour", ".json", "application/json", text, compressed=True)
-        pages = catalogue_of(self._catalogue(tour, files))
+        settings = {"tour": f"{DATA}/{name}"}
+        if not tour.document["labels"]:
+            return settings
+        pages = catalogue_of(self._catalogue(tour, title, files))
         for own, html in pages.items():
             files.put(Entry(own, secured(html).encode(), HTML, compressed=True))
-        return {"tour": f"{DATA}/{name}", "catalogue": next(iter(pages))}
+        return settings | {"catalogue": next(iter(pages))}
 
-    def _catalogue(self, tour: SiteTour, files: Files) -> Content:
+    def _catalogue(self, tour: SiteTour, title: str, files: Files) -> Content:
         stops: dict[int, Mapping[str, Any]] = {}
         for stop in tour.document["stops"]:
             if "label" in stop:
@@ -112,9 +123,7 @@ class Front:
         for viewpoint in self.served.index["viewpoints"]:
             rooms.setdefault(viewpoint["cell"], viewpoint["description"])
         address = folder_of(self.options.address)
-        return Content(
-            tour.document, self.title, rooms, pictures, tour.transcripts, f"{DATA}/", address
-        )
+        return Content(tour.document, title, rooms, pictures, tour.transcripts, f"{DATA}/", address)
 
     def _works(self, views: Sequence[Mapping[str, Any]]) -> list[bytes]:
         from ptmtools.site.pictures import WORK, pictures_of

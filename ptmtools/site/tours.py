@@ -15,14 +15,15 @@ import numpy as np
 from ptmtools.arrays import Floats
 from ptmtools.cells.model import Cells
 from ptmtools.errors import InputError, naming
+from ptmtools.output.served import place_names
 from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import APO, CELLS
 from ptmtools.scene.model import Scene
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.tour.captions import transcript_of
 from ptmtools.tour.markdown import nodes_of
-from ptmtools.tour.model import NAME, Label, Texts, Tour
-from ptmtools.tour.placing import Anchor, Placing
+from ptmtools.tour.model import NAME, Label, Texts, Tour, in_language
+from ptmtools.tour.placing import Anchor, Placing, unknown
 from ptmtools.tour.reading import CAPTIONS, SOUNDS, read_tour
 
 #: A file of the tour, and its media type → its URL, relative to the document.
@@ -57,6 +58,22 @@ class SiteTour:
     document: dict[str, Any]
     transcripts: Mapping[int, Texts]
 
+    @property
+    def empty(self) -> bool:
+        """Whether a visitor would see nothing of it."""
+        return not any(value for name, value in self.document.items() if name != "languages")
+
+    def text(self, name: str) -> str:
+        """The title or the description of the walk in the default language, "" without one."""
+        return self._first(self.document.get(name)) or ""
+
+    def place(self, name: str) -> str:
+        """The name of a place in the default language."""
+        return self._first(self.document.get("places", {}).get(name)) or name
+
+    def _first(self, texts: Texts | None) -> str | None:
+        return in_language(texts, "", self.document["languages"][0])[0]
+
 
 def site_tour(folder: DatabaseFolder, choice: str, name_of: NameOf) -> tuple[SiteTour | None, str]:
     """The tour of a site, None without one; and a note, "" without one.
@@ -88,15 +105,26 @@ class TourPlacer:
     def __init__(self, folder: DatabaseFolder) -> None:
         """Raises PTM-D004 to D008 for the artifacts."""
         artifacts = Artifacts(folder)
+        self._folder = folder
         self.scene: Scene = artifacts[APO]
         self._cells: Cells = artifacts[CELLS]
         self.placing = Placing(self.scene)
 
     def placed(self, tour: Tour, name_of: NameOf) -> dict[str, Any]:
-        """The document of a tour on the page; raises as `Placing.anchors`."""
+        """The document of a tour on the page; raises as `Placing.anchors`, and PTM-I302 no place
+        has a name of `Tour.renamed`."""
         places = self.placing.anchors(tour)
         markers = np.array([place.marker for place in places]).reshape(-1, 3)
+        renamed = tour.renamed
+        known = self.place_names() if renamed else ()
+        for name in renamed:
+            if name not in known:
+                raise unknown("place", name, known, f"places.{name}")
         return _document(tour, places, self._cells.locate(markers).tolist(), name_of)
+
+    def place_names(self) -> tuple[str, ...]:
+        """The names of the viewpoints; raises as `place_names`."""
+        return place_names(self._folder.path)
 
 
 def _document(
@@ -115,8 +143,13 @@ def _document(
         }
         for stop in tour.stops
     ]
-    title = {"title": tour.title} if tour.title else {}
-    return {"languages": list(tour.languages), **title, "labels": labels, "stops": stops}
+    walk = {"title": tour.title, "description": tour.description, "places": tour.renamed}
+    return {
+        "languages": list(tour.languages),
+        **{name: texts for name, texts in walk.items() if texts},
+        "labels": labels,
+        "stops": stops,
+    }
 
 
 def _label(label: Label, place: Anchor, cell: int, name_of: NameOf) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
@@ -73,7 +73,8 @@ class Tour:
     ----------
     languages: tags; the first is the default.
     labels, stops: in the order of the file.
-    title: of the tour, or None.
+    title, description: of the walk, plain text, or None.
+    places: names of viewpoints by the name that the model gives them, which the menu of places has.
     model: file name of the model that it describes, or "".
     """
 
@@ -82,6 +83,13 @@ class Tour:
     stops: tuple[Stop, ...] = ()
     title: Texts | None = None
     model: str = ""
+    description: Texts | None = None
+    places: Mapping[str, Texts] = field(default_factory=dict)
+
+    @property
+    def renamed(self) -> dict[str, Texts]:
+        """`places` without those that keep the name of the model."""
+        return {name: texts for name, texts in self.places.items() if {*texts.values()} != {name}}
 
     def files(self) -> Iterator[Path]:
         """All sounds and captions."""

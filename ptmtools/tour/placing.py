@@ -63,14 +63,15 @@ class Placing:
         if label.object:
             own = self._faces.get(label.object, np.zeros(0, np.int64))
             if not len(own):
-                raise _unknown("object", label.object, scene.objects, number)
+                raise unknown("object", label.object, scene.objects, f"labels[{number}].object")
             if label.object not in self._known:
                 self._known[label.object] = self._of_faces(own)
             return self._known[label.object]
         if label.room:
             rooms = [room for room in scene.rooms if room.name == label.room and len(room.points)]
             if not rooms:
-                raise _unknown("room", label.room, [room.name for room in scene.rooms], number)
+                names = [room.name for room in scene.rooms]
+                raise unknown("room", label.room, names, f"labels[{number}].room")
             low, high = rooms[0].points.min(axis=0), rooms[0].points.max(axis=0)
             marker = (low + high) / 2
             marker[1] = min(low[1] + _ROOM_HEIGHT, high[1])
@@ -103,13 +104,12 @@ def faces_of_objects(scene: Scene) -> dict[str, Ints]:
     return faces
 
 
-def _unknown(kind: str, name: str, names: Sequence[str], number: int) -> InputError:
+def unknown(kind: str, name: str, names: Sequence[str], place: str) -> InputError:
+    """An error: no object, room or place of the model has this name."""
     near = get_close_matches(name, {n for n in names if n}, 1)
     remedy = (
         f"there is one called {near[0]}"
         if near
         else f"name {'an' if kind[0] == 'o' else 'a'} {kind} of the model"
     )
-    return InputError(
-        "PTM-I302", f"no {kind} is called {name}", place=f"labels[{number}].{kind}", remedy=remedy
-    )
+    return InputError("PTM-I302", f"no {kind} is called {name}", place=place, remedy=remedy)

@@ -96,8 +96,19 @@ def _tour(document: Mapping[str, Any], folder: Path) -> Tour:
             raise _wrong(f"{place}.label", f"no label has the id {id}")
         title = reader.texts(row, "title", place)
         stops.append(Stop(_view(row["view"], place), order.get(id, -1), title))
-    title = reader.texts(document, "title", "")
-    return Tour(languages, tuple(labels.values()), tuple(stops), title, document.get("model", ""))
+    places = {}
+    for name in document.get("places", ()):
+        if texts := reader.texts(document["places"], name, "places"):
+            places[name] = texts
+    return Tour(
+        languages,
+        tuple(labels.values()),
+        tuple(stops),
+        reader.texts(document, "title", ""),
+        document.get("model", ""),
+        reader.texts(document, "description", ""),
+        places,
+    )
 
 
 class _Reader:

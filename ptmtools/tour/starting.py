@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,7 +27,7 @@ from ptmtools.tour.writing import formatted
 _LEAST, _GREATEST = 0.1, 5.0
 #: Height of its lower edge above the floor, metres; span of its texture coordinates; and number of
 #: objects that may show the same image.
-_HANGS, _SPAN, _COPIES = 0.3, 1.05, 8
+_HANGS, _SPAN, _COPIES = 0.3, 1.05, 16
 #: Height of a standing visitor's eye, and of the eye region that the floor is searched in, metres.
 _EYE = 1.6
 #: Vertical field of view of a stop, width by height of a narrow window, and the share of the window
@@ -54,8 +54,11 @@ class Proposal:
     view: dict[str, Any] | None
 
 
-def first_tour(scene: Scene, cells: Cells, model: str) -> tuple[str, int, int]:
-    """The text of a tour, and its numbers of pictures and rooms."""
+def first_tour(
+    scene: Scene, cells: Cells, model: str, places: Sequence[str] = ()
+) -> tuple[str, int, int]:
+    """The text of a tour, and its numbers of pictures and rooms; ``places``: the names that the
+    menu of places has."""
     pictures, rooms = list(_pictures(scene, cells)), list(_rooms(scene, cells))
     ids: set[str] = set()
     labels, stops = [], []
@@ -69,6 +72,7 @@ def first_tour(scene: Scene, cells: Cells, model: str) -> tuple[str, int, int]:
         "schema": SCHEMA,
         "model": model,
         "languages": ["en"],
+        **({"places": {name: {"en": name} for name in places}} if places else {}),
         "labels": labels,
         "stops": stops,
     }

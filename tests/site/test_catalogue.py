@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -81,6 +82,31 @@ def test_works_are_listed_by_room_in_the_order_of_the_tour() -> None:
     assert "ليل" in other.text
     spans = [row for row in other.all("div") if row.get("lang") == "en"]
     assert spans, "a text in another language says so"
+
+
+def test_rooms_have_names_in_the_language_of_the_page() -> None:
+    plain = content(label("a"), label("b", 1))
+    walk = {
+        "title": {"en": "Walk", "ar": "جولة"},
+        "description": {"en": "Old works."},
+        "places": {"Hall": {"en": "Red hall", "ar": "القاعة الحمراء"}, "Attic": {"en": HOSTILE}},
+    }
+    pages = catalogue_of(replace(plain, tour={**plain.tour, **walk}))
+    page, other = (Page(pages[name]) for name in ("catalogue.html", "catalogue-ar.html"))
+    assert "Red hall" in page.text
+    assert "Old works." in page.text
+    assert "القاعة الحمراء" in other.text
+    assert page.all("span")[0] == {"dir": "auto"}
+    assert {"dir": "auto", "lang": "en"} in other.all("span"), "a name in another language"
+    assert HOSTILE in page.text
+    assert len(page.all("script")) == 1
+    assert [row["content"] for row in page.all("meta") if row.get("property")] == [
+        "Walk: Catalogue",
+        "Old works.",
+    ]
+    text = pages["catalogue-ar.html"].partition('<script type="application/ld+json">')[2]
+    data = json.loads(text.partition("</script>")[0])
+    assert (data["inLanguage"], data["description"]) == ("ar", "Old works.")
 
 
 def test_linked_data_names_the_works() -> None:

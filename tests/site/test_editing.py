@@ -109,7 +109,7 @@ def test_a_tour_is_made_saved_and_shown(page: Page) -> None:
     (script,) = re.findall(rb"viewer-\w+/editor\.js", editor)
     assert page.client(f"/{script.decode()}").status == 200
     # The page writes the place of the visitor over the token soon after its script has begun.
-    assert editor.index(script) < editor.index(b"/viewer.js\"></script>")
+    assert editor.index(script) < editor.index(b'/viewer.js"></script>')
     again = page.save({**TOUR, "title": "Works"}, message(saved)["tag"])
     assert again.status == 200
     assert page.file.read_text().count("\n") > 10, "in lines, as it was"

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from ptmtools.errors import InputError
+from ptmtools.output.served import place_names
 from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import CELLS, SCENE
@@ -41,6 +42,13 @@ def tour_file(museum_db: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
     document = json.loads(text)
     document["languages"] = ["en", "de"]
     document["title"] = {"en": "Highlights", "de": "Höhepunkte"}
+    document["description"] = {"en": "Old works.", "de": "Alte Werke."}
+    first, second, third, *_ = place_names(museum_db)
+    document["places"] = {
+        first: {"en": "Red hall", "de": "Roter Saal"},
+        second: {"en": HOSTILE},
+        third: {"en": third},
+    }
     first, second, *_ = document["labels"]
     first |= {
         "title": {"en": "Night", "de": "Nacht"},
@@ -197,6 +205,66 @@ def test_languages_side_by_side(visitor: Visitor) -> None:
     # Without a German text, the English one says so.
     assert panel.locator("div[lang=en] em").inner_text() == "dark"
     assert page.locator("#tour h2").inner_text() == "Höhepunkte"
+    assert page.locator("#tour h2 + p").inner_text() == "Alte Werke."
+
+
+def test_the_walk_and_its_places_have_names_in_each_language(
+    visitor: Visitor, museum_db: Path
+) -> None:
+    page, (model, _, third) = visitor.page, place_names(museum_db)[:3]
+    assert page.title() == "Highlights"
+    page.get_by_role("button", name="Places").click()
+    places = page.locator("#places ol button")
+    places.first.wait_for()
+    assert places.all_inner_texts()[:3] == ["Red hall", HOSTILE, third]
+    assert page.locator("#places img").count() == 0, "a text stays text"
+    page.evaluate("ptm.goTo(0)")
+    page.get_by_role("button", name="Map").click()
+    page.get_by_text("Red hall").nth(1).wait_for()
+    page.get_by_role("button", name="Tour", exact=True).click()
+    page.get_by_label("Language").select_option("de")
+    assert page.title() == "Höhepunkte"
+    assert page.locator("title").get_attribute("lang") == "de"
+    assert places.first.inner_text() == "Roter Saal"
+    assert places.first.locator("span").get_attribute("lang") == "de"
+    assert places.nth(1).locator("span").get_attribute("lang") == "en", "only in English"
+    assert places.nth(2).locator("span").get_attribute("lang") == "", "the name of the model"
+    page.locator("#map .place", has_text="Roter Saal").wait_for()
+    assert "Roter Saal" in page.locator("#map canvas").get_attribute("aria-label")
+    row = page.evaluate("ptm.index.viewpoints[0]")
+    assert row["description"] == model, "programs get the same name in each language"
+
+
+def test_the_page_has_title_and_places_of_the_tour(toured: Site, museum_db: Path) -> None:
+    page = toured.entries["index.html"].read().decode()
+    assert "<title>Highlights</title>" in page
+    assert 'property="og:description" content="Old works."' in page
+    catalogue = toured.entries["catalogue-de.html"].read().decode()
+    assert 'property="og:title" content="Höhepunkte: Katalog"' in catalogue
+    assert 'property="og:description" content="Alte Werke."' in catalogue
+    own = site_of(museum_db, SiteOptions(pictures=False, opening=False, title="A & B", tour="none"))
+    assert "<title>A &amp; B</title>" in own.entries["index.html"].read().decode()
+
+
+def test_an_empty_tour_is_none(museum_db: Path, tmp_path: Path) -> None:
+    """As `ptm tour init` writes it where it finds nothing."""
+    names = place_names(museum_db)
+    file = tmp_path / "tour.json"
+    empty = {"format": "ptmtools tour", "schema": 1, "languages": ["en"], "labels": []}
+    options = SiteOptions(pictures=False, opening=False, tour=str(file))
+    file.write_text(json.dumps(empty | {"places": {name: {"en": name} for name in names}}))
+    site = site_of(museum_db, options)
+    assert not any("tour-" in name or "catalogue" in name for name in site.entries)
+    assert any("tour is empty" in note for note in site.notes)
+    # Names alone have no catalogue.
+    file.write_text(json.dumps(empty | {"places": {names[0]: "Hall"}}))
+    again = site.again()
+    assert tour_name(again)
+    assert not any("catalogue" in name for name in again.entries)
+    file.write_text(json.dumps(empty | {"places": {"Nowhere": "Hall"}}))
+    with pytest.raises(InputError, match="PTM-I302") as caught:
+        site.again()
+    assert caught.value.place == "places.Nowhere"
 
 
 def test_the_browsers_language_and_a_link_to_a_label(chromium: Any, toured: Site) -> None:

@@ -52,8 +52,13 @@ def test_a_complete_tour(folder: Path) -> None:
         "link": "https://example.org",
     }
     stops = [{"label": "one", "view": VIEW}, {"view": VIEW, "title": "End"}]
-    tour = read_tour(write(folder, document(labels=[label], stops=stops, title="T", model="m.obj")))
+    places = {"Room 1": {"en": "Hall", "de": ""}, "Room 2": "Room 2", "Room 3": {}}
+    walk = {"title": "T", "model": "m.obj", "description": {"de": "Alt"}, "places": places}
+    tour = read_tour(write(folder, document(labels=[label], stops=stops, **walk)))
     assert (tour.languages, tour.title, tour.model) == (("en", "de"), {"": "T"}, "m.obj")
+    assert tour.description == {"de": "Alt"}
+    assert tour.places == {"Room 1": {"en": "Hall"}, "Room 2": {"": "Room 2"}}
+    assert tour.renamed == {"Room 1": {"en": "Hall"}}, "the other keeps the name of the model"
     (own,) = tour.labels
     assert own.title == {"en": "Night", "de": "Nacht"}
     assert own.text == {"en": "*Text*"}, "an empty text is none"
@@ -74,6 +79,9 @@ def test_a_complete_tour(folder: Path) -> None:
         ('{"format": "x"}', "", "its format is not"),
         (document(schema=2), "", "schema 2"),
         (document(languages=[]), "languages", "fewer than"),
+        (document(places={"Hall": {"fr": "Salle"}}), "places.Hall.fr", "among the languages"),
+        (document(places={"Hall": 7}), "places.Hall", "not of type"),
+        (document(description={"fr": "x"}), "description.fr", "among the languages"),
         (document(languages=["en", "EN"]), "languages", "twice"),
         (document(languages=["../x"]), "languages[0]", "does not match"),
         (document(labels=[LABEL, LABEL]), "labels[1].id", "earlier label"),

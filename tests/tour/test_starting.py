@@ -101,7 +101,9 @@ def test_unknown_names_are_errors_with_the_nearest_name(built: tuple[Scene, Cell
 
 def test_a_wall_is_no_picture() -> None:
     scene = ingest(Path(__file__).resolve().parents[2] / "sample_data/two_rooms/two_rooms.obj")
-    assert first_tour(scene, subdivide(scene), "two_rooms.obj")[1] == 0
+    text, pictures, rooms = first_tour(scene, subdivide(scene), "two_rooms.obj", ["Room 1"])
+    assert (pictures, rooms) == (0, 0)
+    assert json.loads(text)["places"] == {"Room 1": {"en": "Room 1"}}
 
 
 def test_pictures_as_programs_write_them(tmp_path: Path) -> None:

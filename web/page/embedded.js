@@ -24,8 +24,8 @@ export function attachEmbedding(app) {
   if (app.walk.begun) ready();
   else app.on("first-picture", ready);
   app.on("cell", (cell) => {
-    const name = app.index.viewpoints.find((row) => row.cell === cell)?.description ?? "";
-    tell("room", { cell, name });
+    const place = app.index.viewpoints.find((row) => row.cell === cell), name = place?.description ?? "";
+    tell("room", { cell, name, title: place?.title?.text ?? name });
   });
   app.on("label", (id) => tell("label", { id }));
   addEventListener("message", ({ source, data }) => {

@@ -54,6 +54,7 @@ import { levelSizes } from "../../client/src/levels.js";
  * @property {number} fieldOfView
  * @property {number} cell
  * @property {string} [thumbnail]
+ * @property {{text: string, tag: string} | null} [title] its name in a tour, and the language of that
  *
  * @typedef {object} Index
  * @property {number} schema

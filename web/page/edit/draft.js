@@ -2,7 +2,7 @@
 
 /** The order of the fields of a label and of a stop in new texts. */
 const ORDER = [
-  "id", "label", "object", "room", "at", "title", "maker", "date", "text", "image", "sound", "captions", "link", "view",
+  "id", "label", "object", "room", "at", "title", "description", "maker", "date", "text", "image", "sound", "captions", "link", "view",
 ];
 /** Fields that are the same in all languages unless the tour has them in several. */
 const COMMON = new Set(["maker", "date", "sound", "captions", "link"]);
@@ -114,8 +114,9 @@ export class Draft {
   /** Removes a language with its texts. @param {string} tag */
   removeLanguage(tag) {
     this.document.languages = this.languages.filter((one) => one !== tag);
-    for (const row of [this.document, ...this.labels, ...this.stops]) {
-      for (const name of ORDER) {
+    const { places = {} } = this.document;
+    for (const row of [this.document, places, ...this.labels, ...this.stops]) {
+      for (const name of row === places ? Object.keys(places) : ORDER) {
         const texts = row[name];
         if (!isTexts(texts)) continue;
         delete texts[tag];

@@ -32,13 +32,17 @@ export function labelled(name, element, hint = "", ...more) {
  * @param {import("./draft.js").Row} row
  * @param {string} name of the field
  * @param {string} title of the field for people
- * @param {{long?: boolean, hint?: string, options?: string[]}} [kind] `options`: files to choose from
+ * @param {{long?: boolean, hint?: string, options?: string[], keep?: () => void}} [kind] `options`: files to choose
+ *   from; `keep`: puts a new row into the document
  */
-export function textField(editor, row, name, title, { long = false, hint = "", options } = {}) {
+export function textField(editor, row, name, title, { long = false, hint = "", options, keep = () => {} } = {}) {
   const { draft, language } = editor, first = draft.languages[0];
   const value = textIn(row, name, language), common = isCommon(row, name);
   const step = `change of ${title.toLowerCase()}`;
-  const write = () => editor.step(step, () => putText(row, name, language, input.value), `${name} ${language}`);
+  const write = () => editor.step(step, () => {
+    putText(row, name, language, input.value);
+    keep();
+  }, `${name} ${language}`);
   const properties = { "data-field": name, dir: "auto", lang: common ? "" : language, value };
   const known = options && [...new Set([...options, ...(value ? [value] : [])])];
   const input = known
@@ -52,7 +56,10 @@ export function textField(editor, row, name, title, { long = false, hint = "", o
   if (draft.languages.length < 2) return labelled(title, input, hint);
   const all = make("input", { type: "checkbox", checked: common });
   all.onchange = () => {
-    editor.step(step, () => putCommon(row, name, all.checked, language, first));
+    editor.step(step, () => {
+      putCommon(row, name, all.checked, language, first);
+      keep();
+    });
     editor.refresh(name);
   };
   return labelled(title, input, hint, make("label", { className: "all" }, all, "all languages"));

@@ -35,11 +35,26 @@ export function listForm(editor) {
       ? [make("h3", {}, "Labels without a stop"), make("ul", {}, ...free.map((number) =>
         make("li", {}, button(editor.nameOf(number), () => editor.open(number), { className: "name", dir: "auto" }))))]
       : []),
-    make("h3", {}, "Title of the tour"),
+    make("h3", {}, "The walk"),
     languageTabs(editor),
     textField(editor, draft.document, "title", "Title"),
+    textField(editor, draft.document, "description", "Description"),
+    placesForm(editor),
     ...languageForm(editor),
   ];
+}
+
+/** The names of the places, in the language of the tab. @param {Editor} editor */
+function placesForm(editor) {
+  const { draft, loaded } = editor, places = draft.document.places ?? {};
+  const keep = () => {
+    if (Object.keys(places).length) draft.document.places = places;
+    else delete draft.document.places;
+  };
+  const names = [...new Set([...loaded.places, ...Object.keys(places)])];
+  return make("details", { open: editor.opened.has("places"), ontoggle: editor.toggled("places") },
+    make("summary", {}, "Names of the places"),
+    ...names.map((name) => textField(editor, places, name, name, { keep })));
 }
 
 /** Languages to add and remove. @param {Editor} editor */

@@ -11,6 +11,7 @@ const KEPT = "ptm-edit-token";
  * @property {Shown} shown
  * @property {string} file
  * @property {string[]} rooms
+ * @property {string[]} places names of the viewpoints
  * @property {string[]} sounds
  * @property {string[]} captions
  */

@@ -28,7 +28,13 @@ import { tour as words } from "../words/english.js";
  * @property {number} [label]
  * @property {Texts} [title]
  *
- * @typedef {{languages: string[], title?: Texts, labels: Label[], stops: Stop[]}} Document
+ * @typedef {object} Document
+ * @property {string[]} languages
+ * @property {Texts} [title]
+ * @property {Texts} [description]
+ * @property {Record<string, Texts>} [places] names of viewpoints, by those of the model
+ * @property {Label[]} labels
+ * @property {Stop[]} stops
  */
 
 /** @param {any} value @param {number} count */

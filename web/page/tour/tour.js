@@ -69,7 +69,7 @@ export class Tour {
       nameOf: (label) => this.nameOf(label),
       open: (label) => this.show(label),
     });
-    this.#fillList();
+    this.#fill();
     this.#listen();
     const label = tour.labels.findIndex(({ id }) => id === query.get("label")), stop = query.get("stop") ?? "";
     if (label >= 0) this.visit(label);
@@ -123,9 +123,30 @@ export class Tour {
     });
   }
 
+  /** Fills what is in the language of the visitor, besides the labels. */
+  #fill() {
+    this.#fillList();
+    this.#name();
+  }
+
+  /** Names the page and the places. */
+  #name() {
+    const { title, places = {} } = this.tour, { config, index } = this.app, chosen = this.choose(title);
+    // A title that `ptm publish` was given stays.
+    if (chosen && config.title === inLanguage(title, "", this.tour.languages[0])?.text) {
+      find(document, "title").lang = chosen.tag;
+      document.title = String(chosen.text);
+    }
+    for (const place of index.viewpoints) {
+      place.title = Object.hasOwn(places, place.description) ? this.choose(places[place.description]) : null;
+    }
+    for (const panel of ["#places", "#map"]) find(document, panel).dispatchEvent(new Event("rename"));
+  }
+
   #fillList() {
-    const { languages, stops, title } = this.tour;
-    const chosen = this.choose(title);
+    const { languages, stops, labels, title, description } = this.tour;
+    const chosen = this.choose(title), about = this.choose(description);
+    this.button.hidden = !(stops.length || labels.length || about || languages.length > 1);
     const heading = make("h2", { lang: chosen?.tag ?? "", dir: "auto" }, chosen?.text ?? words.tour);
     const rows = stops.map((_, stop) => {
       const button = make("button", { dir: "auto", onclick: () => this.go(stop) }, this.#titleOf(stop));
@@ -137,6 +158,7 @@ export class Tour {
     const { catalogue = "" } = this.app.config;
     this.list.replaceChildren(
       heading,
+      ...(about ? [make("p", { lang: about.tag, dir: "auto" }, String(about.text))] : []),
       ...(languages.length > 1 ? [select] : []),
       make("ol", {}, ...rows),
       ...(catalogue ? [make("p", {}, make("a", { href: catalogue }, words.catalogue))] : []),
@@ -152,7 +174,7 @@ export class Tour {
   /** Shows everything in a language; the focus stays. @param {string} language */
   speakQuietly(language) {
     this.language = language;
-    this.#fillList();
+    this.#fill();
     this.markers.rename();
     if (this.open >= 0) this.show(this.open, true);
   }
@@ -173,7 +195,7 @@ export class Tour {
     this.markers.renew(tour.labels);
     if (!tour.languages.includes(this.language)) this.language = tour.languages[0];
     if (!(this.stop in tour.stops)) this.stop = -1;
-    this.#fillList();
+    this.#fill();
     if (this.open in tour.labels) this.show(this.open, true);
     else if (!this.panel.hidden) this.close();
   }

@@ -11,7 +11,7 @@ import { page } from "../words/english.js";
 /**
  * The parts of the application that the interface uses.
  * @typedef {object} App
- * @property {{viewpoints: {name: string, description: string, thumbnail?: string}[]}} index
+ * @property {{viewpoints: import("../data/site.js").Viewpoint[]}} index
  * @property {{index: string}} config the settings in the page
  * @property {import("../walk/walker.js").Walker} walker
  * @property {HTMLCanvasElement} canvas

@@ -15,11 +15,11 @@ const HERE = "#ffc766", SEEN = "#7fa8d8", REST = "#ffffff24", WALLS = "#f4f1ea8c
 /** @param {HTMLElement} root the panel @param {App} app */
 export function attachMinimap(root, app) {
   const plan = make("canvas", { role: "img" });
-  const storey = make("span"), key = make("p", { className: "key" });
+  const storey = make("span"), place = make("p", { className: "place", dir: "auto" }), key = make("p", { className: "key" });
   for (const [name, color] of [[panels.here, HERE], [panels.visible, SEEN]]) {
     key.append(make("span", { style: `--color:${color}` }, name), " ");
   }
-  root.append(make("h2", {}, panels.map, storey), plan, key);
+  root.append(make("h2", {}, panels.map, storey), plan, place, key);
   const paint = plan.getContext("2d");
   let timer = 0, last = "";
 
@@ -33,7 +33,10 @@ export function attachMinimap(root, app) {
     const storeys = storeysOf(cells);
     const number = Math.max(1, storeys.filter((floor) => floor < eye[1]).length);
     storey.textContent = storeys.length > 1 ? fill(panels.storey, { number, count: storeys.length }) : "";
-    plan.ariaLabel = fill(panels.plan, { number, cell: here });
+    const title = app.index.viewpoints.find(({ cell }) => cell === here)?.title;
+    place.lang = title?.tag ?? "";
+    place.textContent = title?.text ?? "";
+    plan.ariaLabel = [fill(panels.plan, { number, cell: here }), ...(title ? [title.text] : [])].join(": ");
 
     const [left, top] = [0, 2].map((k) => Math.min(...cells.map(({ low }) => low[k])));
     const [right, bottom] = [0, 2].map((k) => Math.max(...cells.map(({ high }) => high[k])));
@@ -70,6 +73,7 @@ export function attachMinimap(root, app) {
     paint.stroke();
     paint.fill();
   };
+  root.addEventListener("rename", () => (last = ""));
   root.addEventListener("open", () => {
     last = "";
     timer = setInterval(draw, OFTEN);
