@@ -28,7 +28,7 @@ from ptmtools.cli.parameters import (
 from ptmtools.pipeline.validation import check_folder
 from ptmtools.quantities import count, size
 from ptmtools.site.about import folder_of
-from ptmtools.site.content import Site, SiteOptions, site_of, title_of
+from ptmtools.site.content import Site, SiteOptions, site_of
 from ptmtools.site.embedding import element_tags, frame_tag
 from ptmtools.site.forms import OPTIONS, form_of, form_site, form_weight
 from ptmtools.site.lookup import files_of
@@ -188,17 +188,17 @@ def publish(
         f"{len(done.unchanged):,} unchanged{removed}"
     )
     weight, lines = _weight_of_form(site) if form else _weight_of_walk(site)
-    embed = _embedding(site, site_options.title or title_of(Path(db)), site_options.address)
+    embed = _embedding(site, site_options.address)
     document = {**changed, "notes": list(site.notes), "bytes": weight, **embed}
     console.result(document, (first, *lines, *(f"{name}: {tags}" for name, tags in embed.items())))
 
 
-def _embedding(site: Site, title: str, address: str) -> dict[str, str]:
+def _embedding(site: Site, address: str) -> dict[str, str]:
     """The HTML that shows a site in another page; the element only for a walk."""
     folder = folder_of(address)
-    tags = {"embed": frame_tag(title, folder)}
+    tags = {"embed": frame_tag(site.title, folder)}
     if script := site.entries.get(ELEMENT):
-        tags["element"] = element_tags(title, ELEMENT, script.read(), folder)
+        tags["element"] = element_tags(site.title, ELEMENT, script.read(), folder)
     return tags
 
 

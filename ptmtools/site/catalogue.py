@@ -15,9 +15,10 @@ from dataclasses import dataclass
 from html import escape
 from itertools import groupby
 from typing import Any, TypeVar
+from urllib.parse import urlencode
 
 from ptmtools.site.about import About
-from ptmtools.site.words import words_of
+from ptmtools.site.words import has_words, words_of
 from ptmtools.tour.markdown import html_of, plain_text
 from ptmtools.tour.model import Texts, in_language
 
@@ -29,6 +30,32 @@ PICTURE, ANGLE = (480, 360), math.pi / 3
 _RIGHT_TO_LEFT = {"ar", "fa", "he", "ur", "yi", "ps", "sd", "ug", "dv", "ku"}
 #: By which the service worker knows a catalogue (web/page/offline/visits.js).
 GENERATOR = '<meta name="generator" content="ptmtools">'
+#: Languages by their own names, for the links between the pages; their tags for others.
+_NAMES = {
+    "ar": "العربية",
+    "cs": "Čeština",
+    "da": "Dansk",
+    "de": "Deutsch",
+    "el": "Ελληνικά",
+    "en": "English",
+    "es": "Español",
+    "fi": "Suomi",
+    "fr": "Français",
+    "he": "עברית",
+    "hu": "Magyar",
+    "it": "Italiano",
+    "ja": "日本語",
+    "ko": "한국어",
+    "nl": "Nederlands",
+    "no": "Norsk",
+    "pl": "Polski",
+    "pt": "Português",
+    "ru": "Русский",
+    "sv": "Svenska",
+    "tr": "Türkçe",
+    "uk": "Українська",
+    "zh": "中文",
+}
 _STYLE = """
 :root { color-scheme: light dark; font: 17px/1.55 system-ui, sans-serif; }
 body { max-width: 46rem; margin: 0 auto; padding: 1rem; }
@@ -38,7 +65,7 @@ img { display: block; width: 100%; height: auto; border-radius: 6px; }
 article { margin: 0 0 3rem; } h2 { margin: 2.5rem 0 1rem; } h3 { margin: .8rem 0 .2rem; }
 .by { margin: 0 0 .8rem; } audio { width: 100%; } nav ul { padding: 0; list-style: none; }
 nav li { display: inline-block; margin-inline-end: 1rem; }
-.skip:not(:focus) { position: absolute; left: -999px; }
+.skip:not(:focus) { position: absolute; inset-inline-start: -999px; }
 @media (prefers-color-scheme: dark) { a { color: #9cc7ff; } }
 """
 
@@ -85,7 +112,9 @@ class _Page:
         self._content, self._tour, self._language = content, content.tour, language
         self._words = words_of(language)["catalogue"]
         own = self._plain(content.tour.get("title")) or content.title
-        self._title = f"{own}: {self._words['catalogue']}"
+        #: What marks words of the page that exist only in English.
+        self._foreign = "" if has_words(language) else ' lang="en" dir="ltr"'
+        self._title = own if self._foreign else f"{own}: {self._words['catalogue']}"
 
     def html(self) -> str:
         """The whole page."""
@@ -99,7 +128,7 @@ class _Page:
         )
         links = "".join(
             f'<li><a lang="{escape(tag)}" hreflang="{escape(tag)}" href="{escape(name)}">'
-            f"{escape(tag)}</a></li>\n"
+            f"{escape(_NAMES.get(tag.lower(), tag))}</a></li>\n"
             for tag, name in names.items()
         )
         nav = (
@@ -114,13 +143,24 @@ class _Page:
             f"{self._about()}{alternates}"
             f'<link rel="icon" href="data:,">\n<style>{_STYLE}</style>\n'
             f"{self._linked_data()}</head>\n<body>\n"
-            f'<a class="skip" href="#content">{escape(words["skip"])}</a>\n'
+            f'<a class="skip" href="#content">{self._word("skip")}</a>\n'
             f"<header>\n<h1>{escape(self._title)}</h1>\n"
             f"{self._paragraph(self._tour.get('description'))}"
-            f'<p><a href="{INDEX}">{escape(words["walk"])}</a></p>\n{nav}</header>\n'
+            f'<p><a href="{escape(self._walk())}">{self._word("walk")}</a></p>\n{nav}</header>\n'
             f'<main id="content">\n{"".join(self._sections())}</main>\n'
-            f"<footer>\n<p>{escape(words['access'])}</p>\n</footer>\n</body>\n</html>\n"
+            f"<footer>\n<p>{self._word('access')}</p>\n</footer>\n</body>\n</html>\n"
         )
+
+    def _walk(self, **query: str) -> str:
+        """The URL of the walk, in the language of this page if there are several."""
+        if len(self._tour["languages"]) > 1:
+            query["lang"] = self._language
+        return f"{INDEX}?{urlencode(query)}" if query else INDEX
+
+    def _word(self, name: str) -> str:
+        """Words of the page as HTML."""
+        text = escape(self._words[name])
+        return f"<span{self._foreign}>{text}</span>" if self._foreign else text
 
     def _about(self) -> str:
         """What link previews and search engines read."""
@@ -146,14 +186,16 @@ class _Page:
 
     def _room(self, number: int) -> str:
         cell = self._tour["labels"][number]["cell"]
-        return self._content.rooms.get(cell, self._words["elsewhere"])
+        return self._content.rooms.get(cell, "")
 
     def _room_heading(self, room: str) -> str:
         """Its name in the language of the page, where the tour has one."""
+        if not room:
+            return self._word("elsewhere")
         return self._span(self._tour.get("places", {}).get(room)) or escape(room)
 
     def _article(self, number: int) -> str:
-        label, words = self._tour["labels"][number], self._words
+        label = self._tour["labels"][number]
         by = [part for name in ("maker", "date") if (part := self._span(label.get(name)))]
         image = self._plain(label.get("image"))
         parts = [f"<h3>{self._heading(number)}</h3>\n"]
@@ -170,14 +212,14 @@ class _Page:
             parts.append(f"<div{_lang(tag)}>{html_of(nodes)}</div>\n")
         if image:
             parts.append(
-                f"<details><summary>{escape(words['image'])}</summary>"
+                f"<details><summary>{self._word('image')}</summary>"
                 f"<p>{self._span(label['image'])}</p></details>\n"
             )
         parts += self._sound(number)
         link = self._plain(label.get("link"))
         if link:
-            parts.append(_link(link, words["about"]))
-        parts.append(_link(f"{INDEX}?label={label['id']}", words["here"]))
+            parts.append(_link(link, self._word("about")))
+        parts.append(_link(self._walk(label=label["id"]), self._word("here")))
         return f'<article id="{escape(label["id"])}">\n{"".join(parts)}</article>\n'
 
     def _sound(self, number: int) -> Iterator[str]:
@@ -194,7 +236,7 @@ class _Page:
         yield f'<audio controls preload="none" src="{source}">{track}</audio>\n'
         if text := self._plain(self._content.transcripts.get(number)):
             yield (
-                f"<details><summary>{escape(self._words['captions'])}</summary>"
+                f"<details><summary>{self._word('captions')}</summary>"
                 f"<p>{escape(text)}</p></details>\n"
             )
 
@@ -235,7 +277,7 @@ class _Page:
                 "description": re.sub(r"\s+", " ", plain_text(nodes or ())).strip(),
                 "image": number in self._content.pictures
                 and f"{address}{self._content.pictures[number]}",
-                "url": f"{address}{INDEX}?label={label['id']}",
+                "url": f"{address}{self._walk(label=label['id'])}",
             }
             works.append({name: value for name, value in fields.items() if value})
         data = {
@@ -253,7 +295,8 @@ class _Page:
 
 
 def _link(address: str, text: str) -> str:
-    return f'<p><a href="{escape(address)}" rel="noopener">{escape(text)}</a></p>\n'
+    """A link with a text, which is HTML."""
+    return f'<p><a href="{escape(address)}" rel="noopener">{text}</a></p>\n'
 
 
 def _lang(tag: str) -> str:

@@ -122,12 +122,14 @@ class Site:
     entries: its files, by name.
     index: the document that the page reads first.
     notes: remarks for the user, one line each.
+    title: of the page.
     again: makes the site with the tour as it is then; raises as `site_tour`.
     """
 
     entries: Mapping[str, Entry]
     index: Mapping[str, Any]
     notes: tuple[str, ...] = ()
+    title: str = ""
     again: Callable[[], Site] | None = field(default=None, repr=False, compare=False)
 
 
@@ -198,8 +200,8 @@ class _Builder:
 
         def toured() -> Site:
             files = Files(dict(self._files.entries), list(self._files.notes))
-            front.add(files)
-            return Site(files.entries, index, tuple(files.notes), toured)
+            title = front.add(files)
+            return Site(files.entries, index, tuple(files.notes), title, toured)
 
         return toured()
 

@@ -123,7 +123,7 @@ def form_site(folder: Path, form: Form, options: SiteOptions | None = None) -> S
     about = About(title, options.description, address=options.address)
     files.put(form_page(settings, script.name, [*about.lines()], framed=form.records))
     add_manifest(files, title)
-    return Site(files.entries, index)
+    return Site(files.entries, index, title=title)
 
 
 def form_weight(site: Site) -> tuple[int, int]:

@@ -51,8 +51,9 @@ class Front:
     poster: str
     openings: Sequence[str]
 
-    def add(self, files: Files) -> None:
-        """Adds the files. Raises as `site_tour`; InputError PTM-I122: the program is incomplete."""
+    def add(self, files: Files) -> str:
+        """Adds the files; returns the title of the page. Raises as `site_tour`; InputError
+        PTM-I122: the program is incomplete."""
         program = program_files()
         for entry in (*program.values(), element()):
             files.put(entry)
@@ -80,6 +81,7 @@ class Front:
             head.append(registration(program))
         files.put(page(settings, program["viewer.js"].name, preload, views, head))
         add_manifest(files, title)
+        return title
 
     def _tour(self, files: Files) -> SiteTour | None:
         """The tour, None without one and with one that a visitor would see nothing of."""

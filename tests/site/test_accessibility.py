@@ -101,6 +101,16 @@ def test_forced_colours_keep_the_focus_visible(visitor: Visitor) -> None:
     style = "getComputedStyle(document.activeElement)"
     assert page.evaluate(f"{style}.outlineStyle") != "none"
     assert page.evaluate(f"parseFloat({style}.outlineWidth)") >= 1
+    # What is open shows without its colour, and the map and its key keep theirs.
+    width = "(one) => parseFloat(getComputedStyle(one).borderTopWidth)"
+    button = page.locator("nav [aria-controls=map]")
+    before = button.evaluate(width)
+    button.click()
+    page.locator("#map .key").wait_for()
+    assert button.evaluate(width) > before
+    key = "getComputedStyle(document.querySelector('.key span'), '::before').backgroundColor"
+    assert page.evaluate(key) == "rgb(255, 199, 102)"
+    button.click()
     page.emulate_media(forced_colors="none")
 
 

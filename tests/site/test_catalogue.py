@@ -76,7 +76,7 @@ def test_works_are_listed_by_room_in_the_order_of_the_tour() -> None:
     ]
     assert "Look left" in page.text
     links = [row["href"] for row in page.all("a")]
-    assert {"index.html?label=a", "https://example.org", "catalogue-ar.html"} <= set(links)
+    assert {"index.html?label=a&lang=en", "https://example.org", "catalogue-ar.html"} <= set(links)
     other = Page(pages["catalogue-ar.html"])
     assert other.all("html") == [{"lang": "ar", "dir": "rtl"}]
     assert "ليل" in other.text
@@ -107,6 +107,15 @@ def test_rooms_have_names_in_the_language_of_the_page() -> None:
     text = pages["catalogue-ar.html"].partition('<script type="application/ld+json">')[2]
     data = json.loads(text.partition("</script>")[0])
     assert (data["inLanguage"], data["description"]) == ("ar", "Old works.")
+    # The walk is in the language of the page that leads to it.
+    assert {row["href"] for row in other.all("a") if "index" in str(row["href"])} == {
+        "index.html?lang=ar",
+        "index.html?label=a&lang=ar",
+        "index.html?label=b&lang=ar",
+    }
+    assert "العربية" in page.text
+    assert other.all("a")[0] == {"class": "skip", "href": "#content"}
+    assert {"lang": "en", "dir": "ltr"} in other.all("span"), "words that are not translated"
 
 
 def test_linked_data_names_the_works() -> None:
@@ -119,7 +128,7 @@ def test_linked_data_names_the_works() -> None:
         "name": "Night",
         "creator": "R.",
         "image": "data/work-a.jpg",
-        "url": "index.html?label=a",
+        "url": "index.html?label=a&lang=en",
     }
 
 
@@ -155,7 +164,7 @@ def test_a_site_has_the_catalogue_with_pictures(
     document = {
         "format": "ptmtools tour",
         "schema": 1,
-        "languages": ["en"],
+        "languages": ["en", "ar"],
         "labels": [
             {"id": f"w{k}", "object": name, "title": name} for k, name in enumerate(objects)
         ],
@@ -169,6 +178,10 @@ def test_a_site_has_the_catalogue_with_pictures(
         page = context.new_page()
         page.goto(url + "catalogue.html")
         assert page.locator("article").count() == 2
+        # Nothing lies where one could scroll to: a page from right to left began there.
+        page.goto(url + "catalogue-ar.html")
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        page.goto(url + "catalogue.html")
         width = page.locator("img").evaluate_all("(all) => all.map((one) => one.naturalWidth)")
         assert width == [480], "the work with a stop has a picture"
         page.goto(url)

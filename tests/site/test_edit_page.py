@@ -110,6 +110,26 @@ def test_a_label_from_the_click_to_the_plain_page(visitor: Visitor, tmp_path: Pa
     assert text.startswith(TOUR[: TOUR.index("}]")]), "the rest is as it was written"
     (stop,) = json.loads(text)["stops"]
     assert stop["label"] == "painting_02"
+    button(visitor, "← All stops and labels").click()
+    page.get_by_text("Names of the places").click()
+    (name, *_) = page.evaluate("editor.loaded.places")
+    place = page.locator(f'#edit [data-field="{name}"]')
+    place.fill("Hall")
+    page.wait_for_function("ptm.index.viewpoints[0].title?.text === 'Hall'")
+    page.get_by_text("Languages", exact=True).click()
+    page.get_by_role("tab", name="German").click()
+    place.fill("Saal")
+    field(visitor, "description").fill("Alte Werke.")
+    page.wait_for_function("document.querySelector('#tour h2 + p')?.textContent === 'Alte Werke.'")
+    page.keyboard.press("Control+s")
+    page.wait_for_function("!editor.draft.changed")
+    document = json.loads(file.read_text())
+    assert document["places"] == {name: {"en": "Hall", "de": "Saal"}}
+    assert document["description"] == {"de": "Alte Werke."}
+    page.get_by_role("button", name="Remove German").click()
+    assert page.evaluate("editor.draft.document.places") == {name: {"en": "Hall"}}
+    assert page.evaluate("editor.draft.document.description") is None
+    button(visitor, "Undo").click()
     plain = page.context.new_page()
     plain.goto(f"{visitor.url}?label=painting_02&lang=de")
     plain.locator("#label h2").wait_for()

@@ -206,6 +206,7 @@ def test_languages_side_by_side(visitor: Visitor) -> None:
     assert panel.locator("div[lang=en] em").inner_text() == "dark"
     assert page.locator("#tour h2").inner_text() == "Höhepunkte"
     assert page.locator("#tour h2 + p").inner_text() == "Alte Werke."
+    assert page.locator("#tour p a").get_attribute("href") == "catalogue-de.html"
 
 
 def test_the_walk_and_its_places_have_names_in_each_language(
@@ -288,6 +289,11 @@ def test_a_label_ends_above_two_rows_of_buttons(chromium: Any, toured: Site) -> 
         visitor.until("document.querySelector('#panels').style.bottom")
         label = page.locator("#label").bounding_box()
         assert label["y"] + label["height"] < min(tops)
+        # A narrow window has room for one panel.
+        for name, other in (("tour", "map"), ("map", "tour"), ("tour", "places")):
+            page.locator(f"nav [aria-controls={name}]").click()
+            page.locator(f"#{name}").wait_for()
+            assert page.locator(f"#{other}").is_hidden()
 
 
 def test_a_sound_is_fetched_by_a_click_only_and_has_captions(visitor: Visitor) -> None:

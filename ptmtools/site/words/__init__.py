@@ -18,11 +18,15 @@ _FOLDER = Path(__file__).parent
 LANGUAGES = ("en", "de", "fr", "es", "it", "zh", "ja")
 
 
+def has_words(language: str) -> bool:
+    """Whether a language tag such as ``de-AT`` has words of its own."""
+    return language.split("-")[0].lower() in LANGUAGES
+
+
 @cache
 def words_of(language: str) -> Mapping[str, Any]:
     """The words for a language tag such as ``de-AT``: section → name → text, and ``direction``,
     ``ltr`` or ``rtl``; in English where the language has none."""
-    plain = language.split("-")[0].lower()
-    name = plain if plain in LANGUAGES else "en"
+    name = language.split("-")[0].lower() if has_words(language) else "en"
     words: Mapping[str, Any] = json.loads((_FOLDER / f"{name}.json").read_text(encoding="utf-8"))
     return words

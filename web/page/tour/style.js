@@ -12,7 +12,7 @@ export const STYLE = `
 #tour li small { display: block; color: var(--dim); font-size: 13px; }
 #tour [aria-current] { border-color: var(--warm); }
 #tour select { width: 100%; margin: 0 0 10px; }
-#label h2 { font-size: 20px; line-height: 1.25; margin: 0 0 4px; margin-inline-end: 44px; }
+#label h2 { font-size: 20px; line-height: 1.25; margin: 0 0 4px; display: flow-root; }
 #label h3 { color: inherit; font-size: 15px; }
 #label .by { color: var(--dim); margin: 0 0 10px; }
 #label p, #label li { max-width: 65ch; }
@@ -20,7 +20,7 @@ export const STYLE = `
 #label audio { width: 100%; margin: 8px 0 0; }
 #label .captions { min-height: 3em; margin: 6px 0 0; padding: 8px 10px; background: #000; border-radius: 8px; }
 #label .captions:empty { display: none; }
-#label .close { float: inline-end; width: 44px; padding: 0; margin: -4px 0 0; margin-inline-end: -6px; }
+#label .close { float: inline-end; width: 44px; padding: 0; margin: -4px 0 0; margin-inline: 8px -6px; }
 #label details summary { min-height: 32px; cursor: pointer; color: var(--dim); }
-@media (forced-colors: active) { #markers button::before { border-color: CanvasText; forced-color-adjust: none; } }
+@media (forced-colors: active) { #tour [aria-current] { border: 3px solid Highlight; } #markers button::before { border-color: CanvasText; forced-color-adjust: none; } }
 `;

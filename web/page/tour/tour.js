@@ -63,8 +63,16 @@ export class Tour {
     this.list = make("section", { id: "tour", ariaLabel: words.tour, tabIndex: 0, hidden: true });
     find(document, "#panels").append(this.list, this.panel);
     this.button = make("button", { "aria-controls": "tour", "aria-expanded": "false" }, words.tour);
+    const nav = find(document, "nav"), narrow = matchMedia("(max-width: 640px)");
     this.button.onclick = () => this.#showList(this.list.hidden);
-    find(document, "nav").prepend(this.button);
+    // A narrow window has room for one panel.
+    nav.addEventListener("click", (/** @type {Event} */ { target }) => {
+      const other = /** @type {Element} */ (target).closest("[aria-controls]");
+      if (!narrow.matches || !other || other.getAttribute("aria-expanded") !== "true") return;
+      if (other !== this.button) return this.#showList(false);
+      for (const open of nav.querySelectorAll("[aria-expanded=true]")) if (open !== other) open.click();
+    });
+    nav.prepend(this.button);
     this.markers = new Markers(app.walk, tour.labels, {
       nameOf: (label) => this.nameOf(label),
       open: (label) => this.show(label),
@@ -155,7 +163,8 @@ export class Tour {
     });
     const options = languages.map((tag) => make("option", { value: tag, selected: tag === this.language }, named(tag)));
     const select = make("select", { ariaLabel: words.language, onchange: () => this.speak(select.value) }, ...options);
-    const { catalogue = "" } = this.app.config;
+    const { catalogue: first = "" } = this.app.config;
+    const catalogue = this.language === languages[0] ? first : first.replace(/(?=\.html$)/, `-${this.language}`);
     this.list.replaceChildren(
       heading,
       ...(about ? [make("p", { lang: about.tag, dir: "auto" }, String(about.text))] : []),

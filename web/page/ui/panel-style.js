@@ -32,4 +32,10 @@ kbd { font: 12px/1 ui-monospace, monospace; color: var(--ink); padding: 2px 6px;
 label span { color: var(--dim); }
 input[type="range"] { flex: 1 0 100%; height: 28px; margin: 0; accent-color: var(--warm); }
 input[type="checkbox"] { width: 22px; height: 22px; margin: 0; accent-color: var(--warm); }
+
+@media (forced-colors: active) {
+  #map canvas { background: #16171b; }
+  .key span::before, .bars span { forced-color-adjust: none; }
+  #places [aria-current], nav [aria-expanded="true"] { border: 3px solid Highlight; }
+}
 `;
