@@ -62,7 +62,9 @@ class SiteOptions:
 
     heading: ClassVar[str] = "Site"
 
-    title: str = option("", "Title of the page. Default: the name of the database.")
+    title: str = option(
+        "", "Title of the page. Default: that of the tour, or the name of the database."
+    )
     poster: str = option(
         "",
         "Picture (JPEG, PNG or WebP) to show while the building loads. Default: a rendered image "
@@ -71,7 +73,8 @@ class SiteOptions:
     )
     description: str = option(
         "",
-        "Description of the site for search engines and link previews. Default: the first places.",
+        "Description of the site for search engines and link previews. Default: that of the "
+        "tour, or the first places.",
     )
     address: str = option(
         "",

@@ -1,7 +1,7 @@
 // <ptm-walk src="https://example.org/site/">: a walk in a page of any origin, in a frame.
 //
 // Attributes: src, the URL of a published site; title; ui, "none" for a frame without buttons; label and
-// stop, where it begins. Events, with details: ptm-ready; ptm-room {cell, name}; ptm-label {id}; they
+// stop, where it begins. Events, with details: ptm-ready; ptm-room {cell, name, title}; ptm-label {id}; they
 // bubble. Methods: goTo({label | stop | place}), and the walk is fetched when the element comes into view.
 
 const FIELDS = ["ui", "label", "stop", "lang", "memory"];
