@@ -69,7 +69,6 @@ export class Tour {
     nav.addEventListener("click", (/** @type {Event} */ { target }) => {
       const other = /** @type {Element} */ (target).closest("[aria-controls]");
       if (!narrow.matches || !other || other.getAttribute("aria-expanded") !== "true") return;
-      if (other !== this.button) return this.#showList(false);
       for (const open of nav.querySelectorAll("[aria-expanded=true]")) if (open !== other) open.click();
     });
     nav.prepend(this.button);
