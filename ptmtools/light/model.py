@@ -14,7 +14,7 @@ from ptmtools.store.archive import Stored
 
 @dataclass(frozen=True)
 class Light:
-    """The light of all cells, in the order of triangles and shapes of `output.content.Geometry`.
+    """The light of all cells, in the order of triangles and shapes of `output.geometry.Geometry`.
 
     Attributes
     ----------

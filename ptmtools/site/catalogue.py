@@ -28,7 +28,7 @@ INDEX = "index.html"
 PICTURE, ANGLE = (480, 360), math.pi / 3
 #: Right-to-left scripts, by the languages that are usually written in them.
 _RIGHT_TO_LEFT = {"ar", "fa", "he", "ur", "yi", "ps", "sd", "ug", "dv", "ku"}
-#: By which the service worker knows a catalogue (web/page/offline/visits.js).
+#: The service worker recognises a catalogue by this line (web/page/offline/visits.js).
 GENERATOR = '<meta name="generator" content="ptmtools">'
 #: Languages by their own names, for the links between the pages; their tags for others.
 _NAMES = {
