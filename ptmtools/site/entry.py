@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +13,14 @@ from ptmtools.output.emission import compressed
 DIGITS = 10
 #: Values of ``Cache-Control``: of contents that never change, and of those revalidated before use.
 FOREVER, FRESH = "public, max-age=31536000, immutable", "no-cache"
+_MARK = rf"-[0-9a-f]{{{DIGITS}}}"
+_MARKED = re.compile(rf"data/(sets/)?[^/]*{_MARK}[.-][^/]*|(data|viewer){_MARK}/.*")
+
+
+def is_marked(name: str) -> bool:
+    """Whether the name of a file of a site has a hash, and so changes with the content. A hash may
+    look like a date in other names: only those of the site's own folders count."""
+    return _MARKED.fullmatch(name) is not None
 
 
 @dataclass(frozen=True)

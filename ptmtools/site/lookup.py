@@ -6,7 +6,6 @@ slash, a backslash, a colon, a NUL or a dotted step matches no file.
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Callable, Mapping
 from os import PathLike
@@ -16,12 +15,16 @@ from urllib.parse import unquote, unquote_to_bytes
 
 from ptmtools.errors import DatabaseError, PtmError
 from ptmtools.files import leads_inside
+from ptmtools.site.about import MANIFEST, MANIFEST_MEDIA
 from ptmtools.site.content import Site, SiteOptions, site_of
-from ptmtools.site.entry import Entry, stamp_of
+from ptmtools.site.entry import Entry, is_marked, stamp_of
 from ptmtools.site.forms import form_of, form_site
 from ptmtools.site.program import HTML, INDEX, JAVASCRIPT
-from ptmtools.store.layout import MANIFEST, SERVED
+from ptmtools.store.layout import MANIFEST as DATABASE
+from ptmtools.store.layout import SERVED
+from ptmtools.texture.previews import FORMATS
 from ptmtools.tour.model import NAME
+from ptmtools.tour.reading import CAPTIONS, SOUNDS
 
 #: The file of a decoded name, or None; raises BlockingIOError for one that will exist later.
 Lookup = Callable[[str], Entry | None]
@@ -37,14 +40,12 @@ _MEDIA = {
     ".wasm": ("application/wasm", True),
     ".glb": ("model/gltf-binary", True),
     ".wrl": ("model/vrml", True),
+    Path(MANIFEST).suffix: (MANIFEST_MEDIA, False),
+    **{suffix: (media, False) for suffix, media in (SOUNDS | CAPTIONS).items()},
+    **{form.suffix: (form.media, False) for form in FORMATS.values()},
     ".png": ("image/png", False),
-    ".jpg": ("image/jpeg", False),
-    ".webp": ("image/webp", False),
-    ".avif": ("image/avif", False),
 }
 _OTHER = ("application/octet-stream", False)
-#: The hash that `ptm publish` puts into names that change with the content.
-_HASH = re.compile(r"-[0-9a-f]{10}(?=[./-])")
 
 
 def name_of(path: bytes) -> str | None:
@@ -81,7 +82,7 @@ def below(folder: Path, *, hashed: bool = False) -> Lookup:
         except (OSError, RuntimeError, ValueError):  # no such file, circular links, a NUL
             return None
         media, compressed = _MEDIA.get(file.suffix.lower(), _OTHER)
-        return Entry(name, file, media, hashed and bool(_HASH.search(name)), compressed)
+        return Entry(name, file, media, hashed and is_marked(name), compressed)
 
     return find
 
@@ -97,7 +98,7 @@ def files_of(folder: str | PathLike[str]) -> Lookup:
         schema; PTM-D004 one that is not finished; and as `site_of`.
     """
     path = Path(folder)
-    if (path / INDEX).is_file() and not (path / MANIFEST).exists():
+    if (path / INDEX).is_file() and not (path / DATABASE).exists():
         return below(path, hashed=True)
     if form := form_of(path):
         return among(form_site(path, form).entries)
@@ -140,7 +141,7 @@ class _Database:
 
     def _database_stamp(self) -> tuple[int, ...]:
         """That of the manifest, which changes when a stage is finished."""
-        return stamp_of(self._path / MANIFEST)
+        return stamp_of(self._path / DATABASE)
 
     def _tour_stamp(self) -> tuple[int, ...]:
         return stamp_of(self._path.absolute().parent / NAME)

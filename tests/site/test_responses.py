@@ -275,10 +275,24 @@ def test_a_file_that_changes_gets_another_tag(tmp_path: Path) -> None:
 
 
 def test_names_with_a_hash_may_be_kept_of_a_published_folder(tmp_path: Path) -> None:
-    (tmp_path / "viewer-0123456789").mkdir()
-    names = ("viewer-0123456789/viewer.js", "c0-abcdef0123.glb", "opening-0123456789-0.bin")
-    others = ("c0-abcdef012.glb", "c0-abcdef01234.glb")
+    names = [
+        "viewer-0123456789/viewer.js",
+        "data/c0-abcdef0123.glb",
+        "data/opening-0123456789-0.bin",
+        "data/sets/sets-0123456789.json",
+        "data-0123456789/objects/a.glb",
+    ]
+    # Others have a date in their name, or fewer or more digits.
+    others = [
+        "walk-1732806393/index.html",
+        "textures/photo-1612345678.png",
+        "photo-1612345678.png",
+        "data/walk-1732806393/index.html",
+        "data/c0-abcdef012.glb",
+        "data/c0-abcdef01234.glb",
+    ]
     for name in (*names, *others):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_bytes(b"x")
     with serving(below(tmp_path, hashed=True)) as url, client_of(url) as ask:
         sent = {name: ask(f"/{name}").headers["cache-control"] for name in (*names, *others)}
