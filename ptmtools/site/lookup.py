@@ -20,8 +20,7 @@ from ptmtools.site.content import Site, SiteOptions, site_of
 from ptmtools.site.entry import Entry, is_marked, stamp_of
 from ptmtools.site.forms import form_of, form_site
 from ptmtools.site.program import HTML, INDEX, JAVASCRIPT
-from ptmtools.store.layout import MANIFEST as DATABASE
-from ptmtools.store.layout import SERVED
+from ptmtools.store.layout import MANIFEST as DATABASE, SERVED
 from ptmtools.texture.previews import FORMATS
 from ptmtools.tour.model import NAME
 from ptmtools.tour.reading import CAPTIONS, SOUNDS

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,13 +15,15 @@ from ptmtools.options import option
 from ptmtools.output.emission import compressed
 from ptmtools.site.about import MANIFEST
 from ptmtools.site.content import GLB, Site
-from ptmtools.site.entry import Entry
+from ptmtools.site.entry import Entry, is_marked
 from ptmtools.site.program import ELEMENT, INDEX
 from ptmtools.store.folder import damaged, unreadable
 from ptmtools.store.layout import sha256
 
 #: The list of our files, and the caching rules for hosts that read them from a file.
 LIST, HEADERS = ".ptm-site.json", "_headers"
+#: End of the name of a gzip copy.
+COPY = ".gz"
 
 
 @dataclass(frozen=True)
@@ -49,11 +51,27 @@ class Published:
     removed: tuple[str, ...]
 
 
-def in_order(files: Mapping[str, Entry]) -> list[str]:
-    """The names of files in the order of writing: those whose contents never change, those that
-    replace others under their names, and the page. So an interrupted run leaves all that each
-    version of a replaced file names."""
-    return sorted(files, key=lambda name: (not files[name].forever, name == INDEX, name))
+def steps_of(names: Iterable[str]) -> list[list[str]]:
+    """Names of files in steps, in the order of writing: those that change with their contents,
+    those that replace others, and the page with its copy. So an interrupted run leaves all that
+    each version of a replaced file names. Removal has the reverse order."""
+    rows = sorted((_step(name), name) for name in names)
+    return [[name for step, name in rows if step == wanted] for wanted in range(3)]
+
+
+def _step(name: str) -> int:
+    return 2 if name.removesuffix(COPY) == INDEX else int(not is_marked(name))
+
+
+def disused(
+    before: Iterable[str], now: Collection[str], options: PublishOptions
+) -> list[list[str]]:
+    """The files of earlier versions to remove, in steps. A copy of a file that is still there has
+    former contents, or those that the file has: servers would send it instead of the file."""
+    steps = reversed(steps_of(name for name in before if name not in now))
+    if not options.keep:
+        return list(steps)
+    return [[name for name in step if name.removesuffix(COPY) in now] for step in steps]
 
 
 def plain_files(site: Site, options: PublishOptions) -> Iterator[tuple[str, Entry]]:
@@ -65,8 +83,8 @@ def plain_files(site: Site, options: PublishOptions) -> Iterator[tuple[str, Entr
             packed = compressed(data)
             if len(packed) < len(data):
                 yield (
-                    f"{unquote(name)}.gz",
-                    Entry(f"{name}.gz", packed, "application/gzip", entry.forever),
+                    f"{unquote(name)}{COPY}",
+                    Entry(f"{name}{COPY}", packed, "application/gzip", entry.forever),
                 )
     yield HEADERS, Entry(HEADERS, _headers(site.entries.values()), "text/plain")
 
@@ -91,7 +109,7 @@ def _headers(entries: Iterable[Entry]) -> bytes:
 
 
 def _addresses(name: str) -> list[str]:
-    """Those of a file beside the page: these hosts remove `.html`."""
+    """The addresses of a file beside the page: these hosts remove `.html`."""
     stem = name.removesuffix(".html")
     return [f"/{name}"] if stem == name else [f"/{name}", "/" if name == INDEX else f"/{stem}"]
 

@@ -1,10 +1,10 @@
 """Writes a site to a folder or a URL, for any static host, and counts what its visitors download.
 
 A visitor during publication gets the old page or the new one: the files whose contents never change
-are written first, then those that replace others, then the page; files of the old page alone are
-removed last. A list in the folder names our files; nothing else is changed or removed. The list is
-written before the first file and after the last, so that publishing again completes an interrupted
-run.
+are written first, then those that replace others, then the page; files of earlier versions alone
+are removed last, their pages first. A list in the folder names our files; nothing else is changed
+or removed. During a run it has the digests of what each file was and becomes, so that the next one,
+of whatever version, knows all that an interrupted run leaves.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import hashlib
 import json
 import os
 import shutil
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,10 +40,11 @@ from ptmtools.site.published import (
     Published,
     PublishOptions,
     digest_of,
+    disused,
     file_digest,
-    in_order,
     plain_files,
     reading,
+    steps_of,
 )
 from ptmtools.site.sets import is_of_sets
 from ptmtools.site.uploading import upload
@@ -53,6 +54,8 @@ from ptmtools.store.objects import is_url, plain_path
 
 #: Texels of the longer side up to which the textures of a room count in `Weight`.
 COARSE = 64
+#: The SHA-256s that each file of the list may have, by its name.
+Digests = dict[str, tuple[str, ...]]
 #: Format of the list of our files.
 FORMAT, SCHEMA = "ptmtools site files", 1
 #: Data that the walk does not show.
@@ -85,30 +88,34 @@ def publish(
     root = Path(target)
     before = _checked(root, force)
     files = dict(plain_files(site, options))
-    names = in_order(files)
+    names = [name for step in steps_of(files) for name in step]
     for name in names:
         if name not in before and not force:
             with writing(root):
                 refuse_existing(root / name, "move it away, or use --force to replace it")
     with writing(root):
         root.mkdir(parents=True, exist_ok=True)
-    now = {name: digest_of(files[name]) for name in names}
-    _write_list(root, before | now)
-    written = []
+    now = {name: (digest_of(files[name]),) for name in names}
+    # Each digest once.
+    both = {name: tuple(dict.fromkeys(before.get(name, ()) + now[name])) for name in names}
+    _write_list(root, before | both)
+    written: dict[str, None] = {}
     for number, name in enumerate(names):
         progress(number, len(names), "files")
-        if _held(root, name) != now[name]:
-            _write(root, name, files[name], now[name])
-            written.append(name)
-    old = {name: digest for name, digest in before.items() if name not in now}
-    removed = () if options.keep else tuple(_remove(root, old))
-    _write_list(root, now | (old if options.keep else {}))
+        (digest,) = now[name]
+        if _held(root, name) != digest:
+            _write(root, name, files[name], digest)
+            written[name] = None
+    old = dict.fromkeys(name for step in disused(before, now, options) for name in step)
+    removed = tuple(name for name in old if _remove(root, name, before[name]))
+    kept = {name: digests for name, digests in before.items() if name not in old}
+    _write_list(root, kept | now)
     unchanged = tuple(name for name in names if name not in written)
     return Published(tuple(written), unchanged, removed)
 
 
-def _checked(root: Path, force: bool) -> dict[str, str]:
-    """The list of a folder, name → SHA-256; empty for a new one, or one that was forced."""
+def _checked(root: Path, force: bool) -> Digests:
+    """The list of a folder; empty for a new one, or one that was forced."""
     if root.exists() and not root.is_dir():
         raise OutputError(
             "PTM-O001", "exists and is not a folder", file=root, remedy="specify another with -o"
@@ -127,7 +134,7 @@ def _checked(root: Path, force: bool) -> dict[str, str]:
     return listed or {}
 
 
-def _read_list(root: Path) -> dict[str, str] | None:
+def _read_list(root: Path) -> Digests | None:
     """The names in a folder's list that may be ours; None without such a list."""
     try:
         with open_regular(root / LIST) as stream:
@@ -136,16 +143,17 @@ def _read_list(root: Path) -> dict[str, str] | None:
             return None
         rows: Mapping[str, Any] = document["files"]
         return {
-            name: digest
-            for name, digest in rows.items()
-            if isinstance(digest, str) and leads_inside(name)
+            name: tuple(digests.split())
+            for name, digests in rows.items()
+            if isinstance(digests, str) and leads_inside(name)
         }
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return None
 
 
-def _write_list(root: Path, files: Mapping[str, str]) -> None:
-    document = {"format": FORMAT, "schema": SCHEMA, "files": dict(sorted(files.items()))}
+def _write_list(root: Path, files: Digests) -> None:
+    rows = {name: " ".join(digests) for name, digests in sorted(files.items())}
+    document = {"format": FORMAT, "schema": SCHEMA, "files": rows}
     data = (json.dumps(document, indent=0, ensure_ascii=False) + "\n").encode()
     if _held(root, LIST) != sha256(data):
         write_bytes(root / LIST, data, force=True)
@@ -178,15 +186,15 @@ def _write(root: Path, name: str, entry: Entry, digest: str) -> None:
     write_with(target, copy, force=True)
 
 
-def _remove(root: Path, files: Mapping[str, str]) -> Iterator[str]:
-    """Removes files that are unchanged since they were written, then empty folders."""
-    for name, digest in files.items():
-        if _held(root, name) == digest:
-            with writing(root / name):
-                (root / name).unlink()
-            yield name
-            with suppress(OSError):
-                (root / name).parent.rmdir()
+def _remove(root: Path, name: str, digests: Collection[str]) -> bool:
+    """Removes a file, and its folder if that is empty; False if others have changed the file."""
+    if _held(root, name) not in digests:
+        return False
+    with writing(root / name):
+        (root / name).unlink()
+    with suppress(OSError):
+        (root / name).parent.rmdir()
+    return True
 
 
 @dataclass(frozen=True)

@@ -10,14 +10,15 @@ The order is that of a folder: the list, the new files, those that replace other
 removal, the list. Each object appears whole, so an interrupted upload leaves the former page with
 all that it names, and the next run sends only what is missing. The list has for each object the
 SHA-256 of its contents and headers, the MD5 of its bytes and the version that the store gave it; an
-object counts as ours while one of the last two is that of the store's listing.
+object counts as ours while one of the last two is that of the store's listing. During a run it has
+two rows of each object that is replaced: the next run, of whatever version, sees which one holds.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -31,16 +32,16 @@ from ptmtools.parallel import ordered
 from ptmtools.progress import Progress
 from ptmtools.site.content import Site
 from ptmtools.site.entry import FRESH, Entry, state_of
-from ptmtools.site.program import INDEX
 from ptmtools.site.published import (
     LIST,
     Published,
     PublishOptions,
     digest_of,
+    disused,
     file_digest,
-    in_order,
     plain_files,
     reading,
+    steps_of,
 )
 from ptmtools.store.folder import damaged
 from ptmtools.store.layout import sha256
@@ -68,6 +69,10 @@ class Row:
         )
 
 
+#: The rows of the list, by the names of the objects: one, and during a run also the next one.
+Rows = dict[str, tuple[Row, ...]]
+
+
 @dataclass(frozen=True)
 class Item:
     """An object to store: its bytes or file, its headers, its row of the list."""
@@ -84,14 +89,20 @@ def upload(
     """Writes a site to the objects below a URL, or brings them up to date; see `publish`."""
     objects = Objects(url)
     held = objects.listing()
-    before = _rows(objects, held, force)
+    rows = _rows(objects, held, force)
+
+    def settled(name: str) -> Row:
+        return _settled(objects, name, held.get(name), rows[name])
+
+    before = dict(zip(rows, ordered(settled, rows, AT_ONCE), strict=True))
     # Headers take the place of gzip copies and of the file with caching rules.
     files = (
         {unquote(name): entry for name, entry in site.entries.items()}
         if objects.kind
         else dict(plain_files(site, options))
     )
-    names = in_order(files)
+    steps = steps_of(files)
+    names = [name for step in steps for name in step]
     for name in names:
         if name in held and name not in before and not force:
             raise OutputError(
@@ -107,16 +118,14 @@ def upload(
         return bool(row and row.sha256 == items[name].row.sha256 and row.is_of(held.get(name)))
 
     unchanged = tuple(name for name in names if current(name))
-    written = tuple(name for name in names if name not in unchanged)
-    old = {name: row for name, row in before.items() if name not in items}
-    # Until the end an object that exists keeps its row; one that --force replaces has an empty row.
-    new = {
-        name: Row("", "") if name in held else items[name].row
-        for name in written
-        if name not in before
-    }
+    changed = {*names} - {*unchanged}
+    written = tuple(name for name in names if name in changed)
+    # What is there under a name that only --force replaces is not ours: its row is empty.
+    unknown = {name: Row("", "") for name in written if name in held and name not in before}
+    both: Rows = {name: (row,) for name, row in (before | unknown).items()}
+    both |= {name: (*both.get(name, ()), items[name].row) for name in written}
     if written:
-        _write_list(objects, new | before)
+        _write_list(objects, both)
 
     def send(name: str) -> None:
         item = items[name]
@@ -128,28 +137,27 @@ def upload(
                 raise damaged(item.body, "it changed while it was copied")
 
     # What replaces a former object waits for the new ones that it names, and the page for all.
-    steps = [
-        [name for name in written if files[name].forever],
-        [name for name in written if not files[name].forever and name != INDEX],
-        [name for name in written if name == INDEX],
-    ]
-    sent = chain.from_iterable(ordered(send, step, AT_ONCE) for step in steps)
-    for number, _ in enumerate(sent):
+    waves = [[name for name in step if name in changed] for step in steps]
+    uploads = chain.from_iterable(ordered(send, wave, AT_ONCE) for wave in waves)
+    for number, _ in enumerate(uploads):
         progress(number, len(written), "files")
-    removed: tuple[str, ...] = ()
-    if not options.keep:
-        removed = tuple(name for name, row in old.items() if row.is_of(held.get(name)))
-        list(ordered(objects.remove, removed, AT_ONCE))
-    rows = {name: before[name] for name in unchanged} | (old if options.keep else {})
+    old = disused(before, items, options)
+    waves = [[name for name in step if before[name].is_of(held.get(name))] for step in old]
+    removed = tuple(chain.from_iterable(waves))
+    for wave in waves:
+        list(ordered(objects.remove, wave, AT_ONCE))
+    gone = {*changed, *chain.from_iterable(old)}
+    after = {name: row for name, row in before.items() if name not in gone}
     if written:
-        after = objects.listing()
-        rows |= {
-            name: replace(items[name].row, version=after[name].version)
+        listed = objects.listing()
+        after |= {
+            name: replace(items[name].row, version=listed[name].version)
             for name in written
-            if name in after
+            if name in listed
         }
-    if rows != before:
-        _write_list(objects, rows)
+    final: Rows = {name: (row,) for name, row in after.items()}
+    if final != rows:
+        _write_list(objects, final)
     return Published(written, unchanged, removed)
 
 
@@ -175,7 +183,7 @@ def _item(entry: Entry, *, encode: bool) -> Item:
     return Item(entry, body, headers, Row(sha256(text.encode()), md5))
 
 
-def _rows(objects: Objects, held: Mapping[str, Held], force: bool) -> dict[str, Row]:
+def _rows(objects: Objects, held: Mapping[str, Held], force: bool) -> Rows:
     """The list of an earlier publication; empty for a new one, or one that was forced.
 
     Raises OutputError PTM-O010 if other objects are there.
@@ -193,13 +201,29 @@ def _rows(objects: Objects, held: Mapping[str, Held], force: bool) -> dict[str, 
     return rows or {}
 
 
-def _read_list(data: bytes) -> dict[str, Row] | None:
+def _settled(objects: Objects, name: str, held: Held | None, rows: Sequence[Row]) -> Row:
+    """The row whose bytes the object has; the first one if none fits. Only an interrupted run
+    leaves an object without a version in the list: if the store gives no MD5, it is read."""
+    if held and not held.md5 and len(rows) + (not rows[0].version) > 1:
+        md5 = hashlib.md5(objects.read(name), usedforsecurity=False).hexdigest()
+        held = replace(held, md5=md5)
+    for row in reversed(rows):
+        if held and row.is_of(held):
+            return replace(row, version=held.version)
+    return rows[0]
+
+
+def _read_list(data: bytes) -> Rows | None:
     """The rows of a list that may be ours; None if it is no list."""
     try:
         document: Any = json.loads(data)
         if (document["format"], document["schema"]) != (FORMAT, SCHEMA):
             return None
-        return dict(_valid(document["files"]))
+        rows: Rows = {name: (row,) for name, row in _valid(document["files"])}
+        # Only an interrupted run leaves these.
+        for name, row in _valid(document.get("next", {})):
+            rows[name] = (*rows.get(name, ()), row)
+        return rows
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return None
 
@@ -211,8 +235,11 @@ def _valid(files: Mapping[str, Any]) -> Iterator[tuple[str, Row]]:
             yield name, Row(*parts)
 
 
-def _write_list(objects: Objects, rows: Mapping[str, Row]) -> None:
-    files = {name: asdict(row) for name, row in sorted(rows.items())}
+def _write_list(objects: Objects, rows: Rows) -> None:
+    files = {name: asdict(alternatives[0]) for name, alternatives in sorted(rows.items())}
     document = {"format": FORMAT, "schema": SCHEMA, "files": files}
+    second = {name: asdict(row) for name, (_, *others) in sorted(rows.items()) for row in others}
+    if second:
+        document["next"] = second
     data = (json.dumps(document, indent=0, ensure_ascii=False) + "\n").encode()
     objects.write(LIST, data, Headers("application/json", FRESH))
