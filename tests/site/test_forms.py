@@ -20,6 +20,7 @@ from ptmtools.neighbours.apo.files import read_mesh, read_octree
 from ptmtools.neighbours.apo.picture import RenderOptions, render
 from ptmtools.neighbours.interlace import deinterlace
 from ptmtools.site.content import SiteOptions
+from ptmtools.site.entry import is_marked
 from ptmtools.site.forms import FORMS, form_of, form_site
 from ptmtools.site.lookup import files_of
 from ptmtools.site.throttle import Throttle
@@ -330,6 +331,7 @@ def test_every_form_has_a_page(statue: Path, pictures: dict[str, Path]) -> None:
         assert "manifest.webmanifest" in site.entries
         (index,) = (e for n, e in site.entries.items() if n.endswith(name))
         assert index.forever
+        assert all(is_marked(name) == entry.forever for name, entry in site.entries.items())
 
 
 def test_a_published_folder(

@@ -24,7 +24,7 @@ from ptmtools.neighbours.interlace import deinterlace
 from ptmtools.output.served import read_served
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.site.content import Site, site_of
-from ptmtools.site.entry import Entry
+from ptmtools.site.entry import Entry, is_marked
 from ptmtools.site.publishing import weight_of
 from ptmtools.site.serving import serving
 from ptmtools.site.sets import is_of_sets
@@ -178,6 +178,7 @@ def test_who_does_not_ask_loads_nothing(visit: Visiting, hall: Site) -> None:
     assert [path for path in paths if "sets" in path] == []
     without = {name: entry for name, entry in hall.entries.items() if not is_of_sets(name)}
     assert weight_of(hall) == weight_of(replace(hall, entries=without))
+    assert all(is_marked(name) for name in hall.entries if is_of_sets(name))
 
 
 def test_other_policies_are_refused(visit: Visiting, hall: Site) -> None:

@@ -22,7 +22,7 @@ from ptmtools.output.emission import compressed
 from ptmtools.site import pictures as drawing
 from ptmtools.site.about import MANIFEST
 from ptmtools.site.content import Site, SiteOptions, site_of, title_of
-from ptmtools.site.entry import link_bytes
+from ptmtools.site.entry import is_marked, link_bytes
 from ptmtools.site.files import DATA
 from ptmtools.site.geometry import lean_glb
 from ptmtools.site.program import ELEMENT, LATER, PROGRAM
@@ -74,7 +74,7 @@ def test_names_are_hashes(site: Site, two_rooms: Path) -> None:
     assert previews
     for name, entry in site.entries.items():
         assert entry.name == name
-        assert entry.forever is (name not in ("index.html", ELEMENT, MANIFEST))
+        assert entry.forever is is_marked(name) is (name not in ("index.html", ELEMENT, MANIFEST))
         if name.startswith(DATA) and name not in previews and "/opening-" not in name:
             digest = hashlib.sha256(entry.read()).hexdigest()
             assert re.fullmatch(rf"data/[\w-]+-{digest[:10]}\.\w+", name)
