@@ -63,7 +63,7 @@ def _step(name: str) -> int:
     return 2 if name.removesuffix(COPY) == INDEX else int(not is_marked(name))
 
 
-def disused(
+def steps_of_removal(
     before: Iterable[str], now: Collection[str], options: PublishOptions
 ) -> list[list[str]]:
     """The files of earlier versions to remove, in steps. A copy of a file that is still there has

@@ -40,11 +40,11 @@ from ptmtools.site.published import (
     Published,
     PublishOptions,
     digest_of,
-    disused,
     file_digest,
     plain_files,
     reading,
     steps_of,
+    steps_of_removal,
 )
 from ptmtools.site.sets import is_of_sets
 from ptmtools.site.uploading import upload
@@ -106,7 +106,7 @@ def publish(
         if _held(root, name) != digest:
             _write(root, name, files[name], digest)
             written[name] = None
-    old = dict.fromkeys(name for step in disused(before, now, options) for name in step)
+    old = dict.fromkeys(name for step in steps_of_removal(before, now, options) for name in step)
     removed = tuple(name for name in old if _remove(root, name, before[name]))
     kept = {name: digests for name, digests in before.items() if name not in old}
     _write_list(root, kept | now)

@@ -37,11 +37,11 @@ from ptmtools.site.published import (
     Published,
     PublishOptions,
     digest_of,
-    disused,
     file_digest,
     plain_files,
     reading,
     steps_of,
+    steps_of_removal,
 )
 from ptmtools.store.folder import damaged
 from ptmtools.store.layout import sha256
@@ -91,10 +91,10 @@ def upload(
     held = objects.listing()
     rows = _rows(objects, held, force)
 
-    def settled(name: str) -> Row:
-        return _settled(objects, name, held.get(name), rows[name])
+    def row_held(name: str) -> Row:
+        return _row_held(objects, name, held.get(name), rows[name])
 
-    before = dict(zip(rows, ordered(settled, rows, AT_ONCE), strict=True))
+    before = dict(zip(rows, ordered(row_held, rows, AT_ONCE), strict=True))
     # Headers take the place of gzip copies and of the file with caching rules.
     files = (
         {unquote(name): entry for name, entry in site.entries.items()}
@@ -141,7 +141,7 @@ def upload(
     uploads = chain.from_iterable(ordered(send, wave, AT_ONCE) for wave in waves)
     for number, _ in enumerate(uploads):
         progress(number, len(written), "files")
-    old = disused(before, items, options)
+    old = steps_of_removal(before, items, options)
     waves = [[name for name in step if before[name].is_of(held.get(name))] for step in old]
     removed = tuple(chain.from_iterable(waves))
     for wave in waves:
@@ -201,7 +201,7 @@ def _rows(objects: Objects, held: Mapping[str, Held], force: bool) -> Rows:
     return rows or {}
 
 
-def _settled(objects: Objects, name: str, held: Held | None, rows: Sequence[Row]) -> Row:
+def _row_held(objects: Objects, name: str, held: Held | None, rows: Sequence[Row]) -> Row:
     """The row whose bytes the object has; the first one if none fits. Only an interrupted run
     leaves an object without a version in the list: if the store gives no MD5, it is read."""
     if held and not held.md5 and len(rows) + (not rows[0].version) > 1:

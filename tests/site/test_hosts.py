@@ -84,9 +84,9 @@ def test_all_files_are_sent_as_by_ptm_serve(site: Site, folder: Path, nginx: Cli
             shared = "*" if name == ELEMENT else None
             assert headers.get("access-control-allow-origin") == shared, name
             if entry := site.entries.get(name):
-                # The site itself is sent so, too.
-                sent = (wanted_media, wanted["cache-control"], plain(expected))
-                assert sent == (entry.media, entry.caching, entry.read()), name
+                # So is the site itself.
+                fields = (wanted_media, wanted["cache-control"], plain(expected))
+                assert fields == (entry.media, entry.caching, entry.read()), name
                 assert ("content-encoding" in wanted) == entry.compressed, name
             else:
                 assert wanted["cache-control"] == FRESH

@@ -19,7 +19,7 @@ from hypothesis import Phase, example, given, settings, strategies as st
 from ptmtools.site import publishing, uploading
 from ptmtools.site.content import Site
 from ptmtools.site.entry import Entry
-from ptmtools.site.published import COPY, LIST, PublishOptions, disused, steps_of
+from ptmtools.site.published import COPY, LIST, PublishOptions, steps_of, steps_of_removal
 from ptmtools.site.publishing import publish
 from ptmtools.store import objects
 from tests.conftest import files_below
@@ -194,7 +194,7 @@ def test_the_copy_of_the_page_comes_with_it() -> None:
     page = ["index.html", "index.html.gz"]
     names = sorted([*first, *documents, *page])
     assert steps_of(names) == [first, documents, page]
-    assert disused(names, (), PublishOptions()) == [page, documents, first]
+    assert steps_of_removal(names, (), PublishOptions()) == [page, documents, first]
 
 
 @pytest.mark.parametrize("kind", ["folder", "bare"])
