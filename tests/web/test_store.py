@@ -89,6 +89,38 @@ def test_a_page_in_place_of_a_file_is_not_kept(rows: dict[str, dict[str, Any]]) 
     assert rows["page"]["kept"] == 0
 
 
+def test_a_text_in_place_of_a_script_is_not_kept(rows: dict[str, dict[str, Any]]) -> None:
+    assert rows["texts"]["kept"] == ["true", "true"]
+
+
+def test_a_host_may_redirect_the_rest_of_a_range(rows: dict[str, dict[str, Any]]) -> None:
+    """To another origin, as it may redirect a whole range."""
+    assert rows["longer"]["modes"] == ["cors", "cors"]
+
+
+def test_the_last_of_two_versions_stays(rows: dict[str, dict[str, Any]]) -> None:
+    """Though its files come first, and with all of them; documents that it does not name go."""
+    mark = "abcdefabcd"
+    files = [f"data/index-{mark}.json", "manifest.webmanifest", f"viewer-{mark}/register.js"]
+    catalogues = ["catalogue-de.html", "catalogue.html"]
+    assert rows["overlap"]["before"] == 6
+    assert rows["overlap"]["kept"] == ["", *files]
+    assert rows["overlap catalogue.html"]["kept"] == ["", *catalogues, *files]
+
+
+def test_only_a_page_with_the_service_worker_creates_storage(
+    rows: dict[str, dict[str, Any]],
+) -> None:
+    """Entries, and requests for what a page has received: as the browser removed the storage, the
+    host published without `--offline`, it has a fault, and it published with it once more."""
+    assert rows["storage"] == {
+        "name": "storage",
+        "kept": {"first": [5, 2], "browser": [5, 2], "plain": [None, 0], "fault": [None, 0]}
+        | {"again": [5, 2]},
+        "sound": 1,
+    }
+
+
 def test_a_version_that_does_not_fit_leaves_the_former(rows: dict[str, dict[str, Any]]) -> None:
     """The version of the page, and whether its index is kept: without and with room."""
     former, new = rows["versions"]["kept"].values()
@@ -102,7 +134,7 @@ def test_without_a_network(rows: dict[str, dict[str, Any]]) -> None:
 
 
 def test_a_sound_that_was_played(rows: dict[str, dict[str, Any]]) -> None:
-    """Players ask for ranges without an end. A long sound is not kept."""
+    """Players ask for ranges without an end, or for a few bytes first. A long sound is not kept."""
     row = rows["played"]
     assert row["asked"] == [[0, 1000]]
     assert all(answer["right"] and answer["status"] == 206 for answer in row["answers"])
@@ -112,7 +144,13 @@ def test_a_sound_that_was_played(rows: dict[str, dict[str, Any]]) -> None:
         "bytes 0-1/1000",
     ]
     assert rows["type"]["type"] == "audio/wav"
-    assert (rows["long"]["answers"][0]["length"], rows["long"]["kept"]) == (9 * 2**20, [])
+    player = rows["player"]
+    assert player["asked"] == [[0, 2], [0, 500], [0, 1000]], "a player does not wait for a part"
+    assert all(answer["right"] for answer in player["answers"])
+    long = 9 * 2**20
+    assert rows["long"]["asked"] == [[0, long], [0, 2], [0, long]]
+    assert rows["long"]["kept"] == rows["long whole"]["kept"] == []
+    assert rows["long whole"]["answers"][0]["length"] == long
 
 
 SITE = '<p id="site">viewer-0123456789/register.js '
@@ -123,14 +161,14 @@ NONE = "TypeError: no network"
 @pytest.mark.parametrize(
     ("case", "texts", "kept"),
     [
-        ("fault", [SITE + "1"] * 5, {"": SITE + "1"}),
+        ("fault", [SITE + "1"] * 7, {"": SITE + "1"}),
         ("unknown", ["fault", NONE], {}),
         ("removed", [CATALOGUE + "1"] * 3 + [NONE], {"catalogue.html": CATALOGUE + "1"}),
         ("stays", None, {"": SITE + "1", "catalogue.html": CATALOGUE + "1"}),
         ("gone", [CATALOGUE + "1", "gone"], {}),
         (
             "login",
-            [CATALOGUE + "1", "login", "login", "login", CATALOGUE + "1"],
+            [CATALOGUE + "1", "login", "login", "login", CATALOGUE + "1", "login"],
             {"catalogue.html": CATALOGUE + "1"},
         ),
         ("others", [None] * 5, {}),

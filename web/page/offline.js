@@ -12,15 +12,15 @@ const NAME = `ptm-walk ${scope}`;
 /** Downloads whose timings are remembered. */
 const MOST = 64;
 
-const make = () => caches.open(NAME);
-/** A worker that a later version has removed still answers for a page that is open: it makes no storage again. */
-async function shelf() {
-  if (!(await caches.has(NAME))) throw new Error("removed");
-  return make();
+/** A worker that a later version has removed still answers for a page that is open: only a page with `--offline`
+ * creates the storage again. */
+async function openCache(create = false) {
+  if (!create && !(await caches.has(NAME))) throw new Error("removed");
+  return caches.open(NAME);
 }
 
 const visits = new Visits(
-  new Store(shelf, (request) => fetch(request)),
+  new Store(openCache, (request) => fetch(request)),
   scope,
   async () => {
     await worker.registration.unregister();
@@ -32,7 +32,7 @@ const laterOf = (event) => (/** @type {Promise<unknown>} */ work) => event.waitU
 
 worker.oninstall = (/** @type {any} */ event) => {
   worker.skipWaiting();
-  event.waitUntil(make());
+  event.waitUntil(openCache(true));
 };
 worker.onactivate = (/** @type {any} */ event) => event.waitUntil(worker.clients.claim());
 worker.onfetch = (/** @type {any} */ event) => {
@@ -48,7 +48,6 @@ watchDownloads(async (timings) => {
 });
 worker.onmessage = (/** @type {any} */ event) => {
   const { data, source } = event;
-  // Browsers may have removed the storage alone.
-  if ("index" in data) return laterOf(event)(make().then(() => visits.keep(data)));
+  if ("index" in data) return laterOf(event)(visits.keep(data));
   source.postMessage(recent.filter(({ asked }) => asked >= data.since));
 };

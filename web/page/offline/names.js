@@ -23,6 +23,8 @@ export function documentOf(address) {
 }
 /** @param {string} name */
 export const isFile = (name) => FILE.test(name);
+/** Players read sounds as they play, in ranges of their own. @param {string} url */
+export const isSound = (url) => /\.(?:mp3|m4a|ogg|opus|wav)$/.test(url);
 /** @param {string} name */
 export const isList = (name) => LIST.test(name) || Boolean(documentOf(name));
 

@@ -1,6 +1,7 @@
 // The files of a site that a browser keeps: whole ones, and spans of those that come in ranges. Names change with
 // contents, so what is kept is right for ever; a file that was damaged is asked for with `no-store` and replaced.
 
+import { isSound } from "./names.js";
 import { answeredSpan, askedSpan, bytesOf, coverOf, keyOf, missingOf, rangeOf, spanOfKey } from "./spans.js";
 
 /** @typedef {import("./spans.js").Span} Span */
@@ -15,14 +16,29 @@ import { answeredSpan, askedSpan, bytesOf, coverOf, keyOf, missingOf, rangeOf, s
  */
 
 const PAST = ["no-store", "reload"];
-/** Bytes of the longest sound that is kept: players ask for a file without an end, and read it as they play. */
+/** Bytes of the longest sound that is kept. */
 const LONGEST = 8 * 2 ** 20;
 /** What hosts say `Vary` about does not differ for one page. */
 const ANY = { ignoreVary: true };
 
-/** Whether an answer is a file: hosts of applications answer with their page for files that they lack.
- * @param {Response} response */
-export const isOwn = ({ status, headers }) => status === 200 && !headers.get("content-type")?.startsWith("text/html");
+/** Media types of files by the ends of their names. @type {Record<string, RegExp>} */
+const TYPES = { js: /javascript/, json: /json/, wasm: /wasm|octet-stream/ };
+
+/** Whether an answer is the file: hosts of applications answer with their page for files that they lack, and
+ * networks with texts of their own. @param {Response} response @param {string} url */
+export function isOwn({ status, headers }, url) {
+  const type = headers.get("content-type") ?? "";
+  return status === 200 && (TYPES[url.split(".").at(-1) ?? ""] ?? /^(?!text\/html)/).test(type);
+}
+
+/** Whether an answer is the file or a range of it, and not of a long sound.
+ * @param {Response} response @param {string} url */
+function isKept(response, url) {
+  const { status, headers } = response;
+  const total = answeredSpan(headers.get("content-range"))?.total, length = headers.get("content-length");
+  if (status === 206 ? !total : !isOwn(response, url)) return false;
+  return !isSound(url) || Number(total ?? length ?? Infinity) <= LONGEST;
+}
 
 export class Store {
   /** The spans of files, by URL. @type {Promise<Map<string, Kept[]>> | null} */
@@ -30,10 +46,18 @@ export class Store {
   /** Whether nothing is kept any more. */
   closed = false;
 
-  /** @param {() => Promise<Shelf>} open @param {(request: Request | string) => Promise<Response>} ask the host */
+  /** @param {(create?: boolean) => Promise<Shelf>} open rejects if there is no cache, and it is not to be created
+   * @param {(request: Request | string) => Promise<Response>} ask the host */
   constructor(open, ask) {
     this.open = open;
     this.ask = ask;
+  }
+
+  /** Creates the storage, also after its removal. */
+  async begin() {
+    await this.open(true);
+    this.closed = false;
+    this.#spans = null;
   }
 
   /** Keeps an answer; without room, nothing happens. @param {string} key @param {Response} response */
@@ -123,20 +147,21 @@ export class Store {
     const kept = past || header ? null : await this.match(url);
     if (kept) return kept;
     const response = await this.ask(request);
-    if (isOwn(response)) later(this.put(url, response.clone()));
+    if (isKept(response, url)) later(this.put(url, response.clone()));
     return response;
   }
 
-  /** @param {Request} request @param {string} url @param {Span} asked @param {boolean} past @param {Later} later */
-  async #range(request, url, asked, past, later) {
-    const spans = past ? [] : await this.spans(url), open = asked.end === Infinity;
-    const span = { begin: asked.begin, end: Math.min(asked.end, spans[0]?.total ?? Infinity) };
-    const gap = missingOf(spans, span), none = gap && (open || (gap.begin === span.begin && gap.end === span.end));
+  /** @param {Request} request @param {string} url @param {Span} wanted @param {boolean} past @param {Later} later */
+  async #range(request, url, wanted, past, later) {
+    const spans = past ? [] : await this.spans(url);
+    const span = { begin: wanted.begin, end: Math.min(wanted.end, spans[0]?.total ?? Infinity) };
+    // A player does not wait for a part of its range.
+    const gap = missingOf(spans, span), none = gap && (isSound(url) || (gap.begin === span.begin && gap.end === span.end));
     if (gap && !none) {
       /** @type {Promise<unknown>[]} */
       const work = [];
-      // Requests of players have a mode in which the header cannot be set.
-      const rest = new Request(request, { mode: "same-origin", headers: { range: rangeOf(gap) } });
+      // The host may redirect to another origin.
+      const rest = new Request(request, { mode: "cors", headers: { range: rangeOf(gap) } });
       const response = await this.#fetched(rest, url, past, (one) => later((work.push(one), one)));
       if (response.status !== 206) return response;
       await Promise.all(work);
@@ -147,12 +172,9 @@ export class Store {
   /** The host's answer, of which the bytes are kept. Hosts that ignore ranges send the file.
    * @param {Request} request @param {string} url @param {boolean} past @param {Later} later */
   async #fetched(request, url, past, later) {
-    const response = await this.ask(request), whole = isOwn(response);
-    const answered = answeredSpan(response.headers.get("content-range"));
-    const most = askedSpan(request.headers.get("range"))?.end === Infinity ? LONGEST : Infinity;
-    if (whole || (response.status === 206 && answered && answered.end - answered.begin <= most)) {
-      later(this.#store(response.clone(), url, whole ? null : answered, past));
-    }
+    const response = await this.ask(request);
+    const span = response.status === 206 ? answeredSpan(response.headers.get("content-range")) : null;
+    if (isKept(response, url)) later(this.#store(response.clone(), url, span, past));
     return response;
   }
 

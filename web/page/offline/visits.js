@@ -1,6 +1,6 @@
 // The visits of a site: its page as it was last, what the visitor has seen of it, and what goes with a new version.
 
-import { documentOf, isFile, isList, markOf, marksIn, nameOf, neededBy } from "./names.js";
+import { documentOf, isFile, isList, isSound, markOf, marksIn, nameOf, neededBy } from "./names.js";
 import { missingOf } from "./spans.js";
 import { isOwn } from "./store.js";
 
@@ -17,13 +17,18 @@ import { isOwn } from "./store.js";
 const PAGE = 'id="site"', HOOK = /viewer-[0-9a-f]{10}\/register\.js/;
 /** Of a catalogue. */
 const CATALOGUE = '<meta name="generator" content="ptmtools">';
-/** The first status of a fault of the host. */
-const FAULT = 500;
+/** As if a host that cannot be reached had answered. */
+const FAULT = 503;
+/** Status 511 is the login of a network. @param {number} status */
+const isFault = (status) => (status >= 500 && status !== 511) || status === 408 || status === 429;
 
 /** A page of ours. No navigation may be answered with a response that was redirected. @param {string} html */
 const pageOf = (html) => new Response(html, { headers: { "content-type": "text/html; charset=utf-8" } });
 
 export class Visits {
+  /** Pages are taken one after the other: each removes the files of those before. @type {Promise<unknown>} */
+  #turn = Promise.resolve();
+
   /**
    * @param {Store} store @param {string} scope URL of the site, with a slash at its end
    * @param {() => Promise<unknown>} leave ends all of this: the site is no longer published so
@@ -52,10 +57,10 @@ export class Visits {
    * @param {Request} request @param {string} name in the address @param {string} document @param {Later} later
    */
   async #document(request, name, document, later) {
-    const { store, scope } = this, key = scope + document, asked = store.ask(request);
-    const status = await asked.then((response) => response.status, () => FAULT);
-    if (status >= FAULT) return (await store.match(key)) ?? asked;
-    const response = await asked, own = !name || name.includes(".");
+    const { store, scope } = this, key = scope + document, answer = store.ask(request);
+    const status = await answer.then((response) => response.status, () => FAULT);
+    if (isFault(status)) return (await store.match(key)) ?? answer;
+    const response = await answer, own = !name || name.includes(".");
     if (status === 404 || status === 410) own && later(store.delete(key));
     else if (document) later(this.#take(key, response.clone()));
     else if (own) later(this.#learn(response.clone()));
@@ -65,20 +70,29 @@ export class Visits {
   /** Takes a document besides the page. Networks that ask for a password answer for the host.
    * @param {string} key @param {Response} response */
   async #take(key, response) {
-    if (!key.endsWith(".html")) return void (isOwn(response) && await this.store.put(key, response));
+    if (!key.endsWith(".html")) return void (isOwn(response, key) && await this.store.put(key, response));
     const html = response.status === 200 ? await response.text() : "";
     if (html.includes(CATALOGUE)) await this.store.put(key, pageOf(html));
   }
 
   /** Takes a page as the last one, once its files are here. @param {Response} response */
   async #learn(response) {
-    const html = response.status === 200 ? await response.text() : "", { store, scope } = this;
+    const html = response.status === 200 ? await response.text() : "";
     if (!html.includes(PAGE)) return;
+    const work = this.#turn.then(() => this.#become(html));
+    this.#turn = work.catch(() => {});
+    return work;
+  }
+
+  /** @param {string} html */
+  async #become(html) {
+    const { store, scope } = this;
     if (!HOOK.test(html)) {
       store.closed = true;
       return void (await this.leave());
     }
     const before = await (await store.match(scope))?.text();
+    if (!before) await store.begin();
     for (const name of neededBy(html)) {
       await this.#hold(scope + name);
       // Without room, what is kept of the former version stays.
@@ -93,17 +107,22 @@ export class Visits {
     if (length && !missingOf(await this.store.spans(url), { begin: 0, end: length })) return;
     /** @type {Promise<unknown>[]} */
     const work = [];
-    const headers = length ? { range: `bytes=0-${length - 1}` } : undefined;
+    const headers = length || isSound(url) ? { range: `bytes=0-${length ? length - 1 : ""}` } : undefined;
     const response = await this.store.answer(new Request(url, { headers }), url, (one) => work.push(one));
     await response.body?.cancel();
     if (!response.ok) throw new Error(`status ${response.status}`);
     await Promise.all(work);
   }
 
-  /** Removes the files that the page and its documents do not name. @param {string} html */
+  /** Removes the documents that the page does not name, and the files that neither of them names.
+   * @param {string} html */
   async #tidy(html) {
     const { store, scope } = this, named = new Set(marksIn(html));
-    const kept = (await store.keys()).map((key) => ({ key, name: nameOf(key, scope) ?? "" }));
+    const all = (await store.keys()).map((key) => ({ key, name: nameOf(key, scope) ?? "" }));
+    // A catalogue names those in other languages.
+    const isNamed = (/** @type {string} */ name) => isFile(name) || html.includes(name.replace(/-.*\./, "."));
+    for (const { key, name } of all) if (!isNamed(name)) await store.delete(key);
+    const kept = all.filter(({ name }) => isNamed(name));
     // The index comes first, which names the others.
     for (const { key, name } of kept.sort((a, b) => (a.name < b.name ? -1 : 1))) {
       if (!isList(name) || (isFile(name) && !named.has(markOf(name)))) continue;
@@ -116,11 +135,13 @@ export class Visits {
   async keep({ index, files, ranged }) {
     const { store, scope } = this;
     const isHere = (/** @type {string} */ url) => isFile(nameOf(url, scope) ?? "");
+    // The page of the host tells whether the site is still published so; the browser may have removed the storage.
+    if (!(await store.match(scope))) await this.#learn(await store.ask(new Request(scope, { cache: "no-cache" })));
+    if (!(await store.match(scope))) return;
     const own = files.filter(isHere);
     for (const url of own) await this.#hold(url).catch(() => {});
     for (const url of own) if (url.includes("/data/opening-")) await this.#unpack(url, index).catch(() => {});
     for (const { url, length } of ranged) if (isHere(url)) await this.#hold(url, length).catch(() => {});
-    if (!(await store.match(scope))) await this.#learn(await store.ask(scope));
   }
 
   /**
