@@ -29,7 +29,7 @@ from ptmtools.site.throttle import Visits
 from ptmtools.store.layout import sha256
 
 #: Whether the browser keeps the page and every byte of the textures that it has received.
-KEPT = """
+KEEPS = """
 async () => {
   const names = await caches.keys(), cache = names.length === 1 && await caches.open(names[0]);
   if (!cache || !(await cache.match("./"))) return false;
@@ -66,8 +66,8 @@ async () => {
 """
 
 
-#: Loads a sound to its end: whether it can be played.
-PLAYED = """
+#: Loads a sound: whether it plays, as the browser expects, without a stop.
+PLAYS = """
 (url) => new Promise((done) => {
   const sound = Object.assign(new Audio(url), { preload: "auto" });
   sound.oncanplaythrough = () => done(true);
@@ -99,8 +99,16 @@ class Host:
         await app({**scope, "raw_path": path.encode()}, receive, send)
 
 
+#: Tells the worker what the page has received, and gives it the time to keep that.
+RECEIVED = """
+async (name) => {
+  const files = [new URL(name, location).href], { controller } = navigator.serviceWorker;
+  controller.postMessage({ index: "", files, ranged: [] });
+  await new Promise((done) => setTimeout(done, 500));
+}
+"""
 #: Fetches a file; it would be kept by the second time. Whether a service worker answers.
-FETCHED = """
+FETCH = """
 async (name) => {
   for (const _ of [1, 2]) await (await fetch(name)).arrayBuffer();
   return navigator.serviceWorker.controller !== null;
@@ -109,14 +117,14 @@ async (name) => {
 
 
 @pytest.fixture(scope="module")
-def toured(tmp_path_factory: pytest.TempPathFactory) -> SiteOptions:
+def with_tour(tmp_path_factory: pytest.TempPathFactory) -> SiteOptions:
     """The options of a site with a tour of one sound."""
     return SiteOptions(pictures=False, tour=write_tour(tmp_path_factory.mktemp("tour")))
 
 
 @pytest.fixture(scope="module")
-def site(two_rooms: Path, toured: SiteOptions) -> Site:
-    return site_of(two_rooms, replace(toured, offline=True))
+def site(two_rooms: Path, with_tour: SiteOptions) -> Site:
+    return site_of(two_rooms, replace(with_tour, offline=True))
 
 
 @contextmanager
@@ -166,7 +174,7 @@ def wait_for(visitor: Visitor, condition: str) -> None:
 def keeps(visitor: Visitor) -> None:
     """Waits until the browser keeps what the page has received."""
     visitor.until(ALL)
-    wait_for(visitor, KEPT)
+    wait_for(visitor, KEEPS)
 
 
 def test_a_visited_walk_without_a_network(chromium: Any, site: Site) -> None:
@@ -181,7 +189,7 @@ def test_a_visited_walk_without_a_network(chromium: Any, site: Site) -> None:
         with open_page(context, url) as visitor:
             keeps(visitor)
             pictures = [picture_of(visitor)]
-            assert visitor.page.evaluate(PLAYED, sound)
+            assert visitor.page.evaluate(PLAYS, sound)
             visitor.page.evaluate("(place) => ptm.goTo(place)", last)
             visitor.frames(2)
             visitor.until(ALL)
@@ -208,7 +216,7 @@ def test_a_visited_walk_without_a_network(chromium: Any, site: Site) -> None:
         with open_page(context, f"{url}index.html?lang=en") as visitor:
             visitor.until(ALL)
             assert np.array_equal(picture_of(visitor), pictures[0])
-            assert visitor.page.evaluate(PLAYED, sound)
+            assert visitor.page.evaluate(PLAYS, sound)
             visitor.page.evaluate("(place) => ptm.goTo(place)", last)
             visitor.frames(2)
             visitor.until(ALL)
@@ -275,13 +283,15 @@ def test_a_new_version_takes_the_place_of_the_old(chromium: Any, two_rooms: Path
             for command in ("enable", "stopAllWorkers"):
                 session.send(f"ServiceWorker.{command}")
             name = next(name for name in entries if name.endswith(".glb"))
-            assert former.page.evaluate(FETCHED, name), "a worker answers"
+            assert former.page.evaluate(FETCH, name), "a worker answers"
+            # A page that loads slowly tells the worker last what it has received.
+            former.page.evaluate(RECEIVED, name)
             assert former.page.evaluate(GONE)
         assert visitor.messages == []
 
 
-def test_other_sites_do_not_grow(site: Site, two_rooms: Path, toured: SiteOptions) -> None:
-    plain = site_of(two_rooms, toured)
+def test_other_sites_do_not_grow(site: Site, two_rooms: Path, with_tour: SiteOptions) -> None:
+    plain = site_of(two_rooms, with_tour)
     assert site.entries.keys() - plain.entries.keys() == {WORKER}
     assert "register.js" not in plain.entries[INDEX].read().decode()
     assert weight_of(site).whole - weight_of(plain).whole < 200

@@ -40,7 +40,7 @@ GPUII = "?form=gpuii"
 #: Whether texture memory is as the client wants it.
 SETTLED = "s.complete && s.held.every((held, t) => held === ptm.walk.client.column[t])"
 #: Whether the browser keeps the page and the data that it has requested.
-KEPT = """
+KEEPS = """
 async () => {
   const files = performance.getEntriesByType("resource").map(({ name }) => name);
   const data = files.filter((name) => name.includes("/data/"));
@@ -155,7 +155,7 @@ def test_without_a_network(chromium: Any, hall_db: Path) -> None:
             held = visitor.until(SETTLED)["held"]
             before = picture_of(visitor)
             assert max(held) > 1
-            wait_for(visitor, KEPT)
+            wait_for(visitor, KEEPS)
             forget(visitor)
         with open_page(context, url + GPUII) as visitor:
             visitor.until(f"{SETTLED} && s.held.join() === '{','.join(map(str, held))}'")
