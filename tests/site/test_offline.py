@@ -272,19 +272,20 @@ def test_a_new_version_takes_the_place_of_the_old(chromium: Any, two_rooms: Path
             visitor.until(ALL)
             assert np.array_equal(picture_of(visitor), second)
         entries = site_of(two_rooms, plain).entries
-        with open_page(context, url) as former, serving(entries, port=port):
-            former.until(ALL)
-            with open_page(context, url) as visitor:
-                visitor.until(ALL)
-                wait_for(visitor, GONE)
-                assert np.array_equal(picture_of(visitor), first)
-            # Browsers end a worker when they like; for a page that is open they start it again.
-            session = context.new_cdp_session(former.page)
-            for command in ("enable", "stopAllWorkers"):
-                session.send(f"ServiceWorker.{command}")
-            name = next(name for name in entries if name.endswith(".glb"))
-            assert former.page.evaluate(FETCH, name), "a worker answers"
-            # A page that loads slowly tells the worker last what it has received.
+        with open_page(context, url) as former:
+            with serving(entries, port=port):
+                former.until(ALL)
+                with open_page(context, url) as visitor:
+                    visitor.until(ALL)
+                    wait_for(visitor, GONE)
+                    assert np.array_equal(picture_of(visitor), first)
+                # Browsers end a worker when they like; for a page that is open they start it again.
+                session = context.new_cdp_session(former.page)
+                for command in ("enable", "stopAllWorkers"):
+                    session.send(f"ServiceWorker.{command}")
+                name = next(name for name in entries if name.endswith(".glb"))
+                assert former.page.evaluate(FETCH, name), "a worker answers"
+            # A page that loads slowly tells the worker last what it received; the host has gone.
             former.page.evaluate(RECEIVED, name)
             assert former.page.evaluate(GONE)
         assert visitor.messages == []
