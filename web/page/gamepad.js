@@ -9,14 +9,14 @@ import { OWN } from "./ui/controls.js";
 
 /** The push of a stick below which it rests: worn ones do not return to 0. */
 const REST = 0.15;
-/** Seconds until a button of the cross repeats, and then between its presses; longest time of a frame that counts. */
+/** Seconds until a button of the D-pad repeats, and then between its presses; longest time of a frame that counts. */
 const FIRST = 0.5, AGAIN = 0.12, FRAME = 0.1;
 /** Buttons of the standard layout. */
 const USE = 0, BACK = 1, BEFORE = 4, NEXT = 5, RUN = 7, STICKS = [10, 11];
 /** The panels of buttons. @type {Record<number, string>} */
 const PANELS = { 3: "tour", 8: "map", 9: "places" };
-/** Of the cross. @type {Record<number, () => void>} */
-const CROSS = { 12: () => move(-1), 13: () => move(1), 14: () => aside(-1), 15: () => aside(1) };
+/** Of the D-pad. @type {Record<number, () => void>} */
+const D_PAD = { 12: () => move(-1), 13: () => move(1), 14: () => aside(-1), 15: () => aside(1) };
 
 /** A stick beyond its rest, at most of length 1. @param {number} x @param {number} y */
 export function pushed(x = 0, y = 0) {
@@ -60,12 +60,17 @@ class Buttons {
     this.app = app;
   }
 
+  /** Buttons that do nothing until they are released. @param {Set<number>} pressed */
+  hold(pressed) {
+    for (const button of pressed) this.#held.set(button, Infinity);
+  }
+
   /** @param {Set<number>} pressed @param {number} time s */
   take(pressed, time) {
     for (const button of this.#held.keys()) if (!pressed.has(button)) this.#held.delete(button);
     for (const button of pressed) {
       const left = (this.#held.get(button) ?? 0) - time, first = !this.#held.has(button);
-      if (first || (left <= 0 && button in CROSS)) {
+      if (first || (left <= 0 && button in D_PAD)) {
         this.#held.set(button, first ? FIRST : AGAIN);
         this.#press(button);
       } else this.#held.set(button, left);
@@ -76,7 +81,7 @@ class Buttons {
   /** @param {number} button */
   #press(button) {
     const view = canvas();
-    if (button in CROSS) CROSS[button]();
+    if (button in D_PAD) D_PAD[button]();
     else if (button === USE) use();
     // Behind the message of an error nothing can be used.
     else if (view.inert) return;
@@ -125,7 +130,7 @@ export function attachGamepad(app) {
   if (attached) return;
   attached = true;
   const buttons = new Buttons(app);
-  let reads = false, before = 0;
+  let reads = false, wakes = false, before = 0;
   const connected = () => (reads ? [...navigator.getGamepads()].filter((pad) => pad?.connected) : []);
   if (app) {
     const { frame } = app;
@@ -145,6 +150,9 @@ export function attachGamepad(app) {
     for (const pad of pads) {
       if (pad?.mapping === "standard") pad.buttons.forEach((one, k) => one.pressed && pressed.add(k));
     }
+    // A browser shows a gamepad once a button is pressed: that press is for nothing else.
+    if (wakes) buttons.hold(pressed);
+    wakes = false;
     buttons.take(pressed, Math.min(FRAME, (now - before) / 1000));
     before = now;
     // A kiosk waits for a visitor's rest.
@@ -153,7 +161,7 @@ export function attachGamepad(app) {
   };
   const begin = () => {
     if (!reads) requestAnimationFrame(read);
-    reads = true;
+    reads = wakes = true;
   };
   addEventListener("gamepadconnected", begin);
   begin();

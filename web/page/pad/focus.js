@@ -6,6 +6,8 @@ import { devices } from "../words/english.js";
 const REACHED = "a[href], audio, button, input, select, summary, textarea, video, [tabindex]";
 /** Of these, what holds others; a step to a side does not lead there. */
 const HOLDS = "canvas, section";
+/** What holds elements that it keeps from the focus; closed details have rectangles in Chromium. */
+const CLOSED = "[inert], details:not([open]) > :not(summary)";
 /** Share of the height of a panel that a press scrolls. */
 const PAGE = 0.6;
 /** How much farther a place seems that lies aside of the way. */
@@ -17,7 +19,7 @@ const SKIP = 5;
 export const reachable = (root) =>
   /** @type {HTMLElement[]} */ ([...root.querySelectorAll(REACHED)]).filter((one) =>
     one.tabIndex >= 0 && !one.matches(":disabled") && one.getClientRects().length > 0
-      && getComputedStyle(one).visibility === "visible" && !one.closest("[inert]"));
+      && getComputedStyle(one).visibility === "visible" && !one.closest(CLOSED));
 
 /** The element with the focus; without any the picture, from which it begins. @returns {HTMLElement} */
 export function focused() {
@@ -58,20 +60,31 @@ export function move(by) {
   if (!panel || !scrolls(panel, next, by)) focus(next ?? all.at(end));
 }
 
+/** @param {HTMLElement} field */
+function changed(field) {
+  for (const name of ["input", "change"]) field.dispatchEvent(new Event(name, { bubbles: true }));
+}
+
+/** Chooses the next option that is not disabled; behind the last the first, if it goes `around`.
+ * @param {HTMLSelectElement} field @param {number} by 1 or -1 @param {boolean} [around] */
+function choose(field, by, around) {
+  const all = [...field.options].filter((one) => !one.disabled);
+  const next = all[all.indexOf(field.selectedOptions[0]) + by] ?? (around ? all[0] : null);
+  if (!next || next.selected) return;
+  next.selected = true;
+  changed(field);
+}
+
 /** Changes a field, as its arrow keys do; false if the element is none. @param {HTMLElement} element @param {number} by */
 function change(element, by) {
   if (element instanceof HTMLMediaElement) {
     element.currentTime = Math.max(0, element.currentTime + SKIP * by);
-    return true;
-  }
-  if (element instanceof HTMLSelectElement) {
-    const to = element.selectedIndex + by;
-    if (!(to in element.options)) return true;
-    element.selectedIndex = to;
+  } else if (element instanceof HTMLSelectElement) {
+    choose(element, by);
   } else if (element instanceof HTMLInputElement && element.type === "range") {
     element.stepUp(by);
+    changed(element);
   } else return false;
-  for (const name of ["input", "change"]) element.dispatchEvent(new Event(name, { bubbles: true }));
   return true;
 }
 
@@ -101,7 +114,7 @@ export function use() {
     if (active.paused) active.play().catch(({ name }) => name === "NotAllowedError" && refused());
     else active.pause();
   } else if (active instanceof HTMLSelectElement) {
-    change(active, active.selectedIndex + 1 in active.options ? 1 : -active.selectedIndex);
+    choose(active, 1, true);
   } else {
     // A browser opens another page only for what it counts as a visitor's act.
     const opens = active.matches("a[target]") && navigator.userActivation?.isActive === false;

@@ -5,8 +5,8 @@ import { Outline } from "./outline.js";
 /** Passes in which walls push the axis; m that they push too far, and that count as 0. */
 const PUSHES = 6, AWAY = 1e-6, SAME = 1e-9;
 
-/** A triangle, its highest point, and how far it is from the axis now.
- * @typedef {{corners: Float32Array, at: number, kind: number, top: number, now: number}} Obstacle
+/** A triangle, and how far it is from the axis now.
+ * @typedef {{corners: Float32Array, at: number, kind: number, now: number}} Obstacle
  */
 /** The distance of the axis at a place, by `outline`, which then has the nearest point.
  * @typedef {(one: Obstacle, x: number, z: number) => number} Distance

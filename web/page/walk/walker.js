@@ -165,7 +165,7 @@ export class Walker {
     const reach = this.radius + way, lowest = feet - (this.#fall && (this.#fall + 1) * PART);
     const highest = feet + this.climb + this.height + Math.max(0, this.#lift) + FOREHEAD;
     const low = [x - reach, lowest, z - reach], high = [x + reach, highest, z + reach];
-    /** @type {Obstacle[]} */
+    /** And their highest points. @type {(Obstacle & {top: number})[]} */
     const near = [];
     let inside = -Infinity;
     this.solids.near(low, high, (corners, at, kind) => {

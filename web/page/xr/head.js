@@ -42,7 +42,7 @@ export function stepOf(solids, [x, y, z], body, dx, dz) {
     const near = [];
     solids.near([x - reach, bottom, z - reach], [x + reach, top, z + reach], (corners, at, kind) => {
       if (!(kind & BLOCKS)) return;
-      const one = { corners, at, kind, top, now: 0 };
+      const one = { corners, at, kind, now: 0 };
       one.now = distance(one, x, z);
       near.push(one);
     });
