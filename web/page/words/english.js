@@ -100,7 +100,7 @@ export const panels = /* @__PURE__ */ own("panels", {
 
 export const devices = /* @__PURE__ */ own("devices", {
   "enterVr": "Enter VR",
-  "noVr": "VR cannot start: {reason}",
+  "noVr": "VR does not work: {reason}",
   "refused": "The browser does not let a gamepad do this. Use a mouse, a key or a finger."
 });
 
