@@ -21,8 +21,8 @@ BUILD = ROOT / "web" / "page" / "build.py"
 #: Sizes in kB that pages of the documentation quote, and the script.
 QUOTED = {
     "devices.md": {
-        "gamepad.js": r"([\d.]+) kB \(`gamepad\.js`\)",
-        "xr.js": r"([\d.]+) kB \(`xr\.js`\)",
+        "gamepad.js": r"([\d.]+) kB\s\(`gamepad\.js`\)",
+        "xr.js": r"([\d.]+) kB\s\(`xr\.js`\)",
     },
     "offline.md": {
         "offline.js": r"service worker, ([\d.]+) kB compressed",
