@@ -19,7 +19,7 @@ import numpy as np
 from ptmtools.arrays import Bools, Floats, Ints, normals
 from ptmtools.embree import ray_tree
 from ptmtools.output.surfaces import LEAST_ALPHA, Surfaces
-from ptmtools.rendering.rays import Caster
+from ptmtools.rendering.rays import Fronts
 from ptmtools.rendering.records import Sight
 
 #: Most layers that a ray meets, those without effect included; it misses what follows, and shows
@@ -59,14 +59,15 @@ class Layers:
         self._surfaces = surfaces
         self._one_sided = ~surfaces.two_sided[which]
         self._place, self._normal = corner[:, 0], normals(corner)
+        self._unit = 1 / np.maximum(np.linalg.norm(self._normal, axis=1), 1e-300)
         self._all = surfaces.corner[:, 0], normals(surfaces.corner)
-        low, high = corner.min(axis=(0, 1), initial=0), corner.max(axis=(0, 1), initial=0)
-        self._middle = (low + high) / 2
-        #: From the front of a layer to the origin of the ray behind it, metres.
-        self._step = 1e-6 * max(1.0, float((high - low).max()))
+        # Not the middle of the box: one pane far away must not coarsen the coordinates of others.
+        self._middle = np.median(corner.reshape(-1, 3), axis=0) if len(which) else np.zeros(3)
+        #: (t,) from the plane of each to the origin of a ray behind it, metres: more than the
+        #: rounding of its corners in single precision.
+        self._step = 2e-6 * np.abs(corner - self._middle).max(axis=(1, 2), initial=0.5)
         self._tree: Any = ray_tree(corner - self._middle) if len(which) else None
-        #: Finds the front of a leaf of two one-sided faces, of which Embree returns either.
-        self._fronts = Caster(surfaces, ~sheer_of(surfaces)) if self._one_sided.any() else None
+        self._fronts = Fronts(surfaces, which, self._middle)
 
     def before(self, sight: Sight, alpha: Alpha) -> tuple[Sight, list[Layer]]:
         """The sight with opaque texels of layers in place of the surfaces behind them, and the
@@ -83,10 +84,12 @@ class Layers:
         return sight._replace(triangle=triangle), layers
 
     def _march(self, sight: Sight, alpha: Alpha) -> list[Layer]:
-        """The layers that blend; writes the opaque ones to the triangles of the sight."""
+        """The layers that blend; writes the opaque ones to the triangles of the sight.
+
+        Distances are in lengths of the rays.
+        """
         layers: list[Layer] = []
-        triangle = sight.triangle
-        ray = sight.ray / np.linalg.norm(sight.ray, axis=1, keepdims=True)
+        triangle, ray = sight.triangle, sight.ray
         end = np.full(len(ray), np.inf)
         hit = np.flatnonzero(triangle >= 0)
         place, normal = (each[triangle[hit]] for each in self._all)
@@ -100,15 +103,21 @@ class Layers:
             waiting, pane = waiting[pane >= 0], pane[pane >= 0]
             along, normal = ray[waiting], self._normal[pane]
             far = _distance(sight.eye, along, self._place[pane], normal)
-            before = far < end[waiting] - self._step
+            turn = np.einsum("ij,ij->i", along, normal) * self._unit[pane]
+            # A ray that grazes a plane needs longer for the same step away from it.
+            step = self._step[pane] / np.maximum(np.abs(turn), 1e-9)
+            before = far < end[waiting] - step
             waiting, pane, far = waiting[before], pane[before], far[before]
+            turn, step = turn[before], step[before]
             if not len(waiting):
                 break
-            met = self._faced(sight.eye, ray[waiting], pane, far)
-            # A ray that grazes a pane may meet it again after the step.
-            met = np.where(pane == last[waiting], -1, met)
-            last[waiting] = pane
-            gone[waiting] = np.maximum(far, gone[waiting]) + self._step
+            met = self._which[pane]
+            back = np.flatnonzero(self._one_sided[pane] & (turn > 0))
+            met[back] = self._front(sight.eye, ray[waiting[back]], far[back], step[back], met[back])
+            # A ray may meet a surface again after the step, or first its back and then its front.
+            met[met == last[waiting]] = -1
+            last[waiting[met >= 0]] = met[met >= 0]
+            gone[waiting] = np.maximum(far, gone[waiting]) + step
             share = self._shares(sight, waiting, met, alpha)
             opaque, blends = share == 1, (share > 0) & (share < 1)
             triangle[waiting[opaque]] = met[opaque]
@@ -117,16 +126,12 @@ class Layers:
             waiting = waiting[~opaque]
         return layers
 
-    def _faced(self, eye: Floats, along: Floats, pane: Ints, far: Floats) -> Ints:
-        """(m,) the triangles at the panes that rays meet, -1 for one seen from behind."""
-        met = self._which[pane]
-        if self._fronts is None:
-            return met
-        turn = np.einsum("ij,ij->i", self._normal[pane], along)
-        back = np.flatnonzero(self._one_sided[pane] & (turn > 0))
-        start = eye + along[back] * (far[back] - self._step)[:, None]
-        met[back] = self._fronts.faced(start, along[back], 2 * self._step, met[back])
-        return met
+    def _front(self, eye: Floats, along: Floats, far: Floats, step: Floats, back: Ints) -> Ints:
+        """(m,) the triangles in front of the one-sided ones that rays meet from behind, -1 for
+        none."""
+        begin = np.maximum(far - step, 0)
+        start = eye - self._middle + along * begin[:, None]
+        return self._fronts.at(start, along, far + step - begin, back)
 
     def _shares(self, sight: Sight, ray: Ints, met: Ints, alpha: Alpha) -> Floats:
         """(m,) the shares of triangles, 0 for -1, at the rays that meet them."""
@@ -164,7 +169,7 @@ def blend(layers: Sequence[Layer], colors: Floats, shown: Floats) -> None:
 
 
 def _distance(eye: Floats, along: Floats, place: Floats, normal: Floats) -> Floats:
-    """(n,) distances to planes through (n, 3) places along (n, 3) unit rays from a point (3,)."""
+    """(n,) distances to planes through (n, 3) places along (n, 3) rays from a point (3,)."""
     turn = np.einsum("ij,ij->i", along, normal)
     flat = np.where(turn == 0, 1.0, turn)
     far = np.einsum("ij,ij->i", place - eye, normal) / flat

@@ -88,8 +88,6 @@ class Caster:
         self._corner = corner
         self._normal = normals(corner)
         self._one_sided, self._seen = ~surfaces.two_sided, surfaces.seen
-        #: (T,) 0 for faces with two sides; of two opposite faces one has 1 and the other -1.
-        self._way = np.where(self._one_sided, _ways(self._normal), 0)
         low, high = corner.min(axis=(0, 1), initial=0), corner.max(axis=(0, 1), initial=0)
         self._middle = (low + high) / 2
         #: Offset of a ray's new origin behind a surface that it passed through, metres.
@@ -97,8 +95,7 @@ class Caster:
         self._tree: Any = None
         if len(self._which):
             self._tree = ray_tree(corner[self._which] - self._middle)
-        #: Trees of the faces that may coincide with the back of one of a `_way`.
-        self._others: dict[int, tuple[Any, Ints]] = {}
+        self._fronts = Fronts(surfaces, self._which, self._middle)
 
     def look(self, camera: Camera, eye: Floats, direction: Floats) -> Sight:
         """Casts all rays of a camera from an eye (3,) in a direction (3,)."""
@@ -131,32 +128,40 @@ class Caster:
             far = np.maximum(np.einsum("ij,ij->i", to, self._normal[triangle]) / turn, 0)
             step = self._step / np.linalg.norm(along[waiting], axis=1)
             start[waiting] += along[waiting] * (far - step)[:, None]
-            met = self._coincident(start[waiting], along[waiting], 2 * step, self._way[triangle])
+            met = self._fronts.at(start[waiting], along[waiting], 2 * step, triangle)
             result[waiting] = met
             start[waiting] += along[waiting] * (2 * step)[:, None]
             waiting = waiting[met < 0]
         return result
 
-    def faced(self, start: Floats, along: Floats, far: float, triangle: Ints) -> Ints:
-        """(n,) the visible triangle in the place of each of ``triangle``, which rays pass through
-        from behind, -1 for none; start, along: (n, 3) of the rays, far: their ends."""
-        ends = np.full(len(start), far)
-        return self._coincident(start - self._middle, along, ends, self._way[triangle])
 
-    def _coincident(self, start: Floats, along: Floats, far: Floats, way: Ints) -> Ints:
-        """(n,) the visible triangle in the place of a face that a ray passes through, -1 for none:
-        a wall may consist of two one-sided faces in one plane, of which Embree returns either.
+class Fronts:
+    """The front in the place of a face that a ray passes through from behind: a wall may consist
+    of two one-sided faces in one plane, of which Embree returns either."""
 
-        start, along: (n, 3) of the rays; far: (n,) their ends; way: (n,) of the faces, see `_way`.
+    def __init__(self, surfaces: Surfaces, which: Ints, middle: Floats) -> None:
+        """``which``: the surfaces that may be fronts. ``middle``: (3,) origin of the rays."""
+        self._which, self._middle = which, middle
+        self._corner, self._seen = surfaces.corner, surfaces.seen
+        self._normal, self._one_sided = normals(surfaces.corner), ~surfaces.two_sided
+        #: (T,) 0 for faces with two sides; of two opposite faces one has 1 and the other -1.
+        self._way = np.where(self._one_sided, _ways(self._normal), 0)
+        #: Trees of the faces that may coincide with the back of one of a `_way`.
+        self._others: dict[int, tuple[Any, Ints]] = {}
+
+    def at(self, start: Floats, along: Floats, far: Floats, back: Ints) -> Ints:
+        """(n,) the visible triangle in the place of each of ``back``, -1 for none.
+
+        start, along: (n, 3) of the rays, from the middle; far: (n,) their ends.
         """
-        result = np.full(len(start), -1, np.int64)
-        for one in np.unique(way).tolist():
-            rows = np.flatnonzero(way == one)
-            if one not in self._others:
-                which = self._which[self._way[self._which] != one]
+        result, ways = np.full(len(start), -1, np.int64), self._way[back]
+        for way in np.unique(ways).tolist():
+            rows = np.flatnonzero(ways == way)
+            if way not in self._others:
+                which = self._which[self._way[self._which] != way]
                 tree = ray_tree(self._corner[which] - self._middle) if len(which) else None
-                self._others[one] = tree, which
-            tree, which = self._others[one]
+                self._others[way] = tree, which
+            tree, which = self._others[way]
             if tree is None:
                 continue
             ray = start[rows].astype(np.float32), along[rows].astype(np.float32)

@@ -68,21 +68,74 @@ def shown(
 
 
 @pytest.mark.parametrize("count", [len(PANES), 3])
-def test_panes_blend_the_farthest_first(count: int) -> None:
+def test_panes_blend_the_farthest_first(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """With a wall, panes behind it are not seen; nor are those that face away."""
+    monkeypatch.setattr("ptmtools.rendering.layers._BATCH", 7)
     actual = shown(panes(PANES[:count]), Camera(6, 4, 1.2, 1.5), np.array([0.1, 0.2, 0.0]), AHEAD)
     behind = 0.5 * (255 if count > 3 else 200)
     expected = 0.75 * np.array([behind, behind + 127.5, behind]) + 0.25 * np.array([255, 0, 0])
     np.testing.assert_allclose(actual, np.repeat(expected[None], 24, axis=0))
 
 
-def test_a_pane_counts_once_for_rays_that_graze_it() -> None:
+@pytest.mark.parametrize("faces", [1, 2])
+def test_a_pane_counts_once_for_rays_that_graze_it(faces: int) -> None:
+    """It has two sides, or two faces of one side each; that behind it counts, too."""
     turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
-    floor = np.array([[-1000, 0, 1000], [1000, 0, 1000], [0, 0, -3000]]) @ turn.T
-    surfaces = replace(panes(PANES[:1]), corner=floor[None], two_sided=np.array([True]))
+    floor = np.array([[-1000, 0, 1000], [1000, 0, 1000], [0, 0, -3000]])
+    corner = np.array([floor, floor - [0, 0.2, 0]])
+    corner = np.concatenate([corner, corner[:, ::-1]])[: 2 * faces] @ turn.T
+    surfaces = panes(PANES[:1] * len(corner))
+    surfaces = replace(surfaces, corner=corner, two_sided=np.full(len(corner), faces == 1))
     eye, ahead = turn @ [0, 0.2, 600], turn @ [0, 0, -1]
     actual = shown(surfaces, Camera(320, 180, 1.2, 1.78), eye, ahead)
-    assert {*actual[:, 1].tolist()} == {200.0, 0.75 * 200}
+    times = np.log(actual[:, 1] / 200) / np.log(0.75)
+    counts = np.unique_counts(times.round(6) + 0.0)
+    assert {*counts.values.tolist()} == {0, 1, 2}
+    # Some pixels see the lower one alone, beside the edges of the upper one.
+    assert counts.counts[1] < 10
+
+
+@pytest.mark.parametrize("span", [5.0, 1000.0])
+def test_leaves_in_a_large_building_have_no_holes(span: float) -> None:
+    """They have a face for each side, and grow in a corner of it."""
+    random = np.random.default_rng(1)
+    leaf = np.array([[-0.2, -0.2, 0], [0.2, -0.2, 0], [0, 0.2, 0]])
+    turns = np.linalg.qr(random.normal(size=(40, 3, 3)))[0]
+    leaves = leaf @ turns + random.uniform(-0.4, 0.4, (40, 1, 3)) + [0, 0, -2]
+    room = np.array([[[0, -5, 0], [span, -5, 0], [0, -5, span]]])
+    surfaces = panes(tuple((1.0, 1, (0.0, 0.0, 0.0), 1.0) for _ in range(81)))
+    surfaces = replace(
+        surfaces,
+        corner=np.concatenate([leaves, leaves[:, ::-1], room]),
+        sheer=np.arange(81) < 80,
+    )
+    one = replace(surfaces, two_sided=np.ones(81, np.bool_))
+    camera = Camera(160, 120, 0.8, 4 / 3)
+    pairs, both = (shown(each, camera, np.zeros(3), AHEAD) for each in (surfaces, one))
+    assert (both == 0).all(axis=1).sum() > 3000
+    np.testing.assert_array_equal(pairs, both)
+
+
+@pytest.mark.parametrize("moved", [0.0, 3e5])
+def test_insulating_glass_is_met_wherever_others_are(moved: float) -> None:
+    rows = tuple((far, 2, (0.0, 0.0, 0.0), 0.5) for far in (2, 2.004, 2.02, 2.024, 10_000))
+    surfaces = panes((*rows, (3.0, 2, (1.0, 1.0, 1.0), 1.0)))
+    eye = np.array([moved, 0, -moved])
+    surfaces = replace(surfaces, corner=surfaces.corner + eye)
+    actual = shown(surfaces, Camera(6, 4, 1.2, 1.5), eye, AHEAD)
+    np.testing.assert_allclose(actual, 255 / 16)
+
+
+def test_panes_in_the_plane_of_a_wall_and_of_no_alpha_are_left_out() -> None:
+    turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
+    faint = (2.0, 2, (0.0, 0.0, 0.0), 0.9 * LEAST_ALPHA)
+    wall = (3.0, 2, (1.0, 1.0, 1.0), 1.0)
+    surfaces = panes((faint, (3.0, 2, (0.0, 0.0, 0.0), 0.5), wall))
+    # Other corners in the same plane, of other rounding.
+    corner = surfaces.corner * [[[1, 1, 1]], [[0.9, 0.7, 1]], [[1, 1, 1]]]
+    surfaces = replace(surfaces, corner=corner @ turn.T)
+    actual = shown(surfaces, Camera(60, 40, 1.2, 1.5), np.zeros(3), turn @ AHEAD)
+    np.testing.assert_array_equal(actual, 255)
 
 
 @given(SEEDS)
