@@ -137,7 +137,7 @@ def draw_view(
     InputError: PTM-I111 the viewpoint does not exist.
     DatabaseError, LimitError: see `read_pyramids` and `read_octrees`.
     """
-    from ptmtools.rendering.layers import Layers, blend, seen_of, sheer_of
+    from ptmtools.rendering.layers import Layers, blend, sheer_of
     from ptmtools.rendering.light import lit
     from ptmtools.rendering.painting import Painter
 
@@ -156,11 +156,9 @@ def draw_view(
     painter = Painter(served, max_side=options.max_side, lit=options.lit, progress=progress)
     sight = Caster(surfaces, sheer_of(surfaces)).look(camera, eye.position, eye.direction)
     sight, layers = Layers(surfaces).before(sight, painter.alpha)
-    blended = seen_of(layers, sight)
-    painter.load(sight, blended)
+    painter.load(sight.triangle, *(layer.triangle for layer in layers))
     shown = painter.colors(sight)
-    if layers:
-        blend(layers, painter.colors(blended), shown)
+    blend(layers, sight, painter.colors, shown)
     each = (options.height, samples, options.width, samples, 3)
     return as_bytes(shown.reshape(each).mean(axis=(1, 3)))
 

@@ -15,8 +15,9 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, normals
+from ptmtools.arrays import Bools, Floats, Ints, Singles, normals
 from ptmtools.embree import ray_tree
 from ptmtools.output.surfaces import LEAST_ALPHA, Surfaces
 from ptmtools.rendering.rays import Fronts
@@ -28,21 +29,23 @@ MOST = 64
 #: Rays that are followed at a time.
 _BATCH = 1 << 18
 
-#: (m,) alpha of the textures at the pixels of a sight, 0 to 1.
+#: (m,) alpha of the textures at the pixels of a sight, 0 to 1; (m, 3) colours of these.
 Alpha = Callable[[Sight], Floats]
+Colors = Callable[[Sight], Floats]
 
 
 class Layer(NamedTuple):
-    """The surfaces that some rays meet at one place in their order.
+    """The surfaces that some rays meet at one place in their order, 12 bytes each: all layers of a
+    picture are in memory.
 
     Attributes
     ----------
     ray: (m,) numbers of the rays. triangle: (m,) that they meet. share: (m,) of its colour.
     """
 
-    ray: Ints
-    triangle: Ints
-    share: Floats
+    ray: NDArray[np.int32]
+    triangle: NDArray[np.int32]
+    share: Singles
 
 
 def sheer_of(surfaces: Surfaces) -> Bools:
@@ -80,7 +83,7 @@ class Layers:
             rows = slice(begin, begin + _BATCH)
             part = sight._replace(triangle=triangle[rows], ray=sight.ray[rows])
             own = self._march(part, alpha)
-            layers += [each._replace(ray=each.ray + begin) for each in own]
+            layers += [each._replace(ray=each.ray + np.int32(begin)) for each in own]
         return sight._replace(triangle=triangle), layers
 
     def _march(self, sight: Sight, alpha: Alpha) -> list[Layer]:
@@ -122,7 +125,8 @@ class Layers:
             opaque, blends = share == 1, (share > 0) & (share < 1)
             triangle[waiting[opaque]] = met[opaque]
             if blends.any():
-                layers.append(Layer(waiting[blends], met[blends], share[blends]))
+                own = waiting[blends].astype(np.int32), met[blends].astype(np.int32)
+                layers.append(Layer(*own, share[blends].astype(np.float32)))
             waiting = waiting[~opaque]
         return layers
 
@@ -151,20 +155,12 @@ class Layers:
         return share
 
 
-def seen_of(layers: Sequence[Layer], sight: Sight) -> Sight:
-    """A sight of the surfaces of layers, one layer after another."""
-    none = np.zeros(0, np.int64)
-    ray = np.concatenate([none, *(layer.ray for layer in layers)])
-    triangle = np.concatenate([none, *(layer.triangle for layer in layers)])
-    return sight._replace(triangle=triangle, ray=sight.ray[ray])
-
-
-def blend(layers: Sequence[Layer], colors: Floats, shown: Floats) -> None:
-    """Blends layers, of the ``colors`` of the pixels of `seen_of`, over (n, 3) ``shown``."""
-    end = len(colors)
-    for ray, _, share in reversed(layers):
-        own, end = colors[end - len(ray) : end], end - len(ray)
-        part = share[:, None]
+def blend(layers: Sequence[Layer], sight: Sight, colors: Colors, shown: Floats) -> None:
+    """Blends the layers before a sight over the (n, 3) colours ``shown`` of its pixels, one at a
+    time, the farthest first."""
+    for ray, triangle, share in reversed(layers):
+        part = share[:, None].astype(np.float64)
+        own = colors(sight._replace(triangle=triangle.astype(np.int64), ray=sight.ray[ray]))
         shown[ray] = shown[ray] * (1 - part) + own * part
 
 

@@ -37,6 +37,8 @@ def show_relief(
     if relief is None:
         return
     relieved = _with_map(sight, surfaces, relief.number, loaded, column)
+    if not len(relieved):
+        return
     maps = replace(
         surfaces,
         uv=relief.uv,

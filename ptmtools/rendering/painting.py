@@ -6,6 +6,7 @@ The pictures of sites have a painter of their own, without compiled code (`ptmto
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.output.served import Served
@@ -24,13 +25,14 @@ from ptmtools.scene.colors import to_srgb
 
 class Painter:
     """The surfaces of a database. Each texture is decoded once: by `alpha`, or by `load`, which
-    comes before `colors`."""
+    comes after that and before `colors`."""
 
     def __init__(self, served: Served, *, max_side: int, lit: bool, progress: Progress) -> None:
         """``max_side``: of the levels, 0 for all. ``lit``: by a lamp, instead of baked light."""
         self._served, self._surfaces, self._lit = served, served.surfaces, lit
         self._triangles = triangles_of(served.surfaces)
         self._light = None if lit else served.surfaces.light
+        self._lightmapped = None if self._light is None else triangles_of(self._light)
         self._max_side, self._progress = max_side, progress
         self._loaded = np.ones(served.cell_count, dtype=np.bool_)
         #: Textures that were decoded for their alpha, and that.
@@ -59,8 +61,8 @@ class Painter:
             result[rows] = value[:, 0] / 255
         return result
 
-    def load(self, *sights: Sight) -> None:
-        """Decodes the textures of all pixels that `colors` will be asked for."""
+    def load(self, *triangles: NDArray[np.integer]) -> None:
+        """Decodes the textures of all triangles, -1 for none, that `colors` will be asked for."""
         maps = [self._surfaces.texture]
         if self._light is not None:
             maps.append(self._light.texture)
@@ -69,11 +71,12 @@ class Painter:
         if self._surfaces.bumps:
             maps.append(self._surfaces.bumps.number)
         used: set[int] = set()
-        for sight in sights:
-            hit = sight.triangle[sight.triangle >= 0]
+        for each in triangles:
+            hit = np.unique(each[each >= 0])
             used.update(*(number[hit].tolist() for number in maps))
         pyramids = read_pyramids(self._served, self._progress, used, self._decoded)
         self._decoded.clear()
+        self._alpha.clear()
         self._shows = own_levels(pyramids)
         self._column = self._columns(self._shows)
         if self._lit:
@@ -95,11 +98,12 @@ class Painter:
             _shade_plain(sight, triangles, self._light, shown)
         show_bumps(sight, surfaces, shows, loaded, column, shown)
         show_colors(sight, triangles, surfaces.paint, shown)
-        if self._light is not None:
+        light = self._lightmapped
+        if light is not None:
             linear = np.empty_like(shown)
-            shade(sight, triangles_of(self._light), shows, loaded, column, linear)
+            shade(sight, light, shows, loaded, column, linear)
             mapped = np.flatnonzero(sight.triangle >= 0)
-            mapped = mapped[self._light.texture[sight.triangle[mapped]] >= 0]
+            mapped = mapped[light.texture[sight.triangle[mapped]] >= 0]
             shown[mapped] *= to_srgb(linear[mapped] / 255)
         shown[sight.triangle < 0] = SKY
         return shown

@@ -27,7 +27,7 @@ from ptmtools.output.model import offsets_of, sizes_of
 from ptmtools.output.served import Served
 from ptmtools.parallel import ordered
 from ptmtools.rendering.footprints import detail_of_pixels, footprints, show_colors
-from ptmtools.rendering.layers import Layer, Layers, blend, seen_of, sheer_of
+from ptmtools.rendering.layers import Layer, Layers, blend, sheer_of
 from ptmtools.rendering.light import GLOW, LIT_GLOW, SKY
 from ptmtools.rendering.previews import read_preview
 from ptmtools.rendering.pyramids import in_colors
@@ -57,7 +57,7 @@ WORK = Kind(PICTURE, 40_000, 512)
 _FINER = 1.5
 #: Viewpoints that have a picture at most.
 MOST = 32
-#: Rays in memory, 50 bytes each.
+#: Rays in memory, 50 bytes each, and 12 for each layer that blends before a surface.
 _TOGETHER = 1 << 22
 _LIMITS = Limits(decoded_bytes=1 << 33)
 _THREADS = 4
@@ -91,13 +91,17 @@ def pictures_of(served: Served, views: Sequence[tuple[Kind, Mapping[str, Any]]])
 
 
 @dataclass(frozen=True)
-class _Seen:
-    """The surfaces of a picture, the layers before them, and the surfaces of these."""
+class _View:
+    """The surfaces of a picture, and the layers before them."""
 
     kind: Kind
     sight: Sight
     layers: Sequence[Layer]
-    blended: Sight
+
+    def triangles(self) -> Ints:
+        """Those of both, each once, with -1 where it shows none."""
+        each = [self.sight.triangle, *(layer.triangle for layer in self.layers)]
+        return np.unique(np.concatenate([np.unique(triangle) for triangle in each]))
 
 
 class _Textures(dict[int, Levels]):
@@ -130,24 +134,22 @@ class _Scene:
     def drawn(self, views: Sequence[tuple[Kind, Mapping[str, Any]]]) -> Iterator[bytes]:
         """The pictures of some views, with the textures that they show in memory."""
         textures = _Textures(self._served, max(kind.finest for kind, _ in views))
-        seen = [self._seen(kind, view, textures) for kind, view in views]
-        sights = [sight for each in seen for sight in (each.sight, each.blended)]
-        shown = np.unique(np.concatenate([np.unique(sight.triangle) for sight in sights]))
+        seen = [self._view(kind, view, textures) for kind, view in views]
+        shown = np.unique(np.concatenate([each.triangles() for each in seen]))
         drawn = [each for each in (self._triangles, self._light) if each]
         numbers = (each.texture[shown[shown >= 0]].tolist() for each in drawn)
         textures.read({number for each in numbers for number in each} - {-1})
         yield from ordered(partial(self._jpeg, textures), seen, _THREADS)
 
-    def _seen(self, kind: Kind, view: Mapping[str, Any], textures: _Textures) -> _Seen:
+    def _view(self, kind: Kind, view: Mapping[str, Any], textures: _Textures) -> _View:
         sight = _look(self._caster, kind.size, view)
         sight, layers = self._layers.before(sight, partial(_alpha, self._triangles, textures))
-        return _Seen(kind, sight, layers, seen_of(layers, sight))
+        return _View(kind, sight, layers)
 
-    def _jpeg(self, textures: _Textures, seen: _Seen) -> bytes:
-        colors = self._colors(textures, seen.sight)
-        if seen.layers:
-            blend(seen.layers, self._colors(textures, seen.blended), colors)
-        return jpeg(colors, seen.kind.size, seen.kind.most)
+    def _jpeg(self, textures: _Textures, view: _View) -> bytes:
+        colors = self._colors(textures, view.sight)
+        blend(view.layers, view.sight, partial(self._colors, textures), colors)
+        return jpeg(colors, view.kind.size, view.kind.most)
 
     def _colors(self, textures: _Textures, sight: Sight) -> Floats:
         colors = _colors(sight, self._triangles, self._light, textures)
