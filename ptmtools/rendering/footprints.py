@@ -43,11 +43,13 @@ def show_colors(sight: Sight, triangles: Triangles, paint: Floats | None, shown:
     _, _, at = _met(sight, pixel, triangles)
     one, other = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     whole = np.einsum("ij,ij->i", normal, normal)
-    second, third = (
-        np.clip(np.einsum("ij,ij->i", cross(*each), normal) / whole, 0, 1)
-        for each in ((at, other), (one, at))
-    )
-    weight = np.stack([1 - second - third, second, third], axis=1)
+    weight = np.zeros((len(pixel), 3))
+    for k, each in (1, (at, other)), (2, (one, at)):
+        part = np.einsum("ij,ij->i", cross(*each), normal)
+        # One without area has the colour of its first corner.
+        np.divide(part, whole, out=weight[:, k], where=whole > 0)
+    np.clip(weight, 0, 1, out=weight)
+    weight[:, 0] = 1 - weight[:, 1] - weight[:, 2]
     here, mean = np.einsum("nk,nkj->nj", weight, own), own.mean(axis=1)
     shown[pixel] *= np.divide(here, mean, out=np.zeros_like(here), where=mean > 0)
 

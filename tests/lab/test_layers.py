@@ -13,11 +13,12 @@ from hypothesis import given
 from ptmtools.arrays import Floats
 from ptmtools.output.surfaces import LEAST_ALPHA, Surfaces
 from ptmtools.progress import silent
+from ptmtools.rendering.footprints import show_colors
 from ptmtools.rendering.layers import MOST, Layers, blend, sheer_of
 from ptmtools.rendering.light import GLOW
 from ptmtools.rendering.painting import Painter
 from ptmtools.rendering.rays import Camera, Caster
-from ptmtools.rendering.records import Sight
+from ptmtools.rendering.records import Sight, triangles_of
 from tests.lab.worlds import SEEDS
 
 AHEAD = np.array([0.0, 0.0, -1.0])
@@ -173,6 +174,16 @@ def test_light_falls_with_the_angle() -> None:
     cosine = 1 / np.linalg.norm(sight.ray, axis=1)
     expected = 255 * 0.25 * (GLOW + (1 - GLOW) * cosine)
     np.testing.assert_allclose(actual[:, 0], expected, rtol=1e-6)
+
+
+def test_a_triangle_without_area_has_the_color_of_a_corner() -> None:
+    """Rays may meet it, at its edge."""
+    surfaces = panes(PANES[1:3])
+    surfaces.corner[1, 2] = surfaces.corner[1, 1]
+    sight = Sight(np.array([1, -1]), np.tile(AHEAD, (2, 1)), np.eye(3)[:2], np.zeros(3), 0.01)
+    colors, actual = np.tile(np.eye(3), (2, 1, 1)), np.full((2, 3), 50.0)
+    show_colors(sight, triangles_of(surfaces), colors, actual)
+    np.testing.assert_allclose(actual, [[150, 0, 0], [50, 50, 50]])
 
 
 @given(SEEDS)
