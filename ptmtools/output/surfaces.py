@@ -49,7 +49,7 @@ class Surfaces:
     corner: (n, 3, 3) float64 world metres. uv: (n, 3, 2) float64, origin at the upper left.
     cell, shape, texture: (n,) int32; the shape counts over all cells, the texture is -1 without.
     color: (n, 3) factor of the texel, encoded as sRGB, 0 to 1; of corners of several colours
-        their mean. paint: (n, 3, 3) the colours of the corners; None if they have none.
+        their mean. vertex_colors: (n, 3, 3) the colours of the corners; None if they have none.
     two_sided, glass: (n,) seen from both sides; without texture and not opaque.
     clamped: (n, 2) whether u and v stop at the edge of the texture instead of repeating it.
     seen: (n, 2) of each the one that is seen in its place from where its normal points to, and from
@@ -59,7 +59,7 @@ class Surfaces:
         coordinates in it, origin at the upper left. None if there are no lightmaps.
     relief: the normal maps of objects, if there are any. bumps: those of materials.
     opacity: (n,) of the factor, 0 to 1.
-    sheer: (n,) whether it, and the alpha of the texture, count. cutoff: (n,) of sheer surfaces
+    transparent: (n,) whether it, and the alpha of the texture, count. cutoff: (n,) of those
         whose texels of less alpha are not drawn, and all others opaque; 0 of those that blend.
         These three are None of surfaces that are all opaque.
     """
@@ -79,9 +79,9 @@ class Surfaces:
     spot: Floats | None = None
     relief: MappedRelief | None = None
     bumps: Bumps | None = None
-    paint: Floats | None = None
+    vertex_colors: Floats | None = None
     opacity: Floats | None = None
-    sheer: Bools | None = None
+    transparent: Bools | None = None
     cutoff: Floats | None = None
 
     @property
@@ -188,14 +188,14 @@ def surfaces_of(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
     cell = spread([cell for cell, _ in shapes], np.int32)
     two_sided = spread([m.two_sided for m in materials], np.bool_)
     factor = spread([m.factor[:3] for m in materials], np.float64, 3)
-    paint = joined([_colors(p) for _, p in shapes], 3)
+    vertex_colors = joined([_colors(p) for _, p in shapes], 3)
     return Surfaces(
         corner=corner,
         uv=joined([corners_of(p.uv, p.triangle) for _, p in shapes], 2),
         cell=cell,
         shape=np.repeat(np.arange(len(shapes), dtype=np.int32), count),
         texture=spread(texture, np.int32),
-        color=to_srgb(factor) * paint.mean(axis=1),
+        color=to_srgb(factor) * vertex_colors.mean(axis=1),
         two_sided=two_sided,
         glass=spread(
             [m.blends and t < 0 for m, t in zip(materials, texture, strict=True)], np.bool_
@@ -207,9 +207,9 @@ def surfaces_of(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
         spot=spot if max(lightmap, default=-1) >= 0 else None,
         relief=_relief([p for _, p in shapes]),
         bumps=bumps_of([p for _, p in shapes], count),
-        paint=None if all(p.color is None for _, p in shapes) else paint,
+        vertex_colors=None if all(p.color is None for _, p in shapes) else vertex_colors,
         opacity=spread([m.factor[3] for m in materials], np.float64),
-        sheer=spread([m.blends for m in materials], np.bool_),
+        transparent=spread([m.blends for m in materials], np.bool_),
         cutoff=spread(
             [0 if m.cutoff is None else max(m.cutoff, LEAST_ALPHA) for m in materials], np.float64
         ),

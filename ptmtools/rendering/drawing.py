@@ -137,7 +137,7 @@ def draw_view(
     InputError: PTM-I111 the viewpoint does not exist.
     DatabaseError, LimitError: see `read_pyramids` and `read_octrees`.
     """
-    from ptmtools.rendering.layers import Layers, blend, sheer_of
+    from ptmtools.rendering.layers import Layers, blend, transparent_of
     from ptmtools.rendering.light import lit
     from ptmtools.rendering.painting import Painter
 
@@ -154,7 +154,7 @@ def draw_view(
         options.height,
     )
     painter = Painter(served, max_side=options.max_side, lit=options.lit, progress=progress)
-    sight = Caster(surfaces, sheer_of(surfaces)).look(camera, eye.position, eye.direction)
+    sight = Caster(surfaces, transparent_of(surfaces)).look(camera, eye.position, eye.direction)
     sight, layers = Layers(surfaces).before(sight, painter.alpha)
     painter.load(sight.triangle, *(layer.triangle for layer in layers))
     shown = painter.colors(sight)

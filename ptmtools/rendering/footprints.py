@@ -14,7 +14,7 @@ def footprints(sight: Sight, pixel: Ints, triangles: Triangles) -> tuple[Floats,
     movement to the next pixel, u and v in the rows, across the screen and up it in the columns."""
     triangle, ray = sight.triangle[pixel], sight.ray[pixel]
     normal, gradient = triangles.normal[triangle], triangles.gradient[triangle]
-    facing, depth, at = _met(sight, pixel, triangles)
+    facing, depth, at = _intersections(sight, pixel, triangles)
     uv = triangles.uv[triangle, 0] + np.einsum("ikj,ij->ik", gradient, at)
     slope = np.einsum("ij,kj->ik", normal, sight.axes) / facing[:, None]
     move = sight.axes[None] - slope[:, :, None] * ray[:, None]
@@ -30,17 +30,19 @@ def detail_of_pixels(moves: Floats, width: int, height: int) -> Floats:
     return np.asarray(np.log2(np.maximum(texels, 1.0)))
 
 
-def show_colors(sight: Sight, triangles: Triangles, paint: Floats | None, shown: Floats) -> None:
-    """Multiplies pixels ``shown`` (n, 3) by the colours ``paint`` (T, 3, 3) between the corners of
-    their triangles, instead of the means of these."""
-    if paint is None:
+def show_colors(
+    sight: Sight, triangles: Triangles, vertex_colors: Floats | None, shown: Floats
+) -> None:
+    """Multiplies pixels ``shown`` (n, 3) by the colours between those of the corners of their
+    triangles, ``vertex_colors`` (T, 3, 3), instead of the means of these."""
+    if vertex_colors is None:
         return
-    uneven = (paint != paint[:, :1]).any(axis=(1, 2))
+    uneven = (vertex_colors != vertex_colors[:, :1]).any(axis=(1, 2))
     pixel = np.flatnonzero((sight.triangle >= 0) & uneven[sight.triangle])
     triangle = sight.triangle[pixel]
-    own = paint[triangle]
+    own = vertex_colors[triangle]
     corner, normal = triangles.corner[triangle], triangles.normal[triangle]
-    _, _, at = _met(sight, pixel, triangles)
+    _, _, at = _intersections(sight, pixel, triangles)
     one, other = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     whole = np.einsum("ij,ij->i", normal, normal)
     weight = np.zeros((len(pixel), 3))
@@ -54,7 +56,9 @@ def show_colors(sight: Sight, triangles: Triangles, paint: Floats | None, shown:
     shown[pixel] *= np.divide(here, mean, out=np.zeros_like(here), where=mean > 0)
 
 
-def _met(sight: Sight, pixel: Ints, triangles: Triangles) -> tuple[Floats, Floats, Floats]:
+def _intersections(
+    sight: Sight, pixel: Ints, triangles: Triangles
+) -> tuple[Floats, Floats, Floats]:
     """Of some pixels, which show a triangle: (n,) component of the ray along its normal, (n,) depth
     of its plane, and (n, 3) where the ray meets that, from the first corner."""
     triangle, ray = sight.triangle[pixel], sight.ray[pixel]

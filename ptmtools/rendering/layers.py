@@ -48,16 +48,16 @@ class Layer(NamedTuple):
     share: Singles
 
 
-def sheer_of(surfaces: Surfaces) -> Bools:
+def transparent_of(surfaces: Surfaces) -> Bools:
     """(T,) the surfaces that are layers."""
-    return surfaces.glass if surfaces.sheer is None else surfaces.sheer
+    return surfaces.glass if surfaces.transparent is None else surfaces.transparent
 
 
 class Layers:
     """The layers of a scene."""
 
     def __init__(self, surfaces: Surfaces) -> None:
-        self._which = which = np.flatnonzero(sheer_of(surfaces))
+        self._which = which = np.flatnonzero(transparent_of(surfaces))
         corner = surfaces.corner[which]
         self._surfaces = surfaces
         self._one_sided = ~surfaces.two_sided[which]

@@ -97,7 +97,7 @@ class Painter:
         else:
             _shade_plain(sight, triangles, self._light, shown)
         show_bumps(sight, surfaces, shows, loaded, column, shown)
-        show_colors(sight, triangles, surfaces.paint, shown)
+        show_colors(sight, triangles, surfaces.vertex_colors, shown)
         light = self._lightmapped
         if light is not None:
             linear = np.empty_like(shown)

@@ -27,7 +27,7 @@ from ptmtools.output.model import offsets_of, sizes_of
 from ptmtools.output.served import Served
 from ptmtools.parallel import ordered
 from ptmtools.rendering.footprints import detail_of_pixels, footprints, show_colors
-from ptmtools.rendering.layers import Layer, Layers, blend, sheer_of
+from ptmtools.rendering.layers import Layer, Layers, blend, transparent_of
 from ptmtools.rendering.light import GLOW, LIT_GLOW, SKY
 from ptmtools.rendering.previews import read_preview
 from ptmtools.rendering.pyramids import in_colors
@@ -128,18 +128,18 @@ class _Scene:
         surfaces = served.surfaces
         self._served, self._triangles = served, triangles_of(surfaces)
         self._light = None if surfaces.light is None else triangles_of(surfaces.light)
-        self._paint = surfaces.paint
-        self._caster, self._layers = Caster(surfaces, sheer_of(surfaces)), Layers(surfaces)
+        self._vertex_colors = surfaces.vertex_colors
+        self._caster, self._layers = Caster(surfaces, transparent_of(surfaces)), Layers(surfaces)
 
     def drawn(self, views: Sequence[tuple[Kind, Mapping[str, Any]]]) -> Iterator[bytes]:
         """The pictures of some views, with the textures that they show in memory."""
         textures = _Textures(self._served, max(kind.finest for kind, _ in views))
-        seen = [self._view(kind, view, textures) for kind, view in views]
-        shown = np.unique(np.concatenate([each.triangles() for each in seen]))
+        frames = [self._view(kind, view, textures) for kind, view in views]
+        shown = np.unique(np.concatenate([each.triangles() for each in frames]))
         drawn = [each for each in (self._triangles, self._light) if each]
         numbers = (each.texture[shown[shown >= 0]].tolist() for each in drawn)
         textures.read({number for each in numbers for number in each} - {-1})
-        yield from ordered(partial(self._jpeg, textures), seen, _THREADS)
+        yield from ordered(partial(self._jpeg, textures), frames, _THREADS)
 
     def _view(self, kind: Kind, view: Mapping[str, Any], textures: _Textures) -> _View:
         sight = _look(self._caster, kind.size, view)
@@ -153,7 +153,7 @@ class _Scene:
 
     def _colors(self, textures: _Textures, sight: Sight) -> Floats:
         colors = _colors(sight, self._triangles, self._light, textures)
-        show_colors(sight, self._triangles, self._paint, colors)
+        show_colors(sight, self._triangles, self._vertex_colors, colors)
         return colors
 
 
@@ -223,16 +223,16 @@ def _colors(
     glow = np.full(len(hit), GLOW if light is None else LIT_GLOW)
     glow += (1 - glow) * np.abs(facing) / np.maximum(length, 1e-300)
     lit = np.repeat(255.0 * glow[:, None], 3, axis=1)
-    _paint(lit, sight, hit, triangles, textures)
+    _sample(lit, sight, hit, triangles, textures)
     if light is not None:
         each = np.full_like(lit, 255.0)
-        _paint(each, sight, hit, light, textures)
+        _sample(each, sight, hit, light, textures)
         lit *= to_srgb(each / 255)
     shown[hit] = lit * triangles.color[triangle]
     return shown
 
 
-def _paint(
+def _sample(
     colors: Floats, sight: Sight, hit: Ints, triangles: Triangles, textures: Mapping[int, Levels]
 ) -> None:
     """Writes the colours of the ``hit`` pixels that show a texture."""

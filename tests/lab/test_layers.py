@@ -14,7 +14,7 @@ from ptmtools.arrays import Floats
 from ptmtools.output.surfaces import LEAST_ALPHA, Surfaces
 from ptmtools.progress import silent
 from ptmtools.rendering.footprints import show_colors
-from ptmtools.rendering.layers import MOST, Layers, blend, sheer_of
+from ptmtools.rendering.layers import MOST, Layers, blend, transparent_of
 from ptmtools.rendering.light import GLOW
 from ptmtools.rendering.painting import Painter
 from ptmtools.rendering.rays import Camera, Caster
@@ -64,7 +64,7 @@ def shown(
     def colors(sight: Sight) -> Floats:
         return np.where((sight.triangle < 0)[:, None], 200, 255 * surfaces.color[sight.triangle])
 
-    sight = Caster(surfaces, sheer_of(surfaces)).look(camera, eye, ahead)
+    sight = Caster(surfaces, transparent_of(surfaces)).look(camera, eye, ahead)
     sight, layers = Layers(surfaces).before(
         sight, lambda at: np.ones(0) if alpha is None else alpha[at.triangle]
     )
@@ -113,7 +113,7 @@ def test_leaves_in_a_large_building_have_no_holes(span: float) -> None:
     surfaces = replace(
         surfaces,
         corner=np.concatenate([leaves, leaves[:, ::-1], room]),
-        sheer=np.arange(81) < 80,
+        transparent=np.arange(81) < 80,
     )
     one = replace(surfaces, two_sided=np.ones(81, np.bool_))
     camera = Camera(160, 120, 0.8, 4 / 3)
@@ -154,7 +154,7 @@ def test_layers_are_painted_one_at_a_time(monkeypatch: pytest.MonkeyPatch) -> No
         return surfaces.color[sight.triangle]
 
     camera = Camera(6, 4, 1.2, 1.5)
-    sight = Caster(surfaces, sheer_of(surfaces)).look(camera, np.zeros(3), AHEAD)
+    sight = Caster(surfaces, transparent_of(surfaces)).look(camera, np.zeros(3), AHEAD)
     sight, layers = Layers(surfaces).before(sight, lambda at: np.ones(len(at.ray)))
     blend(layers, sight, colors, np.zeros((24, 3)))
     assert sizes == [3, 3, 7, 7, 7, 7, 7, 7]
@@ -206,7 +206,7 @@ def test_textures_with_alpha_against_a_loop(seed: int) -> None:
         surfaces,
         texture=np.where(own & (random.random(len(own)) < 0.9), 0, -1).astype(np.int32),
         glass=np.zeros(len(own), np.bool_),
-        sheer=own,
+        transparent=own,
         cutoff=np.array([*cutoff, 0]),
     )
     actual = shown(surfaces, Camera(3, 2, 1.0, 1.5), np.zeros(3), AHEAD, np.array([*alpha, 1]))
