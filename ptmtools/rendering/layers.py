@@ -98,7 +98,6 @@ class Layers:
         place, normal = (each[triangle[hit]] for each in self._all)
         end[hit] = _distance(sight.eye, ray[hit], place, normal)
         waiting, gone = np.arange(len(ray)), np.zeros(len(ray))
-        last = np.full(len(ray), -1)
         for _ in range(MOST):
             start = sight.eye - self._middle + ray[waiting] * gone[waiting][:, None]
             rays = start.astype(np.float32), ray[waiting].astype(np.float32)
@@ -117,10 +116,7 @@ class Layers:
             met = self._which[pane]
             back = np.flatnonzero(self._one_sided[pane] & (turn > 0))
             met[back] = self._front(sight.eye, ray[waiting[back]], far[back], step[back], met[back])
-            # A ray may meet a surface again after the step, or first its back and then its front.
-            met[met == last[waiting]] = -1
-            last[waiting[met >= 0]] = met[met >= 0]
-            gone[waiting] = np.maximum(far, gone[waiting]) + step
+            gone[waiting] = far + step
             share = self._shares(sight, waiting, met, alpha)
             opaque, blends = share == 1, (share > 0) & (share < 1)
             triangle[waiting[opaque]] = met[opaque]
@@ -133,9 +129,9 @@ class Layers:
     def _front(self, eye: Floats, along: Floats, far: Floats, step: Floats, back: Ints) -> Ints:
         """(m,) the triangles in front of the one-sided ones that rays meet from behind, -1 for
         none."""
-        begin = np.maximum(far - step, 0)
-        start = eye - self._middle + along * begin[:, None]
-        return self._fronts.at(start, along, far + step - begin, back)
+        # From half a step before, so that it is not the front of the layer before.
+        start = eye - self._middle + along * (far - step / 2)[:, None]
+        return self._fronts.at(start, along, step, back)
 
     def _shares(self, sight: Sight, ray: Ints, met: Ints, alpha: Alpha) -> Floats:
         """(m,) the shares of triangles, 0 for -1, at the rays that meet them."""

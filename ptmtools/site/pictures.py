@@ -100,8 +100,9 @@ class _View:
 
     def triangles(self) -> Ints:
         """Those of both, each once, with -1 where it shows none."""
-        each = [self.sight.triangle, *(layer.triangle for layer in self.layers)]
-        return np.unique(np.concatenate([np.unique(triangle) for triangle in each]))
+        parts = [np.unique(self.sight.triangle)]
+        parts += [np.unique(layer.triangle.astype(np.int64)) for layer in self.layers]
+        return np.unique(np.concatenate(parts))
 
 
 class _Textures(dict[int, Levels]):

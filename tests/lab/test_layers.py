@@ -132,6 +132,14 @@ def test_insulating_glass_is_met_wherever_others_are(moved: float) -> None:
     np.testing.assert_allclose(actual, 255 / 16)
 
 
+def test_pairs_of_faces_that_almost_touch_are_two() -> None:
+    """The back of the second is not taken for that of the first."""
+    colors = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+    rows = [(2 + 0.0003 * k, side, colors[k], 0.5) for k in (0, 1) for side in (1, -1)]
+    actual = shown(panes(tuple(rows)), Camera(6, 4, 1.2, 1.5), np.zeros(3), AHEAD)
+    np.testing.assert_allclose(actual, np.tile([50 + 127.5, 50 + 63.75, 50], (24, 1)))
+
+
 def test_panes_in_the_plane_of_a_wall_and_of_no_alpha_are_left_out() -> None:
     turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
     faint = (2.0, 2, (0.0, 0.0, 0.0), 0.9 * LEAST_ALPHA)
