@@ -133,9 +133,9 @@ def test_insulating_glass_is_met_wherever_others_are(moved: float) -> None:
 
 
 def test_pairs_of_faces_that_almost_touch_are_two() -> None:
-    """The back of the second is not taken for that of the first."""
+    """The front of the first is not taken for that of the second."""
     colors = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
-    rows = [(2 + 0.0003 * k, side, colors[k], 0.5) for k in (0, 1) for side in (1, -1)]
+    rows = [(2 + 0.0003 * k, side, colors[k], 0.5) for k in (0, 1) for side in (-1, 1)]
     actual = shown(panes(tuple(rows)), Camera(6, 4, 1.2, 1.5), np.zeros(3), AHEAD)
     np.testing.assert_allclose(actual, np.tile([50 + 127.5, 50 + 63.75, 50], (24, 1)))
 
