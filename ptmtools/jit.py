@@ -5,8 +5,9 @@ kernels that it calls and the constants of other modules. So each file has a cac
 the digest of its source and of all modules of the package that it imports, directly or not, as
 they were when this process imported them (`sources`). They are read off the source text
 (`_imports`): constants of a kernel must not come from modules that are imported in another way.
-Classes of arguments may (`_classes`). A digest of the whole package would be simpler, but any edit
-would compile everything again: 14 s of processor time, 50 s on a busy machine.
+Classes of arguments may (`_classes`); each signature has the folder of its own classes. A digest of
+the whole package would be simpler, but any edit would compile everything again: 14 s of processor
+time, 50 s on a busy machine.
 
 Called from Python, a kernel is numba's cached dispatcher. Called from another kernel it is an
 `overload`, compiled without a wrapper for Python and once for all literals: all kernels together
@@ -23,7 +24,7 @@ from __future__ import annotations
 import os
 import re
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache, update_wrapper
 from hashlib import sha256
 from pathlib import Path
@@ -32,6 +33,7 @@ from typing import Any, TypeVar, cast
 
 import llvmlite.ir  # type: ignore[import-untyped]
 import numba
+import numba.core.caching
 import numba.core.event
 import numba.extending
 
@@ -107,36 +109,64 @@ class _Kernel:
 
     def __call__(self, *arguments: Any) -> Any:
         if self._entry is None:
-            self._entry = self._dispatcher(arguments)
+            self._make_entry()
         return self._entry(*arguments)
 
-    def _dispatcher(self, arguments: tuple[Any, ...]) -> Any:
-        settings: Any = numba.config
+    def _make_entry(self) -> None:
         compiled: Any = numba.njit
-        classes = (module_file(each.__module__) for each in _classes(arguments))
-        folder = cache_folder(
-            Path(self.py_func.__code__.co_filename), *(file for file in classes if file)
-        )
-        with _setting:
-            before = settings.CACHE_DIR
-            settings.CACHE_DIR = folder
-            try:
-                return compiled(cache=bool(folder), **self._options)(self.py_func)
-            finally:
-                settings.CACHE_DIR = before
+        with _making:
+            if self._entry is None:
+                entry = compiled(**self._options)(self.py_func)
+                entry._cache = _Cache(self.py_func)
+                self._entry = entry
 
 
-def _classes(argument: Any) -> Iterator[type]:
-    """The classes of named tuples in an argument, whose fields machine code knows by number. It is
+#: Of two threads that call a kernel first, one makes its dispatcher.
+_making = Lock()
+
+
+class _Cache(numba.core.caching.NullCache):  # type: ignore[misc]
+    """The machine code of a kernel on disk.
+
+    Numba asks for it once per signature and process, not at each call, and holds its own lock.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        return self._of(sig).load_overload(sig, target_context)
+
+    def save_overload(self, sig: Any, cres: Any) -> None:
+        # Not the cache that was asked before: a module may have been imported again meanwhile.
+        self._of(sig).save_overload(sig, cres)
+
+    def _of(self, types: tuple[Any, ...]) -> Any:
+        caching: Any = numba.core.caching
+        settings: Any = numba.config
+        classes = (module_file(each.__module__) for each in _classes(types))
+        own = Path(self._function.__code__.co_filename)
+        folder = cache_folder(own, *(file for file in classes if file))
+        before = settings.CACHE_DIR
+        settings.CACHE_DIR = folder
+        try:
+            cache = caching.FunctionCache(self._function) if folder else None
+        except RuntimeError:  # Numba cannot write into any folder that it knows.
+            cache = None
+        finally:
+            settings.CACHE_DIR = before
+        # Numba's other folders are the same for all sources.
+        kept = cache and Path(cache.cache_path).is_relative_to(folder)
+        return cache if kept else caching.NullCache()
+
+
+def _classes(types: Iterable[Any]) -> Iterator[type]:
+    """The classes of named tuples in a signature, whose fields machine code knows by number. It is
     kept beside their names, which fail if a class has moved."""
-    if isinstance(argument, tuple):
-        yield type(argument)
-        for each in argument:
+    for each in types:
+        if isinstance(each, numba.types.BaseTuple):
+            yield getattr(each, "instance_class", tuple)
             yield from _classes(each)
-
-
-#: Guards numba's folder, a setting of the whole process: several threads may call kernels.
-_setting = Lock()
 
 
 class _Compilation(numba.core.event.Listener):
@@ -163,41 +193,51 @@ def compilations() -> int:
 
 
 def cache_folder(*files: Path) -> str:
-    """The folder for machine code that depends on ``files``; "" if none can be written."""
-    root = os.environ.get("NUMBA_CACHE_DIR") or _root()
-    return root and os.path.join(root, _digest(frozenset(files)))
-
-
-@cache
-def _root() -> str:
+    """The folder for machine code that depends on ``files``; "" if none can be written, or if it is
+    not known which state of them this process has imported."""
+    digest = _digest(files)
     # Not Path.expanduser, which raises for a user without a home.
     caches = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
-    for folder in (PACKAGE / "__pycache__" / "kernels", caches / "ptmtools" / "kernels"):
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=folder):
-                return str(folder)
-        except OSError:
-            continue
-    return ""
+    roots = [PACKAGE / "__pycache__" / "kernels", caches / "ptmtools" / "kernels"]
+    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
+        roots.insert(0, Path(chosen))
+    return next((str(root / digest) for root in roots if digest and _writable(root / digest)), "")
 
 
 @cache
-def _digest(first: frozenset[Path]) -> str:
-    files, waiting = set(first), list(first)
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+def _digest(files: Iterable[Path]) -> str:
+    texts: dict[Path, bytes] = {}
+    waiting = set(files)
     while waiting:
-        more = _imports(waiting.pop()) - files
-        files |= more
-        waiting += more
-    sources = (sha256(source(one)).digest() for one in sorted(files))
-    return sha256(b"".join(sources)).hexdigest()[:12]
+        file = waiting.pop()
+        text = source(file)
+        if text is None:
+            return ""
+        texts[file] = text
+        waiting |= _imports(text) - texts.keys()
+    digests = (_sha256(text) for _, text in sorted(texts.items()))
+    return sha256(b"".join(digests)).hexdigest()[:12]
 
 
 @cache
-def _imports(file: Path) -> frozenset[Path]:
-    """The modules of the package that a module imports."""
+def _sha256(text: bytes) -> bytes:
+    return sha256(text).digest()
+
+
+@cache
+def _imports(text: bytes) -> frozenset[Path]:
+    """The modules of the package that a module with this source imports."""
     modules = set()
-    for module, names, whole in _IMPORT.findall(source(file).decode()):
+    for module, names, whole in _IMPORT.findall(text.decode()):
         # A name may be a module of a package, or defined in a module.
         for name in re.findall(r"\w+", re.sub(r"#.*| as \w+", "", names)) or [""]:
             modules.add(module_file(f"{module}.{name}") or module_file(module or whole))

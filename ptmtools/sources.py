@@ -16,15 +16,19 @@ from pathlib import Path
 from typing import Any
 
 PACKAGE = Path(__file__).parent
-_imported: dict[Path, bytes] = {}
+#: None: unknown, unreadable or of two states.
+_imported: dict[Path, bytes | None] = {}
 
 
 class _Reader(MetaPathFinder):
     def find_spec(self, name: str, path: Any, target: Any = None) -> None:
         file = module_file(name) if name.startswith(f"{PACKAGE.name}.") else None
         if file:
-            # A module that is imported again leaves the names that others took from the first.
-            _imported.setdefault(file, file.read_bytes())
+            # A module that is imported again leaves the names that others took from the first; and
+            # it may only have been looked for, and be imported later.
+            text = _read(file)
+            if _imported.setdefault(file, text) != text:
+                _imported[file] = None
 
 
 def watch() -> None:
@@ -33,9 +37,18 @@ def watch() -> None:
         sys.meta_path.insert(0, _Reader())
 
 
-def source(file: Path) -> bytes:
-    """What was imported from a file of the package; what it holds now, if nothing was."""
-    return _imported[file] if file in _imported else file.read_bytes()
+def source(file: Path) -> bytes | None:
+    """What was imported from a file of the package; what it holds now, if nothing was. None if that
+    is not known: the file changed between two imports, or cannot be read (Python may have its
+    bytecode)."""
+    return _imported[file] if file in _imported else _read(file)
+
+
+def _read(file: Path) -> bytes | None:
+    try:
+        return file.read_bytes()
+    except OSError:
+        return None
 
 
 def module_file(name: str) -> Path | None:

@@ -119,16 +119,56 @@ def test_sources_that_change_under_a_process(package: Path) -> None:
     assert run(PROGRAM, package.parent, NUMBA_CACHE_DIR="") == ["12"]
 
 
+@pytest.mark.parametrize(
+    "before",
+    [
+        "import importlib\nfrom ptmtools import one, two, tables\n{}"
+        "for module in (tables, two, one): importlib.reload(module)\n",
+        "from importlib.util import find_spec\nfind_spec('ptmtools.tables')\n{}",
+    ],
+    ids=["reload", "find_spec"],
+)
+def test_a_module_that_is_imported_again(package: Path, before: str) -> None:
+    """Or only looked for, and imported after an edit: other processes compile for themselves."""
+    tables = package / "tables.py"
+    program = before.format(f"open({str(tables)!r}, 'w').write('FACTOR = 20')\n") + PROGRAM
+    assert run(program, package.parent, NUMBA_CACHE_DIR="")[-1] == "22"
+    tables.write_text(SOURCES["tables"])
+    assert run(PROGRAM, package.parent, NUMBA_CACHE_DIR="")[-1] == "12"
+    assert run(program, package.parent, NUMBA_CACHE_DIR="")[-1] == "22"
+
+
+def test_a_source_that_cannot_be_read(package: Path) -> None:
+    """Python needs none beside its bytecode."""
+    program = f"""
+from pathlib import Path
+read = Path.read_bytes
+def read_others(file):
+    if file.name == "tables.py":
+        raise PermissionError
+    return read(file)
+Path.read_bytes = read_others
+{PROGRAM}"""
+    for _ in range(2):
+        announced, actual = run(program, package.parent, NUMBA_CACHE_DIR="")
+        assert announced
+        assert actual == "12"
+
+
 def test_the_class_of_an_argument(package: Path) -> None:
-    """A kernel reads the fields of a named tuple by number, and need not import its class."""
-    pair = package / "pair.py"
+    """A kernel reads the fields of a named tuple by number, and need not import its class. Other
+    classes that it is called with, before or not, decide nothing."""
     (package / "one.py").write_text(SOURCES["one"].replace("called(x) + 1", "x.a - x.b"))
-    program = PROGRAM.replace("outer(1)", "outer(Pair(a=3, b=1))")
+    source = "from typing import NamedTuple\nclass {}(NamedTuple):\n    {}: int\n    {}: int\n"
+    (package / "first.py").write_text(source.format("First", "a", "b"))
+    pair = PROGRAM.replace("outer(1)", "outer(Pair(a=3, b=1))")
+    pair = f"from ptmtools.pair import Pair\n{pair}"
+    both = "from ptmtools.first import First\nfrom ptmtools.one import outer\n"
+    both += f"outer(First(0, 0))\n{pair}"
     for fields in (("a", "b"), ("b", "a")):
-        lines = "".join(f"    {name}: int\n" for name in fields)
-        pair.write_text(f"from typing import NamedTuple\nclass Pair(NamedTuple):\n{lines}")
-        imports = "from ptmtools.pair import Pair\n"
-        assert run(imports + program, package.parent, NUMBA_CACHE_DIR="")[-1] == "2"
+        (package / "pair.py").write_text(source.format("Pair", *fields))
+        assert run(both, package.parent, NUMBA_CACHE_DIR="")[-1] == "2"
+        assert run(pair, package.parent, NUMBA_CACHE_DIR="") == ["2"], "compiled again"
 
 
 def test_two_processes_that_start_together(package: Path) -> None:
@@ -175,18 +215,26 @@ def test_a_constant_of_this_package(tmp_path: Path) -> None:
     assert run(program, tmp_path) == before
 
 
-def test_without_a_place_to_keep_it_code_still_runs(tmp_path: Path) -> None:
-    """As a user without a home, of a package that is not theirs."""
-    (tmp_path / "file").touch()
-    program = (
-        "import os; os.environ.pop('HOME', None)\n"
-        "from pathlib import Path; from ptmtools import jit\n"
-        f"jit.PACKAGE = Path({str(tmp_path / 'file')!r})\n"
-        "assert jit._root() == ''\n"
-        "print(jit.kernel(lambda x: x + 1)(41))"
-    )
-    place = str(tmp_path / "file")
-    assert run(program, ROOT.parent, XDG_CACHE_HOME=place, NUMBA_CACHE_DIR="") == ["42"]
+@pytest.mark.parametrize("closed", ["variable", "subfolder", "all"])
+def test_without_a_place_to_keep_it_code_still_runs(package: Path, closed: str) -> None:
+    """Never where numba keeps it by itself: that folder is the same for all sources."""
+    file, chosen = package.parent / "file", package.parent / "chosen"
+    file.touch()
+    own = package / "__pycache__" / "kernels"
+    places = {"NUMBA_CACHE_DIR": str(file), "XDG_CACHE_HOME": str(file), "HOME": str(file)}
+    if closed == "all":
+        own.parent.mkdir()
+        own.touch()
+    elif closed == "subfolder":
+        places["NUMBA_CACHE_DIR"] = str(chosen)
+        run(PROGRAM, package.parent, **places)
+        for folder in chosen.glob("*/*"):
+            shutil.rmtree(folder)
+            folder.touch()
+    announced = [len(run(PROGRAM, package.parent, **places)) - 1 for _ in range(2)]
+    assert announced == [1, closed != "variable"]
+    assert run(PROGRAM, package.parent, **places)[-1] == "12"
+    assert not list(own.parent.glob("*.nbi"))
 
 
 def test_no_import_is_overlooked() -> None:
@@ -203,4 +251,4 @@ def test_no_import_is_overlooked() -> None:
                 if name.split(".")[0] == ROOT.name:
                     own = module_file(name)
                     actual.add(own or module_file(name.rpartition(".")[0]))
-        assert actual <= jit._imports(file), file
+        assert actual <= jit._imports(file.read_bytes()), file
