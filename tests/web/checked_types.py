@@ -16,20 +16,23 @@ ROOT = Path(__file__).resolve().parents[2]
 #: Folders with a tsconfig.json.
 PACKAGES = ("web/ptm", "web/client", "web/three-ptm", "web/page", "web/embed")
 #: For the second of `make lint` and `make test`, which takes half of the time of the first.
-KNOWN = ROOT / "build/types"
+CACHE = ROOT / "build/types"
 
 
-def complaints(folder: Path | None = None, known: Path = KNOWN) -> str:
-    """Of one folder, or of all packages; empty if there are none.
+def complaints(folder: Path | None = None, cache: Path = CACHE) -> str:
+    """Of one folder, or of all packages; empty if there are none. A compiler that breaks off is one.
 
-    The compiler keeps what it learns about unchanged files in the folder ``known``."""
+    The compiler keeps what it learns about unchanged files in the folder ``cache``."""
     printed = []
     compiler = TYPESCRIPT.folder / "bin/tsc"
     for package in [folder] if folder else [ROOT / name for name in PACKAGES]:
-        info = known / f"{package.name}.tsbuildinfo"
+        info = cache / f"{package.name}.tsbuildinfo"
         command = ["node", str(compiler), "--project", str(package), "--pretty", "false"]
         command += ["--incremental", "--tsBuildInfoFile", str(info)]
-        printed.append(subprocess.run(command, capture_output=True, text=True).stdout)
+        done = subprocess.run(command, capture_output=True, text=True)
+        printed.append(done.stdout)
+        if done.returncode and not done.stdout:
+            printed.append(f"{package}: tsc ended with {done.returncode}\n{done.stderr}")
     return "".join(printed)
 
 

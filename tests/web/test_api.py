@@ -134,6 +134,16 @@ def test_a_wrong_type_is_a_complaint(require: Callable[[str, str], None], tmp_pa
     assert "crc32.js" in checked_types.complaints(tmp_path, tmp_path), "a known one, again"
 
 
+def test_a_compiler_that_breaks_off_is_a_complaint(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    node = tmp_path / "node"
+    node.write_text("#!/bin/sh\necho out of memory >&2\nexit 134\n")
+    node.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    assert "134\nout of memory" in checked_types.complaints(tmp_path, tmp_path)
+
+
 def test_without_a_compiler_the_build_says_what_to_install(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-I", "-S", str(BUILD), str(tmp_path / "none.wasm")],
