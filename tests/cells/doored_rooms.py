@@ -88,7 +88,7 @@ def see(cells: Cells, one: tuple[float, ...], other: tuple[float, ...]) -> bool:
     return bool(b in pvs.cell[pvs.start[a] : pvs.start[a + 1]])
 
 
-def found(scene: Scene, **options: object) -> list[str]:
+def leaf_names(scene: Scene, **options: object) -> list[str]:
     """The names of the door leaves of a scene."""
     chosen = SubdivideOptions(**options)  # type: ignore[arg-type]
     tolerance = scene.tolerance.for_walls(chosen.wall_thickness)

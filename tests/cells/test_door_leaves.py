@@ -17,8 +17,8 @@ from tests.cells.doored_rooms import (
     B,
     Faces,
     Hole,
-    found,
     leaf,
+    leaf_names,
     rooms,
     scene,
     sheet,
@@ -67,7 +67,7 @@ def test_what_is_not_called_door(name: str) -> None:
 )
 def test_what_is_no_door_by_its_shape(hole: Hole | None, things: dict[str, Faces]) -> None:
     made = scene(rooms(hole), **things)
-    assert found(made) == []
+    assert leaf_names(made) == []
     cells = subdivide(made)
     assert not len(cells.opened)
     assert not together(cells, A, B)
@@ -87,7 +87,7 @@ def test_what_is_no_door_by_its_shape(hole: Hole | None, things: dict[str, Faces
 )
 def test_a_name_alone_makes_no_door(hole: Hole, things: dict[str, Faces]) -> None:
     made = scene(rooms(hole), **things)
-    assert found(made) == []
+    assert leaf_names(made) == []
     assert not together(subdivide(made), A, B)
 
 
@@ -105,7 +105,7 @@ def test_a_hatch_in_the_floor_is_no_door_unless_asked_for() -> None:
     hatch = solid((1, -0.05, -1), (2, 0, 1))
     made = scene(below, above, slab, sides, hatch_door=hatch)
     up, down = (3.0, 1.0, 0.0), (3.0, -2.0, 0.0)
-    assert found(made) == []
+    assert leaf_names(made) == []
     assert not together(subdivide(made), up, down)
     assert together(subdivide(made, SubdivideOptions(door=("hatch*",))), up, down)
 
@@ -126,7 +126,7 @@ def test_the_user_says_what_is_a_door() -> None:
 def test_a_door_on_a_wall_or_open_against_it_is_none() -> None:
     against, on_it = leaf(4.205, (0, 2.1, 0.6, 1.6)), leaf(3.955, (0, 2, -1.6, -0.7))
     made = scene(rooms(), Door=against, Cupboard_door=on_it)
-    assert found(made) == []
+    assert leaf_names(made) == []
     assert together(subdivide(made), A, B)
 
 

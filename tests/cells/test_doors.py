@@ -25,8 +25,8 @@ from tests.cells.doored_rooms import (
     B,
     Faces,
     Hole,
-    found,
     leaf,
+    leaf_names,
     rooms,
     said,
     scene,
@@ -56,7 +56,7 @@ from tests.conftest import scene_of
 )
 def test_a_door_parts_no_building(name: str, hole: Hole, door: Faces, leaves: int) -> None:
     made = scene(rooms(hole), **{name: door})
-    assert found(made) == [name] * leaves
+    assert leaf_names(made) == [name] * leaves
     cells = subdivide(made, OPEN)
     assert cells.closed
     assert together(cells, A, B)
@@ -147,7 +147,7 @@ def test_a_closet_in_which_nobody_can_stand_stays_shut() -> None:
     closet = box((4.2, 0, -0.5), (4.9, 4, 0.5), "-x")
     room = box((0, 0, -2), (4, 4, 2), "+x")
     made = scene(room, wall(4, 4.2, HOLE), closet, shelves, Door=leaf(4.05))
-    assert found(made) == ["Door"]
+    assert leaf_names(made) == ["Door"]
     cells = subdivide(made)
     assert cells.closed
     assert not len(cells.opened)

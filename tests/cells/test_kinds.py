@@ -10,7 +10,7 @@ import pytest
 from ptmtools.cells import SubdivideOptions, structural_triangles, subdivide
 from ptmtools.cells.roles import Designated
 from ptmtools.scene.model import Kind, Scene
-from tests.cells.doored_rooms import found, leaf, rooms, scene, solid
+from tests.cells.doored_rooms import leaf, leaf_names, rooms, scene, solid
 from tests.cells.test_detail import ball
 from tests.conftest import scene_of
 
@@ -59,8 +59,8 @@ def test_a_door_as_if_named() -> None:
     """A gate 15 cm thick: no leaf by its shape."""
     gate = leaf(4.02, thickness=0.15)
     made = scene(rooms(), gate=gate)
-    assert found(made) == []
-    assert found(classed(made, gate="door")) == ["gate"]
+    assert leaf_names(made) == []
+    assert leaf_names(classed(made, gate="door")) == ["gate"]
     named = SubdivideOptions(door=("gate",))
     assert same(made, named, classed(made, gate="door"))
     assert not same(made, named, made)
@@ -76,8 +76,8 @@ def test_structure_is_never_a_door() -> None:
     """A part of a wall that is as large as a leaf, fills a doorway, and may even be called so."""
     for name in ("thing", "Door"):
         made = scene(rooms(), **{name: leaf(4.05)})
-        assert found(made) == [name]
-        assert found(classed(made, **{name: "structural"})) == []
+        assert leaf_names(made) == [name]
+        assert leaf_names(classed(made, **{name: "structural"})) == []
 
 
 def test_structure_divides_by_its_area() -> None:
