@@ -125,7 +125,7 @@ class _Kernel:
 _making = Lock()
 
 
-class _Cache(numba.core.caching.NullCache):  # type: ignore[misc]
+class _Cache(numba.core.caching.NullCache):
     """The machine code of a kernel on disk.
 
     Numba asks for it once per signature and process, not at each call, and holds its own lock.
@@ -163,8 +163,9 @@ class _Cache(numba.core.caching.NullCache):  # type: ignore[misc]
 def _classes(types: Iterable[Any]) -> Iterator[type]:
     """The classes of named tuples in a signature, whose fields machine code knows by number. It is
     kept beside their names, which fail if a class has moved."""
+    tuples: Any = numba.types.BaseTuple
     for each in types:
-        if isinstance(each, numba.types.BaseTuple):
+        if isinstance(each, tuples):
             yield getattr(each, "instance_class", tuple)
             yield from _classes(each)
 
