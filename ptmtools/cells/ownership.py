@@ -100,6 +100,8 @@ def _settled(
 
     at = np.full(len(corners), 0 if len(tree.planes) else -2)
     lying = np.zeros(len(corners), dtype=bool)
+    # Contiguous: a view would be a type of its own, compiled again.
+    corners = np.ascontiguousarray(corners)
     sink(tree.planes, tree.children, corners, facing, tolerance.plane, at, lying)
     return at, lying
 

@@ -198,16 +198,17 @@ def status(console: Console, db: str) -> None:
 @click.command("warm-up", cls=Command)
 @with_console
 def warm_up(console: Console) -> None:
-    """Compile the code that the first build, encoding or octree texture would compile.
+    """Compile the code that the first build, image, check, view or octree texture would compile.
 
     This takes a minute, once per release and user. Without this command, the first build compiles
     the code; use it for container images, and before the workers of a cluster start.
     """
     from ptmtools.jit import compilations
-    from ptmtools.pipeline.warm_up import warm_building, warm_statue
+    from ptmtools.pipeline.warm_up import warm_building, warm_images, warm_statue
 
     start, before = time.perf_counter(), compilations()
     warm_building()
+    warm_images()
     warm_statue()
     seconds = time.perf_counter() - start
     fresh = compilations() > before

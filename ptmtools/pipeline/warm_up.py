@@ -1,4 +1,5 @@
-"""Compiles all kernels for ``ptm warm-up``: builds a small building, and simplifies it as a statue.
+"""Compiles kernels for ``ptm warm-up``: builds, checks and draws a small building, encodes and
+decodes images, and simplifies the building as a statue.
 
 The building has the features that run all kernels: doors in a row, whose edges meet in one line
 (near ties), a solid that stands in a room, and an image large enough for the coder to fit weights.
@@ -29,13 +30,32 @@ TEXELS = 256
 
 
 def warm_building() -> None:
-    """Calls the kernels of builds and encoding with default options."""
+    """Calls the kernels of builds with default options, of `ptm validate` and of `ptm render`."""
+    from ptmtools.output.served import read_served
     from ptmtools.pipeline.build import build_scene
+    from ptmtools.pipeline.validation import validate
     from ptmtools.portal_flow.flow_kernels import mark
+    from ptmtools.rendering.drawing import ViewOptions, draw_view
 
     mark(np.zeros(1, np.int64), 0, 1)  # of near ties that let a line pass: few buildings have any
     with TemporaryDirectory() as folder:
-        build_scene(write_building(Path(folder)), Path(folder, "database"), workers=1)
+        database = Path(folder, "database")
+        build_scene(write_building(Path(folder)), database, workers=1)
+        validate(database)
+        for lit in (False, True):
+            draw_view(read_served(database), ViewOptions(width=32, height=18, lit=lit))
+
+
+def warm_images() -> None:
+    """Calls the kernels that encode and decode images of 8 bits, of all profiles."""
+    from ptmtools.texture import EncodeOptions, decode, encode
+
+    noise = np.random.default_rng(1).integers(0, 256, (64, 64, 3)).astype(np.uint8)
+    repeats = np.tile(noise[:16, :16] // 64 * 64, (8, 8, 1))
+    smooth = np.add.outer(np.arange(64), np.arange(64))[..., None].repeat(3, 2).astype(np.uint8)
+    for image in (noise, repeats, smooth):
+        for profile in ("fast", "small", "paper"):
+            decode(encode(image, EncodeOptions(profile=profile)))
 
 
 def write_building(folder: Path) -> Path:
