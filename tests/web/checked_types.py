@@ -20,7 +20,7 @@ CACHE = ROOT / "build/types"
 
 
 def complaints(folder: Path | None = None, cache: Path = CACHE) -> str:
-    """Of one folder, or of all packages; empty if there are none. A compiler that breaks off is one.
+    """Of one folder, or of all packages, also that the compiler broke off; empty if none.
 
     The compiler keeps what it learns about unchanged files in the folder ``cache``."""
     printed = []
