@@ -9,6 +9,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -177,6 +178,15 @@ def test_two_processes_that_start_together(package: Path) -> None:
         printed = list(pool.map(lambda _: run(PROGRAM, package.parent, NUMBA_CACHE_DIR=""), "ab"))
     assert [lines[-1] for lines in printed] == ["12", "12"]
     assert run(PROGRAM, package.parent, NUMBA_CACHE_DIR="") == ["12"]
+
+
+def test_two_threads_make_one_dispatcher() -> None:
+    """Each saw that there is none, and one had to wait."""
+    added: Any = jit.kernel(lambda x: x + 1)
+    added._make_entry()
+    first = added._entry
+    added._make_entry()
+    assert added._entry is first
 
 
 def test_literals_are_not_types_of_their_own(package: Path) -> None:
