@@ -114,7 +114,9 @@ class _Page:
         own = self._plain(content.tour.get("title")) or content.title
         #: What marks words of the page that exist only in English.
         self._foreign = "" if has_words(language) else ' lang="en" dir="ltr"'
-        self._title = own if self._foreign else f"{own}: {self._words['catalogue']}"
+        word = "" if self._foreign else f": {self._words['catalogue']}"
+        self._title = own + word
+        self._h1 = (self._span(content.tour.get("title")) or escape(content.title)) + escape(word)
 
     def html(self) -> str:
         """The whole page."""
@@ -144,7 +146,7 @@ class _Page:
             f'<link rel="icon" href="data:,">\n<style>{_STYLE}</style>\n'
             f"{self._linked_data()}</head>\n<body>\n"
             f'<a class="skip" href="#content">{self._word("skip")}</a>\n'
-            f"<header>\n<h1>{escape(self._title)}</h1>\n"
+            f"<header>\n<h1>{self._h1}</h1>\n"
             f"{self._paragraph(self._tour.get('description'))}"
             f'<p><a href="{escape(self._walk())}">{self._word("walk")}</a></p>\n{nav}</header>\n'
             f'<main id="content">\n{"".join(self._sections())}</main>\n'

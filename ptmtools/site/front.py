@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from ptmtools.output.served import Served
@@ -58,7 +58,7 @@ class Front:
         for entry in (*program.values(), element()):
             files.put(entry)
         tour = self._tour(files)
-        title = self.options.title or (tour and tour.text("title")) or self.title
+        title = (tour and tour.text("title")) or self.options.title or self.title
         settings = {
             "index": self.url,
             "worker": program["worker.js"].name,
@@ -95,7 +95,9 @@ class Front:
         if tour and tour.empty:
             files.note("the tour is empty: the site has none")
             return None
-        return tour
+        options = {"title": self.options.title, "description": self.options.description}
+        chosen = {name: {"": text} for name, text in options.items() if text}
+        return tour and replace(tour, document=tour.document | chosen)
 
     def _tour_files(self, tour: SiteTour, title: str, files: Files) -> dict[str, str]:
         """Adds the tour and its catalogue; returns the settings of the page for them: their URLs. A

@@ -92,6 +92,10 @@ def test_rooms_have_names_in_the_language_of_the_page() -> None:
         "places": {"Hall": {"en": "Red hall", "ar": "القاعة الحمراء"}, "Attic": {"en": HOSTILE}},
     }
     pages = catalogue_of(replace(plain, tour={**plain.tour, **walk}))
+    assert '<h1><span dir="auto">Walk</span>: Catalogue</h1>' in pages["catalogue.html"]
+    english = {**plain.tour, **walk, "title": {"en": "Walk"}}
+    arabic = catalogue_of(replace(plain, tour=english))["catalogue-ar.html"]
+    assert '<h1><span dir="auto" lang="en">Walk</span></h1>' in arabic
     page, other = (Page(pages[name]) for name in ("catalogue.html", "catalogue-ar.html"))
     assert "Red hall" in page.text
     assert "Old works." in page.text

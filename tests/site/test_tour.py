@@ -236,15 +236,27 @@ def test_the_walk_and_its_places_have_names_in_each_language(
     assert row["description"] == model, "programs get the same name in each language"
 
 
-def test_the_page_has_title_and_places_of_the_tour(toured: Site, museum_db: Path) -> None:
+def test_the_page_has_title_and_places_of_the_tour(
+    toured: Site, museum_db: Path, tour_file: Path
+) -> None:
+    """Those of the options take precedence."""
     page = toured.entries["index.html"].read().decode()
     assert "<title>Highlights</title>" in page
     assert 'property="og:description" content="Old works."' in page
     catalogue = toured.entries["catalogue-de.html"].read().decode()
     assert 'property="og:title" content="Höhepunkte: Katalog"' in catalogue
     assert 'property="og:description" content="Alte Werke."' in catalogue
-    own = site_of(museum_db, SiteOptions(pictures=False, opening=False, title="A & B", tour="none"))
-    assert "<title>A &amp; B</title>" in own.entries["index.html"].read().decode()
+    for tour in ("none", str(tour_file)):
+        options = SiteOptions(
+            pictures=False, opening=False, title="A & B", description="C", tour=tour
+        )
+        own = site_of(museum_db, options).entries
+        for name in {"index.html", "catalogue-de.html"} & own.keys():
+            text = own[name].read().decode()
+            assert "A &amp; B" in text
+            assert 'property="og:description" content="C"' in text
+            assert "Highlights" not in text
+            assert "Höhepunkte" not in text
 
 
 def test_an_empty_tour_is_none(museum_db: Path, tmp_path: Path) -> None:
@@ -290,7 +302,7 @@ def test_a_label_ends_above_two_rows_of_buttons(chromium: Any, toured: Site) -> 
         label = page.locator("#label").bounding_box()
         assert label["y"] + label["height"] < min(tops)
         # A narrow window has room for one panel.
-        for name, other in (("tour", "map"), ("map", "tour"), ("tour", "places")):
+        for name, other in (("tour", "map"), ("map", "tour"), ("tour", "map")):
             page.locator(f"nav [aria-controls={name}]").click()
             page.locator(f"#{name}").wait_for()
             assert page.locator(f"#{other}").is_hidden()
