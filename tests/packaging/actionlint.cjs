@@ -4,6 +4,8 @@
 const { readFileSync } = require("node:fs");
 const { join } = require("node:path");
 
+// Node 18 has it under a flag only.
+globalThis.crypto ??= require("node:crypto").webcrypto;
 const { runLintForFiles } = require(join(process.argv[2], "build/run-lint.js"));
 
 runLintForFiles(JSON.parse(readFileSync(0, "utf8"))).then((results) => {

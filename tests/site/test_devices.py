@@ -303,21 +303,6 @@ def test_a_gamepad_uses_what_it_reaches(desk: Any) -> None:
     desk.wait_for_function("window.fake && !window.before")
 
 
-def test_a_gamepad_answers_an_error_without_a_walk(visit: Callable[..., Any], museum: Site) -> None:
-    def refuse(page: Any) -> None:
-        page.add_init_script(PAD)
-        page.route("**/index-*.json", lambda route: route.fulfill(status=404))
-
-    with visit(museum, query="?ui=gamepad", prepare=refuse) as visitor:
-        page = visitor.page
-        page.wait_for_selector("#error:not([hidden])")
-        page.evaluate("window.same = true")
-        wake(page, USE)
-        assert page.evaluate("same"), "the press that shows the gamepad uses nothing"
-        with page.expect_navigation():
-            page.evaluate(f"pad.buttons[{USE}].pressed = true")
-
-
 def test_cameras_of_eyes_and_their_union() -> None:
     """The cameras of the page project as the matrices of WebXR; the union has all that eyes see."""
     actual = json.loads(node.run(HERE / "eyes.mjs", PAGE))

@@ -38,7 +38,8 @@ def folder(tmp_path: Path) -> Path:
     made = tmp_path / "site"
     made.mkdir()
     (made / "index.html").write_bytes(PAGE)
-    (made / "noise-0123456789.ptm").write_bytes(NOISE)
+    (made / "data").mkdir()
+    (made / "data/noise-0123456789.ptm").write_bytes(NOISE)
     return made
 
 
@@ -79,7 +80,7 @@ def test_serves_a_published_folder_until_ctrl_c(folder: Path) -> None:
         url = line(process)
         with client_of(url) as ask:
             assert ask("/").body == PAGE
-            part = ask("/noise-0123456789.ptm", Range="bytes=5-9")
+            part = ask("/data/noise-0123456789.ptm", Range="bytes=5-9")
             assert part.body == NOISE[5:10]
             assert "immutable" in part.headers["cache-control"]
         where = urlsplit(url)
@@ -89,7 +90,7 @@ def test_serves_a_published_folder_until_ctrl_c(folder: Path) -> None:
             socket.create_connection(address, timeout=20),
             socket.create_connection(address, timeout=20) as reading,
         ):
-            reading.sendall(b"GET /noise-0123456789.ptm HTTP/1.1\r\nHost: x\r\n\r\n")
+            reading.sendall(b"GET /data/noise-0123456789.ptm HTTP/1.1\r\nHost: x\r\n\r\n")
             assert reading.recv(100)  # of what takes 90 s
             assert interrupted(process) == (0, "", "")
 

@@ -5,8 +5,6 @@ import { attachKiosk } from "./kiosk.js";
 import { attachDevices } from "./ui/devices.js";
 import { addStyle } from "./ui/elements.js";
 
-export { attachPads } from "./ui/devices.js";
-
 const FORMAT = "ptm-walk";
 /** @param {any[]} list @param {any} number */
 const isOf = (list, number) => Number.isInteger(number) && number in list;

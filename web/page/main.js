@@ -89,7 +89,6 @@ async function main() {
 function end(fault) {
   const known = fault instanceof PageError;
   showError(document, known ? fault : new PageError("PTM-V107", String(fault)));
-  if (/gamepad/.test(location.search)) loadEmbedding().then((s) => s.attachPads(), () => {});
 }
 
 main();

@@ -13,7 +13,7 @@ const KEYS = {
   KeyQ: ["right", -1], KeyE: ["right", 1], PageUp: ["look", 1], PageDown: ["look", -1],
 };
 /** Elements in which keys have a meaning of their own. */
-export const OWN = "input, select, textarea, ol, #places, #panels section, #error";
+export const OWN = "input, select, textarea, ol, #places, #panels section";
 /** Pixels of a thumb's movement for a full wish, and below which there is none. */
 const REACH = 56, REST = 8;
 /** Vertical field of view, radians: a dragged point stays under the pointer. */
