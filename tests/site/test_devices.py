@@ -152,7 +152,7 @@ def use_the_tour(visitor: Visitor) -> None:
     reach(page, "li button")
     press(page, USE)
     assert page.evaluate(text) == "Night", "the heading of its label"
-    # As with keys, nobody walks from a panel.
+    # As with keys, sticks do not walk from a panel.
     before = page.evaluate(EYE)
     page.evaluate("pad.axes = [0, 1, 0, 0]")
     visitor.frames(5)

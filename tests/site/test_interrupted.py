@@ -84,7 +84,7 @@ def assert_whole(target: str) -> None:
     files = files_of(target)
     for name, data in files.items():
         if name.removesuffix(COPY).endswith(".html"):
-            assert {found.decode() for found in NAMED.findall(data)} <= files.keys(), name
+            assert {match.decode() for match in NAMED.findall(data)} <= files.keys(), name
 
 
 class Stopped(BaseException):
