@@ -62,7 +62,7 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 setup: $(VENV)/.installed
 
 # The stamp, not the OBJ, is the target: the command decides what to write again.
-build/museum/.made: $(wildcard ptmtools/sample/*.py) | $(VENV)/.installed
+build/museum/.made: $(wildcard sample_data/ptmtools_samples/*.py) | $(VENV)/.installed
 	$(BIN)/ptm sample museum -o build/museum
 	@touch $@
 

@@ -46,14 +46,14 @@ from ptmtools.coverage.item_buffer import VIEWS
 from ptmtools.coverage.options import PRESETS, AchOptions
 from ptmtools.coverage.sampling import CellHints, Sampler
 from ptmtools.errors import MissingComponentError
-from ptmtools.lab.tradeoff.experiment import run
-from ptmtools.lab.tradeoff.report import as_csv, picture
-from ptmtools.lab.tradeoff.stages import CoverageTrade
 from ptmtools.parallel import open_executor
 from ptmtools.scene import ingest
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
 from ptmtools.visibility.pvs import compute_pvs
+from ptmtools_lab.tradeoff.experiment import run
+from ptmtools_lab.tradeoff.report import as_csv, picture
+from ptmtools_lab.tradeoff.stages import CoverageTrade
 
 OUTPUT = ROOT / "build/bench"
 PARTS = ("presets", "rates", "tolerance", "agreement", "speed", "processes")

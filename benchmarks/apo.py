@@ -21,12 +21,12 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "sample_data")]
 
-from ptmtools.neighbours.apo.files import streamed  # noqa: E402
-from ptmtools.neighbours.apo.making import ApoTexture, make_apo  # noqa: E402
-from ptmtools.neighbours.apo.model import ApoOptions  # noqa: E402
 from ptmtools.parallel import open_executor  # noqa: E402
 from ptmtools.pipeline.warm_up import warm_statue  # noqa: E402
 from ptmtools.scene import IngestOptions, ingest  # noqa: E402
+from ptmtools_systems.apo.files import streamed  # noqa: E402
+from ptmtools_systems.apo.making import ApoTexture, make_apo  # noqa: E402
+from ptmtools_systems.apo.model import ApoOptions  # noqa: E402
 
 #: Model, triangles, faces, seconds, MB, frames a second.
 PAPER = (

@@ -37,15 +37,15 @@ from render import LOOKS, View, load, render  # noqa: E402
 
 from ptmtools import texture  # noqa: E402
 from ptmtools.cli.main import main as command  # noqa: E402
-from ptmtools.neighbours.apo.making import make_apo, smooth, welded  # noqa: E402
-from ptmtools.neighbours.apo.model import ApoOptions  # noqa: E402
-from ptmtools.neighbours.apo.picture import RenderOptions, render as draw_octree  # noqa: E402
 from ptmtools.output.served import read_served  # noqa: E402
 from ptmtools.parallel import open_executor  # noqa: E402
 from ptmtools.rendering.drawing import ViewOptions, draw_view  # noqa: E402
 from ptmtools.scene.model import Material, Scene  # noqa: E402
 from ptmtools.scene.orientation import tolerance_of  # noqa: E402
 from ptmtools.texture import read_image  # noqa: E402
+from ptmtools_systems.apo.making import make_apo, smooth, welded  # noqa: E402
+from ptmtools_systems.apo.model import ApoOptions  # noqa: E402
+from ptmtools_systems.apo.picture import RenderOptions, render as draw_octree  # noqa: E402
 
 PICTURES = ROOT / "docs" / "pictures"
 TWO_ROOMS = ROOT / "sample_data/two_rooms"

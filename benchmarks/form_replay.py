@@ -38,17 +38,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "site")]
 
 from browser import visiting  # noqa: E402
 
-from ptmtools.lab.campus.options import CampusWalkOptions  # noqa: E402
-from ptmtools.lab.campus.simulation import simulate_campus  # noqa: E402
-from ptmtools.lab.campus.stock import Stock  # noqa: E402
-from ptmtools.lab.campus.world import prepare_campus  # noqa: E402
-from ptmtools.lab.network import Link  # noqa: E402
-from ptmtools.lab.policies import POLICIES  # noqa: E402
-from ptmtools.lab.simulation import simulate  # noqa: E402
-from ptmtools.lab.world import prepare, read_forms  # noqa: E402
 from ptmtools.link import Conditions  # noqa: E402
-from ptmtools.neighbours.apo.files import read_mesh  # noqa: E402
-from ptmtools.neighbours.campus.model import MASK, PRESETS  # noqa: E402
 from ptmtools.output.served import read_served  # noqa: E402
 from ptmtools.quantities import parse_bandwidth, parse_duration  # noqa: E402
 from ptmtools.rendering.pyramids import read_pyramids  # noqa: E402
@@ -57,6 +47,16 @@ from ptmtools.site.entry import link_bytes  # noqa: E402
 from ptmtools.site.forms import form_of, form_site  # noqa: E402
 from ptmtools.site.throttle import Throttle  # noqa: E402
 from ptmtools.walk import Walk, parse_walk, read_walk  # noqa: E402
+from ptmtools_lab.campus.options import CampusWalkOptions  # noqa: E402
+from ptmtools_lab.campus.simulation import simulate_campus  # noqa: E402
+from ptmtools_lab.campus.stock import Stock  # noqa: E402
+from ptmtools_lab.campus.world import prepare_campus  # noqa: E402
+from ptmtools_lab.network import Link  # noqa: E402
+from ptmtools_lab.policies import POLICIES  # noqa: E402
+from ptmtools_lab.simulation import simulate  # noqa: E402
+from ptmtools_lab.world import prepare, read_forms  # noqa: E402
+from ptmtools_systems.apo.files import read_mesh  # noqa: E402
+from ptmtools_systems.campus.model import MASK, PRESETS  # noqa: E402
 from tests.e2e.browsers import web  # noqa: E402
 
 #: Window, pixels; poses a second; preset of a campus.

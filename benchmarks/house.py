@@ -9,7 +9,7 @@ file, inside a function, under ``if TYPE_CHECKING``, or as text in a table
 file.
 
 Imports go down if the packages have an order in which each imports only later ones, that is, if the
-graph of imports has no cycle. ``ptmtools.lab`` simulates clients and compares settings: only its
+graph of imports has no cycle. ``ptmtools_lab`` simulates clients and compares settings: only its
 own commands may import it, and no package imports the command line.
 """
 
@@ -27,7 +27,7 @@ from pathlib import Path
 
 PRODUCT, TOP, LABORATORY = "ptmtools", "cli", "lab"
 #: The commands of the laboratory; those of the product do not import it.
-LABORATORY_COMMANDS = {"ptmtools.cli.lab", "ptmtools.cli.tradeoff"}
+LABORATORY_COMMANDS = {"ptmtools_lab.cli.simulation", "ptmtools_lab.cli.tradeoff"}
 TREES = (PRODUCT, "tests", "benchmarks", "sample_data")
 #: Neither is ours to measure: what npm installs, what a build writes.
 SKIPPED = {"node_modules", "build", "dist", ".venv", "__pycache__"}

@@ -31,9 +31,6 @@ from numpy.typing import NDArray
 from PIL import Image
 from scenes import SHARED
 
-from ptmtools.neighbours.interlace import InterlaceOptions, interlace, join, split
-from ptmtools.neighbours.interlace.model import axes_of
-from ptmtools.neighbours.interlace.steps import stride
 from ptmtools.texture import (
     Picture,
     decode_levels,
@@ -42,6 +39,9 @@ from ptmtools.texture import (
     read_image,
 )
 from ptmtools.texture.images import png_bytes
+from ptmtools_systems.interlace import InterlaceOptions, interlace, join, split
+from ptmtools_systems.interlace.model import axes_of
+from ptmtools_systems.interlace.steps import stride
 
 Texels = NDArray[Any]
 #: First column, first row, and every how many-th of them a pass of Adam7 has.

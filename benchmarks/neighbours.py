@@ -33,19 +33,19 @@ import numpy as np
 from scenes import ROOT, ptm
 
 from ptmtools.arrays import Floats
-from ptmtools.lab.comparing import RunResult, SimulateOptions, play
-from ptmtools.lab.forms import FORMS, PTM
-from ptmtools.lab.measures import STANDS
-from ptmtools.lab.policies import POLICIES, PolicyEntry
-from ptmtools.lab.policies.whole_files import GpuiiClient
-from ptmtools.lab.report import link_text
-from ptmtools.lab.simulation import simulate
-from ptmtools.lab.world import World, prepare, read_forms
 from ptmtools.link import Conditions
 from ptmtools.output.served import read_served
 from ptmtools.quantities import size
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.walk import read_walk
+from ptmtools_lab.comparing import RunResult, SimulateOptions, play
+from ptmtools_lab.forms import FORMS, PTM
+from ptmtools_lab.measures import STANDS
+from ptmtools_lab.policies import POLICIES, PolicyEntry
+from ptmtools_lab.policies.whole_files import GpuiiClient
+from ptmtools_lab.report import link_text
+from ptmtools_lab.simulation import simulate
+from ptmtools_lab.world import World, prepare, read_forms
 
 FOLDER = ROOT / "build/bench/neighbours"
 #: Those that take `.ptm`s, and the neighbouring systems; a row each.

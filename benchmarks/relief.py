@@ -25,14 +25,14 @@ from make_statues import STATUES, StatueOptions, make_statue  # noqa: E402
 
 from ptmtools.arrays import Floats  # noqa: E402
 from ptmtools.executor import Executor  # noqa: E402
-from ptmtools.neighbours.apo.files import streamed  # noqa: E402
-from ptmtools.neighbours.apo.making import octree_around, smooth, welded  # noqa: E402
-from ptmtools.neighbours.apo.model import ApoOptions  # noqa: E402
-from ptmtools.neighbours.apo.normal_map import Baking, looked_up, normal_map  # noqa: E402
-from ptmtools.neighbours.apo.sampling import at  # noqa: E402
-from ptmtools.neighbours.apo.traversal import look_up  # noqa: E402
 from ptmtools.simplification import Mesh, SimplifyOptions, simplify  # noqa: E402
 from ptmtools.texture import EncodeOptions, encode  # noqa: E402
+from ptmtools_systems.apo.files import streamed  # noqa: E402
+from ptmtools_systems.apo.making import octree_around, smooth, welded  # noqa: E402
+from ptmtools_systems.apo.model import ApoOptions  # noqa: E402
+from ptmtools_systems.apo.normal_map import Baking, looked_up, normal_map  # noqa: E402
+from ptmtools_systems.apo.sampling import at  # noqa: E402
+from ptmtools_systems.apo.traversal import look_up  # noqa: E402
 
 #: Points at which forms are compared, and sides of the maps as powers of two.
 POINTS, SIDES = 100_000, range(6, 12)

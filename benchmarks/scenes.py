@@ -102,9 +102,9 @@ def make_scene(scene: str) -> None:
 
 def make_mixed(folder: Path, sides: tuple[int, ...]) -> None:
     """Writes a museum; the side of each texture is drawn from ``sides``."""
-    from ptmtools.sample.files import write
-    from ptmtools.sample.museum import make_museum
-    from ptmtools.sample.options import MuseumOptions
+    from ptmtools_samples.files import write
+    from ptmtools_samples.museum import make_museum
+    from ptmtools_samples.options import MuseumOptions
 
     museums = [list(make_museum(MuseumOptions(ROOMS, TEXTURES, side))) for side in sides]
     drawn = np.random.default_rng(1).integers(len(sides), size=len(museums[0]))

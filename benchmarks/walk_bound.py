@@ -26,17 +26,17 @@ from pathlib import Path
 import numpy as np
 
 from ptmtools.arrays import Ints
-from ptmtools.lab.comparing import budget_of
-from ptmtools.lab.path.making import path_through
-from ptmtools.lab.path.options import PathOptions
-from ptmtools.lab.policies import POLICIES
-from ptmtools.lab.simulation import simulate
-from ptmtools.lab.world import World, prepare
 from ptmtools.link import Conditions
 from ptmtools.output.served import read_served
 from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.stage import Artifacts
 from ptmtools.quantities import parse_bandwidth, parse_memory
+from ptmtools_lab.comparing import budget_of
+from ptmtools_lab.path.making import path_through
+from ptmtools_lab.path.options import PathOptions
+from ptmtools_lab.policies import POLICIES
+from ptmtools_lab.simulation import simulate
+from ptmtools_lab.world import World, prepare
 
 #: Latencies before the first byte of geometry or textures: those of the index and of itself; and
 #: with an opening.

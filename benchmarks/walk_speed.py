@@ -21,15 +21,15 @@ from pstats import Stats
 
 from scenes import database_of, make_scene, walk_file
 
-from ptmtools.lab.comparing import budget_of
-from ptmtools.lab.forms import PTM
-from ptmtools.lab.policies import POLICIES
-from ptmtools.lab.simulation import simulate
-from ptmtools.lab.world import RATE, World, prepare
 from ptmtools.link import Conditions
 from ptmtools.output.served import read_served
 from ptmtools.quantities import parse_memory
 from ptmtools.walk import Walk, read_walk
+from ptmtools_lab.comparing import budget_of
+from ptmtools_lab.forms import PTM
+from ptmtools_lab.policies import POLICIES
+from ptmtools_lab.simulation import simulate
+from ptmtools_lab.world import RATE, World, prepare
 
 #: The policies that take `.ptm`s.
 OURS = [name for name, policy in POLICIES.items() if policy.form == PTM]

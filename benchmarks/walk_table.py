@@ -40,12 +40,6 @@ from typing import Any
 
 from scenes import FOLDER, ROOT, SCENES, WALKS, database_of, make_scenes, walk_file
 
-from ptmtools.lab.comparing import budget_of
-from ptmtools.lab.forms import PTM
-from ptmtools.lab.measures import STANDS, measure
-from ptmtools.lab.policies import POLICIES
-from ptmtools.lab.simulation import simulate
-from ptmtools.lab.world import World, prepare
 from ptmtools.link import Conditions
 from ptmtools.output.served import Served, read_served
 from ptmtools.quantities import parse_bandwidth, parse_memory
@@ -53,6 +47,12 @@ from ptmtools.rendering.lossy import Lossy, read_lossy
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.records import Pyramids
 from ptmtools.walk import read_walk
+from ptmtools_lab.comparing import budget_of
+from ptmtools_lab.forms import PTM
+from ptmtools_lab.measures import STANDS, measure
+from ptmtools_lab.policies import POLICIES
+from ptmtools_lab.simulation import simulate
+from ptmtools_lab.world import World, prepare
 
 BANDWIDTHS = ("56k", "512k", "4M", "16M")
 MEMORIES = ("4MiB", "10%", "30%")

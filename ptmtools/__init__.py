@@ -8,7 +8,7 @@ level, `validate` and `plot_plan` look at the result, `read_served` reads it as 
 holds the defaults. Every failure that a user can cause raises a `PtmError`.
 
 Names are imported when first used. They are the public interface, together with `ptmtools.pillow`
-and the names of `ptmtools.lab` and others that docs/reference lists.
+and the names of `ptmtools_lab` and others that docs/reference lists.
 """
 
 from __future__ import annotations

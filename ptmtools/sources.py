@@ -1,4 +1,4 @@
-"""The sources of this package as this process imported them.
+"""The sources of ptmtools and of the packages beside it as this process imported them.
 
 An upgrade or an edit may replace them while a process runs. It then computes with the old modules,
 but reads new files. Python keeps no trace of the sources of a module: a finder that never finds
@@ -22,7 +22,7 @@ _imported: dict[Path, bytes | None] = {}
 
 class _Reader(MetaPathFinder):
     def find_spec(self, name: str, path: Any, target: Any = None) -> None:
-        file = module_file(name) if name.startswith(f"{PACKAGE.name}.") else None
+        file = module_file(name) if name.startswith(PACKAGE.name) else None
         if file:
             # A module that is imported again leaves the names that others took from the first; and
             # it may only have been looked for, and be imported later.

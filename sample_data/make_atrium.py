@@ -21,12 +21,12 @@ from atrium_parts.furnishing import balustrades, drapes, frescoes, reliefs, runn
 from atrium_parts.sheets import Sheet, obj_text
 from atrium_parts.textures import TEXTURES
 from PIL import Image
+from ptmtools_samples.files import File, png, write
+from ptmtools_samples.museum import generator
+from ptmtools_samples.noise import bytes_of
+from ptmtools_samples.paintings import PAINTINGS
 
 from ptmtools.errors import PtmError
-from ptmtools.sample.files import File, png, write
-from ptmtools.sample.museum import generator
-from ptmtools.sample.noise import bytes_of
-from ptmtools.sample.paintings import PAINTINGS
 
 HEAD = "# ptmtools sample atrium"
 #: Paintings of the walls, of different styles.

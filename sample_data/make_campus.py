@@ -32,12 +32,12 @@ from campus_parts.recipes import Recipe
 from campus_parts.textures import ALPHAS, IMAGES, mask, signs
 from campus_parts.way import way_text
 from PIL import Image
+from ptmtools_samples.files import HEAD, File, png, write
+from ptmtools_samples.mesh import Face, Thing
+from ptmtools_samples.noise import bytes_of
+from ptmtools_samples.obj import number, obj_text
 
 from ptmtools.errors import PtmError
-from ptmtools.sample.files import HEAD, File, png, write
-from ptmtools.sample.mesh import Face, Thing
-from ptmtools.sample.noise import bytes_of
-from ptmtools.sample.obj import number, obj_text
 
 #: Recipes in order along the street: all different, then recurring ones, then a single kind.
 RECIPES = [*HETEROGENEOUS, *MIXED, *(residence(k) for k in range(14))]

@@ -15,12 +15,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from ptmtools_samples.files import File, png, write
+from ptmtools_samples.mesh import Face, Point, Thing, Uv, tiled
+from ptmtools_samples.museum import generator
+from ptmtools_samples.obj import obj_text
+from ptmtools_samples.paintings import PAINTINGS, Painting
+
 from ptmtools.errors import PtmError
-from ptmtools.sample.files import File, png, write
-from ptmtools.sample.mesh import Face, Point, Thing, Uv, tiled
-from ptmtools.sample.museum import generator
-from ptmtools.sample.obj import obj_text
-from ptmtools.sample.paintings import PAINTINGS, Painting
 
 HEAD = "# ptmtools sample gallery of photographs"
 #: Styles closest to photographs.

@@ -18,11 +18,11 @@ from pathlib import Path
 
 from make_photo_gallery import COLORS, WIDTH_RATIO, Photo, hall, hung, photos
 from make_statues import STATUES, StatueOptions, make_statue
+from ptmtools_samples.files import File, png, write
+from ptmtools_samples.museum import generator
+from ptmtools_samples.obj import obj_text
 
 from ptmtools.errors import PtmError
-from ptmtools.sample.files import File, png, write
-from ptmtools.sample.museum import generator
-from ptmtools.sample.obj import obj_text
 
 HEAD = "# ptmtools sample hall of statues"
 #: Side of all images, texels.

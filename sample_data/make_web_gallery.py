@@ -30,17 +30,17 @@ from arguments import between
 from make_statues import STATUES, StatueOptions, make_statue
 from numpy.typing import NDArray
 from PIL import Image
+from ptmtools_samples.files import HEAD, File, write
+from ptmtools_samples.furnishing import furnish, hang
+from ptmtools_samples.mesh import Face, Thing
+from ptmtools_samples.museum import MATERIALS, generator, surface_names
+from ptmtools_samples.noise import bytes_of
+from ptmtools_samples.paintings import PAINTINGS
+from ptmtools_samples.plan import make_plan
+from ptmtools_samples.shell import make_shell
+from ptmtools_samples.surfaces import SURFACES
 
 from ptmtools.errors import PtmError
-from ptmtools.sample.files import HEAD, File, write
-from ptmtools.sample.furnishing import furnish, hang
-from ptmtools.sample.mesh import Face, Thing
-from ptmtools.sample.museum import MATERIALS, generator, surface_names
-from ptmtools.sample.noise import bytes_of
-from ptmtools.sample.paintings import PAINTINGS
-from ptmtools.sample.plan import make_plan
-from ptmtools.sample.shell import make_shell
-from ptmtools.sample.surfaces import SURFACES
 
 DRACO, UNLIT = "KHR_draco_mesh_compression", "KHR_materials_unlit"
 #: Texels of the longer side of paintings, in turn; of surfaces.
@@ -189,7 +189,7 @@ def _primitive(
 
 def glb_of(meshes: Sequence[Mesh], images: dict[str, bytes], about: str) -> bytes:
     """A GLB with a node for each mesh; ``images`` by the name of the material, or of the texture
-    that it uses (`ptmtools.sample.museum.MATERIALS`)."""
+    that it uses (`ptmtools_samples.museum.MATERIALS`)."""
     buffer, accessors = _Buffer(), []
     every = np.concatenate([mesh.points for mesh in meshes]).astype(np.float64)
     low = every.min(axis=0)

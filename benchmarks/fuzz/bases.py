@@ -75,9 +75,9 @@ def _museum(rng: np.random.Generator) -> Soup:
 
 @lru_cache(maxsize=4)
 def _whole_museum(seed: int) -> Soup:
-    from ptmtools.sample.furnishing import furnish, hang
-    from ptmtools.sample.plan import make_plan
-    from ptmtools.sample.shell import make_shell
+    from ptmtools_samples.furnishing import furnish, hang
+    from ptmtools_samples.plan import make_plan
+    from ptmtools_samples.shell import make_shell
 
     plan = make_plan(5, np.random.default_rng(seed))
     shell, panels = make_shell(plan)

@@ -21,24 +21,24 @@ from benchmarks.fuzz.databases import MODEL, commanded
 from benchmarks.fuzz.mutation import NAMES, Case, damaged, dumped, twisted
 from benchmarks.fuzz.textures import LIMITS as TEXTURE_LIMITS, sealed_png, textures
 from ptmtools.errors import PtmError
-from ptmtools.lab.campus.stock import read_stock, read_surfaces, read_textures
-from ptmtools.neighbours.apo import read_mesh, read_octree
-from ptmtools.neighbours.apo.checking import check_folder
-from ptmtools.neighbours.apo.files import INDEX as APO_INDEX
-from ptmtools.neighbours.apo.traversal import look_up
-from ptmtools.neighbours.campus.model import INDEX as CAMPUS_INDEX, SIZES
-from ptmtools.neighbours.campus.validation import check_campus
-from ptmtools.neighbours.interlace import (
+from ptmtools.texture import Picture
+from ptmtools.texture.model import Limits
+from ptmtools_lab.campus.stock import read_stock, read_surfaces, read_textures
+from ptmtools_systems.apo import read_mesh, read_octree
+from ptmtools_systems.apo.checking import check_folder
+from ptmtools_systems.apo.files import INDEX as APO_INDEX
+from ptmtools_systems.apo.traversal import look_up
+from ptmtools_systems.campus.model import INDEX as CAMPUS_INDEX, SIZES
+from ptmtools_systems.campus.validation import check_campus
+from ptmtools_systems.interlace import (
     InterlaceOptions,
     deinterlace,
     interlace,
     validate_interlaced,
     write_folder,
 )
-from ptmtools.neighbours.interlace.containers import CONTAINERS
-from ptmtools.neighbours.interlace.model import INDEX as INTERLACE_INDEX
-from ptmtools.texture import Picture
-from ptmtools.texture.model import Limits
+from ptmtools_systems.interlace.containers import CONTAINERS
+from ptmtools_systems.interlace.model import INDEX as INTERLACE_INDEX
 
 LIMITS = Limits(1 << 26)
 

@@ -27,15 +27,15 @@ from PIL import Image
 
 from benchmarks.npm import KTX2
 from benchmarks.web_rivals.images import in_form
-from ptmtools.lab.allocation import allocate
-from ptmtools.lab.measures import flip
-from ptmtools.lab.renderer import Renderer
-from ptmtools.lab.world import World, prepare
 from ptmtools.output.served import Served
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.records import Pyramids
 from ptmtools.scene.model import Scene
 from ptmtools.walk import Walk
+from ptmtools_lab.allocation import allocate
+from ptmtools_lab.measures import flip
+from ptmtools_lab.renderer import Renderer
+from ptmtools_lab.world import World, prepare
 
 WIDTH, HEIGHT, _SAMPLES = 320, 240, 3
 #: Of 4 × 4 texels.

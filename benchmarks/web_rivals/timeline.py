@@ -20,8 +20,8 @@ from benchmarks.npm import ROOT
 from benchmarks.web_rivals.entrants import Entrant
 from benchmarks.web_rivals.link import Traffic, shaped
 from benchmarks.web_rivals.nginx import Certificate, nginx
-from ptmtools.lab.measures import flip
 from ptmtools.site.throttle import Throttle
+from ptmtools_lab.measures import flip
 
 sys.path[:0] = [str(ROOT / "tests" / "e2e")]
 from browsers import web  # noqa: E402

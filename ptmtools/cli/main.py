@@ -7,86 +7,75 @@ ends with an exit status of `ptmtools.errors`.
 
 from __future__ import annotations
 
-import importlib
 import sys
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import click
 from click.shell_completion import CompletionItem
 
+from ptmtools import plugins
 from ptmtools.cli.console import BROKEN_PIPE, Console, abandon_stdout, report
+from ptmtools.cli.entry import Entry
 from ptmtools.progress import listen
 from ptmtools.version import __version__
 
 if TYPE_CHECKING:
     from ptmtools.pipeline.stage import Stage
 
+_CLI = "ptmtools.cli"
 
-@dataclass(frozen=True)
-class Entry:
-    """A command: its line in ``ptm --help``, and ``module:function``, which is the `click.Command`
-    or makes it."""
-
-    about: str
-    place: str
-    hidden: bool = False
-
-    def load(self) -> click.Command:
-        """The command; imports its module."""
-        module, _, name = self.place.partition(":")
-        command = getattr(importlib.import_module(f"ptmtools.cli.{module}"), name)
-        return command if isinstance(command, click.Command) else command()
-
-
-#: Heading → name → command. Besides, each stage has a command.
-GROUPS: dict[str, dict[str, Entry]] = {
-    "Start": {
-        "sample": Entry("Write a model to try ptmtools on.", "sample:sample"),
-    },
-    "Build and check": {
-        "build-scene": Entry("Build or update a database from a model.", "build:build_scene"),
-        "info": Entry("Describe a model, a database or a .ptm file.", "info:info"),
-        "validate": Entry("Check a database or a .ptm file.", "check:validate"),
-        "status": Entry("Show which stages of a database are up to date.", "build:status"),
-        "plot": Entry("Draw the floor plan of a database.", "check:plot"),
-        "render": Entry("Draw a view of a database or an octree texture.", "render:render"),
-        "warm-up": Entry("Compile before the first run.", "build:warm_up", hidden=True),
-    },
-    "Publish": {
-        "serve": Entry("Serve a database to browsers on this machine.", "publish:serve"),
-        "publish": Entry("Write a database as a web site.", "publish:publish"),
-        "tour": Entry("Label the works of a building.", "tour:commands"),
-    },
-    "Images": {
-        "encode": Entry("Encode images as .ptm files.", "images:encode"),
-        "decode": Entry("Decode .ptm files to images.", "images:decode"),
-        "compare": Entry("Compare .ptm with other image formats.", "images:compare"),
-        "interlace": Entry(
-            "Split an image into files that add detail step by step.", "interlaced:interlace"
-        ),
-        "deinterlace": Entry("Join the files of an interlaced image.", "interlaced:deinterlace"),
-    },
-    "Other representations": {
-        "apo": Entry(
-            "Convert a mesh to a simplified mesh and an octree texture.", "representations:apo"
-        ),
-        "campus": Entry(
-            "Convert a model to objects with levels of detail.", "representations:campus"
-        ),
-    },
-    "Experiments": {
-        "path": Entry("Generate a walk through every room of a database.", "lab:path_command"),
-        "simulate": Entry(
-            "Simulate visitors and the clients that load a database for them.", "lab:simulate"
-        ),
-        "walk-campus": Entry("Simulate a walk through a campus.", "lab:walk_campus"),
-        "tradeoff": Entry("Measure the cost and the benefit of each option.", "tradeoff:tradeoff"),
-    },
+#: The headings of ``ptm --help``, in their order; those of other packages follow.
+HEADINGS = ("Start", "Build and check", "Publish", "Images", "Other representations")
+#: The commands of the product. Besides, each stage has a command, and so has each entry point of
+#: the group ``ptmtools.commands``.
+OWN = {
+    "build-scene": Entry(
+        "Build and check", "Build or update a database from a model.", f"{_CLI}.build:build_scene"
+    ),
+    "info": Entry(
+        "Build and check", "Describe a model, a database or a .ptm file.", f"{_CLI}.info:info"
+    ),
+    "validate": Entry(
+        "Build and check", "Check a database or a .ptm file.", f"{_CLI}.check:validate"
+    ),
+    "status": Entry(
+        "Build and check",
+        "Show which stages of a database are up to date.",
+        f"{_CLI}.build:status",
+    ),
+    "plot": Entry("Build and check", "Draw the floor plan of a database.", f"{_CLI}.check:plot"),
+    "render": Entry(
+        "Build and check",
+        "Draw a view of a database or an octree texture.",
+        f"{_CLI}.render:render",
+    ),
+    "warm-up": Entry(
+        "Build and check", "Compile before the first run.", f"{_CLI}.build:warm_up", hidden=True
+    ),
+    "serve": Entry(
+        "Publish", "Serve a database to browsers on this machine.", f"{_CLI}.publish:serve"
+    ),
+    "publish": Entry("Publish", "Write a database as a web site.", f"{_CLI}.publish:publish"),
+    "tour": Entry("Publish", "Label the works of a building.", f"{_CLI}.tour:commands"),
+    "encode": Entry("Images", "Encode images as .ptm files.", f"{_CLI}.images:encode"),
+    "decode": Entry("Images", "Decode .ptm files to images.", f"{_CLI}.images:decode"),
+    "compare": Entry("Images", "Compare .ptm with other image formats.", f"{_CLI}.images:compare"),
 }
-COMMANDS = {name: entry for group in GROUPS.values() for name, entry in group.items()}
+
+
+def entries() -> dict[str, Entry]:
+    """All commands that are not stages, by name; raises as `plugins.declared`."""
+    return {**plugins.declared("commands", Entry), **OWN}
+
+
+def headed() -> dict[str, dict[str, Entry]]:
+    """Heading → name → command, in the order of ``ptm --help``."""
+    groups: dict[str, dict[str, Entry]] = {heading: {} for heading in HEADINGS}
+    for name, entry in (OWN | entries()).items():
+        groups.setdefault(entry.heading, {})[name] = entry
+    return {heading: group for heading, group in groups.items() if group}
 
 
 class Commands(click.Group):
@@ -101,11 +90,13 @@ class Commands(click.Group):
             raise click.Abort from fault
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return [*COMMANDS, *_stages()]
+        return [*OWN, *plugins.points("commands"), *_stages()]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if entry := COMMANDS.get(cmd_name):
+        if entry := OWN.get(cmd_name):
             return entry.load()
+        if point := plugins.points("commands").get(cmd_name):
+            return plugins.load("commands", point, Entry).load()
         stage = _stages().get(cmd_name)
         if stage is None:
             return None
@@ -115,7 +106,7 @@ class Commands(click.Group):
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """The commands and options that begin so; imports no command."""
-        abouts = {name: entry.about for name, entry in COMMANDS.items() if not entry.hidden}
+        abouts = {name: entry.about for name, entry in entries().items() if not entry.hidden}
         abouts |= {name: stage.about for name, stage in _stages().items()}
         return [
             *(CompletionItem(n, help=a) for n, a in abouts.items() if n.startswith(incomplete)),
@@ -125,7 +116,7 @@ class Commands(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         tables = {
             heading: [(name, entry.about) for name, entry in group.items() if not entry.hidden]
-            for heading, group in GROUPS.items()
+            for heading, group in headed().items()
         }
         tables["Individual stages of build-scene"] = [(n, s.about) for n, s in _stages().items()]
         width = max(len(name) for rows in tables.values() for name, _ in rows)

@@ -22,10 +22,10 @@ from ptmtools.cli.parameters import (
     with_console,
 )
 from ptmtools.errors import OutputError
-from ptmtools.neighbours.apo.picture import RenderOptions
 from ptmtools.options import option_name
 from ptmtools.quantities import count
 from ptmtools.rendering.drawing import ViewOptions, draw_view
+from ptmtools_systems.apo.picture import RenderOptions
 
 
 @click.command("render", cls=Command)
@@ -41,7 +41,7 @@ def render(console: Console, target: str, output: str, force: bool, **values: An
     DB is a database or its folder `www`. The view is taken from a viewpoint of the database, or
     from --eye.
     """
-    from ptmtools.neighbours.apo.files import INDEX
+    from ptmtools_systems.apo.files import INDEX
 
     if not target or not output:
         raise no_name()
@@ -73,8 +73,8 @@ def draw_octree(
     """
     import numpy as np
 
-    from ptmtools.neighbours.apo.files import read_mesh, read_octree
-    from ptmtools.neighbours.apo.picture import render as draw
+    from ptmtools_systems.apo.files import read_mesh, read_octree
+    from ptmtools_systems.apo.picture import render as draw
 
     mesh, octree = read_mesh(folder), read_octree(folder)
     normals = mesh.normals.astype(np.float64)

@@ -23,8 +23,8 @@ from ptmtools.visibility.model import Pvs
 if TYPE_CHECKING:
     from ptmtools.coverage.required_levels import Need
     from ptmtools.light.model import Light
-    from ptmtools.neighbours.apo.reliefs import Reliefs
     from ptmtools.output.mesh_levels import MeshLevels
+    from ptmtools_systems.apo.reliefs import Reliefs
 
 
 @dataclass(frozen=True)

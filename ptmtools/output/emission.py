@@ -49,7 +49,7 @@ from ptmtools.visibility.model import Pvs, over_places
 if TYPE_CHECKING:
     from ptmtools.coverage.required_levels import Need
     from ptmtools.light.model import Light
-    from ptmtools.neighbours.apo.reliefs import Reliefs
+    from ptmtools_systems.apo.reliefs import Reliefs
 
 
 #: Files written at a time.

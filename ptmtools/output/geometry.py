@@ -25,7 +25,7 @@ from ptmtools.scene.model import Scene
 
 if TYPE_CHECKING:
     from ptmtools.light.model import Light
-    from ptmtools.neighbours.apo.reliefs import Reliefs
+    from ptmtools_systems.apo.reliefs import Reliefs
 
 #: The step of coordinates in normal maps, far below a texel.
 _RELIEF_STEP = 2.0**-20

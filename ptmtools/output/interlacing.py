@@ -14,9 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import DatabaseError, naming
-from ptmtools.neighbours.interlace.model import INDEX
-from ptmtools.neighbours.interlace.reading import validate_interlaced
-from ptmtools.neighbours.interlace.writing import Written, interlace
 from ptmtools.output.content import Content
 from ptmtools.output.model import TextureRecord
 from ptmtools.output.names import HINTS, INTERLACE, INTERLACE_FILES, INTERLACE_FOLDER, texture_name
@@ -28,6 +25,9 @@ from ptmtools.texture.model import Limits
 from ptmtools.texture.previews import decoded_preview
 from ptmtools.texture.samples import in_eight_bits
 from ptmtools.texture.sources import first_bytes
+from ptmtools_systems.interlace.model import INDEX
+from ptmtools_systems.interlace.reading import validate_interlaced
+from ptmtools_systems.interlace.writing import Written, interlace
 
 #: Files that a set's manifest does not name; the check of the database reports them.
 _STRAY = "PTM-D806"

@@ -32,7 +32,7 @@ class MappedRelief:
     ----------
     number: (n,) int32, the normal map of its object in the hints, -1 without.
     uv: (n, 3, 2) float64 coordinates in it, origin at the upper left; 0 without one.
-    frame: (n, 7) float32, see `ptmtools.neighbours.apo.normal_map`; 0 without one.
+    frame: (n, 7) float32, see `ptmtools_systems.apo.normal_map`; 0 without one.
     """
 
     number: NDArray[np.int32]

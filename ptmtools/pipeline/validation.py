@@ -122,22 +122,22 @@ _LIST = (
         index="interlace.json",
         about="interlaced image",
         again="ptm interlace IMAGE",
-        check=Lazy("ptmtools.neighbours.interlace.reading:validate_interlaced"),
-        describe=Lazy("ptmtools.neighbours.interlace.reading:describe"),
+        check=Lazy("ptmtools_systems.interlace.reading:validate_interlaced"),
+        describe=Lazy("ptmtools_systems.interlace.reading:describe"),
     ),
     FolderKind(
         index="apo.json",
         about="octree texture",
         again="ptm apo MESH",
-        check=Lazy("ptmtools.neighbours.apo.checking:check_folder"),
-        describe=Lazy("ptmtools.neighbours.apo.checking:describe"),
+        check=Lazy("ptmtools_systems.apo.checking:check_folder"),
+        describe=Lazy("ptmtools_systems.apo.checking:describe"),
     ),
     FolderKind(
         index="campus.json",
         about="campus",
         again="ptm campus MODEL",
-        check=Lazy("ptmtools.neighbours.campus.validation:check_campus"),
-        describe=Lazy("ptmtools.neighbours.campus.reading:describe_campus"),
+        check=Lazy("ptmtools_systems.campus.validation:check_campus"),
+        describe=Lazy("ptmtools_systems.campus.reading:describe_campus"),
     ),
 )
 #: By the name of the index.

@@ -92,11 +92,11 @@ def _squares(solid: NDArray[np.bool_]) -> NDArray[np.int64]:
 def warm_statue() -> None:
     """Calls the kernels of octree textures and of simplification, of plain and painted meshes."""
     from ptmtools.executor import Executor
-    from ptmtools.neighbours.apo.making import make_apo
-    from ptmtools.neighbours.apo.model import ApoOptions
-    from ptmtools.neighbours.apo.traversal import look_up
     from ptmtools.scene import IngestOptions, ingest
     from ptmtools.simplification import Mesh, SimplifyOptions, simplify
+    from ptmtools_systems.apo.making import make_apo
+    from ptmtools_systems.apo.model import ApoOptions
+    from ptmtools_systems.apo.traversal import look_up
 
     with TemporaryDirectory() as folder:
         scene = ingest(write_building(Path(folder)), IngestOptions())

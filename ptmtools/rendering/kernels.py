@@ -1,4 +1,4 @@
-"""Compiled texture sampling, and sums of errors by level (see `ptmtools.lab.tables`).
+"""Compiled texture sampling, and sums of errors by level (see `ptmtools_lab.tables`).
 
 Functions called for every pixel are inlined: a call that passes all arrays of the records takes
 1.5 times as long.

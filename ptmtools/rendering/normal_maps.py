@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.neighbours.apo.normal_map import axes_of
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.kernels import shade
 from ptmtools.rendering.light import light_on
 from ptmtools.rendering.records import Shows, Sight, triangles_of
+from ptmtools_systems.apo.normal_map import axes_of
 
 
 def show_relief(

@@ -81,7 +81,7 @@ def _rows(served: Served) -> Sequence[Mapping[str, Any]]:
 
 
 def _texels(served: Served, row: Mapping[str, Any]) -> NDArray[np.uint8]:
-    from ptmtools.neighbours.apo.files import inflated
+    from ptmtools_systems.apo.files import inflated
 
     file = served.file(row["file"])
     start = np.concatenate([[0], np.cumsum(row["levels"], dtype=np.int64)])

@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from ptmtools.errors import InputError, LimitError
-from ptmtools.neighbours.interlace.model import INDEX
-from ptmtools.neighbours.interlace.reading import read_manifest
 from ptmtools.output.names import INTERLACE, texture_name
 from ptmtools.site.entry import DIGITS, Entry, state_of
 from ptmtools.store.folder import damaged
 from ptmtools.store.layout import sha256
+from ptmtools_systems.interlace.model import INDEX
+from ptmtools_systems.interlace.reading import read_manifest
 
 #: Folder of the sets.
 FOLDER = "data/sets"

@@ -7,7 +7,7 @@ the mean over its pixels. A client that has level k is off by Σ differences[n],
 for odd sides.
 
 (Tried: the root mean square over the texels, too, whose squares do add up. A few strong edges carry
-it, and clients that go by it show worse pictures, see `ptmtools.lab.policies.shares`.)
+it, and clients that go by it show worse pictures, see `ptmtools_lab.policies.shares`.)
 
 Levels are means of blocks, rounded down, so each is darker than the one above, by 0.375 on average
 where all remainders are equally likely, and not at all where the image is flat. The *offset* of a

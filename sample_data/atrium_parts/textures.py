@@ -1,7 +1,7 @@
 """Textures of the atrium: those of the museum where they fit, and some of its own.
 
 Each function takes a generator and a size and returns (size, size, 3) colours 0…255. Like the
-museum's, they use arithmetic that is the same on every machine (`ptmtools.sample.noise`).
+museum's, they use arithmetic that is the same on every machine (`ptmtools_samples.noise`).
 """
 
 from __future__ import annotations
@@ -10,9 +10,8 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-
-from ptmtools.sample.noise import Color, Field, axes, blend, fractal, ramp, step, wave
-from ptmtools.sample.surfaces import SURFACES, Surface, speckled
+from ptmtools_samples.noise import Color, Field, axes, blend, fractal, ramp, step, wave
+from ptmtools_samples.surfaces import SURFACES, Surface, speckled
 
 #: Dark and light of each drape.
 DRAPES = {

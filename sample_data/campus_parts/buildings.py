@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from ptmtools_samples.mesh import Face
 
 from campus_parts import roofs
 from campus_parts.facade import Bay, balcony, facades, louvres, pilasters
 from campus_parts.openings import plinth_steps
 from campus_parts.recipes import Recipe
 from campus_parts.solids import Flat, Ring, Wall, box, extruded, lid, prism, swept, walls_of
-from ptmtools.sample.mesh import Face
 
 
 @dataclass(frozen=True)

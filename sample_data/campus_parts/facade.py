@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ptmtools_samples.mesh import Face, Point
 
 from campus_parts.openings import (
     Hole,
@@ -18,7 +19,6 @@ from campus_parts.openings import (
     within,
 )
 from campus_parts.solids import Flat, Ring, Wall, box, walls_of, zipped
-from ptmtools.sample.mesh import Face, Point
 
 
 @dataclass(frozen=True)

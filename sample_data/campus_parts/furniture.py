@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from ptmtools_samples.mesh import Face, Point, Thing
 
 from campus_parts.ground import garden, has_lane
 from campus_parts.layout import CURB_HEIGHT, FRONT, KERB, PAVEMENT, Frame, Plot, Street
 from campus_parts.recipes import Recipe
 from campus_parts.solids import Wall, box, prism
-from ptmtools.sample.mesh import Face, Point, Thing
 
 #: Local frame of boxes: u along the street, d towards it, from the origin of the frame.
 LOCAL = Wall((0.0, 0.0), (1.0, 0.0), 1.0)

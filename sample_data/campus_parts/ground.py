@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from ptmtools_samples.mesh import Face, Point, Thing, tiled
+
 from campus_parts.layout import BEYOND, CURB_HEIGHT, EDGE, GARDEN, KERB, PAVEMENT, Plot, Street
 from campus_parts.materials import MATERIALS
 from campus_parts.solids import Flat
-from ptmtools.sample.mesh import Face, Point, Thing, tiled
 
 #: Shares of a plot's frontage: a lane, garden, the path to the door, garden, a margin.
 COLUMNS = (0.0, 0.06, 0.42, 0.58, 0.94, 1.0)

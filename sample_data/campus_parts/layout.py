@@ -10,8 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 
+from ptmtools_samples.mesh import Face, Point
+
 from campus_parts.solids import Flat
-from ptmtools.sample.mesh import Face, Point
 
 HEADINGS: list[Flat] = [(60 / 61, -11 / 61), (1.0, 0.0), (40 / 41, 9 / 41), (1.0, 0.0)]
 #: Metres: extension of the street at either end; then distances from its centre line: kerb, end of

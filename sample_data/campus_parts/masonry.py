@@ -1,12 +1,11 @@
-"""Tiling textures of walls and roofs. See `ptmtools.sample.noise` for the arithmetic."""
+"""Tiling textures of walls and roofs. See `ptmtools_samples.noise` for the arithmetic."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import numpy as np
-
-from ptmtools.sample.noise import (
+from ptmtools_samples.noise import (
     Color,
     Field,
     axes,
@@ -18,7 +17,7 @@ from ptmtools.sample.noise import (
     warped,
     wave,
 )
-from ptmtools.sample.surfaces import speckled
+from ptmtools_samples.surfaces import speckled
 
 Surface = Callable[[np.random.Generator, int], Field]
 

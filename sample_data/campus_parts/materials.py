@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ptmtools.sample.noise import Color
+from ptmtools_samples.noise import Color
 
 
 @dataclass(frozen=True)

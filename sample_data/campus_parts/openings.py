@@ -11,8 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+from ptmtools_samples.mesh import Face, Point
+
 from campus_parts.solids import Wall, box, extruded, zipped
-from ptmtools.sample.mesh import Face, Point
 
 Hole = tuple[float, float, float, float]  # low u, low v, high u, high v
 

@@ -6,6 +6,7 @@ import itertools
 import math
 
 import numpy as np
+from ptmtools_samples.mesh import Face, Point
 
 from campus_parts.solids import (
     Flat,
@@ -19,7 +20,6 @@ from campus_parts.solids import (
     swept,
     walls_of,
 )
-from ptmtools.sample.mesh import Face, Point
 
 
 def flat(rings: list[Ring], top: float, coping: str, inside: str, surface: str) -> list[Face]:

@@ -12,8 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+from ptmtools_samples.mesh import Face, Point, Uv
+
 from campus_parts.materials import MATERIALS
-from ptmtools.sample.mesh import Face, Point, Uv
 
 Flat = tuple[float, float]
 Ring = list[Flat]

@@ -10,10 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 from PIL import Image
-
-from campus_parts.masonry import WALLS_AND_ROOFS, Surface, courses, shaded
-from ptmtools.sample.brush import lettered
-from ptmtools.sample.noise import (
+from ptmtools_samples.brush import lettered
+from ptmtools_samples.noise import (
     Color,
     Field,
     axes,
@@ -26,7 +24,9 @@ from ptmtools.sample.noise import (
     warped,
     wave,
 )
-from ptmtools.sample.surfaces import speckled
+from ptmtools_samples.surfaces import speckled
+
+from campus_parts.masonry import WALLS_AND_ROOFS, Surface, courses, shaded
 
 
 def paint(rng: np.random.Generator, size: int) -> Field:

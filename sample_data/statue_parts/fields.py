@@ -1,6 +1,6 @@
 """Solids as implicit functions: negative inside, approximately the signed distance.
 
-Like `ptmtools.sample.noise`, the module uses only +, −, ×, ÷, √, floor and comparisons, so statues
+Like `ptmtools_samples.noise`, the module uses only +, −, ×, ÷, √, floor and comparisons, so statues
 have the same bytes on every machine. Points are (3, n) float64: x, y and z, metres, Y up.
 """
 

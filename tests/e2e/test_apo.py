@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from ptmtools.cli.main import main
-from ptmtools.neighbours.apo.files import inflated
-from ptmtools.neighbours.apo.model import Octree
-from ptmtools.neighbours.apo.octree import fault_of
-from ptmtools.neighbours.apo.traversal import look_up
 from ptmtools.output.gltf_reader import read_glb
+from ptmtools_systems.apo.files import inflated
+from ptmtools_systems.apo.model import Octree
+from ptmtools_systems.apo.octree import fault_of
+from ptmtools_systems.apo.traversal import look_up
 from tests.e2e.conftest import Ptm, make_museum
-from tests.neighbours.apo.statues import STATUES, write_rooms
 from tests.output.agreement import disagreements
+from tests.systems.apo.statues import STATUES, write_rooms
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "benchmarks")]

@@ -23,7 +23,7 @@ from ptmtools.cli.main import main  # noqa: E402
 from ptmtools.output.served import read_served  # noqa: E402
 from ptmtools.rendering.drawing import ViewOptions, draw_view  # noqa: E402
 from tests.e2e.conftest import make_museum  # noqa: E402
-from tests.neighbours.apo.statues import write_rooms  # noqa: E402
+from tests.systems.apo.statues import write_rooms  # noqa: E402
 
 #: What MeshBasicMaterial shows before a background of nothing.
 LOOK = Look("none", sky=(0, 0, 0), mipmaps=True)

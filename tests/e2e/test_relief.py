@@ -19,12 +19,12 @@ from browsers import gltf_validator  # noqa: E402
 
 from benchmarks.npm import GLTF_VALIDATOR  # noqa: E402
 from ptmtools.cli.main import main  # noqa: E402
-from ptmtools.neighbours.apo.normal_map import axes_of, looked_up  # noqa: E402
 from ptmtools.output.served import Served, read_served  # noqa: E402
 from ptmtools.rendering.drawing import ViewOptions, draw_view  # noqa: E402
 from ptmtools.rendering.rays import Camera, Caster  # noqa: E402
 from ptmtools.rendering.records import Sight  # noqa: E402
-from tests.neighbours.apo.statues import write_rooms  # noqa: E402
+from ptmtools_systems.apo.normal_map import axes_of, looked_up  # noqa: E402
+from tests.systems.apo.statues import write_rooms  # noqa: E402
 
 WIDTH, HEIGHT = 320, 240
 #: In front of the first statue, with the yaw of a camera that is not turned.

@@ -10,11 +10,11 @@ import pytest
 from PIL import Image
 
 from ptmtools.cli.main import main
-from ptmtools.lab.forms import FORMS
-from ptmtools.lab.world import World, prepare, read_forms
 from ptmtools.output.served import read_served
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.walk import Walk, read_walk
+from ptmtools_lab.forms import FORMS
+from ptmtools_lab.world import World, prepare, read_forms
 from tests.builds import once
 from tests.e2e.conftest import Ptm, built_rooms, ptm
 

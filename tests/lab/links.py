@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 from hypothesis import strategies as st
 
-from ptmtools.lab.network import Link, Request
 from ptmtools.link import Conditions, Step, Trace
+from ptmtools_lab.network import Link, Request
 
 PROTOCOL = st.sampled_from(["h1", "h2"])
 STEPS = st.builds(

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.lab.allocation import allocate, holes, next_fetch, picture
-from ptmtools.lab.previews import no_previews
+from ptmtools_lab.allocation import allocate, holes, next_fetch, picture
+from ptmtools_lab.previews import no_previews
 from tests.lab.worlds import SEEDS, any_world
 
 Case = tuple[Floats, Ints, Ints, int]

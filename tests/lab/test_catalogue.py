@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ptmtools.lab.catalogue import LEAST, catalogue_of
 from ptmtools.output.served import Served, read_served
 from ptmtools.pipeline.build import build_scene
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.texture import read_header
+from ptmtools_lab.catalogue import LEAST, catalogue_of
 
 TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data/two_rooms/two_rooms.obj"
 TOLD = ("differences", "color", "gpuTexelBytes")

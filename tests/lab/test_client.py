@@ -7,10 +7,10 @@ import itertools
 import numpy as np
 from hypothesis import given, strategies as st
 
-from ptmtools.lab.client import Files, Kind, Range
-from ptmtools.lab.network import Link
-from ptmtools.lab.policies.whole_files import LruClient
 from ptmtools.link import Conditions
+from ptmtools_lab.client import Files, Kind, Range
+from ptmtools_lab.network import Link
+from ptmtools_lab.policies.whole_files import LruClient
 from tests.lab.worlds import catalogue, raw, standing
 
 ACTS = st.lists(

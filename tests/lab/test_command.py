@@ -101,7 +101,7 @@ def test_rooms_that_cannot_be_reached(
     db: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Are told, by number."""
-    from ptmtools.lab.path.ground import Obstacles
+    from ptmtools_lab.path.ground import Obstacles
 
     crossed = Obstacles.crossed
 

@@ -7,9 +7,9 @@ import math
 import pytest
 from hypothesis import given, strategies as st
 
-from ptmtools.lab.client import Estimate
-from ptmtools.lab.network import Link
 from ptmtools.link import Conditions, Step, Trace
+from ptmtools_lab.client import Estimate
+from ptmtools_lab.network import Link
 from tests.lab.links import PROTOCOL
 
 SIZES = st.lists(st.integers(1000, 100_000), min_size=1, max_size=20)

@@ -13,22 +13,22 @@ from hypothesis import given, settings
 from numpy.typing import NDArray
 
 from ptmtools.errors import DatabaseError, InputError
-from ptmtools.lab.comparing import SimulateOptions, budget_of, counted, play
-from ptmtools.lab.forms import PTM
-from ptmtools.lab.measures import Flip
-from ptmtools.lab.policies import POLICIES
-from ptmtools.lab.renderer import Renderer
-from ptmtools.lab.report import table
-from ptmtools.lab.simulation import simulate
-from ptmtools.lab.tables import look
-from ptmtools.lab.world import World, read_forms
 from ptmtools.link import Conditions
-from ptmtools.neighbours.interlace import deinterlace, read_manifest
 from ptmtools.output.served import read_served
 from ptmtools.rendering.kernels import GREY
 from ptmtools.rendering.pyramids import mip_levels, mip_sizes, read_pyramids
 from ptmtools.rendering.records import Shows, own_levels
 from ptmtools.texture import decode
+from ptmtools_lab.comparing import SimulateOptions, budget_of, counted, play
+from ptmtools_lab.forms import PTM
+from ptmtools_lab.measures import Flip
+from ptmtools_lab.policies import POLICIES
+from ptmtools_lab.renderer import Renderer
+from ptmtools_lab.report import table
+from ptmtools_lab.simulation import simulate
+from ptmtools_lab.tables import look
+from ptmtools_lab.world import World, read_forms
+from ptmtools_systems.interlace import deinterlace, read_manifest
 from tests.lab.conftest import Ptm
 from tests.lab.test_view import (
     CAMERA,

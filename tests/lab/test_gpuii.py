@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from ptmtools.lab.catalogue import Catalogue, Shapes
-from ptmtools.lab.client import Client, Kind, Range
-from ptmtools.lab.network import Link, Request
-from ptmtools.lab.policies import POLICIES
-from ptmtools.lab.policies.whole_files import RING, GpuiiClient
-from ptmtools.lab.simulation import Run, simulate
-from ptmtools.lab.world import World
 from ptmtools.link import Conditions
+from ptmtools_lab.catalogue import Catalogue, Shapes
+from ptmtools_lab.client import Client, Kind, Range
+from ptmtools_lab.network import Link, Request
+from ptmtools_lab.policies import POLICIES
+from ptmtools_lab.policies.whole_files import RING, GpuiiClient
+from ptmtools_lab.simulation import Run, simulate
+from ptmtools_lab.world import World
 from tests.lab.worlds import (
     CAMERA,
     SEEDS,

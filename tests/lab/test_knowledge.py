@@ -10,14 +10,14 @@ import pytest
 from hypothesis import Phase, given, settings, strategies as st
 
 from ptmtools.arrays import Bools
-from ptmtools.lab.catalogue import Catalogue
-from ptmtools.lab.client import Client, Kind
-from ptmtools.lab.network import Link, Request
-from ptmtools.lab.policies import POLICIES
-from ptmtools.lab.simulation import Run, simulate
-from ptmtools.lab.tables import Views
-from ptmtools.lab.world import World
 from ptmtools.link import Conditions
+from ptmtools_lab.catalogue import Catalogue
+from ptmtools_lab.client import Client, Kind
+from ptmtools_lab.network import Link, Request
+from ptmtools_lab.policies import POLICIES
+from ptmtools_lab.simulation import Run, simulate
+from ptmtools_lab.tables import Views
+from ptmtools_lab.world import World
 from tests.lab.worlds import SEEDS, any_world, for_policy, leaf
 
 PHASES = (Phase.explicit, Phase.reuse, Phase.generate)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ptmtools.lab.measures import measure
-from ptmtools.lab.simulation import Run
 from ptmtools.link import Conditions
+from ptmtools_lab.measures import measure
+from ptmtools_lab.simulation import Run
 
 
 def run_of(error: list[float], still: list[bool]) -> Run:

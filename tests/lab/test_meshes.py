@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ptmtools.lab.meshes import GROSS, SEEN, Meshes, meshes_of
 from ptmtools.rendering.rays import Frustum
+from ptmtools_lab.meshes import GROSS, SEEN, Meshes, meshes_of
 
 NEAREST, BEHIND = 0.5, 0.2
 #: A cube of 2 m in cell 3 with two finer meshes, and one of 20 cm in cell 0 with one.

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from ptmtools.errors import InputError
-from ptmtools.lab.network import Link, Request
 from ptmtools.link import Conditions, Step, Trace
+from ptmtools_lab.network import Link, Request
 from tests.lab.links import (
     ACTS,
     CONDITIONS,

@@ -10,11 +10,6 @@ import pytest
 
 from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
-from ptmtools.lab.catalogue import NORMALS
-from ptmtools.lab.policies import POLICIES
-from ptmtools.lab.renderer import Renderer
-from ptmtools.lab.simulation import simulate
-from ptmtools.lab.world import World, prepare, relief_of
 from ptmtools.link import Conditions
 from ptmtools.output.bumps import bumps_of
 from ptmtools.output.gltf_reader import read_glb
@@ -24,8 +19,13 @@ from ptmtools.rendering.drawing import ViewOptions, draw_view
 from ptmtools.rendering.light import AMBIENT, LAMP, lit
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.walk import read_walk
-from tests.neighbours.apo.statues import write_rooms
+from ptmtools_lab.catalogue import NORMALS
+from ptmtools_lab.policies import POLICIES
+from ptmtools_lab.renderer import Renderer
+from ptmtools_lab.simulation import simulate
+from ptmtools_lab.world import World, prepare, relief_of
 from tests.scene.bumpy import write_bumpy
+from tests.systems.apo.statues import write_rooms
 
 #: In the first room; looks at its north wall, of which x is to the right.
 EYE, WALL = (-2.1, 1.5, 0.8), (-2.1, 1.5, -2.0)

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.lab.client import Client, Kind, Range
-from ptmtools.lab.network import Link, Request
-from ptmtools.lab.policies import POLICIES
-from ptmtools.lab.policies.paper import PaperClient, PaperOptions
-from ptmtools.lab.policies.paper_kernels import refresh, share_out
-from ptmtools.lab.simulation import Run, simulate
-from ptmtools.lab.world import World
 from ptmtools.link import Conditions
+from ptmtools_lab.client import Client, Kind, Range
+from ptmtools_lab.network import Link, Request
+from ptmtools_lab.policies import POLICIES
+from ptmtools_lab.policies.paper import PaperClient, PaperOptions
+from ptmtools_lab.policies.paper_kernels import refresh, share_out
+from ptmtools_lab.simulation import Run, simulate
+from ptmtools_lab.world import World
 from tests.lab.worlds import ROOM, Texture, catalogue, raw, standing, strolling, world
 
 MIB = 1 << 20

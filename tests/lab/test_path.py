@@ -15,11 +15,11 @@ import shapely
 from ptmtools.arrays import Bools, Floats
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
 from ptmtools.errors import InputError
-from ptmtools.lab.path.ground import GRID, Ground, Obstacles, grid_points, over_floors
-from ptmtools.lab.path.making import Path as Made, make_path
-from ptmtools.lab.path.options import PathOptions
 from ptmtools.scene import Scene, ingest
 from ptmtools.walk import Walk, parse_walk, walk_text
+from ptmtools_lab.path.ground import GRID, Ground, Obstacles, grid_points, over_floors
+from ptmtools_lab.path.making import Path as Made, make_path
+from ptmtools_lab.path.options import PathOptions
 from tests.cells.buildings import BuildingCase as Building
 from tests.cells.closed_doors import LEAF
 from tests.cells.small_buildings import HEIGHTS, TWO_ROOMS

@@ -12,15 +12,15 @@ import pytest
 from PIL import Image
 
 from ptmtools.errors import MissingComponentError
-from ptmtools.lab import measures as flips
-from ptmtools.lab.comparing import SimulateOptions, play
-from ptmtools.lab.figures import frames, strip
-from ptmtools.lab.renderer import Renderer
-from ptmtools.lab.world import World
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.lossy import no_previews
 from ptmtools.rendering.rays import Camera
 from ptmtools.rendering.records import Pyramids
+from ptmtools_lab import measures as flips
+from ptmtools_lab.comparing import SimulateOptions, play
+from ptmtools_lab.figures import frames, strip
+from ptmtools_lab.renderer import Renderer
+from ptmtools_lab.world import World
 
 #: Corners of a texture, clockwise from the upper left.
 CORNERS = np.array([[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 0]], dtype=np.uint8)

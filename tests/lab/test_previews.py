@@ -19,17 +19,6 @@ from PIL import Image
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.errors import DatabaseError
-from ptmtools.lab.allocation import next_fetch, offered
-from ptmtools.lab.catalogue import catalogue_of
-from ptmtools.lab.client import Client, Kind
-from ptmtools.lab.network import Link
-from ptmtools.lab.policies import POLICIES
-from ptmtools.lab.policies.oracle import _drops
-from ptmtools.lab.previews import AVERAGING, LEAST, Previews, previews_of
-from ptmtools.lab.renderer import Renderer
-from ptmtools.lab.simulation import Run, simulate
-from ptmtools.lab.tables import look
-from ptmtools.lab.world import World, prepare
 from ptmtools.link import Conditions
 from ptmtools.output.served import Served, read_served
 from ptmtools.rendering.lossy import Lossy, pictures, read_lossy
@@ -37,6 +26,17 @@ from ptmtools.rendering.previews import read_preview
 from ptmtools.rendering.pyramids import packed, read_pyramids
 from ptmtools.texture import decode, encode, read_header
 from ptmtools.walk import read_walk
+from ptmtools_lab.allocation import next_fetch, offered
+from ptmtools_lab.catalogue import catalogue_of
+from ptmtools_lab.client import Client, Kind
+from ptmtools_lab.network import Link
+from ptmtools_lab.policies import POLICIES
+from ptmtools_lab.policies.oracle import _drops
+from ptmtools_lab.previews import AVERAGING, LEAST, Previews, previews_of
+from ptmtools_lab.renderer import Renderer
+from ptmtools_lab.simulation import Run, simulate
+from ptmtools_lab.tables import look
+from ptmtools_lab.world import World, prepare
 from tests.lab.test_forms import pose
 from tests.lab.test_view import CAMERA, room
 from tests.lab.worlds import SEEDS, Texture, any_world, catalogue, standing

@@ -13,12 +13,12 @@ import pytest
 from hypothesis import given
 
 from ptmtools.errors import InputError
-from ptmtools.lab.client import Client, Kind
-from ptmtools.lab.policies import POLICIES
-from ptmtools.lab.simulation import simulate
-from ptmtools.lab.world import World, prepare
 from ptmtools.link import Conditions
 from ptmtools.walk import Waits, Walk, parse_walk
+from ptmtools_lab.client import Client, Kind
+from ptmtools_lab.policies import POLICIES
+from ptmtools_lab.simulation import simulate
+from ptmtools_lab.world import World, prepare
 from tests.lab.test_previews import watched
 from tests.lab.worlds import SEEDS, any_world
 

@@ -17,17 +17,7 @@ from hypothesis import given, settings, strategies as st
 from ptmtools.arrays import Floats, Ints
 from ptmtools.cli.main import main
 from ptmtools.errors import DatabaseError, InputError
-from ptmtools.lab.client import Client, Kind, Range
-from ptmtools.lab.comparing import SimulateOptions, budget_of, play, require_hints
-from ptmtools.lab.network import Link, Request
-from ptmtools.lab.policies import POLICIES, PolicyEntry
-from ptmtools.lab.policies.apo import ApoClient
-from ptmtools.lab.relief.stock import without_octrees
-from ptmtools.lab.renderer import Renderer
-from ptmtools.lab.simulation import Run, simulate
-from ptmtools.lab.world import World, prepare, relief_of
 from ptmtools.link import Conditions
-from ptmtools.neighbours.apo.traversal import look_up, stop_depth
 from ptmtools.output.served import Served, read_served
 from ptmtools.rendering.light import AMBIENT, lamps, lit
 from ptmtools.rendering.octrees import Octrees, no_octrees, read_octrees
@@ -35,10 +25,20 @@ from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.rays import Camera
 from ptmtools.rendering.relief import descend, lamp, stop_of
 from ptmtools.walk import read_walk
+from ptmtools_lab.client import Client, Kind, Range
+from ptmtools_lab.comparing import SimulateOptions, budget_of, play, require_hints
+from ptmtools_lab.network import Link, Request
+from ptmtools_lab.policies import POLICIES, PolicyEntry
+from ptmtools_lab.policies.apo import ApoClient
+from ptmtools_lab.relief.stock import without_octrees
+from ptmtools_lab.renderer import Renderer
+from ptmtools_lab.simulation import Run, simulate
+from ptmtools_lab.world import World, prepare, relief_of
+from ptmtools_systems.apo.traversal import look_up, stop_depth
 from tests.lab.conftest import Ptm
 from tests.lab.worlds import SEEDS, catalogue, raw
-from tests.neighbours.apo.building import Node, nodes, octree_of
-from tests.neighbours.apo.statues import STATUES, write_rooms
+from tests.systems.apo.building import Node, nodes, octree_of
+from tests.systems.apo.statues import STATUES, write_rooms
 
 APO, OURS, BEST = (POLICIES[name] for name in ("apo", "best+apo", "best"))
 
@@ -350,7 +350,7 @@ def test_relief_comes_with_the_bytes(world: World) -> None:
 
 def prepare_views(world: World) -> World:
     """Who stands there for 20 s, with what is really on the screen."""
-    from ptmtools.lab.tables import look
+    from ptmtools_lab.tables import look
 
     (views,) = look(
         world.served.surfaces, world.pyramids, world.camera, world.eye, world.direction,

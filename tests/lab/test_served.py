@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from ptmtools.errors import DatabaseError, LimitError
-from ptmtools.lab.report import rate_text
-from ptmtools.lab.world import prepare
 from ptmtools.output.served import read_served
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.walk import Walk
+from ptmtools_lab.report import rate_text
+from ptmtools_lab.world import prepare
 
 Change = Callable[[Any], object]
 

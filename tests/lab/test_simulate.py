@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from ptmtools import schemas
-from ptmtools.lab.comparing import SimulateOptions, play
-from ptmtools.lab.forms import PTM
-from ptmtools.lab.policies import POLICIES, PolicyEntry
-from ptmtools.lab.report import COLUMNS, table
-from ptmtools.lab.simulation import simulate
-from ptmtools.lab.world import World
 from ptmtools.link import Conditions
 from ptmtools.walk import Walk, walk_text
+from ptmtools_lab.comparing import SimulateOptions, play
+from ptmtools_lab.forms import PTM
+from ptmtools_lab.policies import POLICIES, PolicyEntry
+from ptmtools_lab.report import COLUMNS, table
+from ptmtools_lab.simulation import simulate
+from ptmtools_lab.world import World
 from tests.lab.conftest import Ptm
 
 ALL = [p for p in POLICIES.values() if p.needs is None and p.form == PTM]

@@ -12,14 +12,14 @@ import pytest
 from hypothesis import Phase, given, settings, strategies as st
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.lab.client import Client, Kind, Range
-from ptmtools.lab.network import Link, Request
-from ptmtools.lab.opening import opening_of
-from ptmtools.lab.policies import POLICIES
-from ptmtools.lab.policies.whole_files import LruClient
-from ptmtools.lab.simulation import Run, simulate
-from ptmtools.lab.world import World
 from ptmtools.link import Conditions
+from ptmtools_lab.client import Client, Kind, Range
+from ptmtools_lab.network import Link, Request
+from ptmtools_lab.opening import opening_of
+from ptmtools_lab.policies import POLICIES
+from ptmtools_lab.policies.whole_files import LruClient
+from ptmtools_lab.simulation import Run, simulate
+from ptmtools_lab.world import World
 from tests.lab.links import CONDITIONS
 from tests.lab.worlds import SEEDS, any_world, catalogue, for_policy, raw, standing
 

@@ -11,13 +11,13 @@ from hypothesis import assume, given, settings
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.lab.tables import look
 from ptmtools.output.locating import Locator
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.kernels import GREY, level_of_detail
 from ptmtools.rendering.rays import LINES, Camera, Frustum
 from ptmtools.rendering.records import Pyramids
 from ptmtools.scene.colors import gradients
+from ptmtools_lab.tables import look
 from tests.lab.worlds import SEEDS, leaf
 
 CAMERA = Camera(16, 10, 1.0, 1.6)

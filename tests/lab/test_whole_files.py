@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ptmtools.lab.policies import POLICIES
-from ptmtools.lab.simulation import simulate
 from ptmtools.link import Conditions
+from ptmtools_lab.policies import POLICIES
+from ptmtools_lab.simulation import simulate
 from tests.lab.worlds import catalogue, raw, standing, world
 
 #: Bytes of a texture of 8 × 8 texels.

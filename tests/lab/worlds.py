@@ -14,14 +14,14 @@ import numpy as np
 from hypothesis import strategies as st
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.lab.catalogue import Catalogue, Shapes
-from ptmtools.lab.meshes import Meshes, meshes_of
-from ptmtools.lab.opening import Parts
-from ptmtools.lab.policies import POLICIES
-from ptmtools.lab.previews import AVERAGING, LEAST, previews_of
-from ptmtools.lab.tables import Views
-from ptmtools.lab.world import STILL_SECONDS, World
 from ptmtools.rendering.rays import Camera, Frustum
+from ptmtools_lab.catalogue import Catalogue, Shapes
+from ptmtools_lab.meshes import Meshes, meshes_of
+from ptmtools_lab.opening import Parts
+from ptmtools_lab.policies import POLICIES
+from ptmtools_lab.previews import AVERAGING, LEAST, previews_of
+from ptmtools_lab.tables import Views
+from ptmtools_lab.world import STILL_SECONDS, World
 
 #: Metres of a room along x, up and along z.
 ROOM = np.array([4.0, 3.0, 4.0])

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ptmtools.arrays import Floats
-from tests.neighbours.apo.meshes import sphere
 from tests.scene.conftest import Gltf, png
+from tests.systems.apo.meshes import sphere
 
 SIDE, HEIGHT = 6.0, 3.0
 #: Texels of a tile, of which the outermost are those of its edge.

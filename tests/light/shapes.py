@@ -6,7 +6,7 @@ import numpy as np
 
 from ptmtools.arrays import Floats
 from ptmtools.light.occlusion import Surroundings
-from tests.neighbours.campus.models import house, level
+from tests.systems.campus.models import house, level
 
 
 def triangles_of(rows: Floats) -> Floats:

@@ -18,7 +18,7 @@ from tests.light.shapes import (
     samples,
     triangles_of,
 )
-from tests.neighbours.campus.models import level
+from tests.systems.campus.models import level
 
 pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
 

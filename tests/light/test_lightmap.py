@@ -23,7 +23,7 @@ from tests.light.shapes import (
     surroundings,
     triangles_of,
 )
-from tests.neighbours.campus.models import level
+from tests.systems.campus.models import level
 
 pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
 

@@ -13,11 +13,11 @@ from PIL import Image
 
 from ptmtools.cli.main import main
 from ptmtools.errors import InputError
-from ptmtools.neighbours.interlace import deinterlace, interlace, read_manifest
-from ptmtools.neighbours.interlace.steps import scaled
 from ptmtools.output import EmitOptions, validate_database
 from ptmtools.texture import decode
 from ptmtools.texture.images import Picture
+from ptmtools_systems.interlace import deinterlace, interlace, read_manifest
+from ptmtools_systems.interlace.steps import scaled
 from tests.output.agreement import disagreements
 
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_data"

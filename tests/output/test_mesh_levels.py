@@ -19,7 +19,7 @@ from ptmtools.output.gltf_reader import ReadGlb, read_glb
 from ptmtools.output.mesh_levels import FEWEST, MANY, SHARE
 from ptmtools.output.served import read_served
 from ptmtools.pipeline.validation import validate
-from tests.neighbours.apo.statues import write_rooms
+from tests.systems.apo.statues import write_rooms
 
 
 @pytest.fixture(scope="module")

@@ -12,11 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ptmtools.neighbours.apo.files import streamed
 from ptmtools.output import EmitOptions, emit, validate_database
 from ptmtools.output.model import OctreeRecord
 from ptmtools.output.names import HINTS
-from tests.neighbours.apo.building import ball
+from ptmtools_systems.apo.files import streamed
 from tests.output.agreement import disagreements
 from tests.output.damage import (
     Damage,
@@ -30,6 +29,7 @@ from tests.output.damage import (
     removed,
     rewritten,
 )
+from tests.systems.apo.building import ball
 
 LOW, SIDE = (1.0, 0.5, -0.25), 1.5
 #: What they are of, and how deep.

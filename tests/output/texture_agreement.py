@@ -12,17 +12,17 @@ from urllib.parse import unquote
 import numpy as np
 
 from ptmtools.errors import PtmError
-from ptmtools.neighbours.apo.files import inflated
-from ptmtools.neighbours.apo.model import Octree
-from ptmtools.neighbours.apo.octree import fault_of
-from ptmtools.neighbours.apo.traversal import look_up
-from ptmtools.neighbours.interlace import deinterlace, read_manifest
-from ptmtools.neighbours.interlace.steps import scaled
 from ptmtools.output.gltf_reader import ReadGlb, ReadMaterial, ReadPrimitive
 from ptmtools.texture import load_image, read_header
 from ptmtools.texture.detail import Detail, between, detail_of
 from ptmtools.texture.reader import decode_levels
 from ptmtools.texture.samples import KINDS, in_eight_bits
+from ptmtools_systems.apo.files import inflated
+from ptmtools_systems.apo.model import Octree
+from ptmtools_systems.apo.octree import fault_of
+from ptmtools_systems.apo.traversal import look_up
+from ptmtools_systems.interlace import deinterlace, read_manifest
+from ptmtools_systems.interlace.steps import scaled
 
 #: Relative slack of `differences` of levels, which are rounded, and summed in another order here.
 DIFFERENCE_SLACK = 0.01

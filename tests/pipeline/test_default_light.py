@@ -18,7 +18,7 @@ from ptmtools.light.options import LightOptions
 from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.stages import LIGHT, TEXTURES
 from tests.light.glowing import write_lit_room
-from tests.neighbours.apo.statues import TWO_ROOMS
+from tests.systems.apo.statues import TWO_ROOMS
 
 pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
 

@@ -27,8 +27,8 @@ from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import arrays_of, sha256
 from ptmtools.texture import decode
-from tests.neighbours.apo.statues import write_rooms
 from tests.output.agreement import disagreements
+from tests.systems.apo.statues import write_rooms
 
 pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
 

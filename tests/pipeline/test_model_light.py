@@ -17,7 +17,6 @@ from ptmtools.light import looks
 from ptmtools.light.looks import LightImage, lookup, red_texels
 from ptmtools.light.occlusion import points_on
 from ptmtools.light.options import LightOptions
-from ptmtools.neighbours.apo.options import ReplaceOptions
 from ptmtools.output.geometry import Geometry
 from ptmtools.output.gltf_reader import read_glb
 from ptmtools.pipeline.build import build_scene
@@ -30,6 +29,7 @@ from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import LIGHTS, arrays_of, sha256
 from ptmtools.texture import decode
+from ptmtools_systems.apo.options import ReplaceOptions
 from tests.light.glowing import BALL, light_at, write_lit_room
 from tests.output.agreement import disagreements
 

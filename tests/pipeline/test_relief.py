@@ -14,7 +14,6 @@ import pytest
 from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
 from ptmtools.light.options import LightOptions
-from ptmtools.neighbours.apo.options import ReplaceOptions
 from ptmtools.output.gltf import pack, unpack
 from ptmtools.output.gltf_reader import read_glb
 from ptmtools.output.names import HINTS
@@ -27,8 +26,9 @@ from ptmtools.pipeline.validation import validate
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import arrays_of, sha256
-from tests.neighbours.apo.statues import write_rooms
+from ptmtools_systems.apo.options import ReplaceOptions
 from tests.output.agreement import disagreements
+from tests.systems.apo.statues import write_rooms
 
 QUICK = AchOptions(samples=4, backend="embree")
 

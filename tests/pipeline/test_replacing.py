@@ -16,7 +16,6 @@ from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
 from ptmtools.errors import DatabaseError
 from ptmtools.light.options import LightOptions
-from ptmtools.neighbours.apo.options import ReplaceOptions
 from ptmtools.output.gltf import pack, unpack
 from ptmtools.output.names import HINTS
 from ptmtools.pipeline.build import build_scene
@@ -28,8 +27,9 @@ from ptmtools.pipeline.validation import validate
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import OCTREE_LIST, arrays_of, sha256
-from tests.neighbours.apo.statues import write_rooms
+from ptmtools_systems.apo.options import ReplaceOptions
 from tests.output.agreement import disagreements
+from tests.systems.apo.statues import write_rooms
 
 QUICK = AchOptions(samples=4, backend="embree")
 STATUES = ReplaceOptions(apo=("statue_*",), apo_faces=500, apo_error=0.2, apo_depth=6)

@@ -17,7 +17,7 @@ SAMPLE_DATA = Path(__file__).resolve().parents[2] / "sample_data"
 @pytest.fixture(scope="session")
 def museum() -> ModuleType:
     """The generator of the museum."""
-    from ptmtools.sample import museum
+    from ptmtools_samples import museum
 
     return museum
 

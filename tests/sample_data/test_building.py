@@ -173,7 +173,7 @@ SPAN = st.integers(0, 8).flatmap(lambda low: st.tuples(st.just(low), st.integers
 def test_rectangles_cover_the_rest_once(
     museum: ModuleType, holes: list[tuple[int, int, int, int]]
 ) -> None:
-    from ptmtools.sample.shell import rectangles
+    from ptmtools_samples.shell import rectangles
 
     expected = np.ones((8, 8), dtype=int)
     for a, b, c, d in holes:

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
-
-from ptmtools.sample.two_rooms import two_rooms
+from ptmtools_samples.two_rooms import two_rooms
 
 FOLDER = Path(__file__).resolve().parents[2] / "sample_data" / "two_rooms"
 

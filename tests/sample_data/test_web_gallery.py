@@ -18,8 +18,7 @@ from tests.sample_data.conftest import SAMPLE_DATA
 
 sys.path.append(str(SAMPLE_DATA))
 from make_web_gallery import SIDES, WebGalleryOptions, make_web_gallery, meshes_of, statues_of
-
-from ptmtools.sample.mesh import Thing, block
+from ptmtools_samples.mesh import Thing, block
 
 SMALL = WebGalleryOptions(rooms=2, paintings=6, statue_triangles=400, scale=0.05)
 

@@ -24,7 +24,7 @@ from samples import campus, pictures, statue  # noqa: E402
 from tests.builds import once  # noqa: E402
 from tests.e2e.conftest import make_museum  # noqa: E402
 from tests.lab.conftest import Ptm, ptm, two_rooms  # noqa: E402
-from tests.neighbours.apo.statues import write_rooms  # noqa: E402
+from tests.systems.apo.statues import write_rooms  # noqa: E402
 
 __all__ = ["Ptm", "campus", "pictures", "ptm", "statue", "two_rooms"]
 

@@ -13,10 +13,10 @@ import pytest
 from PIL import Image
 
 from ptmtools.cli.main import main
-from ptmtools.neighbours.campus import CampusOptions, make_campus
 from ptmtools.scene.options import IngestOptions
+from ptmtools_systems.campus import CampusOptions, make_campus
 from tests.builds import once
-from tests.neighbours.apo.meshes import ply, sphere
+from tests.systems.apo.meshes import ply, sphere
 
 ROOT = Path(__file__).resolve().parents[2]
 PIXEL = "data:image/gif;base64,R0lGODlhAQABAIAAAP8AAP///yH5BAAAAAAALAAAAAABAAEAAAICRAEAOw=="

@@ -15,14 +15,14 @@ from browser import Visitor, hurried, new_page, visiting, visiting_in
 
 from ptmtools.cli.main import main
 from ptmtools.errors import InputError
-from ptmtools.lab.campus.options import CampusWalkOptions
-from ptmtools.lab.campus.simulation import simulate_campus
-from ptmtools.lab.campus.stock import read_stock
-from ptmtools.lab.campus.world import prepare_campus
-from ptmtools.neighbours.campus.model import PRESETS, distances
 from ptmtools.site.forms import FORMS, form_site
 from ptmtools.site.throttle import Throttle
 from ptmtools.walk import read_walk
+from ptmtools_lab.campus.options import CampusWalkOptions
+from ptmtools_lab.campus.simulation import simulate_campus
+from ptmtools_lab.campus.stock import read_stock
+from ptmtools_lab.campus.world import prepare_campus
+from ptmtools_systems.campus.model import PRESETS, distances
 
 from .test_recording import AT_ONCE
 

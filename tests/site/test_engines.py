@@ -15,14 +15,14 @@ from browser import visiting
 from engines import PACKAGES, Engine, EngineVisitor, visiting_by
 from numpy.typing import NDArray
 
-from ptmtools.lab.world import World
 from ptmtools.link import Conditions
-from ptmtools.neighbours.interlace import deinterlace
 from ptmtools.site.content import Site
 from ptmtools.site.entry import Entry
 from ptmtools.site.forms import FORMS, form_site
 from ptmtools.texture import open as open_ptm
 from ptmtools.texture.detail import with_offset
+from ptmtools_lab.world import World
+from ptmtools_systems.interlace import deinterlace
 from tests.lab.conftest import walk_file, world
 from tests.site.watching import HERE, Witness, same, write
 

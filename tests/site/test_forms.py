@@ -16,14 +16,14 @@ from PIL import Image
 
 from ptmtools.cli.main import main
 from ptmtools.errors import InputError
-from ptmtools.neighbours.apo.files import read_mesh, read_octree
-from ptmtools.neighbours.apo.picture import RenderOptions, render
-from ptmtools.neighbours.interlace import deinterlace
 from ptmtools.site.content import SiteOptions
 from ptmtools.site.entry import is_marked
 from ptmtools.site.forms import FORMS, form_of, form_site
 from ptmtools.site.lookup import files_of
 from ptmtools.site.throttle import Throttle
+from ptmtools_systems.apo.files import read_mesh, read_octree
+from ptmtools_systems.apo.picture import RenderOptions, render
+from ptmtools_systems.interlace import deinterlace
 
 from .test_page_faults import ATTACK
 

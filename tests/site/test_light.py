@@ -19,8 +19,8 @@ from ptmtools.rendering.drawing import ViewOptions, draw_view
 from ptmtools.site.content import Site, site_of
 from ptmtools.site.entry import Entry
 from ptmtools.site.pictures import pictures
-from tests.neighbours.apo.statues import write_rooms
 from tests.site.conftest import PLAIN, Visiting
+from tests.systems.apo.statues import write_rooms
 
 pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from ptmtools.site.content import Site, site_of
-from tests.neighbours.apo.statues import write_rooms
 from tests.site.conftest import PLAIN, build
+from tests.systems.apo.statues import write_rooms
 
 #: Triangles that the page has, and those that it draws.
 COUNTS = """({

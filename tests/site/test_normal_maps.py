@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from ptmtools.cli.main import main
-from ptmtools.lab.tables import look
 from ptmtools.output.served import Served, read_served
 from ptmtools.rendering.drawing import ViewOptions, draw_view
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.rays import Camera
 from ptmtools.site.content import Site, site_of
+from ptmtools_lab.tables import look
 from tests.scene.bumpy import write_bumpy
 from tests.site.conftest import PLAIN, Visiting
 

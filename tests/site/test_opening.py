@@ -231,12 +231,12 @@ def test_steps_come_by_worth_per_byte() -> None:
 def test_it_weighs_as_the_client(two_rooms: Path) -> None:
     """The product does not import the simulator, so its constants are compared here; the needs are
     those of the simulator's own screen."""
-    from ptmtools.lab.policies import engine
-    from ptmtools.lab.previews import AVERAGING, LEAST as LEAST_DIFFERENCE
-    from ptmtools.lab.tables import look
     from ptmtools.rendering.pyramids import read_pyramids
     from ptmtools.rendering.rays import Camera
     from ptmtools.site.opening import HALVED, HEIGHT, LEAST, NOTHING, OVERHEAD, WIDTH
+    from ptmtools_lab.policies import engine
+    from ptmtools_lab.previews import AVERAGING, LEAST as LEAST_DIFFERENCE
+    from ptmtools_lab.tables import look
 
     assert (NOTHING, LEAST, HALVED) == (engine.NOTHING, LEAST_DIFFERENCE, AVERAGING)
     assert OVERHEAD == engine.OVERHEAD

@@ -13,15 +13,15 @@ import pytest
 from hypothesis import example, given, settings, strategies as st
 
 from ptmtools.arrays import Floats
-from ptmtools.lab.allocation import allocate, next_fetch
-from ptmtools.lab.catalogue import catalogue_of
-from ptmtools.lab.client import PRIOR, Estimate
-from ptmtools.lab.network import Link, Request
-from ptmtools.lab.policies.engine import CONCURRENCY
-from ptmtools.lab.policies.paper_kernels import refresh, share_out
-from ptmtools.lab.previews import Previews, previews_of
-from ptmtools.lab.world import World
 from ptmtools.link import Conditions
+from ptmtools_lab.allocation import allocate, next_fetch
+from ptmtools_lab.catalogue import catalogue_of
+from ptmtools_lab.client import PRIOR, Estimate
+from ptmtools_lab.network import Link, Request
+from ptmtools_lab.policies.engine import CONCURRENCY
+from ptmtools_lab.policies.paper_kernels import refresh, share_out
+from ptmtools_lab.previews import Previews, previews_of
+from ptmtools_lab.world import World
 from tests.lab.conftest import two_rooms, walk_file, world
 from tests.lab.worlds import SEEDS, any_world, catalogue, raw, standing
 from tests.site.watching import (

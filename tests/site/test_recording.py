@@ -11,14 +11,14 @@ from urllib.parse import unquote
 import pytest
 
 from ptmtools.cli.main import main
-from ptmtools.lab.policies import POLICIES
-from ptmtools.lab.simulation import simulate
-from ptmtools.lab.world import prepare
 from ptmtools.link import Conditions
 from ptmtools.output.served import read_served
 from ptmtools.site.content import Site
 from ptmtools.site.throttle import Throttle
 from ptmtools.walk import read_walk
+from ptmtools_lab.policies import POLICIES
+from ptmtools_lab.simulation import simulate
+from ptmtools_lab.world import prepare
 
 LINK = Throttle(2e6, 0.05)
 #: Recording begins as soon as there is something to record.

@@ -14,8 +14,8 @@ from ptmtools.rendering.drawing import ViewOptions, draw_view, eye_of
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.site.content import Site, site_of
 from ptmtools.site.entry import Entry
-from tests.neighbours.apo.statues import write_rooms
 from tests.site.conftest import PLAIN, Visiting
+from tests.systems.apo.statues import write_rooms
 
 WIDTH, HEIGHT = 320, 240
 LEVELS = "window.ptm.walk.renderer.statues?.levels ?? []"

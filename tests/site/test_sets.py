@@ -16,11 +16,7 @@ import numpy as np
 import pytest
 
 from ptmtools.errors import DatabaseError
-from ptmtools.lab.policies import POLICIES
-from ptmtools.lab.simulation import simulate
-from ptmtools.lab.world import prepare, read_forms
 from ptmtools.link import Conditions
-from ptmtools.neighbours.interlace import deinterlace
 from ptmtools.output.served import read_served
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.site.content import Site, site_of
@@ -30,6 +26,10 @@ from ptmtools.site.serving import serving
 from ptmtools.site.sets import is_of_sets
 from ptmtools.site.throttle import Throttle
 from ptmtools.walk import parse_walk
+from ptmtools_lab.policies import POLICIES
+from ptmtools_lab.simulation import simulate
+from ptmtools_lab.world import prepare, read_forms
+from ptmtools_systems.interlace import deinterlace
 from tests.scene.bumpy import write_bumpy
 from tests.site.conftest import PLAIN, Visiting, build
 from tests.site.test_forms import check_texels

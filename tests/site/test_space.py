@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from ptmtools.arrays import Floats
-from ptmtools.lab.policies.paper import _crossing
-from ptmtools.lab.world import World
 from ptmtools.output.locating import SLACK
 from ptmtools.rendering.rays import Frustum, axes
+from ptmtools_lab.policies.paper import _crossing
+from ptmtools_lab.world import World
 from tests.lab.conftest import two_rooms, walk_file, world
 from tests.site.watching import called
 from tests.web.node import missing

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from browser import hurried
 
-from ptmtools.lab.allocation import best_step
 from ptmtools.output.served import read_served
 from ptmtools.rendering.drawing import ViewOptions, draw_view, eye_of
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.site.content import Site, site_of
 from ptmtools.site.entry import Entry
-from tests.neighbours.apo.statues import write_rooms
+from ptmtools_lab.allocation import best_step
 from tests.site.conftest import OCTREES, PLAIN, Visiting, build
+from tests.systems.apo.statues import write_rooms
 from tests.web import node
 
 HERE = Path(__file__).parent

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 import pytest
 
 from ptmtools.errors import InputError
-from ptmtools.lab.network import Link as FluidLink
 from ptmtools.link import Conditions
 from ptmtools.site import throttle
 from ptmtools.site.throttle import LATE, PIECE, Link, Paced, Throttle, Visits
+from ptmtools_lab.network import Link as FluidLink
 
 if TYPE_CHECKING:
     from starlette.types import Message, Receive, Scope, Send

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ptmtools_samples.files import write
+from ptmtools_samples.museum import make_museum
+from ptmtools_samples.options import MuseumOptions
 
 from ptmtools.cells import subdivide
 from ptmtools.cells.model import Cells
 from ptmtools.embree import ray_tree
 from ptmtools.errors import InputError
-from ptmtools.sample.files import write
-from ptmtools.sample.museum import make_museum
-from ptmtools.sample.options import MuseumOptions
 from ptmtools.scene import ingest
 from ptmtools.scene.model import RoomVolume, Scene
 from ptmtools.tour.model import Label, Tour

@@ -162,7 +162,7 @@ def check_octrees(hints: ReadHints, database: ServedDatabase) -> None:
 
 def _row_fault(row: Mapping[str, Any]) -> str:
     """The fault of a row by itself; "" if there is none."""
-    from ptmtools.neighbours.apo.model import ADDRESS_BITS
+    from ptmtools_systems.apo.model import ADDRESS_BITS
 
     levels, ends = row["levels"], row["ends"]
     if not len(levels) == len(ends) == len(row["crc32"]):
@@ -176,9 +176,9 @@ def _row_fault(row: Mapping[str, Any]) -> str:
 
 def _check_octree(row: Mapping[str, Any], data: bytes, at: Place) -> None:
     """Inflates the levels of a row, each by itself, and checks that they form an octree."""
-    from ptmtools.neighbours.apo.files import inflated
-    from ptmtools.neighbours.apo.model import Octree
-    from ptmtools.neighbours.apo.octree import fault_of
+    from ptmtools_systems.apo.files import inflated
+    from ptmtools_systems.apo.model import Octree
+    from ptmtools_systems.apo.octree import fault_of
 
     start = np.concatenate([[0], np.cumsum(row["levels"], dtype=np.int64)])
     if len(data) != row["ends"][-1]:

@@ -18,23 +18,23 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ptmtools.lazy import Lazy, component
-from ptmtools.neighbours.apo.options import ReplaceOptions
 from ptmtools.output.names import OCTREE_FOLDER, plain_name
 from ptmtools.pipeline.stage import Artifacts, Job, Run, Stage, described
 from ptmtools.pipeline.stages.scene import SCENE
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import OCTREE_LIST, SERVED, arrays_of
+from ptmtools_systems.apo.options import ReplaceOptions
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ptmtools.neighbours.apo.model import Octree
-    from ptmtools.neighbours.apo.replacing import ReplacedObject, Replacement
     from ptmtools.output.model import OctreeRecord
     from ptmtools.scene.model import Scene
     from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
+    from ptmtools_systems.apo.model import Octree
+    from ptmtools_systems.apo.replacing import ReplacedObject, Replacement
 
 _FILE = re.compile(rf"{OCTREE_FOLDER}/[A-Za-z0-9_]+\.bin")
 
@@ -54,7 +54,7 @@ class ReplacingJob(Job):
         artifacts: Artifacts, stage: Stage[Any], arrays: Mapping[str, NDArray[np.generic]]
     ) -> Scene:
         """See `Job.load`."""
-        from ptmtools.neighbours.apo.replacing import Replacement
+        from ptmtools_systems.apo.replacing import Replacement
 
         replacement = Replacement.from_arrays(arrays)
         numbers = [record.number for record in octree_records(artifacts)]
@@ -81,7 +81,7 @@ class ReplacingJob(Job):
         """Raises the errors of `replaced`."""
         if not self.options.apo:
             return replace(work, counts={"octrees": 0})
-        from ptmtools.neighbours.apo.replacing import replaced
+        from ptmtools_systems.apo.replacing import replaced
 
         run = self.run
         result = replaced(run[SCENE], self.options, run.workers.executor, run.progress)
@@ -152,7 +152,7 @@ def source_triangles(artifacts: Artifacts) -> NDArray[np.int64]:
 
 
 def _replacement(artifacts: Artifacts) -> Replacement | None:
-    from ptmtools.neighbours.apo.replacing import Replacement
+    from ptmtools_systems.apo.replacing import Replacement
 
     name = arrays_of(APO.name)
     if name not in artifacts.outputs(APO):
@@ -166,7 +166,7 @@ def _row(file: str, replaced: ReplacedObject, octree: Octree) -> tuple[dict[str,
     """The row of an octree in the list, and its stream."""
     import numpy as np
 
-    from ptmtools.neighbours.apo.files import streamed
+    from ptmtools_systems.apo.files import streamed
 
     data, levels = streamed(octree.texels, octree)
     row = {

@@ -33,12 +33,12 @@ from ptmtools.store.layout import SERVED
 if TYPE_CHECKING:
     from ptmtools.coverage.required_levels import Need
     from ptmtools.light.model import Light
-    from ptmtools.neighbours.apo.reliefs import Reliefs
     from ptmtools.output.model import TextureRecord
     from ptmtools.scene.model import Scene
     from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
     from ptmtools.texture.sources import Source
+    from ptmtools_systems.apo.reliefs import Reliefs
 
 
 class EmissionJob(Job):

@@ -19,11 +19,11 @@ from ptmtools.pipeline.stages.textures import TEXTURES
 from ptmtools.quantities import count, size
 
 if TYPE_CHECKING:
-    from ptmtools.neighbours.apo.normal_map import NormalMap
-    from ptmtools.neighbours.apo.reliefs import Reliefs, Replacing
     from ptmtools.scene.model import Scene
     from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
+    from ptmtools_systems.apo.normal_map import NormalMap
+    from ptmtools_systems.apo.reliefs import Reliefs, Replacing
 
 #: A greater share of texels whose rays miss the original is reported.
 _MISSED = 0.01
@@ -60,8 +60,8 @@ class ReliefJob(Job):
         objects = replaced_objects(run)
         if not len(objects) or run.recorded(APO).relief != "normal-map":
             return described(work, {"maps": 0}, ())
-        from ptmtools.neighbours.apo.reliefs import Replacing, reliefs_of
-        from ptmtools.neighbours.apo.replacing import apo_options
+        from ptmtools_systems.apo.reliefs import Replacing, reliefs_of
+        from ptmtools_systems.apo.replacing import apo_options
 
         # Workers need no images.
         scene, shown = replace(run[SCENE], images=()), replace(run[APO], images=())
@@ -137,7 +137,7 @@ RELIEF: Stage[Reliefs] = Stage(
     reads=(SCENE, APO),
     inputs=_inputs,
     heeds=(APO, TEXTURES),
-    artifact=Lazy("ptmtools.neighbours.apo.reliefs:Reliefs"),
+    artifact=Lazy("ptmtools_systems.apo.reliefs:Reliefs"),
     counts=_counts,
     summary=_summary,
     fits={APO: _fits_scene},

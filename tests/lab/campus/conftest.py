@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from ptmtools.arrays import Floats
-from ptmtools.neighbours.campus import CampusOptions, make_campus
 from ptmtools.scene import IngestOptions
-from tests.neighbours.campus.models import house, level, write_campus, write_obj
+from ptmtools_systems.campus import CampusOptions, make_campus
+from tests.systems.campus.models import house, level, write_campus, write_obj
 
 
 def round_(radius: float, k: int) -> Floats:

@@ -6,9 +6,9 @@ import numpy as np
 from hypothesis import strategies as st
 
 from ptmtools.arrays import Floats
-from ptmtools.lab.campus.stock import Stock
-from ptmtools.lab.campus.world import CampusWorld
-from ptmtools.neighbours.campus.model import (
+from ptmtools_lab.campus.stock import Stock
+from ptmtools_lab.campus.world import CampusWorld
+from ptmtools_systems.campus.model import (
     CHANNELS,
     DIFFUSE,
     INDEX,

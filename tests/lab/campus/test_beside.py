@@ -11,15 +11,15 @@ import pytest
 from ptmtools import schemas
 from ptmtools.cli.main import main
 from ptmtools.errors import InputError
-from ptmtools.lab.campus.options import CampusWalkOptions
-from ptmtools.lab.campus.simulation import CAMPUS_POLICIES, measure_campus_walk, simulate_campus
-from ptmtools.lab.campus.world import CampusWorld, prepare_campus
-from ptmtools.lab.world import World
 from ptmtools.link import Conditions
-from ptmtools.neighbours.campus import CampusOptions, make_campus
 from ptmtools.output.served import read_served
 from ptmtools.scene import IngestOptions
 from ptmtools.walk import read_walk
+from ptmtools_lab.campus.options import CampusWalkOptions
+from ptmtools_lab.campus.simulation import CAMPUS_POLICIES, measure_campus_walk, simulate_campus
+from ptmtools_lab.campus.world import CampusWorld, prepare_campus
+from ptmtools_lab.world import World
+from ptmtools_systems.campus import CampusOptions, make_campus
 from tests.lab.test_recording import document, parsed
 
 SLOW = Conditions(64_000.0)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from ptmtools.cli.main import main
-from ptmtools.lab.campus.charts import WINDOW, network, picture
-from ptmtools.lab.campus.options import CampusWalkOptions
-from ptmtools.lab.campus.simulation import CampusRun, simulate_campus
-from ptmtools.neighbours.campus.model import PRESETS
+from ptmtools_lab.campus.charts import WINDOW, network, picture
+from ptmtools_lab.campus.options import CampusWalkOptions
+from ptmtools_lab.campus.simulation import CampusRun, simulate_campus
+from ptmtools_systems.campus.model import PRESETS
 from tests.lab.campus.stocks import RATE, campus, stock, world
 from tests.lab.campus.test_command import walk as walk  # a fixture
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from ptmtools.lab.campus.client import CampusClient
-from ptmtools.lab.campus.options import CampusWalkOptions
-from ptmtools.lab.campus.simulation import simulate_campus
-from ptmtools.lab.campus.stock import Stock
-from ptmtools.lab.network import Link, Request
-from ptmtools.neighbours.campus.model import PRESETS, Quality
+from ptmtools_lab.campus.client import CampusClient
+from ptmtools_lab.campus.options import CampusWalkOptions
+from ptmtools_lab.campus.simulation import simulate_campus
+from ptmtools_lab.campus.stock import Stock
+from ptmtools_lab.network import Link, Request
+from ptmtools_systems.campus.model import PRESETS, Quality
 from tests.lab.campus.stocks import (
     APART,
     COARSE,

@@ -15,10 +15,13 @@ from PIL import Image
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError
-from ptmtools.lab.campus.options import CampusWalkOptions
-from ptmtools.lab.campus.simulation import CampusRun, simulate_campus
-from ptmtools.lab.campus.stock import read_stock, read_surfaces, read_textures
-from ptmtools.lab.campus.world import (
+from ptmtools.rendering.pyramids import mip_levels
+from ptmtools.rendering.rays import Camera
+from ptmtools.walk import Walk
+from ptmtools_lab.campus.options import CampusWalkOptions
+from ptmtools_lab.campus.simulation import CampusRun, simulate_campus
+from ptmtools_lab.campus.stock import read_stock, read_surfaces, read_textures
+from ptmtools_lab.campus.world import (
     COARSE,
     FINE,
     NOTHING,
@@ -28,12 +31,9 @@ from ptmtools.lab.campus.world import (
     look,
     prepare_campus,
 )
-from ptmtools.neighbours.campus import read_campus
-from ptmtools.neighbours.campus.meshes import read_mesh
-from ptmtools.neighbours.campus.model import SIZES
-from ptmtools.rendering.pyramids import mip_levels
-from ptmtools.rendering.rays import Camera
-from ptmtools.walk import Walk
+from ptmtools_systems.campus import read_campus
+from ptmtools_systems.campus.meshes import read_mesh
+from ptmtools_systems.campus.model import SIZES
 
 PIXELS = (16, 9)
 #: At each of them one looks at houses and the dome, past a house, down at the lawn, at nothing.

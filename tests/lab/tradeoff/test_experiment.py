@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, strategies as st
 
-from ptmtools.lab.tradeoff.experiment import (
+from ptmtools_lab.tradeoff.experiment import (
     Experiment,
     Measurement,
     Setting,
@@ -18,7 +18,7 @@ from ptmtools.lab.tradeoff.experiment import (
     rates,
     run,
 )
-from ptmtools.lab.tradeoff.report import as_csv, table
+from ptmtools_lab.tradeoff.report import as_csv, table
 
 
 def measure(setting):

@@ -14,9 +14,13 @@ from PIL import Image
 
 from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
-from ptmtools.lab.tradeoff import FURTHER
-from ptmtools.lab.tradeoff.experiment import Experiment, Measurement, Setting, decibels
-from ptmtools.lab.tradeoff.forms import (
+from ptmtools.pipeline.build import build_scene
+from ptmtools.scene import IngestOptions, ingest
+from ptmtools.scene.model import Scene, SourceImage
+from ptmtools.texture import EncodeOptions
+from ptmtools_lab.tradeoff import FURTHER
+from ptmtools_lab.tradeoff.experiment import Experiment, Measurement, Setting, decibels
+from ptmtools_lab.tradeoff.forms import (
     coarse_experiment,
     corners_of,
     interlaced_experiment,
@@ -25,14 +29,10 @@ from ptmtools.lab.tradeoff.forms import (
     octree_experiment,
     only,
 )
-from ptmtools.lab.tradeoff.looks import Rays, apart, look, outline
-from ptmtools.lab.tradeoff.stages import textures_experiment
-from ptmtools.neighbours.campus.objects import parts_of
-from ptmtools.pipeline.build import build_scene
-from ptmtools.scene import IngestOptions, ingest
-from ptmtools.scene.model import Scene, SourceImage
-from ptmtools.texture import EncodeOptions
-from tests.neighbours.campus.models import level, write_obj
+from ptmtools_lab.tradeoff.looks import Rays, apart, look, outline
+from ptmtools_lab.tradeoff.stages import textures_experiment
+from ptmtools_systems.campus.objects import parts_of
+from tests.systems.campus.models import level, write_obj
 
 TWO_ROOMS = Path(__file__).resolve().parents[3] / "sample_data/two_rooms/two_rooms.obj"
 SMOOTH = np.broadcast_to(np.arange(256, dtype=np.uint8)[:, None, None], (256, 256, 3)).copy()

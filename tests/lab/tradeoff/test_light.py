@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from ptmtools.lab.tradeoff.experiment import Subject
-from ptmtools.lab.tradeoff.knobs import own_options, settings
-from ptmtools.lab.tradeoff.light import prepare_lightmaps
 from ptmtools.light.options import LightOptions
 from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import LIGHT
+from ptmtools_lab.tradeoff.experiment import Subject
+from ptmtools_lab.tradeoff.knobs import own_options, settings
+from ptmtools_lab.tradeoff.light import prepare_lightmaps
 
 pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
 

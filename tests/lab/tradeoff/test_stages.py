@@ -15,18 +15,18 @@ from PIL import Image
 from ptmtools.cli.console import Console
 from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
-from ptmtools.lab.tradeoff.experiment import Setting
-from ptmtools.lab.tradeoff.stages import (
-    REFERENCE_SEED,
-    CoverageTrade,
-    textures_experiment,
-    visibility_experiment,
-)
 from ptmtools.pipeline.build import build_scene
 from ptmtools.scene.model import SourceImage
 from ptmtools.texture import EncodeOptions
 from ptmtools.visibility.options import PvsOptions
 from ptmtools.visibility.pvs import compute_pvs
+from ptmtools_lab.tradeoff.experiment import Setting
+from ptmtools_lab.tradeoff.stages import (
+    REFERENCE_SEED,
+    CoverageTrade,
+    textures_experiment,
+    visibility_experiment,
+)
 from tests.conftest import files_below
 
 TWO_ROOMS = Path(__file__).resolve().parents[3] / "sample_data/two_rooms/two_rooms.obj"
@@ -120,7 +120,7 @@ def test_a_database_of_lossy_textures() -> None:
 def test_what_cannot_be_written_is_refused_before_anything_runs(
     db, tmp_path, capsys, monkeypatch, option, file
 ) -> None:
-    monkeypatch.setattr("ptmtools.cli.tradeoff.run", pytest.fail)
+    monkeypatch.setattr("ptmtools_lab.cli.tradeoff.run", pytest.fail)
     (tmp_path / "file").touch()
     (tmp_path / "folder").mkdir()
     assert main(["tradeoff", str(db), option, str(tmp_path / file), "--force"]) == 4
@@ -130,7 +130,7 @@ def test_what_cannot_be_written_is_refused_before_anything_runs(
 def test_a_plot_without_matplotlib_is_refused_before_anything_runs(
     db, tmp_path, capsys, monkeypatch
 ) -> None:
-    monkeypatch.setattr("ptmtools.cli.tradeoff.run", pytest.fail)
+    monkeypatch.setattr("ptmtools_lab.cli.tradeoff.run", pytest.fail)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     assert main(["tradeoff", str(db), "--plot", str(tmp_path / "t.png")]) == 6
@@ -201,7 +201,7 @@ def test_visibility_is_tried_alike_whatever_the_database_was_built_with(room_row
         return compute_pvs(cells, options)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("ptmtools.lab.tradeoff.stages.compute_pvs", watched)
+        patch.setattr("ptmtools_lab.tradeoff.stages.compute_pvs", watched)
         trade = visibility_experiment(cells, built.budget)
         assert (asked[0].method, asked[0].budget) == ("full", 2_000_000)
         asked.clear()

@@ -14,17 +14,6 @@ from PIL import Image
 
 from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
-from ptmtools.lab.tables import look
-from ptmtools.lab.tradeoff.knobs import KNOBS, build_again, concerned, copied, own_options, settings
-from ptmtools.lab.tradeoff.report import (
-    representative,
-    sentence,
-    sentences,
-    settings_table as table,
-    trades,
-)
-from ptmtools.lab.tradeoff.walk import WalkOutcome, WalkTrade, WalkTrial, begins_with, compared
-from ptmtools.lab.world import World, prepare
 from ptmtools.output import EmitOptions
 from ptmtools.output.served import read_served
 from ptmtools.pipeline.build import build_scene, run_stage
@@ -33,6 +22,17 @@ from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import EMIT, TEXTURES
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.walk import Walk, read_walk
+from ptmtools_lab.tables import look
+from ptmtools_lab.tradeoff.knobs import KNOBS, build_again, concerned, copied, own_options, settings
+from ptmtools_lab.tradeoff.report import (
+    representative,
+    sentence,
+    sentences,
+    settings_table as table,
+    trades,
+)
+from ptmtools_lab.tradeoff.walk import WalkOutcome, WalkTrade, WalkTrial, begins_with, compared
+from ptmtools_lab.world import World, prepare
 from tests.conftest import files_below
 
 TWO_ROOMS = Path(__file__).resolve().parents[3] / "sample_data/two_rooms/two_rooms.obj"
@@ -285,7 +285,7 @@ def test_a_policy_without_its_hints_is_refused_before_anything_is_built(
     with copied(db) as copy:
         own = own_options(Artifacts(open_database(copy)))
         build_again(copy, {EMIT: replace(own[EMIT], need=0)})
-        monkeypatch.setattr("ptmtools.lab.tradeoff.walk.build_again", pytest.fail)
+        monkeypatch.setattr("ptmtools_lab.tradeoff.walk.build_again", pytest.fail)
         asked = ["tradeoff", str(copy), "--stage", "walk", "--walk", str(walk_file)]
         assert main([*asked, "--policy", "screen+need"]) == 3
     assert "PTM-I701" in capsys.readouterr().err

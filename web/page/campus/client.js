@@ -1,5 +1,5 @@
 // The client of a campus (docs/formats/campus.md, "A client"): which files come next, and in which detail
-// each object is shown. It decides as `ptmtools.lab.campus.client` does.
+// each object is shown. It decides as `ptmtools_lab.campus.client` does.
 
 /** @typedef {import("./index.js").CampusIndex} CampusIndex */
 /** @typedef {import("./index.js").Preset} Preset */

@@ -14,7 +14,7 @@ import { distance, meetsBox } from "../space/frustum.js";
 /** @typedef {import("./sets.js").TextureSet} TextureSet */
 /** @typedef {import("./pieces.js").Piece} Piece */
 
-/** Width of a ring, and the nearest distance that counts, metres: as in `ptmtools/lab/policies/whole_files.py`. */
+/** Width of a ring, and the nearest distance that counts, metres: as in `ptmtools_lab/policies/whole_files.py`. */
 const RING = 8, NEAR = 0.05;
 
 /** @implements {Policy} */

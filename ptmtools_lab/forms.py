@@ -1,0 +1,169 @@
+"""The forms in which clients load textures, as a table: their columns, and the image of each
+column.
+
+The columns of a texture come one after the other (`Catalogue`). Each displayed image is compared
+with the same picture, that of the `.ptm`s with all levels. To add a form, add a module with two
+functions, and a line here; a policy names its form.
+
+Form `ptm`: ranges of a `.ptm`, each a level.
+
+Form `interlaced`: interlaced images, files that are joined on the GPU one after the other (Englert
+et al. 2014, §3.2). After some files the display shows their image with its mip levels by box, as
+`generateMipmap` makes them; the paper has powers of two for these. So a texture takes 4/3 of its
+texels, and each step has mip levels of its own, of an image that was decimated without a filter.
+The next step replaces the one before. Each file is a request. Manifests are not on the link: axes
+follow from the paper's rules, and the index could hold the sizes. While files are joined, the old
+image, the file and the new image are in texture memory together; this is not counted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import accumulate
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.errors import DatabaseError, InputError, LimitError
+from ptmtools.output.served import Served
+from ptmtools.progress import Progress
+from ptmtools.rendering.pyramids import mip_levels, mip_sizes, packed, rgb
+from ptmtools.rendering.records import Pyramids, Shows
+from ptmtools.texture.model import Limits, gpu_texel_bytes
+from ptmtools_lab.catalogue import Columns, aligned, columns_of
+from ptmtools_systems.interlace.model import Interlaced
+from ptmtools_systems.interlace.reading import check_joined, read_manifest, read_part
+from ptmtools_systems.interlace.steps import join
+
+#: The form of a database without other files.
+PTM = "ptm"
+
+
+@dataclass(frozen=True)
+class Form:
+    """A form of textures.
+
+    Attributes
+    ----------
+    name, about: its name and description.
+    columns: the columns of the textures of a served folder; with RGB of three bytes in texture
+        memory if the second argument is true. Raises DatabaseError.
+    shows: the images of the columns, given the `.ptm`s; None: the levels of those. Raises
+        DatabaseError, LimitError.
+    needs: the texture set or list of the index that it reads, and how to get it.
+    octrees: whether octree textures are also fetched, which only lit pictures show.
+    """
+
+    name: str
+    about: str
+    columns: Callable[[Served, bool], Columns]
+    shows: Callable[[Served, Pyramids, Progress], Shows] | None = None
+    needs: tuple[str, str] | None = None
+    octrees: bool = False
+
+
+def level_columns(served: Served, paper: bool) -> Columns:
+    """See `Form.columns`."""
+    return columns_of(served.index["textures"], paper=paper)
+
+
+#: The form of the index's texture sets.
+_SET = "interlace"
+_AGAIN = "write them again with `ptm emit DB --format vrml,gltf,interlace`"
+#: A texture that needs more memory than this to decode is refused.
+_LIMITS = Limits(decoded_bytes=1 << 33)
+
+
+def interlaced_columns(served: Served, paper: bool) -> Columns:
+    """See `Form.columns`: a column is a file.
+
+    Raises DatabaseError: PTM-D005, PTM-D006 a manifest is missing or damaged, or does not match the
+    index.
+    """
+    rows = []
+    for t in range(len(served.index["textures"])):
+        manifest = _manifest(served, t)[1]
+        parts, stored = manifest.parts, manifest.texel_bytes
+        each = stored if paper else gpu_texel_bytes(stored, manifest.components)
+        held = [each * sum(w * h for w, h in mip_sizes(*part.joined)) for part in parts]
+        ends = [*accumulate(part.bytes for part in parts)]
+        rows.append((ends, held, [part.joined for part in parts]))
+    return aligned(rows)
+
+
+def shows(served: Served, own: Pyramids, progress: Progress) -> Shows:
+    """See `Form.shows`: the image of the files of each column, with its mip levels.
+
+    Raises DatabaseError: as `columns`, and of the files. LimitError: PTM-L104, L204.
+    """
+    count = len(served.index["textures"])
+    chains: list[list[NDArray[np.uint8]]] = []
+    steps = []
+    for t in range(count):
+        progress(t, count, "joining interlaced images")
+        joined = [mip_levels(image) for image in _images(served, t)]
+        chains += joined
+        steps.append(len(joined))
+    first = np.cumsum([0, *steps[:-1]]) if steps else np.zeros(0, np.int64)
+    each = np.array(steps, dtype=np.int64)
+    pyramids = packed(chains)
+    wide = int(each.max(initial=0)) + 1
+    row = first[:, None] + np.clip(np.arange(wide) - 1, 0, each[:, None] - 1)
+    held = np.where(np.arange(wide) > 0, pyramids.levels[row], 0)
+    return Shows(pyramids, row, held, each, own.mean)
+
+
+def _images(served: Served, texture: int) -> Iterator[NDArray[np.uint8]]:
+    """(h, w, 3) images of the first file, of the first two, …"""
+    folder, interlaced = _manifest(served, texture)
+    check_joined(interlaced, len(interlaced.parts), _LIMITS, folder)
+    image = None
+    for part in interlaced.parts:
+        try:
+            texels = read_part(folder, interlaced, part)
+        except InputError as fault:
+            raise _damaged(fault) from None
+        image = texels if image is None or part.axis is None else join(image, texels, part.axis)
+        yield rgb(image)
+
+
+def _manifest(served: Served, texture: int) -> tuple[Path, Interlaced]:
+    """The set of a texture: its folder and its manifest."""
+    folder, row = served.texture_set(_SET, texture), served.index["textures"][texture]
+    try:
+        interlaced = read_manifest(folder)
+    except (InputError, LimitError) as fault:
+        raise _damaged(fault) from None
+    if interlaced.original != (row["width"], row["height"]):
+        raise DatabaseError(
+            "PTM-D006", "is not of the texture that the index has", file=folder, remedy=_AGAIN
+        )
+    return folder, interlaced
+
+
+def _damaged(fault: InputError | LimitError) -> DatabaseError:
+    code = "PTM-D005" if fault.code in ("PTM-I120", "PTM-I122") else "PTM-D006"
+    return DatabaseError(code, fault.message, file=fault.file, place=fault.place, remedy=_AGAIN)
+
+
+_LIST = (
+    Form("ptm", "levels of `.ptm`s", level_columns),
+    Form(
+        "interlaced",
+        "interlaced images",
+        interlaced_columns,
+        shows,
+        ("interlace", "write them with `ptm emit DB --format vrml,gltf,interlace`"),
+    ),
+    Form(
+        "octree",
+        "levels of `.ptm`s and of octree textures",
+        level_columns,
+        needs=("octrees", "build it with `ptm build-scene --apo`"),
+        octrees=True,
+    ),
+)
+#: Forms by name.
+FORMS = {form.name: form for form in _LIST}

@@ -1,0 +1,375 @@
+"""The engine of most policies: it fetches the ranges of greatest worth per byte.
+
+A policy computes the current worth of each level of each texture, and of the geometry of each cell.
+The engine chooses the levels for texture memory, to the last that fits, and requests the missing
+ones by worth per byte, in ranges of a fraction of a second, so that few bytes are under way that
+may become unwanted, or as previews, which are requested as a whole. A preview counts as the worth
+that it adds to the best source that was requested, so a step may leap over levels, and the exact
+ones follow when their worth per byte is the greatest. When nothing is missing the engine continues
+with the most valuable levels beyond the budget, which stay in main memory.
+
+Records and geometry compete with textures by the same measure: a cell without geometry is grey, and
+its worth is the error of that. Both are requested as a whole, since browsers get no ranges of
+responses that a server compresses. The first cell's geometry does not wait for its record: a
+latency less of grey is worth 5 % of the error of 150 s at half a megabit a second, and nothing at
+56 kbit/s.
+
+`ItemBuffers` gives the item buffer of a client: one that it drew some frames ago, or, in a browser,
+the last that could be read back by then. It shows the geometry that was loaded when it was drawn.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools_lab.allocation import allocate, gather, holes, next_fetch, offered
+from ptmtools_lab.client import Client, Kind
+from ptmtools_lab.network import Link, Request
+from ptmtools_lab.world import World
+
+
+class ItemBuffer(NamedTuple):
+    """An item buffer.
+
+    Attributes
+    ----------
+    view: number in `World.views`. frame: the frame in which it was drawn.
+    loaded: (C,) cells with displayed geometry. missing: cells with displayed placeholders.
+    """
+
+    view: int
+    frame: int
+    loaded: Bools
+    missing: Ints
+
+
+class ItemBuffers:
+    """The item buffers of a client."""
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+        self._frame = 0
+        #: At each frame of the client: loaded geometry; then times of its arrival, and the cells in
+        #: use over time.
+        self._loaded: list[Bools] = []
+        self._since = np.full(client.world.catalogue.cell_count, math.inf)
+        self._times: list[float] = []
+        self._cells: list[int] = []
+
+    def note(self) -> None:
+        """Records arrivals and a change of the cell in use."""
+        client, now = self._client, self._client.link.now
+        self._since[client.geometry.whole & np.isinf(self._since)] = now
+        if client.cell >= 0 and self._cells[-1:] != [client.cell]:
+            self._times.append(now)
+            self._cells.append(client.cell)
+
+    def look(self) -> None:
+        """Records the state at a frame of the client."""
+        self._loaded.append(self._client.geometry.whole)
+        self.note()
+
+    def glance(self, frame: int) -> bool:
+        """Passes a frame; returns whether it has another item buffer than the frame before."""
+        drawn, before = self._client.world.drawn, self._frame
+        self._frame = frame
+        return drawn is not None and drawn[before] != drawn[frame]
+
+    def available(self, age: int) -> ItemBuffer | None:
+        """The item buffer of ``age`` frames ago, or a browser's last, or None."""
+        client, world = self._client, self._client.world
+        stock = world.catalogue
+        if world.drawn is None:
+            frame = max(0, client.frame - age)
+            known, whole = stock.visible[client.cell], client.geometry.whole
+            missing = known[~whole[known]]
+            return ItemBuffer(int(world.view[frame]), frame, self._loaded[frame], missing)
+        frame = int(world.drawn[self._frame])
+        if frame < 0:
+            return None
+        loaded = self._since <= world.time[frame]
+        entered = bisect_right(self._times, world.time[frame]) - 1
+        known = stock.visible[self._cells[entered]] if entered >= 0 else np.zeros(0, np.int64)
+        return ItemBuffer(int(world.view[self._frame]), frame, loaded, known[~loaded[known]])
+
+
+#: Length of a range in seconds of the link, and least bytes of a range.
+RANGE_SECONDS, RANGE_BYTES = 0.2, 8000
+#: Requests at a time: connections of a browser to a host; one connection of HTTP/2 takes more.
+CONNECTIONS = 6
+CONCURRENCY = {"h1": CONNECTIONS, "h2": 24}
+#: Bytes of the headers of a request, and the greatest cost of waiting, bytes, on links without a
+#: limit.
+OVERHEAD, LONGEST_WAIT = 300, 1 << 20
+#: Error of a pixel without geometry: the measured mean, 0 to 255.
+NOTHING = 64.0
+#: Least distance, metres; nearer shapes count as this far. Weight of what is out of sight.
+NEAREST, BEHIND = 0.5, 0.2
+#: Worth of the record of a neighbouring cell, as a share of the screen.
+RECORD_SHARE = 0.005
+#: Share of its worth at which a level stays when it is no longer wanted, and its half-life, s.
+HELD_ON, HELD_SECONDS = 1e-3, 7.0
+
+
+@dataclass(frozen=True)
+class Worth:
+    """Worth of levels and geometry, as a policy computes it.
+
+    Attributes
+    ----------
+    hold: (R, K) that each column of each source adds on the screen now to those before it.
+    fetch: (R, K) that it adds now and soon.
+    geometry: (C,) that the geometry of a cell adds.
+    ahead: (R, K) of fetching beyond the budget; None: no such fetching.
+    sight: (T, K) share of the view that wants each column; None: unknown.
+    exact: see `allocate`.
+    """
+
+    hold: Floats
+    fetch: Floats
+    geometry: Floats
+    ahead: Floats | None = None
+    sight: Floats | None = None
+    exact: bool = False
+
+
+class Policy(Protocol):
+    """A policy of the engine."""
+
+    def __call__(self, client: EngineClient) -> Worth:
+        """Computes the worth at the client's frame from the client's knowledge."""
+
+
+class EngineClient(Client):
+    """A client with a policy, which may need the statistics."""
+
+    def __init__(
+        self, world: World, link: Link, budget: int, policy: Policy, *, statistics: bool = False
+    ) -> None:
+        super().__init__(world, link, budget)
+        self._policy, self._statistics = policy, statistics
+        self._concurrency = CONCURRENCY[link.conditions.protocol]
+        stock = world.catalogue
+        self._target: Ints = np.zeros(stock.texture_count, np.int64)
+        self._kept = np.zeros(stock.gains.shape)
+        self._worth: Worth | None = None
+        self._items, self._looked = ItemBuffers(self), -math.inf
+        #: Budget including the second copy of a growing texture.
+        self._all = budget
+        # In a browser: bytes kept free, and the cell since whose entry.
+        self._reserve, self._since = 0, -1
+        self.frustum = world.frustum(0)
+
+    # Input of policies.
+
+    def sight(self, age: int) -> Floats:
+        """(T, K) the share of the item buffer that wants each level, in columns, as drawn ``age``
+        frames ago with the geometry of that time."""
+        result = np.zeros(self.world.catalogue.ends.shape)
+        item, views = self._items.available(age), self.world.views
+        if item:
+            rows = views.rows(item.view)
+            gather(
+                rows.start, rows.stop, views.cell, views.texture, views.sight, item.loaded, result
+            )
+        return result
+
+    def placeholders(self, age: int) -> Floats:
+        """(C,) the share of the item buffer, ``age`` frames old, that shows placeholders: the far
+        faces of the boxes of visible cells without geometry."""
+        stock, world = self.world.catalogue, self.world
+        share = np.zeros(stock.cell_count)
+        item = self._items.available(age)
+        if item and len(item.missing):
+            loaded = item.loaded if world.browser else self.geometry.whole
+            rays, _ = world.camera.rays(world.direction[item.frame : item.frame + 1])
+            holes(
+                rays.reshape(-1, 3)[world.camera.sparse], world.views.owner[item.view],
+                world.views.depth[item.view], world.eye[item.frame], stock.low, stock.high, loaded,
+                item.missing, share,
+            )  # fmt: skip
+        return share
+
+    def known(self) -> Ints:
+        """The visible set of the current cell, itself first."""
+        return self.world.catalogue.visible[self.cell]
+
+    def coverage(self) -> Floats:
+        """Average coverage hints, aligned with `known`."""
+        return self.world.catalogue.coverage[self.cell]
+
+    # The engine.
+
+    def look(self, frame: int) -> None:
+        """See `Client.look`."""
+        self.frustum = self.world.frustum(frame)
+        self._items.look()
+        super().look(frame)
+
+    def glance(self, frame: int) -> None:
+        """See `Client.glance`."""
+        if self._items.glance(frame):
+            self._weigh()
+
+    def settle(self) -> None:
+        """See `Client.settle`."""
+        here = int(self.world.cell[self.frame])
+        if here != self._since:
+            self._reserve, self._since = 0, here
+        self.budget = self._all - self._reserve
+        self._weigh()
+        if self._worth is None:
+            return
+        hold, exact = self._worth.hold, self._worth.exact
+        now = float(self.world.time[self.frame])
+        fading = 0.5 ** ((now - self._looked) / HELD_SECONDS)
+        self._looked = now
+        # The greatest share of late, whatever the sign of what it counts for.
+        kept = self._kept * fading
+        self._kept = np.where(np.abs(hold) > np.abs(kept), hold, kept)
+        stock = self.world.catalogue
+        worth = hold + HELD_ON * self._kept + HELD_ON**2 * stock.gains
+        step, source = np.zeros(stock.ends.shape), np.zeros(stock.ends.shape, np.int64)
+        last = np.zeros(stock.texture_count, np.int64)
+        offered(worth, self.have, stock.previews, self.previews.whole, step, source, last)
+        last = np.where(self._suffices(), self.exact, last)
+        allocate(step, stock.memory, last, self.budget, self.column, exact)
+        while self.world.browser and self._grow():
+            self.budget = self._all - self._reserve
+            allocate(step, stock.memory, last, self.budget, self.column, exact)
+        self.source = source[np.arange(len(last)), self.column]
+
+    def arrived(self, request: Request) -> None:
+        """See `Client.arrived`."""
+        super().arrived(request)
+        if request.tag.kind not in (Kind.TEXTURE, Kind.PREVIEW):  # type: ignore[attr-defined]
+            if self.cell < 0 and self.records.whole[self.world.cell[self.frame]]:
+                self.cell = int(self.world.cell[self.frame])
+            self._items.note()
+            self._weigh()
+
+    def _suffices(self) -> Bools:
+        """(T,) the textures in view whose exact columns are all that the view wants: no finer
+        preview takes their place."""
+        stock = self.world.catalogue
+        if self._worth is None or self._worth.sight is None:
+            return np.zeros(stock.texture_count, dtype=bool)
+        sight, beyond = self._worth.sight, np.arange(stock.ends.shape[1]) > self.exact[:, None]
+        result: Bools = (sight[:, 1] > 0) & ~(beyond & (sight > 0)).any(axis=1)
+        return result
+
+    def _grow(self) -> bool:
+        """Reserves memory for the second copy of a texture while it grows: the largest texture
+        without its finest level, at most half of the memory. Returns whether the reserve grew; it
+        stays while the client is in the cell, lest a level go in and out."""
+        column, memory = self.column, self.world.catalogue.memory
+        need = int(memory[np.arange(len(column)), np.maximum(column - 1, 0)].max(initial=0))
+        more = min(need, self._all // 2)
+        grown = more > self._reserve
+        self._reserve = max(more, self._reserve)
+        return grown
+
+    def _weigh(self) -> None:
+        if self.cell >= 0 and (self.files[Kind.STATISTICS].whole[0] or not self._statistics):
+            stock = self.world.catalogue
+            self._worth = self._policy(self)
+            fetch, exact = self._worth.fetch[: stock.texture_count], self._worth.exact
+            allocate(fetch, stock.memory, stock.levels, self.budget, self._target, exact)
+
+    def fetch(self) -> None:
+        """See `Client.fetch`."""
+        while self._room() and self._fetch_one():
+            pass
+
+    def _room(self) -> bool:
+        """Whether the link would run dry before a later request could be answered."""
+        if len(self.waiting) >= self._concurrency:
+            return False
+        left = sum(request.outstanding for request in self.waiting)
+        ahead = self.estimate.latency + RANGE_SECONDS / 2
+        return left == 0 or 8 * left < ahead * self.estimate.bandwidth
+
+    def _fetch_one(self) -> bool:
+        """Requests the range of the greatest worth; False if there is none."""
+        if not self.files[Kind.INDEX].asked[0]:
+            self.open()
+        if not self.index:
+            return False
+        if self._statistics and self.whole(Kind.STATISTICS, 0, math.inf):
+            return True
+        here = int(self.world.cell[self.frame])
+        if self.whole(Kind.RECORD, here, math.inf):
+            return True
+        if self.cell < 0 and self.whole(Kind.GEOMETRY, here, math.inf):
+            return True
+        if self._worth is None:
+            return False
+        stock, worth = self.world.catalogue, self._worth
+        # With little memory a preview may show more columns than are wanted of the exact levels.
+        last = np.maximum(self._target, np.where(self.column > self.exact, self.column, 0))
+        best, source, column = self._next_fetch(worth.fetch, last)
+        size = np.maximum(self.geometry.size, 1)
+        density = np.where(self.geometry.asked == 0, worth.geometry / size, 0.0)
+        cell = int(density.argmax())
+        mesh, finer = self._next_mesh()
+        records = [c for c in stock.adjacent[self.cell].tolist() if not self.records.asked[c]]
+        if records:
+            least = min(records, key=lambda c: int(self.records.size[c]))
+            record = NOTHING * RECORD_SHARE / float(self.records.size[least])
+            if record > max(best, float(density[cell]), finer):
+                return self.whole(Kind.RECORD, least, record)
+        if finer > max(best, float(density[cell])):
+            return self.whole(Kind.MESH, mesh, finer)
+        if density[cell] > best:
+            return self.whole(Kind.GEOMETRY, cell, float(density[cell]))
+        if source < 0 and worth.ahead is not None:
+            best, source, column = self._next_fetch(worth.ahead, stock.levels)
+        if source < 0:
+            return False
+        if source >= stock.texture_count:
+            return self.whole(Kind.PREVIEW, source - stock.texture_count, best)
+        return self._range(source, int(stock.ends[source, column]), best)
+
+    def _next_mesh(self) -> tuple[int, float]:
+        """The finer mesh of the greatest worth per byte, and that; -1 and 0 if there is none."""
+        stock = self.world.catalogue
+        meshes, asked = stock.meshes, self.meshes.asked > 0
+        shown = self.geometry.whole & np.isin(np.arange(stock.cell_count), self.known())
+        free = ~asked & shown[meshes.cell]
+        if not free.any():
+            return -1, 0.0
+        gains = NOTHING * meshes.gains(asked, self.frustum, NEAREST, BEHIND)
+        density = np.where(free, gains / (meshes.bytes + self._overhead()), 0.0)
+        best = int(density.argmax())
+        return best, float(density[best])
+
+    def _next_fetch(self, worth: Floats, last: Ints) -> tuple[float, int, int]:
+        """See `next_fetch`; with one range a file at a time, no more while one is pending."""
+        stock, asked = self.world.catalogue, self.textures.asked
+        busy = (asked > self.textures.loaded) & self.world.one_range
+        step: tuple[float, int, int] = next_fetch(
+            worth, stock.ends, stock.stored, asked, busy, last, stock.previews,
+            self.previews.asked > 0, self._overhead(),
+        )  # fmt: skip
+        return step
+
+    def _overhead(self) -> int:
+        """Overhead of a request, bytes: headers, and the bytes that its connection could bring
+        while it waits. On a fast link a request thus covers more levels."""
+        latency, bandwidth = self.estimate.latency, self.estimate.bandwidth
+        waiting = latency * bandwidth / 8 / self._concurrency if latency else 0.0
+        return OVERHEAD + int(min(waiting, LONGEST_WAIT))
+
+    def _range(self, texture: int, end: int, priority: float) -> bool:
+        most = max(RANGE_BYTES, RANGE_SECONDS * self.estimate.bandwidth / 8)
+        asked = int(self.textures.asked[texture])
+        if end - asked > most:
+            end = asked + int(most)
+        self.ask(Kind.TEXTURE, texture, end, priority)
+        return True

@@ -1,0 +1,174 @@
+"""The knobs whose price a walk measures, with their values, and rebuilding a database with another
+option.
+
+The cost of a setting is the time of all stages after the scene: those that depend on the option run
+again in a copy, and the others count their time with the database's own options.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from ptmtools.errors import InputError
+from ptmtools.options import option_name
+from ptmtools.pipeline.build import run_stage
+from ptmtools.pipeline.stage import Artifacts, Options, Stage
+from ptmtools.pipeline.stages import ACH, CELLS, EMIT, LIGHT, PVS, STAGES, TEXTURES
+from ptmtools_lab.tradeoff.experiment import timed
+
+
+@dataclass(frozen=True)
+class Knob:
+    """One option of a stage.
+
+    Attributes
+    ----------
+    stage, field: the stage, and the field of its options.
+    values: to try.
+    coarser: only values above the database's own are tried, since pictures are compared with those
+        of the database.
+    policy: the client's policy, if only some clients use the result; "" for those of the user.
+    own: the property of the options with the value in force; by default the field.
+    slow: values that take far longer, only tried if the knob is named.
+    of_longest: the values are shares of the longest side of a texture.
+    """
+
+    stage: Stage[Any]
+    field: str
+    values: tuple[Any, ...]
+    coarser: bool = False
+    policy: str = ""
+    own: str = ""
+    slow: tuple[Any, ...] = ()
+    of_longest: bool = False
+
+    @property
+    def option(self) -> str:
+        """The option as a user gives it, with its dashes."""
+        option = next(each for each in fields(self.stage.options) if each.name == self.field)
+        return f"--{option_name(option)}"
+
+    def text(self, value: Any) -> str:
+        """A value as a user gives it."""
+        if isinstance(value, bool):
+            return self.option if value else self.option.replace("--", "--no-", 1)
+        return f"{self.option} {value:g}" if isinstance(value, float) else f"{self.option} {value}"
+
+
+KNOBS = (
+    Knob(CELLS, "wall_area", (1.0, 4.0)),
+    Knob(CELLS, "wall_thickness", (0.2, 1.0)),
+    Knob(CELLS, "max_leaves", (50,)),
+    Knob(CELLS, "cells", ("leaf", "room")),
+    Knob(CELLS, "gain", (0.0, 0.3)),
+    Knob(PVS, "method", ("fast", "sampled", "full")),
+    Knob(PVS, "gain", (0.0, 0.1)),
+    Knob(ACH, "samples", (8, 1, 64, 512), policy="ach", own="points"),
+    Knob(TEXTURES, "profile", ("raw", "fast"), slow=("small",)),
+    Knob(TEXTURES, "preview", (0, 50, 90)),
+    Knob(TEXTURES, "preview_format", ("webp", "jpeg"), slow=("avif",)),
+    Knob(TEXTURES, "exact", ("always", "lossless-sources", "never")),
+    Knob(TEXTURES, "max_error", (2, 4), coarser=True),
+    Knob(TEXTURES, "max_side", (1 / 2, 1 / 4), of_longest=True),
+    Knob(TEXTURES, "trim", (True,), coarser=True),
+    Knob(LIGHT, "light_samples", (16, 256)),
+    Knob(EMIT, "need", (16, 0)),
+)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One knob at another value than the database's own.
+
+    Attributes
+    ----------
+    own: the database's value, in the form of `Knob.text`.
+    options: the options of its stage.
+    """
+
+    knob: Knob
+    value: Any
+    own: str
+    options: Options
+
+    @property
+    def name(self) -> str:
+        """As a user gives it."""
+        return self.knob.text(self.value)
+
+
+def settings(
+    own: Mapping[Stage[Any], Options],
+    longest: int,
+    named: Collection[str] = (),
+    *,
+    quick: bool = False,
+) -> Iterator[Setting]:
+    """Settings to try beside the ``own`` options of a database whose longest texture side is
+    ``longest`` texels: of all knobs, or of the ``named`` options, such as "max-side"; with
+    ``quick``, one value of each."""
+    for knob in KNOBS:
+        if named and knob.option.removeprefix("--") not in named:
+            continue
+        if knob.stage not in own:  # an optional one, which has stored nothing
+            continue
+        options = own[knob.stage]
+        current = getattr(options, knob.own or knob.field)
+        values = (*knob.values, *(knob.slow if named else ()))
+        if knob.of_longest:
+            values = tuple(int(share * longest) for share in values if share * longest >= 1)
+        chosen = [v for v in values if (v > current if knob.coarser else v != current)]
+        for value in chosen[:1] if quick else chosen:
+            with suppress(InputError):  # if the other options do not allow it
+                changed = replace(options, **{knob.field: value})
+                yield Setting(knob, value, knob.text(current), changed)
+
+
+def concerned(stage: Stage[Any], own: Mapping[Stage[Any], Options]) -> list[Stage[Any]]:
+    """A stage and those that depend on its result, in their order."""
+    result = [stage]
+    for later in STAGES.values():
+        if later not in own or later in result:
+            continue
+        if {*later.read_with(own[later]), *later.heeds} & set(result):
+            result.append(later)
+    return result
+
+
+#: Seconds of one core for each stage.
+Seconds = dict[str, float]
+Own = Mapping[Stage[Any], Options]
+
+
+def own_options(artifacts: Artifacts) -> Own:
+    """The options of the last run of each stage that has written anything, without those of the
+    scene, the first of which needs the model.
+
+    Raises DatabaseError PTM-D004 if one has not run, PTM-D002 for options that no stage has.
+    """
+    stages = (s for s in STAGES.values() if not s.joined and artifacts.is_stored(s))
+    return {stage: artifacts.recorded(stage) for stage in stages}
+
+
+@contextmanager
+def copied(db: Path) -> Iterator[Path]:
+    """A temporary copy of a database, to be changed."""
+    with TemporaryDirectory(prefix="ptmtools-") as folder:
+        yield Path(shutil.copytree(db, Path(folder) / "db"))
+
+
+def build_again(db: Path, options: Own) -> Seconds:
+    """Runs the stages whose options are given, current or not, in the order of the options, by one
+    worker: nothing is reused."""
+    result: Seconds = {}
+    for stage, chosen in options.items():
+        run = partial(run_stage, db, chosen, workers=1, rebuild=True)
+        _, result[stage.name] = timed(run)
+    return result

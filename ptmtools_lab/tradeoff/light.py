@@ -1,0 +1,126 @@
+"""The experiment of baked light: what clients look up in lightmaps, beside the light at points.
+
+The reference is the light by far more rays at random points of the surfaces of a few cells, without
+texels and without smoothing. What is covered, as a wall by a picture, does not count: lightmaps
+have the light of the neighbours there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ptmtools.arrays import Floats, Ints, areas
+from ptmtools.light.cells import ABOVE, COVERED, WHITE, Baking, CellLight, Piece, exposed
+from ptmtools.light.lamps import lamps_of
+from ptmtools.light.looks import LightImage, lookup
+from ptmtools.light.mixing import mixed
+from ptmtools.light.occlusion import Surroundings
+from ptmtools.output.geometry import Geometry
+from ptmtools.output.pieces import pieces_of
+from ptmtools.pipeline.stages import APO, CELLS, LIGHT
+from ptmtools.pipeline.stages.apo import replaced_objects
+from ptmtools.pipeline.stages.light import unlit_materials
+from ptmtools.pipeline.stages.scene import lights_of
+from ptmtools_lab.tradeoff.experiment import (
+    Experiment,
+    Measurement,
+    Setting,
+    Subject,
+    decibels,
+    timed,
+)
+
+#: Cells that stand for all, and points of each.
+TRIED, POINTS = 4, 2_000
+#: Rays of the reference.
+MOST = 4_096
+
+
+def prepare_lightmaps(subject: Subject, most: int = MOST) -> Experiment:
+    """See `EXPERIMENTS`. The light is baked, even if the database has that of its model."""
+    artifacts = subject.artifacts
+    scene, lights = artifacts[APO], lights_of(artifacts)
+    options = replace(subject.options(LIGHT), light="bake")
+    dark = unlit_materials(scene, lights, painted=False)
+    geometry, replaced = Geometry(scene, artifacts[CELLS]), replaced_objects(artifacts)
+
+    def pieces(density: float) -> list[Piece]:
+        return pieces_of(geometry, artifacts[CELLS], dark, 1 / density, replaced)
+
+    around, own = Surroundings.of(scene), pieces(options.light_density)
+    mix = mixed(around, own, lamps_of(scene, lights), options, ABOVE, WHITE)
+    lit = [n for n, piece in enumerate(own) if not piece.glass.all()]
+    chosen = np.unique(np.linspace(0, len(lit) - 1, min(TRIED, len(lit))).astype(int)).tolist()
+    return lightmap_experiment(Baking(around, options, mix), pieces, [lit[n] for n in chosen], most)
+
+
+def lightmap_experiment(
+    baking: Baking, pieces: Callable[[float], list[Piece]], cells: Sequence[int], most: int
+) -> Experiment:
+    """The experiment of the texels and rays of the lightmaps of some cells. ``pieces``: of all
+    cells, for texels to the metre; ``most``: rays of the reference."""
+    own, random = baking.options, np.random.default_rng(0)
+    exact = replace(baking, options=replace(own, light_samples=most))
+    places: list[tuple[Ints, Floats]] = []
+    truth, again = [], []
+    for piece in (pieces(own.light_density)[cell] for cell in cells):
+        corner = piece.corner.astype(np.float64)
+        area = np.where(piece.glass, 0.0, areas(corner))
+        face = random.choice(len(area), POINTS, p=area / area.sum())
+        share = random.dirichlet((1, 1, 1), POINTS)
+        point = np.einsum("nk,nkx->nx", share, corner[face])
+        look = exact.look(corner, exact.sides(corner, piece.side), piece.face)
+        one, other = (look(face, point, random.random(POINTS)) for _ in range(2))
+        open_to = one >= COVERED
+        places.append((face[open_to], share[open_to]))
+        truth.append(exposed(one[open_to]))
+        again.append(exposed(other[open_to]))
+        replace(baking, options=replace(own, light_samples=1)).light(piece)  # compiles it
+    right = np.concatenate([np.zeros(0), *truth])
+    noise = 255 * (np.concatenate([np.zeros(0), *again]) - right)
+
+    def measure(setting: Setting) -> Measurement:
+        options = replace(own, **setting.knobs)
+        chosen = [pieces(options.light_density)[cell] for cell in cells]
+        with_options = replace(baking, options=options)
+        made, seconds = timed(lambda: [with_options.light(piece) for piece in chosen])
+        rows = zip(made, chosen, places, strict=True)
+        shown = np.concatenate([_shown(light, piece, *place) for light, piece, place in rows])
+        off = np.abs(255 * (shown - right))
+        error = float(np.sqrt(np.square(off).mean()))
+        return Measurement(
+            seconds=seconds,
+            work=float(sum(0 if k.texels is None else k.texels.size for k in made)),
+            error=error,
+            worst=float(np.percentile(off, 95)),
+            more={"PSNR": decibels(error)},
+        )
+
+    values = {"density": (2.5, 5.0, 10.0, 20.0), "samples": (4, 16, 64, 256)}
+    settings = [
+        Setting(f"--light-{name} {value:g}", {f"light_{name}": value}, name)
+        for name, some in values.items()
+        for value in some
+        if name != "samples" or value < most
+    ]
+    return Experiment(
+        f"texels of the lightmaps of {len(cells)} cells",
+        "RMS error of linear light, of 255",
+        settings if cells else [],
+        measure,
+        float(np.sqrt(np.square(noise).mean() / 2)) if cells else 0.0,
+        units={"PSNR": "dB"},
+    )
+
+
+def _shown(light: CellLight, piece: Piece, face: Ints, share: Floats) -> Floats:
+    """(n,) the light, 0 to 1, that clients show at places of (n,) faces."""
+    at_vertices = np.einsum("nk,nk->n", share, light.vertex[face] / 255)
+    if light.texels is None:
+        return np.asarray(at_vertices)
+    at = np.einsum("nk,nkx->nx", share, light.uv[face].astype(np.float64))
+    mapped = lookup(LightImage(light.texels, ("clamp", "clamp")), at)
+    return np.where(piece.dense[face], at_vertices, mapped)

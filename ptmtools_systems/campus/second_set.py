@@ -1,0 +1,182 @@
+"""Lightmaps and reflection masks of a model, which a scene does not have (docs/formats/campus.md,
+"Sources by format").
+
+A mask has the texture coordinates of the colours, or is left out. For OBJ, the scene's own reader
+names the masks. A glTF is read a second time (`read_again`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Floats
+from ptmtools.errors import InputError, LimitError, PtmError
+from ptmtools.light.looks import LightImage, red_texels
+from ptmtools.scene.gltf.second import SecondReading, read_again
+from ptmtools.scene.model import Scene
+from ptmtools.scene.options import GLTF, IngestOptions
+from ptmtools.scene.reference import Folder
+from ptmtools.scene.source import FileRange, Texture
+from ptmtools_systems.campus.textures import Mask
+
+#: Reasons for leaving out a file that a model names.
+_NOT_THERE = {"missing": "not found", "outside": "lies outside the model's folder"}
+
+
+@dataclass(frozen=True)
+class ModelLight:
+    """The lightmaps of a model.
+
+    Attributes
+    ----------
+    uv: (T, 3, 2) of the scene's faces, origin at the lower left.
+    image: (T,) index into `images`, -1 for faces without.
+    images: one for each material that has one.
+    """
+
+    uv: Floats
+    image: NDArray[np.int32]
+    images: tuple[LightImage, ...]
+
+
+def model_light(model: Path, options: IngestOptions) -> ModelLight:
+    """The lightmaps of a model, for the faces of its scene.
+
+    Raises InputError: PTM-I701 it has none, its format has none, or one that it names is missing;
+    and as reading and decoding.
+    """
+    read = None
+    if model.suffix.lower() in GLTF:
+        read = read_again(model, options, lambda entry: entry.get("occlusionTexture"))
+    if read is None:
+        raise InputError(
+            "PTM-I701",
+            "has no lightmaps",
+            file=model,
+            remedy="use --lightmaps bake, or a glTF with occlusionTexture",
+        )
+    used = np.unique(read.source.triangle_material[read.faces]).tolist()
+    index = np.full(len(read.source.materials), -1, np.int32)
+    images: list[LightImage] = []
+    decoded: dict[Callable[[], bytes], NDArray[np.uint8]] = {}
+    for number in used:
+        if not read.asked[number]:
+            continue
+        material = read.source.materials[number]
+        if (texture := material.texture) is None:
+            raise _missing(model, material.name, number, read)
+        if texture.read not in decoded:
+            decoded[texture.read] = _red(texture, material.name, options)
+        index[number] = len(images)
+        wrap = texture.wrap_s, texture.wrap_t
+        images.append(LightImage(decoded[texture.read], wrap, texture.strength))
+    uv = read.source.uv[read.faces]
+    finite = np.asarray(np.isfinite(uv).all(axis=(1, 2)))
+    return ModelLight(
+        np.where(finite[:, None, None], uv, 0.0),
+        index[read.source.triangle_material[read.faces]],
+        tuple(images),
+    )
+
+
+def _missing(model: Path, material: str, number: int, read: SecondReading) -> InputError:
+    """The error for a missing lightmap that a material names."""
+    # Each material without the texture that it names left a note, in the same order.
+    textures = zip(read.asked, read.source.materials, strict=True)
+    lost = [k for k, (asked, m) in enumerate(textures) if asked and m.texture is None]
+    fault = read.missing[min(lost.index(number), len(read.missing) - 1)].message
+    return InputError(
+        "PTM-I701",
+        f"the lightmap of material {material}, {fault}",
+        file=model,
+        remedy="put it where the model says (or use --allow-outside, where it lies elsewhere), or "
+        "use --lightmaps bake",
+    )
+
+
+def _red(texture: Texture, material: str, options: IngestOptions) -> NDArray[np.uint8]:
+    """(h, w) red samples of a lightmap. Raises as decoding, and InputError PTM-I122."""
+    try:
+        return red_texels(texture.read(), options.limit << 20, texture.label)
+    except InputError as fault:
+        place, remedy = f"lightmap of material {material}", "mend it, or use --lightmaps bake"
+        raise InputError(
+            fault.code, fault.message, file=texture.label, place=place, remedy=remedy
+        ) from None
+    except OSError as fault:
+        what = fault.strerror or str(fault)
+        raise InputError("PTM-I122", what, file=fault.filename or texture.label) from None
+
+
+def model_masks(
+    model: Path, scene: Scene, options: IngestOptions
+) -> tuple[dict[int, Mask], tuple[str, ...]]:
+    """The masks of a model that was read as ``scene``, by the number of its material, and notes on
+    invalid ones."""
+    masks_of = _gltf_masks if model.suffix.lower() in GLTF else _obj_masks
+    masks, notes = {}, []
+    for number, label, mask in masks_of(model, scene, options):
+        if fault := mask if isinstance(mask, str) else _fault(mask, options):
+            name = scene.materials[number].name
+            notes.append(f"the mask of material {name} is left out: {label}{fault}")
+        elif not isinstance(mask, str):
+            masks[number] = mask
+    return masks, tuple(notes)
+
+
+#: The number of a material, the beginning of a note on its mask, and the mask or its fault.
+_Candidates = Iterator[tuple[int, str, Mask | str]]
+
+
+def _gltf_masks(model: Path, scene: Scene, options: IngestOptions) -> _Candidates:
+    def glossy(entry: Mapping[str, Any]) -> Any:
+        return entry.get("pbrMetallicRoughness", {}).get("metallicRoughnessTexture")
+
+    if (read := read_again(model, options, glossy)) is None:
+        return
+    source, faces = read.source, read.faces
+    material = source.triangle_material[faces]
+    for number, index in enumerate(np.unique(material).tolist()):
+        texture = source.materials[index].texture
+        if texture is None or scene.materials[number].image < 0:
+            continue
+        own = material == index
+        mirrored = "mirror" in (texture.wrap_s, texture.wrap_t)
+        if mirrored or not np.array_equal(source.uv[faces][own], scene.uv[own]):
+            yield number, "", "other texture coordinates"
+        else:
+            yield number, "", Mask(texture.read, texture.label, band=1, inverted=True)
+
+
+def _obj_masks(model: Path, scene: Scene, options: IngestOptions) -> _Candidates:
+    """The masks that the scene's own reader names."""
+    folder = Folder(model.absolute().parent, options.allow_outside)
+    for number, (own, shine) in enumerate(zip(scene.materials, scene.shines, strict=True)):
+        if own.image < 0 or shine is None:
+            continue
+        file = None if shine.fault else folder.find(shine.file, shine.base)
+        if file is None:
+            yield number, "", shine.fault
+        elif file.path is None:
+            yield number, f"map_Ks {shine.file}: ", _NOT_THERE[file.outcome]
+        else:
+            yield number, f"map_Ks {shine.file}: ", Mask(FileRange(file.path), file.path.name)
+
+
+def _fault(mask: Mask, options: IngestOptions) -> str:
+    """The fault of a mask that is no image, or "". Raises LimitError."""
+    try:
+        red_texels(mask.load(), options.limit << 20, mask.label)
+    except LimitError:
+        raise
+    except PtmError as fault:
+        return fault.message
+    except OSError as fault:
+        return fault.strerror or str(fault)
+    return ""
