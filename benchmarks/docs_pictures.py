@@ -41,7 +41,7 @@ from ptmtools.output.served import read_served  # noqa: E402
 from ptmtools.parallel import open_executor  # noqa: E402
 from ptmtools.rendering.drawing import ViewOptions, draw_view  # noqa: E402
 from ptmtools.scene.model import Material, Scene  # noqa: E402
-from ptmtools.scene.orientation import tolerance_of  # noqa: E402
+from ptmtools.scene.orientation.main_axes import tolerance_of  # noqa: E402
 from ptmtools.texture import read_image  # noqa: E402
 from ptmtools_systems.apo.making import make_apo, smooth, welded  # noqa: E402
 from ptmtools_systems.apo.model import ApoOptions  # noqa: E402

@@ -21,7 +21,7 @@ from formats import glb
 
 from ptmtools.cells import subdivide
 from ptmtools.scene import Scene, ingest
-from ptmtools.scene.orientation import tolerance_of
+from ptmtools.scene.orientation.main_axes import tolerance_of
 
 NAME = "KHR_draco_mesh_compression"
 

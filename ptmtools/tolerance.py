@@ -4,7 +4,7 @@ All geometry behind ingest is float64 in metres with its origin at the centre of
 floor, so the extent of the scene bounds every coordinate. A tolerance is a fixed share of that
 extent: the same building in other units, or moved, is treated alike. Where a file has its
 coordinates on a grid that is coarser (compressed glTF), that grid counts instead, up to `COARSEST`:
-two faces of one plane lie up to a step apart there. Ingest derives them once (`scene.orientation`);
+two faces of one plane lie up to a step apart there. Ingest derives them once (`main_axes`);
 `Scene.tolerance` and `Cells.tolerance` hand them on to every stage.
 """
 

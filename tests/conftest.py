@@ -18,7 +18,7 @@ from ptmtools.cells.model import Cells
 from ptmtools.coverage.backends.opengl import APT, create_context
 from ptmtools.errors import MissingComponentError
 from ptmtools.scene.model import Material, Scene
-from ptmtools.scene.orientation import tolerance_of
+from ptmtools.scene.orientation.main_axes import tolerance_of
 
 # How long an example takes says how busy the machine is.
 settings.register_profile("untimed", deadline=None)

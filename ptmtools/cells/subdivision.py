@@ -51,7 +51,7 @@ from ptmtools.executor import Executor
 from ptmtools.portal_flow.flow import MOST_PORTALS
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
-from ptmtools.scene.orientation import main_axes
+from ptmtools.scene.orientation.main_axes import main_axes
 from ptmtools.tolerance import Tolerance
 
 #: Margin of the first root box around the model, as a share of the model's extent.

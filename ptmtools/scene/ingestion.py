@@ -20,18 +20,18 @@ from ptmtools.files import open_regular
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.baking import LARGEST, bake, emitted_wraps, near_origin
 from ptmtools.scene.faces import KeptFaces, keep_faces
-from ptmtools.scene.facing import TURNED_AWAY, share_turned_away
 from ptmtools.scene.images import ImageStore
 from ptmtools.scene.lighting import lights_of
 from ptmtools.scene.model import Camera, Material, RoomVolume, Scene, Space, Storey
 from ptmtools.scene.normal_maps import NormalMaps
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.options import GLTF, IngestOptions
-from ptmtools.scene.orientation import tolerance_of
+from ptmtools.scene.orientation.facing import TURNED_AWAY, share_turned_away
+from ptmtools.scene.orientation.main_axes import tolerance_of
+from ptmtools.scene.orientation.space import DeclaredSpace, parse_unit, rotated, settle, to_world
+from ptmtools.scene.orientation.up_axis import NamedFaces
 from ptmtools.scene.source import MAX_VERTICES, Source, SourceMaterial
-from ptmtools.scene.space import DeclaredSpace, parse_unit, rotated, settle, to_world
 from ptmtools.scene.texels import uses_holes
-from ptmtools.scene.up_axis import NamedFaces
 from ptmtools.tolerance import PLANE_SHARE
 
 #: Default colours: of faces without an image, and of images.

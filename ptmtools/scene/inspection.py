@@ -14,7 +14,14 @@ from ptmtools.scene.gltf.document import document_json, support_of
 from ptmtools.scene.ingestion import ingest
 from ptmtools.scene.model import Scene, SourceImage
 from ptmtools.scene.options import IngestOptions
-from ptmtools.scene.up_axis import USUAL_UP, Candidate, NamedFaces, Up, candidates, evidence
+from ptmtools.scene.orientation.up_axis import (
+    USUAL_UP,
+    Candidate,
+    NamedFaces,
+    Up,
+    candidates,
+    evidence,
+)
 from ptmtools.texture.images.opening import opened
 from ptmtools.texture.model import Limits
 

@@ -23,8 +23,8 @@ from ptmtools.scene.lights import MOST, Lamp, Lights, ModelMap
 from ptmtools.scene.model import Space
 from ptmtools.scene.notes import Findings
 from ptmtools.scene.options import GLTF, IngestOptions
+from ptmtools.scene.orientation.space import rotated, to_world
 from ptmtools.scene.source import Source, SourceMaterial, Texture
-from ptmtools.scene.space import rotated, to_world
 from ptmtools.texture.model import Limits
 
 #: Coordinates may be this far outside of an image that lies on its surfaces once.

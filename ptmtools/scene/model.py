@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ptmtools import schemas
 from ptmtools.scene.lights import Lights
-from ptmtools.scene.orientation import tolerance_of
+from ptmtools.scene.orientation.main_axes import tolerance_of
 from ptmtools.store.archive import Stored, without_repeats
 from ptmtools.tolerance import Tolerance
 

@@ -71,6 +71,6 @@ class IngestOptions:
                 remedy="use --limit and --max-triangles of 1 or more",
             )
         if self.unit is not None:
-            from ptmtools.scene.space import parse_unit
+            from ptmtools.scene.orientation.space import parse_unit
 
             parse_unit(self.unit)

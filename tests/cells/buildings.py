@@ -13,7 +13,7 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats
 from ptmtools.scene import IngestOptions, Scene, ingest
-from ptmtools.scene.space import to_world
+from ptmtools.scene.orientation.space import to_world
 from tests.scene.buildings import Point, box, inside_out, sheet, welded
 
 Box = tuple[Point, Point]

@@ -13,7 +13,7 @@ from ptmtools.cells import Cells, SubdivideOptions, structural_triangles, subdiv
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
 from ptmtools.scene import IngestOptions, Scene, ingest
-from ptmtools.scene.space import to_world
+from ptmtools.scene.orientation.space import to_world
 from ptmtools.visibility import check_conservative, compute_pvs
 from tests.cells.buildings import write
 from tests.cells.strangers import Parts, office, serpentine

@@ -26,7 +26,7 @@ import shapely
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
 from ptmtools.cells.planar import intersection, neighbours, union
 from ptmtools.scene import IngestOptions, Scene, ingest
-from ptmtools.scene.orientation import main_axes
+from ptmtools.scene.orientation.main_axes import main_axes
 from ptmtools.tolerance import ranked
 from ptmtools.visibility import Pvs, compute_pvs
 

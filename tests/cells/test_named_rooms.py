@@ -16,7 +16,7 @@ from ptmtools.cells import Cells, SubdivideOptions, subdivide
 from ptmtools.cells.room_volumes import Volume, Volumes, windings
 from ptmtools.scene import IngestOptions, Scene, ingest
 from ptmtools.scene.model import RoomVolume
-from ptmtools.scene.space import to_world
+from ptmtools.scene.orientation.space import to_world
 from tests.cells.buildings import AXES, Box, carved, prism, room, write
 from tests.cells.strangers import LINTEL, office
 from tests.scene.buildings import box, welded

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
+from tests.scene.test_facing import glb
 
 from ptmtools.cells.model import Cells
 from ptmtools.pipeline.build import build_scene
@@ -14,7 +15,6 @@ from ptmtools.pipeline.stages import CELLS
 from ptmtools.scene import IngestOptions
 from tests.e2e.conftest import TWO_ROOMS, Ptm
 from tests.scene.buildings import house, inside_out, obj_text, y_up
-from tests.scene.test_facing import glb
 
 MODEL = TWO_ROOMS / "two_rooms.obj"
 

@@ -32,7 +32,7 @@ from ptmtools.light.occlusion import light_and_sky, points_on, turns
 from ptmtools.light.options import LightOptions
 from ptmtools.scene.lights import Lamp, Lights
 from ptmtools.scene.model import Material, Scene
-from ptmtools.scene.orientation import tolerance_of
+from ptmtools.scene.orientation.main_axes import tolerance_of
 from tests.light.shapes import indexed, quad, surroundings
 from tests.light.test_cells import HEIGHT, SIDE, at, piece, room
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ptmtools.scene.facing import SampleLines
+from ptmtools.scene.orientation.facing import SampleLines
 
 from .buildings import box, divided, house, meadow, turned_in_plan, welded
 

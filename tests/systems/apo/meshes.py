@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ptmtools.scene.model import Material, Scene
-from ptmtools.scene.orientation import tolerance_of
+from ptmtools.scene.orientation.main_axes import tolerance_of
 
 
 def scene_of(points: np.ndarray, triangles: np.ndarray, colors: np.ndarray | None = None) -> Scene:

@@ -12,11 +12,10 @@ from ptmtools.arrays import Floats
 from ptmtools.errors import InputError
 from ptmtools.scene.model import Space
 from ptmtools.scene.notes import Findings
-from ptmtools.scene.space import UNITS, DeclaredSpace, parse_unit, rotated, settle
-from ptmtools.scene.up_axis import NamedFaces
-
-from .buildings import atrium, box, corridor, house, site_plan, tower, welded, y_up
-from .districts import boulder, city, flat, hills, museum, serpentine, square, table
+from ptmtools.scene.orientation.space import UNITS, DeclaredSpace, parse_unit, rotated, settle
+from ptmtools.scene.orientation.up_axis import NamedFaces
+from tests.scene.buildings import atrium, box, corridor, house, site_plan, tower, welded, y_up
+from tests.scene.districts import boulder, city, flat, hills, museum, serpentine, square, table
 
 
 @pytest.mark.parametrize(

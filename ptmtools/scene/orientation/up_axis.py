@@ -37,8 +37,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.scene.facing import Crossings, SampleLines
-from ptmtools.scene.standing import HEIGHT, NO_ROOMS, Standing, standing
+from ptmtools.scene.orientation.facing import Crossings, SampleLines
+from ptmtools.scene.orientation.standing import HEIGHT, NO_ROOMS, Standing, standing
 
 Up = Literal["y", "z"]
 AXES: dict[Up, int] = {"y": 1, "z": 2}

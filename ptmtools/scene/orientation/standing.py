@@ -28,7 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.scene.facing import Crossings, SampleLines, strips
+from ptmtools.scene.orientation.facing import Crossings, SampleLines, strips
 
 #: Radius and height of a visitor in metres: the default of ``--walker``.
 RADIUS, HEIGHT = 0.25, 1.7

@@ -11,9 +11,8 @@ import pytest
 from ptmtools.arrays import Floats
 from ptmtools.cli.main import main
 from ptmtools.scene import IngestOptions, ingest
-from ptmtools.scene.facing import TURNED_AWAY, share_turned_away
-
-from .buildings import (
+from ptmtools.scene.orientation.facing import TURNED_AWAY, share_turned_away
+from tests.scene.buildings import (
     box,
     castle,
     corridor,
@@ -28,7 +27,7 @@ from .buildings import (
     welded,
     y_up,
 )
-from .conftest import Gltf, Put
+from tests.scene.conftest import Gltf, Put
 
 #: Solids that face outwards, which is towards the rooms between them.
 SOUND = {

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from ptmtools.arrays import Floats
-from ptmtools.scene.up_axis import (
+from ptmtools.scene.orientation.up_axis import (
     CLOSE_AXIS,
     CLOSE_UNIT,
     UNITS,
@@ -24,8 +24,7 @@ from ptmtools.scene.up_axis import (
     candidates,
     evidence,
 )
-
-from .buildings import (
+from tests.scene.buildings import (
     atrium,
     box,
     corridor,
@@ -41,7 +40,7 @@ from .buildings import (
     welded,
     y_up,
 )
-from .districts import city, flat, office, serpentine, square
+from tests.scene.districts import city, flat, office, serpentine, square
 
 WALLS = house(floor=False, roof=False)
 #: A person is sure which axis is up, and that these are metres.

@@ -7,11 +7,31 @@ import pytest
 
 from ptmtools.arrays import Floats
 from ptmtools.cells.options import WALKER
-from ptmtools.scene.standing import HEIGHT, NO_ROOMS, RADIUS, Standing
-from ptmtools.scene.up_axis import NamedFaces, evidence
-
-from .buildings import atrium, box, castle, corridor, house, mezzanine, sheet, tower, wall, welded
-from .districts import boulder, city, flat, hills, museum, office, serpentine, square, table
+from ptmtools.scene.orientation.standing import HEIGHT, NO_ROOMS, RADIUS, Standing
+from ptmtools.scene.orientation.up_axis import NamedFaces, evidence
+from tests.scene.buildings import (
+    atrium,
+    box,
+    castle,
+    corridor,
+    house,
+    mezzanine,
+    sheet,
+    tower,
+    wall,
+    welded,
+)
+from tests.scene.districts import (
+    boulder,
+    city,
+    flat,
+    hills,
+    museum,
+    office,
+    serpentine,
+    square,
+    table,
+)
 
 
 def of(triangles: Floats) -> Standing:

@@ -26,8 +26,8 @@ from ptmtools.arrays import Floats
 from ptmtools.errors import InputError, LimitError
 from ptmtools.scene.model import Space
 from ptmtools.scene.notes import Findings
-from ptmtools.scene.standing import HEIGHT
-from ptmtools.scene.up_axis import (
+from ptmtools.scene.orientation.standing import HEIGHT
+from ptmtools.scene.orientation.up_axis import (
     CLOSE_AXIS,
     CLOSE_UNIT,
     CONVENTION,
