@@ -169,8 +169,10 @@ def texture_steps(
         for source in sources:
             worth, end, kind, _, _ = source
             length = end - held if kind == "texture" else end
+            if worth <= shown or length <= 0:
+                continue
             density = (worth - shown) / (length + OVERHEAD)
-            if worth > shown and length > 0 and (best is None or density >= best[0]):
+            if best is None or density >= best[0]:
                 best = density, length, source
         if best is None:
             return steps

@@ -207,6 +207,24 @@ def test_without_previews_the_exact_levels_that_it_needs() -> None:
     assert steps[-1].end == row["ends"][5]
 
 
+def test_levels_300_bytes_apart() -> None:
+    """The overhead of a request does not cancel the bytes of a level that is left behind."""
+    row = texture(3, []) | {"ends": [100, 100 + opening.OVERHEAD, 100_000]}
+    steps = texture_steps(0, row, np.full(3, 0.5), first=0)
+    assert [step.end for step in steps] == row["ends"][1:]
+
+
+def test_the_error_of_a_preview_halves_with_each_coarser_level() -> None:
+    """Worth by hand, as in docs/formats/client.md: the sum over the levels of their shares times
+    their differences less the errors."""
+    row = texture(9, [(6, 300, 4.0)]) | {"ends": [10**9] * 9, "differences": [8.0] * 9}
+    share = np.array([0.4, 0.4, 0.4, 0.4, 0.4, 0.3, 0.2, 0.0, 0.0])
+    (step,) = texture_steps(0, row, share, first=0)
+    error = [4.0 / 2**6, *(4.0 / 2 ** (7 - level) for level in range(1, 7))]
+    worth = sum(part * (8.0 - off) for part, off in zip(share, error, strict=False))
+    assert step.density == pytest.approx(worth / (300 + opening.OVERHEAD), rel=1e-9)
+
+
 def test_steps_come_by_worth_per_byte() -> None:
     row = texture(9, [(6, 300, 5.0), (7, 900, 4.0), (8, 5000, 3.0)])
     index = {"textures": [row, row], "cells": [{}, {}, {}]}
