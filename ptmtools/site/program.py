@@ -108,8 +108,9 @@ def page(
         )
     links += about
     catalogue, works = settings.get("catalogue"), words_of("en")["markup"]["works"]
+    poster = html.escape(str(settings.get("poster") or ""))
     fields = {
-        "poster": html.escape(str(settings.get("poster") or "")),
+        "poster": f'<img id="poster" src="{poster}" alt="">' if poster else "",
         "catalogue": f'<p><a href="{catalogue}">{html.escape(works)}</a></p>' if catalogue else "",
     }
     return _filled(INDEX, settings, script, links, fields)

@@ -159,6 +159,7 @@ def test_the_page(site: Site, two_rooms: Path) -> None:
     assert "{{" not in page
     for kind in ("index", "worker", "wasm", "poster"):
         assert config[kind] in site.entries
+    assert f'<img id="poster" src="{config["poster"]}" alt="">' in page
     linked = re.findall(r'<link rel="preload" as="fetch" href="([^"]+)" crossorigin>', page)
     assert linked == [config["index"], config["wasm"]]
     (opening,) = re.findall(r'<link id="opening" rel="next" as="fetch" href="([^"]+)"', page)
@@ -175,6 +176,7 @@ def test_the_page(site: Site, two_rooms: Path) -> None:
     first = site.index["cells"][site.index["viewpoints"][0]["cell"]]
     assert all(f'href="data/{first[kind]}"' in text for kind in ("record", "geometry"))
     assert "data-views" not in text
+    assert "<img" not in text  # without an address browsers show it as broken
     assert title_of(Path("a/old_town-hall.db")) == "Old town hall"
 
 
