@@ -297,9 +297,9 @@ def _profiles(context: click.Context, parameter: click.Parameter, value: str) ->
 @option(
     "--profiles",
     callback=_profiles,
-    default=",".join(PROFILES),
+    default=lambda: ",".join(PROFILES),
     metavar="NAME[,NAME]",
-    help="Profiles of .ptm to compare.",
+    help="Profiles of .ptm to compare; all by default.",
 )
 @option(
     "--repeat",

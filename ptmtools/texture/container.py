@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from ptmtools.errors import InputError, LimitError
@@ -26,9 +26,9 @@ from ptmtools.texture.model import (
     Level,
     PtmHeader,
 )
-from ptmtools.texture.profiles import PROFILES, profile_numbered
+from ptmtools.texture.profiles import PROFILES, Profile
 from ptmtools.texture.pyramid import level_sizes, tile_counts
-from ptmtools.texture.samples import KINDS, KINDS_BY_NUMBER
+from ptmtools.texture.samples import KINDS, KINDS_BY_NUMBER, SampleKind
 
 #: As in PNG: a byte above 127, the name, both line ends and an end-of-file mark.
 MAGIC = b"\x89PTM\r\n\x1a\n"
@@ -108,6 +108,7 @@ def read_header(data: bytes) -> PtmHeader:
     InputError: PTM-I101 not a PTM file (or HP's format of that suffix), PTM-I103 cut
         inside the head, PTM-I104 another version or profile, PTM-I105 damaged head.
     LimitError: PTM-L104 sizes beyond what the format allows.
+    MissingComponentError: PTM-M110 as `Profiles`, for a profile that ptmtools does not have.
     """
     _check_magic(data)
     if len(data) < _FIXED.size:
@@ -129,19 +130,7 @@ def read_header(data: bytes) -> PtmHeader:
     (crc,) = _CRC.unpack_from(data, size - _CRC.size)
     if crc != zlib.crc32(data[: size - _CRC.size]):
         raise _damaged_head("its checksum is wrong")
-    profile = profile_numbered(profile_number)
-    if (
-        profile is None
-        or version < profile.since
-        or kind not in KINDS_BY_NUMBER
-        or (version == 1 and kind)
-    ):
-        raise InputError(
-            "PTM-I104",
-            f"uses profile {profile_number} with samples of kind {kind}, which this program does "
-            "not know",
-            remedy="use a newer ptmtools, or encode the image again",
-        )
+    profile, samples = _known(version, profile_number, kind)
     if max(width, height) > MAX_SIDE:
         raise LimitError(
             "PTM-L104",
@@ -157,21 +146,9 @@ def read_header(data: bytes) -> PtmHeader:
     low, high = TILE_SIDES
     if tile and not (low <= tile <= high and tile % 2 == 0):
         raise _damaged_head(f"tiles of {tile} texels are impossible")
-    samples = KINDS_BY_NUMBER[kind]
     if max_error > (samples.top_error if profile.lossy else 0) or described > DESCRIPTION_MAX:
         raise _damaged_head("its largest error or the length of its description is impossible")
     entries = [_ENTRY.unpack_from(data, table + i * _ENTRY.size) for i in range(count)]
-    levels: list[Level] = []
-    texel_bytes = components * samples.size
-    expected, texels = size + described, 0
-    for number, ((w, h), (offset, length, crc)) in enumerate(zip(sizes, entries, strict=True)):
-        tiles = tile_counts(w, h, tile) if number else (1, 1)
-        # No coder makes a group twice as long as its texels, except for a few bytes.
-        if offset != expected or length > 2 * w * h * texel_bytes + 1024 * tiles[0] * tiles[1]:
-            raise _damaged_head(f"the byte range of level {len(levels)} is impossible")
-        expected += length
-        texels += w * h
-        levels.append(Level(w, h, offset, length, crc, tiles, texels * texel_bytes))
     return PtmHeader(
         width=width,
         height=height,
@@ -183,8 +160,45 @@ def read_header(data: bytes) -> PtmHeader:
         tile=tile,
         max_error=max_error,
         description=(size, described, crc32),
-        levels=tuple(levels),
+        levels=_levels(entries, sizes, tile, components * samples.size, size + described),
     )
+
+
+def _known(version: int, profile_number: int, kind: int) -> tuple[Profile, SampleKind]:
+    """The profile and the kind of samples of these numbers in a head. Raises InputError PTM-I104,
+    and as `Profiles.numbered`."""
+    profile, samples = PROFILES.numbered(profile_number), KINDS_BY_NUMBER.get(kind)
+    if profile and samples and version >= profile.since and not (version == 1 and kind):
+        return profile, samples
+    package = "" if profile else "install the package that has this profile, "
+    raise InputError(
+        "PTM-I104",
+        f"uses profile {profile_number} with samples of kind {kind}, which this program does not "
+        "know",
+        remedy=f"{package}use a newer ptmtools, or encode the image again",
+    )
+
+
+def _levels(
+    entries: Iterable[tuple[int, int, int]],
+    sizes: Iterable[tuple[int, int]],
+    tile: int,
+    texel_bytes: int,
+    start: int,
+) -> tuple[Level, ...]:
+    """The levels of a group table, the first of which begins at byte ``start``. Raises InputError
+    PTM-I105 for byte ranges that no encoder writes."""
+    levels: list[Level] = []
+    expected, texels = start, 0
+    for number, ((w, h), (offset, length, crc)) in enumerate(zip(sizes, entries, strict=True)):
+        tiles = tile_counts(w, h, tile) if number else (1, 1)
+        # No coder makes a group twice as long as its texels, except for a few bytes.
+        if offset != expected or length > 2 * w * h * texel_bytes + 1024 * tiles[0] * tiles[1]:
+            raise _damaged_head(f"the byte range of level {number} is impossible")
+        expected += length
+        texels += w * h
+        levels.append(Level(w, h, offset, length, crc, tiles, texels * texel_bytes))
+    return tuple(levels)
 
 
 def whole_levels(header: PtmHeader, size: int) -> int:
