@@ -109,7 +109,7 @@ $(LINTS): $(VENV)/.installed-dev
 lint-types:
 	$(BIN)/mypy
 	$(BIN)/mypy --config-file benchmarks/mypy.ini
-	$(BIN)/mypy --config-file benchmarks/mypy.ini -p benchmarks.fuzz -p benchmarks.web_rivals
+	$(BIN)/mypy --config-file benchmarks/mypy.ini -p benchmarks.codebase -p benchmarks.fuzz -p benchmarks.web_rivals
 
 lint-tables:
 	$(BIN)/python benchmarks/docs_tables.py --check

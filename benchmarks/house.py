@@ -1,306 +1,225 @@
-"""Measures the code: files, lines, statements, imports between packages, import cycles.
+"""Measures the code of checkouts, and holds it to limits: sizes, imports, names.
 
-    python benchmarks/house.py [ROOT …]     tables for each checkout, as Markdown
-    python benchmarks/house.py --check      exit 1 if an import goes up, and name it
+    python benchmarks/house.py [ROOT …]      figures of each checkout beside each other, as Markdown
+    python benchmarks/house.py --list        where the figures come from: names and their places
+    python benchmarks/house.py --check       exit 1 if a limit is passed, and name the place
+    python benchmarks/house.py --shrink      drop exceptions that no longer apply, then check
 
-Logical lines are statements without docstrings. An import counts in any position: at the top of a
-file, inside a function, under ``if TYPE_CHECKING``, or as text in a table
-(``"package.module:function"``). A *package* is a direct child of ``ptmtools``: a folder or a single
-file.
+`--check` holds the packages to these rules:
 
-Imports go down if the packages have an order in which each imports only later ones, that is, if the
-graph of imports has no cycle. ``ptmtools_lab`` simulates clients and compares settings: only its
-own commands may import it, and no package imports the command line.
+- **Imports** go down only. The product imports none of the packages beside it, other systems do not
+  import the laboratory, nothing outside a command line imports one, and the folders of a package
+  form no circle. Imports for types, in functions and as text count.
+- **Sizes**: a package or folder grows only in a commit that changes its row in `BUDGET`.
+- **Class names** mean one thing in all packages.
+- **Locals** name a quantity: `BANNED` of `benchmarks/codebase/names.py` do not.
+- **Functions** are verbs, or nouns of their results: the number of participles and prepositions
+  stays within `NAMES`.
+
+`house_exceptions.txt` lists what broke a rule before the rule was there. It only shrinks: a line
+that no longer applies is an error, too.
 """
 
 from __future__ import annotations
 
 import argparse
-import ast
-import re
-import statistics
 import sys
-from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Set
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-PRODUCT, TOP, LABORATORY = "ptmtools", "cli", "lab"
-#: The commands of the laboratory; those of the product do not import it.
-LABORATORY_COMMANDS = {"ptmtools_lab.cli.simulation", "ptmtools_lab.cli.tradeoff"}
-TREES = (PRODUCT, "tests", "benchmarks", "sample_data")
-#: Neither is ours to measure: what npm installs, what a build writes.
-SKIPPED = {"node_modules", "build", "dist", ".venv", "__pycache__"}
-WEB = {".js", ".mjs", ".ts", ".css", ".html", ".c", ".h"}
-#: A module, or a module and a name in it, as text.
-PLACE = re.compile(r"ptmtools(\.\w+)+(:\w+)?")
-LONG = 500
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-Graph = Mapping[str, Set[str]]
+from benchmarks.codebase.graphs import circles, graph_of_children
+from benchmarks.codebase.names import (
+    banned_locals,
+    function_names,
+    is_participle,
+    is_preposition,
+    repeated_classes,
+)
+from benchmarks.codebase.report import print_places, print_report
+from benchmarks.codebase.sources import PythonFile, read_imports, read_packages
 
+#: Lines and files. Aim: `ptmtools` 58,000 lines in 290 files, all packages 78,000 lines.
+BUDGET: dict[str, tuple[int, int]] = {
+    "ptmtools": (66_990, 351),
+    "ptmtools/*.py": (3_830, 25),
+    "ptmtools/cells": (7_970, 37),
+    "ptmtools/cli": (3_190, 14),
+    "ptmtools/coverage": (2_510, 15),
+    "ptmtools/light": (2_050, 11),
+    "ptmtools/meshopt": (830, 5),
+    "ptmtools/output": (8_520, 42),
+    "ptmtools/pipeline": (4_050, 20),
+    "ptmtools/portal_flow": (1_680, 8),
+    "ptmtools/rendering": (1_990, 16),
+    "ptmtools/scene": (8_900, 47),
+    "ptmtools/schemas": (340, 1),
+    "ptmtools/simplification": (1_950, 9),
+    "ptmtools/site": (4_510, 27),
+    "ptmtools/store": (2_300, 13),
+    "ptmtools/texture": (10_190, 45),
+    "ptmtools/tour": (1_280, 10),
+    "ptmtools/visibility": (960, 6),
+    "ptmtools_lab": (10_710, 59),
+    "ptmtools_samples": (2_520, 19),
+    "ptmtools_systems": (6_670, 42),
+}
+#: Functions of a package that are named by a participle, and by a preposition.
+NAMES: dict[str, tuple[int, int]] = {
+    "ptmtools": (313, 103),
+    "ptmtools_systems": (37, 6),
+    "ptmtools_lab": (60, 17),
+    "ptmtools_samples": (11, 4),
+}
+#: What each package must not import.
+FORBIDDEN: dict[str, set[str]] = {
+    "ptmtools": {"ptmtools_systems", "ptmtools_lab", "ptmtools_samples"},
+    "ptmtools_systems": {"ptmtools_lab", "ptmtools_samples"},
+    "ptmtools_lab": {"ptmtools_samples"},
+    "ptmtools_samples": {"ptmtools_systems", "ptmtools_lab"},
+}
+EXCEPTIONS = "house_exceptions.txt"
 
-@dataclass(frozen=True)
-class Module:
-    """One Python file: its dotted name, its sizes, and the modules that it imports."""
-
-    path: Path
-    name: str
-    lines: int
-    logical: int
-    plain: frozenset[str]
-    """At run time, by a statement, at the top of the file or in a function."""
-    declared: frozenset[str]
-    """For types only, or as text that is imported when first used."""
-
-    @property
-    def package(self) -> str:
-        return self.name.split(".")[1] if "." in self.name else self.name
+Packages = dict[str, list[PythonFile]]
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("roots", nargs="*", type=Path, default=[Path()], metavar="ROOT")
-    parser.add_argument("--check", action="store_true", help="only check the imports")
-    given = parser.parse_args()
-    if not given.check:
-        for root in given.roots:
-            report(root)
+    action = parser.add_mutually_exclusive_group()
+    action.add_argument("--list", action="store_true", help="print names and places")
+    action.add_argument("--check", action="store_true", help="only check the limits")
+    action.add_argument("--shrink", action="store_true", help="drop stale exceptions, then check")
+    arguments = parser.parse_args()
+    if arguments.list:
+        for root in arguments.roots:
+            print_places(root)
         return 0
-    wrong = [line for root in given.roots for line in violations(root)]
-    print("\n".join(wrong) or "Imports go down only.")
-    return int(bool(wrong))
+    if not (arguments.check or arguments.shrink):
+        print_report(arguments.roots)
+        return 0
+    (root,) = arguments.roots
+    path = root / "benchmarks" / EXCEPTIONS
+    exceptions = path.read_text("utf-8").splitlines()
+    faults, stale = check(read_packages(root), exceptions)
+    if stale and arguments.shrink:
+        exceptions = [line for line in exceptions if line not in stale]
+        path.write_text("".join(f"{line}\n" for line in exceptions), "utf-8")
+        stale = []
+    faults += [f"{path}: no longer needed, remove it: {line}" for line in stale]
+    print("\n".join(faults) or "Imports, sizes and names are within their limits.")
+    return int(bool(faults))
 
 
-def violations(root: Path) -> list[str]:
-    """A line for each import, or circle of packages, that the rules forbid."""
-    modules = read_tree(root, PRODUCT)
-    wrong = [
-        f"{module.path} imports {target}: {rule}"
-        for module in modules
-        for target in sorted(module.plain | module.declared)
-        for package, allowed, rule in (
-            (LABORATORY, {LABORATORY}, "only its own commands may import the laboratory"),
-            (TOP, {TOP, "__main__"}, "nothing imports the command line"),
-        )
-        if package_of(target) == package
-        and module.package not in allowed
-        and not (package == LABORATORY and module.name in LABORATORY_COMMANDS)
+def check(
+    packages: Packages,
+    exceptions: Iterable[str] = (),
+    budget: dict[str, tuple[int, int]] = BUDGET,
+    ceilings: dict[str, tuple[int, int]] = NAMES,
+) -> tuple[list[str], list[str]]:
+    """A line for each broken rule, and the exceptions that no longer apply."""
+    breaches: dict[str, str] = {}
+    rules = import_faults, circle_faults, name_faults
+    for exception, fault in (pair for rule in rules for pair in rule(packages)):
+        breaches[exception] = f"{breaches[exception]}\n{fault}" if exception in breaches else fault
+    known = {line for line in exceptions if line and not line.startswith("#")}
+    faults = [fault for exception, fault in breaches.items() if exception not in known]
+    faults += size_faults(packages, budget)
+    faults += ceiling_faults(packages, ceilings)
+    return faults, sorted(known - breaches.keys())
+
+
+def import_faults(packages: Packages) -> Iterator[tuple[str, str]]:
+    """Forbidden imports: the line that excepts each, and its message."""
+    imports = read_imports(packages)
+    for package, files in packages.items():
+        for file in files:
+            for target in sorted(imports[file.name].any):
+                goal = target.split(".")[0]
+                if goal in FORBIDDEN[package]:
+                    rule = f"{package} must not import {goal}"
+                elif target.split(".")[1:2] == ["cli"] and not may_import_commands(file, goal):
+                    rule = "only commands and entry points import a command line"
+                else:
+                    continue
+                yield f"import {file.path} {goal}", f"{file.path} imports {target}: {rule}"
+
+
+def may_import_commands(file: PythonFile, package: str) -> bool:
+    """Whether a file is a part of a command line, or names the commands of its package."""
+    inside = file.name.split(".")[1:2]
+    return inside == ["cli"] or (file.package == package and inside in (["__main__"], ["entries"]))
+
+
+def circle_faults(packages: Packages) -> Iterator[tuple[str, str]]:
+    """Circles between the folders and single files of a package."""
+    imports = read_imports(packages)
+    for files in packages.values():
+        for ring in circles(graph_of_children(files, imports)):
+            members = " ".join(ring)
+            yield f"circle {members}", f"folders that import each other: {members}"
+
+
+def name_faults(packages: Packages) -> Iterator[tuple[str, str]]:
+    """Repeated classes and banned locals: the line that excepts each, and its message."""
+    files = [file for members in packages.values() for file in members]
+    for name, places in repeated_classes(files).items():
+        yield f"class {name}", f"class {name} is defined more than once: {', '.join(places)}"
+    for file in files:
+        for line, name in banned_locals(file):
+            yield f"locals {file.path}", f"{file.path}:{line}: name the quantity, not `{name}`"
+
+
+def size_faults(packages: Packages, budget: dict[str, tuple[int, int]]) -> list[str]:
+    """A message for each package or folder that has no row, or is larger than its row."""
+    sizes = measure_sizes(packages)
+    faults = [f"{name} has no row in BUDGET" for name in sizes.keys() - budget.keys()]
+    faults += [
+        f"BUDGET has a row of {name}, which is gone" for name in budget.keys() - sizes.keys()
     ]
-    for circle in circles(between_packages(modules)):
-        wrong.append(f"packages in a circle: {', '.join(circle)}")
-        wrong += [
-            f"    {module.path} imports {target}"
-            for module in modules
-            for target in sorted(module.plain | module.declared)
-            if {module.package, package_of(target)} <= set(circle)
-            and module.package != package_of(target)
-        ]
-    return wrong
+    for name in sizes.keys() & budget.keys():
+        for amount, limit, unit in zip(sizes[name], budget[name], ("lines", "files"), strict=True):
+            if amount > limit:
+                faults.append(
+                    f"{name} has {amount:,} {unit}, {amount - limit:,} more than its row in BUDGET:"
+                    " remove code, or change the row and say why in the commit"
+                )
+    return sorted(faults)
 
 
-def report(root: Path) -> None:
-    """Prints the tables of one checkout."""
-    print(f"| {root.resolve().name} | files | lines | logical | median | largest |")
-    print("|---|---|---|---|---|---|")
-    trees = {tree: read_tree(root, tree) for tree in TREES}
-    product = trees[PRODUCT]
-    folders = sorted({m.package for m in product if len(m.path.parts) > 2})
-    for folder in folders:
-        size_row(f"{PRODUCT}/{folder}", [m for m in product if m.path.parts[1] == folder])
-    size_row(f"{PRODUCT}/*.py", [m for m in product if len(m.path.parts) == 2])
-    for tree, modules in trees.items():
-        size_row(f"**{tree}**", modules)
-    scripts = [path for tree in (PRODUCT, "web") for path in files(root / tree, WEB)]
-    web = {path: path.read_text("utf-8").count("\n") for path in scripts}
-    sizes = f"{len(web)} | {sum(web.values()):,} | | {middle(web.values())} | {most(web)}"
-    print(f"| **web and page** | {sizes} |")
-    words = {path: len(path.read_text("utf-8").split()) for path in files(root / "docs", {".md"})}
-    print(f"\ndocs: {len(words)} pages, {sum(words.values()):,} words")
-    print(f"files of {PRODUCT} over {LONG} lines: {sum(m.lines > LONG for m in product)}")
-    plain = {m.name: m.plain for m in product}
-    every = {m.name: m.plain | m.declared for m in product}
-    for title, graph in (
-        ("files, at run time", plain),
-        ("files, types and tables included", every),
-        ("packages", between_packages(product)),
-    ):
-        rings = circles(graph)
-        print(f"circles between {title}: {len(rings)}")
-        for ring in rings:
-            print(f"    {len(ring)}: {', '.join(ring)}")
-    if not circles(between_packages(product)):
-        print(f"packages, each above what it imports: {' '.join(order(between_packages(product)))}")
+def measure_sizes(packages: Packages) -> dict[str, tuple[int, int]]:
+    """Lines and files of each package, and of the folders of the product."""
+    groups: dict[str, list[PythonFile]] = {}
+    for package, files in packages.items():
+        groups[package] = files
+        if package == "ptmtools":
+            for file in files:
+                groups.setdefault(file.folder, []).append(file)
+    return {name: (sum(f.lines for f in files), len(files)) for name, files in groups.items()}
 
 
-def size_row(name: str, modules: list[Module]) -> None:
-    """Prints the sizes of some modules; an empty ``__init__.py`` is no file of the median."""
-    lines = {module.path: module.lines for module in modules}
-    print(
-        f"| {name} | {len(modules)} | {sum(lines.values()):,} "
-        f"| {sum(m.logical for m in modules):,} | {middle(lines.values())} | {most(lines)} |"
-    )
+def ceiling_faults(packages: Packages, ceilings: dict[str, tuple[int, int]]) -> list[str]:
+    """A message for each package with more participles or prepositions than it may have."""
+    faults = []
+    for package, counts in count_names(packages).items():
+        limits = ceilings.get(package, (0, 0))
+        for count, limit, kind in zip(counts, limits, ("participle", "preposition"), strict=True):
+            if count > limit:
+                faults.append(
+                    f"{package}: {count} functions are named by a {kind}, {limit} are allowed;"
+                    " name them by a verb or by their result (--list shows all)"
+                )
+    return faults
 
 
-def middle(lines: Iterable[int]) -> int:
-    """The median of the files that have more than two lines."""
-    return round(statistics.median([count for count in lines if count > 2] or [0]))
-
-
-def most(lines: Mapping[Path, int]) -> str:
-    """The largest file and its lines."""
-    path = max(lines, key=lambda path: lines[path], default=None)
-    return f"{lines[path]:,} {path.name}" if path else ""
-
-
-def files(folder: Path, suffixes: Set[str]) -> list[Path]:
-    """The files below a folder that are part of the project, sorted."""
-    return sorted(
-        path
-        for path in folder.rglob("*")
-        if path.suffix in suffixes
-        and not SKIPPED & set(path.relative_to(folder).parts)
-        and path.is_file()
-    )
-
-
-def read_tree(root: Path, tree: str) -> list[Module]:
-    """The Python files of one tree of a checkout, measured."""
-    return [read(root, file) for file in files(root / tree, {".py"})]
-
-
-def read(root: Path, file: Path) -> Module:
-    """Measures one file of a checkout."""
-    text = file.read_text("utf-8")
-    tree = ast.parse(text)
-    path = file.relative_to(root)
-    docs = {id(doc) for node in ast.walk(tree) if (doc := docstring(node)) is not None}
-    logical = sum(isinstance(node, ast.stmt) and id(node) not in docs for node in ast.walk(tree))
-    name = ".".join(path.with_suffix("").parts).removesuffix(".__init__")
-    plain, declared = imports(root, tree, name, docs)
-    return Module(path, name, text.count("\n"), logical, plain - {name}, declared - plain - {name})
-
-
-def docstring(node: ast.AST) -> ast.stmt | None:
-    """The statement that is the docstring of a module, class or function."""
-    if not isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-        return None
-    first = node.body[0] if node.body else None
-    if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant):
-        return first if isinstance(first.value.value, str) else None
-    return None
-
-
-def imports(
-    root: Path, tree: ast.AST, name: str, docs: Set[int]
-) -> tuple[frozenset[str], frozenset[str]]:
-    """The modules of the product that a file imports: at run time, and for types or as text."""
-    for_types = {
-        id(inner)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
-        for inner in ast.walk(node)
+def count_names(packages: Packages) -> dict[str, tuple[int, int]]:
+    """Functions of each package that are named by a participle, and by a preposition."""
+    names = {package: list(function_names(files)) for package, files in packages.items()}
+    return {
+        package: (sum(map(is_participle, found)), sum(map(is_preposition, found)))
+        for package, found in names.items()
     }
-    texts = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-    plain: set[str] = set()
-    declared: set[str] = set()
-    for node in ast.walk(tree):
-        places: Iterator[str] = iter(())
-        if isinstance(node, ast.Import):
-            places = (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            base = node.module or ""
-            if node.level:
-                base = ".".join([*name.split(".")[: -node.level], *base.split(".")]).strip(".")
-            places = (f"{base}.{alias.name}" for alias in node.names)
-        elif isinstance(node, ast.Constant | ast.JoinedStr) and id(node) not in texts:
-            text = written(node, name)
-            places = iter([text.replace(":", ".")] if PLACE.fullmatch(text) else [])
-        kept = {actual for place in places if (actual := module_of(root, place))}
-        by_statement = isinstance(node, ast.Import | ast.ImportFrom) and id(node) not in for_types
-        (plain if by_statement else declared).update(kept)
-    return frozenset(plain), frozenset(declared)
-
-
-def written(node: ast.Constant | ast.JoinedStr, name: str) -> str:
-    """A text of the source; in an f-string only ``__name__`` is replaced."""
-    if isinstance(node, ast.Constant):
-        return node.value if isinstance(node.value, str) else ""
-    parts = [
-        str(part.value)
-        if isinstance(part, ast.Constant)
-        else (name if ast.unparse(part).strip("f'\"{}") == "__name__" else "?")
-        for part in node.values
-    ]
-    return "".join(parts)
-
-
-def module_of(root: Path, place: str) -> str | None:
-    """The longest part of a dotted name that is a file of the product, if there is any."""
-    parts = place.split(".")
-    while parts[0] == PRODUCT and len(parts) > 1:
-        path = root.joinpath(*parts)
-        if path.with_suffix(".py").is_file() or (path / "__init__.py").is_file():
-            return ".".join(parts)
-        parts.pop()
-    return None
-
-
-def package_of(module: str) -> str:
-    """The folder or file directly below the product in which a module stands."""
-    return module.split(".")[1]
-
-
-def between_packages(modules: list[Module]) -> dict[str, set[str]]:
-    """The packages that each package imports."""
-    graph: dict[str, set[str]] = defaultdict(set)
-    for module in modules:
-        targets = {package_of(target) for target in module.plain | module.declared}
-        graph[module.package] |= targets - {module.package}
-    return dict(graph)
-
-
-def order(graph: Graph) -> list[str]:
-    """Names, each before those that it imports; the graph has no circle."""
-    waiting = Counter(target for targets in graph.values() for target in targets)
-    ready = sorted((name for name in graph if not waiting[name]), reverse=True)
-    result: list[str] = []
-    while ready:
-        result.append(ready.pop())
-        for target in sorted(graph.get(result[-1], ()), reverse=True):
-            waiting[target] -= 1
-            if not waiting[target]:
-                ready.append(target)
-    return result
-
-
-def circles(graph: Graph) -> list[list[str]]:
-    """Groups of names that import each other, in however many steps (Tarjan 1972)."""
-    index: dict[str, int] = {}
-    low: dict[str, int] = {}
-    stack: list[str] = []
-    rings: list[list[str]] = []
-
-    def visit(name: str) -> None:
-        index[name] = low[name] = len(index)
-        stack.append(name)
-        for other in sorted(graph[name] & graph.keys()):
-            if other not in index:
-                visit(other)
-                low[name] = min(low[name], low[other])
-            elif other in stack:
-                low[name] = min(low[name], index[other])
-        if low[name] == index[name]:
-            at = stack.index(name)
-            ring = sorted(stack[at:])
-            del stack[at:]
-            if len(ring) > 1:
-                rings.append(ring)
-
-    sys.setrecursionlimit(10_000)
-    for name in graph:
-        if name not in index:
-            visit(name)
-    return rings
 
 
 if __name__ == "__main__":

@@ -1,0 +1,1 @@
+"""What `benchmarks/house.py` measures and checks: sources, imports, names, parameters."""
