@@ -1,8 +1,13 @@
-"""Cleans the faces of a model: welds points, drops degenerate and duplicate faces.
+"""Cleans the faces of a model: welds points, drops stray, degenerate and duplicate faces.
 
 Points are welded if their coordinates are equal, not if they are near: nearness is decided by the
 planes of the cells. A face is degenerate if its height is below the rounding of the coordinates.
 Duplicates have the same three points and winding, in any rotation.
+
+A face is a stray if a corner lies a thousand sizes of the model beyond it. All tolerances are
+shares of the extent, so one stray at 100 km would take the doorways from a house of 10 m. (Kept as
+distant objects with the tolerances of the rest, strays would lie beyond what float32 and the grid
+of polygons resolve.)
 """
 
 from __future__ import annotations
@@ -13,6 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.tolerance import ROUNDING_SHARE
+
+#: A face is a stray beyond this many sizes of the faces around the middle of the model,
+_REACH = 1000.0
+#: which are found from the corners of this many faces.
+_SAMPLE = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -26,8 +36,9 @@ class KeptFaces:
     source: (T,) int64 number of each face before cleaning, increasing.
     paired: (T,) bool, another kept face has the same points and the opposite winding.
     keeper: (N,) int64 for every face before cleaning: the face kept in its place, or -1 if it was
-        dropped as degenerate or not finite.
+        dropped as degenerate, stray or not finite.
     not_finite, degenerate: numbers of dropped faces.
+    strays: (n,) int64 numbers of the faces dropped as strays, increasing.
     """
 
     points: NDArray[np.float64]
@@ -37,6 +48,7 @@ class KeptFaces:
     keeper: NDArray[np.int64]
     not_finite: int
     degenerate: int
+    strays: NDArray[np.int64]
 
 
 def keep_faces(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> KeptFaces:
@@ -44,6 +56,8 @@ def keep_faces(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> Kep
     finite_point = np.asarray(np.isfinite(points).all(axis=1))
     finite = finite_point[triangles].all(axis=1)
     source = np.flatnonzero(finite)
+    far = stray_faces(points, triangles[source])
+    strays, source = source[far], source[~far]
     welded, index = _weld(points, triangles[source])
 
     thin = _degenerate(welded, index)
@@ -78,7 +92,28 @@ def keep_faces(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> Kep
         keeper=keeper,
         not_finite=int((~finite).sum()),
         degenerate=int(thin.sum()),
+        strays=strays,
     )
+
+
+def stray_faces(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(T,) which of (T, 3) triangles over (P, 3) points, finite where used, are strays: those
+    beyond the first gap of `_REACH` sizes that leaves most triangles on its inner side."""
+    none = np.zeros(len(triangles), dtype=bool)
+    if not len(triangles):
+        return none
+    sample = triangles[:: -(-len(triangles) // _SAMPLE)].reshape(-1)
+    middle = np.median(points[sample], axis=0)
+    with np.errstate(over="ignore", invalid="ignore"):  # of points that no triangle uses, too
+        # By the longest coordinate, since the square of 1e308 is infinite.
+        radius = np.abs(points - middle).max(axis=1)[triangles].max(axis=1)
+        half = len(radius) // 2
+        inner = float(np.partition(radius, half)[half])
+        if not radius.max() / _REACH > 2 * inner > 0:
+            return none
+        ordered = np.sort(radius)[half:]
+        gap = np.flatnonzero(ordered[1:] / _REACH > 2 * ordered[:-1])
+    return radius > ordered[gap[0]] if len(gap) else none
 
 
 def _weld(

@@ -235,6 +235,15 @@ def _read(model: Path, findings: Findings, progress: Progress, options: IngestOp
 
 
 def _note_faces(kept: KeptFaces, source: Source, findings: Findings) -> None:
+    if len(kept.strays):
+        corners = source.points[source.triangles[kept.strays]].reshape(-1, 3)
+        x, y, z = corners[np.abs(corners).max(axis=1).argmax()].tolist()
+        share = 100 * len(kept.strays) / len(source.triangles)
+        message = (
+            f"faces a thousand sizes of the model away from it left out, {share:.2g}% of all, one "
+            f"with a corner at {x:.6g}, {y:.6g}, {z:.6g}"
+        )
+        findings.miss("PTM-N210", message, "", len(kept.strays))
     dropped = np.flatnonzero((kept.keeper >= 0) & (kept.keeper != np.arange(len(kept.keeper))))
     material = source.triangle_material
     other = int((material[dropped] != material[kept.keeper[dropped]]).sum())

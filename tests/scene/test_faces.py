@@ -32,6 +32,33 @@ def test_degenerate_and_not_finite() -> None:
     assert result.keeper.tolist() == [-1, -1, -1, -1, 4]
 
 
+ROOM = np.random.default_rng(2).uniform(-4, 4, (60, 3)).round(3)
+STRAYS = [[100, 0, 0], [0, 101, 0], [0, 0, 102]]
+
+
+@pytest.mark.parametrize("scale", [1e-200, 1.0, 1e200])
+@pytest.mark.parametrize("distance", [1e5, 1e7, 1e300, 1e308])
+def test_strays_change_nothing(distance: float, scale: float) -> None:
+    """A face out there, and one that a corner of the room spans with a corner out there."""
+    clean = np.arange(60).reshape(-1, 3)
+    far = np.sign(STRAYS) * min(distance, 1e308 / scale) + STRAYS
+    faces = np.concatenate([clean[:9], [[60, 61, 62], [0, 1, 60]], clean[9:]])
+    result = keep_faces(np.concatenate([ROOM, far]) * scale, faces)
+    assert result.strays.tolist() == [9, 10]
+    assert np.array_equal(result.points, keep_faces(ROOM * scale, clean).points)
+    assert (result.keeper == -1).nonzero()[0].tolist() == [9, 10]
+
+
+def test_what_is_no_stray() -> None:
+    """A model of few large faces around many small ones, and one of two equal halves."""
+    clean = np.arange(60).reshape(-1, 3)
+    ground = np.array([[-3e3, 0, -3e3], [3e3, 0, -3e3], [0, 0, 5e3]])
+    assert not len(keep_faces(np.concatenate([ROOM, ground]), np.arange(63).reshape(-1, 3)).strays)
+    halves = np.concatenate([ROOM, ROOM + 1e6, ROOM - 1e6])
+    assert not len(keep_faces(halves, np.arange(180).reshape(-1, 3)).strays)
+    assert not len(keep_faces(ROOM * 0, clean).strays)
+
+
 def test_points_are_those_in_use_in_the_order_of_their_use() -> None:
     result = kept([[3, 2, 5], [1, 2, 0]])
     assert result.points.tolist() == POINTS[[3, 2, 1, 0]].tolist()

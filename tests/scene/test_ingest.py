@@ -17,6 +17,7 @@ from PIL import Image
 
 from ptmtools.errors import InputError, LimitError, PtmError
 from ptmtools.scene import IngestOptions, Scene, ingest
+from tests.conftest import ROOT
 
 from .conftest import FACE, QUAD, Put, noise, png
 
@@ -270,6 +271,21 @@ def test_faces_that_go_and_faces_that_stay(put: Put) -> None:
     assert scene.triangles.tolist() == [[0, 1, 2], [2, 1, 0], [0, 2, 3]]
     assert scene.two_sided.tolist() == [False, False, True]
     assert [m.name for m in scene.materials] == ["a"]
+
+
+@pytest.mark.parametrize("far", ["1e5", "1e7", "1e308"])
+def test_a_stray_face_is_left_out_and_told(put: Put, far: str) -> None:
+    """The rest of the scene, and so each cell, is that of the model without it."""
+    text = (ROOT / "sample_data/two_rooms/two_rooms.obj").read_text("utf-8")
+    clean = ingest(put("a.obj", text), IngestOptions(unit="m", up="y"))
+    stray = f"\nv {far} 0 0\nv {far} 1 0\nv {far} 0 1\nf -1 -2 -3\n"
+    scene = ingest(put("b.obj", text + stray), IngestOptions(unit="m", up="y"))
+    assert np.array_equal(scene.corners, clean.corners)
+    assert scene.tolerance == clean.tolerance
+    [note] = [note for note in scene.notes if note.code == "PTM-N210"]
+    assert note.count == 1
+    assert f"one with a corner at {float(far):.6g}, 0, " in note.message
+    assert f"{100 / (len(clean.triangles) + 1):.2g}% of all" in note.message
 
 
 def test_coordinates_that_are_not_finite(put: Put) -> None:
