@@ -25,6 +25,7 @@ from itertools import count
 from queue import LifoQueue, SimpleQueue
 from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
+from ptmtools.child import watch_child
 from ptmtools.errors import WorkerError
 from ptmtools.executor import (
     AHEAD,
@@ -53,6 +54,10 @@ ALIGNMENT = 64
 SMALL = 1 << 12
 #: Background tasks for each process: starting one takes a second.
 WORTH_A_PROCESS = 8
+#: Seconds without any progress after which a worker process is ended; attempts at its call.
+IDLE, _ATTEMPTS = 600.0, 2
+#: Seconds to wait for a killed process, which a lost disk may keep.
+_ENDING = 10.0
 
 
 def processors() -> int:
@@ -261,30 +266,42 @@ class Process:
         self._running: tuple[BaseProcess, Connection] | None = None
 
     def call(self, function: Callable[..., Outcome], *arguments: Any) -> Outcome:
-        """``function(*arguments)`` in the process. Blocks Ctrl-C in the calling thread for good.
+        """``function(*arguments)`` in the process; again in a new one if it makes no progress.
+        Blocks Ctrl-C in the calling thread for good.
 
-        Raises WorkerError PTM-W004 if the process ends.
+        Raises WorkerError PTM-W004 if the process ends, PTM-W006 without progress in all attempts.
         """
-        try:
-            pipe = self._started()
-            pipe.send((function, arguments))
-            answer: Outcome = pipe.recv()
-        except (EOFError, OSError) as fault:
-            self._end()
-            raise WorkerError(
-                "PTM-W004",
-                "a worker process ended while it worked",
-                remedy="if it ran out of memory, use fewer workers (-j 1); a script "
-                "that starts processes needs `if __name__ == '__main__'`",
-            ) from fault
-        return answer
+        for _ in range(_ATTEMPTS):
+            watch = None
+            try:
+                process, pipe = self._started()
+                with watch_child(process.pid or 0, process.kill, IDLE) as watch:
+                    pipe.send((function, arguments))
+                    answer: Outcome = pipe.recv()
+                if watch.expired:  # just when it replied
+                    self._end()
+                return answer
+            except (EOFError, OSError) as fault:
+                self._end()
+                if watch is None or not watch.expired:
+                    raise WorkerError(
+                        "PTM-W004",
+                        "a worker process ended while it worked",
+                        remedy="if it ran out of memory, use fewer workers (-j 1); a script "
+                        "that starts processes needs `if __name__ == '__main__'`",
+                    ) from fault
+        raise WorkerError(
+            "PTM-W006",
+            f"a worker process stood still for {IDLE:g} s, {_ATTEMPTS} times",
+            remedy="run the same command again to resume; if it happens again, with -j 1",
+        )
 
     def close(self) -> None:
         """Ends the process for good, during a task if need be. Any thread may call it."""
         self._closed = True
         self._end()
 
-    def _started(self) -> Connection:
+    def _started(self) -> tuple[BaseProcess, Connection]:
         from multiprocessing import get_context, resource_tracker
 
         with self._changing:
@@ -301,14 +318,14 @@ class Process:
                 with theirs:
                     process.start()
                 self._running = process, ours
-            return self._running[1]
+            return self._running
 
     def _end(self) -> None:
         with self._changing:
             if self._running:
                 process, _ = self._running
                 process.kill()
-                process.join()
+                process.join(_ENDING)
                 self._running = None
 
 

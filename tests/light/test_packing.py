@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 from typing import Any
 
 import numpy as np
@@ -64,3 +66,70 @@ def test_crashes_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(WorkerError, match="xatlas crashes") as refused:
         pack(MESHES, 16.0, 1)
     assert refused.value.code == "PTM-W004"
+
+
+SILENT = "import time; time.sleep(600)"
+HALF = """
+import struct, sys, time
+sys.stdout.buffer.write(struct.pack("<Q", 1000) + bytes(10))
+sys.stdout.flush()
+time.sleep(600)
+"""
+#: An atlas whose destruction does not end.
+STUCK = """
+import time
+from ptmtools.light import packing
+
+class Atlas:
+    def __init__(self, atlas):
+        self.atlas = atlas
+    def __del__(self):
+        time.sleep(600)
+
+reply = packing._reply
+def with_stuck_atlas(request):
+    atlas, message = reply(request)
+    return Atlas(atlas), message
+
+packing._reply, packing._DESTRUCTION = with_stuck_atlas, 0.05
+packing._serve()
+"""
+
+
+def planted(monkeypatch: pytest.MonkeyPatch, *scripts: str) -> None:
+    """Makes the next children run scripts."""
+    rest, start = list(scripts), packing._started
+
+    def started() -> subprocess.Popen[bytes]:
+        if not rest:
+            return start()
+        command = [sys.executable, "-c", rest.pop(0)]
+        return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+
+    monkeypatch.setattr(packing, "_started", started)
+    monkeypatch.setattr(packing, "_child", None)
+
+
+def test_a_child_that_stands_still_is_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
+    planted(monkeypatch, SILENT, HALF)
+    monkeypatch.setattr(packing, "_IDLE", 0.5)
+    assert pack(MESHES, 16.0, 1).width > 0
+
+
+def test_children_that_stand_still_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    planted(monkeypatch, SILENT, HALF, SILENT)
+    monkeypatch.setattr(packing, "_IDLE", 0.2)
+    with pytest.raises(WorkerError, match="xatlas stands still") as refused:
+        pack(MESHES, 16.0, 1)
+    assert refused.value.code == "PTM-W006"
+    assert packing._child is None
+
+
+def test_the_reply_comes_before_the_destruction(monkeypatch: pytest.MonkeyPatch) -> None:
+    planted(monkeypatch, STUCK)
+    first = pack(MESHES, 16.0, 1)
+    stuck = the_child()
+    assert stuck.wait(10) == 1  # by itself
+    again = pack(MESHES, 16.0, 1)
+    assert the_child() is not stuck
+    assert (again.width, again.height) == (first.width, first.height)

@@ -15,6 +15,7 @@ from pathlib import Path
 import parallel_tasks as tasks
 import pytest
 
+from ptmtools import parallel
 from ptmtools.errors import InputError, OutputError, WorkerError
 from ptmtools.executor import Executor
 from ptmtools.parallel import Local, in_background, open_executor
@@ -108,6 +109,23 @@ def test_a_worker_that_is_killed_is_an_error_and_not_the_end(local):
     with pytest.raises(WorkerError, match="PTM-W004"):
         list(actual)
     assert list(local.each(tasks.die, 3, range(3))) == [0, 1, 2]
+
+
+def test_a_worker_that_stands_still_is_replaced(tmp_path, monkeypatch):
+    monkeypatch.setattr(parallel, "IDLE", 0.6)
+    with Local(1, threads=False) as local:
+        assert list(local.each(tasks.send_half, tmp_path, [0])) == [bytes(1000)]
+        monkeypatch.setattr(parallel, "_ATTEMPTS", 1)
+        with pytest.raises(WorkerError, match=r"stood still for 0.6 s.*PTM-W006"):
+            list(local.each(tasks.stand_still, tmp_path, [1]))
+
+
+def test_a_busy_worker_is_left_alone(monkeypatch):
+    """One that waits for a child of its own is busy, too."""
+    monkeypatch.setattr(parallel, "IDLE", 0.6)
+    with Local(1, threads=False) as local:
+        assert list(local.each(tasks.compute, 0.9, [1])) == [1]
+        assert list(local.each(tasks.watch_a_child, 1.2, [1])) == [1]
 
 
 def test_a_script_without_a_guard_is_told_what_it_needs(tmp_path):

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import os
 import signal
+import struct
+import subprocess
 import threading
 import time
 import uuid
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ptmtools.child import watch_child
 from ptmtools.errors import InputError
 
 
@@ -101,6 +105,52 @@ def die_while_sending(_: Any, i: int) -> Any:
 def note_and_sleep(folder: Path, seconds: float) -> None:
     (folder / str(os.getpid())).touch()
     time.sleep(seconds)
+
+
+def stand_still(folder: Path, i: int) -> int:
+    """Never returns where its file is not yet in the folder."""
+    file = folder / str(i)
+    while not file.exists():
+        file.touch()
+        time.sleep(600)
+    return i
+
+
+def send_half(folder: Path, i: int) -> bytes:
+    """As `stand_still`, in the middle of its answer."""
+    file = folder / str(i)
+    if not file.exists():
+        file.touch()
+
+        def send(connection: Connection, answer: bytes) -> None:
+            os.write(
+                connection.fileno(), struct.pack("!i", len(answer)) + answer[: len(answer) // 2]
+            )
+            time.sleep(600)
+
+        Connection._send_bytes = send
+    return bytes(1000)
+
+
+def compute(seconds: float, i: int) -> int:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        pass
+    return i
+
+
+def sleep(seconds: float, i: int) -> int:
+    time.sleep(seconds)
+    return i
+
+
+def watch_a_child(seconds: float, i: int) -> int:
+    with (
+        subprocess.Popen(["sleep", str(seconds)]) as child,
+        watch_child(child.pid, child.kill, 1.5),
+    ):
+        child.wait()
+    return i
 
 
 def process(_: Any, i: int) -> int:
