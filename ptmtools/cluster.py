@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
 import pickle
 import sys
 import threading
@@ -29,6 +30,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
+from ptmtools.child import watch_thread
 from ptmtools.errors import WorkerError
 from ptmtools.executor import AHEAD, Executor, Outcome, Task, chunks, in_order, outcome, results
 from ptmtools.lazy import component
@@ -39,6 +41,8 @@ from ptmtools.version import __version__
 PATIENCE = 15
 #: Seconds between two counts of the workers.
 COUNT_INTERVAL = 5
+#: Seconds without any processor time in which a task may wait, say for a child, in a worker.
+IDLE = 7200.0
 #: Times that a shared value is scattered again in one call.
 AGAIN = 3
 #: Libraries whose arithmetic affects the results of tasks.
@@ -123,8 +127,7 @@ class Cluster(Executor):
         for left in range(AGAIN, -1, -1):
             todo = chain(tuple(sent), taken())
             try:
-                with self._losses():
-                    [value] = self._client.scatter([shared], broadcast=True, hash=False)
+                value = self._scatter(shared)
                 for done in in_order(submit, todo, self._ahead, result=self._result):
                     sent.popleft()
                     yield done
@@ -139,6 +142,15 @@ class Cluster(Executor):
             finally:
                 if value is not None:
                     value.release()  # or the client would keep it on the workers
+
+    def _scatter(self, shared: Any) -> Any:
+        """The Dask future of a shared value."""
+        with self._losses():
+            try:
+                [value] = self._client.scatter([shared], broadcast=True, hash=False)
+            except ValueError as fault:  # Dask's own, if the worker that received it has ended
+                raise OSError("the shared value was lost") from fault
+        return value
 
     def close(self) -> None:
         """Leaves the cluster, which drops our tasks."""
@@ -247,7 +259,8 @@ def _perform(value: Any, call: bytes, alone: bool, theirs: tuple[str, ...]) -> O
 
         raise _other_software(get_worker().address, difference)
     function, tasks = pickle.loads(call)
-    with _alone if alone else nullcontext():
+    # Dask repeats the task elsewhere.
+    with _alone if alone else nullcontext(), watch_thread(lambda: os._exit(1), IDLE):
         return outcome(function, value, tasks)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import pickle
 import signal
 import sys
 import threading
@@ -55,6 +56,27 @@ def test_workers_with_other_software(scheduler, cluster, monkeypatch):
         open_executor(scheduler=scheduler)
     with pytest.raises(WorkerError, match="PTM-W003"):  # one that joined since
         list(cluster.each(tasks.refuse, 0, [1]))
+
+
+def test_a_task_that_stands_still_ends_its_worker(monkeypatch):
+    ended: list[int] = []
+    monkeypatch.setattr(os, "_exit", ended.append)
+    monkeypatch.setattr(module, "IDLE", 0.3)
+    for function, expected in ((tasks.compute, []), (tasks.sleep, [1])):
+        call = pickle.dumps((function, [1]))
+        assert module._perform(0.5, call, False, software()) == ([1], None)
+        assert ended == expected
+
+
+def test_a_value_is_lost_while_it_is_scattered(cluster, monkeypatch):
+    scatter = cluster._client.scatter
+
+    def lost(*_args, **_settings):
+        monkeypatch.setattr(cluster._client, "scatter", scatter)
+        raise ValueError("Can not use replicate to delete data")
+
+    monkeypatch.setattr(cluster._client, "scatter", lost)
+    assert list(cluster.each(tasks.at, np.arange(9.0), [7, 8])) == [7, 8]
 
 
 def test_dying_workers(require, monkeypatch):
