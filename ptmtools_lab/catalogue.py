@@ -24,13 +24,11 @@ from ptmtools.output.model import sizes_of
 from ptmtools.output.served import Document, Served
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.scene.colors import gradients
+from ptmtools.site.client import LEAST_DIFFERENCE, NORMALS
 from ptmtools.texture.model import gpu_texel_bytes
 from ptmtools.walk import Browser
 from ptmtools_lab.meshes import Meshes, meshes_of
-from ptmtools_lab.previews import LEAST, Previews, no_previews, previews_of
-
-#: Worth, and error, of a difference of normals: they come after the colours.
-NORMALS = 0.25
+from ptmtools_lab.previews import Previews, no_previews, previews_of
 
 
 class Columns(NamedTuple):
@@ -139,7 +137,7 @@ class Catalogue:
     memory: (T, K) bytes of texture memory. size: (T, K, 2) width and height of the finest
         image that a column shows.
     differences: (T, K) mean difference of each column's texels to the column before, 0 to 255, at
-        least `LEAST`; 0 after the last column.
+        least `LEAST_DIFFERENCE`; 0 after the last column.
     colors: (T, 3) mean colour, 0 to 255.
     index_bytes, statistics_bytes, record_bytes, geometry_bytes: bytes on the link; the latter two
         are (C,).
@@ -258,7 +256,7 @@ class Catalogue:
 
     def in_columns(self, columns: Columns) -> Catalogue:
         """The same textures with other columns, all of the least difference, and no previews."""
-        differences = np.where(_existing(columns), LEAST, 0.0)
+        differences = np.where(_existing(columns), LEAST_DIFFERENCE, 0.0)
         previews = no_previews(self.texture_count)
         return replace(self, **columns._asdict(), differences=differences, previews=previews)
 
@@ -306,7 +304,7 @@ def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalog
     boxes = np.array([cell["box"] for cell in served.index["cells"]], dtype=np.float64)
     low, high = boxes.reshape(-1, 2, 3).transpose(1, 0, 2).copy()
     existing = _existing(columns)
-    differences_[existing] = np.maximum(differences_[existing], LEAST)
+    differences_[existing] = np.maximum(differences_[existing], LEAST_DIFFERENCE)
     return Catalogue(
         **columns._asdict(),
         differences=differences_,

@@ -25,15 +25,16 @@ from enum import IntEnum
 import numpy as np
 
 from ptmtools.arrays import Bools, Ints
+from ptmtools.site.client import (
+    ENOUGH_BYTES,
+    ENOUGH_SECONDS,
+    HALF_LIFE,
+    LATENCIES,
+    PRIOR_BANDWIDTH,
+    PRIOR_LATENCY,
+)
 from ptmtools_lab.network import Link, Request
 from ptmtools_lab.world import World
-
-#: Half-life of arrived bytes, in s of arrival time.
-HALF_LIFE = 1.0
-#: Below these bytes and s the estimate is the prior.
-ENOUGH_BYTES, ENOUGH_SECONDS = 16_384, 0.25
-#: Number of latencies in the mean.
-LATENCIES = 8
 
 
 class Estimate:
@@ -82,10 +83,6 @@ class Estimate:
     def duration(self, size: float) -> float:
         """s until a request of ``size`` bytes would be finished, alone on the link."""
         return self.latency + 8 * size / self.bandwidth if self.bandwidth else math.inf
-
-
-#: Prior estimate of a link: bit/s and s.
-PRIOR = (1e6, 0.1)
 
 
 class Kind(IntEnum):
@@ -189,7 +186,7 @@ class Client(ABC):
         self.meshes = self.files[Kind.MESH]
         self.column = np.zeros(stock.texture_count, np.int64)
         self.source = np.arange(stock.texture_count)
-        self.estimate = Estimate(link, *PRIOR)
+        self.estimate = Estimate(link, PRIOR_BANDWIDTH, PRIOR_LATENCY)
         self.waiting: list[Request] = []
         #: The cell whose record is in use: the current one, once its record has arrived.
         self.cell = -1

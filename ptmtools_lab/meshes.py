@@ -14,9 +14,7 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.rendering.rays import Frustum
-
-#: Error by distance that can be seen, and that counts half as much as a pixel without geometry.
-SEEN, GROSS = 5e-4, 0.05
+from ptmtools.site.client import GROSS, SEEN
 
 
 @dataclass(frozen=True)

@@ -18,12 +18,7 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.rendering.lossy import states_of
-
-#: Least difference of a level or a preview, 0 to 255: a level that only repeats the texels of the
-#: one below still sharpens the filtering between them.
-LEAST = 0.5
-#: Share of the error of an image that is left when it is halved.
-AVERAGING = 0.5
+from ptmtools.site.client import AVERAGING, LEAST_DIFFERENCE
 
 
 class Previews(NamedTuple):
@@ -35,7 +30,7 @@ class Previews(NamedTuple):
     column: (P,) the finest column that each shows.
     bytes: (P,) of the file.
     difference: (P,) mean difference of its texels to the exact ones, 0 to 255; 0 for an exact one,
-        else at least `LEAST`.
+        else at least `LEAST_DIFFERENCE`.
     exact: (P,) whether it is the exact form of its texture.
     state: (P,) the state before its first one, see `ptmtools.rendering.lossy`.
     """
@@ -79,7 +74,7 @@ def previews_of(textures: Sequence[Mapping[str, Any]]) -> Previews:
         first=np.concatenate([[0], np.cumsum(count)]).astype(np.int64),
         column=np.array([row["level"] + 1 for row in rows], dtype=np.int64),
         bytes=np.array([row["bytes"] for row in rows], dtype=np.int64),
-        difference=np.where(exact, 0.0, np.maximum(error, LEAST)),
+        difference=np.where(exact, 0.0, np.maximum(error, LEAST_DIFFERENCE)),
         exact=exact,
         state=np.array([s for row in textures for s in states_of(row)], dtype=np.int64),
     )

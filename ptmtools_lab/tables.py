@@ -30,7 +30,7 @@ from ptmtools.progress import Progress, silent
 from ptmtools.rendering.lossy import Lossy, no_previews
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.rendering.records import Pyramids, Shows, Sight, Triangles, triangles_of
-from ptmtools_lab.catalogue import NORMALS
+from ptmtools.site.client import NORMALS
 from ptmtools_lab.relief.tables import Relief, Tally as ReliefTally
 from ptmtools_lab.rows import Rows, RowSums
 

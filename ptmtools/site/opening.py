@@ -46,17 +46,13 @@ from ptmtools.output.served import Served
 from ptmtools.rendering.footprints import detail_of_pixels, footprints
 from ptmtools.rendering.rays import Camera, Caster
 from ptmtools.rendering.records import triangles_of
+from ptmtools.site.client import AVERAGING, LEAST_DIFFERENCE, NOTHING, OVERHEAD
 from ptmtools.texture.previews import coarse_levels
 
 #: Pixels of the view, and its aspect.
 WIDTH, HEIGHT = 160, 90
-#: Error of a pixel without geometry, 0 to 255; least difference of a level; by how much less a
-#: preview is off in the next coarser level: as for the client (docs/formats/client.md).
-NOTHING, LEAST, HALVED = 64.0, 0.5, 0.5
 #: Lines of the screen, and by how many powers of two finer a texture may be needed than it is.
 LINES, FINER = 1080, 4
-#: Bytes of a request beside its own.
-OVERHEAD = 300
 #: Largest preview that is a part, bytes.
 SMALL = 4096
 #: Share of a texture's pixels that may need a finer level than those of the opening.
@@ -145,7 +141,7 @@ def texture_steps(
     """The steps of a texture, in their order, up to one that shows what the view needs; ``first``
     is the number of its first preview, ``detail``: see `Needs`."""
     sizes, ends, previews = sizes_of(row), row["ends"], row.get("previews", ())
-    gain = np.append(0, np.cumsum(share * np.maximum(row["differences"], LEAST)))
+    gain = np.append(0, np.cumsum(share * np.maximum(row["differences"], LEAST_DIFFERENCE)))
     needed = 1 + int(np.flatnonzero(share > FEW * share[0])[-1])
     exact = min(len(ends), coarse_levels([max(size) for size in sizes]) if previews else needed)
     # What each source shows: (worth, bytes of its file, kind, number, column).
@@ -155,8 +151,8 @@ def texture_steps(
     fades = np.maximum(share - np.append(share[1:], 0), 0)
     for place, preview in enumerate(previews):
         column = preview["level"] + 1
-        error = 0.0 if preview.get("exact") else max(preview["difference"], LEAST)
-        halved = HALVED ** (column - np.arange(1, column + 1))
+        error = 0.0 if preview.get("exact") else max(preview["difference"], LEAST_DIFFERENCE)
+        halved = AVERAGING ** (column - np.arange(1, column + 1))
         lost = float((np.append(fades[: column - 1], share[column - 1]) * error * halved).sum())
         worth = float(gain[column]) - lost
         sources.append((worth, preview["bytes"], "preview", first + place, column))

@@ -28,6 +28,20 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.site.client import (
+    BEHIND,
+    CONNECTIONS,
+    HELD_ON,
+    HELD_SECONDS,
+    LONGEST_WAIT,
+    NEAREST,
+    NOTHING,
+    OVERHEAD,
+    RANGE_BYTES,
+    RANGE_SECONDS,
+    RECORD_SHARE,
+    STREAMS,
+)
 from ptmtools_lab.allocation import allocate, gather, holes, next_fetch, offered
 from ptmtools_lab.client import Client, Kind
 from ptmtools_lab.network import Link, Request
@@ -99,22 +113,8 @@ class ItemBuffers:
         return ItemBuffer(int(world.view[self._frame]), frame, loaded, known[~loaded[known]])
 
 
-#: Length of a range in seconds of the link, and least bytes of a range.
-RANGE_SECONDS, RANGE_BYTES = 0.2, 8000
-#: Requests at a time: connections of a browser to a host; one connection of HTTP/2 takes more.
-CONNECTIONS = 6
-CONCURRENCY = {"h1": CONNECTIONS, "h2": 24}
-#: Bytes of the headers of a request, and the greatest cost of waiting, bytes, on links without a
-#: limit.
-OVERHEAD, LONGEST_WAIT = 300, 1 << 20
-#: Error of a pixel without geometry: the measured mean, 0 to 255.
-NOTHING = 64.0
-#: Least distance, metres; nearer shapes count as this far. Weight of what is out of sight.
-NEAREST, BEHIND = 0.5, 0.2
-#: Worth of the record of a neighbouring cell, as a share of the screen.
-RECORD_SHARE = 0.005
-#: Share of its worth at which a level stays when it is no longer wanted, and its half-life, s.
-HELD_ON, HELD_SECONDS = 1e-3, 7.0
+#: Requests at a time by protocol.
+CONCURRENCY = {"h1": CONNECTIONS, "h2": STREAMS}
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,7 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.errors import InputError
 from ptmtools.options import option
 from ptmtools.quantities import MemorySize, parse_memory
+from ptmtools.site.client import AHEAD, BEFORE
 from ptmtools_lab.client import Client, Kind, Range
 from ptmtools_lab.network import Link
 from ptmtools_lab.policies.paper_kernels import refresh, share_out
@@ -43,8 +44,6 @@ from ptmtools_lab.world import STILL_SECONDS, World
 
 #: Rendered frames per second.
 FRAMES = 30
-#: Past motion that is extrapolated, and how far ahead, s.
-BEFORE, AHEAD = 0.5, 2.0
 #: Priorities of requests: levels, the next cell, the visible set, the cell.
 LEVEL, NEXT, VISIBLE, CURRENT = 1.0, 2.0, 3.0, 4.0
 

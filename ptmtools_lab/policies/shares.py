@@ -32,11 +32,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ptmtools.arrays import Floats, Ints
+from ptmtools.site.client import BEHIND, BEYOND, HELD, NEAREST, NOTHING, SURROUNDINGS
 from ptmtools_lab.catalogue import Catalogue
-from ptmtools_lab.policies.engine import BEHIND, NEAREST, NOTHING, EngineClient, Worth
-
-#: Weight of a cell seen only from a neighbouring cell, beside one in view.
-BEYOND = 0.05
+from ptmtools_lab.policies.engine import EngineClient, Worth
 
 
 def geometry_by_coverage(client: EngineClient) -> Floats:
@@ -191,9 +189,8 @@ def _summed(stock: Catalogue, shapes: Ints, of_shape: Floats) -> Floats:
     return result
 
 
-#: Weight of the surroundings beside the screen, and the part of it that counts for texture memory
-#: now.
-AROUND, HELD = 0.2, 0.1
+#: Weight of the surroundings beside the screen in policies other than `BEST`.
+AROUND = 0.2
 
 
 @dataclass(frozen=True)
@@ -227,10 +224,6 @@ class Screen:
         )
 
 
-#: Weight of the surroundings in `BEST`; anything from a twentieth to a half does.
-SHARE = 0.1
-
-
 def by_both(client: EngineClient) -> Floats:
     """(T, K) shares of the surroundings by distance and need."""
     near = by_distance(client)
@@ -239,4 +232,4 @@ def by_both(client: EngineClient) -> Floats:
     return (near + by_need(client)) / 2
 
 
-BEST = Screen(by_both, SHARE)
+BEST = Screen(by_both, SURROUNDINGS)

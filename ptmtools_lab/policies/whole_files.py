@@ -36,9 +36,9 @@ import numpy as np
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.rendering.rays import NEAR
+from ptmtools.site.client import CONNECTIONS
 from ptmtools_lab.client import Client, Kind
 from ptmtools_lab.network import Link
-from ptmtools_lab.policies.engine import CONNECTIONS
 from ptmtools_lab.world import World
 
 

@@ -8,8 +8,8 @@ from ptmtools.arrays import Floats
 from ptmtools.output.served import Served
 from ptmtools.rendering.octree_levels import level_differences
 from ptmtools.rendering.octrees import Octrees
+from ptmtools.site.client import LEAST_DIFFERENCE
 from ptmtools_lab.catalogue import Catalogue, Columns, Shapes, aligned
-from ptmtools_lab.previews import LEAST
 
 #: Bytes of a texel in texture memory.
 _TEXEL = 4
@@ -53,11 +53,11 @@ def _with_empty(stock: Catalogue, count: int, octrees: Octrees) -> Catalogue:
 
 
 def _differences(served: Served, octrees: Octrees, columns: Columns) -> Floats:
-    """(O, K) mean difference of each level to the one before, at least `LEAST`."""
+    """(O, K) mean difference of each level to the one before, at least `LEAST_DIFFERENCE`."""
     result = np.zeros(columns.ends.shape)
     for o, steps in enumerate(level_differences(served.surfaces, octrees)):
         levels = int(octrees.levels[o])
-        result[o, 1 : levels + 1] = np.maximum(steps[:levels], LEAST)
+        result[o, 1 : levels + 1] = np.maximum(steps[:levels], LEAST_DIFFERENCE)
     return result
 
 

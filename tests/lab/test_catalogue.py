@@ -10,8 +10,9 @@ import pytest
 from ptmtools.output.served import Served, read_served
 from ptmtools.pipeline.build import build_scene
 from ptmtools.rendering.pyramids import read_pyramids
+from ptmtools.site.client import LEAST_DIFFERENCE
 from ptmtools.texture import read_header
-from ptmtools_lab.catalogue import LEAST, catalogue_of
+from ptmtools_lab.catalogue import catalogue_of
 
 TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data/two_rooms/two_rooms.obj"
 TOLD = ("differences", "color", "gpuTexelBytes")
@@ -51,7 +52,7 @@ def test_what_hints_say_counts_only_if_they_say_it_of_every_texture(database: Pa
     served = read_served(database)
     first = catalogue_of(served, *made_up)
     row = served.index["textures"][0]
-    printed = [max(LEAST, value) for value in row["differences"]]
+    printed = [max(LEAST_DIFFERENCE, value) for value in row["differences"]]
     assert first.differences[0, 1 : len(row["ends"]) + 1].tolist() == printed
     assert first.colors.max() > 0
     without(served, "differences")
@@ -63,7 +64,7 @@ def test_what_hints_say_counts_only_if_they_say_it_of_every_texture(database: Pa
 def test_the_only_level_of_a_texture_is_worth_something(database: Path) -> None:
     served, pyramids = (read_served(database), read_pyramids(read_served(database)))
     stock = catalogue_of(served, pyramids.differences * 0, pyramids.mean)
-    assert (stock.differences[np.arange(stock.texture_count), 1] >= LEAST).all()
+    assert (stock.differences[np.arange(stock.texture_count), 1] >= LEAST_DIFFERENCE).all()
 
 
 def test_how_large_an_image_is_on_a_shape(database: Path) -> None:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from ptmtools.rendering.rays import Frustum
-from ptmtools_lab.meshes import GROSS, SEEN, Meshes, meshes_of
+from ptmtools.site.client import BEHIND, GROSS, NEAREST, SEEN
+from ptmtools_lab.meshes import Meshes, meshes_of
 
-NEAREST, BEHIND = 0.5, 0.2
 #: A cube of 2 m in cell 3 with two finer meshes, and one of 20 cm in cell 0 with one.
 ROWS = (
     {"cell": 3, "box": [9, -1, -1, 11, 1, 1], "errors": [0.1, 0.01, 0.0]},

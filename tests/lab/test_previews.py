@@ -24,6 +24,7 @@ from ptmtools.output.served import Served, read_served
 from ptmtools.rendering.lossy import Lossy, pictures, read_lossy
 from ptmtools.rendering.previews import read_preview
 from ptmtools.rendering.pyramids import packed, read_pyramids
+from ptmtools.site.client import AVERAGING, LEAST_DIFFERENCE
 from ptmtools.texture import decode, encode, read_header
 from ptmtools.walk import read_walk
 from ptmtools_lab.allocation import next_fetch, offered
@@ -32,7 +33,7 @@ from ptmtools_lab.client import Client, Kind
 from ptmtools_lab.network import Link
 from ptmtools_lab.policies import POLICIES
 from ptmtools_lab.policies.oracle import _drops
-from ptmtools_lab.previews import AVERAGING, LEAST, Previews, previews_of
+from ptmtools_lab.previews import Previews, previews_of
 from ptmtools_lab.renderer import Renderer
 from ptmtools_lab.simulation import Run, simulate
 from ptmtools_lab.tables import look
@@ -82,7 +83,7 @@ def test_the_loss_of_a_preview(seed: int) -> None:
             expected = float((finest * error).sum())
             assert float((share[1 : k + 1] * losses[p, 1 : k + 1]).sum()) == pytest.approx(expected)
         assert not losses[p, [0, *range(c + 1, columns)]].any()
-        assert previews.difference[p] >= LEAST or previews.exact[p]
+        assert previews.difference[p] >= LEAST_DIFFERENCE or previews.exact[p]
 
 
 class Case:

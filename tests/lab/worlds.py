@@ -15,11 +15,12 @@ from hypothesis import strategies as st
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.rendering.rays import Camera, Frustum
+from ptmtools.site.client import AVERAGING, LEAST_DIFFERENCE
 from ptmtools_lab.catalogue import Catalogue, Shapes
 from ptmtools_lab.meshes import Meshes, meshes_of
 from ptmtools_lab.opening import Parts
 from ptmtools_lab.policies import POLICIES
-from ptmtools_lab.previews import AVERAGING, LEAST, previews_of
+from ptmtools_lab.previews import previews_of
 from ptmtools_lab.tables import Views
 from ptmtools_lab.world import STILL_SECONDS, World
 
@@ -90,7 +91,7 @@ def catalogue(
         for table, each in ((ends, texture.groups), (memory, texture.memory)):
             table[t, 1:] = np.cumsum([*each, *[0] * (wide - 1 - len(each))])
         if any(texture.previews for texture in textures):
-            differences[t, 1] = LEAST
+            differences[t, 1] = LEAST_DIFFERENCE
         each = 8.0 if random is None else random.uniform(1, 20, count[t] - 1)
         differences[t, 2 : count[t] + 1] = each
     cell, texture_of = np.array(shapes, dtype=np.int64).reshape(-1, 2).T

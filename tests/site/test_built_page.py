@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -13,7 +14,7 @@ import pytest
 from benchmarks.npm import ESBUILD
 from benchmarks.page_weight import sent
 from ptmtools.errors import InputError
-from ptmtools.site import program
+from ptmtools.site import client, program
 from ptmtools.site.program import FORM_SCRIPTS, PAGE, PROGRAM, program_files
 
 ROOT = Path(__file__).parents[2]
@@ -30,6 +31,24 @@ QUOTED = {
     },
     "embedding.md": {"ptm-walk.js": r"The element has less than (\d+) kB"},
 }
+#: What docs/formats/client.md says of constants of the client.
+SPECIFIED = (
+    "1 / max(d, {NEAREST} m)²",
+    "max(`differences`[n], {LEAST_DIFFERENCE})",
+    "d = max(`difference`, {LEAST_DIFFERENCE})",
+    "the worth (*present* + {SURROUNDINGS} *around*)",
+    "the worth {NOTHING} × (*hidden*[c] + a)",
+    "a is the greatest of {BEHIND} `ach`[c]",
+    "and {BEYOND} `ach`[c] of the record of each adjacent cell",
+    "w(x) = x / (x + {GROSS})",
+    "{NOTHING} × {RECORD_SHARE} each",
+    "Choose by (share + {HELD_ON} *kept* +",
+    "which halves every {HELD_SECONDS} s",
+    "adds to the bytes {OVERHEAD} bytes",
+    "the link delivers in {RANGE_SECONDS} s, but at least {RANGE_BYTES:,}",
+    "fewer than six requests ({STREAMS} with HTTP/2 or 3)",
+    "the first download 1 Mbit/s and {PRIOR_LATENCY} s",
+)
 
 
 def test_the_sources_give_the_page(require: Callable[[str, str], None], tmp_path: Path) -> None:
@@ -55,6 +74,19 @@ def test_sizes_in_the_docs(page: str) -> None:
             assert size < float(quote), script
         else:
             assert abs(size - float(quote)) < 0.1, script
+
+
+def test_the_constants_of_the_client() -> None:
+    """The page has those of the simulator, and the format specifies them."""
+    module = (ROOT / "web/page/policy/constants.js").read_text("utf-8")
+    table = {name: value for name, (value, _) in client.CONSTANTS.items()}
+    assert re.findall(r"export const (\w+) = (.*);", module) == [
+        (name, json.dumps(value)) for name, value in table.items()
+    ]
+    assert {name: getattr(client, name) for name in table} == table
+    text = " ".join((ROOT / "docs/formats/client.md").read_text("utf-8").split())
+    for phrase in SPECIFIED:
+        assert phrase.format(**table) in text
 
 
 def test_scripts_import_nothing_at_once() -> None:

@@ -16,6 +16,7 @@ import pytest
 
 from ptmtools.output.served import Served, read_served
 from ptmtools.site import opening
+from ptmtools.site.client import OVERHEAD
 from ptmtools.site.content import Site, SiteOptions, site_of
 from ptmtools.site.files import DATA
 from ptmtools.site.opening import (
@@ -209,7 +210,7 @@ def test_without_previews_the_exact_levels_that_it_needs() -> None:
 
 def test_levels_300_bytes_apart() -> None:
     """The overhead of a request does not cancel the bytes of a level that is left behind."""
-    row = texture(3, []) | {"ends": [100, 100 + opening.OVERHEAD, 100_000]}
+    row = texture(3, []) | {"ends": [100, 100 + OVERHEAD, 100_000]}
     steps = texture_steps(0, row, np.full(3, 0.5), first=0)
     assert [step.end for step in steps] == row["ends"][1:]
 
@@ -222,7 +223,7 @@ def test_the_error_of_a_preview_halves_with_each_coarser_level() -> None:
     (step,) = texture_steps(0, row, share, first=0)
     error = [4.0 / 2**6, *(4.0 / 2 ** (7 - level) for level in range(1, 7))]
     worth = sum(part * (8.0 - off) for part, off in zip(share, error, strict=False))
-    assert step.density == pytest.approx(worth / (300 + opening.OVERHEAD), rel=1e-9)
+    assert step.density == pytest.approx(worth / (300 + OVERHEAD), rel=1e-9)
 
 
 def test_steps_come_by_worth_per_byte() -> None:
@@ -246,18 +247,13 @@ def test_steps_come_by_worth_per_byte() -> None:
     assert not {("preview", 2), ("preview", 5)} & {part[:2] for part in parts}
 
 
-def test_it_weighs_as_the_client(two_rooms: Path) -> None:
-    """The product does not import the simulator, so its constants are compared here; the needs are
-    those of the simulator's own screen."""
+def test_it_sees_as_the_client(two_rooms: Path) -> None:
+    """The needs are those of the simulator's own screen."""
     from ptmtools.rendering.pyramids import read_pyramids
     from ptmtools.rendering.rays import Camera
-    from ptmtools.site.opening import HALVED, HEIGHT, LEAST, NOTHING, OVERHEAD, WIDTH
-    from ptmtools_lab.policies import engine
-    from ptmtools_lab.previews import AVERAGING, LEAST as LEAST_DIFFERENCE
+    from ptmtools.site.opening import HEIGHT, WIDTH
     from ptmtools_lab.tables import look
 
-    assert (NOTHING, LEAST, HALVED) == (engine.NOTHING, LEAST_DIFFERENCE, AVERAGING)
-    assert OVERHEAD == engine.OVERHEAD
     served = read_served(two_rooms)
     for viewpoint in served.index["viewpoints"]:
         eye, direction = (np.array([viewpoint[name]]) for name in ("position", "direction"))

@@ -14,11 +14,11 @@ from hypothesis import example, given, settings, strategies as st
 
 from ptmtools.arrays import Floats
 from ptmtools.link import Conditions
+from ptmtools.site.client import PRIOR_BANDWIDTH, PRIOR_LATENCY
 from ptmtools_lab.allocation import allocate, next_fetch
 from ptmtools_lab.catalogue import catalogue_of
-from ptmtools_lab.client import PRIOR, Estimate
+from ptmtools_lab.client import Estimate
 from ptmtools_lab.network import Link, Request
-from ptmtools_lab.policies.engine import CONCURRENCY
 from ptmtools_lab.policies.paper_kernels import refresh, share_out
 from ptmtools_lab.previews import Previews, previews_of
 from ptmtools_lab.world import World
@@ -161,7 +161,7 @@ def test_what_is_believed_of_a_link(
     random = np.random.default_rng(seed)
     latency = float(random.uniform(0.01, 0.3))
     link = Link(Conditions(float(random.uniform(2e4, 2e7)), latency, protocol=protocol))
-    estimate, calls, expected = Estimate(link, *PRIOR), [], []
+    estimate, calls, expected = Estimate(link, PRIOR_BANDWIDTH, PRIOR_LATENCY), [], []
     asked: list[Request] = []
     begun: set[int] = set()
     carried = 0.0
@@ -252,7 +252,6 @@ def test_requests_at_a_time(tmp_path: Path) -> None:
     """As many as the protocol takes; one that browsers do not name is the old one."""
     protocols = ["", "http/1.1", "h2", "h3"]
     assert called(tmp_path, [("concurrency", {"protocols": protocols})])[0] == [6, 6, 24, 24]
-    assert CONCURRENCY == {"h1": 6, "h2": 24}
 
 
 @EACH

@@ -14,6 +14,7 @@ from browser import hurried
 from ptmtools.output.served import read_served
 from ptmtools.rendering.drawing import ViewOptions, draw_view, eye_of
 from ptmtools.rendering.rays import Camera, Caster
+from ptmtools.site.client import OVERHEAD, SURROUNDINGS
 from ptmtools.site.content import Site, site_of
 from ptmtools.site.entry import Entry
 from ptmtools_lab.allocation import best_step
@@ -207,14 +208,10 @@ def test_other_sites_do_not_load_the_script(
     assert not loads(museum)
 
 
-#: Bytes of a request besides its own, and the weight of the surroundings (`web/page/policy`).
-OVERHEAD, AROUND = 300, 0.1
-
-
 def expected_order(case: dict[str, Any]) -> list[list[Any]]:
     """The requests of the simulator, of which each takes the step of most worth for its bytes."""
     rows = [case["texture"], case["octree"]]
-    shares = [case["sight"] + AROUND, case["share"]]
+    shares = [case["sight"] + SURROUNDINGS, case["share"]]
     worth = [np.array([0, *np.maximum(row["differences"], 0.5)]) * share
              for row, share in zip(rows, shares, strict=True)]  # fmt: skip
     ends = [np.array([0, *row["ends"]]) for row in rows]

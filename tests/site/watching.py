@@ -12,14 +12,15 @@ from typing import Any
 import numpy as np
 
 from ptmtools.link import Conditions
+from ptmtools.site.client import AVERAGING, BEHIND, HELD_ON, NEAREST
 from ptmtools_lab.allocation import allocate
 from ptmtools_lab.catalogue import Catalogue
 from ptmtools_lab.client import Client, Kind
 from ptmtools_lab.meshes import Meshes
 from ptmtools_lab.network import Link, Request
 from ptmtools_lab.policies import POLICIES
-from ptmtools_lab.policies.engine import BEHIND, HELD_ON, NEAREST, EngineClient
-from ptmtools_lab.previews import AVERAGING, Previews
+from ptmtools_lab.policies.engine import EngineClient
+from ptmtools_lab.previews import Previews
 from ptmtools_lab.simulation import simulate
 from ptmtools_lab.world import World
 from tests.web.node import run

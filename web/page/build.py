@@ -6,7 +6,8 @@ the worker, bundled and minified by esbuild, the template with its style, and th
 
 The words of the page come from ``ptmtools/site/words``: the English ones as a module, of which each
 bundle takes the sections that it uses (``web/page/words/english.js``, written here), every other
-language as a script of its own.
+language as a script of its own. The constants of the client come from ``ptmtools/site/client.json``
+in the same way (``web/page/policy/constants.js``).
 
 The result is committed, so that `ptm publish` and `ptm serve` need no node. Bundles, since forty
 modules would be forty requests, each found only in the one before it.
@@ -32,6 +33,9 @@ PTM = ROOT / "web" / "ptm" / "src"
 FORMS = HERE / "forms"
 #: Words by language, and the module of the English ones.
 WORDS, ENGLISH = ROOT / "ptmtools" / "site" / "words", HERE / "words" / "english.js"
+#: Constants of the client, and their module.
+CLIENT = ROOT / "ptmtools" / "site" / "client.json"
+CONSTANTS = HERE / "policy" / "constants.js"
 OUTPUT = ROOT / "ptmtools" / "site" / "page"
 #: Scripts that the page loads when it needs them.
 LATER = (
@@ -60,6 +64,14 @@ def bundled(folder: Path, source: list[str], text: str = "") -> bytes:
 def minified(source: Path) -> bytes:
     """A module with all that it imports, or a style sheet. CalledProcessError if esbuild fails."""
     return bundled(source.parent, [source.name])
+
+
+def constants() -> str:
+    """The module of the constants of the client."""
+    lines = ["// Written by web/page/build.py from ptmtools/site/client.json.", ""]
+    for name, (value, about) in json.loads(CLIENT.read_text(encoding="utf-8")).items():
+        lines += [f"/** {about} */", f"export const {name} = {json.dumps(value)};"]
+    return "\n".join(lines) + "\n"
 
 
 def words_of(language: str) -> Any:
@@ -120,6 +132,7 @@ def build(folder: Path) -> None:
     ESBUILD.require()
     if folder == OUTPUT:
         ENGLISH.write_text(english(), encoding="utf-8")
+        CONSTANTS.write_text(constants(), encoding="utf-8")
     files = {
         "index.html": page(HERE),
         "form.html": page(FORMS),

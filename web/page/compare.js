@@ -3,7 +3,8 @@
 
 import { Renderer } from "./gl/renderer.js";
 import { TextureMemory } from "./gl/texture-memory.js";
-import { RANGE_BYTES, RANGE_SECONDS, room } from "./policy/best.js";
+import { room } from "./policy/best.js";
+import { RANGE_BYTES, RANGE_SECONDS } from "./policy/constants.js";
 
 export class Comparison {
   /** @param {import("./walkthrough.js").Walkthrough} walk */

@@ -2,16 +2,9 @@
 // of cells.
 
 import { distance } from "../space/frustum.js";
+import { BEHIND, BEYOND, NEAREST, NOTHING } from "./constants.js";
 
 /** @typedef {import("./client.js").Client} Client */
-
-/** Error of a pixel without geometry, 0 to 255. */
-export const NOTHING = 64;
-// The least distance that counts, metres.
-export const NEAREST = 0.5;
-// Weight of a cell out of sight, and of one seen from a neighbouring cell only.
-export const BEHIND = 0.2;
-const BEYOND = 0.05;
 
 /**
  * (T) shares that fall with the square of the distance of the nearest shape; they sum to 1.

@@ -5,27 +5,18 @@
 // compete with the exact levels, and these replace them as they arrive.
 
 import { allocate, nextFetch } from "./allocation.js";
-import { lookAround, NOTHING, weighGeometry } from "./around.js";
-import { NO_SOURCE, OVERHEAD } from "./downloads.js";
+import { lookAround, weighGeometry } from "./around.js";
+import {
+  HELD, HELD_ON, HELD_SECONDS, LONGEST_WAIT, NOTHING, OVERHEAD, RANGE_BYTES, RANGE_SECONDS, RECORD_SHARE,
+  SURROUNDINGS,
+} from "./constants.js";
+import { NO_SOURCE } from "./downloads.js";
 import { gainsOf } from "./meshes.js";
 import { meetsBox } from "../space/frustum.js";
 
 /** @typedef {import("./client.js").Client} Client */
 /** @typedef {import("./client.js").Policy} Policy */
 /** @typedef {import("./estimate.js").Belief} Belief */
-
-// Seconds of the link that a range takes, and its least bytes.
-export const RANGE_SECONDS = 0.2;
-export const RANGE_BYTES = 8000;
-// The most bytes that waiting counts for, on links without a limit.
-const LONGEST_WAIT = 2 ** 20;
-// Worth of the record of a neighbouring cell, as a share of the screen.
-const RECORD_SHARE = 0.005;
-// Weight of the surroundings beside the screen, and of these for what is to
-// be in texture memory now.
-const AROUND = 0.1, HELD = 0.1;
-// Share of its worth at which a level that is no longer wanted is kept, and its half-life, s.
-const HELD_ON = 1e-3, HELD_SECONDS = 7;
 
 /**
  * Whether the link would run dry before a request made later could be answered.
@@ -162,8 +153,8 @@ export class Best {
     const around = new Float64Array(T * K), share = new Float64Array(T * K);
     lookAround(this.#client, around);
     for (let i = 0; i < around.length; i++) {
-      this.#hold[i] = sight[i] + HELD * AROUND * around[i];
-      share[i] = sight[i] + AROUND * around[i];
+      this.#hold[i] = sight[i] + HELD * SURROUNDINGS * around[i];
+      share[i] = sight[i] + SURROUNDINGS * around[i];
     }
     this.#gained(share, this.#fetch);
     this.#gained(around, this.#ahead);

@@ -5,6 +5,7 @@
 // worth have T + P rows: those of the textures, then those of the previews (docs/formats/client.md).
 
 import { levelSizes } from "../../client/src/levels.js";
+import { AVERAGING, LEAST_DIFFERENCE } from "./constants.js";
 import { meshesOf } from "./meshes.js";
 
 /**
@@ -37,7 +38,7 @@ import { meshesOf } from "./meshes.js";
  * @property {Int32Array} column (P) the finest column that each gives
  * @property {Float64Array} bytes (P)
  * @property {Float64Array} loss (P) error of each in the empty column, from which that of column k is
- *   HALVED ** −k times as much: the less, the closer are all of its columns; of exact previews 0
+ *   AVERAGING ** −k times as much: the less, the closer are all of its columns; of exact previews 0
  */
 
 /**
@@ -51,10 +52,6 @@ import { meshesOf } from "./meshes.js";
  * @property {{box: number[], recordBytes?: number, geometryBytes?: number}[]} cells
  */
 
-// A level that only repeats the texels of the one below still sharpens interpolated colours.
-const LEAST = 0.5;
-/** Error of a level as a share of that of the level above it: errors of texels cancel in means. */
-export const HALVED = 0.5;
 const RECORD_BYTES = 1000, GEOMETRY_BYTES = 4000;
 const GREY = [128, 128, 128];
 
@@ -76,7 +73,7 @@ export function catalogueOf({ textures, cells, meshes = [] }) {
       const at = t * K + k, size = sizes[k - 1];
       ends[at] = texture.ends[k - 1] ?? ends[at - 1];
       memory[at] = memory[at - 1] + (size ? size.width * size.height * texel : 0);
-      differences[at] = size ? Math.max(texture.differences?.[k - 1] ?? 0, LEAST) : 0;
+      differences[at] = size ? Math.max(texture.differences?.[k - 1] ?? 0, LEAST_DIFFERENCE) : 0;
     }
     whole += memory[t * K + K - 1];
   });
@@ -102,7 +99,7 @@ function previewsOf(textures) {
     column: Int32Array.from(all, ({ level }) => level + 1),
     bytes: Float64Array.from(all, ({ bytes }) => bytes),
     loss: Float64Array.from(all, ({ level, difference, exact }) =>
-      exact ? 0 : Math.max(difference, LEAST) * HALVED ** (level + 1)),
+      exact ? 0 : Math.max(difference, LEAST_DIFFERENCE) * AVERAGING ** (level + 1)),
   };
 }
 
@@ -118,7 +115,7 @@ export function gainsOf(differences, K, { first, column, loss }) {
     for (let p = first[t]; p < first[t + 1]; p++) {
       for (let k = 1; k <= column[p]; k++) {
         // The error of the column less that of the one before it, which it replaces.
-        const own = loss[p] * HALVED ** -k * (k > 1 ? 1 - HALVED : 1);
+        const own = loss[p] * AVERAGING ** -k * (k > 1 ? 1 - AVERAGING : 1);
         gains[(T + p) * K + k] = differences[t * K + k] - own;
       }
     }

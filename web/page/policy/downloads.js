@@ -2,6 +2,8 @@
 // `.ptm` one range at a time, each where the last one ended: caches of browsers request ranges again
 // while they still receive the file.
 
+import { OVERHEAD } from "./constants.js";
+
 /** @typedef {import("./catalogue.js").Catalogue} Catalogue */
 /** @typedef {"record" | "geometry" | "texture" | "preview" | "mesh"} Kind */
 
@@ -18,8 +20,6 @@
  * @property {boolean} [waits] whether it pauses before another try
  */
 
-/** Bytes of the headers of a request. */
-export const OVERHEAD = 300;
 const ABSENT = 0, ASKED = 1, THERE = 2;
 /** In place of the number of a preview: the exact levels, and no source. */
 export const EXACT = -1, NO_SOURCE = -2;

@@ -7,6 +7,10 @@
 // it was due, and its wait tells of the latency only if it is less than the mean: requests that are made by a
 // latency with its queue would lengthen the queue.
 
+import {
+  CONNECTIONS, ENOUGH_BYTES, ENOUGH_SECONDS, HALF_LIFE, LATENCIES, PRIOR_BANDWIDTH, PRIOR_LATENCY, STREAMS,
+} from "./constants.js";
+
 /**
  * @typedef {object} Belief
  * @property {number} bandwidth bit/s
@@ -14,14 +18,6 @@
  * @property {number} concurrency requests at a time
  */
 
-/** Requests at a time: connections of a browser to a host; one connection of HTTP/2 or 3 takes more. */
-const CONNECTIONS = 6, STREAMS = 24;
-
-// Half-life of bytes, in seconds during which bytes arrive.
-const HALF_LIFE = 1;
-// With fewer bytes and less time than these the prior is used.
-const ENOUGH_BYTES = 16384, ENOUGH_SECONDS = 0.25;
-const LATENCIES = 8;
 // What ended within this time of a request ended before it, s.
 const AT_ONCE = 1e-3;
 
@@ -39,7 +35,7 @@ export class Estimate {
   #ended = -Infinity;
 
   /** @param {{bandwidth: number, latency: number}} prior */
-  constructor(prior = { bandwidth: 1e6, latency: 0.1 }) {
+  constructor(prior = { bandwidth: PRIOR_BANDWIDTH, latency: PRIOR_LATENCY }) {
     this.#prior = prior;
     this.concurrency = CONNECTIONS;
   }

@@ -1,7 +1,7 @@
 // Levels of detail of objects: the GLB of a cell has the coarsest mesh of an object with many triangles,
 // and files of their own the finer ones (docs/formats/client.md).
 
-import { BEHIND, NEAREST, NOTHING } from "./around.js";
+import { BEHIND, GROSS, NEAREST, NOTHING, SEEN } from "./constants.js";
 import { distance, meetsBox } from "../space/frustum.js";
 
 /**
@@ -19,8 +19,6 @@ import { distance, meetsBox } from "../space/frustum.js";
  * @typedef {import("./client.js").Client} Client
  */
 
-/** Error by distance that can be seen, and that counts half as much as a pixel without geometry. */
-const SEEN = 5e-4, GROSS = 0.05;
 /** The worth of an error by distance, as a share of that. @param {number} error */
 const worth = (error) => error / (error + GROSS);
 

@@ -4,6 +4,7 @@
 // within the patience of the visitor. Requests are made at once. The paper has no previews: they serve
 // only for levels finer than those of the `.ptm`, the coarsest first.
 
+import { AHEAD, BEFORE } from "./constants.js";
 import { duration } from "./estimate.js";
 import { boxed, lacking, modelled } from "./files.js";
 import { refresh, shareOut } from "./sharing.js";
@@ -15,8 +16,6 @@ import { nextCell } from "../space/portals.js";
 /** @typedef {import("./downloads.js").Kind} Kind */
 /** @typedef {import("./estimate.js").Belief} Belief */
 
-// Past time from which the way is extrapolated, and the time ahead, s.
-const BEFORE = 0.5, AHEAD = 2;
 // Priorities of requests.
 const LEVEL = 1, NEXT = 2, VISIBLE = 3, CURRENT = 4;
 

@@ -1,7 +1,6 @@
-// The worth of normal maps of materials: they come after the colours.
+// The worth of normal maps of materials.
 
-/** Of a difference of their numbers. */
-const NORMALS = 0.25;
+import { NORMALS } from "../policy/constants.js";
 
 /**
  * Lowers the gains of normal maps, once: until then nothing wants them.
