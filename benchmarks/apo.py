@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "sample_data")]
 
 from ptmtools.parallel import open_executor  # noqa: E402
-from ptmtools.pipeline.warm_up import warm_statue  # noqa: E402
+from ptmtools.pipeline.warm_up import warm_objects  # noqa: E402
 from ptmtools.scene import IngestOptions, ingest  # noqa: E402
 from ptmtools_systems.apo.files import streamed  # noqa: E402
 from ptmtools_systems.apo.making import ApoTexture, make_apo  # noqa: E402
@@ -88,7 +88,7 @@ def main() -> None:
     given = parser.parse_args()
     files = given.files or list(made_statues(given.triangles, given.only))
     options = ApoOptions(faces=given.faces, error=given.error)
-    warm_statue()
+    warm_objects()
     print(f"{HEAD}\n|{'---|' * (HEAD.count('|') - 1)}")
     for name, triangles, faces, seconds, mb, _ in PAPER:
         print(

@@ -38,13 +38,14 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "site")]
 
 from browser import visiting  # noqa: E402
 
+from ptmtools.folder_kinds import folder_kind  # noqa: E402
 from ptmtools.link import Conditions  # noqa: E402
 from ptmtools.output.served import read_served  # noqa: E402
 from ptmtools.quantities import parse_bandwidth, parse_duration  # noqa: E402
 from ptmtools.rendering.pyramids import read_pyramids  # noqa: E402
 from ptmtools.site.content import Site, SiteOptions, site_of  # noqa: E402
 from ptmtools.site.entry import link_bytes  # noqa: E402
-from ptmtools.site.forms import form_of, form_site  # noqa: E402
+from ptmtools.site.forms import form_site  # noqa: E402
 from ptmtools.site.throttle import Throttle  # noqa: E402
 from ptmtools.walk import Walk, parse_walk, read_walk  # noqa: E402
 from ptmtools_lab.campus.options import CampusWalkOptions  # noqa: E402
@@ -310,7 +311,7 @@ def scenes(given: Sequence[str], seconds: float) -> Iterator[Scene]:
     rest = [*given]
     while rest:
         folder = Path(rest.pop(0))
-        form = form_of(folder)
+        form = folder_kind(folder)
         site = form_site(folder, form) if form else None
         if form and site and form.index != "campus.json":
             yield (octree if form.index == "apo.json" else picture)(folder, site, seconds)

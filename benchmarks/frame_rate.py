@@ -43,8 +43,9 @@ from browsers import web  # noqa: E402
 from scenes import SAMPLES, SCENES, database_of, make_scene, ptm  # noqa: E402
 
 from ptmtools.errors import PtmError  # noqa: E402
+from ptmtools.folder_kinds import folder_kind  # noqa: E402
 from ptmtools.site.content import Site, SiteOptions, site_of  # noqa: E402
-from ptmtools.site.forms import form_of, form_site  # noqa: E402
+from ptmtools.site.forms import form_site  # noqa: E402
 from ptmtools.site.serving import serving  # noqa: E402
 from ptmtools.walk import Walk, read_walk  # noqa: E402
 
@@ -274,7 +275,7 @@ def opened(given: str, options: argparse.Namespace) -> tuple[Site, list[Page]]:
     Raises PtmError if it cannot be read, or a campus comes without a walk.
     """
     folder = Path(given)
-    if form := form_of(folder):
+    if form := folder_kind(folder):
         site = form_site(folder, form)
         if form.index == "apo.json":
             return site, pages_of_octree(options.seconds)
@@ -362,7 +363,7 @@ def main(arguments: list[str] | None = None) -> int:
                     print(line, flush=True)
             except RuntimeError as error:
                 parser.exit(1, f"frame_rate: {error}\n")
-            if not form_of(Path(given)):
+            if not folder_kind(Path(given)):
                 print(UNSHOWN, end="\n\n", flush=True)
     return 0
 

@@ -53,7 +53,7 @@ from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.encoding import TextureOptions, encoded_texels
 from ptmtools.pipeline.stage import Artifacts
-from ptmtools.pipeline.stages import APO, CELLS, EMIT, LIGHT, TEXTURES
+from ptmtools.pipeline.stages import CELLS, EMIT, LIGHT, SCENE, TEXTURES
 from ptmtools.pipeline.stages.light import lightmap_files
 from ptmtools.scene import Scene, ingest
 from ptmtools.scene.lights import Lights
@@ -153,7 +153,7 @@ def cut(model: Path) -> tuple[Scene, Cells]:
     with tempfile.TemporaryDirectory() as folder:
         build_scene(model, folder, until=CELLS)
         artifacts = Artifacts(open_database(folder))
-        return artifacts[APO], artifacts[CELLS]
+        return artifacts[SCENE], artifacts[CELLS]
 
 
 def parts(model: Path) -> None:
@@ -232,7 +232,7 @@ def of_the_model(model: Path) -> None:
         assert light is not None
         for cell, name in lightmap_files(light).items():
             files[cell] = decode(Path(folder, "db/www", name).read_bytes())[:, :, 0]
-        scene, cells = artifacts[APO], artifacts[CELLS]
+        scene, cells = artifacts[SCENE], artifacts[CELLS]
     geometry = Geometry(scene, cells)
     pieces = pieces_of(geometry, cells, np.zeros(1, np.bool_), 1.0)
     painted = LightImage(texels, ("clamp", "clamp"))

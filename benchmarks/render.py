@@ -252,10 +252,10 @@ def load(path: Path) -> Scene:
     """The scene of a model file, or of a database."""
     if path.is_dir():
         from ptmtools.pipeline.stage import Artifacts
-        from ptmtools.pipeline.stages import APO
+        from ptmtools.pipeline.stages import SCENE
         from ptmtools.store.folder import DatabaseFolder
 
-        return Artifacts(DatabaseFolder.open(path))[APO]
+        return Artifacts(DatabaseFolder.open(path))[SCENE]
     from ptmtools.scene import ingest
 
     return ingest(path)

@@ -22,7 +22,16 @@ from ptmtools.errors import MissingComponentError
 D = TypeVar("D")
 
 #: The kinds of declarations; the group of each is ``ptmtools.<kind>``.
-KINDS = ("commands", "stages", "emitters", "pages", "profiles", "formats", "policies")
+KINDS = (
+    "commands",
+    "emitters",
+    "formats",
+    "pages",
+    "policies",
+    "profiles",
+    "representations",
+    "stages",
+)
 
 
 @cache

@@ -70,7 +70,7 @@ class Renderer:
         surfaces, shown = self._world.served.surfaces, np.empty((len(sight.ray), 3))
         shade(sight, self._triangles, shows, loaded, column, shown)
         if self._world.relief:
-            from ptmtools.rendering.relief import relieve
+            from ptmtools_systems.apo.lighting import relieve
 
             octrees, first = self._world.relief.octrees, len(self._world.pyramids.levels)
             held = column[first : first + octrees.number]

@@ -304,8 +304,8 @@ def relief_of(
     InputError: PTM-I700 the other database has other textures.
     DatabaseError: those of `read_octrees` and `read_pyramids`.
     """
-    from ptmtools.rendering.octrees import no_octrees, read_octrees
     from ptmtools_lab.relief.tables import Reference
+    from ptmtools_systems.apo.served_octrees import no_octrees, read_octrees
 
     if against is None and not lit:
         return None

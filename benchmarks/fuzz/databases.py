@@ -23,7 +23,7 @@ import numpy as np
 from benchmarks.fuzz.mutation import NAMES, NUMBERS, Case, damaged, dumped, garbled, twisted
 from ptmtools.cli.main import main
 from ptmtools.pipeline.stage import Artifacts
-from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS, STAGES
+from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE, STAGES
 from ptmtools.store import lists
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.store.folder import DatabaseFolder
@@ -92,7 +92,7 @@ class Npz:
     def read(self, case: Case) -> str:
         """Reads it back as the stage that it is of, beside the others, and counts by it."""
         artifacts = Artifacts(_Held({**self._arrays, case.facts: case.data}, self._images))
-        scene, cells, pvs, ach = (artifacts[stage] for stage in (APO, CELLS, PVS, ACH))
+        scene, cells, pvs, ach = (artifacts[stage] for stage in (SCENE, CELLS, PVS, ACH))
         assert len(scene.corners) == len(scene.opaque)
         with np.errstate(all="ignore"):
             cells.locate(scene.points[:9])

@@ -204,12 +204,12 @@ def warm_up(console: Console) -> None:
     the code; use it for container images, and before the workers of a cluster start.
     """
     from ptmtools.jit import compilations
-    from ptmtools.pipeline.warm_up import warm_building, warm_images, warm_statue
+    from ptmtools.pipeline.warm_up import warm_building, warm_images, warm_objects
 
     start, before = time.perf_counter(), compilations()
     warm_building()
     warm_images()
-    warm_statue()
+    warm_objects()
     seconds = time.perf_counter() - start
     fresh = compilations() > before
     console.print(f"compiled in {seconds:.1f} s" if fresh else "nothing to compile")

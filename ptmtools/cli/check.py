@@ -28,12 +28,13 @@ from ptmtools.cli.parameters import (
 )
 from ptmtools.diagnostics import FOLDER_CODES, ValidationReport
 from ptmtools.errors import CheckError
+from ptmtools.folder_kinds import folder_kind
 from ptmtools.output import PlotOptions
 from ptmtools.output.validation.findings import NOT_BUILT, SEEN_BY_BUILD
 from ptmtools.pipeline.command import build_command, open_database
 from ptmtools.pipeline.stage import Artifacts
-from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS
-from ptmtools.pipeline.validation import kind_of, shoot_segments, validate as check
+from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE
+from ptmtools.pipeline.validation import shoot_segments, validate as check
 from ptmtools.quantities import count, size
 from ptmtools.store.copies import url_of
 from ptmtools.texture.model import Limits
@@ -130,7 +131,7 @@ def plot(
     options = take(PlotOptions, values)
     artifacts = Artifacts(open_database(db))
     report = plot_plan(
-        artifacts[APO],
+        artifacts[SCENE],
         artifacts[CELLS],
         artifacts[PVS] if artifacts.before(PVS) else None,
         artifacts[ACH] if artifacts.before(ACH) else None,
@@ -208,7 +209,7 @@ def _repair(target: str, report: ValidationReport) -> str | None:
     if not Path(target).is_dir():
         again = f"ptm encode IMAGE -o {shlex.quote(target)} --force"
         return again if target.endswith(".ptm") else None
-    if kind := kind_of(Path(target)):
+    if kind := folder_kind(Path(target)):
         return f"{kind.again} -o {shlex.quote(target)} --force"
     if "PTM-D650" in codes:
         return f"{build_command(target)} --rebuild --force"

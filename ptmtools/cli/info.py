@@ -17,7 +17,7 @@ from ptmtools.cli.batch import STANDARD, no_name, standard_input
 from ptmtools.cli.console import Console
 from ptmtools.cli.parameters import Command, json_option, local_copy, options_of, take, with_console
 from ptmtools.errors import InputError, naming
-from ptmtools.pipeline.validation import kind_of
+from ptmtools.folder_kinds import folder_kind
 from ptmtools.quantities import count, size
 from ptmtools.scene.options import SUFFIXES, IngestOptions
 from ptmtools.store.copies import url_of
@@ -58,7 +58,7 @@ def info(console: Console, target: str, **values: Any) -> None:
     if not target:
         raise no_name()
     if target != STANDARD and Path(target).is_dir():
-        if kind := kind_of(Path(target)):
+        if kind := folder_kind(Path(target)):
             lines, record = kind.describe.load()(Path(target))
             console.result(record, [f"{Path(target)}: {kind.about}", *lines])
         else:

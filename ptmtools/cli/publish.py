@@ -25,18 +25,19 @@ from ptmtools.cli.parameters import (
     take,
     with_console,
 )
-from ptmtools.pipeline.validation import check_folder
+from ptmtools.folder_kinds import check_folder, folder_kind
 from ptmtools.quantities import count, size
 from ptmtools.site.about import folder_of
 from ptmtools.site.content import Site, SiteOptions, site_of
 from ptmtools.site.embedding import element_tags, frame_tag
-from ptmtools.site.forms import OPTIONS, form_of, form_site, form_weight
+from ptmtools.site.forms import OPTIONS, form_site, form_weight
 from ptmtools.site.lookup import files_of
 from ptmtools.site.program import ELEMENT
 from ptmtools.site.published import PublishOptions
 from ptmtools.site.publishing import COARSE, publish as write, weight_of
 from ptmtools.site.serving import ServeOptions, serving
 from ptmtools.store.objects import is_url
+from ptmtools.texture.model import Limits
 
 if TYPE_CHECKING:
     from ptmtools.site.edit_requests import Editing
@@ -165,17 +166,17 @@ def publish(
             f"--address {site_options.address!r} is not the address of a folder, such as "
             "https://example.org/walk/"
         )
-    form = form_of(Path(db))
+    kind = folder_kind(Path(db))
     own = {name: getattr(site_options, name) for name in OPTIONS}
-    if form and site_options != SiteOptions(**own):
+    if kind and site_options != SiteOptions(**own):
         names = ", ".join(f"--{name}" for name in OPTIONS)
         raise click.UsageError(
-            f"of the options of a site, a folder with {form.index} has {names} only"
+            f"of the options of a site, a folder with {kind.index} has {names} only"
         )
     with console.progress() as progress:
-        if form:
-            check_folder(Path(db), form.index)
-            site = form_site(Path(db), form, site_options)
+        if kind:
+            check_folder(Path(db), kind, Limits())
+            site = form_site(Path(db), kind, site_options)
         else:
             site = site_of(db, site_options, progress)
         done = write(site, target, options, force=force, progress=progress)
@@ -187,7 +188,7 @@ def publish(
         f"{target}: {count(len(done.written), 'file')} written, "
         f"{len(done.unchanged):,} unchanged{removed}"
     )
-    weight, lines = _weight_of_form(site) if form else _weight_of_walk(site)
+    weight, lines = _weight_of_form(site) if kind else _weight_of_walk(site)
     embed = _embedding(site, site_options.address)
     document = {**changed, "notes": list(site.notes), "bytes": weight, **embed}
     console.result(document, (first, *lines, *(f"{name}: {tags}" for name, tags in embed.items())))

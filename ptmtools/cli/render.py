@@ -22,16 +22,18 @@ from ptmtools.cli.parameters import (
     with_console,
 )
 from ptmtools.errors import OutputError
+from ptmtools.folder_kinds import FolderKind, folder_kind, folder_kinds
 from ptmtools.options import option_name
-from ptmtools.quantities import count
 from ptmtools.rendering.drawing import ViewOptions, draw_view
-from ptmtools_systems.apo.picture import RenderOptions
+
+#: The kinds of folders that are drawn, and the options of each.
+_DRAWN = {kind: kind.drawing.options for kind in folder_kinds().values() if kind.drawing}
 
 
 @click.command("render", cls=Command)
 @click.argument("target", metavar="DB|DIR", type=click.Path(), callback=local_copy)
 @output_option("PNG to write.", metavar="FILE", required=True)
-@options_of(ViewOptions, RenderOptions)
+@options_of(ViewOptions, *(options.load() for options in _DRAWN.values()))
 @force_option("Replace an existing picture.")
 @json_option
 @with_console
@@ -41,54 +43,29 @@ def render(console: Console, target: str, output: str, force: bool, **values: An
     DB is a database or its folder `www`. The view is taken from a viewpoint of the database, or
     from --eye.
     """
-    from ptmtools_systems.apo.files import INDEX
-
     if not target or not output:
         raise no_name()
     check_picture(output, force=force)
-    of_octree = (Path(target) / INDEX).is_file()
-    _refuse_others(target, of_octree)
-    if of_octree:
+    kind = folder_kind(Path(target))
+    drawing = kind.drawing if kind else None
+    _refuse_others(target, kind)
+    if drawing:
         # Without a value each kind of picture has its own default for the field of view.
         given = {name: value for name, value in values.items() if value is not None}
-        record, line = draw_octree(target, output, take(RenderOptions, given), force=force)
+        drawn = drawing.draw.load()(Path(target), take(drawing.options.load(), given))
+        write_picture(output, drawn.texels, force=force)
+        record = {"file": output, **drawn.document}
+        line = f"{output}: {target}, {drawn.text}"
     else:
         from ptmtools.output.served import read_served
 
         view = take(ViewOptions, values)
         with console.progress() as progress:
             picture = draw_view(read_served(target), view, progress)
-        _write(output, picture, force=force)
+        write_picture(output, picture, force=force)
         record = {"file": output, "width": view.width, "height": view.height}
         line = f"{output}: {target}, {view.width} x {view.height}"
     console.result(record, [line])
-
-
-def draw_octree(
-    folder: str, output: str, options: RenderOptions, *, force: bool
-) -> tuple[dict[str, Any], str]:
-    """Writes a picture of an octree texture; returns its JSON document and its line of text.
-
-    Raises what reading the folder and `ptmtools.apo.picture.render` raise.
-    """
-    import numpy as np
-
-    from ptmtools_systems.apo.files import read_mesh, read_octree
-    from ptmtools_systems.apo.picture import render as draw
-
-    mesh, octree = read_mesh(folder), read_octree(folder)
-    normals = mesh.normals.astype(np.float64)
-    rendering = draw(octree, mesh.points, mesh.triangles, options, normals)
-    _write(output, rendering.picture, force=force)
-    levels = octree.levels if options.levels is None else min(options.levels, octree.levels)
-    document = {
-        "file": output,
-        "levels": levels,
-        "octree_levels": octree.levels,
-        "renderer": rendering.renderer,
-    }
-    shown = f"{levels} of {count(octree.levels, 'level')}"
-    return document, f"{output}: {folder}, {shown}, {rendering.renderer}"
 
 
 def check_picture(output: str, *, force: bool) -> None:
@@ -98,16 +75,18 @@ def check_picture(output: str, *, force: bool) -> None:
     check_writable(output, force=force)
 
 
-def _write(output: str, picture: Any, *, force: bool) -> None:
+def write_picture(output: str, picture: Any, *, force: bool) -> None:
     from ptmtools.files import write_bytes
     from ptmtools.texture.images import png_bytes
 
     write_bytes(output, png_bytes(picture), force=force)
 
 
-def _refuse_others(target: str, of_octree: bool) -> None:
+def _refuse_others(target: str, kind: FolderKind | None) -> None:
     """Raises UsageError for options that do not apply to the target."""
-    kinds = ("a database", ViewOptions), ("an octree texture", RenderOptions)
-    (has, own), (needs, other) = kinds[::-1] if of_octree else kinds
-    for wrong in sorted(given_options(other) - {option_name(field) for field in fields(own)}):
-        raise click.UsageError(f"--{wrong} is for {needs}; {target} is {has}")
+    classes = {"a database": ViewOptions} | {k.noun: d.load() for k, d in _DRAWN.items()}
+    noun = kind.noun if kind and kind.drawing else "a database"
+    names = {option_name(field) for field in fields(classes[noun])}
+    for other, options in classes.items():
+        for wrong in sorted(given_options(options) - names):
+            raise click.UsageError(f"--{wrong} is for {other}; {target} is {noun}")

@@ -38,7 +38,7 @@ def init(console: Console, db: str, output: str | None, force: bool) -> None:
     from ptmtools.output.served import place_names
     from ptmtools.pipeline.command import naming_command, open_database
     from ptmtools.pipeline.stage import Artifacts
-    from ptmtools.pipeline.stages import APO, CELLS
+    from ptmtools.pipeline.stages import CELLS, SCENE
     from ptmtools.tour.model import NAME
     from ptmtools.tour.starting import first_tour
 
@@ -48,7 +48,7 @@ def init(console: Console, db: str, output: str | None, force: bool) -> None:
     with naming_command(db):
         folder = open_database(db)
         artifacts = Artifacts(folder)
-        scene, cells, places = artifacts[APO], artifacts[CELLS], place_names(db)
+        scene, cells, places = artifacts[SCENE], artifacts[CELLS], place_names(db)
     text, pictures, rooms = first_tour(scene, cells, folder.manifest.model, places)
     write_bytes(file, text.encode(), force=force)
     if pictures + rooms:

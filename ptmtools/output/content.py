@@ -14,8 +14,9 @@ from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
 from ptmtools.output.emitter import Emitter
 from ptmtools.output.geometry import Geometry
-from ptmtools.output.model import OctreeRecord, TextureRecord, Viewpoint, WriterOptions
+from ptmtools.output.model import TextureRecord, Viewpoint, WriterOptions
 from ptmtools.output.numbers import shares_of
+from ptmtools.output.representation import Represented
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from ptmtools.coverage.required_levels import Need
     from ptmtools.light.model import Light
     from ptmtools.output.mesh_levels import MeshLevels
-    from ptmtools_systems.apo.reliefs import Reliefs
+    from ptmtools.output.object_maps import ObjectMaps
 
 
 @dataclass(frozen=True)
@@ -37,12 +38,11 @@ class Content:
     viewpoints: where a walk may start.
     progress: called for every cell.
     need: the required levels of textures, if measured.
-    octrees: the octree textures of objects.
+    represented: other representations of objects, one for each kind.
     workers: number of threads.
     emitters: the forms that are written, in the order of writing.
     light: the light of the cells, if baked.
-    reliefs: the places of objects in their normal maps, if there are any; relief_need: the required
-        levels of these, if measured.
+    map_need: the required levels of the normal maps of objects, if measured.
     """
 
     scene: Scene
@@ -54,12 +54,11 @@ class Content:
     options: WriterOptions = WriterOptions()  # noqa: RUF009 - a frozen value
     progress: Progress = silent
     need: Need | None = None
-    octrees: tuple[OctreeRecord, ...] = ()
+    represented: tuple[Represented, ...] = ()
     workers: int = 1
     emitters: tuple[Emitter, ...] = ()
     light: Light | None = None
-    reliefs: Reliefs | None = None
-    relief_need: Need | None = None
+    map_need: Need | None = None
 
     @cached_property
     def geometry(self) -> Geometry:
@@ -68,9 +67,9 @@ class Content:
 
     @cached_property
     def lit(self) -> Geometry:
-        """`geometry` with the light and the relief, if there is any."""
+        """`geometry` with the light, and the coordinates in normal maps of objects."""
         lit = self.geometry.lit_by(self.light) if self.light else self.geometry
-        return lit.relieved_by(self.reliefs, self.scene, self.cells) if self.reliefs else lit
+        return lit.mapped_by(self.object_maps, self.scene, self.cells) if self.object_maps else lit
 
     @cached_property
     def position_exponent(self) -> int:
@@ -86,8 +85,7 @@ class Content:
 
         if self.options.lods != "auto" or not any(one.has_meshes for one in self.emitters):
             return ()
-        replaced = self.octree_of.keys() | self.relief_of.keys()
-        return mesh_levels(self.lit, replaced, self.progress)
+        return mesh_levels(self.lit, self.replaced, self.progress)
 
     @cached_property
     def mesh_of(self) -> Mapping[tuple[int, int], int]:
@@ -112,14 +110,30 @@ class Content:
         return {r.cell: (place, r) for place, r in enumerate(self.textures) if r.cell >= 0}
 
     @cached_property
-    def relief_of(self) -> Mapping[int, tuple[int, TextureRecord]]:
+    def object_maps(self) -> ObjectMaps | None:
+        """The places of objects in their normal maps, if there are any."""
+        return next((r.maps for r in self.represented if r.maps), None)
+
+    @cached_property
+    def map_of(self) -> Mapping[int, tuple[int, TextureRecord]]:
         """Object → the index of its normal map in `textures`, and the record of that."""
         return {r.object: (place, r) for place, r in enumerate(self.textures) if r.object >= 0}
 
     @cached_property
-    def octree_of(self) -> Mapping[int, int]:
-        """Object of the scene → the place of its octree in `octrees`."""
-        return {record.number: place for place, record in enumerate(self.octrees)}
+    def replaced(self) -> frozenset[int]:
+        """The objects of the scene with another representation."""
+        return frozenset(number for kind in self.represented for number in kind.objects)
+
+    @cached_property
+    def extras(self) -> Mapping[int, Mapping[str, int]]:
+        """Object of the scene → the members of its nodes' "extras": of each kind of representation
+        the number of its row."""
+        extras: dict[int, dict[str, int]] = {}
+        for represented in self.represented:
+            if represented.kind:
+                for row, number in enumerate(represented.objects):
+                    extras.setdefault(number, {})[represented.kind.member] = row
+        return extras
 
     @cached_property
     def normal_maps(self) -> frozenset[int]:
@@ -140,10 +154,10 @@ class Content:
         start = self.geometry.cell_start[1:-1]
         cells = np.split(self.paint, start)
         light = [self.lightmap_of[c][0] if c in self.lightmap_of else -1 for c in range(len(cells))]
-        relief = np.full(len(self.scene.objects) + 1, -1)
-        for number, (place, _) in self.relief_of.items():
-            relief[number] = place
-        maps = np.split(relief[self.geometry.object], start)
+        map_place = np.full(len(self.scene.objects) + 1, -1)
+        for number, (place, _) in self.map_of.items():
+            map_place[number] = place
+        maps = np.split(map_place[self.geometry.object], start)
         used = (np.concatenate([own, [c], m]) for own, c, m in zip(cells, light, maps, strict=True))
         return [np.unique(own[own >= 0]) for own in used]
 

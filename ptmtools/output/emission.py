@@ -37,9 +37,10 @@ from ptmtools.files import real_folder, refuse_existing, write_bytes, writing
 from ptmtools.output.content import Content
 from ptmtools.output.emitter import GZIP, Emitter, File
 from ptmtools.output.emitters import chosen_emitters
-from ptmtools.output.model import EmitReport, OctreeRecord, TextureRecord, Visit
+from ptmtools.output.model import EmitReport, TextureRecord, Visit
 from ptmtools.output.names import BUNDLE, HINTS, RECORD_FILES, mesh_path, path_of
 from ptmtools.output.options import EmitOptions
+from ptmtools.output.representation import Represented
 from ptmtools.output.viewpoints import place_viewpoints
 from ptmtools.parallel import ordered
 from ptmtools.progress import Progress, silent
@@ -49,7 +50,6 @@ from ptmtools.visibility.model import Pvs, over_places
 if TYPE_CHECKING:
     from ptmtools.coverage.required_levels import Need
     from ptmtools.light.model import Light
-    from ptmtools_systems.apo.reliefs import Reliefs
 
 
 #: Files written at a time.
@@ -213,10 +213,9 @@ def emit(
     *,
     force: bool = False,
     need: Need | None = None,
-    octrees: tuple[OctreeRecord, ...] = (),
+    represented: tuple[Represented, ...] = (),
     light: Light | None = None,
-    reliefs: Reliefs | None = None,
-    relief_need: Need | None = None,
+    map_need: Need | None = None,
     workers: int = 1,
 ) -> EmitReport:
     """Writes the files of every emitter that ``options.format`` names into the folder ``out``. The
@@ -228,10 +227,9 @@ def emit(
         those of normal maps.
     force: overwrite files of these names, gzip copies included.
     need: the levels that each cell requires, for the records; None leaves them out.
-    octrees: the octree textures of objects, already written.
+    represented: other representations of objects, whose files are already written.
     light: the light of the cells, if baked.
-    reliefs: the places of objects in their normal maps, if there are any; relief_need: the levels
-        of these that each cell requires.
+    map_need: the levels of the normal maps of objects that each cell requires.
     workers: threads that may be used.
 
     Raises
@@ -263,12 +261,11 @@ def emit(
         options,
         progress,
         need,
-        octrees,
+        represented,
         workers,
         emitters,
         light,
-        reliefs,
-        relief_need,
+        map_need,
     )
     written = [emitter.writer.load()(content) for emitter in emitters]
     for name in owned:

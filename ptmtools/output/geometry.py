@@ -25,7 +25,7 @@ from ptmtools.scene.model import Scene
 
 if TYPE_CHECKING:
     from ptmtools.light.model import Light
-    from ptmtools_systems.apo.reliefs import Reliefs
+    from ptmtools.output.object_maps import ObjectMaps
 
 #: The step of coordinates in normal maps, far below a texel.
 _RELIEF_STEP = 2.0**-20
@@ -148,21 +148,21 @@ class Geometry:
             result.color = np.rint(255 * to_srgb(linear)).astype(np.uint8)
         return result
 
-    def relieved_by(self, reliefs: Reliefs, scene: Scene, cells: Cells) -> Geometry:
+    def mapped_by(self, maps: ObjectMaps, scene: Scene, cells: Cells) -> Geometry:
         """The same geometry with the normal maps of objects."""
         result = copy(self)
-        result.relieved = np.isin(self.object, reliefs.objects)
+        result.relieved = np.isin(self.object, maps.objects)
         row = np.full(len(scene.triangles), -1)
-        row[np.isin(scene.triangle_object, reliefs.objects)] = np.arange(len(reliefs.uv))
+        row[np.isin(scene.triangle_object, maps.objects)] = np.arange(len(maps.uv))
         own = np.repeat(result.relieved, np.diff(self.triangle_start))
         source = row[cells.triangle_source[self.piece[own]]]
         uv = np.zeros((len(scene.triangles), 3, 2))
-        uv[row >= 0] = reliefs.uv
+        uv[row >= 0] = maps.uv
         uv = np.clip(_carried(scene, cells, self.piece[own], uv), 0, 1)
         result.relief = np.zeros((len(self.triangle), 3, 9), np.float32)
         # Pieces of one triangle, and neighbours, have the same numbers at a corner.
         result.relief[own, :, :2] = np.rint(uv / _RELIEF_STEP) * _RELIEF_STEP
-        result.relief[own, :, 2:] = reliefs.frame[source][:, None]
+        result.relief[own, :, 2:] = maps.frame[source][:, None]
         return result
 
     def areas(self) -> NDArray[np.float64]:

@@ -276,8 +276,7 @@ def _normal_coords(content: Content, shape: Shape) -> int | None:
     """The number of the coordinates of a shape in the normal map of its material; None if that is
     not drawn: replaced objects have other relief, and coarse meshes no coordinates of their own."""
     normal = content.scene.materials[shape.material].normal
-    replaced = shape.object in content.octree_of or shape.object in content.relief_of
-    if normal is None or replaced or (normal.own and shape.normal is None):
+    if normal is None or shape.object in content.replaced or (normal.own and shape.normal is None):
         return None
     return 0 if not normal.own else 1 if shape.light is None else 2
 
@@ -287,7 +286,7 @@ def _glb(content: Content, cell: int, name: str, shapes: Iterable[_Drawn]) -> by
     buffer = PlainBuffer() if options.plain_gltf else CompressedBuffer(content.position_exponent)
     lightmap = content.lightmap_of.get(cell)
     materials = MaterialWriter(
-        scene.materials, content.records, options.fallback, lightmap, content.relief_of
+        scene.materials, content.records, options.fallback, lightmap, content.map_of
     )
     nodes: list[dict[str, Any]] = []
     meshes: list[dict[str, Any]] = []
@@ -306,7 +305,7 @@ def _glb(content: Content, cell: int, name: str, shapes: Iterable[_Drawn]) -> by
             relief=relief,
             normal=normal,
         )
-        second = lightmap if relief is None else content.relief_of[relief]
+        second = lightmap if relief is None else content.map_of[relief]
         third = None
         if normal:
             own = scene.materials[shape.material].normal
@@ -323,8 +322,8 @@ def _glb(content: Content, cell: int, name: str, shapes: Iterable[_Drawn]) -> by
         if shape.object != last:
             last = shape.object
             node: dict[str, Any] = {"name": scene.objects[shape.object], "mesh": len(meshes)}
-            if (octree := content.octree_of.get(shape.object)) is not None:
-                node["extras"] = {"octree": octree}
+            if extras := content.extras.get(shape.object):
+                node["extras"] = extras
             nodes.append(node)
             meshes.append({"primitives": []})
         meshes[-1]["primitives"].append(primitive)

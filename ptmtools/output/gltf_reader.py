@@ -7,6 +7,7 @@ allocates an array.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -69,8 +70,8 @@ class ReadPrimitive:
     Attributes
     ----------
     place: of the primitive in the document.
-    object, octree: of its node: the name of the object, and the index of its octree texture in the
-        hints, or None.
+    object, extras: of its node: the name of the object, and the row of each representation of it
+        in the hints, by the member of the node's "extras".
     point: (n, 3) float32.
     uv: (n, 2) float32, origin at the upper left, or None.
     color: (n, 3) linear light, or None.
@@ -83,7 +84,7 @@ class ReadPrimitive:
 
     place: str
     object: str
-    octree: int | None
+    extras: Mapping[str, int]
     point: NDArray[np.float32]
     uv: NDArray[np.float32] | None
     color: NDArray[np.float64] | None
@@ -203,11 +204,10 @@ class _Reader:
                 _foreign(place, "has only one of a normal map and its coordinates")
         if (material.light is None and frame is None) != (light is None):
             _foreign(place, "has only one of a lightmap, or normal map, and its coordinates")
-        octree = node.get("extras", {}).get("octree")
         return ReadPrimitive(
             place,
             node["name"],
-            octree,
+            node.get("extras", {}),
             point,
             uv,
             color,

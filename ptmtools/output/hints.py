@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ptmtools.cells.model import Cells
 from ptmtools.output.convexity import leaf_numbers, portal_polygons, slack_of
 from ptmtools.output.first_look import FirstLooks
-from ptmtools.output.model import OctreeRecord, PreviewRecord, TextureRecord, Viewpoint
+from ptmtools.output.model import PreviewRecord, TextureRecord, Viewpoint
 from ptmtools.output.names import (
     FIRST_LOOK_FILES,
     HINTS,
@@ -81,7 +81,7 @@ def index_text(content: Content) -> str:
             | ({"normals": True} if r.image in content.normal_maps else {})
             for r in content.textures
         ],
-        "octrees": [_octree(r) for r in content.octrees],
+        **{r.kind.name: list(r.rows) for r in content.represented if r.kind and r.rows},
         "cells": [
             {"name": cell_name(c), "box": box}
             | ({} if standing else {"standing": False})
@@ -91,10 +91,8 @@ def index_text(content: Content) -> str:
             )
         ],
     }
-    lists["meshes"] = [_mesh(each) for each in content.meshes]
-    for name in ("octrees", "meshes"):
-        if not lists[name]:
-            del lists[name]
+    if content.meshes:
+        lists["meshes"] = [_mesh(mesh) for mesh in content.meshes]
     return document_text(head, lists)
 
 
@@ -155,17 +153,6 @@ def _preview(record: PreviewRecord) -> Mapping[str, Any]:
         "error": whole(preview.error),
     }
     return row | ({"exact": True} if preview.exact else {})
-
-
-def _octree(record: OctreeRecord) -> Mapping[str, Any]:
-    return {
-        "object": record.object,
-        "file": quote(record.file),
-        "cube": {"low": list(record.low), "side": record.side},
-        "levels": list(record.levels),
-        "ends": list(record.ends),
-        "crc32": list(record.crc32),
-    }
 
 
 def _mesh(levels: MeshLevels) -> Mapping[str, Any]:
@@ -254,9 +241,9 @@ class RecordWriter:
         content, cells = self._content, self._content.pvs.row(cell).tolist()
         visible = {place for other in cells for place in content.painted[other].tolist()}
         images = {image: place for image, (place, _) in content.records.items()}
-        maps = dict(enumerate(place for place, _ in content.relief_of.values()))
+        maps = dict(enumerate(place for place, _ in content.map_of.values()))
         rows = []
-        for measured, places in ((need, images), (content.relief_need, maps)):
+        for measured, places in ((need, images), (content.map_need, maps)):
             if measured is None:
                 continue
             for entry in range(*measured.start[cell : cell + 2].tolist()):

@@ -114,30 +114,6 @@ def offsets_of(row: Mapping[str, Any]) -> list[int]:
 
 
 @dataclass(frozen=True)
-class OctreeRecord:
-    """The octree texture of an object, for the emitted files (docs/formats/apo.md).
-
-    Attributes
-    ----------
-    object, number: its name, which objects may share, and its index in the scene.
-    file: the stream of texels, relative to the served folder, "apo/NAME.bin".
-    low, side: corner and side of the cube, world metres.
-    levels: texels of each level, from the root on.
-    ends: the length of the prefix of the file that holds each level and those before it.
-    crc32: of the texels of each level.
-    """
-
-    object: str
-    number: int
-    file: str
-    low: tuple[float, ...]
-    side: float
-    levels: tuple[int, ...]
-    ends: tuple[int, ...]
-    crc32: tuple[int, ...]
-
-
-@dataclass(frozen=True)
 class GivenViewpoint:
     """A viewpoint that the user asks for.
 

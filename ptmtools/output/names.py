@@ -21,7 +21,6 @@ CELL_FOLDER = "cells"
 TEXTURE_FOLDER = "textures"
 GLTF_FOLDER = "gltf"
 INTERLACE_FOLDER = "interlace"
-OCTREE_FOLDER = "apo"
 #: From one of these folders back to the served one.
 UP = "../"
 #: The files of a cell, as the index names them: URI templates (RFC 6570, level 1).

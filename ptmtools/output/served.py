@@ -25,6 +25,7 @@ from ptmtools.output.locating import Locator
 from ptmtools.output.mesh_levels import row_fault
 from ptmtools.output.model import FileError, sizes_of
 from ptmtools.output.names import HINTS, texture_name
+from ptmtools.output.representation import representations
 from ptmtools.output.surfaces import Surfaces, surfaces_of
 from ptmtools.store.layout import SERVED
 
@@ -131,8 +132,7 @@ def read_served(database: str | os.PathLike[str]) -> Served:
     for cell, name in enumerate(names):
         file = _of(folder, index["geometry"][FORM], name)
         data = _bytes(file)
-        lists = len(index["textures"]), len(index.get("octrees", ()))
-        geometry.append(_glb(file, data, cell, *lists))
+        geometry.append(_glb(file, data, cell, index))
         sizes.append(on_link(data))
     mesh_bytes = []
     for number, row in enumerate(index.get("meshes", ())):
@@ -143,7 +143,7 @@ def read_served(database: str | os.PathLike[str]) -> Served:
         files = [_inside(folder, url) for url in row["files"]]
         bodies = [_bytes(file) for file in files]
         mesh_bytes.append(tuple(map(on_link, bodies)))
-        whole = _glb(files[-1], bodies[-1], row["cell"], *lists)
+        whole = _glb(files[-1], bodies[-1], row["cell"], index)
         geometry[row["cell"]] = _refined(geometry[row["cell"]], number, whole)
     locator = Locator(records)
     return Served(
@@ -233,7 +233,7 @@ def _check_record(
         raise DatabaseError("PTM-D006", fault, file=file, remedy=BUILD)
 
 
-def _glb(file: Path, data: bytes, cell: int, textures: int, octrees: int) -> ReadGlb:
+def _glb(file: Path, data: bytes, cell: int, index: Mapping[str, Any]) -> ReadGlb:
     try:
         read = read_glb(data)
     except FileError as fault:
@@ -242,8 +242,10 @@ def _glb(file: Path, data: bytes, cell: int, textures: int, octrees: int) -> Rea
         ) from None
     named = ((p.material.texture, p.material.light, p.material.normal) for p in read.primitives)
     used = [number for each in named for number in each if number is not None]
-    octree = [p.octree for p in read.primitives if p.octree is not None]
-    out_of_range = max(used, default=-1) >= textures or max(octree, default=-1) >= octrees
+    out_of_range = max(used, default=-1) >= len(index["textures"])
+    for kind in representations():
+        rows = [p.extras[kind.member] for p in read.primitives if kind.member in p.extras]
+        out_of_range |= max(rows, default=-1) >= len(index.get(kind.name, ()))
     if read.cell != cell or out_of_range:
         raise DatabaseError("PTM-D006", "belongs to another cell", file=file, remedy=BUILD)
     return read

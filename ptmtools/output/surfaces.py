@@ -7,7 +7,8 @@ behind a wall.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ class MappedRelief:
     ----------
     number: (n,) int32, the normal map of its object in the hints, -1 without.
     uv: (n, 3, 2) float64 coordinates in it, origin at the upper left; 0 without one.
-    frame: (n, 7) float32, see `ptmtools_systems.apo.normal_map`; 0 without one.
+    frame: (n, 7) float32, see `ptmtools.output.object_maps`; 0 without one.
     """
 
     number: NDArray[np.int32]
@@ -54,7 +55,8 @@ class Surfaces:
     clamped: (n, 2) whether u and v stop at the edge of the texture instead of repeating it.
     seen: (n, 2) of each the one that is seen in its place from where its normal points to, and from
         behind it, see `sides`.
-    octree: (n,) int32, the octree texture of its object in the hints, -1 without.
+    represented: member of the extras of nodes → (n,) int32, the row of its object in the list of
+        the hints, -1 without (`ptmtools.output.representation`).
     lightmap, spot: (n,) int32, the lightmap in the hints' textures, -1 without; (n, 3, 2) float64
         coordinates in it, origin at the upper left. None if there are no lightmaps.
     relief: the normal maps of objects, if there are any. bumps: those of materials.
@@ -74,7 +76,7 @@ class Surfaces:
     glass: Bools
     clamped: Bools
     seen: Ints
-    octree: NDArray[np.int32]
+    represented: Mapping[str, NDArray[np.int32]] = field(default_factory=dict)
     lightmap: NDArray[np.int32] | None = None
     spot: Floats | None = None
     relief: MappedRelief | None = None
@@ -202,7 +204,10 @@ def surfaces_of(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
         ),
         clamped=spread([[w == clamp for w in m.wrap] for m in materials], np.bool_, 2),
         seen=sides(corner, cell, two_sided, locator),
-        octree=spread([-1 if p.octree is None else p.octree for _, p in shapes], np.int32),
+        represented={
+            member: spread([p.extras.get(member, -1) for _, p in shapes], np.int32)
+            for member in {member for _, p in shapes for member in p.extras}
+        },
         lightmap=spread(lightmap, np.int32) if max(lightmap, default=-1) >= 0 else None,
         spot=spot if max(lightmap, default=-1) >= 0 else None,
         relief=_relief([p for _, p in shapes]),

@@ -1,7 +1,8 @@
 """The contract of the stages: a stage's declaration, its artifacts, and its job in one run.
 
-A stage is one frozen value in a file of its own in `stages/`, with a line in the table there.
-Build, plan, status, info, validate, tradeoff and the command line loop over that table.
+A stage is one frozen value in a file of its own in `stages/`, with a line in the table there, or
+an entry point of the group ``ptmtools.stages`` in another package. Build, plan, status, info,
+validate, tradeoff and the command line loop over that table.
 
 `ptmtools.pipeline.command` completes the command of their `Rebuild` remedies.
 """
@@ -15,6 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
+from ptmtools import plugins
 from ptmtools.diagnostics import warnings_in
 from ptmtools.errors import DatabaseError, Rebuild, naming
 from ptmtools.lazy import Lazy
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from ptmtools.output.representation import Represented
     from ptmtools.parallel import Workers
     from ptmtools.store.folder import DatabaseFolder
     from ptmtools.store.manifest import StageRecord
@@ -61,12 +64,17 @@ class Stage(Generic[A]):
         recipe, and the default before that.
     reads: the stages whose artifacts `compute` takes, in this order; a function of the options if
         it depends on them.
-    files: those of `reads` of which it reads all files, not only the arrays.
+    before_changes: whether, with these options, it reads artifacts as they are before other stages
+        change them.
+    files: those of `reads` of which it reads all files, not only the arrays; or a function that
+        returns them.
     inputs: ``inputs(artifacts, options)``: name → SHA-256 of its inputs, if these are not the files
         of `reads`.
     heeds: stages whose options it depends on, besides its own; `Artifacts.choices` are inputs.
-    changes: the stage whose artifact it replaces by another of the same class. If it stores no
-        arrays, the artifact is unchanged. A stage that reads it reads the arrays of both.
+    changes: the stage whose artifact it replaces by another of the same class, for all stages that
+        read it. If it stores no arrays, the artifact is unchanged.
+    origin: for a stage that changes the scene: the `SceneOrigin` of an `Artifacts`.
+    representation: what it adds to the served files, the `Represented` of an `Artifacts`.
     artifact: the class of its artifact, with ``to_arrays`` and ``from_arrays``; None if it writes
         files only.
     compute: ``compute(*artifacts, options, progress, executor)`` returns the artifact.
@@ -92,10 +100,13 @@ class Stage(Generic[A]):
     options: type
     changed: str = ""
     reads: tuple[Stage[Any], ...] | Callable[[Options], tuple[Stage[Any], ...]] = ()
-    files: tuple[Stage[Any], ...] = ()
+    files: tuple[Stage[Any], ...] | Callable[[], tuple[Stage[Any], ...]] = ()
+    before_changes: Callable[[Options], bool] = field(default=lambda options: False)
     inputs: Callable[[Artifacts, Options], Mapping[str, str]] | None = None
     heeds: tuple[Stage[Any], ...] = ()
     changes: Stage[A] | None = None
+    origin: Lazy[Callable[[Artifacts], SceneOrigin]] | None = None
+    representation: Lazy[Callable[[Artifacts], Represented | None]] | None = None
     artifact: Lazy[Any] | None = None
     compute: Lazy[Callable[..., A]] | None = None
     counts: Callable[[A], Counts] = field(default=lambda artifact: {})
@@ -114,10 +125,14 @@ class Stage(Generic[A]):
         return self.reads(options) if callable(self.reads) else self.reads
 
     def sources(self, options: Options) -> tuple[Stage[Any], ...]:
-        """The stages whose files it reads: those of `read_with`, and the ones that these change."""
-        reads = self.read_with(options)
-        changed = (read.changes for read in reads if read.changes)
-        return tuple(dict.fromkeys((*changed, *reads)))
+        """The stages whose files it reads: those of `read_with`, each followed by the ones that
+        change its artifact before this stage runs."""
+        if self.before_changes(options):
+            return self.read_with(options)
+        sources: dict[Stage[Any], None] = {}
+        for read in self.read_with(options):
+            sources |= dict.fromkeys((read, *changes_before(self, read)))
+        return tuple(sources)
 
     def summarize(self, counts: Counts) -> str:
         """`summary`, of counts from a manifest, which may be invalid."""
@@ -140,8 +155,37 @@ class Stage(Generic[A]):
         return StageRecord(self.recipe, parameters(options), dict(inputs), {})
 
 
+@dataclass(frozen=True)
+class SceneOrigin:
+    """What a changed scene comes from.
+
+    Attributes
+    ----------
+    objects: (K,) int32 the numbers of the objects that were replaced, ascending.
+    triangle: (T,) int64 for each triangle of the changed scene that of the scene as read which it
+        is, or stands for.
+    """
+
+    objects: NDArray[np.int32]
+    triangle: NDArray[np.int64]
+
+
+def changes_of(stage: Stage[Any]) -> tuple[Stage[Any], ...]:
+    """The stages of other packages that change the artifact of a stage, in the order of their
+    runs."""
+    declared = plugins.declared("stages", Stage).values()
+    return tuple(other for other in declared if other.changes is stage)
+
+
+def changes_before(reader: Stage[Any], stage: Stage[Any]) -> tuple[Stage[Any], ...]:
+    """Of `changes_of` those that run before a stage that reads the artifact."""
+    changes = changes_of(stage)
+    return changes[: changes.index(reader)] if reader in changes else changes
+
+
 class Artifacts:
-    """The artifacts of a database: ``artifacts[CELLS]``, read at first use.
+    """The artifacts of a database: ``artifacts[CELLS]``, read at first use, as other stages have
+    changed them; `original` is an artifact before.
 
     Attributes
     ----------
@@ -164,14 +208,25 @@ class Artifacts:
     def __getitem__(self, stage: Stage[A]) -> A:
         """Raises PTM-D004 to PTM-D006, also where artifacts do not fit together; PTM-D008 if
         another release of ptmtools computed the artifact."""
+        return self.original(self._last_change(stage))
+
+    def original(self, stage: Stage[A]) -> A:
+        """The artifact of a stage itself; of one that changed nothing, that of the changed stage.
+        Raises as `__getitem__`."""
         if stage not in self._artifacts:
-            stored = stage if self.is_stored(stage) else stage.changes
-            assert stored
-            artifact = self._read(stage) if stored is stage else self[stored]
-            with self.reading(arrays_of(stored.name)):
+            if stage.changes and not self.is_stored(stage):
+                artifact = self.original(stage.changes)
+            else:
+                artifact = self._read(stage)
+            with self.reading(arrays_of(stage.name)):
                 self._check_fit(stage, artifact)
             self._artifacts[stage] = artifact
         return cast(A, self._artifacts[stage])
+
+    def _last_change(self, stage: Stage[A]) -> Stage[A]:
+        """The stage that changed the artifact of a stage last, or itself."""
+        changes = (change for change in reversed(changes_of(stage)) if self.is_stored(change))
+        return next(changes, stage)
 
     def _read(self, stage: Stage[A]) -> A:
         self.check_recipe(stage)
@@ -249,7 +304,8 @@ class Artifacts:
         PTM-D002."""
         if stage.inputs:
             return dict(stage.inputs(self, options))
-        return self.files_of(stage.sources(options), stage.files)
+        files = stage.files() if callable(stage.files) else stage.files
+        return self.files_of(stage.sources(options), files)
 
     def files_of(
         self, stages: Iterable[Stage[Any]], files: Collection[Stage[Any]] = ()
@@ -306,11 +362,12 @@ class Artifacts:
 
     def _check_fit(self, stage: Stage[A], artifact: A) -> None:
         """Raises ValueError if an artifact does not fit those that were read before."""
-        together = {**self._artifacts, stage: artifact}
-        for one, own in together.items():
-            for other, check in one.fits.items():
-                concerned = stage in (one, other) and other in together
-                if concerned and (fault := check(own, together[other])):
+        known = {**self._artifacts, stage: artifact}
+        for reader, dependent in known.items():
+            for read, check in reader.fits.items():
+                shown = self._last_change(read)
+                concerned = stage in (reader, shown) and shown in known
+                if concerned and (fault := check(dependent, known[shown])):
                     raise ValueError(fault)
 
     @contextmanager

@@ -5,29 +5,27 @@ the counts of the manifest. Files with a wrong hash are reported by `validate_da
 those that are damaged although their hash is right, after a manifest was repaired by hand or a
 stage was taken from another build.
 
-`FOLDERS` are the kinds of folders that are no databases, each recognised by its index file. `ptm
-info` and `ptm validate` look a folder up here, and nothing else branches on a kind: a new one is a
-line in the table.
+Other folders have checks of their own (`ptmtools.folder_kinds`).
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ptmtools.cells import structural_triangles
 from ptmtools.diagnostics import Findings, Issue, ValidationReport, worst_first
 from ptmtools.errors import DatabaseError
-from ptmtools.lazy import Lazy
+from ptmtools.folder_kinds import folder_kind
 from ptmtools.output import validate_database, validate_ptm
 from ptmtools.output.validation.findings import CODES
 from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.stage import Artifacts, Stage
-from ptmtools.pipeline.stages import APO, CELLS, PVS, STAGES
+from ptmtools.pipeline.stages import CELLS, PVS, SCENE, STAGES
 from ptmtools.progress import Progress, silent
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import MANIFEST
@@ -48,7 +46,7 @@ def check_stages(db: DatabaseFolder, faulty: Collection[str] = ()) -> tuple[Issu
             _check_stage(stage, together, faulty, findings)
         if stage.changes and not together.is_stored(stage):
             with suppress(DatabaseError):  # reported for the stage that it could have changed
-                together[stage]
+                together.original(stage)
     return findings.issues()
 
 
@@ -72,12 +70,12 @@ def _check_stage(
     if stage.artifact is None or not alone.is_stored(stage):
         return
     try:
-        artifact = alone[stage]
+        artifact = alone.original(stage)
     except DatabaseError as fault:
         _add("PTM-D720", fault, db, faulty, findings)
         return
     try:
-        together[stage]
+        together.original(stage)
     except DatabaseError as fault:
         _add("PTM-D720", fault, db, faulty, findings)
     for name, count in stage.counts(artifact).items():
@@ -96,74 +94,7 @@ def _add(
         findings.add(code, MANIFEST if file == "." else file, "", fault.message)
 
 
-@dataclass(frozen=True)
-class FolderKind:
-    """A kind of folder.
-
-    Attributes
-    ----------
-    index: the file in it that describes the others.
-    about: a noun for messages.
-    again: the command that writes it.
-    check: checks a folder.
-    describe: the lines of ``ptm info`` for a folder, and its record as JSON. Raises the errors of
-        reading the index.
-    """
-
-    index: str
-    about: str
-    again: str
-    check: Lazy[Callable[[Path, Limits], ValidationReport]]
-    describe: Lazy[Callable[[Path], tuple[tuple[str, ...], Mapping[str, Any]]]]
-
-
-_LIST = (
-    FolderKind(
-        index="interlace.json",
-        about="interlaced image",
-        again="ptm interlace IMAGE",
-        check=Lazy("ptmtools_systems.interlace.reading:validate_interlaced"),
-        describe=Lazy("ptmtools_systems.interlace.reading:describe"),
-    ),
-    FolderKind(
-        index="apo.json",
-        about="octree texture",
-        again="ptm apo MESH",
-        check=Lazy("ptmtools_systems.apo.checking:check_folder"),
-        describe=Lazy("ptmtools_systems.apo.checking:describe"),
-    ),
-    FolderKind(
-        index="campus.json",
-        about="campus",
-        again="ptm campus MODEL",
-        check=Lazy("ptmtools_systems.campus.validation:check_campus"),
-        describe=Lazy("ptmtools_systems.campus.reading:describe_campus"),
-    ),
-)
-#: By the name of the index.
-FOLDERS = {kind.index: kind for kind in _LIST}
-
-
-def kind_of(folder: Path) -> FolderKind | None:
-    """The kind of a folder, or None."""
-    return next((kind for kind in FOLDERS.values() if (folder / kind.index).is_file()), None)
-
-
 _LIMITS = Limits()
-
-
-def check_folder(folder: Path, index: str) -> None:
-    """Raises DatabaseError PTM-D006 if a folder of the kind with this index (`FOLDERS`) has an
-    error."""
-    kind = FOLDERS[index]
-    if errors := kind.check.load()(folder, _LIMITS).errors:
-        first = errors[0]
-        raise DatabaseError(
-            "PTM-D006",
-            f"damaged: {first.message}",
-            file=folder / first.file,
-            remedy=f"write the folder again with `{kind.again}`",
-        )
 
 
 def validate(
@@ -173,7 +104,7 @@ def validate(
     limits: Limits = _LIMITS,
     workers: int = 0,
 ) -> ValidationReport:
-    """Checks a database, a folder of `FOLDERS` or a `.ptm` file.
+    """Checks a database, a folder of `folder_kinds` or a `.ptm` file.
 
     ``limits`` and ``workers`` as for `validate_database`.
 
@@ -185,7 +116,7 @@ def validate(
     file = Path(target)
     if not file.is_dir() and (file.exists() or file.suffix == ".ptm"):
         return validate_ptm(target, limits=limits)
-    if kind := kind_of(file):
+    if kind := folder_kind(file):
         return kind.check.load()(file, limits)
     db = None
     try:
@@ -210,6 +141,6 @@ def shoot_segments(
     DatabaseError: PTM-D001 to PTM-D006, as `DatabaseFolder` and `Artifacts`.
     """
     artifacts = Artifacts(open_database(db))
-    options, scene, cells = artifacts.recorded(CELLS), artifacts[APO], artifacts[CELLS]
+    options, scene, cells = artifacts.recorded(CELLS), artifacts[SCENE], artifacts[CELLS]
     corners = scene.corners[structural_triangles(scene, options, cells.opened)]
     return check_conservative(corners, cells, artifacts[PVS], segments, progress=progress)

@@ -3,7 +3,7 @@ decodes images, and simplifies the building as a statue.
 
 The building has the features that run all kernels: doors in a row, whose edges meet in one line
 (near ties), a solid that stands in a room, and an image large enough for the coder to fit weights.
-Its faces also become an octree texture, and are simplified with their texture coordinates.
+Its faces are also simplified with their texture coordinates.
 """
 
 from __future__ import annotations
@@ -89,19 +89,16 @@ def _squares(solid: NDArray[np.bool_]) -> NDArray[np.int64]:
     return np.concatenate(squares)
 
 
-def warm_statue() -> None:
-    """Calls the kernels of octree textures and of simplification, of plain and painted meshes."""
-    from ptmtools.executor import Executor
+def warm_objects() -> None:
+    """Calls the kernels of simplification, of plain and painted meshes, and of other
+    representations."""
+    from ptmtools.output.representation import representations
     from ptmtools.scene import IngestOptions, ingest
     from ptmtools.simplification import Mesh, SimplifyOptions, simplify
-    from ptmtools_systems.apo.making import make_apo
-    from ptmtools_systems.apo.model import ApoOptions
-    from ptmtools_systems.apo.traversal import look_up
 
+    for kind in representations():
+        kind.warm_up.load()()
     with TemporaryDirectory() as folder:
         scene = ingest(write_building(Path(folder)), IngestOptions())
-        faces = len(scene.triangles) // 4
-        replaced = make_apo(scene, ApoOptions(faces=faces, depth=3), Executor())
-    look_up(replaced.octree, np.full((1, 3), 0.5))
     mesh = Mesh(scene.points, scene.triangles, scene.triangle_material, scene.uv)
-    simplify(mesh, SimplifyOptions(faces))
+    simplify(mesh, SimplifyOptions(len(scene.triangles) // 4))

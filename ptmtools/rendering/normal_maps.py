@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.output.object_maps import frame_axes
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.kernels import shade
 from ptmtools.rendering.light import light_on
 from ptmtools.rendering.records import Shows, Sight, triangles_of
-from ptmtools_systems.apo.normal_map import axes_of
 
 
 def show_relief(
@@ -48,7 +48,7 @@ def show_relief(
     )
     value = _sampled(sight, maps, shows, loaded, column)
     face = sight.triangle[relieved]
-    axes = axes_of(relief.frame[face])
+    axes = frame_axes(relief.frame[face])
     normal = np.einsum("nij,nj->ni", axes, value[relieved] / 127.5 - 1)
     shown[relieved] *= (light_on(normal) / lamps[face])[:, None]
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
+from ptmtools.output.representation import listed
 from ptmtools.output.served import Served
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.progress import Progress
@@ -16,7 +17,6 @@ from ptmtools.rendering.footprints import show_colors
 from ptmtools.rendering.kernels import shade
 from ptmtools.rendering.light import GLOW, LIT_GLOW, SKY, lamps
 from ptmtools.rendering.normal_maps import show_bumps, show_relief
-from ptmtools.rendering.octrees import read_octrees
 from ptmtools.rendering.previews import Texels
 from ptmtools.rendering.pyramids import alpha_of, read_levels, read_pyramids
 from ptmtools.rendering.records import Shows, Sight, Triangles, own_levels, triangles_of
@@ -80,7 +80,9 @@ class Painter:
         self._shows = own_levels(pyramids)
         self._column = self._columns(self._shows)
         if self._lit:
-            self._octrees, self._lamps = read_octrees(self._served), lamps(self._surfaces.corner)
+            self._lamps = lamps(self._surfaces.corner)
+            kinds = listed(self._served.index)
+            self._painters = [kind.painter.load()(self._served) for kind in kinds]
 
     def colors(self, sight: Sight) -> Floats:
         """(n, 3) colours of pixels, 0 to 255; of the sky where they show nothing."""
@@ -89,11 +91,9 @@ class Painter:
         shown = np.empty((len(sight.ray), 3))
         shade(sight, triangles, shows, loaded, column, shown)
         if self._lit:
-            from ptmtools.rendering.relief import relieve
-
-            octrees, lamp = self._octrees, self._lamps
-            relieve(sight, triangles, lamp, octrees, loaded, octrees.levels, shown)
-            show_relief(sight, surfaces, shows, loaded, column, lamp, shown)
+            for painter in self._painters:
+                painter.paint(sight, triangles, self._lamps, loaded, shown)
+            show_relief(sight, surfaces, shows, loaded, column, self._lamps, shown)
         else:
             _shade_plain(sight, triangles, self._light, shown)
         show_bumps(sight, surfaces, shows, loaded, column, shown)

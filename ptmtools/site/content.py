@@ -24,6 +24,7 @@ from ptmtools.files import open_regular
 from ptmtools.options import option
 from ptmtools.output.emission import compressed
 from ptmtools.output.model import FileError
+from ptmtools.output.representation import Representation, listed
 from ptmtools.output.served import FORM, Served, read_served
 from ptmtools.pipeline.command import naming_command, open_database
 from ptmtools.pipeline.stages.emit import EMIT
@@ -179,8 +180,8 @@ class _Builder:
         index["cells"] = list(self._cells())
         if "meshes" in index:
             index["meshes"] = list(self._meshes())
-        if "octrees" in index:
-            index["octrees"] = list(self._octrees())
+        for kind in listed(index):
+            index[kind.name] = list(self._represented(kind))
         index["textures"] = list(self._textures())
         if has_sets(self._served.index):
             index["sets"] = self._sets()
@@ -254,16 +255,10 @@ class _Builder:
             names, sizes = zip(*files, strict=True)
             yield row | {"files": names, "bytes": sizes}
 
-    def _octrees(self) -> Iterator[dict[str, Any]]:
-        from ptmtools.rendering.octree_levels import level_differences
-        from ptmtools.rendering.octrees import read_octrees
-
-        octrees = read_octrees(self._served)
-        differences = level_differences(self._served.surfaces, octrees).round(3).tolist()
-        for row, steps in zip(self._served.index["octrees"], differences, strict=True):
-            file, digest = self._place(row["file"])
-            name = self._files.add(file.stem, ".bin", PTM, file, digest=digest)
-            yield row | {"file": name, "differences": steps[: len(row["levels"])]}
+    def _represented(self, kind: Representation) -> Iterator[Mapping[str, Any]]:
+        """The rows of a kind of representation."""
+        for row, file, digest in kind.published.load()(self._served, self._place):
+            yield {**row, "file": self._files.add(file.stem, ".bin", PTM, file, digest=digest)}
 
     def _sets(self) -> str:
         """The URL of the document of all interlaced images."""

@@ -1,23 +1,20 @@
-"""The site of a folder of another form than a database: an octree texture (`ptm apo`), an
-interlaced image (`ptm interlace`) or a campus (`ptm campus`).
+"""The site of a folder that is no database (`ptmtools.folder_kinds`).
 
-Each form has a page with a script of its own (``web/page/forms``), which the page of databases does
-not load. A new form is a row of `FORMS`. All files are in ``data-HASH``, with a hash of the index,
-which has the checksums of the others.
+Each kind has a page with a script of its own (``web/page/forms``), which the page of databases does
+not load. All files are in ``data-HASH``, with a hash of the index, which has the checksums of the
+others.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 from urllib.parse import quote
 
 from ptmtools import schemas
 from ptmtools.errors import InputError
 from ptmtools.files import open_below
+from ptmtools.folder_kinds import FolderKind
 from ptmtools.site.about import About
 from ptmtools.site.content import Site, SiteOptions, title_of
 from ptmtools.site.entry import DIGITS, Entry, link_bytes, state_of
@@ -25,7 +22,7 @@ from ptmtools.site.files import DATA, Files, add_manifest
 from ptmtools.site.program import form_page, form_script
 from ptmtools.store.layout import sha256
 
-#: The options of a site that a form has.
+#: The options of a site that such a folder has.
 OPTIONS = ("title", "description", "address")
 #: Largest index, bytes.
 _LONGEST = 1 << 26
@@ -39,89 +36,39 @@ _MEDIA = {
 }
 
 
-def _of_octree(index: Mapping[str, Any]) -> Iterator[str]:
-    for name in ("mesh", "normals", "colors"):
-        if name in index:
-            yield index[name]["file"]
-
-
-def _of_campus(index: Mapping[str, Any]) -> Iterator[str]:
-    for each in index["objects"]:
-        yield from (mesh["file"] for mesh in each["meshes"])
-        if "record" in each:
-            yield each["record"]["file"]
-    yield from (texture["file"] for texture in index["textures"])
-
-
-def _of_set(index: Mapping[str, Any]) -> Iterator[str]:
-    return (part["name"] for part in index["files"])
-
-
-@dataclass(frozen=True)
-class Form:
-    """A form of an object.
-
-    Attributes
-    ----------
-    index: the file that describes the others. schema: its name. script: of the page.
-    files: of an index: the other files that the page fetches.
-    records: whether the page shows HTML of others in frames.
-    """
-
-    index: str
-    schema: str
-    script: str
-    files: Callable[[Mapping[str, Any]], Iterator[str]]
-    records: bool = False
-
-
-_LIST = (
-    Form("apo.json", schemas.APO, "apo.js", _of_octree),
-    Form("interlace.json", schemas.INTERLACE, "interlace.js", _of_set),
-    Form("campus.json", schemas.CAMPUS, "campus.js", _of_campus, records=True),
-)
-#: By the name of the index.
-FORMS = {form.index: form for form in _LIST}
-
-
-def form_of(folder: Path) -> Form | None:
-    """The form of a folder, or None."""
-    return next((form for form in FORMS.values() if (folder / form.index).is_file()), None)
-
-
-def form_site(folder: Path, form: Form, options: SiteOptions | None = None) -> Site:
+def form_site(folder: Path, kind: FolderKind, options: SiteOptions | None = None) -> Site:
     """The site of a folder. Checks its index alone: the page checks what it fetches. Of the options
     `OPTIONS` apply.
 
     Raises InputError PTM-I122: a file is missing or cannot be read, or the index is none.
     """
-    data, _ = _read(folder, form.index, _LONGEST)
+    data, _ = _read(folder, kind.index, _LONGEST)
     try:
         index = schemas.parse(data)
-        schemas.check(index, form.schema)
+        schemas.check(index, kind.schema)
     except schemas.ShapeError as fault:
         raise InputError(
             "PTM-I122",
             f"describes no folder that ptmtools has written ({fault})",
-            file=folder / form.index,
+            file=folder / kind.index,
             remedy="write the folder again",
         ) from fault
     place = f"data-{sha256(data)[:DIGITS]}"
     options = options or SiteOptions()
     title = options.title or title_of(folder)
     files = Files()
-    files.put(Entry(f"{place}/{form.index}", data, _MEDIA[".json"], True, compressed=True))
-    for name in form.files(index):
+    files.put(Entry(f"{place}/{kind.index}", data, _MEDIA[".json"], True, compressed=True))
+    for name in kind.files.load()(index):
         file = folder / name
         _, state = _read(folder, name, 0)
         media = _MEDIA.get(file.suffix, "application/octet-stream")
         packed = file.suffix in (".glb", ".txt")
         files.put(Entry(f"{place}/{quote(name)}", file, media, True, packed, state))
-    script = form_script(form.script)
+    script = form_script(kind.script)
     files.put(script)
-    settings = {"title": title, "index": f"{place}/{form.index}"}
+    settings = {"title": title, "index": f"{place}/{kind.index}"}
     about = About(title, options.description, address=options.address)
-    files.put(form_page(settings, script.name, [*about.lines()], framed=form.records))
+    files.put(form_page(settings, script.name, [*about.lines()], framed=kind.records))
     add_manifest(files, title)
     return Site(files.entries, index, title=title)
 

@@ -15,10 +15,11 @@ from urllib.parse import unquote, unquote_to_bytes
 
 from ptmtools.errors import DatabaseError, PtmError
 from ptmtools.files import leads_inside
+from ptmtools.folder_kinds import folder_kind
 from ptmtools.site.about import MANIFEST, MANIFEST_MEDIA
 from ptmtools.site.content import Site, SiteOptions, site_of
 from ptmtools.site.entry import Entry, is_marked, stamp_of
-from ptmtools.site.forms import form_of, form_site
+from ptmtools.site.forms import form_site
 from ptmtools.site.program import HTML, INDEX, JAVASCRIPT
 from ptmtools.store.layout import MANIFEST as DATABASE, SERVED
 from ptmtools.texture.previews import FORMATS
@@ -99,8 +100,8 @@ def files_of(folder: str | PathLike[str]) -> Lookup:
     path = Path(folder)
     if (path / INDEX).is_file() and not (path / DATABASE).exists():
         return below(path, hashed=True)
-    if form := form_of(path):
-        return among(form_site(path, form).entries)
+    if kind := folder_kind(path):
+        return among(form_site(path, kind).entries)
     return _Database(path)
 
 

@@ -30,6 +30,7 @@ from ptmtools.files import (
     write_with,
     writing,
 )
+from ptmtools.output.representation import listed
 from ptmtools.progress import Progress, silent
 from ptmtools.site.content import Site
 from ptmtools.site.entry import Entry, link_bytes
@@ -227,7 +228,7 @@ def weight_of(site: Site) -> Weight:
         for number, row in enumerate(index["cells"])
         if row.get("standing", True)
     }
-    used = {"statues.js"} if "octrees" in index else set()
+    used = {kind.script for kind in listed(index)}
     used |= {"reliefs.js" for row in index["textures"] if row.keys() & {"relief", "normals"}}
     used |= {"tour.js" for name in site.entries if name.startswith(f"{DATA}/tour-")}
     bytes_of = {n: link_bytes(e) for n, e in site.entries.items() if _walked(n, used)}

@@ -17,7 +17,7 @@ from ptmtools.cells.model import Cells
 from ptmtools.errors import InputError, naming
 from ptmtools.output.served import place_names
 from ptmtools.pipeline.stage import Artifacts
-from ptmtools.pipeline.stages import APO, CELLS
+from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.scene.model import Scene
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.tour.captions import transcript_of
@@ -106,7 +106,7 @@ class TourPlacer:
         """Raises PTM-D004 to D008 for the artifacts."""
         artifacts = Artifacts(folder)
         self._folder = folder
-        self.scene: Scene = artifacts[APO]
+        self.scene: Scene = artifacts[SCENE]
         self._cells: Cells = artifacts[CELLS]
         self.placing = Placing(self.scene)
 

@@ -7,7 +7,6 @@
     stages/images.json  the list of the model's images
     stages/images/      a copy of each, under its SHA-256
     stages/lights.npz   the lights of the model
-    stages/octrees.json the list of the octree textures
     stages/textures/    the details of the levels of each texture
     stages/lists/       names and digests of the files of large stages, see `lists`
     www/                the served files, and nothing else
@@ -26,7 +25,6 @@ STAGES_FOLDER = "stages"
 WRITTEN = (STAGES_FOLDER, SERVED)
 IMAGES, IMAGE_LIST = f"{STAGES_FOLDER}/images", f"{STAGES_FOLDER}/images.json"
 LIGHTS = "lights"
-OCTREE_LIST = f"{STAGES_FOLDER}/octrees.json"
 LISTS = f"{STAGES_FOLDER}/lists"
 STAGING = ".ptm-new"
 LOCK = ".ptm-lock"

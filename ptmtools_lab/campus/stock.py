@@ -288,7 +288,6 @@ def read_surfaces(folder: Path, stock: Stock, level: int) -> Surfaces:
         glass=spread(glass, np.bool_),
         clamped=spread([[w == "clamp" for w in m.wrap] for m in looks], np.bool_, 2),
         seen=np.repeat(np.arange(len(corner))[:, None], 2, axis=1),
-        octree=np.full(len(corner), -1, np.int32),
     )
 
 

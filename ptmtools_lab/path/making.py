@@ -19,7 +19,7 @@ from ptmtools.errors import InputError
 from ptmtools.output.names import HINTS
 from ptmtools.output.served import read_index
 from ptmtools.pipeline.stage import Artifacts
-from ptmtools.pipeline.stages import APO, CELLS
+from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.scene.model import Scene
 from ptmtools.store.layout import SERVED
 from ptmtools.walk import DIGITS, Walk
@@ -225,7 +225,7 @@ def path_through(artifacts: Artifacts, options: PathOptions) -> Path:
 
     Raises what `make_path` and `read_index` do.
     """
-    return make_path(artifacts[APO], artifacts[CELLS], options, _viewpoints(artifacts))
+    return make_path(artifacts[SCENE], artifacts[CELLS], options, _viewpoints(artifacts))
 
 
 def _viewpoints(artifacts: Artifacts) -> Viewpoints:

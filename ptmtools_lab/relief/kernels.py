@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.jit import kernel, plain_kernel
 from ptmtools.rendering.kernels import GREY, Sums, blend, distance, texel_under
-from ptmtools.rendering.octrees import Octrees
 from ptmtools.rendering.records import Pyramids, Sight, Triangles
-from ptmtools.rendering.relief import depth_of, descend, stop_of
+from ptmtools_systems.apo.lighting import depth_of, descend, stop_of
+from ptmtools_systems.apo.served_octrees import Octrees
 
 
 @plain_kernel

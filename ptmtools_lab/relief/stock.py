@@ -6,10 +6,9 @@ import numpy as np
 
 from ptmtools.arrays import Floats
 from ptmtools.output.served import Served
-from ptmtools.rendering.octree_levels import level_differences
-from ptmtools.rendering.octrees import Octrees
 from ptmtools.site.client import LEAST_DIFFERENCE
 from ptmtools_lab.catalogue import Catalogue, Columns, Shapes, aligned
+from ptmtools_systems.apo.served_octrees import Octrees, level_differences
 
 #: Bytes of a texel in texture memory.
 _TEXEL = 4

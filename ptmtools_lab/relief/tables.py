@@ -18,11 +18,11 @@ import numpy as np
 from ptmtools.arrays import Bools, Floats
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.light import lamps
-from ptmtools.rendering.octrees import Octrees
 from ptmtools.rendering.pyramids import full_colors
 from ptmtools.rendering.rays import Caster
 from ptmtools.rendering.records import Pyramids, Sight, Triangles, triangles_of
 from ptmtools_lab.rows import RowSums
+from ptmtools_systems.apo.served_octrees import Octrees
 
 #: Largest relative difference of the depths of the same surface.
 APART = 1e-3

@@ -23,7 +23,7 @@ from ptmtools.executor import Executor
 from ptmtools.light.looks import Rays as Light
 from ptmtools.light.occlusion import Surroundings, points_on
 from ptmtools.pipeline.stages import SCENE
-from ptmtools.pipeline.warm_up import warm_statue
+from ptmtools.pipeline.warm_up import warm_objects
 from ptmtools.scene.model import Scene, SourceImage
 from ptmtools.simplification import Mesh
 from ptmtools.texture import Picture, read_image
@@ -62,7 +62,7 @@ JPEG_SIDE = 256
 
 def prepare_octree(subject: Subject) -> Experiment:
     """See `EXPERIMENTS`."""
-    scene = subject.artifacts[SCENE]
+    scene = subject.artifacts.original(SCENE)
     count = np.bincount(scene.triangle_object, minlength=len(scene.objects))
     return octree_experiment(only(scene, scene.triangle_object == count.argmax()))
 
@@ -75,7 +75,7 @@ def octree_experiment(scene: Scene) -> Experiment:
     truth = look(rays, points, triangles)
     own = corner_normals(points, triangles)
     base = replace(ApoOptions(), faces=max(4, min(ApoOptions.faces, len(triangles) // 4)))
-    warm_statue()
+    warm_objects()
 
     def measure(setting: Setting) -> Measurement:
         options = replace(base, **setting.knobs)
@@ -118,7 +118,7 @@ def octree_experiment(scene: Scene) -> Experiment:
 
 def prepare_interlaced(subject: Subject) -> Experiment:
     """See `EXPERIMENTS`."""
-    return interlaced_experiment(corners_of(subject.artifacts[SCENE].images))
+    return interlaced_experiment(corners_of(subject.artifacts.original(SCENE).images))
 
 
 def interlaced_experiment(images: Sequence[NDArray[np.uint8]]) -> Experiment:
@@ -159,7 +159,7 @@ def interlaced_experiment(images: Sequence[NDArray[np.uint8]]) -> Experiment:
 
 def prepare_coarse(subject: Subject) -> Experiment:
     """See `EXPERIMENTS`."""
-    scene = subject.artifacts[SCENE]
+    scene = subject.artifacts.original(SCENE)
     return coarse_experiment(scene, _largest(scene))
 
 
@@ -208,7 +208,7 @@ def coarse_experiment(scene: Scene, parts: Sequence[Part]) -> Experiment:
 
 def prepare_light(subject: Subject) -> Experiment:
     """See `EXPERIMENTS`."""
-    scene = subject.artifacts[SCENE]
+    scene = subject.artifacts.original(SCENE)
     return light_experiment(scene, _largest(scene))
 
 
@@ -254,7 +254,7 @@ def light_experiment(scene: Scene, parts: Sequence[Part], most: int = MAX_SAMPLE
 
 def prepare_jpeg(subject: Subject) -> Experiment:
     """See `EXPERIMENTS`."""
-    return jpeg_experiment(corners_of(subject.artifacts[SCENE].images))
+    return jpeg_experiment(corners_of(subject.artifacts.original(SCENE).images))
 
 
 def jpeg_experiment(images: Sequence[NDArray[np.uint8]]) -> Experiment:

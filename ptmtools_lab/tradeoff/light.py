@@ -20,10 +20,9 @@ from ptmtools.light.mixing import mixed
 from ptmtools.light.occlusion import Surroundings
 from ptmtools.output.geometry import Geometry
 from ptmtools.output.pieces import pieces_of
-from ptmtools.pipeline.stages import APO, CELLS, LIGHT
-from ptmtools.pipeline.stages.apo import replaced_objects
+from ptmtools.pipeline.stages import CELLS, LIGHT, SCENE
 from ptmtools.pipeline.stages.light import unlit_materials
-from ptmtools.pipeline.stages.scene import lights_of
+from ptmtools.pipeline.stages.scene import lights_of, scene_origin
 from ptmtools_lab.tradeoff.experiment import (
     Experiment,
     Measurement,
@@ -42,10 +41,10 @@ MOST = 4_096
 def prepare_lightmaps(subject: Subject, most: int = MOST) -> Experiment:
     """See `EXPERIMENTS`. The light is baked, even if the database has that of its model."""
     artifacts = subject.artifacts
-    scene, lights = artifacts[APO], lights_of(artifacts)
+    scene, lights = artifacts[SCENE], lights_of(artifacts)
     options = replace(subject.options(LIGHT), light="bake")
     dark = unlit_materials(scene, lights, painted=False)
-    geometry, replaced = Geometry(scene, artifacts[CELLS]), replaced_objects(artifacts)
+    geometry, replaced = Geometry(scene, artifacts[CELLS]), scene_origin(artifacts).objects
 
     def pieces(density: float) -> list[Piece]:
         return pieces_of(geometry, artifacts[CELLS], dark, 1 / density, replaced)

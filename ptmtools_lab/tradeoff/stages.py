@@ -35,7 +35,7 @@ from ptmtools.coverage.item_buffer import VIEWS
 from ptmtools.coverage.options import MAX_SAMPLES, PRESETS, AchOptions
 from ptmtools.coverage.sampling import CellHints, Sampler
 from ptmtools.errors import MissingComponentError
-from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS, SCENE, TEXTURES
+from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE, TEXTURES
 from ptmtools.scene.model import Scene, SourceImage
 from ptmtools.texture import (
     EncodeOptions,
@@ -64,7 +64,7 @@ WARM = 4
 
 def prepare_cells(subject: Subject) -> Experiment:
     """See `EXPERIMENTS`."""
-    scene, own = subject.artifacts[APO], subject.options(CELLS)
+    scene, own = subject.artifacts[SCENE], subject.options(CELLS)
     few = subdivide(scene, replace(own, max_leaves=WARM))
     compute_pvs(few, PvsOptions(method="fast"))  # compiles both
 
@@ -111,7 +111,7 @@ def prepare_coverage(subject: Subject) -> Experiment:
     artifacts = subject.artifacts
     tried, points = subject.cells_tried, subject.reference_points
     return CoverageTrade(
-        artifacts[APO], artifacts[CELLS], artifacts[PVS], options, tried, points
+        artifacts[SCENE], artifacts[CELLS], artifacts[PVS], options, tried, points
     ).experiment()
 
 
@@ -237,7 +237,7 @@ PREFIX = 8
 
 def prepare_textures(subject: Subject) -> Experiment:
     """See `EXPERIMENTS`."""
-    return textures_experiment(subject.artifacts[SCENE].images, subject.options(TEXTURES))
+    return textures_experiment(subject.artifacts.original(SCENE).images, subject.options(TEXTURES))
 
 
 def textures_experiment(images: Sequence[SourceImage], own: EncodeOptions) -> Experiment:

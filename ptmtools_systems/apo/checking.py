@@ -1,4 +1,5 @@
-"""Checks a folder with an octree texture, and describes it for `ptm info`."""
+"""Checks a folder with an octree texture, or the octree textures of a database, and describes a
+folder for `ptm info`."""
 
 from __future__ import annotations
 
@@ -10,9 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from ptmtools.diagnostics import FOLDER_CODES, Findings, ValidationReport
+from ptmtools.diagnostics import FOLDER_CODES, Findings, Place, ValidationReport
 from ptmtools.errors import InputError, PtmError
 from ptmtools.files import open_below
+from ptmtools.output.names import HINTS
+from ptmtools.output.validation.files import ReadHints, ServedDatabase
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Limits
 from ptmtools_systems.apo.files import (
@@ -22,13 +25,19 @@ from ptmtools_systems.apo.files import (
     NORMALS,
     OBJ,
     Index,
+    inflated,
     mesh_bytes,
     mesh_of,
     read_index,
     read_octree,
 )
+from ptmtools_systems.apo.model import ADDRESS_BITS, Octree
 from ptmtools_systems.apo.octree import fault_of
+from ptmtools_systems.entries import OCTREES
 
+#: Texels of an octree take less than this many bytes, however they are deflated: the texels are
+#: fewer than the addresses.
+_MOST_BYTES = 1 << 27
 _NAMES = (INDEX, NORMALS, COLORS, MESH, OBJ)
 
 
@@ -128,3 +137,43 @@ def describe(folder: Path) -> tuple[tuple[str, ...], Mapping[str, Any]]:
     ):
         lines.append(f"{k:>9} {texels:>10,} {part:>10,} {int(ends[k]):>11,}")
     return tuple(lines), document
+
+
+def check_octrees(hints: ReadHints, database: ServedDatabase) -> None:
+    """Checks each octree texture: its row, its length, its levels and the order of its texels."""
+    rows = hints.index.get(OCTREES.name, ())
+    files = database.resolve_each(HINTS, OCTREES.name, [row["file"] for row in rows])
+    for i, (row, file) in enumerate(zip(rows, files, strict=True)):
+        if fault := _row_fault(row):
+            database.at(HINTS, f"{OCTREES.name}[{i}]").add("PTM-D700", fault)
+        elif file:
+            _check_stream(row, database.head(file, row["ends"][-1] + 1), database.at(file))
+
+
+def _row_fault(row: Mapping[str, Any]) -> str:
+    """The fault of a row by itself; "" if there is none."""
+    levels, ends = row["levels"], row["ends"]
+    if not len(levels) == len(ends) == len(row["crc32"]):
+        return "levels, ends and crc32 are not aligned"
+    if min(b - a for a, b in zip([0, *ends], ends, strict=False)) <= 0:
+        return "ends are not in ascending order"
+    if sum(levels) > 1 << ADDRESS_BITS or ends[-1] > _MOST_BYTES:
+        return f"has {sum(levels):,} texels in {ends[-1]:,} bytes, more than an octree can have"
+    return ""
+
+
+def _check_stream(row: Mapping[str, Any], data: bytes, at: Place) -> None:
+    """Inflates the levels of a row, each by itself, and checks that they form an octree."""
+    start = np.concatenate([[0], np.cumsum(row["levels"], dtype=np.int64)])
+    if len(data) != row["ends"][-1]:
+        less = len(data) < row["ends"][-1]
+        at.add("PTM-D710", f"ends {'before' if less else 'after'} the last level")
+    try:
+        texels = inflated(data, start, row)
+    except InputError as error:
+        at.add("PTM-D710", error.message, error.place or "")
+        return
+    octree = Octree(texels, start, np.array(row["cube"]["low"]), row["cube"]["side"])
+    if fault := fault_of(octree):
+        place, message = fault
+        at.add("PTM-D710", message, place)

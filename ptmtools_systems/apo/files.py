@@ -337,3 +337,10 @@ def _bytes_of(folder: str | os.PathLike[str], name: str, most: int, *, whole: bo
     if len(data) > most:
         raise LimitError("PTM-L204", f"has more than {most:,} bytes", file=file, remedy=_AGAIN)
     return data
+
+
+def page_files(index: Mapping[str, Any]) -> Iterator[str]:
+    """The files of a folder with this index that its page fetches."""
+    for name in ("mesh", "normals", "colors"):
+        if name in index:
+            yield index[name]["file"]

@@ -159,3 +159,18 @@ def welded(points: Floats, triangles: NDArray[np.int32]) -> tuple[Floats, NDArra
     rows = np.ascontiguousarray(points + 0.0).view([("", np.float64)] * 3).ravel()
     _, first, number = np.unique(rows, return_index=True, return_inverse=True)
     return points[first], number.reshape(-1)[triangles].astype(np.int32)
+
+
+def warm_up() -> None:
+    """Calls the compiled kernels that making and drawing octree textures need."""
+    from pathlib import Path
+    from tempfile import TemporaryDirectory
+
+    from ptmtools.pipeline.warm_up import write_building
+    from ptmtools.scene import IngestOptions, ingest
+    from ptmtools_systems.apo.traversal import look_up
+
+    with TemporaryDirectory() as folder:
+        scene = ingest(write_building(Path(folder)), IngestOptions())
+        replaced = make_apo(scene, ApoOptions(faces=len(scene.triangles) // 4, depth=3), Executor())
+    look_up(replaced.octree, np.full((1, 3), 0.5))

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, Singles, normals, summed
 from ptmtools.light.atlas import Atlas, claim, cover, nearest as nearest_on, unwrap
 from ptmtools.light.lightmap import fill
+from ptmtools.output.object_maps import frame_axes
 from ptmtools_systems.apo.making import Simple
 from ptmtools_systems.apo.model import ApoOptions
 from ptmtools_systems.apo.normals import corner_normals
@@ -110,13 +111,6 @@ def frames(atlas: Atlas, corner: Floats) -> NDArray[np.float32]:
     return result[chart].astype(np.float32)
 
 
-def axes_of(frame: NDArray[np.float32]) -> Floats:
-    """(n, 3, 3) tangent, bitangent and normal, as columns, of (n, 7) frames."""
-    normal, tangent = frame[:, :3].astype(np.float64), frame[:, 3:6].astype(np.float64)
-    bitangent = np.cross(normal, tangent) * frame[:, 6:]
-    return np.stack([tangent, bitangent, normal], axis=2)
-
-
 def _units(vectors: Floats | Singles, axis: int) -> Floats:
     """Unit vectors; along an axis for those of no length."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
@@ -154,7 +148,7 @@ class Baking:
         place = np.stack([(column + 0.5) / side, 1 - (row + 0.5) / side], axis=1)
         points = Points(face, nearest_on(atlas.uv[face], place))
         normal, met = self._normals(points)
-        inside = np.linalg.solve(axes_of(frame)[face], normal[:, :, None])[:, :, 0]
+        inside = np.linalg.solve(frame_axes(frame)[face], normal[:, :, None])[:, :, 0]
         inside[:, 2] = np.maximum(inside[:, 2], _LEAST_ALONG)
         value = np.zeros((side, side, 3), np.float32)
         value[row, column] = _units(inside, 2)
@@ -208,7 +202,7 @@ def looked_up(texels: NDArray[np.uint8], uv: Floats, frame: NDArray[np.float32])
             column, row = np.clip(first + [across, down], 0, side - 1).T
             weight = np.abs(1 - across - share[:, 0]) * np.abs(1 - down - share[:, 1])
             value += weight[:, None] * texels[row, column]
-    return _units(np.einsum("nij,nj->ni", axes_of(frame), value / 127.5 - 1), 2)
+    return _units(np.einsum("nij,nj->ni", frame_axes(frame), value / 127.5 - 1), 2)
 
 
 def _encoded(value: Floats) -> NDArray[np.uint8]:

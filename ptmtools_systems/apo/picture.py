@@ -6,6 +6,7 @@ OpenGL draws (`shader`) where it is available, Embree's rays (`rays`) elsewhere.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -13,7 +14,9 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats
 from ptmtools.errors import InputError, MissingComponentError
+from ptmtools.folder_kinds import FolderPicture
 from ptmtools.options import option
+from ptmtools.quantities import count
 from ptmtools_systems.apo.model import Octree
 from ptmtools_systems.apo.view import FIELD_OF_VIEW, Frame, Look, view_of
 
@@ -116,3 +119,18 @@ def render(
     from ptmtools_systems.apo import rays
 
     return rays.draw(*mesh)
+
+
+def draw_folder(folder: Path, options: RenderOptions) -> FolderPicture:
+    """A picture of the octree texture in a folder.
+
+    Raises what `read_mesh`, `read_octree` and `render` raise.
+    """
+    from ptmtools_systems.apo.files import read_mesh, read_octree
+
+    mesh, octree = read_mesh(folder), read_octree(folder)
+    frame = render(octree, mesh.points, mesh.triangles, options, mesh.normals.astype(np.float64))
+    levels = octree.levels if options.levels is None else min(options.levels, octree.levels)
+    document = {"levels": levels, "octree_levels": octree.levels, "renderer": frame.renderer}
+    text = f"{levels} of {count(octree.levels, 'level')}, {frame.renderer}"
+    return FolderPicture(frame.picture, document, text)

@@ -154,3 +154,12 @@ def record(campus: Campus) -> dict[str, Any]:
         "textures": [asdict(kind) | {"average": kind.average} for kind in kinds(campus)],
         **{name: document[name] for name in ("unit", "origin", "lightmaps", "start", "presets")},
     }
+
+
+def page_files(index: Mapping[str, Any]) -> Iterator[str]:
+    """The files of a folder with this index that its page fetches."""
+    for thing in index["objects"]:
+        yield from (mesh["file"] for mesh in thing["meshes"])
+        if "record" in thing:
+            yield thing["record"]["file"]
+    yield from (texture["file"] for texture in index["textures"])

@@ -24,11 +24,11 @@ from ptmtools.cli.parameters import (
     take,
     with_console,
 )
-from ptmtools.cli.render import check_picture, draw_octree
+from ptmtools.cli.render import check_picture, write_picture
 from ptmtools.quantities import count, size
 from ptmtools.scene.options import IngestOptions
 from ptmtools_systems.apo.model import ApoOptions
-from ptmtools_systems.apo.picture import RenderOptions
+from ptmtools_systems.apo.picture import RenderOptions, draw_folder
 from ptmtools_systems.campus.options import CampusOptions
 from ptmtools_systems.campus.reading import record, summary
 
@@ -84,8 +84,10 @@ def apo(
     index = read_index(target)
     document, lines = dict(index.document), list[str]()
     if view is not None:
-        document["picture"], line = draw_octree(target, view, options, force=force)
-        lines.append(line)
+        drawn = draw_folder(Path(target), options)
+        write_picture(view, drawn.texels, force=force)
+        document["picture"] = {"file": view, **drawn.document}
+        lines.append(f"{view}: {target}, {drawn.text}")
     if not exists:
         source, mesh_file = index.document["source"], index.mesh
         whole = sum(stream["ends"][-1] for stream in (index.normals, index.colors) if stream)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, cast
 
@@ -321,3 +321,8 @@ def _check_part(folder: Path, interlaced: Interlaced, part: Part, decoded: bool,
     except InputError as fault:
         at.add("PTM-D803" if fault.code == "PTM-I122" else "PTM-D804", fault.message)
     return len(data)
+
+
+def page_files(index: Mapping[str, Any]) -> Iterator[str]:
+    """The files of a folder with this index that its page fetches."""
+    return (part["name"] for part in index["files"])

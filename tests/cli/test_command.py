@@ -178,7 +178,9 @@ def test_the_public_names_are_there() -> None:
 
 def test_packages_name_the_same_for_type_checkers_and_at_run_time() -> None:
     """The table of `lazy_exports` has the imports ``if TYPE_CHECKING``."""
-    packages = list(Path(ptmtools.__file__).parent.rglob("__init__.py"))
+    root = Path(ptmtools.__file__).parents[1]
+    tops = ("ptmtools", "ptmtools_lab", "ptmtools_systems")
+    packages = [file for top in tops for file in (root / top).rglob("__init__.py")]
     count = 0
     for package in packages:
         tree = ast.parse(package.read_text("utf-8"))

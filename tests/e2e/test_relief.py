@@ -19,11 +19,12 @@ from browsers import gltf_validator  # noqa: E402
 
 from benchmarks.npm import GLTF_VALIDATOR  # noqa: E402
 from ptmtools.cli.main import main  # noqa: E402
+from ptmtools.output.object_maps import frame_axes  # noqa: E402
 from ptmtools.output.served import Served, read_served  # noqa: E402
 from ptmtools.rendering.drawing import ViewOptions, draw_view  # noqa: E402
 from ptmtools.rendering.rays import Camera, Caster  # noqa: E402
 from ptmtools.rendering.records import Sight  # noqa: E402
-from ptmtools_systems.apo.normal_map import axes_of, looked_up  # noqa: E402
+from ptmtools_systems.apo.normal_map import looked_up  # noqa: E402
 from tests.systems.apo.statues import write_rooms  # noqa: E402
 
 WIDTH, HEIGHT = 320, 240
@@ -145,7 +146,7 @@ def test_frames_are_as_gltf_demands(database: Path) -> None:
     relief = served.surfaces.relief
     assert relief is not None
     frame = relief.frame[relief.number >= 0]
-    axes = axes_of(frame)
+    axes = frame_axes(frame)
     assert np.abs(np.linalg.norm(axes, axis=1) - 1).max() < 0.005
     assert np.abs(np.einsum("nij,nik->njk", axes, axes) - np.eye(3)).max() < 0.01
     assert set(np.unique(frame[:, 6])) <= {-1, 1}

@@ -51,7 +51,6 @@ def panes(rows: tuple[tuple[float, int, tuple[float, ...], float], ...]) -> Surf
         glass=share < 1,
         clamped=np.zeros((count, 2), np.bool_),
         seen=np.repeat(np.arange(count)[:, None], 2, axis=1),
-        octree=np.full(count, -1, np.int32),
         opacity=share,
     )
 

@@ -44,7 +44,6 @@ def card() -> Any:
         glass=np.zeros(2, dtype=bool),
         clamped=np.ones((2, 2), dtype=bool),
         seen=np.array([[0, 0], [1, 1]]),
-        octree=np.full(2, -1, np.int32),
     )
     mean = CORNERS.mean(axis=0)
     texels = np.concatenate([np.rint(mean).astype(np.uint8), CORNERS[[0, 1, 3, 2]].ravel()])

@@ -20,10 +20,8 @@ from ptmtools.errors import DatabaseError, InputError
 from ptmtools.link import Conditions
 from ptmtools.output.served import Served, read_served
 from ptmtools.rendering.light import AMBIENT, lamps, lit
-from ptmtools.rendering.octrees import Octrees, no_octrees, read_octrees
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.rays import Camera
-from ptmtools.rendering.relief import descend, lamp, stop_of
 from ptmtools.walk import read_walk
 from ptmtools_lab.client import Client, Kind, Range
 from ptmtools_lab.comparing import SimulateOptions, budget_of, play, require_hints
@@ -34,6 +32,8 @@ from ptmtools_lab.relief.stock import without_octrees
 from ptmtools_lab.renderer import Renderer
 from ptmtools_lab.simulation import Run, simulate
 from ptmtools_lab.world import World, prepare, relief_of
+from ptmtools_systems.apo.lighting import descend, lamp, stop_of
+from ptmtools_systems.apo.served_octrees import Octrees, no_octrees, read_octrees
 from ptmtools_systems.apo.traversal import look_up, stop_depth
 from tests.lab.conftest import Ptm
 from tests.lab.worlds import SEEDS, catalogue, raw
@@ -399,7 +399,7 @@ def test_all_policies_walk_through_lit_rooms(world: World, policy: PolicyEntry) 
 def test_a_database_whose_objects_have_none(made: Path) -> None:
     """As one of before nodes said which octree is theirs."""
     served = read_served(made / "light.db")
-    none = replace(served.surfaces, octree=np.full(len(served.surfaces.cell), -1, np.int32))
+    none = replace(served.surfaces, represented={})
     with pytest.raises(DatabaseError, match=r"no object in the GLBs.*PTM-D006"):
         read_octrees(replace(served, surfaces=none))
 

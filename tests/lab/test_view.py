@@ -93,7 +93,6 @@ def room(random: np.random.Generator) -> Room:
             glass=(random.random(count) < 0.3) & (texture < 0),
             clamped=random.random((count, 2)) < 0.5,
             seen=np.repeat(np.arange(count)[:, None], 2, axis=1),
-            octree=np.full(count, -1, np.int32),
         ),
         levels,
     )

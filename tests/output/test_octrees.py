@@ -13,9 +13,11 @@ import numpy as np
 import pytest
 
 from ptmtools.output import EmitOptions, emit, validate_database
-from ptmtools.output.model import OctreeRecord
 from ptmtools.output.names import HINTS
+from ptmtools.output.representation import Represented
 from ptmtools_systems.apo.files import streamed
+from ptmtools_systems.entries import OCTREES
+from ptmtools_systems.stages.apo import OctreeRecord
 from tests.output.agreement import disagreements
 from tests.output.damage import (
     Damage,
@@ -37,7 +39,7 @@ OBJECTS = (("Statue ü", "Statue_u", 4), ("Statue ü", "Statue_u_2", 0))
 FIRST = "apo/Statue_u.bin"
 
 
-def put_octrees(www: Path) -> tuple[OctreeRecord, ...]:
+def put_octrees(www: Path) -> Represented:
     (www / "apo").mkdir()
     records = []
     for number, (name, stem, depth) in enumerate(OBJECTS):
@@ -48,7 +50,8 @@ def put_octrees(www: Path) -> tuple[OctreeRecord, ...]:
         ends, checks = tuple(levels["ends"]), tuple(levels["crc32"])
         file = f"apo/{stem}.bin"
         records.append(OctreeRecord(name, number, file, LOW, SIDE, counts, ends, checks))
-    return tuple(records)
+    rows = [record.row() for record in records]
+    return Represented(tuple(range(len(rows))), OCTREES, rows)
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +60,7 @@ def whole(artifacts, tmp_path_factory, put_textures, seal) -> Path:
     a, textures = artifacts, put_textures(db / "www")
     octrees = put_octrees(db / "www")
     options = EmitOptions(format="vrml")
-    emit(a.scene, a.cells, a.pvs, a.ach, textures, db / "www", options, octrees=octrees)
+    emit(a.scene, a.cells, a.pvs, a.ach, textures, db / "www", options, represented=(octrees,))
     seal(db)
     return db
 

@@ -159,8 +159,8 @@ def octrees(www: Path, index: Any, glbs: Mapping[str, ReadGlb]) -> Iterator[str]
     shapes: list[list[tuple[str, ReadPrimitive]]] = [[] for _ in rows]
     for name, glb in glbs.items():
         for shape in glb.primitives:
-            if shape.octree is not None and shape.octree < len(rows):
-                shapes[shape.octree].append((name, shape))
+            if shape.extras.get("octree", len(rows)) < len(rows):
+                shapes[shape.extras["octree"]].append((name, shape))
     for row, of_row in zip(rows, shapes, strict=True):
         if glbs and not of_row:
             yield f"octree: no GLB has {row['object']!r}"

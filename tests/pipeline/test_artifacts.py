@@ -18,7 +18,7 @@ import pytest
 from ptmtools.cli.main import main
 from ptmtools.errors import DatabaseError
 from ptmtools.pipeline.stage import Artifacts
-from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS
+from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE
 from ptmtools.pipeline.stages.scene import images_of
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.store.folder import DatabaseFolder
@@ -54,7 +54,7 @@ def replaced(db: Path, name: str, data: bytes) -> None:
 
 def opened(db: Path) -> list[object]:
     artifacts = Artifacts(DatabaseFolder.open(db))
-    return [artifacts[stage] for stage in (APO, CELLS, PVS, ACH)]
+    return [artifacts[stage] for stage in (SCENE, CELLS, PVS, ACH)]
 
 
 def first(name: str, value: object, at: int = 0) -> Change:

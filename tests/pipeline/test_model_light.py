@@ -21,7 +21,7 @@ from ptmtools.output.geometry import Geometry
 from ptmtools.output.gltf_reader import read_glb
 from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.stage import Artifacts
-from ptmtools.pipeline.stages import APO, CELLS, LIGHT, light as light_stage
+from ptmtools.pipeline.stages import CELLS, LIGHT, SCENE, light as light_stage
 from ptmtools.pipeline.stages.light import lightmap_files
 from ptmtools.pipeline.status import plan_build
 from ptmtools.pipeline.validation import validate
@@ -49,7 +49,7 @@ def seen(db: Path, count: int = 40) -> tuple[Floats, Floats]:
     artifacts = Artifacts(DatabaseFolder.open(db))
     light, cells = artifacts.stored(LIGHT), artifacts[CELLS]
     assert light is not None
-    geometry = Geometry(artifacts[APO], cells)
+    geometry = Geometry(artifacts[SCENE], cells)
     points, values = [], []
     for cell, name in lightmap_files(light).items():
         texels = decode((db / "www" / name).read_bytes())[:, :, 0]

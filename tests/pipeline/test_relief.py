@@ -20,13 +20,15 @@ from ptmtools.output.names import HINTS
 from ptmtools.output.options import EmitOptions
 from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.stage import Artifacts
-from ptmtools.pipeline.stages import APO, RELIEF
+from ptmtools.pipeline.stages import SCENE
 from ptmtools.pipeline.status import plan_build
 from ptmtools.pipeline.validation import validate
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import arrays_of, sha256
 from ptmtools_systems.apo.options import ReplaceOptions
+from ptmtools_systems.stages.apo import APO
+from ptmtools_systems.stages.relief import RELIEF
 from tests.output.agreement import disagreements
 from tests.systems.apo.statues import write_rooms
 
@@ -91,7 +93,7 @@ def test_the_hints_and_the_cells_name_them(made: Path) -> None:
     assert "octrees" not in index
     maps = {n: row["relief"] for n, row in enumerate(index["textures"]) if "relief" in row}
     assert sorted(maps.values()) == ["statue_01", "statue_02"]
-    scene = Artifacts(DatabaseFolder.open(db))[APO]
+    scene = Artifacts(DatabaseFolder.open(db))[SCENE]
     seen = 0
     for cell, file in enumerate(glbs(db)):
         record = json.loads((db / f"www/hints/{file.stem}.json").read_text())

@@ -20,14 +20,14 @@ from ptmtools.output.gltf import pack, unpack
 from ptmtools.output.names import HINTS
 from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.stage import Artifacts
-from ptmtools.pipeline.stages import ACH, APO, CELLS, EMIT, SCENE, STAGES
-from ptmtools.pipeline.stages.apo import octree_files
+from ptmtools.pipeline.stages import ACH, CELLS, EMIT, SCENE, STAGES
 from ptmtools.pipeline.status import database_status, plan_build
 from ptmtools.pipeline.validation import validate
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.store.folder import DatabaseFolder
-from ptmtools.store.layout import OCTREE_LIST, arrays_of, sha256
+from ptmtools.store.layout import arrays_of, sha256
 from ptmtools_systems.apo.options import ReplaceOptions
+from ptmtools_systems.stages.apo import APO, OCTREE_LIST, octree_files
 from tests.output.agreement import disagreements
 from tests.systems.apo.statues import write_rooms
 
@@ -92,7 +92,7 @@ def test_later_stages_see_the_simplified_meshes(made: Path) -> None:
     db = made / "light.db"
     assert validate(db).issues == ()
     artifacts = opened(db)
-    scene, shown = artifacts[SCENE], artifacts[APO]
+    scene, shown = artifacts.original(SCENE), artifacts[SCENE]
     assert len(shown.triangles) < len(scene.triangles) == 40 + 2 * 1280
     cells, ach = artifacts[CELLS], artifacts[ACH]
     assert cells.triangle_source.max() < len(shown.triangles)

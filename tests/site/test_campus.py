@@ -15,7 +15,8 @@ from browser import Visitor, hurried, new_page, visiting, visiting_in
 
 from ptmtools.cli.main import main
 from ptmtools.errors import InputError
-from ptmtools.site.forms import FORMS, form_site
+from ptmtools.folder_kinds import folder_kinds
+from ptmtools.site.forms import form_site
 from ptmtools.site.throttle import Throttle
 from ptmtools.walk import read_walk
 from ptmtools_lab.campus.options import CampusWalkOptions
@@ -54,7 +55,7 @@ def pages(chromium: Any) -> Iterator[dict[Any, Any]]:
 @pytest.fixture
 def opened(chromium: Any, pages: dict[Any, Any]) -> Open:
     def of(folder: Path, query: str = "", **options: Any) -> AbstractContextManager[Visitor]:
-        entries = form_site(folder, FORMS["campus.json"]).entries
+        entries = form_site(folder, folder_kinds()["campus.json"]).entries
         if options.keys() <= {"prepare"} and (how := options.get("prepare")) in pages:
             return visiting_in(pages[how], entries, query=query)
         sizes = {"width": 320, "height": 240, **options}

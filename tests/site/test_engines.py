@@ -15,10 +15,11 @@ from browser import visiting
 from engines import PACKAGES, Engine, EngineVisitor, visiting_by
 from numpy.typing import NDArray
 
+from ptmtools.folder_kinds import folder_kinds
 from ptmtools.link import Conditions
 from ptmtools.site.content import Site
 from ptmtools.site.entry import Entry
-from ptmtools.site.forms import FORMS, form_site
+from ptmtools.site.forms import form_site
 from ptmtools.texture import open as open_ptm
 from ptmtools.texture.detail import with_offset
 from ptmtools_lab.world import World
@@ -51,7 +52,7 @@ def engine(request: pytest.FixtureRequest, engines: Callable[[str], Engine]) -> 
 def forms(statue: Path, pictures: dict[str, Path], campus: Path) -> dict[str, Site]:
     """The sites of single objects, by the names of their indices."""
     folders = {"apo.json": statue, "interlace.json": pictures["rgb-png"], "campus.json": campus}
-    return {name: form_site(folder, FORMS[name]) for name, folder in folders.items()}
+    return {name: form_site(folder, folder_kinds()[name]) for name, folder in folders.items()}
 
 
 def decibels(one: NDArray[np.uint8], other: NDArray[np.uint8]) -> float:
@@ -378,7 +379,7 @@ def test_statues_of_a_walk(
 @pytest.mark.parametrize("kind", ["rgb-png", "rgba-png", "grey-webp", "rgba-webp"])
 def test_interlaced_texels(engine: Engine, pictures: dict[str, Path], kind: str) -> None:
     expected = deinterlace(pictures[kind])
-    site = form_site(pictures[kind], FORMS["interlace.json"])
+    site = form_site(pictures[kind], folder_kinds()["interlace.json"])
     with visiting_by(engine, site.entries, query="?all", width=WIDTH, height=HEIGHT) as visitor:
         visitor.until("s.complete")
         actual = np.array(engine.evaluate("[...ptm.texels()]"), np.uint8)
@@ -397,6 +398,6 @@ def test_damaged_forms(
             file.write_bytes(b"GIF89a" + file.read_bytes()[6:])
     else:
         (OCTREE_FAULTS if form == "apo.json" else SET_FAULTS)["other"](folder)
-    entries = form_site(folder, FORMS[form]).entries
+    entries = form_site(folder, folder_kinds()[form]).entries
     with visiting_by(engine, entries, query=PLACES[form]) as visitor:
         assert failed(visitor) == "PTM-V105"

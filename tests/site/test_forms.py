@@ -16,9 +16,10 @@ from PIL import Image
 
 from ptmtools.cli.main import main
 from ptmtools.errors import InputError
+from ptmtools.folder_kinds import folder_kind, folder_kinds
 from ptmtools.site.content import SiteOptions
 from ptmtools.site.entry import is_marked
-from ptmtools.site.forms import FORMS, form_of, form_site
+from ptmtools.site.forms import form_site
 from ptmtools.site.lookup import files_of
 from ptmtools.site.throttle import Throttle
 from ptmtools_systems.apo.files import read_mesh, read_octree
@@ -43,7 +44,7 @@ def pages(chromium: Any) -> Iterator[dict[Any, Any]]:
 @pytest.fixture
 def opened(chromium: Any, pages: dict[Any, Any]) -> Open:
     def of(folder: Path, query: str = "", **options: Any) -> AbstractContextManager[Visitor]:
-        form = form_of(folder)
+        form = folder_kind(folder)
         assert form
         entries = form_site(folder, form).entries
         if options.keys() <= {"prepare"}:
@@ -322,7 +323,7 @@ def test_damaged_files_give_a_message(
 def test_every_form_has_a_page(statue: Path, pictures: dict[str, Path]) -> None:
     folders = {"apo.json": statue, "interlace.json": pictures["rgb-png"]}
     for name, folder in folders.items():
-        form = FORMS[name]
+        form = folder_kinds()[name]
         site = form_site(folder, form, SiteOptions("A <title>", address="https://example.org/x"))
         page = site.entries["index.html"].read().decode()
         assert "<title>A &lt;title&gt;</title>" in page
@@ -360,7 +361,7 @@ def test_links_are_refused(statue: Path, tmp_path: Path) -> None:
     (folder / "apo.bin").unlink()
     (folder / "apo.bin").symlink_to(tmp_path / "secret")
     with pytest.raises(InputError, match="PTM-I122"):
-        form_site(folder, FORMS["apo.json"])
+        form_site(folder, folder_kinds()["apo.json"])
 
 
 def test_publishing_checks_the_form_that_it_writes(
@@ -389,7 +390,7 @@ def test_pictures_have_the_ratio_of_their_source(opened: Open, tmp_path: Path) -
 
 def test_a_host_without_ranges(chromium: Any, statue: Path) -> None:
     """Which sends the whole file: once."""
-    site = form_site(statue, FORMS["apo.json"])
+    site = form_site(statue, folder_kinds()["apo.json"])
 
     def whole(route: Any) -> None:
         headers = {k: v for k, v in route.request.headers.items() if k.lower() != "range"}
@@ -409,4 +410,4 @@ def test_a_missing_file(statue: Path, tmp_path: Path) -> None:
     folder = Path(shutil.copytree(statue, tmp_path / "folder"))
     (folder / "apo.bin").unlink()
     with pytest.raises(InputError, match="PTM-I122"):
-        form_site(folder, FORMS["apo.json"])
+        form_site(folder, folder_kinds()["apo.json"])

@@ -15,8 +15,9 @@ import pytest
 from browser import HURRY, Visitor, hurried, new_page, visiting_in
 from engines import PACKAGES, visiting_by
 
+from ptmtools.folder_kinds import folder_kinds
 from ptmtools.site.content import Site
-from ptmtools.site.forms import FORMS, form_site
+from ptmtools.site.forms import form_site
 
 from .hostile import hostile
 
@@ -43,7 +44,9 @@ ANSWER = """
 def sites(statue: Path, pictures: dict[str, Path], campus: Path, statues: Site) -> dict[str, Site]:
     """A sound one of each form."""
     folders = {"apo.json": statue, "interlace.json": pictures["rgb-png"], "campus.json": campus}
-    return {"walk": statues} | {name: form_site(f, FORMS[name]) for name, f in folders.items()}
+    return {"walk": statues} | {
+        name: form_site(f, folder_kinds()[name]) for name, f in folders.items()
+    }
 
 
 @pytest.mark.parametrize("form", PLACES)

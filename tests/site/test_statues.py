@@ -61,7 +61,7 @@ def test_they_are_drawn_as_by_render(revisit: Visiting, site: Site, database: Pa
     view = eye_of(served, options)
     camera = Camera(WIDTH, HEIGHT, view.field_of_view, WIDTH / HEIGHT, HEIGHT)
     sight = Caster(served.surfaces).look(camera, view.position, view.direction)
-    shown = np.where(sight.triangle < 0, -1, served.surfaces.octree[sight.triangle])
+    shown = np.where(sight.triangle < 0, -1, served.surfaces.represented["octree"][sight.triangle])
     mask = inside = (shown == 1).reshape(HEIGHT, WIDTH)
     for dy in range(-3, 4):
         for dx in range(-3, 4):

@@ -27,8 +27,9 @@ from ptmtools.files import open_regular
 from ptmtools.output.emitter import GZIP, Emitter
 from ptmtools.output.emitters import all_emitters, chosen_emitters, owner_of
 from ptmtools.output.model import FileError
-from ptmtools.output.names import HINTS, OCTREE_FOLDER, TEXTURE_FOLDER
+from ptmtools.output.names import HINTS, TEXTURE_FOLDER
 from ptmtools.output.options import EmitOptions
+from ptmtools.output.representation import representations
 from ptmtools.output.validation.files import ServedDatabase, check_gzip, check_names, served_files
 from ptmtools.output.validation.findings import CODES
 from ptmtools.output.validation.hints import gather
@@ -161,7 +162,7 @@ class _Check:
             if emitter.check:
                 emitter.check.load()(database)
         for path in sorted(ours - database.named):
-            if path.startswith((f"{TEXTURE_FOLDER}/", f"{OCTREE_FOLDER}/")):
+            if path.partition("/")[0] in _stage_folders():
                 database.at(path).add("PTM-D677", "no other file names it")
 
     def _read_manifest(self) -> None:
@@ -224,7 +225,7 @@ class _Check:
 
     def _is_ours(self, path: str) -> bool:
         """Whether a stage wrote a served file, or it lies in a folder of such files."""
-        in_folder = path.partition("/")[0] in (TEXTURE_FOLDER, OCTREE_FOLDER)
+        in_folder = path.partition("/")[0] in _stage_folders()
         return f"{SERVED}/{path}" in self._outputs or in_folder or owner_of(path) is not None
 
     def _note_foreign(self, paths: Sequence[str]) -> None:
@@ -326,3 +327,8 @@ class _Check:
             return self._content(name)[1] if self._is_served(name) else None
         except OSError:
             return None
+
+
+def _stage_folders() -> tuple[str, ...]:
+    """The folders of served files that stages before the emission write."""
+    return TEXTURE_FOLDER, *(kind.folder for kind in representations())

@@ -1,5 +1,5 @@
 """The check of the GLBs: each is that of a cell or of a finer mesh of an object in one, and names
-textures, octrees and meshes that exist."""
+textures, representations and meshes that exist."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import PurePosixPath
 
 from ptmtools.output.gltf_reader import ReadGlb, read_glb
 from ptmtools.output.names import GLTF, GLTF_FOLDER
+from ptmtools.output.representation import representations
 from ptmtools.output.validation.files import ServedDatabase
 
 
@@ -42,7 +43,11 @@ def check_files(database: ServedDatabase) -> None:
         if hints is None:
             continue
         numbers = [("texture", m.texture, "materials") for m in materials]
-        numbers += [("octree texture", p.octree, p.place) for p in glb.primitives]
+        numbers += [
+            (kind.noun, p.extras.get(kind.member), p.place)
+            for kind in representations()
+            for p in glb.primitives
+        ]
         numbers += [("mesh", m.mesh, "materials") for m in materials]
         numbers += [("lightmap", m.light, "materials") for m in materials]
         numbers += [
@@ -56,7 +61,7 @@ def check_files(database: ServedDatabase) -> None:
         objects = {primitive.place: primitive.object for primitive in glb.primitives}
         lists = {
             "texture": hints.index["textures"],
-            "octree texture": hints.index.get("octrees", ()),
+            **{kind.noun: hints.index.get(kind.name, ()) for kind in representations()},
             "mesh": hints.index.get("meshes", ()),
             "lightmap": hints.index["textures"],
             "normal map": hints.index["textures"],

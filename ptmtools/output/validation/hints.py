@@ -16,9 +16,10 @@ from ptmtools.output.hints import RECORD_FORMAT as FORMAT, SCHEMA
 from ptmtools.output.mesh_levels import row_fault
 from ptmtools.output.model import FileError, shaped, sizes_of
 from ptmtools.output.names import BUNDLE, HINTS, HINTS_FOLDER, STATISTICS
+from ptmtools.output.representation import listed
 from ptmtools.output.validation.files import Images, ReadHints, Row, ServedDatabase
 from ptmtools.output.validation.space import check_space
-from ptmtools.output.validation.textures import Pictures, check_octrees, check_record
+from ptmtools.output.validation.textures import Pictures, check_record
 from ptmtools.tolerance import PARALLEL_COSINE
 
 #: Slack of the sum of the ach values.
@@ -103,7 +104,8 @@ def check_files(database: ServedDatabase) -> None:
             message = f"{row['missed']:.3g} of the pixels fell on cells outside the PVS"
             database.at(STATISTICS, f"cells[{i}]").add("PTM-D703", message)
     _check_first_looks(hints, database)
-    check_octrees(hints, database)
+    for kind in listed(hints.index):
+        kind.check.load()(hints, database)
     _check_meshes(index, at)
     if not index["geometry"]:
         at.add("PTM-D700", "names no form", "geometry")

@@ -1,5 +1,4 @@
-"""The check of the textures and the octree textures (docs/formats/apo.md), and of their rows in the
-hints."""
+"""The check of the textures and of their rows in the hints."""
 
 from __future__ import annotations
 
@@ -8,13 +7,9 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from ptmtools.diagnostics import Place
-from ptmtools.errors import InputError, LimitError, PtmError
+from ptmtools.errors import LimitError, PtmError
 from ptmtools.output.model import sizes_of
-from ptmtools.output.names import HINTS
-from ptmtools.output.validation.files import ReadHints, ServedDatabase
 from ptmtools.texture.model import gpu_texel_bytes
 
 if TYPE_CHECKING:
@@ -22,9 +17,6 @@ if TYPE_CHECKING:
 
 #: Formats of the served images, as Pillow names them, by suffix.
 IMAGES = {".png": "PNG", ".webp": "WEBP", ".avif": "AVIF", ".jpg": "JPEG"}
-#: Texels of an octree take less than this many bytes, however they are deflated: the texels are
-#: fewer than the addresses.
-_MOST_BYTES = 1 << 27
 
 
 def read_ptm(data: bytes, limits: Limits, at: Place) -> PtmHeader | None:
@@ -147,49 +139,3 @@ def _check_fallback(
         elif level != record["fallbackLevel"]:
             message = f"the fallback image is level {level}, not {record['fallbackLevel']}"
             at.add("PTM-D704", message)
-
-
-def check_octrees(hints: ReadHints, database: ServedDatabase) -> None:
-    """Checks each octree texture: its row, its length, its levels and the order of its texels."""
-    rows = hints.index.get("octrees", ())
-    files = database.resolve_each(HINTS, "octrees", [row["file"] for row in rows])
-    for i, (row, file) in enumerate(zip(rows, files, strict=True)):
-        if fault := _row_fault(row):
-            database.at(HINTS, f"octrees[{i}]").add("PTM-D700", fault)
-        elif file:
-            _check_octree(row, database.head(file, row["ends"][-1] + 1), database.at(file))
-
-
-def _row_fault(row: Mapping[str, Any]) -> str:
-    """The fault of a row by itself; "" if there is none."""
-    from ptmtools_systems.apo.model import ADDRESS_BITS
-
-    levels, ends = row["levels"], row["ends"]
-    if not len(levels) == len(ends) == len(row["crc32"]):
-        return "levels, ends and crc32 are not aligned"
-    if min(b - a for a, b in zip([0, *ends], ends, strict=False)) <= 0:
-        return "ends are not in ascending order"
-    if sum(levels) > 1 << ADDRESS_BITS or ends[-1] > _MOST_BYTES:
-        return f"has {sum(levels):,} texels in {ends[-1]:,} bytes, more than an octree can have"
-    return ""
-
-
-def _check_octree(row: Mapping[str, Any], data: bytes, at: Place) -> None:
-    """Inflates the levels of a row, each by itself, and checks that they form an octree."""
-    from ptmtools_systems.apo.files import inflated
-    from ptmtools_systems.apo.model import Octree
-    from ptmtools_systems.apo.octree import fault_of
-
-    start = np.concatenate([[0], np.cumsum(row["levels"], dtype=np.int64)])
-    if len(data) != row["ends"][-1]:
-        less = len(data) < row["ends"][-1]
-        at.add("PTM-D710", f"ends {'before' if less else 'after'} the last level")
-    try:
-        texels = inflated(data, start, row)
-    except InputError as error:
-        at.add("PTM-D710", error.message, error.place or "")
-        return
-    octree = Octree(texels, start, np.array(row["cube"]["low"]), row["cube"]["side"])
-    if fault := fault_of(octree):
-        place, message = fault
-        at.add("PTM-D710", message, place)

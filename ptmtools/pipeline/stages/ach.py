@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 from ptmtools.coverage.options import AchOptions
 from ptmtools.lazy import Lazy
 from ptmtools.pipeline.stage import Stage
-from ptmtools.pipeline.stages.apo import APO
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.pvs import PVS
 from ptmtools.pipeline.stages.scene import SCENE
@@ -60,7 +59,7 @@ ACH: Stage[Ach] = Stage(
     about="Measure how much of the view each visible cell covers.",
     recipe=3,
     options=AchOptions,
-    reads=(APO, CELLS, PVS),
+    reads=(SCENE, CELLS, PVS),
     artifact=Lazy("ptmtools.coverage.model:Ach"),
     compute=Lazy("ptmtools.coverage.ach:compute_ach"),
     counts=_counts,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.lazy import Lazy
 from ptmtools.pipeline.stage import Stage
-from ptmtools.pipeline.stages.apo import APO
+from ptmtools.pipeline.stages.scene import SCENE
 from ptmtools.quantities import count
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ CELLS: Stage[Cells] = Stage(
     about="Read a model and divide its space into cells and portals.",
     recipe=8,
     options=SubdivideOptions,
-    reads=(APO,),
+    reads=(SCENE,),
     changed="division ends where it saves visitors little (--gain); cells are walkable space, or "
     "space visible from it",
     artifact=Lazy("ptmtools.cells.model:Cells"),
@@ -56,7 +56,7 @@ CELLS: Stage[Cells] = Stage(
     counts=_counts,
     notes=lambda cells, _: cells.notes,
     summary=_summary,
-    fits={APO: _fits_scene},
+    fits={SCENE: _fits_scene},
     from_model=True,
     one_thread=True,
 )

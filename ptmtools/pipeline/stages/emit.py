@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from ptmtools import plugins
 from ptmtools.output.options import EmitOptions
 from ptmtools.pipeline.encoding import (
     fallback_level,
@@ -15,12 +16,10 @@ from ptmtools.pipeline.encoding import (
 )
 from ptmtools.pipeline.stage import Artifacts, Job, Stage, described
 from ptmtools.pipeline.stages.ach import ACH
-from ptmtools.pipeline.stages.apo import APO, octree_records
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.light import LIGHT, lightmap_files
 from ptmtools.pipeline.stages.pvs import PVS
-from ptmtools.pipeline.stages.relief import RELIEF, relief_files
-from ptmtools.pipeline.stages.scene import image_digests
+from ptmtools.pipeline.stages.scene import SCENE, image_digests
 from ptmtools.pipeline.stages.textures import (
     OBJECTS_AHEAD,
     TEXTURES,
@@ -34,11 +33,11 @@ if TYPE_CHECKING:
     from ptmtools.coverage.required_levels import Need
     from ptmtools.light.model import Light
     from ptmtools.output.model import TextureRecord
+    from ptmtools.output.representation import Represented
     from ptmtools.scene.model import Scene
     from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
     from ptmtools.texture.sources import Source
-    from ptmtools_systems.apo.reliefs import Reliefs
 
 
 class EmissionJob(Job):
@@ -48,12 +47,14 @@ class EmissionJob(Job):
         """See `Job.make`."""
         from ptmtools.output import emit
 
-        run, light, reliefs = self.run, self.run.stored(LIGHT), self.run.stored(RELIEF)
+        run, light, scene = self.run, self.run.stored(LIGHT), self.run[SCENE]
         images = texture_records(run)
-        maps = relief_records(run, reliefs)
+        represented = tuple(_represented(run))
+        maps = tuple(texture for kind in represented for texture in kind.textures)
+        places = next((kind.maps for kind in represented if kind.maps), None)
         textures = (*images, *lightmap_records(run, light), *maps)
         report = emit(
-            run[APO],
+            scene,
             run[CELLS],
             run[PVS],
             run[ACH],
@@ -62,13 +63,10 @@ class EmissionJob(Job):
             self.options,
             run.progress,
             force=True,
-            need=self._need(run[APO], {record.image: record for record in images}),
-            octrees=octree_records(run),
+            need=self._need(scene, {record.image: record for record in images}),
+            represented=represented,
             light=light,
-            reliefs=reliefs,
-            relief_need=(
-                self._need(reliefs.painted(run[APO]), dict(enumerate(maps))) if reliefs else None
-            ),
+            map_need=(self._need(places.painted(scene), dict(enumerate(maps))) if places else None),
             workers=run.workers.executor.workers,
         )
         for name in report.files:
@@ -101,25 +99,31 @@ class EmissionJob(Job):
 def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
     """The textures of the scene's images, for the served files."""
     files = texture_files(image_digests(run))
-    return _records(run, TEXTURES, ((name, {"image": i}) for i, name in enumerate(files)))
+    return read_records(run, TEXTURES, ((name, {"image": i}) for i, name in enumerate(files)))
 
 
 def lightmap_records(run: Artifacts, light: Light | None) -> tuple[TextureRecord, ...]:
     """The lightmaps of the cells, for the served files."""
     files = lightmap_files(light)
-    return _records(
+    return read_records(
         run, LIGHT, ((name, {"image": -1, "cell": cell}) for cell, name in files.items())
     )
 
 
-def relief_records(run: Artifacts, reliefs: Reliefs | None) -> tuple[TextureRecord, ...]:
-    """The normal maps of objects, for the served files."""
-    files = relief_files(run, reliefs)
-    owners = ((name, {"image": -1, "object": number}) for number, name in files.items())
-    return _records(run, RELIEF, owners)
+def representing() -> tuple[Stage[Any], ...]:
+    """The stages of other packages that add representations of objects."""
+    declared = plugins.declared("stages", Stage).values()
+    return tuple(stage for stage in declared if stage.representation)
 
 
-def _records(
+def _represented(run: Artifacts) -> Iterator[Represented]:
+    for stage in representing():
+        assert stage.representation
+        if represented := stage.representation.load()(run):
+            yield represented
+
+
+def read_records(
     run: Artifacts, stage: Stage[Any], files: Iterable[tuple[str, Mapping[str, int]]]
 ) -> tuple[TextureRecord, ...]:
     """The textures that a stage has encoded: the `.ptm` of each, and its image, cell or object."""
@@ -195,8 +199,8 @@ EMIT: Stage[None] = Stage(
     "pictures; hulls with slivers and portals with short edges are convex in float32 and float64; "
     "objects with thousands of triangles have levels of detail",
     options=EmitOptions,
-    reads=(APO, CELLS, PVS, ACH, TEXTURES, RELIEF, LIGHT),
-    files=(APO, RELIEF, LIGHT),
+    reads=lambda options: (SCENE, CELLS, PVS, ACH, TEXTURES, *representing(), LIGHT),
+    files=lambda: (LIGHT, *representing()),
     summary=_summary,
     job=EmissionJob,
 )

@@ -18,9 +18,8 @@ from ptmtools.light.options import LightOptions
 from ptmtools.output.names import cell_name
 from ptmtools.pipeline.encoding import TextureOptions, baked, encoded_texels, ptm_file
 from ptmtools.pipeline.stage import Artifacts, Job, Run, Stage, described
-from ptmtools.pipeline.stages.apo import APO, replaced_objects, source_triangles
 from ptmtools.pipeline.stages.cells import CELLS
-from ptmtools.pipeline.stages.scene import SCENE, image_bytes, lights_of
+from ptmtools.pipeline.stages.scene import SCENE, image_bytes, lights_of, scene_origin
 from ptmtools.pipeline.stages.textures import TEXTURES
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import LIGHTS, arrays_of, sha256
@@ -113,11 +112,11 @@ class LightJob(Job):
         from ptmtools.output.geometry import Geometry
         from ptmtools.output.pieces import pieces_of
 
-        scene, cells = run[APO], run[CELLS]
+        scene, cells = run[SCENE], run[CELLS]
         own = lights if has_maps and self.options.light != "bake" else None
         unlit = unlit_materials(scene, lights, painted=own is not None)
         options, texel = self.options, 1 / self.options.light_density
-        pieces = pieces_of(Geometry(scene, cells), cells, unlit, texel, replaced_objects(run))
+        pieces = pieces_of(Geometry(scene, cells), cells, unlit, texel, scene_origin(run).objects)
         if options.light == "auto" and not own:
             density = affordable(pieces, options.light_density, rounded(image_bytes(run)))
             if not density:
@@ -158,7 +157,7 @@ class LightJob(Job):
         from ptmtools.light.mixing import mixed
         from ptmtools.light.occlusion import Surroundings
 
-        scene = self.run[APO]
+        scene = self.run[SCENE]
         around = Surroundings.of(scene)
         if own:
             return Baking(around, options, painted=_painted(self.run, own))
@@ -199,13 +198,13 @@ def _painted(run: Run, lights: Lights) -> Painted:
 
     from ptmtools.light.looks import LightImage, Painted, red_texels
 
-    scene = run[SCENE]
+    scene = run.original(SCENE)
     files = {each.data for each in lights.maps}
     decoded = {data: red_texels(data, _MOST, "lightmap") for data in files}
     images = tuple(LightImage(decoded[k.data], k.wrap, k.strength) for k in lights.maps)
     image = lights.map[scene.triangle_material]
     uv = lights.uv.astype(np.float64)
-    return Painted(scene.corners, uv, image, images, source_triangles(run))
+    return Painted(scene.corners, uv, image, images, scene_origin(run).triangle)
 
 
 def _about(baking: Baking) -> Mapping[str, Any]:
@@ -237,7 +236,7 @@ def lightmap_files(light: Light | None) -> dict[int, str]:
 
 
 def _reads(options: LightOptions) -> tuple[Stage[Any], ...]:
-    return () if options.light == "none" else (SCENE, APO, CELLS)
+    return () if options.light == "none" else (SCENE, CELLS)
 
 
 def _inputs(artifacts: Artifacts, options: LightOptions) -> dict[str, str]:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from ptmtools.errors import DatabaseError, naming
 from ptmtools.lazy import Lazy
-from ptmtools.pipeline.stage import Artifacts, Job, Stage
+from ptmtools.pipeline.stage import Artifacts, Job, SceneOrigin, Stage, changes_of
 from ptmtools.quantities import count
 from ptmtools.scene.options import IngestOptions
 from ptmtools.store.layout import IMAGE_LIST, IMAGES, LIGHTS, arrays_of, sha256
@@ -147,11 +147,25 @@ def lights_of(artifacts: Artifacts) -> Lights | None:
 
         data = artifacts.db.read_output(SCENE.name, name)
         lights = Lights.from_arrays(unpack_arrays(data, file=artifacts.db.path / name))
-        scene = artifacts[SCENE]
+        scene = artifacts.original(SCENE)
         lights.check(len(scene.materials), len(scene.triangles))
         return lights
 
     return artifacts.cached(name, read)
+
+
+def scene_origin(artifacts: Artifacts) -> SceneOrigin:
+    """Where the scene as changed comes from; raises PTM-D004 to PTM-D006."""
+    import numpy as np
+
+    triangle = np.arange(len(artifacts.original(SCENE).triangles))
+    objects = np.zeros(0, np.int32)
+    for change in changes_of(SCENE):
+        if change.origin and artifacts.is_stored(change):
+            origin = change.origin.load()(artifacts)
+            objects = np.union1d(objects, origin.objects).astype(np.int32)
+            triangle = triangle[origin.triangle]
+    return SceneOrigin(objects, triangle)
 
 
 class ReadingJob(Job):

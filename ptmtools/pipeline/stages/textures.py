@@ -39,7 +39,6 @@ from ptmtools.pipeline.encoding import (
     steps_file,
 )
 from ptmtools.pipeline.stage import Artifacts, Job, Run, Stage
-from ptmtools.pipeline.stages.apo import APO
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.pvs import PVS
 from ptmtools.pipeline.stages.scene import SCENE, image_digests, image_rows, images_of
@@ -106,7 +105,7 @@ def unresolved(artifacts: Artifacts, options: TextureOptions) -> list[int]:
     screen = Screen(options.trim_height, options.trim_fov, options.trim_distance)
 
     def levels() -> list[int]:
-        stages = artifacts[APO], artifacts[CELLS], artifacts[PVS]
+        stages = artifacts[SCENE], artifacts[CELLS], artifacts[PVS]
         return [int(n) for n in unresolved_levels(*stages, _sizes(artifacts, options), screen)]
 
     return artifacts.cached(f"levels unresolved by {screen}", levels)
@@ -472,7 +471,8 @@ TEXTURES: Stage[None] = Stage(
     changed="previews of the levels are written, lossy images are kept as they are, and the error "
     "and the offset of each level are recorded",
     options=TextureOptions,
-    reads=lambda options: (SCENE, APO, CELLS, PVS) if options.trim else (SCENE,),
+    reads=lambda options: (SCENE, CELLS, PVS) if options.trim else (SCENE,),
+    before_changes=lambda options: not options.trim,  # it reads the images only
     inputs=_inputs,
     summary=_summary,
     job=TexturesJob,

@@ -268,7 +268,7 @@ def test_options_out_of_range(wrong: dict[str, float]) -> None:
 
 def test_the_warm_up_calls_every_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
     from ptmtools import jit
-    from ptmtools.pipeline.warm_up import warm_statue
+    from ptmtools.pipeline.warm_up import warm_objects
 
     names: set[str] = set()
     call = jit._Kernel.__call__
@@ -282,6 +282,6 @@ def test_the_warm_up_calls_every_kernel(monkeypatch: pytest.MonkeyPatch) -> None
     look_up(actual.octree, np.full((1, 3), 0.5))
     needed = set(names)
     names.clear()
-    warm_statue()
+    warm_objects()
     assert needed
     assert needed <= names

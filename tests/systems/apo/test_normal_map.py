@@ -10,6 +10,7 @@ import pytest
 from ptmtools.errors import MissingComponentError
 from ptmtools.executor import Executor
 from ptmtools.light.atlas import unwrap
+from ptmtools.output.object_maps import ObjectMaps
 from ptmtools.simplification import Mesh, SimplifyOptions, simplify
 from ptmtools.texture import EncodeOptions, encode
 from ptmtools_systems.apo.files import streamed
@@ -17,7 +18,7 @@ from ptmtools_systems.apo.making import Simple, octree_around, smooth
 from ptmtools_systems.apo.model import ApoOptions
 from ptmtools_systems.apo.normal_map import NormalMap, axes_of, frames, looked_up, normal_map
 from ptmtools_systems.apo.normals import corner_normals
-from ptmtools_systems.apo.reliefs import Reliefs, reliefs_of
+from ptmtools_systems.apo.reliefs import object_maps
 from ptmtools_systems.apo.sampling import Source, at, nearest, spacing_for, spread
 from ptmtools_systems.apo.traversal import look_up
 from tests.systems.apo.meshes import scene_of, sphere
@@ -137,8 +138,8 @@ def test_without_xatlas(monkeypatch: pytest.MonkeyPatch, mesh: Simple) -> None:
 
 def test_arrays(mesh: Simple, made: NormalMap) -> None:
     scene = scene_of(mesh.points, mesh.triangles)
-    reliefs = reliefs_of(scene, np.array([0], np.int32), [made])
-    again = Reliefs.from_arrays(reliefs.to_arrays())
+    reliefs = object_maps(scene, np.array([0], np.int32), [made])
+    again = ObjectMaps.from_arrays(reliefs.to_arrays())
     assert np.array_equal(again.uv, made.uv)
     assert np.array_equal(again.frame, made.frame)
     assert again.side.tolist() == [len(made.texels)]
@@ -154,4 +155,4 @@ def test_arrays(mesh: Simple, made: NormalMap) -> None:
     ):
         arrays = dict(reliefs.to_arrays())
         with pytest.raises((KeyError, ValueError)):
-            Reliefs.from_arrays(arrays | {name: change(arrays[name])})
+            ObjectMaps.from_arrays(arrays | {name: change(arrays[name])})

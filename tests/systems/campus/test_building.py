@@ -15,8 +15,9 @@ from ptmtools import schemas
 from ptmtools.cli.main import main
 from ptmtools.diagnostics import ValidationReport
 from ptmtools.errors import InputError, MissingComponentError, OutputError
+from ptmtools.folder_kinds import folder_kind
 from ptmtools.parallel import open_executor
-from ptmtools.pipeline.validation import kind_of, validate
+from ptmtools.pipeline.validation import validate
 from ptmtools.scene import IngestOptions
 from ptmtools_systems.campus import Campus, CampusOptions, distances, make_campus, read_campus
 from ptmtools_systems.campus.meshes import read_mesh
@@ -36,7 +37,7 @@ def valid(folder: Path) -> ValidationReport:
 def test_it_is_valid(made: Path, plain: Path) -> None:
     assert valid(made).files == len(read_campus(made).files()) + 1
     valid(plain)
-    kind = kind_of(made)
+    kind = folder_kind(made)
     assert kind is not None
     lines, record = kind.describe.load()(made)
     assert any("wall" in line or "diffuse" in line for line in lines)

@@ -12,9 +12,10 @@ import pytest
 from ptmtools import schemas
 from ptmtools.cli.main import main
 from ptmtools.errors import InputError, LimitError
+from ptmtools.folder_kinds import folder_kinds
 from ptmtools.pipeline.validation import validate
 from ptmtools.scene import IngestOptions
-from ptmtools.site.forms import FORMS, form_site
+from ptmtools.site.forms import form_site
 from ptmtools_lab.campus.stock import read_stock
 from ptmtools_systems.campus import CampusOptions, make_campus, read_campus
 from ptmtools_systems.campus.records import LARGEST, read_records
@@ -64,7 +65,7 @@ def test_records_are_in_the_campus(recorded: Path, plain: Path) -> None:
 
 
 def test_no_server_sends_them_as_pages(recorded: Path) -> None:
-    entries = form_site(recorded, FORMS["campus.json"]).entries
+    entries = form_site(recorded, folder_kinds()["campus.json"]).entries
     media = [entry.media for name, entry in entries.items() if "/records/" in name]
     assert media == ["text/plain; charset=utf-8"] * 2
 

@@ -13,17 +13,19 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from ptmtools.lazy import Lazy
 from ptmtools.pipeline.encoding import TextureOptions, baked, encoded_texels, ptm_file
 from ptmtools.pipeline.stage import Artifacts, Job, Stage, described
-from ptmtools.pipeline.stages.apo import APO, object_stems, replaced_objects
-from ptmtools.pipeline.stages.scene import SCENE
+from ptmtools.pipeline.stages.scene import SCENE, scene_origin
 from ptmtools.pipeline.stages.textures import TEXTURES
 from ptmtools.quantities import count, size
+from ptmtools_systems.stages.apo import APO, object_stems
 
 if TYPE_CHECKING:
+    from ptmtools.output.object_maps import ObjectMaps
+    from ptmtools.output.representation import Represented
     from ptmtools.scene.model import Scene
     from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
     from ptmtools_systems.apo.normal_map import NormalMap
-    from ptmtools_systems.apo.reliefs import Reliefs, Replacing
+    from ptmtools_systems.apo.reliefs import Replacing
 
 #: A greater share of texels whose rays miss the original is reported.
 _MISSED = 0.01
@@ -57,21 +59,21 @@ class ReliefJob(Job):
     def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
         """Raises MissingComponentError: PTM-M100 xatlas is not installed."""
         run = self.run
-        objects = replaced_objects(run)
+        objects = scene_origin(run).objects
         if not len(objects) or run.recorded(APO).relief != "normal-map":
             return described(work, {"maps": 0}, ())
-        from ptmtools_systems.apo.reliefs import Replacing, reliefs_of
+        from ptmtools_systems.apo.reliefs import Replacing, object_maps
         from ptmtools_systems.apo.replacing import apo_options
 
         # Workers need no images.
-        scene, shown = replace(run[SCENE], images=()), replace(run[APO], images=())
+        scene, shown = replace(run.original(SCENE), images=()), replace(run[APO], images=())
         replacing = Replacing(scene, shown, apo_options(run.recorded(APO)))
         names = [shown.objects[number] for number in objects.tolist()]
         tasks = list(zip(objects.tolist(), relief_stems(names), strict=True))
         shared = Mapped(replacing, run.recorded(TEXTURES))
         maps, total = baked(run, transaction, mapped, shared, tasks, "normal maps")
         notes = [note for pair in zip(names, maps, strict=True) for note in _notes(*pair)]
-        reliefs = reliefs_of(shown, objects, maps)
+        reliefs = object_maps(shown, objects, maps)
         run.keep(RELIEF, reliefs)
         transaction.put_arrays(RELIEF.name, reliefs.to_arrays())
         error = max(relief.error for relief in maps)
@@ -91,11 +93,25 @@ def relief_stems(objects: list[str]) -> list[str]:
     return [f"relief~{stem}" for stem in object_stems(objects)]
 
 
-def relief_files(artifacts: Artifacts, reliefs: Reliefs | None) -> dict[int, str]:
+def relief_files(artifacts: Artifacts, reliefs: ObjectMaps | None) -> dict[int, str]:
     """Replaced object → `.ptm` of its normal map, relative to the served folder."""
     numbers = [] if reliefs is None else reliefs.objects.tolist()
     names = [artifacts[APO].objects[number] for number in numbers]
     return dict(zip(numbers, map(ptm_file, relief_stems(names)), strict=True))
+
+
+def represented(artifacts: Artifacts) -> Represented | None:
+    """The objects with normal maps; None without any."""
+    from ptmtools.output.representation import Represented
+    from ptmtools.pipeline.stages.emit import read_records
+
+    reliefs = artifacts.stored(RELIEF)
+    if reliefs is None:
+        return None
+    files = relief_files(artifacts, reliefs)
+    owners = ((name, {"image": -1, "object": number}) for number, name in files.items())
+    textures = read_records(artifacts, RELIEF, owners)
+    return Represented(tuple(reliefs.objects.tolist()), maps=reliefs, textures=textures)
 
 
 def _inputs(artifacts: Artifacts, options: ReliefOptions) -> dict[str, str]:
@@ -106,7 +122,7 @@ def _inputs(artifacts: Artifacts, options: ReliefOptions) -> dict[str, str]:
     return artifacts.files_of(RELIEF.sources(options)) | artifacts.choices(RELIEF)
 
 
-def _counts(reliefs: Reliefs) -> Mapping[str, Any]:
+def _counts(reliefs: ObjectMaps) -> Mapping[str, Any]:
     return {
         "maps": len(reliefs.objects),
         "texels": int((reliefs.side.astype("int64") ** 2).sum()),
@@ -122,22 +138,23 @@ def _summary(n: Mapping[str, Any]) -> str:
     )
 
 
-def _fits_scene(reliefs: Reliefs, scene: Scene) -> str:
+def _fits_scene(reliefs: ObjectMaps, scene: Scene) -> str:
     import numpy as np
 
     own = np.isin(scene.triangle_object, reliefs.objects).sum()
     return "" if own == len(reliefs.uv) else "the normal maps are those of other objects"
 
 
-RELIEF: Stage[Reliefs] = Stage(
+RELIEF: Stage[ObjectMaps] = Stage(
     name="relief",
     about="Bake the normals of replaced objects into normal maps.",
     recipe=1,
     options=ReliefOptions,
-    reads=(SCENE, APO),
+    reads=(SCENE,),
+    representation=Lazy(f"{__name__}:represented"),
     inputs=_inputs,
     heeds=(APO, TEXTURES),
-    artifact=Lazy("ptmtools_systems.apo.reliefs:Reliefs"),
+    artifact=Lazy("ptmtools.output.object_maps:ObjectMaps"),
     counts=_counts,
     summary=_summary,
     fits={APO: _fits_scene},

@@ -14,29 +14,32 @@ import json
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 from ptmtools.lazy import Lazy, component
-from ptmtools.output.names import OCTREE_FOLDER, plain_name
-from ptmtools.pipeline.stage import Artifacts, Job, Run, Stage, described
+from ptmtools.output.names import plain_name
+from ptmtools.pipeline.stage import Artifacts, Job, Run, SceneOrigin, Stage, described
 from ptmtools.pipeline.stages.scene import SCENE
 from ptmtools.quantities import count, size
-from ptmtools.store.layout import OCTREE_LIST, SERVED, arrays_of
+from ptmtools.store.layout import SERVED, STAGES_FOLDER, arrays_of
 from ptmtools_systems.apo.options import ReplaceOptions
+from ptmtools_systems.entries import OCTREES
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ptmtools.output.model import OctreeRecord
+    from ptmtools.output.representation import Represented
     from ptmtools.scene.model import Scene
     from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
     from ptmtools_systems.apo.model import Octree
-    from ptmtools_systems.apo.replacing import ReplacedObject, Replacement
+    from ptmtools_systems.apo.replacing import ReplacedObject
 
-_FILE = re.compile(rf"{OCTREE_FOLDER}/[A-Za-z0-9_]+\.bin")
+OCTREE_LIST = f"{STAGES_FOLDER}/octrees.json"
+_FILE = re.compile(rf"{OCTREES.folder}/[A-Za-z0-9_]+\.bin")
 
 
 class ReplacingJob(Job):
@@ -61,7 +64,7 @@ class ReplacingJob(Job):
         has_list = OCTREE_LIST in artifacts.outputs(APO)
         if has_list and numbers != replacement.objects.tolist():
             raise ValueError(f"{arrays_of(APO.name)} and {OCTREE_LIST} are of other objects")
-        return replacement.of(artifacts[SCENE])
+        return replacement.of(artifacts.original(SCENE))
 
     @staticmethod
     def missing(artifacts: Artifacts, artifact: Scene) -> Iterator[tuple[str, str, str]]:
@@ -84,7 +87,7 @@ class ReplacingJob(Job):
         from ptmtools_systems.apo.replacing import replaced
 
         run = self.run
-        result = replaced(run[SCENE], self.options, run.workers.executor, run.progress)
+        result = replaced(run.original(SCENE), self.options, run.workers.executor, run.progress)
         rows = []
         files = octree_files(each.name for each in result.objects)
         for file, each in zip(files, result.objects, strict=True):
@@ -114,7 +117,7 @@ class ReplacingJob(Job):
 
 def octree_files(objects: Iterable[str]) -> list[str]:
     """The file of each object's octree, relative to the served folder."""
-    return [f"{OCTREE_FOLDER}/{stem}.bin" for stem in object_stems(objects)]
+    return [f"{OCTREES.folder}/{stem}.bin" for stem in object_stems(objects)]
 
 
 def object_stems(objects: Iterable[str]) -> list[str]:
@@ -132,34 +135,14 @@ def object_stems(objects: Iterable[str]) -> list[str]:
     return stems
 
 
-def replaced_objects(artifacts: Artifacts) -> NDArray[np.int32]:
-    """The numbers of the objects that were replaced, ascending; raises PTM-D004 to PTM-D006."""
-    import numpy as np
-
-    replacement = _replacement(artifacts)
-    return np.zeros(0, np.int32) if replacement is None else replacement.objects
-
-
-def source_triangles(artifacts: Artifacts) -> NDArray[np.int64]:
-    """(T,) for each triangle of the scene with replaced objects that of the scene that it is, or
-    stands for; raises as `replaced_objects`."""
-    import numpy as np
-
-    replacement, scene = _replacement(artifacts), artifacts[SCENE]
-    if replacement is None:
-        return np.arange(len(scene.triangles))
-    return replacement.sources(scene)
-
-
-def _replacement(artifacts: Artifacts) -> Replacement | None:
+def replaced_origin(artifacts: Artifacts) -> SceneOrigin:
+    """What the replaced objects come from; raises PTM-D004 to PTM-D006."""
     from ptmtools_systems.apo.replacing import Replacement
 
-    name = arrays_of(APO.name)
-    if name not in artifacts.outputs(APO):
-        return None
     arrays = artifacts.db.read_arrays(APO.name)
-    with artifacts.reading(name):
-        return Replacement.from_arrays(arrays)
+    with artifacts.reading(arrays_of(APO.name)):
+        replacement = Replacement.from_arrays(arrays)
+    return SceneOrigin(replacement.objects, replacement.sources(artifacts.original(SCENE)))
 
 
 def _row(file: str, replaced: ReplacedObject, octree: Octree) -> tuple[dict[str, Any], bytes]:
@@ -185,6 +168,15 @@ def _row(file: str, replaced: ReplacedObject, octree: Octree) -> tuple[dict[str,
     return row, data
 
 
+def represented(artifacts: Artifacts) -> Represented:
+    """The objects with octree textures; raises PTM-D004 to PTM-D006."""
+    from ptmtools.output.representation import Represented
+
+    records = octree_records(artifacts)
+    rows = [record.row() for record in records]
+    return Represented(tuple(record.number for record in records), OCTREES, rows)
+
+
 def octree_records(artifacts: Artifacts) -> tuple[OctreeRecord, ...]:
     """The octree textures of a database, for the served files; raises PTM-D004 to PTM-D006."""
     if OCTREE_LIST not in artifacts.outputs(APO):
@@ -197,10 +189,43 @@ def octree_records(artifacts: Artifacts) -> tuple[OctreeRecord, ...]:
     return artifacts.cached(OCTREE_LIST, read)
 
 
+@dataclass(frozen=True)
+class OctreeRecord:
+    """The octree texture of an object, for the emitted files (docs/formats/apo.md).
+
+    Attributes
+    ----------
+    object, number: its name, which objects may share, and its index in the scene.
+    file: the stream of texels, relative to the served folder, "apo/NAME.bin".
+    low, side: corner and side of the cube, world metres.
+    levels: texels of each level, from the root on.
+    ends: the length of the prefix of the file that holds each level and those before it.
+    crc32: of the texels of each level.
+    """
+
+    object: str
+    number: int
+    file: str
+    low: tuple[float, ...]
+    side: float
+    levels: tuple[int, ...]
+    ends: tuple[int, ...]
+    crc32: tuple[int, ...]
+
+    def row(self) -> dict[str, Any]:
+        """The row in the index of the hints."""
+        return {
+            "object": self.object,
+            "file": quote(self.file),
+            "cube": {"low": list(self.low), "side": self.side},
+            "levels": list(self.levels),
+            "ends": list(self.ends),
+            "crc32": list(self.crc32),
+        }
+
+
 def _record(row: Mapping[str, Any]) -> OctreeRecord:
     """Raises ValueError, KeyError or TypeError for a row that no list has."""
-    from ptmtools.output.model import OctreeRecord
-
     low, side = tuple(map(float, row["low"])), float(row["side"])
     levels, ends, checks = (tuple(map(int, row[name])) for name in ("levels", "ends", "crc32"))
     number = int(row["number"])
@@ -236,6 +261,8 @@ APO: Stage[Scene] = Stage(
     changed="meshes with many small holes, handles or parts are simplified as far as others",
     reads=_reads,
     changes=SCENE,
+    origin=Lazy(f"{__name__}:replaced_origin"),
+    representation=Lazy(f"{__name__}:represented"),
     artifact=Lazy("ptmtools.scene.model:Scene"),
     counts=lambda scene: {"triangles": len(scene.triangles)},
     summary=_summary,

@@ -1,0 +1,1 @@
+"""The stages that the neighbouring systems add to a build."""
