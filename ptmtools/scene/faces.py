@@ -56,8 +56,8 @@ def keep_faces(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> Kep
     finite_point = np.asarray(np.isfinite(points).all(axis=1))
     finite = finite_point[triangles].all(axis=1)
     source = np.flatnonzero(finite)
-    far = stray_faces(points, triangles[source])
-    strays, source = source[far], source[~far]
+    stray = stray_faces(points, triangles[source])
+    strays, source = source[stray], source[~stray]
     welded, index = _weld(points, triangles[source])
 
     thin = _degenerate(welded, index)
