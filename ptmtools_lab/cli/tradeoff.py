@@ -31,10 +31,10 @@ from ptmtools_lab.figures import require
 from ptmtools_lab.path.making import path_through
 from ptmtools_lab.path.options import PathOptions
 from ptmtools_lab.tradeoff import EXPERIMENTS, FURTHER, report as sentences
-from ptmtools_lab.tradeoff.experiment import Subject, Trade, run
+from ptmtools_lab.tradeoff.experiment import Deadline, Subject, Trade, run
 from ptmtools_lab.tradeoff.knobs import KNOBS
 from ptmtools_lab.tradeoff.report import as_csv, picture, table
-from ptmtools_lab.tradeoff.walk import WalkOptions, WalkTrade, try_settings
+from ptmtools_lab.tradeoff.walk import WalkOptions, WalkTrade, require_prices, try_settings
 
 #: An option under the heading of this command.
 experiment = partial(option, heading="Experiments")
@@ -42,6 +42,8 @@ experiment = partial(option, heading="Experiments")
 LEAST_POINTS = 64
 #: The experiment on a walk, beside those of the stages.
 WALK = "walk"
+#: Share of the time that is for the walk.
+_SHARE = 0.5
 #: Duration of the default walk, and with ``--quick``, s.
 DURATION, QUICK = 60.0, 30.0
 
@@ -72,6 +74,13 @@ DURATION, QUICK = 60.0, 30.0
     multiple=True,
     help="Test only this option on the walk, including values that make the build slow. "
     "Repeatable. Default: all.",
+)
+@experiment(
+    "--minutes",
+    type=click.FloatRange(0, min_open=True),
+    default=10.0,
+    help="Time limit. The first values of the options with the greatest effect are tested first; "
+    "half of the time is for the walk. Settings that remain are named.",
 )
 @experiment("--quick", is_flag=True, help="Test one value of each option, on a shorter walk.")
 @experiment(
@@ -105,6 +114,7 @@ def tradeoff(
     stages: tuple[str, ...],
     walk_file: str | None,
     knobs: tuple[str, ...],
+    minutes: float,
     quick: bool,
     wanted: float | None,
     cells_tried: int,
@@ -117,8 +127,9 @@ def tradeoff(
     """Measure the cost and the benefit of settings on the scene of DB. The command does not change
     DB.
 
-    The first part is the effect on a walk through the building, in sentences and as a table. The
-    second part is the accuracy of each stage; a star marks settings that no cheaper one surpasses.
+    The first part is the effect on a walk through the building, in sentences and as a table: first
+    the settings that only gain, then those with gains and losses. The second part is the accuracy
+    of each stage; a star marks settings that no cheaper one surpasses.
     """
     options = take(WalkOptions, values)
     stages = stages or (WALK, *EXPERIMENTS)
@@ -135,21 +146,24 @@ def tradeoff(
     subject = Subject(artifacts, cells_tried, reference)
     walked: list[WalkTrade] = []
     trades = []
+    deadline = Deadline(minutes)
     with console.progress() as progress:
-        for stage in stages:
+        for number, stage in enumerate(stages):
+            remaining = len(stages) - number
+            until = deadline.part(max(_SHARE, 1 / remaining) if stage == WALK else 1 / remaining)
             progress(0, 1, f"preparing {stage}")
             if stage == WALK:
                 duration = QUICK if quick else DURATION
                 walk = walk or path_through(artifacts, PathOptions(duration=duration)).walk
                 walked.append(
                     try_settings(
-                        Path(db), artifacts, walk, options, knobs,
-                        quick=quick, progress=progress, tell=console.warn,
+                        artifacts, walk, options, knobs,
+                        quick=quick, deadline=until, progress=progress, tell=console.warn,
                     )
                 )  # fmt: skip
             else:
                 experiment = {**EXPERIMENTS, **FURTHER}[stage].load()(subject)
-                trades.append(run(stage, experiment, progress))
+                trades.append(run(stage, experiment, progress, until))
     every = [trade for walk in walked for trade in sentences.trades(walk)] + trades
     if csv_file:
         write_bytes(csv_file, as_csv(every).encode(), force=force)
@@ -163,6 +177,8 @@ def tradeoff(
     blocks += [table(trade, wanted) for trade in trades]
     document = [*first, *(_document(trade, wanted) for trade in trades)]
     console.result(document, (line for lines in blocks for line in (*lines, "")))
+    for trade in walked:
+        require_prices(trade, Path(db))
 
 
 def _document(trade: Trade, wanted: float | None) -> dict[str, Any]:

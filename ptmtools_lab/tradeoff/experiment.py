@@ -103,7 +103,7 @@ class Trade:
     ----------
     stage: its name.
     work, error, reference_error, units: as in `Experiment`.
-    trials: by cost.
+    trials: by cost. untried: names of the settings that the time did not allow.
     rates: family → exponent b of error ∝ work^b, by least squares over the logarithms of trials
         with more than twice the error of the reference.
     """
@@ -115,17 +115,42 @@ class Trade:
     trials: tuple[Trial, ...]
     rates: Mapping[str, float]
     units: Mapping[str, str] = field(default_factory=dict)
+    untried: tuple[str, ...] = ()
 
     def cheapest(self, error: float) -> Trial | None:
         """The cheapest trial with at most this error; None if there is none."""
         return next((t for t in self.trials if t.best and t.measured.error <= error), None)
 
 
-def run(stage: str, experiment: Experiment, progress: Progress = silent) -> Trade:
-    """Tries all settings of a stage's experiment."""
+class Deadline:
+    """A limit on the time of experiments, from now on."""
+
+    def __init__(self, minutes: float = math.inf) -> None:
+        self._end = time.perf_counter() + 60 * minutes
+
+    @property
+    def left(self) -> float:
+        """Remaining seconds, at least 0."""
+        return max(0.0, self._end - time.perf_counter())
+
+    def part(self, share: float) -> Deadline:
+        """A share of the remaining time."""
+        return Deadline(share * self.left / 60)
+
+
+def run(
+    stage: str,
+    experiment: Experiment,
+    progress: Progress = silent,
+    deadline: Deadline | None = None,
+) -> Trade:
+    """Tries the settings of a stage's experiment, the first in any case, the others until the
+    deadline."""
     settings = experiment.settings
-    trials = []
+    trials: list[Trial] = []
     for i, setting in enumerate(settings):
+        if trials and deadline and not deadline.left:
+            break
         trials.append(Trial(setting, experiment.measure(setting)))
         progress(i + 1, len(settings), f"trying {stage}")
     return Trade(
@@ -136,6 +161,7 @@ def run(stage: str, experiment: Experiment, progress: Progress = silent) -> Trad
         pareto(trials, by_work=experiment.by_work),
         rates(trials, 2 * experiment.reference_error),
         experiment.units,
+        tuple(setting.name for setting in settings[len(trials) :]),
     )
 
 

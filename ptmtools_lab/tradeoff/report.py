@@ -58,6 +58,8 @@ def table(trade: Trade, wanted: float | None = None) -> list[str]:
             else "none of these; the last one with a star comes closest"
         )
         lines.append(f"  cheapest with an error of at most {wanted:g}: {answer}")
+    if trade.untried:
+        lines.append(f"  {_untried(trade.untried)}")
     return lines
 
 
@@ -140,16 +142,31 @@ def _draw(trade: Trade, axes: Any) -> None:
 _AS_IS = "unchanged"
 #: Least visible change of e, as a share of it and in steps of 8-bit colour.
 _SHARE, _STEPS = 0.005, 0.01
-#: Least relevant share of bytes, and of seconds, which are no more exact.
-_BYTES, _SECONDS = 0.005, 0.1
+#: Least relevant share of bytes; of seconds, and least seconds, which are no more exact.
+_BYTES, _SECONDS, _BRIEF = 0.005, 0.1, 0.2
 
 
 def sentences(trade: WalkTrade) -> list[str]:
-    """A sentence for each knob, on the setting chosen by `representative`."""
-    return [
-        sentence(representative(list(some), trade.own), trade)
+    """A sentence for each knob, on the setting chosen by `representative`, by `_price`."""
+    chosen = [
+        representative(list(some), trade.own)
         for _, some in groupby(trade.trials, lambda tried: tried.option)
     ]
+    return [sentence(tried, trade) for tried in sorted(chosen, key=partial(_price, own=trade.own))]
+
+
+def _price(tried: WalkTrial, own: WalkTrial) -> tuple[int, float]:
+    """The rank of a setting: it only saves bytes or seconds or improves the picture, has gains and
+    losses, changes nothing, only loses, or could not be tested; and within a rank the sum of the
+    losses less that of the gains, as shares."""
+    if tried.problem:
+        return 4, 0.0
+    changes = [_more_bytes(tried, own), _longer(tried, own) / max(own.build, _BRIEF)]
+    if any(_noticed(*pair) for pair in _pairs(tried, own)):
+        changes.append(_change(tried, own))
+    gains, losses = any(c < 0 for c in changes), any(c > 0 for c in changes)
+    rank = (1 if losses else 0) if gains else (3 if losses else 2)
+    return rank, sum(changes)
 
 
 def representative(some: Sequence[WalkTrial], own: WalkTrial) -> WalkTrial:
@@ -195,16 +212,26 @@ def sentence(tried: WalkTrial, trade: WalkTrade) -> str:
 
 def _saved(tried: WalkTrial, own: WalkTrial) -> str:
     parts = []
-    more = tried.served / max(own.served, 1) - 1
-    if abs(more) >= _BYTES:
+    if more := _more_bytes(tried, own):
         parts.append(
             f"increases the total size by {_percent(more)}" if more > 0 else
             f"reduces the total size by {_percent(-more)}"
         )  # fmt: skip
-    longer = tried.build - own.build
-    if abs(longer) >= _SECONDS * own.build:
+    if longer := _longer(tried, own):
         parts.append(f"builds {abs(longer):.1f} s {'slower' if longer > 0 else 'faster'}")
     return _and(parts) if parts else "costs the same"
+
+
+def _more_bytes(tried: WalkTrial, own: WalkTrial) -> float:
+    """The change of the bytes served, as a share; 0 if it is not relevant."""
+    more = tried.served / max(own.served, 1) - 1
+    return more if abs(more) >= _BYTES else 0.0
+
+
+def _longer(tried: WalkTrial, own: WalkTrial) -> float:
+    """The change of the seconds to build; 0 if it is not relevant."""
+    longer = tried.build - own.build
+    return longer if abs(longer) >= max(_SECONDS * own.build, _BRIEF) else 0.0
 
 
 def _and(parts: Sequence[str]) -> str:
@@ -264,8 +291,13 @@ def settings_table(trade: WalkTrade, wanted: float | None = None) -> list[str]:
             cheapest = _trade(trade, case).cheapest(wanted)
             name = cheapest.setting.name if cheapest else "none of these"
             lines.append(f"  cheapest with an error of at most {wanted:g}: {name}")
-    problems = [f"{tried.name}: {tried.problem}" for tried in trade.trials if tried.problem]
-    return [*lines, "", *problems] if problems else lines
+    if trade.untried:
+        lines += ["", _untried(trade.untried)]
+    return lines
+
+
+def _untried(names: Sequence[str]) -> str:
+    return f"Not tested within the time limit (--minutes): {', '.join(names)}."
 
 
 def _rows(trade: WalkTrade, case: Case, wide: int) -> Iterator[str]:

@@ -8,20 +8,23 @@ full picture of the original database, whatever the setting does to the textures
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cache
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
 import numpy as np
 
 from ptmtools.errors import InputError, PtmError
+from ptmtools.link import Conditions, Trace
 from ptmtools.options import option
 from ptmtools.output.served import Served, read_served
 from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.warm_up import warm_building
 from ptmtools.progress import Progress, silent
-from ptmtools.quantities import count
+from ptmtools.quantities import MemorySize, count, size
 from ptmtools.rendering.lossy import read_lossy
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.records import Pyramids
@@ -31,10 +34,11 @@ from ptmtools_lab.comparing import SimulateOptions, budget_of, counted, play, re
 from ptmtools_lab.forms import PTM
 from ptmtools_lab.measures import SHARES
 from ptmtools_lab.policies import POLICIES
+from ptmtools_lab.report import rate_text
 from ptmtools_lab.tables import limited
+from ptmtools_lab.tradeoff.experiment import Deadline
 from ptmtools_lab.tradeoff.knobs import (
     Own,
-    Seconds,
     Setting,
     build_again,
     concerned,
@@ -46,7 +50,14 @@ from ptmtools_lab.world import World, prepare
 
 #: Share of the full picture whose time is reported.
 FIRST = 0.9
-
+#: The value of options that the walk decides.
+AUTO = "auto"
+#: Texture memory by `AUTO`: this share of the memory for the pictures of the walk, that is, for
+#: what 95 % of them show. With all of it nothing has to be chosen; with a tenth of it every setting
+#: shows the same blur.
+_SHARE, _PICTURES = 0.5, 95
+#: Links by `AUTO`: all that the walk shows arrives in this part of its duration; bit/s at most.
+_LINKS = ((1.0, 512_000), (1 / 8, 4_000_000))
 
 #: Policies for any database.
 _OF_DATABASES = {name: policy for name, policy in POLICIES.items() if policy.form == PTM}
@@ -54,15 +65,62 @@ _OF_DATABASES = {name: policy for name, policy in POLICIES.items() if policy.for
 
 @dataclass(frozen=True)
 class WalkOptions(SimulateOptions):
-    """`SimulateOptions` with other defaults."""
+    """`SimulateOptions`, with links and memory that suit the walk by default."""
 
     policy: str = option("best", "Policies of the clients", choices=_OF_DATABASES, several=True)
+    bandwidth: str = option(
+        AUTO,
+        "Bandwidth of the link in bit/s: 56k, 4M (k = 1,000, M = 1,000,000) or inf. Commas "
+        "separate several values. auto: two links, on which the data of the walk take its whole "
+        "duration and an eighth of it, at most 512k and 4M.",
+        metavar="RATE[,RATE]",
+    )
     memory: str = option(
-        "10%",
+        AUTO,
         "Texture memory: an amount (4MiB), a share of the memory of all textures (10%), or inf. "
-        "Commas separate several values.",
+        "Commas separate several values. auto: half of what the pictures of the walk need.",
         metavar="SIZE[,SIZE]",
     )
+
+    def links(self, trace: Trace | None = None) -> list[Conditions]:
+        """See `SimulateOptions.links`; none by `AUTO`."""
+        return [] if self.bandwidth == AUTO else super().links(trace)
+
+    @property
+    def memories(self) -> list[MemorySize]:
+        """See `SimulateOptions.memories`; none by `AUTO`."""
+        return [] if self.memory == AUTO else super().memories
+
+    def for_walk(self, world: World) -> WalkOptions:
+        """These options with links and memory in place of `AUTO`."""
+        memory, received = needs_of(world)
+        seconds = max(float(world.time[-1] - world.time[0]), 1.0)
+        rates = (min(8 * received / (part * seconds), most) for part, most in _LINKS)
+        texts = dict.fromkeys(f"{max(float(f'{rate:.2g}'), 1):.0f}" for rate in rates)
+        return replace(
+            self,
+            bandwidth=",".join(texts) if self.bandwidth == AUTO else self.bandwidth,
+            memory=size(max(round(_SHARE * memory), 1)) if self.memory == AUTO else self.memory,
+        )
+
+
+def needs_of(world: World) -> tuple[int, int]:
+    """Bytes of texture memory that `_PICTURES` of the pictures of a walk need at most, and bytes to
+    receive for all of them: textures as levels, geometry and records of cells in sight."""
+    views, stock = world.views, world.catalogue
+    texture = views.texture >= 0
+    level = np.where(views.need > 0, np.arange(views.need.shape[1]) + 1, 0).max(axis=1)
+    view = np.repeat(np.arange(views.frames), np.diff(views.start))
+    # (V, T) column that each view needs of each texture.
+    column = np.zeros((views.frames, stock.texture_count), np.int64)
+    np.maximum.at(column, (view[texture], views.texture[texture]), level[texture])
+    column = np.minimum(column, stock.levels)
+    each = np.arange(stock.texture_count)
+    memory = stock.memory[each, column].sum(axis=1)
+    cells = np.unique(views.cell[views.cell >= 0])
+    files = stock.geometry_bytes[cells].sum() + stock.record_bytes[cells].sum()
+    received = stock.ends[each, column.max(axis=0, initial=0)].sum() + files + stock.index_bytes
+    return int(np.percentile(memory[world.view], _PICTURES)), int(received)
 
 
 #: Policy of the client, bandwidth of the link (bit/s, None for no limit), texture memory.
@@ -131,11 +189,13 @@ class WalkTrade:
     ----------
     seconds: duration of the walk.
     own: the unchanged database. trials: the settings, in the order of their knobs.
+    untried: the names of settings that the time did not allow.
     """
 
     seconds: float
     own: WalkTrial
     trials: tuple[WalkTrial, ...]
+    untried: tuple[str, ...] = ()
 
     @property
     def cases(self) -> list[Case]:
@@ -144,17 +204,18 @@ class WalkTrade:
 
 
 def try_settings(
-    db: Path,
     artifacts: Artifacts,
     walk: Walk,
     options: WalkOptions,
     knobs: Collection[str] = (),
     *,
     quick: bool = False,
+    deadline: Deadline | None = None,
     progress: Progress = silent,
     tell: Callable[[str], None] = lambda line: None,
 ) -> WalkTrade:
-    """Tries settings on a walk through a database, which is not changed.
+    """Tries settings on a walk through a database, which is not changed: the first value of each
+    knob, then the others, at least one, and as many as end before the deadline.
 
     Parameters
     ----------
@@ -169,10 +230,12 @@ def try_settings(
     InputError: PTM-I700 the walk leads elsewhere; PTM-I701 a policy's hints are missing, or none of
         the ``knobs`` has another setting.
     """
+    db, deadline = artifacts.db.path, deadline or Deadline()
     served = read_served(db)
     require_hints(served, options.policies)
     own = own_options(artifacts)
-    chosen = list(settings(own, _longest(served), knobs, quick=quick))
+    priced = {stage: of_stage for stage, of_stage in own.items() if artifacts.is_stored(stage)}
+    chosen = list(settings(priced, _longest(served), knobs, quick=quick))
     if knobs and not chosen:
         raise InputError(
             "PTM-I701",
@@ -180,31 +243,103 @@ def try_settings(
             file=db,
             remedy="build it with what these options change, such as --light bake",
         )
-    begin = time.perf_counter()
     original = prepare(served, walk, progress=progress)
-    preparing = time.perf_counter() - begin
+    options = options.for_walk(original)
     progress(0, len(chosen), "trying settings")
-    warm_building()
-    with copied(db) as copy:
-        seconds = build_again(copy, own)
-    least = sum(
-        preparing + sum(seconds[s.name] for s in concerned(setting.knob.stage, own))
-        for setting in chosen
+    _warm_up()
+    policies = ["", *dict.fromkeys(s.knob.policy for s in chosen if s.knob.policy)]
+    trials = _Trials(db, own, _Walker(walk, original, options), policies)
+    number, total = count(len(chosen), "setting"), sum(map(trials.estimate, chosen))
+    where = " and ".join(rate_text(link.bandwidth) for link in options.links())
+    limit = "" if total < deadline.left else f", of which {minutes(deadline.left)} are allowed"
+    tell(
+        f"{number} on a walk of {walk.duration:.0f} s at {where} with {options.memory} of texture "
+        f"memory; about {minutes(total)}{limit}"
     )
-    number = count(len(chosen), "setting")
-    tell(f"{number} on a walk of {walk.duration:.0f} s; about {minutes(least)}")
-    walker = _Walker(walk, original, options)
-    others = list(dict.fromkeys(s.knob.policy for s in chosen if s.knob.policy))
-    seen = [s for policy in ("", *others) for s in walker.walks(original, policy)]
-    trials = []
-    for done, setting in enumerate(chosen):
-        with copied(db) as copy:
-            trials.append(_try_setting(copy, setting, own, seconds, walker))
+    tried: dict[int, WalkTrial] = {}
+    for done, k in enumerate(by_turns(chosen)):
+        if not tried or trials.estimate(chosen[k]) <= deadline.left:
+            tried[k] = trials.of(chosen[k])
         progress(done + 1, len(chosen), "trying settings")
-    unchanged = WalkTrial(
-        "", "", "", sum(seconds.values()), served_bytes(original.catalogue), tuple(seen)
-    )
-    return WalkTrade(walk.duration, unchanged, tuple(trials))
+    untried = tuple(setting.name for k, setting in enumerate(chosen) if k not in tried)
+    in_order = tuple(tried[k] for k in sorted(tried))
+    return WalkTrade(walk.duration, trials.unchanged, in_order, untried)
+
+
+@cache
+def _warm_up() -> None:
+    """Loads the kernels of builds, once a process: the first build that is measured, that of the
+    unchanged database, would have to load them."""
+    warm_building()
+
+
+def require_prices(trade: WalkTrade, db: Path) -> None:
+    """Raises InputError PTM-I701 if a setting could not be tried."""
+    problems = [tried for tried in trade.trials if tried.problem]
+    if problems:
+        more = f", nor could {count(len(problems) - 1, 'more setting')}" if problems[1:] else ""
+        raise InputError(
+            "PTM-I701",
+            f"{problems[0].name} could not be tested ({problems[0].problem}){more}",
+            file=db,
+            remedy="name the options to test with --option",
+        )
+
+
+def by_turns(chosen: Sequence[Setting]) -> list[int]:
+    """The numbers of settings, the first of each knob first, then the second of each."""
+    turn: list[int] = []
+    for k, setting in enumerate(chosen):
+        turn.append(turn[-1] + 1 if k and chosen[k - 1].knob is setting.knob else 0)
+    return sorted(range(len(chosen)), key=lambda k: turn[k])
+
+
+class _Trials:
+    """Tries settings, and estimates how long that takes from those tried before.
+
+    Attributes
+    ----------
+    unchanged: the trial of the database itself.
+    """
+
+    def __init__(self, db: Path, own: Own, walker: _Walker, policies: Sequence[str]) -> None:
+        self._db, self._own, self._walker = db, own, walker
+        begin = time.perf_counter()
+        with copied(db) as copy:
+            self._seconds = build_again(copy, own)
+            built = time.perf_counter()
+            world = compared(read_served(copy), walker.walk, walker.original)
+            self._walks = {policy: walker.walks(world, policy) for policy in policies}
+        #: Wall-clock seconds to build by seconds of one core, and of the walks of each setting.
+        self._slowness = (built - begin) / max(sum(self._seconds.values()), 1e-3)
+        self._walking = [time.perf_counter() - built]
+        outcomes = tuple(outcome for walks in self._walks.values() for outcome in walks)
+        built_seconds = sum(self._seconds.values())
+        self.unchanged = WalkTrial(
+            "", "", "", built_seconds, served_bytes(world.catalogue), outcomes
+        )
+
+    def estimate(self, setting: Setting) -> float:
+        """Wall-clock seconds that a setting takes."""
+        stages = concerned(setting.knob.stage, self._own)
+        building = sum(self._seconds[stage.name] for stage in stages)
+        return self._slowness * building + fmean(self._walking)
+
+    def of(self, setting: Setting) -> WalkTrial:
+        """The trial of a setting."""
+        stage, words = setting.knob.stage, (setting.name, setting.own, setting.knob.option)
+        try:
+            with copied(self._db) as copy:
+                options = {**self._own, stage: setting.options}
+                took = build_again(copy, {s: options[s] for s in concerned(stage, options)})
+                begin = time.perf_counter()
+                world = compared(read_served(copy), self._walker.walk, self._walker.original)
+                outcomes = tuple(self._walker.walks(world, setting.knob.policy))
+                self._walking.append(time.perf_counter() - begin)
+        except PtmError as fault:
+            return WalkTrial(*words, 0, 0, problem=fault.message)
+        build = sum({**self._seconds, **took}.values())
+        return WalkTrial(*words, build, served_bytes(world.catalogue), outcomes)
 
 
 class _Walker:
@@ -237,21 +372,6 @@ class _Walker:
             )
             for each in play({"": counted(world, options)}, options)
         ]
-
-
-def _try_setting(
-    copy: Path, setting: Setting, own: Own, seconds: Seconds, walker: _Walker
-) -> WalkTrial:
-    stage, words = setting.knob.stage, (setting.name, setting.own, setting.knob.option)
-    try:
-        options = {**own, stage: setting.options}
-        took = build_again(copy, {each: options[each] for each in concerned(stage, options)})
-        world = compared(read_served(copy), walker.walk, walker.original)
-        seen = walker.walks(world, setting.knob.policy)
-    except PtmError as fault:
-        return WalkTrial(*words, 0, 0, problem=fault.message)
-    build = sum({**seconds, **took}.values())
-    return WalkTrial(*words, build, served_bytes(world.catalogue), tuple(seen))
 
 
 def compared(served: Served, walk: Walk, original: World) -> World:

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ptmtools_lab.tradeoff.experiment import (
+    Deadline,
     Experiment,
     Measurement,
     Setting,
@@ -64,6 +65,14 @@ def test_the_cost_may_be_the_work():
     assert [t.setting.name for t in pareto([swift, small]) if t.best] == ["swift"]
     both = [t.setting.name for t in pareto([swift, small], by_work=True) if t.best]
     assert both == ["small", "swift"]
+
+
+def test_after_the_deadline_no_further_setting_is_tried():
+    trade = run("made", MADE, deadline=Deadline(1e-9))
+    assert [t.setting.name for t in trade.trials] == ["--steps 400"]
+    assert trade.untried == tuple(setting.name for setting in SETTINGS[1:])
+    assert table(trade)[-1].startswith("  Not tested within the time limit (--minutes): --steps 1")
+    assert run("made", MADE, deadline=Deadline(10.0)).untried == ()
 
 
 def test_errors_below_twice_that_of_the_reference_fit_no_rate():

@@ -14,16 +14,29 @@ from PIL import Image
 
 from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
+from ptmtools.errors import InputError, LimitError
 from ptmtools.output import EmitOptions
 from ptmtools.output.served import read_served
 from ptmtools.pipeline.build import build_scene, run_stage
 from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.stage import Artifacts
-from ptmtools.pipeline.stages import EMIT, TEXTURES
+from ptmtools.pipeline.stages import CELLS, EMIT, LIGHT, STAGES, TEXTURES
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.walk import Walk, read_walk
+from ptmtools_lab.comparing import play
+from ptmtools_lab.path.making import path_through
+from ptmtools_lab.path.options import PathOptions
 from ptmtools_lab.tables import look
-from ptmtools_lab.tradeoff.knobs import KNOBS, build_again, concerned, copied, own_options, settings
+from ptmtools_lab.tradeoff.experiment import Deadline
+from ptmtools_lab.tradeoff.knobs import (
+    KNOBS,
+    Setting,
+    build_again,
+    concerned,
+    copied,
+    own_options,
+    settings,
+)
 from ptmtools_lab.tradeoff.report import (
     representative,
     sentence,
@@ -31,7 +44,18 @@ from ptmtools_lab.tradeoff.report import (
     settings_table as table,
     trades,
 )
-from ptmtools_lab.tradeoff.walk import WalkOutcome, WalkTrade, WalkTrial, begins_with, compared
+from ptmtools_lab.tradeoff.walk import (
+    WalkOptions,
+    WalkOutcome,
+    WalkTrade,
+    WalkTrial,
+    begins_with,
+    by_turns,
+    compared,
+    needs_of,
+    require_prices,
+    try_settings,
+)
 from ptmtools_lab.world import World, prepare
 from tests.conftest import files_below
 
@@ -52,15 +76,8 @@ def db(tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def walk_file(db) -> Path:
-    file = db.parent / "walk.json"
-    assert main(["-q", "path", str(db), "-o", str(file), "--duration", "10"]) == 0
-    return file
-
-
-@pytest.fixture(scope="module")
-def walk(walk_file) -> Walk:
-    return read_walk(walk_file)
+def walk(db) -> Walk:
+    return path_through(Artifacts(open_database(db)), PathOptions(duration=10.0)).walk
 
 
 @pytest.fixture(scope="module")
@@ -124,7 +141,8 @@ def test_what_cannot_be_built_says_why() -> None:
     failed = WalkTrial("--cells leaf", "--cells room", "--cells", 0, 0, problem="is too much")
     trade = WalkTrade(60.0, OWN, (failed,))
     assert sentences(trade) == ["--cells leaf cannot be tested: is too much."]
-    assert table(trade)[-1] == "--cells leaf: is too much"
+    with pytest.raises(InputError, match=r"--cells leaf could not be tested \(is too much\)"):
+        require_prices(trade, Path("db"))
 
 
 def test_of_a_knob_the_best_is_told_then_what_saves_most_then_what_loses_least() -> None:
@@ -138,6 +156,19 @@ def test_of_a_knob_the_best_is_told_then_what_saves_most_then_what_loses_least()
         ((worst, bad), bad),
     ):
         assert representative(some, OWN) is reported
+
+
+def test_the_best_price_is_first() -> None:
+    names = {
+        "--gain 1": (2.0, 1.0, 20.0, 9 * 10**6),
+        "--trade 1": (2.4, 1.2, 20.0, 8 * 10**6),
+        "--dear-trade 1": (3.0, 1.5, 20.0, 8 * 10**6),
+        "--nothing 1": (2.0, 1.0, 20.1, 10**7),
+        "--loss 1": (2.0, 1.0, 25.0, 10**7),
+    }
+    trials = [tried(name, *v[:2], build=v[2], served=v[3]) for name, v in names.items()]
+    lines = sentences(WalkTrade(60.0, OWN, (*trials[::-1],)))
+    assert [line.split(" instead")[0] for line in lines] == [*names]
 
 
 def test_the_table_has_a_block_for_each_walker_and_the_cheapest() -> None:
@@ -170,7 +201,7 @@ def test_settings_are_other_than_the_databases_own_and_coarser_where_pictures_ch
     assert (small.own, small.options.profile) == ("--profile fast", "small")
     quick = list(settings(own, 1024, quick=True))
     assert len({each.knob.option for each in quick}) == len(quick) <= len(KNOBS)
-    assert [s.name for s in concerned(TEXTURES, own)] == ["textures", "light", "emit"]
+    assert [s.name for s in concerned(TEXTURES, own)] == ["textures", "relief", "light", "emit"]
 
 
 def test_what_lacks_levels_is_predicted_by_the_tables_of_the_original(db, walk, original) -> None:
@@ -253,30 +284,116 @@ def test_a_stage_runs_again_where_it_is_current(db) -> None:
         assert not run_stage(copy, own[TEXTURES], workers=1).stages[0].ran
 
 
-def test_the_command(db, walk_file, tmp_path, capsys) -> None:
-    before = files_below(db)
+def test_all_later_stages_are_built_again(two_rooms) -> None:
+    """Also the light, whose stage decided to store nothing."""
+    artifacts = Artifacts(open_database(two_rooms))
+    assert not artifacts.is_stored(LIGHT)
+    own = own_options(artifacts)
+    assert {stage.name for stage in own} == {
+        name for name in artifacts.db.manifest.stages if not STAGES[name].joined
+    }
+    chosen = list(settings(own, 64))
+    assert {setting.knob for setting in chosen} == {*KNOBS}
+    for setting in chosen:
+        again = concerned(setting.knob.stage, own)
+        for stage, options in own.items():
+            if stage not in again:
+                assert not {*stage.sources(options), *stage.heeds} & {*again}
+
+
+#: Options of the first and of a later stage, and one of some clients.
+TESTED = ("cells", "max-side", "samples")
+
+
+def test_options_are_priced_on_a_default_build(two_rooms, walk_file, tmp_path, capsys) -> None:
+    before = files_below(two_rooms)
     file = tmp_path / "t.csv"
-    asked = ["tradeoff", str(db), "--stage", "walk", "--walk", str(walk_file), "--csv", str(file)]
-    knobs = ["--knob", "max-side", "--knob", "pvs", "--knob", "samples"]
+    asked = ["tradeoff", str(two_rooms), "--stage", "walk", "--csv", str(file), "--quick"]
+    asked += ["--walk", str(walk_file)]
+    knobs = [word for name in TESTED for word in ("--option", name)]
     links = ["--bandwidth", "64k,inf", "--memory", "inf"]
-    assert main([*asked, *knobs, *links, "--quick", "--json"]) == 0
+    assert main([*asked, *knobs, *links, "--json"]) == 0
     out, err = capsys.readouterr()
-    assert "3 settings on a walk of 10 s; about" in err
+    assert "3 settings on a walk of 20 s at 64 kbit/s and unlimited bandwidth" in err
     (actual,) = json.loads(out)
     assert actual["stage"] == "walk"
-    assert [t["option"] for t in actual["trials"]] == ["--pvs", "--samples", "--max-side"]
+    trials = {trial["option"]: trial for trial in actual["trials"]}
+    assert set(trials) == {f"--{name}" for name in TESTED}
+    assert [trial["problem"] for trial in actual["trials"]] == [""] * 3
     assert len(actual["sentences"]) == 3
-    side = actual["trials"][2]
+    side = trials["--max-side"]
     assert side["served"] < actual["own"]["served"]
     by_case = {(s["policy"], s["bandwidth"]): s["e"] for s in actual["own"]["seen"]}
     assert set(by_case) == {(p, b) for p in ("best", "ach") for b in (64e3, None)}
     (unlimited,) = (s["e"] for s in side["seen"] if s["bandwidth"] is None)
     assert unlimited > by_case["best", None], "no link brings what was left out"
-    assert {s["policy"] for s in actual["trials"][1]["seen"]} == {"ach"}
-    assert files_below(db) == before
+    assert {s["policy"] for s in trials["--samples"]["seen"]} == {"ach"}
+    assert files_below(two_rooms) == before
     rows = list(csv.DictReader(file.open(encoding="utf-8")))
     assert {row["stage"] for row in rows} == {"walk"}
     assert len(rows) == 4 + 2 * 3
+
+
+@pytest.fixture
+def instant(monkeypatch) -> None:
+    """Nothing is built again, and leaves are too many."""
+
+    def build(db, options):
+        if CELLS in options and options[CELLS].cells == "leaf":
+            raise LimitError("PTM-L400", "is too much")
+        return {stage.name: 0.1 for stage in options}
+
+    monkeypatch.setattr("ptmtools_lab.tradeoff.walk.build_again", build)
+    monkeypatch.setattr("ptmtools_lab.tradeoff.walk.warm_building", lambda: None)
+
+
+@pytest.mark.usefixtures("instant")
+def test_a_setting_that_cannot_be_tested_is_an_error(two_rooms, walk_file, capsys) -> None:
+    asked = ["tradeoff", str(two_rooms), "--stage", "walk", "--walk", str(walk_file)]
+    assert main([*asked, "--option", "cells", "--option", "max-side", "--quick"]) == 3
+    out, err = capsys.readouterr()
+    assert "--max-side 32 instead of --max-side 0" in out, "the others are priced"
+    assert "--cells leaf could not be tested (is too much)" in err
+    assert "PTM-I701" in err
+
+
+def test_links_and_memory_suit_the_walk(world) -> None:
+    options = WalkOptions().for_walk(world)
+    memory, received = needs_of(world)
+    assert 0 < memory <= world.catalogue.whole
+    slow, fast = (link.bandwidth for link in options.links())
+    assert slow == pytest.approx(8 * received / world.time[-1], rel=0.05)
+    assert fast == pytest.approx(8 * slow, rel=0.1)
+    given = replace(WalkOptions(), bandwidth="512k,4M", memory="10%")
+    assert given.for_walk(world) == given
+    suited, starved = ([r.measures.e.mean for r in play({"": world}, o)] for o in (options, given))
+    assert suited[0] > 2 * suited[1] > 0, "the wider link shows more"
+    assert starved[0] == pytest.approx(starved[1], rel=0.01), "a tenth of the memory shows nothing"
+
+
+@pytest.mark.usefixtures("instant")
+def test_what_the_time_does_not_allow_is_named(two_rooms, walk_file) -> None:
+    """The first values of all options are before the second ones."""
+    told: list[str] = []
+    trade = try_settings(
+        Artifacts(open_database(two_rooms)), read_walk(walk_file), WalkOptions(),
+        ["max-side", "need"], deadline=Deadline(1e-9), tell=told.append,
+    )  # fmt: skip
+    assert [trial.name for trial in trade.trials] == ["--max-side 32"]
+    assert trade.untried == ("--max-side 16", "--need 0")
+    assert "of which 0 s are allowed" in told[0]
+    assert table(trade)[-1].endswith("(--minutes): --max-side 16, --need 0.")
+    names = ["a1", "a2", "a3", "b1", "b2"]
+    some = [Setting(KNOBS[name > "b"], name, "", None) for name in names]
+    assert [names[k] for k in by_turns(some)] == ["a1", "b1", "a2", "b2", "a3"]
+
+
+def test_seconds_do_not_include_the_compiler(db, monkeypatch) -> None:
+    compiled, seconds = iter([0, 3, 3, 3]), iter([50.0, 2.0, 0.5, 0.4])
+    monkeypatch.setattr("ptmtools_lab.tradeoff.knobs.compilations", lambda: next(compiled))
+    monkeypatch.setattr("ptmtools_lab.tradeoff.knobs.timed", lambda run: (None, next(seconds)))
+    both = {EMIT: EmitOptions(), TEXTURES: None}
+    assert build_again(db, both) == {"emit": 2.0, "textures": 0.4}
 
 
 def test_a_policy_without_its_hints_is_refused_before_anything_is_built(
