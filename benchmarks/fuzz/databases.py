@@ -9,7 +9,6 @@ from __future__ import annotations
 import io
 import json
 import os
-import re
 import shutil
 import zipfile
 from collections.abc import Mapping
@@ -393,9 +392,7 @@ class Served:
         texts = [name for name in self._files if name.endswith((".wrl", ".json"))]
         name = rng.choice(rng.choice((texts, list(self._files))))
         data = self._files[name]
-        if name.endswith(".wrl") and rng.random() < 0.2:
-            changed = reused(rng, data.decode()).encode()
-        elif name.endswith(".wrl") and rng.random() < 0.8:
+        if name.endswith(".wrl") and rng.random() < 0.8:
             words = (
                 "Shape",
                 "Inline",
@@ -434,25 +431,6 @@ class Served:
         return f"validate ended with {status}"
 
 
-_NODE = re.compile(r"(\w+) (?:DEF \w+ )?(IndexedFaceSet|Appearance|ImageTexture|Coordinate) \{")
-
-
-def reused(rng: Random, text: str) -> str:
-    """A node is given a name, and used again, up to some thousand times."""
-    nodes = list(_NODE.finditer(text))
-    if not nodes:
-        return text
-    node = rng.choice(nodes)
-    field, kind = node.groups()
-    use = f"{field} USE again"
-    if kind == "ImageTexture":
-        use = f"appearance Appearance {{ {use} }}"
-    elif kind == "Coordinate":
-        use = f"geometry IndexedFaceSet {{ {use} }}"
-    named = f"{text[: node.start()]}{field} DEF again {kind} {{{text[node.end() :]}"
-    return named + f"Shape {{ {use} }}\n" * rng.choice((1, 3, 5000))
-
-
 class Vrml:
     """The reader of VRML alone."""
 
@@ -467,17 +445,15 @@ class Vrml:
         data = rng.choice(self._files)
         if rng.random() < 0.3:
             return Case(damaged(rng, data, rng.choice(self._files)))
-        words = ("Shape", "{", "}", "[", "]", "point", "-1", "PROTO", "field", "DEF", "USE", "TRUE")
-        if rng.random() < 0.3:
-            return Case(reused(rng, data.decode()).encode())
+        words = ("Inline", "{", "}", "[", "]", "url", '"', "\\", "#", "-1", "TRUE")
         return Case(garbled(rng, data.decode(), words).encode("utf-8", "surrogatepass"))
 
     def read(self, case: Case) -> str:
-        """Parses it."""
+        """Reads its URLs."""
         from ptmtools.output.model import FileError
-        from ptmtools.output.vrml_reader import parse
+        from ptmtools.output.validation.vrml import read_file
 
         try:
-            return f"{len(parse(case.data).nodes)} nodes"
+            return f"{len(read_file('a.wrl', case.data) or ())} URLs"
         except FileError as error:
             return error.code

@@ -26,11 +26,10 @@ from ptmtools.cli.parameters import (
     take,
     with_console,
 )
-from ptmtools.diagnostics import FOLDER_CODES, ValidationReport
+from ptmtools.diagnostics import CODES, FOLDER_CODES, NOT_BUILT, SEEN_BY_BUILD, ValidationReport
 from ptmtools.errors import CheckError
 from ptmtools.folder_kinds import folder_kind
 from ptmtools.output import PlotOptions
-from ptmtools.output.validation.findings import NOT_BUILT, SEEN_BY_BUILD
 from ptmtools.pipeline.command import build_command, open_database
 from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE
@@ -46,8 +45,6 @@ SHOWN = 20
 
 def _print_codes(context: click.Context, option: click.Option, given: bool) -> None:
     if given and not context.resilient_parsing:  # a shell completes a line
-        from ptmtools.output.validation.findings import CODES
-
         for code, (severity, meaning) in sorted({**CODES, **FOLDER_CODES}.items()):
             click.echo(f"{code}  {severity:<7}  {meaning}")
         context.exit()

@@ -7,7 +7,7 @@ a shape by its material, and what browsers show: a texture alone is unlit; a `Co
 (emissiveColor), since a headlight leaves floors and corridor walls black. (Tried: ambient light in
 the root file instead of a glow: X_ITE shows none.)
 
-`NODES` and `PROTOS` are the emission pattern: all nodes and fields that the files may have. The
+The tests read the files by the emission pattern, all nodes and fields that they may have. The
 items of a list are separated by a comma, or by a line's end after several: one character, which
 VRML97 reads as white space.
 """
@@ -62,39 +62,6 @@ HEADER = "#VRML V2.0 utf8\n"
 #: The version of the pattern, in WorldInfo's first info string.
 PATTERN = 1
 
-#: Node → field → type; the node's name for SFNode. A "?" marks optional fields.
-NODES: dict[str, dict[str, str]] = {
-    "WorldInfo": {"title": "SFString?", "info": "MFString?"},
-    "NavigationInfo": {"type": "MFString?", "avatarSize": "MFFloat?", "headlight": "SFBool?"},
-    "Viewpoint": {
-        "position": "SFVec3f",
-        "orientation": "SFRotation",
-        "fieldOfView": "SFFloat",
-        "description": "SFString",
-    },
-    "Inline": {"url": "MFString", "bboxCenter": "SFVec3f", "bboxSize": "SFVec3f"},
-    "Shape": {"appearance": "Appearance", "geometry": "IndexedFaceSet"},
-    "Appearance": {"material": "Material?", "texture": "ImageTexture?"},
-    "Material": {
-        "diffuseColor": "SFColor?",
-        "emissiveColor": "SFColor?",
-        "transparency": "SFFloat?",
-    },
-    "ImageTexture": {"url": "MFString", "repeatS": "SFBool?", "repeatT": "SFBool?"},
-    "IndexedFaceSet": {
-        "solid": "SFBool?",
-        "coord": "Coordinate",
-        "coordIndex": "MFInt32",
-        "texCoord": "TextureCoordinate?",
-        "texCoordIndex": "MFInt32?",
-        "color": "Color?",
-        "colorIndex": "MFInt32?",
-        "colorPerVertex": "SFBool?",
-    },
-    "Coordinate": {"point": "MFVec3f"},
-    "TextureCoordinate": {"point": "MFVec2f"},
-    "Color": {"color": "MFColor"},
-}
 _CELL = {
     "cellName": "SFString",
     "hullPoint": "MFVec3f",
@@ -108,7 +75,6 @@ _CELL = {
 CELL = ("PTMCell", _CELL)
 CELL_OF_LEAVES = ("PTMCell", _CELL | {"leafPoint": "MFVec3f", "leafStart": "MFInt32"})
 VIEWPOINT_CELL = ("PTMViewpointCell", {"viewpoint": "SFString", "cellUrl": "MFString"})
-PROTOS = (CELL, CELL_OF_LEAVES, VIEWPOINT_CELL)
 
 
 def declaration(name: str, fields: Mapping[str, str]) -> str:

@@ -18,11 +18,10 @@ from pathlib import Path
 from typing import Any
 
 from ptmtools.cells import structural_triangles
-from ptmtools.diagnostics import Findings, Issue, ValidationReport, worst_first
+from ptmtools.diagnostics import CODES, Findings, Issue, ValidationReport, worst_first
 from ptmtools.errors import DatabaseError
 from ptmtools.folder_kinds import folder_kind
 from ptmtools.output import validate_database, validate_ptm
-from ptmtools.output.validation.findings import CODES
 from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.stage import Artifacts, Stage
 from ptmtools.pipeline.stages import CELLS, PVS, SCENE, STAGES

@@ -13,8 +13,7 @@ import click
 import pytest
 
 from ptmtools.cli.main import ptm
-from ptmtools.diagnostics import FOLDER_CODES
-from ptmtools.output.validation.findings import CODES
+from ptmtools.diagnostics import CODES, FOLDER_CODES
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = sorted(ROOT.glob("docs/**/*.md"))

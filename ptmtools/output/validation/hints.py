@@ -1,26 +1,23 @@
-"""The check of the hints beyond their schemas: the URLs and indices of the index and the records,
-and the cells in space."""
+"""The check of the hints beyond their schemas: the URLs, indices and lists of the index and the
+records, and the textures that they describe."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from ptmtools import schemas
 from ptmtools.diagnostics import Place
+from ptmtools.output.emitters import EMITTERS
 from ptmtools.output.hints import RECORD_FORMAT as FORMAT, SCHEMA
 from ptmtools.output.mesh_levels import row_fault
 from ptmtools.output.model import FileError, shaped, sizes_of
 from ptmtools.output.names import BUNDLE, HINTS, HINTS_FOLDER, STATISTICS
 from ptmtools.output.representation import listed
-from ptmtools.output.validation.files import Images, ReadHints, Row, ServedDatabase
-from ptmtools.output.validation.space import check_space
-from ptmtools.output.validation.textures import Pictures, check_record
-from ptmtools.tolerance import PARALLEL_COSINE
+from ptmtools.output.validation.files import ReadHints, Row, ServedDatabase
+from ptmtools.output.validation.textures import check_record
 
 #: Slack of the sum of the ach values.
 _ACH_SLACK = 1e-9
@@ -59,7 +56,7 @@ def _read(data: bytes, name: str) -> Row:
 
 
 def gather(database: ServedDatabase) -> ReadHints | None:
-    """The hints of a database, with all their URLs resolved; None without an index."""
+    """The hints of a database; None without an index."""
     index: Row | None = database.contents.get(HINTS)
     if index is None:
         return None
@@ -74,18 +71,12 @@ def gather(database: ServedDatabase) -> ReadHints | None:
             database.at(path or "", fault.place).add(fault.code, fault.message)
             record = None
         records.append(record)
-    images: list[Images] = []
-    files = database.resolve_each(HINTS, "textures", [row["file"] for row in textures])
-    for row, file in zip(textures, files, strict=True):
-        fallback = row["fallback"] and database.resolve(HINTS, row["fallback"])
-        previews = [database.resolve(HINTS, each["file"]) for each in row.get("previews", ())]
-        images.append(Images(file, fallback, tuple(previews)))
     paths_or_urls = [path or url for path, url in zip(paths, urls, strict=True)]
-    return ReadHints(index, paths_or_urls, records, images)
+    return ReadHints(index, paths_or_urls, records)
 
 
 def check_files(database: ServedDatabase) -> None:
-    """Checks the records, the textures, the first-look bundles and the cells in space."""
+    """Checks the records, the textures, the first-look bundles and the viewpoints."""
     hints = database.hints
     if hints is None:
         return
@@ -94,10 +85,6 @@ def check_files(database: ServedDatabase) -> None:
     levels = [len(sizes_of(row)) for row in index["textures"]]
     for i, record in hints.known():
         _check_record(record, i, levels, places[i])
-        points = np.array([point for leaf in record["leaves"] for point in leaf["points"]])
-        box = index["cells"][i]["box"]
-        if not ((points >= box[:3]).all() and (points <= box[3:]).all()):
-            at.add("PTM-D700", "does not contain the leaves of the cell", f"cells[{i}].box")
     _check_textures(hints, database)
     for i, row in enumerate(database.contents.get(STATISTICS, {"cells": ()})["cells"]):
         if row["missed"] > _MISSED:
@@ -109,16 +96,16 @@ def check_files(database: ServedDatabase) -> None:
     _check_meshes(index, at)
     if not index["geometry"]:
         at.add("PTM-D700", "names no form", "geometry")
-    for urls in map(hints.expanded, index["geometry"].values()):
+    for form, template in index["geometry"].items():
+        urls = hints.expanded(template)
         if database.files.isdisjoint(urls):  # else the check of the form compares its files
             database.resolve_each(HINTS, "geometry", urls)
-    check_space(hints.records, index["viewpoints"], places, at, database.extent)
+        elif form not in EMITTERS or not EMITTERS[form].is_owner(template):
+            at.add("PTM-D700", "names files of another form", f"geometry.{form}")
     for i, view in enumerate(index["viewpoints"]):
         if not index["cells"][view["cell"]].get("standing", True):
             message = f"lies in cell {view['cell']}, which has no place to stand"
             at.add("PTM-D699", message, f"viewpoints[{i}]")
-        if abs(math.hypot(*view["direction"]) - 1) > 1 - PARALLEL_COSINE:
-            at.add("PTM-D699", "is no unit vector", f"viewpoints[{i}].direction")
 
 
 def _check_meshes(index: Row, at: Place) -> None:
@@ -142,18 +129,16 @@ def _record_fault(record: Any, i: int, cells: Sequence[Row], textures: int) -> F
     try:
         for name in ("adjacent", "visible"):
             _in_range(record[name], len(cells), name)
-        for k, row in enumerate(record["textures"]):
-            _in_range(row, textures, f"textures[{k}]")
-        for k, portal in enumerate(record["portals"]):
-            _in_range([portal["neighbour"]], len(cells), f"portals[{k}].neighbour")
+        _in_range([p["neighbour"] for p in record["portals"]], len(cells), "portals")
         for k, leaf in enumerate(record["leaves"]):
             for f, loop in enumerate(leaf["faces"]):
                 _in_range(loop, len(leaf["points"]), f"leaves[{k}].faces[{f}]")
+        for k, row in enumerate(record["textures"]):
+            _in_range(row, textures, f"textures[{k}]")
         for k, shares in enumerate(record.get("textureShares", ())):
-            used = [texture for texture, _ in shares if texture is not None]
-            _in_range(used, textures, f"textureShares[{k}]")
-        _in_range([t for t, _ in record.get("firstLook", ())], textures, "firstLook")
-        _in_range([row[0] for row in record.get("need", ())], textures, "need")
+            _in_range([t for t, _ in shares if t is not None], textures, f"textureShares[{k}]")
+        for name in ("firstLook", "need"):
+            _in_range([row[0] for row in record.get(name, ())], textures, name)
     except FileError as fault:
         return fault
     return None
@@ -166,49 +151,38 @@ def _in_range(indices: Sequence[int], count: int, place: str) -> None:
 
 def _check_record(record: Row, i: int, levels: Sequence[int], at: Place) -> None:
     """Checks a record by itself; ``levels``: the number of levels of each texture."""
-    for name in ("adjacent", "visible"):
-        others = record[name]
-        if name == "visible":
-            if others[:1] != [i]:
-                at.add("PTM-D690", f"visible does not begin with {i}")
-                continue
-            others = others[1:]
-        if i in others or not _ascends(others):
-            at.add("PTM-D690", f"{name} has an entry twice or out of order, or {i} itself")
+    if record["visible"][:1] != [i]:
+        at.add("PTM-D690", f"visible does not begin with {i}")
+    elif any(
+        cells != sorted({*cells} - {i}) for cells in (record["adjacent"], record["visible"][1:])
+    ):
+        at.add("PTM-D690", f"a list has an entry twice or out of order, or {i} itself")
     for name in ("ach", "textures", "textureShares"):
         if len(record.get(name, record["visible"])) != len(record["visible"]):
             at.add("PTM-D692", f"{name} is not aligned with visible")
     total = float(np.sum(record["ach"]))
     if not abs(total - 1) <= _ACH_SLACK:
         at.add("PTM-D692", f"the ach values sum to {total:.9g}")
-    visible = {texture for row in record["textures"] for texture in row}
-    needs: Sequence[Sequence[Any]] = record.get("need", ())
-    if not _ascends([row[0] for row in needs]):
-        at.add("PTM-D700", "its textures are not in ascending order", "need")
-    for texture, first, *shares in needs:
-        if texture not in visible:
-            at.add("PTM-D700", f"texture {texture} is not visible", "need")
-        elif first + len(shares) > levels[texture]:
+    for texture, first, *shares in record.get("need", ()):
+        if first + len(shares) > levels[texture]:
             at.add("PTM-D700", f"texture {texture} has only {levels[texture]} levels", "need")
-
-
-def _ascends(entries: Sequence[int]) -> bool:
-    return all(one < other for one, other in pairwise(entries))
 
 
 def _check_textures(hints: ReadHints, database: ServedDatabase) -> None:
     used = {t for _, record in hints.known() for row in record["textures"][:1] for t in row}
     used |= {t for t, row in enumerate(hints.index["textures"]) if row.get("normals")}
     complete = all(record is not None for record in hints.records)
-    for i, (row, images) in enumerate(zip(hints.index["textures"], hints.images, strict=True)):
+    rows = hints.index["textures"]
+    files = database.resolve_each(HINTS, "textures", [row["file"] for row in rows])
+    for i, (row, file) in enumerate(zip(rows, files, strict=True)):
         at = database.at(HINTS, f"textures[{i}]")
         if complete and i not in used:
             at.add("PTM-D708", f"no cell uses {row['file']}")
-        if header := database.contents.get(images.file or ""):
-            fallback, *previews = (
-                database.contents.get(file or "") for file in (images.fallback, *images.previews)
-            )
-            check_record(row, header, Pictures(fallback, previews), at)
+        urls = (row["fallback"], *(preview["file"] for preview in row.get("previews", ())))
+        images = [url and database.resolve(HINTS, url) for url in urls]
+        fallback, *previews = (database.contents.get(image or "") for image in images)
+        if header := database.contents.get(file or ""):
+            check_record(row, header, fallback, previews, at)
 
 
 def _check_first_looks(hints: ReadHints, database: ServedDatabase) -> None:
@@ -221,12 +195,11 @@ def _check_first_looks(hints: ReadHints, database: ServedDatabase) -> None:
         if (template is None) != ("firstLook" not in record):
             at.add("PTM-D704", "only one of the index and the record names a bundle")
             continue
-        visible = {texture for row in record["textures"] for texture in row}
         reached: dict[int, int] = {}
         for texture, level in record.get("firstLook", ()):
             before = reached.get(texture, -1)
-            if texture not in visible or not before < level < len(ends[texture]) - 1:
-                at.add("PTM-D704", "a pair does not refine a visible texture")
+            if not before < level < len(ends[texture]) - 1:
+                at.add("PTM-D704", "a pair does not refine its texture")
                 break
             reached[texture] = level
         else:

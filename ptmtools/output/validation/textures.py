@@ -63,19 +63,15 @@ def read_picture(data: bytes, format: str, limits: Limits, at: Place) -> ReadPic
     return None
 
 
-class Pictures(NamedTuple):
-    """The images of a texture that could be read: its fallback, and its previews in the order of
-    their rows."""
-
-    fallback: ReadPicture | None
-    previews: Sequence[ReadPicture | None]
-
-
 def check_record(
-    record: Mapping[str, Any], header: PtmHeader, pictures: Pictures, at: Place
+    record: Mapping[str, Any],
+    header: PtmHeader,
+    fallback: ReadPicture | None,
+    previews: Sequence[ReadPicture | None],
+    at: Place,
 ) -> None:
     """Compares a row of `textures` in `hints.json` with its `.ptm`, its fallback image and its
-    previews."""
+    previews, None where they could not be read."""
     finest = header.levels[-1]
     actual = {
         "components": header.components,
@@ -93,8 +89,15 @@ def check_record(
     for name in ("differences", "offsets"):
         if name in record and len(record[name]) != len(sizes):
             at.add("PTM-D704", f"{name} do not match the levels")
-    _check_previews(record, sizes, pictures.previews, at)
-    _check_fallback(record, sizes, pictures.fallback, at)
+    _check_previews(record, sizes, previews, at)
+    if (record["fallback"] is None) != (record["fallbackLevel"] is None):
+        at.add("PTM-D704", "only one of fallback and fallbackLevel is null")
+    elif fallback is not None and fallback.size not in sizes:
+        message = f"is {_shown(fallback.size)}, which is not the size of any level"
+        at.add("PTM-D710", f"{record['fallback']} {message}")
+    elif fallback is not None and (level := sizes.index(fallback.size)) != record["fallbackLevel"]:
+        message = f"the fallback image is level {level}, not {record['fallbackLevel']}"
+        at.add("PTM-D704", message)
 
 
 def _check_previews(
@@ -104,8 +107,7 @@ def _check_previews(
     at: Place,
 ) -> None:
     rows = record.get("previews", ())
-    levels = [row["level"] for row in rows]
-    if any(one >= other for one, other in pairwise(levels)):
+    if any(a["level"] >= b["level"] for a, b in pairwise(rows)):
         at.add("PTM-D704", "previews are not in ascending order of their levels")
         return
     if sizes_of(record)[len(record["ends"]) - 1] != (record["width"], record["height"]):
@@ -115,27 +117,12 @@ def _check_previews(
         if row["level"] >= len(sizes):
             at.add("PTM-D704", f"the {place} has no level")
         elif size != sizes[row["level"]]:
-            at.add("PTM-D704", f"the {place} is {size[0]} x {size[1]}, its level is not")
+            at.add("PTM-D704", f"the {place} is {_shown(size)}, its level is not")
         if row.get("exact") and row["difference"]:
             at.add("PTM-D704", f"the {place} is exact and differs by {row['difference']:g}")
         if picture and picture != (size, row["bytes"]):
             at.add("PTM-D704", f"the {place} does not match its file")
 
 
-def _check_fallback(
-    record: Mapping[str, Any],
-    sizes: Sequence[tuple[int, int]],
-    picture: ReadPicture | None,
-    at: Place,
-) -> None:
-    if (record["fallback"] is None) != (record["fallbackLevel"] is None):
-        at.add("PTM-D704", "only one of fallback and fallbackLevel is null")
-    elif picture is not None:
-        size = picture.size
-        level = sizes.index(size) if size in sizes else None
-        if level is None:
-            message = f"is {size[0]} x {size[1]}, which is not the size of any level"
-            at.add("PTM-D710", f"{record['fallback']} {message}")
-        elif level != record["fallbackLevel"]:
-            message = f"the fallback image is level {level}, not {record['fallbackLevel']}"
-            at.add("PTM-D704", message)
+def _shown(size: tuple[int, int]) -> str:
+    return f"{size[0]} x {size[1]}"

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ptmtools.diagnostics import CODES
 from ptmtools.output import validate_database
 from ptmtools.output.gltf import pack, unpack
-from ptmtools.output.validation.findings import CODES
 from tests.output.agreement import disagreements, kinds
 from tests.output.damage import (
     KINDS,
@@ -262,7 +262,7 @@ def test_the_forms_agree(gltf_finished: Path) -> None:
 def test_a_damaged_vrml_file_is_told_once(gltf_database: Path, seal: Damage) -> None:
     """What is wrong with the VRML file is not reported of the GLB as well."""
     path = gltf_database / "www/cells/c0001.wrl"
-    path.write_text(path.read_text().replace(" coordIndex [ 0", " coordIndex [ 99", 1))
+    path.write_text(path.read_text().replace(" coordIndex [ 0", " coordIndex { 0", 1))
     seal(gltf_database)
     report = validate_database(gltf_database)
     assert {issue.code for issue in report.issues} == {"PTM-D661"}

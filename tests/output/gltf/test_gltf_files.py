@@ -21,10 +21,10 @@ from ptmtools.errors import InputError, LimitError, OutputError
 from ptmtools.output import EmitOptions, validate_database
 from ptmtools.output.gltf import linear, pack, unpack
 from ptmtools.output.gltf_shapes import PlainBuffer
-from ptmtools.output.vrml_reader import Node, parse
 from ptmtools.pipeline.build import build_scene
 from ptmtools.scene.model import Material
 from tests.output.agreement import disagreements
+from tests.output.vrml_reader import VrmlNode, parse
 
 TWO_ROOMS = Path(__file__).parents[3] / "sample_data" / "two_rooms"
 
@@ -62,11 +62,11 @@ def documents(www: Path) -> list[dict[str, Any]]:
     return [unpack((www / f"gltf/c{c:04d}.glb").read_bytes())[0] for c in range(3)]
 
 
-def shapes(www: Path, cell: int) -> list[Node]:
+def shapes(www: Path, cell: int) -> list[VrmlNode]:
     return parse((www / f"cells/c{cell:04d}.wrl").read_bytes()).of_type("Shape")
 
 
-def corners(shape: Node, values: str, index: str) -> np.ndarray:
+def corners(shape: VrmlNode, values: str, index: str) -> np.ndarray:
     """(m, 3, k) of the triangles of a VRML shape."""
     fields = shape.fields["geometry"].fields
     return fields[values].fields["point"][fields[index].reshape(-1, 4)[:, :3]]

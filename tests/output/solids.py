@@ -1,4 +1,4 @@
-"""Convex bodies, and the check of the hints in space: leaves, portals and viewpoints.
+"""Convex bodies, and the faults of hints in space: leaves, portals and viewpoints.
 
 All in float64 with the distances of `Tolerance`. A body is its planes: (f, 4) outward unit normals
 and offsets, so that n·x + d is the distance of x in front of a plane.
@@ -6,7 +6,7 @@ and offsets, so that n·x + d is the distance of x in front of a plane.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from typing import Any
 
@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import polygon_planes
-from ptmtools.diagnostics import Place
-from ptmtools.tolerance import Tolerance
+from ptmtools.tolerance import PARALLEL_COSINE, Tolerance
 
-Row = Mapping[str, Any]
+Record = Mapping[str, Any]
 Points = NDArray[np.float64]
 Planes = NDArray[np.float64]
 
@@ -27,40 +26,37 @@ MOST_CORNERS = 1 << 14
 _BATCH = 1 << 22
 
 
-def check_space(
-    records: Sequence[Row | None],
-    viewpoints: Sequence[Row],
-    places: Sequence[Place],
-    at: Place,
-    extent: float = 0.0,
-) -> None:
-    """Checks the leaves and portals of the records, whose places are ``places``, and the viewpoints
-    of the index, whose place is ``at``; all indices must be in range. ``extent``: see
+def spatial_faults(
+    records: Mapping[int, Record], viewpoints: Sequence[Record], extent: float
+) -> Iterator[str]:
+    """The leaves that are no convex polyhedra ("leaves"), the portals that lie in no face of their
+    cell ("portals"), and the viewpoints outside of their cell ("viewpoint_place"). ``extent``: see
     `tolerance_about`."""
     leaves = [
         (i, k, leaf, np.array(leaf["points"], np.float64))
-        for i, record in enumerate(records)
-        for k, leaf in enumerate(record["leaves"] if record is not None else ())
+        for i, record in records.items()
+        for k, leaf in enumerate(record["leaves"])
     ]
     if not leaves:
         return
     tolerance = tolerance_about(np.concatenate([points for *_, points in leaves]), extent)
-    bodies: list[list[Planes]] = [[] for _ in records]
+    bodies: dict[int, list[Planes]] = {i: [] for i in records}
     for i, k, leaf, points in leaves:
         try:
             bodies[i].append(solid_planes(points, leaf["faces"], tolerance))
         except SolidError as fault:
-            places[i].add("PTM-D683", str(fault), f"leaves[{k}]")
-    for i, record in enumerate(records):
-        for k, portal in enumerate(record["portals"] if record is not None else ()):
+            yield f"leaves: {i}: leaf {k} {fault}"
+    for i, record in records.items():
+        for k, portal in enumerate(record["portals"]):
             polygon = np.array(portal["polygon"], np.float64)
             if message := _portal_fault(polygon, bodies[i], tolerance):
-                places[i].add("PTM-D699", message, f"portals[{k}]")
-    for i, view in enumerate(viewpoints):
-        around, eye = bodies[view["cell"]], np.array([view["position"]], np.float64)
+                yield f"portals: {i}: portal {k} {message}"
+    for view in viewpoints:
+        if abs(np.linalg.norm(view["direction"]) - 1) > 1 - PARALLEL_COSINE:
+            yield f"viewpoint_place: {view['name']} looks along no unit vector"
+        around, eye = bodies.get(view["cell"], []), np.array([view["position"]], np.float64)
         if around and min(farthest(planes, eye)[0] for planes in around) > tolerance.plane:
-            message = f"does not lie in cell {view['cell']}"
-            at.add("PTM-D699", message, f"viewpoints[{i}].position")
+            yield f"viewpoint_place: {view['name']} does not lie in cell {view['cell']}"
 
 
 def _portal_fault(polygon: Points, bodies: Sequence[Planes], tolerance: Tolerance) -> str:
@@ -99,8 +95,9 @@ def tolerance_about(points: Points, extent: float) -> Tolerance:
     """The tolerance for the (n, 3) points of the cells of a model with this ``extent``, metres, or
     0 if that is unknown: cells may be a small part of a model, whose extent gave the distances by
     which they were divided."""
-    own = Tolerance.for_points(points)
-    return Tolerance.for_extent(extent) if own.extent < extent < np.inf else own
+    of_points = Tolerance.for_points(points)
+    within = of_points.extent < extent < np.inf
+    return Tolerance.for_extent(extent) if within else of_points
 
 
 class SolidError(Exception):

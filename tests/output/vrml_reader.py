@@ -1,4 +1,4 @@
-"""A strict reader of the VRML97 that `emit` writes, and of no other.
+"""A strict reader of the VRML97 that `emit` writes, and of no other, for tests.
 
 Browsers are lenient: view3dscene and X_ITE both accept indices out of range, colours above 1 and
 bytes that are not UTF-8. This reader accepts only the nodes and fields of the emission pattern with
@@ -22,8 +22,43 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.output.model import FileError
-from ptmtools.output.vrml import HEADER, NODES, PROTOS, declaration
+from ptmtools.output.vrml import CELL, CELL_OF_LEAVES, HEADER, VIEWPOINT_CELL, declaration
 
+#: The emission pattern: node → field → type; the node's name for SFNode. A "?" marks
+#: optional fields.
+NODES: dict[str, dict[str, str]] = {
+    "WorldInfo": {"title": "SFString?", "info": "MFString?"},
+    "NavigationInfo": {"type": "MFString?", "avatarSize": "MFFloat?", "headlight": "SFBool?"},
+    "Viewpoint": {
+        "position": "SFVec3f",
+        "orientation": "SFRotation",
+        "fieldOfView": "SFFloat",
+        "description": "SFString",
+    },
+    "Inline": {"url": "MFString", "bboxCenter": "SFVec3f", "bboxSize": "SFVec3f"},
+    "Shape": {"appearance": "Appearance", "geometry": "IndexedFaceSet"},
+    "Appearance": {"material": "Material?", "texture": "ImageTexture?"},
+    "Material": {
+        "diffuseColor": "SFColor?",
+        "emissiveColor": "SFColor?",
+        "transparency": "SFFloat?",
+    },
+    "ImageTexture": {"url": "MFString", "repeatS": "SFBool?", "repeatT": "SFBool?"},
+    "IndexedFaceSet": {
+        "solid": "SFBool?",
+        "coord": "Coordinate",
+        "coordIndex": "MFInt32",
+        "texCoord": "TextureCoordinate?",
+        "texCoordIndex": "MFInt32?",
+        "color": "Color?",
+        "colorIndex": "MFInt32?",
+        "colorPerVertex": "SFBool?",
+    },
+    "Coordinate": {"point": "MFVec3f"},
+    "TextureCoordinate": {"point": "MFVec2f"},
+    "Color": {"color": "MFColor"},
+}
+PROTOS = (CELL, CELL_OF_LEAVES, VIEWPOINT_CELL)
 #: Nodes that USE may repeat: their content does not grow with the file.
 USED = ("ImageTexture",)
 #: Numbers in one value of a numeric type.
@@ -42,7 +77,7 @@ _PROTOS = [(declaration(*proto).split(), proto) for proto in PROTOS]
 
 
 @dataclass(frozen=True)
-class Node:
+class VrmlNode:
     """A node: strings and truth values are Python's; numbers are arrays, (n, width) for multiple
     values of vectors and colours; nodes are nodes. `line` is its first line; `lacks` lists the
     missing fields of the node and of the nodes in it."""
@@ -66,16 +101,16 @@ class Node:
 
 
 @dataclass(frozen=True)
-class Document:
+class VrmlDocument:
     """A file: its nodes, in order."""
 
-    nodes: tuple[Node, ...]
+    nodes: tuple[VrmlNode, ...]
 
-    def of_type(self, type: str) -> list[Node]:
+    def of_type(self, type: str) -> list[VrmlNode]:
         return [n for n in self.nodes if n.type == type]
 
 
-def parse(data: bytes) -> Document:
+def parse(data: bytes) -> VrmlDocument:
     """Reads a file.
 
     Raises FileError PTM-D661 at the first thing that is not as in the emission pattern.
@@ -84,27 +119,27 @@ def parse(data: bytes) -> Document:
         text = data.decode("utf-8")
     except UnicodeDecodeError as fault:
         raise FileError("PTM-D661", f"byte {fault.start}", "not UTF-8") from fault
-    return _Reader(text).document()
+    return _VrmlParser(text).document()
 
 
-class _Reader:
+class _VrmlParser:
     def __init__(self, text: str) -> None:
         self._text = text
         self._at = 0
         self._breaks = [match.start() for match in re.finditer("\n", text)]
         self._types = dict(NODES)
-        self._names: dict[str, Node | None] = {}
+        self._names: dict[str, VrmlNode | None] = {}
 
-    def document(self) -> Document:
+    def document(self) -> VrmlDocument:
         if not self._text.startswith(HEADER):
             self._fail(f"the first line is not {HEADER.strip()!r}")
-        nodes: list[Node] = []
+        nodes: list[VrmlNode] = []
         while self._skip() < len(self._text):
             if self._peek("PROTO"):
                 self._proto()
             else:
                 nodes.append(self._node(self._word("a node")))
-        return Document(tuple(nodes))
+        return VrmlDocument(tuple(nodes))
 
     def _proto(self) -> None:
         # For each PROTO of the pattern: the number of equal words, the position of the first
@@ -130,7 +165,7 @@ class _Reader:
             )
         self._fail(f"{word!r} is in no PROTO of the emission pattern, or the PROTO stands twice")
 
-    def _node(self, type: str) -> Node:
+    def _node(self, type: str) -> VrmlNode:
         name = ""
         if type == "DEF":
             name = self._word("a DEF name")
@@ -158,8 +193,8 @@ class _Reader:
             if field not in fields and not kind.endswith("?")
         ]
         for value in fields.values():
-            lacks += value.lacks if isinstance(value, Node) else ()
-        node = Node(type, name, fields, line, tuple(lacks))
+            lacks += value.lacks if isinstance(value, VrmlNode) else ()
+        node = VrmlNode(type, name, fields, line, tuple(lacks))
         if name:
             self._names[name] = node
         return node
