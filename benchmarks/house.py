@@ -49,7 +49,7 @@ BUDGET: dict[str, tuple[int, int]] = {
     "ptmtools/coverage": (2_510, 15),
     "ptmtools/light": (2_050, 11),
     "ptmtools/meshopt": (830, 5),
-    "ptmtools/output": (8_520, 42),
+    "ptmtools/output": (7_830, 41),
     "ptmtools/pipeline": (4_050, 20),
     "ptmtools/portal_flow": (1_680, 8),
     "ptmtools/rendering": (1_990, 16),
