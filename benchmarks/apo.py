@@ -2,7 +2,7 @@
 
     python benchmarks/apo.py [FILE...] [--triangles 50000 200000 1000000] [--faces 10000] [--jobs 2]
 
-Without files, the statues of sample_data/make_statues.py. Times are those of `make_apo` on this
+Without files, the statues of `ptm sample statues`. Times are those of `make_apo` on this
 machine, without reading the file; "a second a core" divides by the processor time of all workers.
 The paper used a machine of 2008 and other models, and its times exclude simplification.
 """
@@ -13,13 +13,12 @@ import argparse
 import resource
 import sys
 import time
-from contextlib import redirect_stdout
 from pathlib import Path
 
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "sample_data")]
+sys.path.insert(0, str(ROOT))
 
 from ptmtools.parallel import open_executor  # noqa: E402
 from ptmtools.pipeline.warm_up import warm_objects  # noqa: E402
@@ -106,18 +105,18 @@ def main() -> None:
 
 def made_statues(triangles: list[int], only: list[str] | None) -> list[Path]:
     """The sample statues of each size, in build/bench/statues."""
-    import make_statues
+    from ptmtools_samples.files import write
+    from ptmtools_samples.options import STATUES, StatueOptions
+    from ptmtools_samples.statues.model import make_statues
 
     actual = []
     for count in triangles:
         folder = ROOT / "build/bench/statues" / f"{count}"
-        wanted = only or list(make_statues.STATUES)
-        for name in wanted:
+        for name in only or STATUES:
             file = folder / f"{name}.ply"
             if not file.exists():
-                made = ["-o", str(folder), "--triangles", str(count), "--only", name]
-                with redirect_stdout(sys.stderr):
-                    make_statues.main(made)
+                options = StatueOptions(count, only=(name,))
+                write(folder, list(make_statues(options)), force=True)
             actual.append(file)
     return actual
 

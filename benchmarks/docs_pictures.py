@@ -30,9 +30,10 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "sample_data")]
-import make_statues  # noqa: E402
+sys.path.insert(0, str(ROOT / "benchmarks"))
 from interlace import box, by_files, by_ptm, psnr  # noqa: E402
+from ptmtools_samples.options import StatueOptions  # noqa: E402
+from ptmtools_samples.statues.model import make_statue  # noqa: E402
 from render import LOOKS, View, load, render  # noqa: E402
 
 from ptmtools import texture  # noqa: E402
@@ -165,7 +166,7 @@ def interlaced(folder: Path) -> Image.Image:
 
 def octree_levels() -> Image.Image:
     """A bust: its triangles, the simplified mesh, and that mesh with levels of the octree."""
-    statue = make_statues.make_statue("bust", make_statues.StatueOptions(triangles=TRIANGLES))
+    statue = make_statue("bust", StatueOptions(triangles=TRIANGLES))
     points, triangles = welded(statue.points.astype(np.float64), statue.triangles)
     n = len(triangles)
     none = np.zeros(n, np.int32)

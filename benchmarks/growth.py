@@ -1,7 +1,7 @@
 """Growth of time and memory with the model: ``python benchmarks/growth.py [KIND…] [--jobs 2]``
 
 rooms         sample museums of 12, 50, 200 and 800 rooms (`ptm sample museum`)
-buildings     streets of 3, 6 and 12 buildings (`sample_data/make_campus.py`)
+buildings     streets of 3, 6 and 12 buildings (`ptm sample campus`)
 walls         the museum of 12 rooms, its walls subdivided into 200,000 to 5 million triangles
 furniture     the same with an equal number of triangles of curved furniture (`enlarging.py`)
 
@@ -155,7 +155,7 @@ def make_model(kind: str, size: int, folder: Path) -> None:
     if model.is_file():
         return
     if kind == "buildings":
-        maker = [sys.executable, str(ROOT / "sample_data/make_campus.py"), "-o", str(model.parent)]
+        maker = [sys.executable, "-m", "ptmtools", "sample", "campus", "-o", str(model.parent)]
         maker += ["--buildings", str(size), "--length", str(PLOT * size), "--texture", "16"]
         subprocess.run([*maker, "--force"], check=True, stdout=subprocess.DEVNULL)
         model.with_name("campus.obj").rename(model)

@@ -2,7 +2,7 @@
 
 The viewer's client, other clients of `.ptm` files, and the clients of the neighbouring systems, on
 the same walks: the sample museum (`make sample`), and a hall of large, distinct photographs
-(`sample_data/make_photo_gallery.py`), the target scene of interlaced images. `h1`, 100 ms to the
+(`ptm sample photo-gallery`), the target scene of interlaced images. `h1`, 100 ms to the
 first byte, 300 bytes of headers per request; geometry, records and hints use the link, too. The
 script first builds missing data in ``build/bench/neighbours``, which takes minutes.
 
@@ -74,7 +74,7 @@ SCENES = {
         Scene("museum", ("-m", "ptmtools", "sample", "museum"), ROOT / "build/museum/museum.obj"),
         Scene(
             "photos",
-            ("sample_data/make_photo_gallery.py",),
+            ("-m", "ptmtools", "sample", "photo-gallery"),
             ROOT / "build/photo_gallery/photo_gallery.obj",
         ),
     )

@@ -2,7 +2,7 @@
 
     python benchmarks/relief.py [NAME …] [--triangles 200000] [--faces 2000]
 
-The statues are those of sample_data/make_statues.py, simplified as by ``--apo``. Of each form one
+The statues are those of `ptm sample statues`, simplified as by ``--apo``. Of each form one
 line for each number of levels, or side of the map: bytes of the stream or of the `.ptm`, and the
 mean angle to the source's own normals at 100,000 points of the simplified mesh, degrees, as a
 client shows it that stands near (a map with bilinear filtering). The last lines compare bytes at
@@ -19,9 +19,10 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "sample_data")]
+sys.path.insert(0, str(ROOT))
 
-from make_statues import STATUES, StatueOptions, make_statue  # noqa: E402
+from ptmtools_samples.options import STATUES, StatueOptions  # noqa: E402
+from ptmtools_samples.statues.model import make_statue  # noqa: E402
 
 from ptmtools.arrays import Floats  # noqa: E402
 from ptmtools.executor import Executor  # noqa: E402

@@ -9,8 +9,8 @@ rooms         a museum of 40 rooms and 120 textures of 1024 × 1024 texels
 mixed         the same with random texture sides of 256, 512, 1024 and 2048 texels
 hospital      of the shared data: 9 small textures, and much furniture
 office        of the shared data: a floor of offices with one texture
-web_gallery   40 JPEG paintings, geometry in Draco (`sample_data/make_web_gallery.py`)
-atrium        one hall of 250,000 triangles, 25 textures (`sample_data/make_atrium.py`)
+web_gallery   40 JPEG paintings, geometry in Draco (`ptm sample web-gallery`)
+atrium        one hall of 250,000 triangles, 25 textures (`ptm sample atrium`)
 
 Two processes build scenes in parallel. The museums of 40 rooms take longest; painting their
 pictures comes first.
@@ -41,10 +41,10 @@ MODELS = {
 }
 
 FOLDER = ROOT / "build/bench/walks"
-#: Models that a script of `sample_data` writes: script and file.
+#: Models that `ptm sample` writes: sample and file.
 SAMPLES = {
-    "web_gallery": ("make_web_gallery.py", "web_gallery.glb"),
-    "atrium": ("make_atrium.py", "atrium.obj"),
+    "web_gallery": ("web-gallery", "web_gallery.glb"),
+    "atrium": ("atrium", "atrium.obj"),
 }
 #: Sides of the textures of the museums that are made here.
 SIDES = {"rooms": (1024,), "mixed": (256, 512, 1024, 2048)}
@@ -93,8 +93,7 @@ def make_scene(scene: str) -> None:
     if scene in SIDES and not model.is_file():
         make_mixed(model.parent, SIDES[scene])
     if scene in SAMPLES and not model.is_file():
-        script = ROOT / "sample_data" / SAMPLES[scene][0]
-        subprocess.run([sys.executable, script, "-o", model.parent], check=True)
+        ptm("sample", SAMPLES[scene][0], "-o", model.parent)
     ptm("build-scene", model, "-o", database_of(scene), *BUILD)
     for seed in WALKS:
         walk_file(scene, seed)

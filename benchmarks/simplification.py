@@ -44,7 +44,7 @@ from typing import Any
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT), str(ROOT / "sample_data")]
+sys.path.insert(0, str(ROOT))
 
 from memory import with_peak  # noqa: E402
 
@@ -67,7 +67,8 @@ def grid(n: int) -> Any:
 
 def column(faces: int) -> Mesh:
     """The sample column, of whose flutes a million faces make thousands of handles."""
-    from make_statues import StatueOptions, make_statue
+    from ptmtools_samples.options import StatueOptions
+    from ptmtools_samples.statues.model import make_statue
 
     made = make_statue("column", StatueOptions(faces))
     return Mesh(made.points.astype(np.float64), made.triangles.astype(np.int32))

@@ -11,7 +11,6 @@ from ptmtools.cli.console import Console
 from ptmtools.cli.parameters import (
     Command,
     force_option,
-    given_options,
     json_option,
     options_of,
     output_option,
@@ -19,41 +18,44 @@ from ptmtools.cli.parameters import (
     with_console,
 )
 from ptmtools.quantities import count, size
-from ptmtools_samples.options import MuseumOptions
+from ptmtools_samples.samples import SAMPLES, Sample
 
 
-@click.command("sample", cls=Command)
-@click.argument("model", type=click.Choice(["museum", "two-rooms"]))
-@output_option("Folder to write. Default: museum or two_rooms.", "folder", metavar="DIR")
-@options_of(MuseumOptions)
-@force_option("Write into a folder that contains other files; these are not changed.")
-@json_option
-@with_console
-def sample(console: Console, model: str, folder: str | None, force: bool, **values: Any) -> None:
-    """Write a model to try ptmtools on: OBJ, MTL and PNG files.
+@click.group("sample")
+def sample() -> None:
+    """Write a model to try ptmtools on. The same options give the same bytes."""
 
-    museum is a building with pictures, statues and stairs; two-rooms is small enough to check by
-    hand. The same options give the same bytes.
-    """
-    if folder == "":
-        raise click.UsageError("a name is empty")
-    if model == "two-rooms" and (wrong := sorted(given_options(MuseumOptions))):
-        raise click.UsageError(f"--{wrong[0]} is for the museum")
-    options = take(MuseumOptions, values)
-    from ptmtools_samples.files import constant, write
-    from ptmtools_samples.museum import make_museum
-    from ptmtools_samples.two_rooms import two_rooms
 
-    if model == "museum":
-        files = list(make_museum(options, lambda text: console.warn(f"note: {text}")))
-    else:
-        files = [(name, constant(data)) for name, data in two_rooms().items()]
-    target = Path(folder or model.replace("-", "_"))
-    with console.progress() as progress:
-        write(target, files, force=force, progress=progress)
-    total = sum((target / name).stat().st_size for name, _ in files)
-    obj = target / files[-1][0]
-    console.result(
-        {"model": str(obj), "files": len(files), "bytes": total},
-        [f"{obj}: {count(len(files), 'file')}, {size(total)}"],
-    )
+def sample_command(name: str, entry: Sample) -> click.Command:
+    """The command that writes one sample."""
+    folder_name = name.replace("-", "_")
+
+    @output_option(f"Folder to write. Default: {folder_name}.", "folder", metavar="DIR")
+    @options_of(entry.options)
+    @force_option("Write into a folder that contains other files; these are not changed.")
+    @json_option
+    @with_console
+    def write_sample(console: Console, folder: str | None, force: bool, **values: Any) -> None:
+        if folder == "":
+            raise click.UsageError("a name is empty")
+        from ptmtools_samples.files import write
+
+        options: Any = take(entry.options, values)
+        make = entry.make.load()
+        files = list(make(options, lambda text: console.warn(f"note: {text}")))
+        target = Path(folder or folder_name)
+        with console.progress() as progress:
+            write(target, files, force=force, progress=progress)
+        total = sum((target / name).stat().st_size for name, _ in files)
+        model = str(target / files[-1][0])
+        console.result(
+            {"model": model, "files": len(files), "bytes": total},
+            [f"{model}: {count(len(files), 'file')}, {size(total)}"],
+        )
+
+    about = f"{entry.about}\n\n{entry.details}"
+    return click.command(name, cls=Command, help=about, short_help=entry.about)(write_sample)
+
+
+for _name, _entry in SAMPLES.items():
+    sample.add_command(sample_command(_name, _entry))

@@ -34,8 +34,8 @@ def landscape(rng: np.random.Generator, size: int) -> Image.Image:
     _, y = axes(size)
     horizon = 0.42 + 0.16 * float(rng.random())
     image = _sky(rng, size, horizon)
-    near = pick(rng, [(58, 74, 30), (92, 82, 34), (48, 66, 44), (104, 74, 36)])
-    far = (132, 146, 170)
+    near_color = pick(rng, [(58, 74, 30), (92, 82, 34), (48, 66, 44), (104, 74, 36)])
+    far_color = (132, 146, 170)
     layers = 5
     for k in range(layers):
         share = k / (layers - 1)
@@ -44,7 +44,7 @@ def landscape(rng: np.random.Generator, size: int) -> Image.Image:
             0.22 * (1 - 0.45 * share)
         )
         tone = fractal(rng, size, 8 + 4 * k, 16 + 8 * k, 4)
-        color = [f + (n - f) * share for f, n in zip(far, near, strict=True)]
+        color = [f + (n - f) * share for f, n in zip(far_color, near_color, strict=True)]
         dark: Color = (color[0] * 0.7, color[1] * 0.7, color[2] * 0.75)
         lit: Color = (color[0] * 1.3 + 12, color[1] * 1.3 + 10, color[2] * 1.15)
         mask = step(y - edge, -0.002, 0.006)

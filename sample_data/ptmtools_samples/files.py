@@ -6,7 +6,7 @@ import io
 import os
 import re
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from PIL import Image
@@ -15,9 +15,13 @@ from ptmtools.errors import OutputError
 from ptmtools.files import writing
 from ptmtools.progress import Progress, silent
 
-HEAD = "# ptmtools sample"
+#: In the first lines of each model; OBJ and MTL have it in a comment.
+HEAD = "ptmtools sample"
+MODELS = (".obj", ".ply", ".glb")
 #: A path in the output folder, and a function that returns the bytes.
 File = tuple[str, Callable[[], bytes]]
+#: Gets a line about a file of the user that is left out.
+Note = Callable[[str], object]
 
 
 def constant(data: bytes) -> Callable[[], bytes]:
@@ -30,21 +34,42 @@ def png(image: Image.Image) -> bytes:
     return out.getvalue()
 
 
-def ours(folder: Path, stem: str) -> set[str]:
-    """Returns the files of an earlier sample in ``folder``; none if the folder holds no such
-    model."""
+def ignore(text: str) -> None:
+    """Drops a note."""
+
+
+def earlier_files(folder: Path, names: Iterable[str]) -> set[str]:
+    """The files of an earlier sample in ``folder``, by the models among ``names``; none if a file
+    of such a name is of other origin."""
+    earlier: set[str] = set()
+    for name in names:
+        if not name.endswith(MODELS):
+            continue
+        try:
+            with (folder / name).open("rb") as file:
+                head = file.read(4096)
+        except FileNotFoundError:
+            continue
+        except OSError:
+            return set()
+        if HEAD.encode() not in head:
+            return set()
+        earlier |= {name, *material_files(folder, name)}
+    return earlier
+
+
+def material_files(folder: Path, name: str) -> set[str]:
+    """The material library of an OBJ of ours, and its images."""
+    library = Path(name).with_suffix(".mtl").name
     try:
-        with (folder / f"{stem}.obj").open(encoding="utf-8") as file:
-            if not file.readline().startswith(HEAD):
-                return set()
-        lines = (folder / f"{stem}.mtl").read_text(encoding="utf-8").splitlines()
+        lines = (folder / library).read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError):
         return set()
     images = {
         line.split()[-1] for line in lines if line.startswith(("map_Kd ", "map_Ks ", "map_d "))
     }
     safe = re.compile(r"(textures/)?[a-z0-9_]+\.(png|jpg)")
-    return {f"{stem}.obj", f"{stem}.mtl", *(name for name in images if safe.fullmatch(name))}
+    return {library, *(image for image in images if safe.fullmatch(image))}
 
 
 def write(folder: Path, files: list[File], *, force: bool, progress: Progress = silent) -> None:
@@ -59,7 +84,7 @@ def write(folder: Path, files: list[File], *, force: bool, progress: Progress = 
     with writing(folder):
         if folder.exists() and not folder.is_dir():
             raise OutputError("PTM-O002", "is not a folder", file=folder, remedy="name a folder")
-        before = ours(folder, Path(files[-1][0]).stem) if folder.is_dir() else set()
+        before = earlier_files(folder, dict(files)) if folder.is_dir() else set()
         if folder.exists() and not before and not force and any(folder.iterdir()):
             raise OutputError(
                 "PTM-O001",

@@ -14,7 +14,7 @@ import numpy as np
 
 from ptmtools.errors import InputError
 from ptmtools_samples.mesh import Face, Point, Thing, Uv, block, tiled
-from ptmtools_samples.plan import STAIR_LANDING, STAIR_RUN, STOREY, Box, Plan
+from ptmtools_samples.plan import STAIR_LANDING, STAIR_RUN, STOREY, Plan, PlanBox
 from ptmtools_samples.shell import TILE, Panel
 
 #: Distance of a frame's back, and of its canvas, from the wall; mm.
@@ -34,7 +34,7 @@ FLIGHT_GAP = 0.3
 
 
 @dataclass(frozen=True)
-class Place:
+class FurnitureSpot:
     """A position for a picture: its panel, the centre along the wall and above the model's origin,
     and the maximum size of the canvas; m."""
 
@@ -45,7 +45,7 @@ class Place:
     tall: float
 
 
-def places(panels: list[Panel], wanted: int) -> list[Place]:
+def places(panels: list[Panel], wanted: int) -> list[FurnitureSpot]:
     """Returns positions for at least ``wanted`` pictures, with as much spacing as possible.
 
     Raises InputError: PTM-I111 they do not fit even with the least spacing.
@@ -59,7 +59,7 @@ def places(panels: list[Panel], wanted: int) -> list[Place]:
             for k in range(count):
                 along = panel.low / 1000 + 0.15 + length * (2 * k + 1) / (2 * count)
                 actual += [
-                    Place(panel, along, panel.bottom / 1000 + row, pitch - 0.45, tall)
+                    FurnitureSpot(panel, along, panel.bottom / 1000 + row, pitch - 0.45, tall)
                     for row in rows
                 ]
         if len(actual) >= wanted:
@@ -92,7 +92,7 @@ def hang(
 
 
 def _picture(
-    name: str, picture: int, aspect: float, place: Place, rng: np.random.Generator
+    name: str, picture: int, aspect: float, place: FurnitureSpot, rng: np.random.Generator
 ) -> Thing:
     """A canvas in a closed frame of four mitred bars."""
     panel = place.panel
@@ -163,11 +163,11 @@ def furnish(plan: Plan, rng: np.random.Generator) -> list[Thing]:
     return things
 
 
-def _between(box: Box, axis: int, share: float) -> float:
+def _between(box: PlanBox, axis: int, share: float) -> float:
     return round((box.low[axis] + (box.high[axis] - box.low[axis]) * share) / 1000, 2)
 
 
-def _bench(number: int, box: Box, share: float, turned: int) -> Thing:
+def _bench(number: int, box: PlanBox, share: float, turned: int) -> Thing:
     x, z, y = _between(box, 0, share), _between(box, 2, 0.5), box.low[1] / 1000
     a, b = (0.3, 0.9) if turned else (0.9, 0.3)
     faces = block("wood", (x - a, y + 0.38, z - b), (x + a, y + 0.46, z + b), 0.9)
@@ -179,7 +179,7 @@ def _bench(number: int, box: Box, share: float, turned: int) -> Thing:
     return Thing(f"bench_{number:02d}", faces)
 
 
-def _stairs(shaft: Box, storeys: int) -> list[Thing]:
+def _stairs(shaft: PlanBox, storeys: int) -> list[Thing]:
     """Two flights and a landing per storey, with guards; step heights divide the storey exactly."""
     things: list[Thing] = []
     x0 = shaft.low[0] / 1000

@@ -12,14 +12,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from PIL import Image, ImageOps
 
 from ptmtools.errors import InputError
-from ptmtools_samples.files import HEAD, File, constant, png
+from ptmtools_samples.files import HEAD, File, Note, constant, ignore, png
 from ptmtools_samples.furnishing import furnish, hang
 from ptmtools_samples.mesh import Thing
-from ptmtools_samples.noise import bytes_of
+from ptmtools_samples.noise import bytes_of, generator
 from ptmtools_samples.obj import number, obj_text
 from ptmtools_samples.options import MuseumOptions
 from ptmtools_samples.paintings import PAINTINGS
@@ -53,17 +52,12 @@ GLASS = "newmtl glass\nKd 0.75 0.85 0.9\nd 0.3\nillum 1\n"
 
 
 @dataclass(frozen=True)
-class Picture:
+class MuseumPicture:
     """A file in the textures folder: name, width over height as hung, and bytes."""
 
     name: str
     aspect: float
     load: Callable[[], bytes]
-
-
-def generator(seed: int, *stream: int) -> np.random.Generator:
-    """Returns an independent stream of random numbers for a part of the museum."""
-    return np.random.Generator(np.random.PCG64([seed, *stream]))
 
 
 def surface_names(things: list[Thing], textures: int) -> list[str]:
@@ -73,7 +67,7 @@ def surface_names(things: list[Thing], textures: int) -> list[str]:
     return [name for name in SURFACES if name in used][: textures // 3]
 
 
-def surface_pictures(names: list[str], options: MuseumOptions) -> list[Picture]:
+def surface_pictures(names: list[str], options: MuseumOptions) -> list[MuseumPicture]:
     def loader(name: str) -> Callable[[], bytes]:
         stream = list(SURFACES).index(name)
 
@@ -83,28 +77,28 @@ def surface_pictures(names: list[str], options: MuseumOptions) -> list[Picture]:
 
         return load
 
-    return [Picture(f"{name}.png", 1.0, loader(name)) for name in names]
+    return [MuseumPicture(f"{name}.png", 1.0, loader(name)) for name in names]
 
 
-def generated_pictures(count: int, options: MuseumOptions) -> list[Picture]:
+def generated_pictures(count: int, options: MuseumOptions) -> list[MuseumPicture]:
     def loader(k: int) -> Callable[[], bytes]:
         paint = PAINTINGS[k % len(PAINTINGS)][1]
         return lambda: png(paint(generator(options.seed, 2, k), options.size))
 
     return [
-        Picture(f"painting_{k + 1:02d}.png", PAINTINGS[k % len(PAINTINGS)][2], loader(k))
+        MuseumPicture(f"painting_{k + 1:02d}.png", PAINTINGS[k % len(PAINTINGS)][2], loader(k))
         for k in range(count)
     ]
 
 
-def users_pictures(folder: Path) -> tuple[list[Picture], list[str]]:
+def users_pictures(folder: Path) -> tuple[list[MuseumPicture], list[str]]:
     """The images of a folder, ordered by name, under names safe on every system, and notes on
     files that Pillow cannot read.
 
     PNG and JPEG files are copied byte for byte unless the camera orientation must be applied; other
     formats are converted to PNG.
     """
-    actual: list[Picture] = []
+    actual: list[MuseumPicture] = []
     notes: list[str] = []
     for path in sorted(p for p in folder.iterdir() if p.is_file()):
         try:
@@ -122,7 +116,7 @@ def users_pictures(folder: Path) -> tuple[list[Picture], list[str]]:
             else png(upright.convert("RGBA" if "A" in upright.getbands() else "RGB"))
         )
         actual.append(
-            Picture(
+            MuseumPicture(
                 f"painting_{len(actual) + 1:02d}{suffix}",
                 upright.width / upright.height,
                 constant(data),
@@ -131,10 +125,10 @@ def users_pictures(folder: Path) -> tuple[list[Picture], list[str]]:
     return actual, notes
 
 
-def mtl_text(things: list[Thing], surfaces: list[str], pictures: list[Picture]) -> str:
+def mtl_text(things: list[Thing], surfaces: list[str], pictures: list[MuseumPicture]) -> str:
     """Returns the used materials in a fixed order."""
     used = {face.material for thing in things for face in thing.faces}
-    blocks = [f"{HEAD} museum: materials\n"]
+    blocks = [f"# {HEAD} museum: materials\n"]
     for name, (texture, tint, plain) in MATERIALS.items():
         if name in used:
             textured = texture in surfaces
@@ -149,9 +143,7 @@ def mtl_text(things: list[Thing], surfaces: list[str], pictures: list[Picture]) 
     return "\n".join(blocks)
 
 
-def make_museum(
-    options: MuseumOptions, note: Callable[[str], object] = lambda text: None
-) -> Iterator[File]:
+def make_museum(options: MuseumOptions, note: Note = ignore) -> Iterator[File]:
     """The files of the museum: relative path and a function that returns the bytes; the OBJ comes
     last. ``note`` gets a line about each of the user's files that is left out.
 
@@ -175,7 +167,7 @@ def make_museum(
     hung = hang(panels, [p.aspect for p in pictures], options.rooms, generator(options.seed, 3))
     things = [*shell, *hung, *furniture]
     head = [
-        f"{HEAD} museum: {options.rooms} rooms on {plan.storeys} floors, "
+        f"# {HEAD} museum: {options.rooms} rooms on {plan.storeys} floors, "
         f"{len(surfaces) + len(pictures)} textures, seed {options.seed}",
         "# metres, Y up",
     ]

@@ -17,6 +17,11 @@ Field = NDArray[np.float32]
 Color = tuple[float, float, float]
 
 
+def generator(seed: int, *stream: int) -> np.random.Generator:
+    """An independent stream of random numbers for a part of a sample."""
+    return np.random.Generator(np.random.PCG64([seed, *stream]))
+
+
 def axes(size: int) -> tuple[Field, Field]:
     """x (1, size) from left to right and y (size, 1) from top to bottom, texel centres in 0…1."""
     t = ((np.arange(size, dtype=np.float32) + np.float32(0.5)) / np.float32(size)).astype(

@@ -39,7 +39,7 @@ Mm = tuple[int, int, int]
 
 
 @dataclass(frozen=True)
-class Box:
+class PlanBox:
     """A box of air [low, high] in mm and the names of its surface materials.
 
     ``kind`` is room, corridor, entry, shaft, door or window; ``storey`` counts from 0.
@@ -59,12 +59,12 @@ class Box:
 class Plan:
     """All boxes of air, and the bounds [low, high] of the solid block."""
 
-    boxes: list[Box] = field(default_factory=list)
+    boxes: list[PlanBox] = field(default_factory=list)
     low: Mm = (0, 0, 0)
     high: Mm = (0, 0, 0)
     storeys: int = 1
 
-    def of_kind(self, *kinds: str) -> list[Box]:
+    def of_kind(self, *kinds: str) -> list[PlanBox]:
         return [box for box in self.boxes if box.kind in kinds]
 
 
@@ -91,13 +91,13 @@ def make_plan(rooms: int, rng: np.random.Generator, *, windows: bool = True) -> 
     plan = Plan(storeys=storeys)
     number = 0
     for storey in range(storeys):
-        here = min(per_storey, rooms - number)
+        room_count = min(per_storey, rooms - number)
         # The same widths in another order: rooms differ within the same block.
         order = [widths[k] for k in rng.permutation(columns)] if storey else widths
         starts = np.cumsum([0, *[w + INNER_WALL for w in order]]).tolist()
-        slots = [(c, s) for c in range(columns) for s in range(strips)][:here]
+        slots = [(c, s) for c in range(columns) for s in range(strips)][:room_count]
         _storey(plan, storey, number, slots, starts, order, depths, rng, windows)
-        number += here
+        number += room_count
 
     depth = _strip_start(strips - 1, depths) + depths[-1]
     if strips % 2:
@@ -131,13 +131,13 @@ def _storey(
     """Plans one floor: rooms in their slots (column, strip), corridors, doorways, windows."""
     base = storey * STOREY
     length = starts[-1] - INNER_WALL
-    room: dict[tuple[int, int], Box] = {}
+    room: dict[tuple[int, int], PlanBox] = {}
     for k, (column, strip) in enumerate(slots):
         z = _strip_start(strip, depths)
         # The last room takes the rest of its strip, so all solid is wall.
         last = (column + 1, strip) not in slots
         end = length if last else starts[column] + widths[column]
-        room[column, strip] = Box(
+        room[column, strip] = PlanBox(
             name=f"room{number + k + 1:02d}",
             kind="room",
             storey=storey,
@@ -153,7 +153,7 @@ def _storey(
     for wing in range((len(depths) + 1) // 2):
         z = _strip_start(2 * wing, depths) + depths[2 * wing] + INNER_WALL
         corridors.append(
-            Box(
+            PlanBox(
                 name=f"corridor{storey}{chr(97 + wing)}",
                 kind="corridor",
                 storey=storey,
@@ -177,7 +177,7 @@ def _storey(
             _door(plan, box, south, 2, rng, (1300, 2000))
     for wing, corridor in enumerate(corridors):
         entry_x = corridor.high[0] + INNER_WALL
-        entry = Box(
+        entry = PlanBox(
             name=f"stair{chr(97 + wing)}_entry{storey}",
             kind="entry",
             storey=storey,
@@ -198,7 +198,7 @@ def _storey(
                 _window(plan, box, 2, 1 if strip else -1, count, 1400)
 
 
-def _past_corridor(box: Box, corridors: list[Box]) -> bool:
+def _past_corridor(box: PlanBox, corridors: list[PlanBox]) -> bool:
     """Whether a room lies east of the corridor, so it cannot open into it."""
     least = box.low[0] + 2 * DOOR_MARGIN + 1900
     return all(least > corridor.high[0] for corridor in corridors)
@@ -206,8 +206,8 @@ def _past_corridor(box: Box, corridors: list[Box]) -> bool:
 
 def _door(
     plan: Plan,
-    first: Box,
-    second: Box,
+    first: PlanBox,
+    second: PlanBox,
     axis: int,
     rng: np.random.Generator,
     width: tuple[int, int],
@@ -231,7 +231,7 @@ def _door(
     corner[axis], opposite[axis] = first.high[axis], second.low[axis]
     corner[along], opposite[along] = start, start + wide
     plan.boxes.append(
-        Box(
+        PlanBox(
             name=f"doorway_{first.name}_{second.name}",
             kind="door",
             storey=first.storey,
@@ -247,7 +247,7 @@ def _door(
 
 def _window(
     plan: Plan,
-    box: Box,
+    box: PlanBox,
     axis: int,
     side: int,
     count: int,
@@ -267,7 +267,7 @@ def _window(
         corner[axis], opposite[axis] = wall, wall + OUTER_WALL
         corner[along], opposite[along] = centre - width // 2, centre + width // 2
         plan.boxes.append(
-            Box(
+            PlanBox(
                 name=f"window_{box.name}_{first + k}",
                 kind="window",
                 storey=box.storey,
@@ -282,7 +282,7 @@ def _window(
 
 def _stairwell(plan: Plan, wing: int, length: int, z: int, windows: bool) -> None:
     """The shaft between the entries of the storeys: one box of air from the ground to the top."""
-    shaft = Box(
+    shaft = PlanBox(
         name=f"stair{chr(97 + wing)}_shaft",
         kind="shaft",
         storey=0,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from ptmtools_samples.mesh import Face, Point, Thing, block, tiled
-from ptmtools_samples.plan import Box, Plan
+from ptmtools_samples.plan import Plan, PlanBox
 
 #: Metres per repetition of the image of a surface.
 TILE = {
@@ -72,15 +72,15 @@ def rectangles(whole: Rectangle, holes: list[Rectangle]) -> list[Rectangle]:
     return [(a, bottom, b, top) for a, b, free in strips for bottom, top in free]
 
 
-def _contact(box: Box, axis: int, high: bool, other: Box) -> Rectangle | None:
-    """Returns the contact of ``other`` with a side of ``box``."""
-    here = box.high[axis] if high else box.low[axis]
-    there = other.low[axis] if high else other.high[axis]
-    if here != there:
+def _contact(box: PlanBox, axis: int, high: bool, neighbour: PlanBox) -> Rectangle | None:
+    """Returns the contact of ``neighbour`` with a side of ``box``."""
+    position = box.high[axis] if high else box.low[axis]
+    opposite = neighbour.low[axis] if high else neighbour.high[axis]
+    if position != opposite:
         return None
     u, v = _axes(axis)
-    low = max(box.low[u], other.low[u]), max(box.low[v], other.low[v])
-    top = min(box.high[u], other.high[u]), min(box.high[v], other.high[v])
+    low = max(box.low[u], neighbour.low[u]), max(box.low[v], neighbour.low[v])
+    top = min(box.high[u], neighbour.high[u]), min(box.high[v], neighbour.high[v])
     return (*low, *top) if low[0] < top[0] and low[1] < top[1] else None
 
 
@@ -112,13 +112,15 @@ SIDES = [
 ]
 
 
-def _open_sides(plan: Plan, box: Box) -> Iterator[tuple[int, bool, str, list[Rectangle]]]:
+def _open_sides(plan: Plan, box: PlanBox) -> Iterator[tuple[int, bool, str, list[Rectangle]]]:
     """Yields axis, whether the side is the high one, name and remaining rectangles of each side of
     a box."""
     for axis, high, name in SIDES:
         u, v = _axes(axis)
         whole = (box.low[u], box.low[v], box.high[u], box.high[v])
-        holes = [_contact(box, axis, high, other) for other in plan.boxes if other is not box]
+        holes = [
+            _contact(box, axis, high, neighbour) for neighbour in plan.boxes if neighbour is not box
+        ]
         actual = [h for h in holes if h]
         if box.kind == "window":  # the outer side of a window is open
             outside = plan.high[axis] if high else plan.low[axis]
@@ -158,7 +160,7 @@ def make_shell(plan: Plan) -> tuple[list[Thing], list[Panel]]:
     return things, panels
 
 
-def _pane(box: Box) -> list[Thing]:
+def _pane(box: PlanBox) -> list[Thing]:
     """The glass in the middle of a window, and its glazing bars."""
     axis = 0 if box.high[0] - box.low[0] < box.high[2] - box.low[2] else 2
     u, v = _axes(axis)

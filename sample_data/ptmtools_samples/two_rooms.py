@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Iterator
 
 import numpy as np
 from PIL import Image
 
+from ptmtools_samples.files import File, Note, constant, ignore
 from ptmtools_samples.mesh import Face, Point, Thing, Uv
 from ptmtools_samples.obj import obj_text
+from ptmtools_samples.options import NoOptions
 from ptmtools_samples.shell import rectangles
 
 HEAD = """\
@@ -137,9 +140,9 @@ def _image(color: Color, letter: str) -> bytes:
     return out.getvalue()
 
 
-def two_rooms() -> dict[str, bytes]:
-    """File names and bytes; the OBJ last."""
-    return {
+def make_two_rooms(options: NoOptions | None = None, note: Note = ignore) -> Iterator[File]:
+    """The files of the two rooms: name and a function that returns the bytes; the OBJ is last."""
+    files = {
         "room_a.png": _image((168, 60, 52), "A"),
         "room_b.png": _image((52, 84, 160), "B"),
         "floor.png": _image((150, 120, 84), ""),
@@ -147,3 +150,5 @@ def two_rooms() -> dict[str, bytes]:
         "two_rooms.mtl": MTL.encode(),
         "two_rooms.obj": obj_text(_things(), HEAD.splitlines(), "two_rooms.mtl").encode(),
     }
+    for name, data in files.items():
+        yield name, constant(data)

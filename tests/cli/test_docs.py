@@ -146,14 +146,24 @@ def options_of_scripts() -> set[str]:
     return {o for s in scripts for o in re.findall(r'"(--[a-z-]+)"', s.read_text("utf-8"))}
 
 
+def options_of(command: click.Command) -> set[str]:
+    """The options of a command, and of those within a group."""
+    context = click.Context(command)
+    names = command.list_commands(context) if isinstance(command, click.Group) else []
+    inner = [command.get_command(context, name) for name in names]  # type: ignore[attr-defined]
+    return {o for p in command.params for o in (*p.opts, *p.secondary_opts)}.union(
+        *(options_of(child) for child in inner if child)
+    )
+
+
 def options_of_commands() -> dict[str, set[str]]:
     """The options of each `ptm` command, and of `ptm` itself under "--help"."""
     context = click.Context(ptm)
     commands = {name: ptm.get_command(context, name) for name in ptm.list_commands(context)}
+    known = {name: options_of(command) for name, command in commands.items() if command}
+    ptm_options = {o for p in ptm.params for o in (*p.opts, *p.secondary_opts)}
     return {
-        name: {"--help"} | {o for p in command.params for o in (*p.opts, *p.secondary_opts)}
-        for name, command in [*commands.items(), ("--help", ptm)]
-        if command is not None
+        name: {"--help"} | options for name, options in [*known.items(), ("--help", ptm_options)]
     }
 
 

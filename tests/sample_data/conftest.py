@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-
-SAMPLE_DATA = Path(__file__).resolve().parents[2] / "sample_data"
 
 
 @pytest.fixture(scope="session")

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterable
 
 import numpy as np
 import pytest
+from ptmtools_samples.atrium.building import HEIGHT, LENGTH, STOREYS, WALK, WIDTH
+from ptmtools_samples.atrium.model import make_atrium
+from ptmtools_samples.options import AtriumOptions
 
-from tests.sample_data.conftest import SAMPLE_DATA, Triangles
-
-sys.path.append(str(SAMPLE_DATA))
-from atrium_parts.building import HEIGHT, LENGTH, STOREYS, WALK, WIDTH
-from make_atrium import AtriumOptions, make_atrium
+from tests.sample_data.conftest import Triangles
 
 
 @pytest.fixture(scope="module")

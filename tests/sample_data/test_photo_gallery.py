@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import itertools
-import sys
 from collections import defaultdict
 
 import numpy as np
 import pytest
-
-from tests.sample_data.conftest import SAMPLE_DATA
-
-sys.path.append(str(SAMPLE_DATA))
-from make_photo_gallery import HEIGHT, WALL_DISTANCE, WIDTH_RATIO, hung, make_gallery, photos
+from ptmtools_samples.options import PhotoGalleryOptions
+from ptmtools_samples.photo_gallery import (
+    HEIGHT,
+    WALL_DISTANCE,
+    WIDTH_RATIO,
+    hung,
+    make_photo_gallery,
+    photos,
+)
 
 
 @pytest.mark.parametrize("count", [1, 2, 24, 60])
@@ -46,8 +49,8 @@ def test_images_hang_apart_on_the_walls(count: int) -> None:
 
 def test_the_same_again_and_another_seed() -> None:
     """Of the smallest image; painting all of them takes minutes."""
-    files = {seed: dict(make_gallery(2, seed)) for seed in (1, 2)}
-    again = dict(make_gallery(2, 1))
+    files = {seed: dict(make_photo_gallery(PhotoGalleryOptions(2, seed))) for seed in (1, 2)}
+    again = dict(make_photo_gallery(PhotoGalleryOptions(2, 1)))
     small = "textures/photo_02.png"
     assert list(again) == [
         "textures/photo_01.png",

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-import sys
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from ptmtools_samples.options import StatueHallOptions
+from ptmtools_samples.photo_gallery import HEIGHT, WIDTH_RATIO
+from ptmtools_samples.statue_hall import (
+    SPACING,
+    STATUE_HEIGHT,
+    make_statue_hall,
+    statue_rows,
+)
 
-from tests.sample_data.conftest import SAMPLE_DATA
+from ptmtools.errors import InputError
 
-sys.path.append(str(SAMPLE_DATA))
-from make_photo_gallery import HEIGHT, WIDTH_RATIO
-from make_statue_hall import SPACING, STATUE_HEIGHT, HallOptions, main, make_hall, statue_rows
-
-SMALL = HallOptions(statues=5, triangles=1500, images=2)
+SMALL = StatueHallOptions(statues=5, triangles=1500, images=2)
 
 
 def statues(rows: list[str], first: int = 0) -> dict[str, np.ndarray]:
@@ -52,8 +55,8 @@ def test_they_stand_apart_on_the_floor() -> None:
 
 
 def test_the_same_again_and_another_seed() -> None:
-    files, again = dict(make_hall(SMALL)), dict(make_hall(SMALL))
-    other = dict(make_hall(HallOptions(statues=5, triangles=1500, images=2, seed=2)))
+    files, again = dict(make_statue_hall(SMALL)), dict(make_statue_hall(SMALL))
+    other = dict(make_statue_hall(StatueHallOptions(statues=5, triangles=1500, images=2, seed=2)))
     assert list(files)[-2:] == ["statue_hall.mtl", "statue_hall.obj"]
     model = files["statue_hall.obj"]()
     assert model == again["statue_hall.obj"]() != other["statue_hall.obj"]()
@@ -62,7 +65,6 @@ def test_the_same_again_and_another_seed() -> None:
     assert max(xs) >= 4 * SPACING
 
 
-def test_numbers_out_of_range(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        main(["-o", str(tmp_path), "--statues", "0"])
-    assert "1 to 100" in capsys.readouterr().err
+def test_numbers_out_of_range() -> None:
+    with pytest.raises(InputError, match=r"PTM-I111.*--statues 0.*1 to 100"):
+        StatueHallOptions(statues=0)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
 
+from ptmtools.cli.main import main
 from ptmtools.scene import IngestOptions, ingest
-from tests.sample_data.conftest import SAMPLE_DATA
 
 NAMES = ("bust", "relief", "dragon", "column")
 #: Enough to have every part of the code, few enough to be made in a second.
@@ -19,11 +18,9 @@ FEW = 6000
 
 @pytest.fixture(scope="session")
 def statues() -> ModuleType:
-    if str(SAMPLE_DATA) not in sys.path:
-        sys.path.insert(0, str(SAMPLE_DATA))
-    import make_statues
+    from ptmtools_samples.statues import model
 
-    return make_statues
+    return model
 
 
 @pytest.fixture(scope="session")
@@ -92,7 +89,7 @@ def test_the_seed_decides(statues) -> None:
 
 
 def test_parts_on_threads_change_nothing(statues, monkeypatch) -> None:
-    from statue_parts import surface
+    from ptmtools_samples.statues import surface
 
     one = statues.make_statue("relief", statues.StatueOptions(2000))
     monkeypatch.setattr(surface, "BATCH", 999)
@@ -102,9 +99,10 @@ def test_parts_on_threads_change_nothing(statues, monkeypatch) -> None:
 
 @pytest.mark.parametrize("kind", ["ply", "obj", "glb"])
 def test_files_are_read_again(statues, kind: str, tmp_path: Path) -> None:
-    command = ["-o", str(tmp_path), "--triangles", "2000", "--only", "dragon", "--format", kind]
-    assert statues.main([*command, "--colors"]) == 0
-    assert statues.main(command) == 0  # over its own file
+    command = ["sample", "statues", "-o", str(tmp_path), "--triangles", "2000"]
+    command += ["--only", "dragon", "--format", kind]
+    assert main([*command, "--colors"]) == 0
+    assert main(command) == 0  # over its own file
     scene = ingest(tmp_path / f"dragon.{kind}", IngestOptions(unit="m", up="y"))
     again = statues.make_statue("dragon", statues.StatueOptions(2000))
     assert len(scene.triangles) == len(again.triangles)
@@ -112,14 +110,18 @@ def test_files_are_read_again(statues, kind: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(extent, np.ptp(again.points, axis=0), rtol=1e-5)
 
 
-def test_files_of_other_origin_stay(statues, tmp_path: Path, capsys) -> None:
+def test_files_of_other_origin_stay(tmp_path: Path, capsys) -> None:
     (tmp_path / "bust.ply").write_bytes(b"mine")
-    command = ["-o", str(tmp_path), "--triangles", "1500", "--only", "bust"]
-    with pytest.raises(SystemExit):
-        statues.main(command)
+    command = ["sample", "statues", "-o", str(tmp_path), "--triangles", "1500", "--only", "bust"]
+    assert main(command) == 4
     assert "use --force" in capsys.readouterr().err
     assert (tmp_path / "bust.ply").read_bytes() == b"mine"
-    assert statues.main([*command, "--force"]) == 0
+    assert main([*command, "--force"]) == 0
+
+
+def test_an_unknown_statue_is_refused(tmp_path: Path, capsys) -> None:
+    assert main(["sample", "statues", "-o", str(tmp_path / "s"), "--only", "bull"]) == 3
+    assert "choose bust, relief, dragon, column" in capsys.readouterr().err
 
 
 def test_colours(made) -> None:

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
-from ptmtools_samples.two_rooms import two_rooms
+from ptmtools_samples.two_rooms import make_two_rooms
 
 FOLDER = Path(__file__).resolve().parents[2] / "sample_data" / "two_rooms"
 
 
 def test_committed_files_are_those_of_the_generator() -> None:
-    made = two_rooms()
+    made = {name: load() for name, load in make_two_rooms()}
     committed = {p.name: p.read_bytes() for p in FOLDER.iterdir()}
     assert committed.keys() == made.keys()
     for name, data in made.items():

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import io
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
+from ptmtools_samples.mesh import Thing, block
+from ptmtools_samples.options import WebGalleryOptions
+from ptmtools_samples.web_gallery import SIDES, make_web_gallery, meshes_of, statues_of
 
 from ptmtools.cells import subdivide
 from ptmtools.glb import glb_chunks
 from ptmtools.scene import ingest
-from tests.sample_data.conftest import SAMPLE_DATA
-
-sys.path.append(str(SAMPLE_DATA))
-from make_web_gallery import SIDES, WebGalleryOptions, make_web_gallery, meshes_of, statues_of
-from ptmtools_samples.mesh import Thing, block
 
 SMALL = WebGalleryOptions(rooms=2, paintings=6, statue_triangles=400, scale=0.05)
 

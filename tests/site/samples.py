@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 import wave
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
+from ptmtools_samples.campus.model import make_campus as make_street
+from ptmtools_samples.files import write
+from ptmtools_samples.options import StreetOptions
 
 from ptmtools.cli.main import main
 from ptmtools.scene.options import IngestOptions
@@ -98,9 +99,7 @@ def campus(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def _make_campus(folder: Path) -> None:
-    script = ROOT / "sample_data" / "make_campus.py"
-    words = ["-o", folder / "model", "--buildings", 2, "--length", 60, "--texture", 32]
-    subprocess.run([sys.executable, *map(str, (script, *words))], check=True, capture_output=True)
+    write(folder / "model", list(make_street(StreetOptions(2, 60, texture=32))), force=False)
     (folder / "records").mkdir()
     (folder / "records/building_01_rectorate.html").write_text("<p>Built in 1903</p>")
     (folder / "records/building_02_medicine.html").write_text(HOSTILE)

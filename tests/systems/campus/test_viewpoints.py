@@ -17,7 +17,6 @@ from ptmtools_systems.campus.viewpoints import EYE, STEP, viewpoint
 from tests.light.shapes import prism, surroundings, triangles_of
 from tests.systems.campus.models import level
 
-SCRIPT = Path(__file__).resolve().parents[3] / "sample_data" / "make_campus.py"
 METRES = IngestOptions(unit="m", up="y")
 
 
@@ -78,7 +77,11 @@ def test_on_a_small_campus(model: Path) -> None:
 
 def test_on_the_made_campus(tmp_path: Path) -> None:
     words = ["-o", str(tmp_path / "few"), "--buildings", "3", "--length", "100", "--texture", "32"]
-    subprocess.run([sys.executable, str(SCRIPT), *words], check=True, capture_output=True)
+    subprocess.run(
+        [sys.executable, "-m", "ptmtools", "sample", "campus", *words],
+        check=True,
+        capture_output=True,
+    )
     check(ingest(tmp_path / "few" / "campus.obj", METRES))
 
 
