@@ -42,35 +42,35 @@ from benchmarks.codebase.sources import PythonFile, read_imports, read_packages
 
 #: Lines and files. Aim: `ptmtools` 58,000 lines in 290 files, all packages 78,000 lines.
 BUDGET: dict[str, tuple[int, int]] = {
-    "ptmtools": (66_990, 351),
-    "ptmtools/*.py": (3_830, 25),
+    "ptmtools": (66_000, 347),
+    "ptmtools/*.py": (4_100, 26),
     "ptmtools/cells": (7_970, 37),
-    "ptmtools/cli": (3_190, 14),
+    "ptmtools/cli": (3_170, 14),
     "ptmtools/coverage": (2_510, 15),
-    "ptmtools/light": (2_050, 11),
+    "ptmtools/light": (2_070, 11),
     "ptmtools/meshopt": (830, 5),
-    "ptmtools/output": (7_830, 41),
-    "ptmtools/pipeline": (4_050, 20),
+    "ptmtools/output": (7_860, 41),
+    "ptmtools/pipeline": (3_670, 18),
     "ptmtools/portal_flow": (1_680, 8),
-    "ptmtools/rendering": (1_990, 16),
-    "ptmtools/scene": (8_900, 47),
+    "ptmtools/rendering": (1_730, 13),
+    "ptmtools/scene": (8_940, 47),
     "ptmtools/schemas": (340, 1),
     "ptmtools/simplification": (1_950, 9),
-    "ptmtools/site": (4_510, 27),
-    "ptmtools/store": (2_300, 13),
+    "ptmtools/site": (4_500, 28),
+    "ptmtools/store": (2_290, 13),
     "ptmtools/texture": (10_190, 45),
     "ptmtools/tour": (1_280, 10),
     "ptmtools/visibility": (960, 6),
-    "ptmtools_lab": (10_710, 59),
-    "ptmtools_samples": (2_520, 19),
-    "ptmtools_systems": (6_670, 42),
+    "ptmtools_lab": (10_900, 59),
+    "ptmtools_samples": (8_400, 56),
+    "ptmtools_systems": (7_480, 47),
 }
 #: Functions of a package that are named by a participle, and by a preposition.
 NAMES: dict[str, tuple[int, int]] = {
-    "ptmtools": (313, 103),
-    "ptmtools_systems": (37, 6),
-    "ptmtools_lab": (60, 17),
-    "ptmtools_samples": (11, 4),
+    "ptmtools": (319, 102),
+    "ptmtools_systems": (39, 6),
+    "ptmtools_lab": (62, 18),
+    "ptmtools_samples": (36, 13),
 }
 #: What each package must not import.
 FORBIDDEN: dict[str, set[str]] = {

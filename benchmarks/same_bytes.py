@@ -19,9 +19,7 @@ import time
 from hashlib import sha256
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.scenes import ROOT, SHARED, TWO_ROOMS
+from scenes import ROOT, SHARED, TWO_ROOMS
 
 #: Models, and further arguments of the build.
 MODELS: dict[str, tuple[Path, tuple[str, ...]]] = {

@@ -17,7 +17,7 @@ from ptmtools_samples.campus.buildings import build
 from ptmtools_samples.campus.furniture import furnish
 from ptmtools_samples.campus.ground import make_ground
 from ptmtools_samples.campus.layout import CURB_HEIGHT, FRONT, Street
-from ptmtools_samples.campus.materials import MATERIALS, CampusMaterial
+from ptmtools_samples.campus.materials import MATERIALS, StreetMaterial
 from ptmtools_samples.campus.monuments import HETEROGENEOUS
 from ptmtools_samples.campus.quarters import MIXED, residence
 from ptmtools_samples.campus.recipes import Recipe
@@ -65,12 +65,12 @@ def make_things(options: StreetOptions) -> tuple[list[Thing], Street, tuple[floa
     return things, street, (x, z)
 
 
-def used(things: list[Thing]) -> dict[str, CampusMaterial]:
+def used(things: list[Thing]) -> dict[str, StreetMaterial]:
     names = {face.material for thing in things for face in thing.faces}
     return {name: material for name, material in MATERIALS.items() if name in names}
 
 
-def mtl_text(materials: dict[str, CampusMaterial]) -> str:
+def mtl_text(materials: dict[str, StreetMaterial]) -> str:
     blocks = [f"# {HEAD} campus: materials\n"]
     for name, m in materials.items():
         kd = " ".join(number(c, 3) for c in m.tint)
@@ -85,7 +85,7 @@ def mtl_text(materials: dict[str, CampusMaterial]) -> str:
     return "\n".join(blocks)
 
 
-def pictures(materials: dict[str, CampusMaterial], options: StreetOptions) -> Iterator[File]:
+def pictures(materials: dict[str, StreetMaterial], options: StreetOptions) -> Iterator[File]:
     """Returns the images of the materials with their masks."""
     size, seed = options.texture, options.seed
     streams = {name: k for k, name in enumerate(IMAGES)}
